@@ -1,0 +1,68 @@
+//! Axis-aligned boxes, in scene units, and the part of a line inside one.
+
+use glam::Vec3A;
+
+/// Coordinates beyond this magnitude count as non-finite: the largest power of two for which the
+/// extent of a box, its cells and the distances along a ray all stay far from overflow.
+pub const MAX_COORDINATE: f32 = f32::from_bits(0x7b80_0000); // 2^120, about 1.3e36
+
+/// The smallest box around some points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Aabb {
+    pub(crate) min: Vec3A,
+    pub(crate) max: Vec3A,
+}
+
+impl Aabb {
+    /// The box around nothing.
+    pub(crate) const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
+
+    /// The box around a triangle, or `None` if one of its coordinates is not finite.
+    #[inline(always)]
+    pub(crate) fn of([a, b, c]: [Vec3A; 3]) -> Option<Self> {
+        // Largest magnitude per axis with the NaN-keeping comparison: `<=` fails on NaN.
+        let limit = Vec3A::splat(MAX_COORDINATE);
+        let finite = a.abs().cmple(limit) & b.abs().cmple(limit) & c.abs().cmple(limit);
+        finite.all().then(|| Self { min: a.min(b).min(c), max: a.max(b).max(c) })
+    }
+
+    /// Its extent on each axis.
+    #[inline(always)]
+    pub(crate) fn size(&self) -> Vec3A {
+        self.max - self.min
+    }
+
+    /// The box around two boxes.
+    #[inline(always)]
+    pub(crate) fn union(&self, other: &Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Whether it is a finite box with an inside on every axis.
+    pub(crate) fn is_proper(&self) -> bool {
+        let limit = Vec3A::splat(2.0 * MAX_COORDINATE);
+        let finite = self.min.abs().cmple(limit) & self.max.abs().cmple(limit);
+        (finite & self.min.cmplt(self.max)).all()
+    }
+
+    /// The part `(near, far)` of a line inside the box, in multiples of its direction.
+    #[inline]
+    pub(crate) fn clip(&self, origin: [f32; 3], direction: [f32; 3]) -> Option<(f64, f64)> {
+        let (min, max) = (self.min.to_array(), self.max.to_array());
+        let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+        for axis in 0..3 {
+            let (origin, direction) = (f64::from(origin[axis]), f64::from(direction[axis]));
+            let (low, high) = (f64::from(min[axis]) - origin, f64::from(max[axis]) - origin);
+            if direction > 0.0 {
+                near = near.max(low / direction);
+                far = far.min(high / direction);
+            } else if direction < 0.0 {
+                near = near.max(high / direction);
+                far = far.min(low / direction);
+            } else if low > 0.0 || high < 0.0 {
+                return None;
+            }
+        }
+        (near <= far).then_some((near, far))
+    }
+}

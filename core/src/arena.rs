@@ -1,0 +1,90 @@
+//! The caller's memory: checked views of a region, and a type that gives aligned ones.
+//!
+//! There is no allocator here. A region is a slice of bytes that starts at a multiple of 64; a
+//! layout says at which byte each section starts, and the cast from bytes to words is checked
+//! (alignment and length), never assumed.
+
+use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
+
+use crate::error::{Error, Region};
+
+/// Regions start at a multiple of this many bytes, and so does every section in them.
+pub const ALIGNMENT: usize = 64;
+
+/// 64 aligned bytes: the unit from which Rust callers make regions.
+///
+/// ```
+/// use hgrid_core::Block;
+/// static SCRATCH: [Block; 4] = [Block::ZERO; 4];
+/// let mut index = vec![Block::ZERO; Block::count_for(1000)];
+/// assert_eq!(Block::bytes_mut(&mut index).len(), 1024);
+/// ```
+#[repr(C, align(64))]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Block([u8; ALIGNMENT]);
+
+impl Block {
+    /// A block of zeros.
+    pub const ZERO: Self = Self([0; ALIGNMENT]);
+
+    /// How many blocks hold this many bytes.
+    #[must_use]
+    pub const fn count_for(bytes: usize) -> usize {
+        bytes.div_ceil(ALIGNMENT)
+    }
+
+    /// The blocks as a region to build or open a grid in.
+    #[must_use]
+    pub fn bytes(blocks: &[Self]) -> &[u8] {
+        bytemuck::cast_slice(blocks)
+    }
+
+    /// The blocks as a region to build a grid in.
+    #[must_use]
+    pub fn bytes_mut(blocks: &mut [Self]) -> &mut [u8] {
+        bytemuck::cast_slice_mut(blocks)
+    }
+}
+
+/// Refuses a region that does not start at a multiple of [`ALIGNMENT`]; an empty one starts nowhere.
+pub(crate) fn check_alignment(bytes: &[u8], region: Region) -> Result<(), Error> {
+    let is_aligned = bytes.is_empty() || bytes.as_ptr().addr() & (ALIGNMENT - 1) == 0;
+    if is_aligned { Ok(()) } else { Err(Error::Misaligned { region }) }
+}
+
+/// The next multiple of [`ALIGNMENT`].
+pub(crate) const fn align_up(bytes: u64) -> u64 {
+    bytes.saturating_add(ALIGNMENT as u64 - 1) & !(ALIGNMENT as u64 - 1)
+}
+
+/// Bytes of a section of `count` words, padding included.
+pub(crate) const fn section_bytes<T>(count: u64) -> u64 {
+    align_up(count.saturating_mul(size_of::<T>() as u64))
+}
+
+/// A section of `count` words at the start of `bytes`, and the bytes behind it. The padding is
+/// zeroed, the words are whatever was there.
+pub(crate) fn split_mut<T: AnyBitPattern + NoUninit>(
+    bytes: &mut [u8],
+    count: u64,
+) -> Option<(&mut [T], &mut [u8])> {
+    let section = usize::try_from(section_bytes::<T>(count)).ok()?;
+    let (section, rest) = bytes.split_at_mut_checked(section)?;
+    let used = usize::try_from(count).ok()?.checked_mul(size_of::<T>())?;
+    let (words, padding) = section.split_at_mut_checked(used)?;
+    padding.fill(0);
+    Some((bytemuck::try_cast_slice_mut(words).ok()?, rest))
+}
+
+/// A section of `count` words at the start of `bytes`, and the bytes behind it. `None` also if the
+/// padding is not zero, as every build leaves it.
+pub(crate) fn split<T: AnyBitPattern>(bytes: &[u8], count: u64) -> Option<(&[T], &[u8])> {
+    let section = usize::try_from(section_bytes::<T>(count)).ok()?;
+    let (section, rest) = bytes.split_at_checked(section)?;
+    let used = usize::try_from(count).ok()?.checked_mul(size_of::<T>())?;
+    let (words, padding) = section.split_at_checked(used)?;
+    if padding.iter().any(|&byte| byte != 0) {
+        return None;
+    }
+    Some((bytemuck::try_cast_slice(words).ok()?, rest))
+}

@@ -1,0 +1,144 @@
+//! The built grid as bytes: one header for every method, then the method's own sections.
+//!
+//! ```text
+//! 0        128                                                    blob_bytes
+//! | header | section | section | ...                              |
+//! ```
+//!
+//! Every section starts at a multiple of 64 and is filled up with zeros. The header holds counts,
+//! never offsets: where a section lies follows from the counts through the method's layout, the
+//! same one that answered how many bytes the build needs. There is no pointer in it, so it can be
+//! copied, mapped from a file, sent, or put in flash. It is in the byte order of its machine; the
+//! other order is recognised and refused.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::aabb::Aabb;
+use crate::arena::{self, ALIGNMENT};
+use crate::cell::{Lattice, MAX_RESOLUTION};
+use crate::config::Method;
+use crate::error::{Error, Region};
+use crate::mesh::TriangleMesh;
+
+/// The version of the blob format. A blob of another version is refused.
+pub const BLOB_VERSION: u32 = 1;
+
+/// Bytes before the first section.
+pub(crate) const HEADER_BYTES: usize = size_of::<Header>();
+
+const MAGIC: [u8; 8] = *b"hgrid\r\n\x1a";
+const BYTE_ORDER: u32 = 0x0102_0304;
+
+/// The first 128 bytes of every blob.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct Header {
+    magic: [u8; 8],
+    byte_order: u32,
+    version: u32,
+    /// Bytes of the whole blob.
+    pub(crate) blob_bytes: u64,
+    /// Vertices of the mesh it was built for.
+    pub(crate) vertex_count: u64,
+    /// Triangles of the mesh it was built for, skipped ones included.
+    pub(crate) triangle_count: u32,
+    /// Triangles left out because a coordinate is not finite.
+    pub(crate) skipped_count: u32,
+    /// The method, as [`Method`] numbers them.
+    pub(crate) method: u32,
+    /// The density the grid was built with.
+    pub(crate) density: f32,
+    /// The box, pad included.
+    pub(crate) bounds_min: [f32; 3],
+    pub(crate) bounds_max: [f32; 3],
+    /// Cells per axis.
+    pub(crate) resolution: [u32; 3],
+    /// Slots of the hash table.
+    pub(crate) hash_count: u32,
+    /// Primitive ids in all cells together.
+    pub(crate) reference_count: u32,
+    pub(crate) reserved: [u32; 9],
+}
+
+const _: () = assert!(HEADER_BYTES == 128 && HEADER_BYTES % ALIGNMENT == 0);
+
+impl Header {
+    /// A header for a mesh; the counts that the build finds are the caller's to fill in.
+    pub(crate) fn new(method: Method, mesh: &TriangleMesh<'_>, lattice: &Lattice) -> Self {
+        Self {
+            magic: MAGIC,
+            byte_order: BYTE_ORDER,
+            version: BLOB_VERSION,
+            method: method as u32,
+            triangle_count: mesh.triangle_count(),
+            vertex_count: mesh.vertex_count() as u64,
+            bounds_min: lattice.min,
+            bounds_max: lattice.max,
+            resolution: lattice.resolution,
+            ..Self::zeroed()
+        }
+    }
+
+    /// Reads the header of foreign bytes and checks all that O(1) can: it is a grid of this version
+    /// for a mesh of this size, and it is all there.
+    pub(crate) fn read(bytes: &[u8], mesh: &TriangleMesh<'_>) -> Result<Self, Error> {
+        arena::check_alignment(bytes, Region::Index)?;
+        let Some(head) = bytes.get(..HEADER_BYTES) else {
+            return Err(if bytes.starts_with(&MAGIC) {
+                Error::Truncated {
+                    needed_bytes: HEADER_BYTES as u64,
+                    available_bytes: bytes.len() as u64,
+                }
+            } else {
+                Error::NotAGrid
+            });
+        };
+        let header: Self = bytemuck::pod_read_unaligned(head);
+        if header.magic != MAGIC {
+            return Err(Error::NotAGrid);
+        }
+        if header.byte_order == BYTE_ORDER.swap_bytes() {
+            return Err(Error::WrongByteOrder);
+        }
+        if header.byte_order != BYTE_ORDER {
+            return Err(Error::NotAGrid);
+        }
+        if header.version != BLOB_VERSION {
+            return Err(Error::UnsupportedVersion { found: header.version });
+        }
+        if header.blob_bytes > bytes.len() as u64 {
+            return Err(Error::Truncated {
+                needed_bytes: header.blob_bytes,
+                available_bytes: bytes.len() as u64,
+            });
+        }
+        if header.triangle_count != mesh.triangle_count()
+            || header.vertex_count != mesh.vertex_count() as u64
+        {
+            return Err(Error::MeshMismatch);
+        }
+        Ok(header)
+    }
+
+    /// The lattice, if box and resolution can be one.
+    pub(crate) fn lattice(&self) -> Result<Lattice, Error> {
+        let bounds = Aabb { min: self.bounds_min.into(), max: self.bounds_max.into() };
+        if !bounds.is_proper() {
+            return Err(corrupt(core::mem::offset_of!(Self, bounds_min)));
+        }
+        if !self.resolution.iter().all(|r| (1..=MAX_RESOLUTION).contains(r)) {
+            return Err(corrupt(core::mem::offset_of!(Self, resolution)));
+        }
+        Ok(Lattice::new(bounds, self.resolution))
+    }
+
+    /// Whether the bytes that mean nothing yet are zero, as a build leaves them.
+    pub(crate) fn reserved_is_zero(&self) -> bool {
+        self.reserved == [0; 9]
+    }
+}
+
+/// The error for a contradiction at a byte of the blob.
+pub(crate) const fn corrupt(offset: usize) -> Error {
+    Error::Corrupt { offset: offset as u64 }
+}

@@ -1,0 +1,190 @@
+//! From scene units to cells and back: how many cells, which ones a triangle overlaps.
+//!
+//! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis. A
+//! triangle is inserted into every cell that its own box, grown by a margin, overlaps. The margin
+//! is what makes float error harmless everywhere else: the walk may be a few roundings off at a
+//! border, and the hit a few roundings off the triangle, and still the cell lists the triangle.
+//!
+//! ```text
+//! error of             bound, in box extents E        why
+//! spreading             4 * 2^-24                     v - min, * cells per unit, + margin
+//! the triangle test    25 * 2^-24                     vertex - origin at up to 5 extents, shear
+//! the walk              4 * 2^-24                     base, cell * delta, their sum
+//! a moved far origin   1/2 ulp of the coordinate      see approach.rs
+//! margin               64 * 2^-24 + 1 ulp of the largest coordinate (pad: twice the margin)
+//! ```
+
+use glam::Vec3A;
+
+use crate::aabb::Aabb;
+
+/// The most cells on an axis. f32 positions keep 11 bits for the place inside a cell.
+pub const MAX_RESOLUTION: u32 = 4096;
+
+/// Smallest margin, so that a scene of a single point still has a box, and one whose cells per unit
+/// do not overflow.
+const LEAST_MARGIN: f32 = f32::from_bits(0x0680_0000); // 2^-114
+
+/// The cells that a box overlaps, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct CellRange {
+    pub(crate) min: [u32; 3],
+    pub(crate) max: [u32; 3],
+}
+
+impl CellRange {
+    /// Number of cells.
+    #[inline(always)]
+    pub(crate) fn count(&self) -> u64 {
+        let [x, y, z] = self.lengths();
+        x * y * z
+    }
+
+    #[inline(always)]
+    fn lengths(&self) -> [u64; 3] {
+        core::array::from_fn(|axis| u64::from(self.max[axis] - self.min[axis]) + 1)
+    }
+
+    /// Whether a cell is one of them.
+    pub(crate) fn contains(&self, cell: [u32; 3]) -> bool {
+        (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&cell[axis]))
+    }
+}
+
+/// A box cut into equal cells. Plain arrays, so that views of grids need no special alignment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Lattice {
+    /// The box's least corner, pad included.
+    pub(crate) min: [f32; 3],
+    /// The box's greatest corner, pad included.
+    pub(crate) max: [f32; 3],
+    /// Cells per axis, 1 to [`MAX_RESOLUTION`].
+    pub(crate) resolution: [u32; 3],
+    cells_per_unit: [f32; 3],
+    /// The margin, in cells.
+    margin: [f32; 3],
+}
+
+/// Woo's resolution (the paper's equation 1): `M_i = S_i / max(S) * cbrt(density * primitives)`,
+/// rounded down, at least 1; `None` if an axis would need more than [`MAX_RESOLUTION`] cells.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to MAX_RESOLUTION")]
+pub(crate) fn woo(size: Vec3A, density: f64, primitives: u32) -> Option<[u32; 3]> {
+    let longest = cube_root(density * f64::from(primitives));
+    let max = f64::from(size.max_element());
+    let cells = |s: f32| ((f64::from(s) / max * longest) as u32).max(1);
+    (longest < f64::from(MAX_RESOLUTION + 1)).then(|| size.to_array().map(cells))
+}
+
+/// The cube root of a positive number, by Newton's method: the same bits everywhere, and exact for
+/// the cubes of whole numbers.
+pub(crate) const fn cube_root(x: f64) -> f64 {
+    // Adding it rounds a number of this size to a whole one.
+    const WHOLE: f64 = 4_503_599_627_370_496.0; // 2^52
+
+    // A third of the exponent is a start that is right to a few percent; 5 rounds give all bits.
+    let mut root = f64::from_bits(x.to_bits() / 3 + 0x2a9f_7893_782d_a1ce);
+    let mut round = 0;
+    while round < 5 {
+        root -= (root - x / (root * root)) / 3.0;
+        round += 1;
+    }
+    // The last bit may be off: prefer the whole number if it is the root.
+    let whole = (root + WHOLE) - WHOLE;
+    let error = whole * whole * whole - x;
+    if error.abs() > 0.0 { root } else { whole }
+}
+
+impl Lattice {
+    /// Pads a mesh's box, so that no triangle and no float error lies on the outside.
+    pub(crate) fn pad(bounds: &Aabb) -> Aabb {
+        // Without a single finite triangle there is no box: any will do, nothing is in it.
+        let bounds = if bounds.min.cmple(bounds.max).all() {
+            *bounds
+        } else {
+            Aabb { min: Vec3A::ZERO, max: Vec3A::ZERO }
+        };
+        let pad = Vec3A::splat(2.0 * margin(&bounds));
+        Aabb { min: bounds.min - pad, max: bounds.max + pad }
+    }
+
+    /// Cuts a padded box into cells. The same box and resolution give the same bits.
+    pub(crate) fn new(bounds: Aabb, resolution: [u32; 3]) -> Self {
+        let cells_per_unit = Vec3A::from_array(resolution.map(as_f32)) / bounds.size();
+        Self {
+            min: bounds.min.to_array(),
+            max: bounds.max.to_array(),
+            resolution,
+            cells_per_unit: cells_per_unit.to_array(),
+            margin: (cells_per_unit * margin(&bounds)).to_array(),
+        }
+    }
+
+    /// The box, pad included.
+    #[inline(always)]
+    pub(crate) fn bounds(&self) -> Aabb {
+        Aabb { min: self.min.into(), max: self.max.into() }
+    }
+
+    /// The cells into which a triangle with this box belongs.
+    #[inline(always)]
+    pub(crate) fn range(&self, triangle: &Aabb) -> CellRange {
+        let origin = Vec3A::from_array(self.min);
+        let cells_per_unit = Vec3A::from_array(self.cells_per_unit);
+        let margin = Vec3A::from_array(self.margin);
+        let end = Vec3A::from_array(self.resolution.map(as_f32)) - 0.5;
+        let min = (triangle.min - origin) * cells_per_unit - margin;
+        let max = (triangle.max - origin) * cells_per_unit + margin;
+        let clamp = |position: Vec3A| position.max(Vec3A::ZERO).min(end);
+        CellRange { min: whole(clamp(min)), max: whole(clamp(max)) }
+    }
+
+    /// Where a coordinate lies, in cells from the box's corner.
+    #[inline(always)]
+    pub(crate) fn position(&self, axis: usize, coordinate: f64) -> f64 {
+        (coordinate - f64::from(self.min[axis])) * self.cells_per_unit(axis)
+    }
+
+    /// The cell of a position, the nearest one if it lies outside.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped by min")]
+    pub(crate) fn clamp(&self, axis: usize, position: f64) -> u32 {
+        (position.max(0.0) as u32).min(self.resolution[axis] - 1)
+    }
+
+    #[inline(always)]
+    pub(crate) fn cells_per_unit(&self, axis: usize) -> f64 {
+        f64::from(self.cells_per_unit[axis])
+    }
+
+    /// The most cells per unit on any axis.
+    #[inline(always)]
+    pub(crate) fn finest(&self) -> f64 {
+        self.cells_per_unit.map(f64::from).into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// How far a triangle's box is grown before it is spread over cells; see the module's head.
+fn margin(bounds: &Aabb) -> f32 {
+    const EXTENT_SHARE: f32 = 1.0 / 262_144.0; // 2^-18
+    let extent = bounds.size().max_element();
+    let coordinate = bounds.min.abs().max(bounds.max.abs()).max_element();
+    (extent * EXTENT_SHARE + coordinate * f32::EPSILON).max(LEAST_MARGIN)
+}
+
+/// A cell number as f32: exact, because it is below 2^24.
+#[inline(always)]
+#[expect(clippy::cast_precision_loss, reason = "at most MAX_RESOLUTION")]
+pub(crate) const fn as_f32(cell: u32) -> f32 {
+    cell as f32
+}
+
+/// The whole part of positions between 0 and [`MAX_RESOLUTION`]; an odd whole number may count as
+/// the end of the cell before it, which the margin allows.
+///
+/// Adding 1.5 * 2^23 rounds to whole numbers and leaves them in the low bits: 15 % of a build less
+/// than with casts, which must saturate.
+#[inline(always)]
+fn whole(position: Vec3A) -> [u32; 3] {
+    let shifted = position - Vec3A::splat(0.5) + Vec3A::splat(12_582_912.0);
+    shifted.to_array().map(|bits| bits.to_bits() & 0x003f_ffff)
+}

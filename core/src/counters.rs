@@ -1,0 +1,37 @@
+//! Counting work the way the paper's Table 1 counts it, at no cost where nobody counts.
+
+/// Work done by queries, summed over all of them, as in the paper's Table 1.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Ray-triangle tests ("primitive intersections").
+    pub primitive_tests: u64,
+    /// Cells entered ("cell traversals"), empty ones included.
+    pub cell_steps: u64,
+    /// Subgrids or macrocell levels entered ("grid traversals"); 0 for a one-level grid.
+    pub grid_steps: u64,
+}
+
+/// A query reports its work here; `()` ignores it and compiles to nothing.
+pub(crate) trait Tally {
+    fn primitive_test(&mut self);
+    fn cell_step(&mut self);
+}
+
+impl Tally for () {
+    #[inline(always)]
+    fn primitive_test(&mut self) {}
+    #[inline(always)]
+    fn cell_step(&mut self) {}
+}
+
+impl Tally for Counters {
+    #[inline(always)]
+    fn primitive_test(&mut self) {
+        self.primitive_tests += 1;
+    }
+    #[inline(always)]
+    fn cell_step(&mut self) {
+        self.cell_steps += 1;
+    }
+}

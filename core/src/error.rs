@@ -1,0 +1,153 @@
+//! What can go wrong, with the number that helps: one enum for build and open, no strings, no allocation.
+//!
+//! A query has no error: a miss is not one, and a grid that was opened answers every ray.
+
+use core::fmt;
+
+/// Which of the caller's two memory regions an error speaks of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Region {
+    /// The region that keeps the built grid.
+    Index,
+    /// The region that only the build needs.
+    Scratch,
+}
+
+/// Which part of a mesh description an error speaks of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeshField {
+    /// The vertices: their bytes end before the last vertex, or the stride is below 12 bytes.
+    Positions,
+    /// The indices: their bytes end before the last triangle, or the stride is below three indices.
+    Indices,
+}
+
+/// Which field of a [`Config`](crate::Config) an error speaks of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ConfigField {
+    /// Not a method of this version.
+    Method,
+    /// Zero, negative, NaN, or so large that an axis would need more than
+    /// [`MAX_RESOLUTION`](crate::MAX_RESOLUTION) cells.
+    Density,
+    /// A flag that this version does not know.
+    Flags,
+}
+
+/// Why a build or an open was refused. Nothing outside the caller's regions was touched.
+#[non_exhaustive]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Error {
+    /// A region is too small. With a region of `needed_bytes` the same call gets past this point.
+    OutOfMemory {
+        /// The region that is too small.
+        region: Region,
+        /// Bytes that the call needs in this region.
+        needed_bytes: u64,
+        /// Bytes that the region has.
+        available_bytes: u64,
+    },
+    /// A region does not start at a multiple of [`ALIGNMENT`](crate::ALIGNMENT).
+    Misaligned {
+        /// The region that is misaligned.
+        region: Region,
+    },
+    /// The mesh description contradicts itself.
+    InvalidMesh(MeshField),
+    /// More triangles than 32-bit ids can name ([`MAX_TRIANGLES`](crate::MAX_TRIANGLES)).
+    TooManyTriangles,
+    /// A triangle names a vertex that the mesh does not have.
+    IndexOutOfRange {
+        /// The first such triangle.
+        triangle: u32,
+    },
+    /// A triangle has a NaN, infinite or too large coordinate, and
+    /// [`BuildFlags::STRICT`](crate::BuildFlags::STRICT) was set.
+    NonFiniteTriangle {
+        /// The first such triangle.
+        triangle: u32,
+    },
+    /// A field of the configuration is outside its range.
+    InvalidConfig(ConfigField),
+    /// The bytes are not a grid.
+    NotAGrid,
+    /// The grid was built on a machine of the other byte order: build it again on this one.
+    WrongByteOrder,
+    /// The grid has a format that this version does not read: build it again.
+    UnsupportedVersion {
+        /// The format version in the blob.
+        found: u32,
+    },
+    /// The bytes end before the grid does.
+    Truncated {
+        /// Bytes that the grid's header announces.
+        needed_bytes: u64,
+        /// Bytes that the caller brought.
+        available_bytes: u64,
+    },
+    /// The grid was built for a mesh with other triangle or vertex counts.
+    MeshMismatch,
+    /// The grid contradicts itself or its mesh.
+    Corrupt {
+        /// Where in the blob, in bytes from its start.
+        offset: u64,
+    },
+}
+
+impl fmt::Display for Region {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Index => "index",
+            Self::Scratch => "scratch",
+        })
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::OutOfMemory { region, needed_bytes, available_bytes } => {
+                write!(f, "the {region} region has {available_bytes} bytes and needs {needed_bytes}")
+            }
+            Self::Misaligned { region } => {
+                write!(f, "the {region} region must start at a multiple of {}", crate::ALIGNMENT)
+            }
+            Self::InvalidMesh(MeshField::Positions) => {
+                f.write_str("the position bytes end before the last vertex, or the stride is below 12")
+            }
+            Self::InvalidMesh(MeshField::Indices) => f.write_str(
+                "the index bytes end before the last triangle, or the stride is below three indices",
+            ),
+            Self::TooManyTriangles => {
+                write!(f, "a grid takes at most {} triangles", crate::MAX_TRIANGLES)
+            }
+            Self::IndexOutOfRange { triangle } => {
+                write!(f, "triangle {triangle} names a vertex that the mesh does not have")
+            }
+            Self::NonFiniteTriangle { triangle } => {
+                write!(f, "triangle {triangle} has a coordinate that is NaN, infinite or too large")
+            }
+            Self::InvalidConfig(ConfigField::Method) => f.write_str("unknown method"),
+            Self::InvalidConfig(ConfigField::Density) => write!(
+                f,
+                "density must be above 0 and ask for at most {} cells on an axis",
+                crate::MAX_RESOLUTION
+            ),
+            Self::InvalidConfig(ConfigField::Flags) => f.write_str("unknown build flag"),
+            Self::NotAGrid => f.write_str("the bytes are not a grid"),
+            Self::WrongByteOrder => {
+                f.write_str("the grid was built on a machine of the other byte order")
+            }
+            Self::UnsupportedVersion { found } => {
+                write!(f, "the grid has format version {found}, this library reads another")
+            }
+            Self::Truncated { needed_bytes, available_bytes } => {
+                write!(f, "the grid has {needed_bytes} bytes, of which {available_bytes} are here")
+            }
+            Self::MeshMismatch => f.write_str("the grid was built for another mesh"),
+            Self::Corrupt { offset } => write!(f, "the grid is damaged at byte {offset}"),
+        }
+    }
+}
+
+impl core::error::Error for Error {}

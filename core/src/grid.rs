@@ -1,0 +1,243 @@
+//! The view that queries run on: a blob bound to its mesh, whichever method built it.
+
+use crate::approach::Approach;
+use crate::arena::check_alignment;
+use crate::blob::{Header, corrupt};
+use crate::cell::Lattice;
+use crate::config::{Config, Method};
+use crate::counters::{Counters, Tally};
+use crate::dda::Dda;
+use crate::error::{Error, Region};
+use crate::mesh::TriangleMesh;
+use crate::one_level::{self, OneLevel};
+use crate::ray::{Hit, Ray};
+use crate::triangle::TriangleTest;
+
+/// A built grid and the mesh it was built for, ready for queries.
+///
+/// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
+/// number of threads may query it at once. Queries never fail, never allocate, never panic, take
+/// at most as many steps as the three resolutions sum up to, and need a few hundred bytes of stack.
+#[derive(Debug, Clone, Copy)]
+pub struct Grid<'a> {
+    mesh: TriangleMesh<'a>,
+    blob: &'a [u8],
+    lattice: Lattice,
+    structure: Structure<'a>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Structure<'a> {
+    OneLevel(OneLevel<'a>),
+}
+
+impl<'a> Grid<'a> {
+    /// Builds a grid in memory that the caller brings.
+    ///
+    /// `index` keeps the grid, `scratch` is free again when the build returns; both start at a
+    /// multiple of [`ALIGNMENT`](crate::ALIGNMENT) and may hold anything. [`sizes`](crate::sizes)
+    /// tells how large they must be; more is not used. The same mesh and configuration give the
+    /// same bits, on every machine of the same byte order.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] names the region and its need, [`Error::Misaligned`] the region;
+    /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
+    /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field. After an
+    /// error the index region is as it was.
+    ///
+    /// ```
+    /// use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
+    /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// let config = Config::default();
+    ///
+    /// let sizes = sizes(&mesh, &config, &mut [])?;
+    /// let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// let grid = Grid::build(mesh, &config, index, scratch)?;
+    ///
+    /// let hit = grid.intersect(&Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0])).unwrap();
+    /// assert_eq!((hit.t, hit.u, hit.v, hit.primitive), (1.0, 0.25, 0.25, 0));
+    /// # Ok::<(), hgrid_core::Error>(())
+    /// ```
+    pub fn build(
+        mesh: TriangleMesh<'a>,
+        config: &Config,
+        index: &'a mut [u8],
+        scratch: &mut [u8],
+    ) -> Result<Self, Error> {
+        config.check()?;
+        check_alignment(index, Region::Index)?;
+        check_alignment(scratch, Region::Scratch)?;
+        let blob = match config.method {
+            Method::OneLevel => one_level::build(&mesh, config, index, scratch)?,
+        };
+        Self::open(blob, mesh)
+    }
+
+    /// Opens a grid that was built earlier or elsewhere, in O(1); bytes behind the grid are ignored.
+    ///
+    /// The mesh must be the one it was built for. What O(1) cannot see is not trusted: on damaged
+    /// bytes queries may answer wrongly, but they stay inside the blob and end. Use
+    /// [`validate`](Self::validate) to be sure.
+    ///
+    /// # Errors
+    /// [`Error::Misaligned`], [`Error::NotAGrid`], [`Error::WrongByteOrder`],
+    /// [`Error::UnsupportedVersion`], [`Error::Truncated`], [`Error::MeshMismatch`] and
+    /// [`Error::Corrupt`], each for what it says.
+    pub fn open(blob: &'a [u8], mesh: TriangleMesh<'a>) -> Result<Self, Error> {
+        let header = Header::read(blob, &mesh)?;
+        let lattice = header.lattice()?;
+        let bytes = usize::try_from(header.blob_bytes).ok().and_then(|bytes| blob.get(..bytes));
+        let blob = bytes.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
+        let structure = match Method::from_u32(header.method) {
+            Some(Method::OneLevel) => Structure::OneLevel(OneLevel::open(&header, blob)?),
+            None => return Err(corrupt(core::mem::offset_of!(Header, method))),
+        };
+        Ok(Self { mesh, blob, lattice, structure })
+    }
+
+    /// Proves that the blob is a grid of the mesh, and so that every answer is right.
+    ///
+    /// O(triangles + references) time, no memory. A grid that was just built needs no proof; one
+    /// that came from a file, a network or another process may.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`] with the first byte that a build would not have written so;
+    /// [`Error::IndexOutOfRange`] if the mesh itself is damaged.
+    pub fn validate(&self) -> Result<(), Error> {
+        let header = Header::read(self.blob, &self.mesh)?;
+        match &self.structure {
+            Structure::OneLevel(grid) => {
+                grid.validate(&header, &self.lattice, self.blob, &self.mesh)
+            }
+        }
+    }
+
+    /// The closest hit of a ray. Where several triangles are hit at the same `t`, the one with the
+    /// lowest id.
+    #[must_use]
+    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.query::<false, _>(ray, &mut ())
+    }
+
+    /// The closest hit of a ray; adds the work done to `counters`.
+    #[must_use]
+    pub fn intersect_counted(&self, ray: &Ray, counters: &mut Counters) -> Option<Hit> {
+        self.query::<false, _>(ray, counters)
+    }
+
+    /// Whether anything is hit: what [`intersect`](Self::intersect) would find, found sooner.
+    #[must_use]
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        self.query::<true, _>(ray, &mut ()).is_some()
+    }
+
+    /// Whether anything is hit; adds the work done to `counters`.
+    #[must_use]
+    pub fn occluded_counted(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        self.query::<true, _>(ray, counters).is_some()
+    }
+
+    /// The closest hit, or with `ANY` the first one found.
+    #[inline(always)]
+    fn query<const ANY: bool, T: Tally>(&self, ray: &Ray, tally: &mut T) -> Option<Hit> {
+        let approach = Approach::new(ray, &self.lattice.bounds())?;
+        let walk = Dda::new(&self.lattice, ray, &approach)?;
+        let test = TriangleTest::from(ray, &approach);
+
+        let mut best = None;
+        let mut limit = walk.end;
+        let leaf = |references: &[u32], tally: &mut T| {
+            for &id in references {
+                tally.primitive_test();
+                let Some(triangle) = self.mesh.triangle(id) else { continue };
+                let Some(hit) = test.test(&triangle) else { continue };
+                if ANY {
+                    best = Some(hit.on(id));
+                    return f32::NEG_INFINITY;
+                }
+                if best.is_none_or(|best| hit.on(id).is_closer(&best)) {
+                    best = Some(hit.on(id));
+                    limit = walk.distance(hit.t);
+                }
+            }
+            limit
+        };
+        match &self.structure {
+            Structure::OneLevel(grid) => grid.traverse(walk, tally, leaf),
+        }
+        best
+    }
+
+    /// The mesh that the grid was built for.
+    #[must_use]
+    pub const fn mesh(&self) -> &TriangleMesh<'a> {
+        &self.mesh
+    }
+
+    /// The grid as bytes: what to copy, store or send in order to [`open`](Self::open) it again.
+    #[must_use]
+    pub const fn blob(&self) -> &'a [u8] {
+        self.blob
+    }
+
+    /// Bytes of the grid.
+    #[must_use]
+    pub const fn blob_bytes(&self) -> usize {
+        self.blob.len()
+    }
+
+    /// Bytes of scratch that the build took.
+    #[must_use]
+    pub const fn scratch_bytes(&self) -> u64 {
+        match self.structure {
+            Structure::OneLevel(_) => one_level::scratch_bytes(self.lattice.resolution),
+        }
+    }
+
+    /// The least and the greatest corner of the grid's box, in scene units: the mesh's box and a
+    /// pad of about 1e-5 of its extent.
+    #[must_use]
+    pub const fn bounds(&self) -> ([f32; 3], [f32; 3]) {
+        (self.lattice.min, self.lattice.max)
+    }
+
+    /// Cells per axis.
+    #[must_use]
+    pub const fn resolution(&self) -> [u32; 3] {
+        self.lattice.resolution
+    }
+
+    /// The structure.
+    #[must_use]
+    pub const fn method(&self) -> Method {
+        match self.structure {
+            Structure::OneLevel(_) => Method::OneLevel,
+        }
+    }
+
+    /// The density that the grid has: the configured one, or a half, a quarter, ... of it where the
+    /// mesh would have needed more than 16 references a triangle.
+    #[must_use]
+    pub fn density(&self) -> f32 {
+        self.header().map_or(0.0, |header| header.density)
+    }
+
+    /// Triangles left out because a coordinate is not finite.
+    #[must_use]
+    pub fn skipped_count(&self) -> u32 {
+        self.header().map_or(0, |header| header.skipped_count)
+    }
+
+    /// Primitive ids in all cells together.
+    #[must_use]
+    pub fn reference_count(&self) -> u32 {
+        self.header().map_or(0, |header| header.reference_count)
+    }
+
+    fn header(&self) -> Option<Header> {
+        Header::read(self.blob, &self.mesh).ok()
+    }
+}

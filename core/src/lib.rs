@@ -1,0 +1,70 @@
+//! A ray-tracing acceleration structure that a renderer links and a microcontroller can carry.
+//!
+//! hgrid builds a hashed grid over a triangle mesh in O(n), in memory that the caller brings, and
+//! answers ray queries on it. It implements *Multi-Level Hashed Grid Construction Methods* (Costa,
+//! Pereira, Jorge, 2010). No allocation, no threads, no I/O, no `unsafe`, no panic.
+//!
+//! ```
+//! use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
+//!
+//! let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+//! let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+//! let config = Config::default();
+//!
+//! // Ask the size, bring the memory, build. There is nothing to free.
+//! let sizes = sizes(&mesh, &config, &mut [])?;
+//! let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+//! let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+//! let grid =
+//!     Grid::build(mesh, &config, Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch))?;
+//!
+//! let hit = grid.intersect(&Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]));
+//! assert_eq!(hit.map(|hit| hit.primitive), Some(0));
+//! # Ok::<(), hgrid_core::Error>(())
+//! ```
+//!
+//! The house, from the ground up: nouns ([`error`](Error), [`ray`](Ray), `aabb`,
+//! [`mesh`](TriangleMesh), `approach`, [`triangle`](TriangleTest), [`config`](Config), [`arena`](Block), `bits`,
+//! `cell`, `dda`, [`counters`](Counters), `survey`, `blob`), one folder per structure above them
+//! (`one_level`), and [`grid`](Grid) on top: the view that queries run on.
+//!
+//! Keys used in these pages: **CP10** Costa, Pereira, Jorge 2010; **LD08** Lagae and Dutré,
+//! *Compact, Fast and Robust Grids for Ray Tracing*, 2008.
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate alloc;
+
+const _: () = assert!(usize::BITS >= 32, "hgrid needs pointers of 32 bits or more");
+
+mod aabb;
+mod approach;
+mod arena;
+mod bits;
+mod blob;
+mod cell;
+mod config;
+mod counters;
+mod dda;
+mod error;
+mod grid;
+mod mesh;
+mod one_level;
+mod ray;
+mod sizes;
+mod survey;
+mod triangle;
+
+pub use aabb::MAX_COORDINATE;
+pub use arena::{ALIGNMENT, Block};
+pub use blob::BLOB_VERSION;
+pub use cell::MAX_RESOLUTION;
+pub use config::{BuildFlags, Config, Method};
+pub use counters::Counters;
+pub use error::{ConfigField, Error, MeshField, Region};
+pub use grid::Grid;
+pub use mesh::{IndexType, MAX_TRIANGLES, Strided, Triangle, TriangleMesh};
+pub use ray::{Hit, INVALID_ID, Ray};
+pub use sizes::{Sizes, sizes};
+pub use triangle::{TriangleHit, TriangleTest};

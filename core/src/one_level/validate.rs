@@ -1,0 +1,124 @@
+//! Proof that a foreign blob is a grid of its mesh, in O(n) and without memory.
+//!
+//! A grid answers right if every triangle is listed in every cell that its range covers, and it is
+//! what a build makes if nothing else is listed. With ids that strictly ascend in each list and
+//! each listed triangle covering the list's cell, every listed pair (cell, triangle) is a right one
+//! and none is listed twice; so there are as many pairs as the ranges have cells if and only if
+//! none is missing. No bitmap, no sorting: one sum against another.
+
+use glam::Vec3A;
+
+use super::OneLevel;
+use super::build::count_references;
+use crate::aabb::Aabb;
+use crate::bits::{WORD_BITS, each_one, extent};
+use crate::blob::{Header, corrupt};
+use crate::cell::{Lattice, woo};
+use crate::config::BuildFlags;
+use crate::error::Error;
+use crate::mesh::TriangleMesh;
+use crate::survey::Survey;
+
+impl OneLevel<'_> {
+    /// Whether this is what a build makes of the mesh; the error names the first byte that is not.
+    pub(crate) fn validate(
+        &self,
+        header: &Header,
+        lattice: &Lattice,
+        blob: &[u8],
+        mesh: &TriangleMesh<'_>,
+    ) -> Result<(), Error> {
+        let at = |section: usize, index: usize| corrupt(section - blob.as_ptr().addr() + index);
+        let sections = &self.sections;
+
+        // The header says what the mesh says.
+        let survey = Survey::of(mesh, BuildFlags::empty())?;
+        if header.skipped_count != survey.skipped_count {
+            return Err(corrupt(core::mem::offset_of!(Header, skipped_count)));
+        }
+        if lattice.bounds() != Lattice::pad(&survey.bounds) {
+            return Err(corrupt(core::mem::offset_of!(Header, bounds_min)));
+        }
+        let size = lattice.bounds().size();
+        let is_density = header.density > 0.0 && header.density.is_finite();
+        let resolution = woo(size, f64::from(header.density), survey.finite_count);
+        if !is_density || resolution != Some(lattice.resolution) {
+            return Err(corrupt(core::mem::offset_of!(Header, resolution)));
+        }
+        let expected = count_references(mesh, lattice, header.reference_count, |_| {});
+        if expected != Some(header.reference_count) {
+            return Err(corrupt(core::mem::offset_of!(Header, reference_count)));
+        }
+
+        // The hash table cuts the references into lists.
+        let hash = sections.hash;
+        let hash_at = hash.as_ptr().addr();
+        if hash.first() != Some(&0) {
+            return Err(at(hash_at, 0));
+        }
+        if let Some(slot) = hash.windows(2).position(|ends| ends[0] > ends[1]) {
+            return Err(at(hash_at, (slot + 1) * size_of::<u32>()));
+        }
+        if hash.last() != Some(&header.reference_count) {
+            return Err(at(hash_at, header.hash_count as usize * size_of::<u32>()));
+        }
+
+        // Every marked cell lists triangles that cover it, each once; an empty row has offset 0.
+        let [width, height, _] = lattice.resolution;
+        let width = width as usize;
+        let domain_at = sections.domain_bits.as_ptr().addr();
+        let mut listed = 0;
+        for (row, &offset) in sections.row_offsets.iter().enumerate() {
+            if offset != 0 && extent(sections.domain_bits, row * width, width).is_none() {
+                return Err(at(sections.row_offsets.as_ptr().addr(), row * size_of::<i32>()));
+            }
+            let mut damage = None;
+            each_one(sections.domain_bits, row * width, width, |x| {
+                match self.list(lattice, mesh, cell_of(row, x, height)) {
+                    Ok(list) => listed += list.len() as u64,
+                    Err(Some(list)) => damage = Some(at(list.as_ptr().addr(), 0)),
+                    Err(None) => damage = Some(at(domain_at, (row * width + x) / 8)),
+                }
+                damage.is_none()
+            });
+            damage.map_or(Ok(()), Err)?;
+        }
+
+        // No bit is set behind the last cell.
+        let cells = sections.row_offsets.len() * width;
+        if let Some((first, _)) = extent(sections.domain_bits, cells, WORD_BITS) {
+            return Err(at(domain_at, (cells + first) / 8));
+        }
+        if listed != u64::from(header.reference_count) {
+            return Err(at(sections.references.as_ptr().addr(), 0));
+        }
+        if !header.reserved_is_zero() {
+            return Err(corrupt(core::mem::offset_of!(Header, reserved)));
+        }
+        Ok(())
+    }
+
+    /// The primitives of a cell if they are as they must be: some, ascending, each covering it.
+    /// Else the list that is not, if there is one.
+    fn list(
+        &self,
+        lattice: &Lattice,
+        mesh: &TriangleMesh<'_>,
+        cell: Option<[u32; 3]>,
+    ) -> Result<&[u32], Option<&[u32]>> {
+        let cell = cell.ok_or(None)?;
+        let list = self.references(cell).filter(|list| !list.is_empty()).ok_or(None)?;
+        let ascends = list.windows(2).all(|ids| ids[0] < ids[1]);
+        let covers = |&id: &u32| {
+            let bounds = mesh.corners(id, Vec3A::new).and_then(Aabb::of);
+            bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
+        };
+        if ascends && list.iter().all(covers) { Ok(list) } else { Err(Some(list)) }
+    }
+}
+
+/// The cell at bit `x` of a row.
+fn cell_of(row: usize, x: usize, height: u32) -> Option<[u32; 3]> {
+    let row = u32::try_from(row).ok()?;
+    Some([u32::try_from(x).ok()?, row.checked_rem(height)?, row.checked_div(height)?])
+}

@@ -1,0 +1,83 @@
+//! Rays and hits: the two structs that cross every boundary, laid out as C sees them.
+
+use bytemuck::{Pod, Zeroable};
+
+/// The id that no primitive has.
+pub const INVALID_ID: u32 = u32::MAX;
+
+/// A ray, or the part of it between `t_min` and `t_max`: 32 bytes in DXR order.
+///
+/// The direction has any length, and every `t` is a multiple of it. A hit is accepted for
+/// `t_min <= t <= t_max`, closed at both ends. A ray with a NaN anywhere, an infinite origin or
+/// direction, a zero direction or `t_min > t_max` hits nothing.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Ray {
+    /// Where `t` is 0, in scene units.
+    pub origin: [f32; 3],
+    /// Smallest accepted `t`; negative reaches behind the origin.
+    pub t_min: f32,
+    /// Direction, any length but zero.
+    pub direction: [f32; 3],
+    /// Largest accepted `t`; may be infinite.
+    pub t_max: f32,
+}
+
+impl Ray {
+    /// A ray from `origin` along `direction` that accepts every hit at `t >= 0`.
+    ///
+    /// ```
+    /// let ray = hgrid_core::Ray::new([0.0, 0.0, 5.0], [0.0, 0.0, -1.0]);
+    /// assert_eq!((ray.t_min, ray.t_max), (0.0, f32::INFINITY));
+    /// ```
+    #[must_use]
+    pub const fn new(origin: [f32; 3], direction: [f32; 3]) -> Self {
+        Self { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
+    }
+
+    /// Whether this ray can hit anything at all: finite, not null, a range that is not empty.
+    #[inline]
+    pub(crate) fn is_valid(&self) -> bool {
+        let finite = |[x, y, z]: [f32; 3]| x.is_finite() && y.is_finite() && z.is_finite();
+        let [dx, dy, dz] = self.direction.map(f32::abs);
+        finite(self.origin)
+            && finite(self.direction)
+            && (dx > 0.0 || dy > 0.0 || dz > 0.0)
+            && self.t_min <= self.t_max
+    }
+}
+
+/// Where a ray meets a triangle: 16 bytes.
+///
+/// The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
+/// triangle's vertices `a`, `b`, `c`, up to rounding.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Hit {
+    /// Distance in multiples of the ray's direction.
+    pub t: f32,
+    /// Weight of the triangle's second vertex, 0 to 1.
+    pub u: f32,
+    /// Weight of the triangle's third vertex, 0 to 1.
+    pub v: f32,
+    /// Id of the triangle: its position in the index buffer.
+    pub primitive: u32,
+}
+
+impl Hit {
+    /// Whether this hit is reported rather than the other: smaller `t`, then smaller id.
+    #[inline(always)]
+    #[must_use]
+    pub const fn is_closer(&self, other: &Self) -> bool {
+        self.t < other.t || (self.t <= other.t && self.primitive < other.primitive)
+    }
+}
+
+/// The nearest f32.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "rounding is what this is for")]
+pub(crate) const fn round(x: f64) -> f32 {
+    x as f32
+}
+
+const _: () = assert!(size_of::<Ray>() == 32 && size_of::<Hit>() == 16);

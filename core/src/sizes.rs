@@ -1,0 +1,95 @@
+//! How much memory a build takes, asked before the build.
+
+use crate::config::{Config, Method};
+use crate::error::{Error, Region};
+use crate::mesh::TriangleMesh;
+use crate::one_level;
+
+/// Bytes of the two regions that a build takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// For the region that keeps the grid.
+    pub index_bytes: usize,
+    /// For the region that only the build needs.
+    pub scratch_bytes: usize,
+    /// Whether `index_bytes` is what the grid will take, to the byte, or only no less than that.
+    /// `scratch_bytes` is always exact.
+    pub is_exact: bool,
+}
+
+impl Sizes {
+    /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
+    ///
+    /// A scan needs a fifth of it. `None` if the density is no density or the sizes do not fit the
+    /// machine's address space.
+    ///
+    /// ```
+    /// use hgrid_core::{Block, Config, Method, Sizes};
+    /// const SIZES: Sizes = match Sizes::bound(100, &Config::new(Method::OneLevel)) {
+    ///     Some(sizes) => sizes,
+    ///     None => panic!("too large"),
+    /// };
+    /// static INDEX: [Block; Block::count_for(SIZES.index_bytes)] =
+    ///     [Block::ZERO; Block::count_for(SIZES.index_bytes)];
+    /// ```
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "compared before")]
+    pub const fn bound(triangles: u32, config: &Config) -> Option<Self> {
+        if !config.density_is_valid() {
+            return None;
+        }
+        let (index, scratch) = match config.method {
+            Method::OneLevel => one_level::bound(triangles, config.density),
+        };
+        if index > usize::MAX as u64 || scratch > usize::MAX as u64 {
+            return None;
+        }
+        let (index_bytes, scratch_bytes) = (index as usize, scratch as usize);
+        Some(Self { index_bytes, scratch_bytes, is_exact: false })
+    }
+
+    /// Sizes from counts in 64 bits; an error if they do not fit the machine's address space.
+    pub(crate) fn new(index_bytes: u64, scratch_bytes: u64, is_exact: bool) -> Result<Self, Error> {
+        let fit = |needed_bytes: u64, region| {
+            let available_bytes = usize::MAX as u64;
+            usize::try_from(needed_bytes).map_err(|_| Error::OutOfMemory {
+                region,
+                needed_bytes,
+                available_bytes,
+            })
+        };
+        Ok(Self {
+            index_bytes: fit(index_bytes, Region::Index)?,
+            scratch_bytes: fit(scratch_bytes, Region::Scratch)?,
+            is_exact,
+        })
+    }
+}
+
+/// The memory that a build of this mesh takes.
+///
+/// With an empty `scratch` the answer takes two passes over the triangles; `scratch_bytes` is
+/// exact and `index_bytes` enough, about twice what a scan will take. With `scratch_bytes` of
+/// scratch (same alignment rule as for a build) the grid is planned in it and `index_bytes` is
+/// exact too, for about half the time of a build. The scratch holds nothing of use afterwards.
+///
+/// # Errors
+/// Those of [`Grid::build`](crate::Grid::build), but for index memory.
+///
+/// ```
+/// use hgrid_core::{Block, Config, TriangleMesh, sizes};
+/// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+/// let enough = sizes(&mesh, &Config::default(), &mut [])?;
+/// let mut scratch = vec![Block::ZERO; Block::count_for(enough.scratch_bytes)];
+/// let exact = sizes(&mesh, &Config::default(), Block::bytes_mut(&mut scratch))?;
+/// assert!(exact.is_exact && exact.index_bytes <= enough.index_bytes);
+/// # Ok::<(), hgrid_core::Error>(())
+/// ```
+pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Result<Sizes, Error> {
+    config.check()?;
+    crate::arena::check_alignment(scratch, Region::Scratch)?;
+    match config.method {
+        Method::OneLevel => one_level::sizes(mesh, config, scratch),
+    }
+}

@@ -1,0 +1,49 @@
+//! The first look at a mesh: is it sound, how many triangles count, what box holds them.
+
+use glam::Vec3A;
+
+use crate::aabb::Aabb;
+use crate::config::BuildFlags;
+use crate::error::Error;
+use crate::mesh::TriangleMesh;
+
+/// What one pass over the triangles tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Survey {
+    /// The box around all finite triangles; unreferenced vertices do not stretch it.
+    pub(crate) bounds: Aabb,
+    /// Triangles that go into the grid.
+    pub(crate) finite_count: u32,
+    /// Triangles left out because a coordinate is not finite.
+    pub(crate) skipped_count: u32,
+}
+
+impl Survey {
+    /// Looks at every triangle once: O(n), no memory.
+    pub(crate) fn of(mesh: &TriangleMesh<'_>, flags: BuildFlags) -> Result<Self, Error> {
+        let mut survey = Self { bounds: Aabb::EMPTY, finite_count: 0, skipped_count: 0 };
+        for id in 0..mesh.triangle_count() {
+            let Some(corners) = mesh.corners(id, Vec3A::new) else {
+                return Err(Error::IndexOutOfRange { triangle: id });
+            };
+            match Aabb::of(corners) {
+                Some(bounds) => survey.bounds = survey.bounds.union(&bounds),
+                None if flags.contains(BuildFlags::STRICT) => {
+                    return Err(Error::NonFiniteTriangle { triangle: id });
+                }
+                None => survey.skipped_count += 1,
+            }
+        }
+        survey.finite_count = mesh.triangle_count() - survey.skipped_count;
+        Ok(survey)
+    }
+}
+
+/// The finite triangles of a mesh with their boxes, in the order of their ids: what every pass of
+/// every build runs over, so that all of them see the same triangles.
+#[inline(always)]
+pub(crate) fn boxes<'m>(
+    mesh: &'m TriangleMesh<'_>,
+) -> impl DoubleEndedIterator<Item = (u32, Aabb)> + 'm {
+    (0..mesh.triangle_count()).filter_map(|id| Some((id, Aabb::of(mesh.corners(id, Vec3A::new)?)?)))
+}

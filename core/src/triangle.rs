@@ -1,0 +1,223 @@
+//! The watertight ray-triangle test of Woop, Benthin and Wald (2013), exact at every scale.
+//!
+//! Shear space so that the ray becomes the z axis; then the ray hits a triangle if the origin lies
+//! inside its 2D shadow, which three edge functions tell by their signs. Two triangles that share
+//! an edge compute the same products for it in the other order, so no ray slips between them.
+//!
+//! ```text
+//! for each corner p:  x = p.x - shear.x * p.z,  y = p.y - shear.y * p.z      (p relative to the ray)
+//! U = c.x*b.y - c.y*b.x    V = a.x*c.y - a.y*c.x    W = b.x*a.y - b.y*a.x
+//! hit if U, V, W have no two opposite signs and U + V + W is not 0
+//! ```
+//!
+//! Here the f32 edge functions are only a filter. A rounded difference of two rounded products has
+//! the exact sign or is zero, because rounding is monotonic; so strictly opposite signs are proof
+//! of a miss, and everything else (a zero, an underflow at scale 1e-30, an overflow at 1e30) goes
+//! on to f64, where products of f32 are exact and decide. That keeps neighbours consistent with
+//! no threshold and no scale, and the survivors, about one a ray, get their `t` and weights without
+//! further error than the f32 shear: hits compare equal where surfaces meet, and a ray's range can
+//! be closed at both ends.
+
+use crate::aabb::Aabb;
+use crate::approach::Approach;
+use crate::mesh::Triangle;
+use crate::ray::{Hit, Ray, round};
+
+/// Where a ray meets a triangle, before anyone asked whether it is the closest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TriangleHit {
+    /// Distance in multiples of the ray's direction.
+    pub t: f32,
+    /// Weight of the triangle's second vertex.
+    pub u: f32,
+    /// Weight of the triangle's third vertex.
+    pub v: f32,
+}
+
+impl TriangleHit {
+    /// This hit as one of a mesh.
+    #[inline(always)]
+    #[must_use]
+    pub const fn on(self, primitive: u32) -> Hit {
+        Hit { t: self.t, u: self.u, v: self.v, primitive }
+    }
+}
+
+/// A ray prepared for tests against many triangles.
+#[derive(Debug, Clone, Copy)]
+pub struct TriangleTest {
+    /// The axis along which the direction is longest; it becomes z.
+    axis: Axis,
+    /// Where the sheared space has its origin: the ray's own, or closer to the box.
+    anchor: [f32; 3],
+    /// Direction x / z and y / z: at most 1.
+    shear: [f32; 2],
+    origin_z: f64,
+    direction_z: f64,
+    t_min: f32,
+    t_max: f32,
+}
+
+/// The axis that becomes z; x and y follow cyclically.
+#[derive(Debug, Clone, Copy)]
+enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+impl Axis {
+    #[inline(always)]
+    const fn to_z<T: Copy>(self, [x, y, z]: [T; 3]) -> [T; 3] {
+        match self {
+            Self::X => [y, z, x],
+            Self::Y => [z, x, y],
+            Self::Z => [x, y, z],
+        }
+    }
+}
+
+impl TriangleTest {
+    /// Prepares a ray for tests against triangles inside `bounds` (least and greatest corner).
+    ///
+    /// `None` if the ray cannot hit anything there: it is invalid or passes the box.
+    #[must_use]
+    pub fn new(ray: &Ray, bounds: ([f32; 3], [f32; 3])) -> Option<Self> {
+        let bounds = Aabb { min: bounds.0.into(), max: bounds.1.into() };
+        Approach::new(ray, &bounds).map(|approach| Self::from(ray, &approach))
+    }
+
+    /// The same for a ray that was brought to its box.
+    #[inline]
+    pub(crate) fn from(ray: &Ray, approach: &Approach) -> Self {
+        let [dx, dy, dz] = ray.direction.map(f32::abs);
+        let axis = if dx > dy {
+            if dx > dz { Axis::X } else { Axis::Z }
+        } else if dy > dz {
+            Axis::Y
+        } else {
+            Axis::Z
+        };
+        let [x, y, z] = axis.to_z(ray.direction.map(f64::from));
+        let [_, _, origin_z] = axis.to_z(ray.origin);
+        Self {
+            axis,
+            anchor: axis.to_z(approach.anchor),
+            shear: [round(x / z), round(y / z)],
+            origin_z: f64::from(origin_z),
+            direction_z: z,
+            t_min: ray.t_min,
+            t_max: ray.t_max,
+        }
+    }
+
+    /// The hit with this triangle, if its `t` lies in the ray's closed range.
+    ///
+    /// A triangle of no area, or seen exactly edge on, is never hit.
+    #[inline(always)]
+    #[must_use]
+    #[expect(clippy::needless_bitwise_bool, reason = "one branch instead of six")]
+    pub fn test(&self, triangle: &Triangle) -> Option<TriangleHit> {
+        let [a, b, c] = triangle.map(|corner| self.shear(corner));
+
+        // Drop the triangle if two edge functions have opposite signs. A NaN passes.
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        let any_negative = (u < 0.0) | (v < 0.0) | (w < 0.0);
+        let any_positive = (u > 0.0) | (v > 0.0) | (w > 0.0);
+        if any_negative & any_positive {
+            return None;
+        }
+        self.resolve(triangle, [a, b, c])
+    }
+
+    /// A corner relative to the ray, sheared so that the ray is the z axis.
+    #[inline(always)]
+    fn shear(&self, corner: [f32; 3]) -> [f32; 2] {
+        let [x, y, z] = self.axis.to_z(corner);
+        let (x, y, z) = (x - self.anchor[0], y - self.anchor[1], z - self.anchor[2]);
+        [x - self.shear[0] * z, y - self.shear[1] * z]
+    }
+
+    /// Decides in f64 what the filter let through.
+    #[inline]
+    fn resolve(&self, triangle: &Triangle, sheared: [[f32; 2]; 3]) -> Option<TriangleHit> {
+        let [a, b, c] = sheared.map(|corner| corner.map(f64::from));
+
+        // Compute the edge functions again: exact products, so the signs are exact.
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let area = u + v + w;
+        if !(area.is_finite() && area.abs() > 0.0) {
+            return None;
+        }
+        // Adding zero makes the negative zero of a vertex a plain one.
+        let weights = [u / area + 0.0, v / area + 0.0, w / area + 0.0];
+
+        // Interpolate the depth from the ray's own origin, wherever the sheared space has its.
+        let depths = triangle.map(|corner| {
+            let [_, _, z] = self.axis.to_z(corner);
+            f64::from(z) - self.origin_z
+        });
+        let depth = weights[0] * depths[0] + weights[1] * depths[1] + weights[2] * depths[2];
+        let t = round(depth / self.direction_z);
+        let hit = TriangleHit { t, u: round(weights[1]), v: round(weights[2]) };
+        (t >= self.t_min && t <= self.t_max && t.is_finite()).then_some(hit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNIT: Triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    const BOUNDS: ([f32; 3], [f32; 3]) = ([-0.1, -0.1, -0.1], [1.1, 1.1, 0.1]);
+
+    fn hit(ray: &Ray) -> Option<TriangleHit> {
+        TriangleTest::new(ray, BOUNDS)?.test(&UNIT)
+    }
+
+    #[test]
+    fn weights_and_distance_are_exact() {
+        for direction in [[0.0, 0.0, -1.0], [0.0, 0.0, -0.5], [0.0, 0.0, -1e-40]] {
+            let ray = Ray::new([0.25, 0.5, 2.0], direction);
+            let t = 2.0 / -f64::from(direction[2]);
+            let hit = hit(&ray);
+            if t > f64::from(f32::MAX) {
+                assert_eq!(hit, None);
+            } else {
+                assert_eq!(hit, Some(TriangleHit { t: round(t), u: 0.25, v: 0.5 }));
+            }
+        }
+    }
+
+    #[test]
+    fn the_range_is_closed_at_both_ends() {
+        let ray = |t_min, t_max| Ray { t_min, t_max, ..Ray::new([0.25; 3], [0.0, 0.0, -2.0]) };
+        let (below, above) = (0.125_f32.next_down(), 0.125_f32.next_up());
+        assert!(hit(&ray(0.125, 0.125)).is_some());
+        assert!(hit(&ray(0.0, below)).is_none() && hit(&ray(above, 1.0)).is_none());
+        assert!(hit(&ray(-1.0, 0.125)).is_some() && hit(&ray(0.125, f32::INFINITY)).is_some());
+    }
+
+    #[test]
+    fn edges_and_corners_belong_to_the_triangle() {
+        for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)] {
+            assert!(hit(&Ray::new([x, y, 1.0], [0.0, 0.0, -1.0])).is_some(), "{x} {y}");
+            assert!(hit(&Ray::new([x, y, 1.0], [0.0, 0.0, 1.0])).is_none(), "{x} {y}");
+        }
+    }
+
+    #[test]
+    fn far_origins_hit_as_near_ones() {
+        for distance in [1e3, 1e6, 1e9, 1e18] {
+            let hit = hit(&Ray::new([0.25, 0.25, distance], [0.0, 0.0, -1.0]));
+            assert_eq!(hit, Some(TriangleHit { t: distance, u: 0.25, v: 0.25 }));
+        }
+    }
+}

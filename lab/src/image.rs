@@ -1,0 +1,82 @@
+//! Pictures as PNG files.
+//!
+//! Whether the file can be written is asked before the work, and answered without leaving an empty
+//! file behind; the file itself is written in one go when the picture is complete.
+
+use std::fs::{self, OpenOptions};
+use std::io::{Cursor, ErrorKind};
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+
+use crate::shade::Rgb;
+
+/// Refuses a path where no file can be written. An existing file stays as it is.
+///
+/// # Errors
+/// Those of opening the file.
+pub fn check_writable(path: &Path) -> Result<()> {
+    let attempt = match OpenOptions::new().write(true).create_new(true).open(path) {
+        Ok(_) => fs::remove_file(path),
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+            OpenOptions::new().write(true).open(path).map(drop)
+        }
+        Err(error) => Err(error),
+    };
+    attempt.with_context(|| format!("cannot write `{}`", path.display()))
+}
+
+/// Writes a square picture, rows from the top.
+///
+/// # Errors
+/// Those of writing the file.
+pub fn write_png(path: &Path, size: u16, pixels: &[Rgb]) -> Result<()> {
+    encode(size, pixels)
+        .and_then(|bytes| Ok(fs::write(path, bytes)?))
+        .with_context(|| format!("cannot write `{}`", path.display()))
+}
+
+fn encode(size: u16, pixels: &[Rgb]) -> Result<Vec<u8>> {
+    let mut bytes = Cursor::new(Vec::new());
+    let mut encoder = png::Encoder::new(&mut bytes, u32::from(size), u32::from(size));
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(pixels.as_flattened())?;
+    writer.finish()?;
+    Ok(bytes.into_inner())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_png_reads_back() {
+        let pixels = [[1, 2, 3], [4, 5, 6], [7, 8, 9], [250, 251, 252]];
+        let bytes = encode(2, &pixels).unwrap();
+        let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+        let mut read = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut read).unwrap();
+        assert_eq!((info.width, info.height), (2, 2));
+        assert_eq!(read, pixels.as_flattened());
+        assert!(encode(2, &pixels[1..]).is_err());
+    }
+
+    #[test]
+    fn a_check_leaves_nothing_behind() {
+        let folder = std::env::temp_dir().join(format!("hgrid-image-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("picture.png");
+        check_writable(&path).unwrap();
+        assert!(!path.exists());
+        fs::write(&path, "before").unwrap();
+        check_writable(&path).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"before");
+        write_png(&path, 1, &[[0; 3]]).unwrap();
+        let message = format!("{:#}", check_writable(&folder).unwrap_err());
+        assert!(message.starts_with("cannot write `"), "{message}");
+        assert!(check_writable(&folder.join("missing/picture.png")).is_err());
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,25 @@
+//! The `hgrid` command.
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use clap::Parser as _;
+use hgrid_lab::cli::{Cli, Command, RenderArgs};
+use hgrid_lab::render;
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Some(Command::Render(args)) => render::run(&args),
+        None => render::run(&RenderArgs::parse_from(["hgrid"])).and_then(|()| {
+            let next = "next: hgrid render YOUR.ply, or hgrid render --help";
+            Ok(writeln!(std::io::stdout(), "{next}")?)
+        }),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! A progress bar that stays away from short work.
+//!
+//! It appears on standard error after a second, only if that is a terminal, and disappears when
+//! the work is done: standard output belongs to the results, and a bar that flashes by says
+//! nothing. Generating, loading and rendering share it.
+
+use core::fmt;
+use core::time::Duration;
+use std::io::{self, Read};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// How long work may take before it owes an explanation.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// The progress of one piece of work.
+pub struct Progress {
+    bar: ProgressBar,
+    is_shown: bool,
+}
+
+impl Progress {
+    /// Starts counting to `total`, in any unit.
+    #[must_use]
+    pub fn new(what: &'static str, total: u64) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
+        let template = "{msg:<10} {bar:40} {percent:>3} %, {eta} left";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_message(what);
+        Self { bar, is_shown: false }
+    }
+
+    /// Counts `amount` more. Call it per row or per buffer, not per element.
+    pub fn advance(&mut self, amount: u64) {
+        self.bar.inc(amount);
+        if !self.is_shown && self.bar.elapsed() > PATIENCE {
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+            self.is_shown = true;
+        }
+    }
+
+    /// A reader whose bytes are counted.
+    pub fn reader<R: Read>(self, inner: R) -> impl Read {
+        CountedReader { inner, progress: self }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl fmt::Debug for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Progress").field("position", &self.bar.position()).finish_non_exhaustive()
+    }
+}
+
+struct CountedReader<R> {
+    inner: R,
+    progress: Progress,
+}
+
+impl<R: Read> Read for CountedReader<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        self.progress.advance(count as u64);
+        Ok(count)
+    }
+}

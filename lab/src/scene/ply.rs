@@ -1,0 +1,329 @@
+//! PLY files: ascii and binary, any number type, faces with any number of corners.
+//!
+//! Elements are read one at a time and go straight into the arrays that the scene keeps, so a
+//! file of ten million triangles needs no second copy of itself. Everything that is neither a
+//! coordinate nor a list of corners is read past.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind};
+use std::path::Path;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{
+    BeginList, ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult,
+};
+
+use super::Scene;
+use crate::progress::Progress;
+
+/// Bytes per read: large enough that system calls do not show.
+const BUFFER_BYTES: usize = 1 << 20;
+
+/// Reads a file.
+///
+/// # Errors
+/// If the file cannot be opened, is not PLY, ends too early, or declares no vertices.
+pub(super) fn load(path: &Path) -> Result<Scene> {
+    let file = File::open(path).context("cannot open it")?;
+    let byte_count = file.metadata().context("cannot read its size")?.len();
+    let reader = Progress::new("loading", byte_count).reader(file);
+    read(BufReader::with_capacity(BUFFER_BYTES, reader), byte_count)
+}
+
+/// Reads a PLY of at most `byte_count` bytes, which only limits what is reserved in advance.
+fn read(mut source: impl BufRead, byte_count: u64) -> Result<Scene> {
+    let is_ply = source.fill_buf()?.starts_with(b"ply");
+    ensure!(is_ply, "it is not a PLY file: it does not start with `ply`");
+    let mut reader = Reader::new(source);
+    let header =
+        Parser::<Skipped>::new().read_header(&mut reader).context("its header is damaged")?;
+    ensure!(header.elements.contains_key("vertex"), "its header declares no `vertex` element");
+    ensure!(
+        !header.elements.contains_key("tristrips"),
+        "it has triangle strips; convert them to faces first"
+    );
+
+    let mut source = reader.into_inner();
+    let mut scene = Scene::default();
+    for element in header.elements.values() {
+        // Elements of no bytes would never end the file, however many the header promises.
+        ensure!(!element.properties.is_empty(), "its `{}` elements are empty", element.name);
+        // No element takes less than a byte, so a header that lies cannot make this reserve more.
+        let count = element.count.min(usize::try_from(byte_count).unwrap_or(usize::MAX));
+        match element.name.as_str() {
+            "vertex" => {
+                check_vertex(element)?;
+                scene.positions.reserve_exact(count);
+                each(&mut source, header.encoding, element, |vertex: Vertex| {
+                    scene.positions.push(vertex.0);
+                    Ok(())
+                })?;
+            }
+            "face" => {
+                check_face(element)?;
+                scene.indices.reserve_exact(count);
+                each(&mut source, header.encoding, element, |face: Face| {
+                    face.fan(&mut scene.indices)
+                })?;
+            }
+            _ => each(&mut source, header.encoding, element, |_: Skipped| Ok(()))?,
+        }
+    }
+    Ok(scene)
+}
+
+/// Reads all elements of one kind and hands them on.
+fn each<E: PropertyAccess>(
+    source: &mut impl BufRead,
+    encoding: Encoding,
+    element: &ElementDef,
+    mut take: impl FnMut(E) -> Result<()>,
+) -> Result<()> {
+    let parser = Parser::<E>::new();
+    let mut line = String::new();
+    for number in 0..element.count {
+        let value = match encoding {
+            Encoding::Ascii => {
+                line.clear();
+                match source.read_line(&mut line) {
+                    Ok(0) => Err(std::io::Error::from(ErrorKind::UnexpectedEof).into()),
+                    Ok(_) => parser.read_ascii_element(&line, element),
+                    Err(error) => Err(error.into()),
+                }
+            }
+            Encoding::BinaryLittleEndian => parser.read_little_endian_element(source, element),
+            Encoding::BinaryBigEndian => parser.read_big_endian_element(source, element),
+        };
+        if value.as_ref().is_err_and(|error| error.kind() == ErrorKind::UnexpectedEof) {
+            bail!(
+                "it is cut off after {number} of {} `{}` elements: fetch or export it again",
+                element.count,
+                element.name
+            );
+        }
+        value
+            .map_err(Into::into)
+            .and_then(&mut take)
+            .with_context(|| format!("`{}` element {number}", element.name))?;
+    }
+    Ok(())
+}
+
+fn check_vertex(element: &ElementDef) -> Result<()> {
+    for axis in ["x", "y", "z"] {
+        ensure!(element.properties.contains_key(axis), "its vertices have no `{axis}`");
+    }
+    Ok(())
+}
+
+fn check_face(element: &ElementDef) -> Result<()> {
+    ensure!(
+        element.properties.keys().any(|name| is_corner_list(name)),
+        "its faces have no `vertex_indices`"
+    );
+    Ok(())
+}
+
+/// Both names are in use; the format's own paper has the first.
+fn is_corner_list(name: &str) -> bool {
+    name == "vertex_indices" || name == "vertex_index"
+}
+
+/// An element that nobody asked for.
+struct Skipped;
+
+impl PropertyAccess for Skipped {
+    fn new() -> Self {
+        Self
+    }
+}
+
+/// The coordinates of a vertex.
+struct Vertex([f32; 3]);
+
+impl Vertex {
+    fn set(&mut self, name: &str, value: f32) -> PropertyAccessResult {
+        let [x, y, z] = &mut self.0;
+        match name {
+            "x" => *x = value,
+            "y" => *y = value,
+            "z" => *z = value,
+            _ => return PropertyAccessResult::Ignored,
+        }
+        PropertyAccessResult::Set
+    }
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self([f32::NAN; 3])
+    }
+
+    fn set_float(&mut self, name: &str, value: f32) -> PropertyAccessResult {
+        self.set(name, value)
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        match property.to_f32_lossy() {
+            Some(value) => self.set(name, value),
+            None => PropertyAccessResult::Ignored,
+        }
+    }
+}
+
+/// The corners of a face.
+struct Face(Vec<i32>);
+
+impl Face {
+    /// Appends the triangles that fan out from the first corner; fewer than three corners give none.
+    fn fan(&self, triangles: &mut Vec<[u32; 3]>) -> Result<()> {
+        let mut corners = self.0.iter().map(|&corner| {
+            u32::try_from(corner).with_context(|| format!("vertex {corner} does not exist"))
+        });
+        let (Some(first), Some(second)) = (corners.next(), corners.next()) else { return Ok(()) };
+        let (first, mut previous) = (first?, second?);
+        for corner in corners {
+            let corner = corner?;
+            triangles.push([first, previous, corner]);
+            previous = corner;
+        }
+        Ok(())
+    }
+}
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    fn begin_list_int(&mut self, name: &str, _: usize) -> BeginList<'_, i32> {
+        if is_corner_list(name) { BeginList::Fill(&mut self.0) } else { BeginList::UseSetter }
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if !is_corner_list(name) {
+            return PropertyAccessResult::Ignored;
+        }
+        let Some(corners) = property.to_u32_list() else {
+            return PropertyAccessResult::UnsupportedType;
+        };
+        let corners = corners.into_iter().map(i32::try_from).collect::<Result<Vec<i32>, _>>();
+        match corners {
+            Ok(corners) => {
+                self.0 = corners;
+                PropertyAccessResult::Set
+            }
+            Err(_) => PropertyAccessResult::UnsupportedType,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VERTICES: [[f32; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.5]];
+
+    const HEADER: &str = "1.0\ncomment a quad and a triangle, with extras\n\
+        element vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        property uchar red\nelement other 1\nproperty list uchar float weights\n\
+        element face 2\nproperty list uchar int vertex_indices\nproperty uchar flags\nend_header\n";
+
+    fn ascii() -> Vec<u8> {
+        let payload =
+            "0 0 0 1\n1 0 0 2\n1 1.0 0 3\n0 1 5e-1 4\n2 0.5 0.5\n4 0 1 2 3 9\n3 3 2 1 9\n";
+        format!("ply\nformat ascii {HEADER}{payload}").into_bytes()
+    }
+
+    fn binary(format: &str, float: fn(f32) -> [u8; 4], int: fn(i32) -> [u8; 4]) -> Vec<u8> {
+        let mut bytes = format!("ply\nformat {format} {HEADER}").into_bytes();
+        for vertex in VERTICES {
+            bytes.extend(vertex.into_iter().flat_map(float));
+            bytes.push(1);
+        }
+        bytes.push(2);
+        bytes.extend([0.5, 0.5].into_iter().flat_map(float));
+        for (count, face) in [(4, &[0, 1, 2, 3][..]), (3, &[3, 2, 1])] {
+            bytes.push(count);
+            bytes.extend(face.iter().copied().flat_map(int));
+            bytes.push(9);
+        }
+        bytes
+    }
+
+    fn read_all(bytes: &[u8]) -> Result<Scene> {
+        read(bytes, bytes.len() as u64)
+    }
+
+    fn message(bytes: &[u8]) -> String {
+        format!("{:#}", read_all(bytes).unwrap_err())
+    }
+
+    #[test]
+    fn three_encodings_give_one_mesh() {
+        let files = [
+            ascii(),
+            binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes),
+            binary("binary_big_endian", f32::to_be_bytes, i32::to_be_bytes),
+        ];
+        for file in files {
+            let scene = read_all(&file).unwrap();
+            assert_eq!(scene.positions, VERTICES);
+            assert_eq!(scene.indices, [[0, 1, 2], [0, 2, 3], [3, 2, 1]]);
+        }
+    }
+
+    #[test]
+    fn every_number_type_is_understood() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty short y\n\
+            property float32 z\nelement face 1\nproperty list int ushort vertex_index\nend_header\n\
+            0.25 -1 0\n1 2 0\n0 1 0\n3 0 1 2\n";
+        let scene = read_all(text.as_bytes()).unwrap();
+        assert_eq!(scene.positions, [[0.25, -1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 1.0, 0.0]]);
+        assert_eq!(scene.indices, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn every_cut_is_reported() {
+        let file = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);
+        for length in 0..file.len() - 1 {
+            let message = message(&file[..length]);
+            assert!(!message.is_empty());
+        }
+        let cut = message(&file[..file.len() - 8]);
+        assert_eq!(cut, "it is cut off after 1 of 2 `face` elements: fetch or export it again");
+    }
+
+    #[test]
+    fn damage_is_reported() {
+        assert!(message(b"hello\n").contains("not a PLY file"));
+        assert!(message(b"").contains("not a PLY file"));
+        let text = String::from_utf8(ascii()).unwrap();
+        let broken = [
+            ("1 0 0 2", "1 zero 0 2", "`vertex` element 1"),
+            ("3 3 2 1 9", "3 3 -2 1 9", "`face` element 1: vertex -2 does not exist"),
+            ("vertex_indices", "corners", "no `vertex_indices`"),
+            ("float z", "float w", "no `z`"),
+            ("element vertex 4", "element point 4", "no `vertex` element"),
+            ("format ascii 1.0", "format text 1.0", "header is damaged"),
+            (
+                "end_header",
+                "element nothing 99999999999999\nend_header",
+                "`nothing` elements are empty",
+            ),
+            ("element other", "element tristrips", "triangle strips"),
+        ];
+        for (from, to, expected) in broken {
+            let message = message(text.replacen(from, to, 1).as_bytes());
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_header_that_promises_too_much_reserves_nothing() {
+        let text = String::from_utf8(ascii()).unwrap();
+        let huge = text.replace("element face 2", "element face 99999999999999");
+        assert!(message(huge.as_bytes()).contains("cut off after 2 of 99999999999999"));
+    }
+}

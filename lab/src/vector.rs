@@ -1,0 +1,29 @@
+//! Vectors of three `f64`, for everything that is not a query: generating, framing, shading.
+
+/// A vector or a point.
+pub(crate) type Vector = [f64; 3];
+
+pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// `from + amount * along`.
+pub(crate) fn offset(from: Vector, amount: f64, along: Vector) -> Vector {
+    [0, 1, 2].map(|axis| from[axis] + amount * along[axis])
+}
+
+/// The vector at length 1, unless it has none. No `f32` coordinates are too small or too large.
+pub(crate) fn unit(v: Vector) -> Option<Vector> {
+    let length = dot(v, v).sqrt();
+    (length > 0.0).then(|| v.map(|c| c / length))
+}
+
+/// The nearest point that a mesh or a ray can have.
+#[expect(clippy::cast_possible_truncation, reason = "the rounding that is wanted")]
+pub(crate) fn round(v: Vector) -> [f32; 3] {
+    v.map(|c| c as f32)
+}
