@@ -20,6 +20,13 @@ pub(crate) fn set_range(words: &mut [u64], bit: usize, more: usize) {
     }
 }
 
+/// A word as two, the lower bits first.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "that is how to take the lower half")]
+pub(crate) const fn halves(word: u64) -> [u32; 2] {
+    [word as u32, (word >> 32) as u32]
+}
+
 /// Whether a bit is set; a bit past the end is not.
 #[inline(always)]
 pub(crate) fn is_set(words: &[u64], bit: usize) -> bool {

@@ -15,8 +15,9 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::aabb::Aabb;
 use crate::arena::{self, ALIGNMENT};
+use crate::bits::halves;
 use crate::cell::{Lattice, MAX_RESOLUTION};
-use crate::config::Method;
+use crate::config::{Config, Method};
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
 
@@ -57,19 +58,31 @@ pub(crate) struct Header {
     pub(crate) hash_count: u32,
     /// Primitive ids in all cells together.
     pub(crate) reference_count: u32,
-    pub(crate) reserved: [u32; 9],
+    /// Cells of a level in one of the level above, on each axis; 0 for a method without levels.
+    pub(crate) macrocell_factor: u32,
+    /// A cell with more primitives has a subgrid; 0 for a method without subgrids.
+    pub(crate) subdivide_above: u32,
+    reserved: [u32; 6],
+    /// Over all bytes before it: a header is what a build wrote, or `open` refuses it.
+    checksum: u32,
 }
 
-const _: () = assert!(HEADER_BYTES == 128 && HEADER_BYTES % ALIGNMENT == 0);
+const _: () = assert!(HEADER_BYTES == 128 && HEADER_BYTES.is_multiple_of(ALIGNMENT));
 
 impl Header {
     /// A header for a mesh; the counts that the build finds are the caller's to fill in.
-    pub(crate) fn new(method: Method, mesh: &TriangleMesh<'_>, lattice: &Lattice) -> Self {
+    pub(crate) fn new(config: &Config, mesh: &TriangleMesh<'_>, lattice: &Lattice) -> Self {
         Self {
             magic: MAGIC,
             byte_order: BYTE_ORDER,
             version: BLOB_VERSION,
-            method: method as u32,
+            method: config.method as u32,
+            macrocell_factor: if config.method.has_macrocells() {
+                config.macrocell_factor
+            } else {
+                0
+            },
+            subdivide_above: if config.method.has_subgrids() { config.subdivide_above } else { 0 },
             triangle_count: mesh.triangle_count(),
             vertex_count: mesh.vertex_count() as u64,
             bounds_min: lattice.min,
@@ -77,6 +90,22 @@ impl Header {
             resolution: lattice.resolution,
             ..Self::zeroed()
         }
+    }
+
+    /// The header as the first bytes of a blob.
+    pub(crate) fn to_bytes(mut self) -> [u8; HEADER_BYTES] {
+        self.checksum = self.sum();
+        bytemuck::cast(self)
+    }
+
+    /// FNV-1a over the words before the checksum, and a finisher so that every bit counts.
+    fn sum(&self) -> u32 {
+        let words: [u32; HEADER_BYTES / size_of::<u32>()] = bytemuck::cast(*self);
+        let (_, words) = words.split_last().unwrap_or((&0, &[]));
+        let step = |sum: u64, &word: &u32| (sum ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
+        let sum = words.iter().fold(0xcbf2_9ce4_8422_2325, step);
+        let [low, high] = halves(sum ^ (sum >> 29));
+        low ^ high
     }
 
     /// Reads the header of foreign bytes and checks all that O(1) can: it is a grid of this version
@@ -106,6 +135,9 @@ impl Header {
         if header.version != BLOB_VERSION {
             return Err(Error::UnsupportedVersion { found: header.version });
         }
+        if header.checksum != header.sum() {
+            return Err(corrupt(core::mem::offset_of!(Self, checksum)));
+        }
         if header.blob_bytes > bytes.len() as u64 {
             return Err(Error::Truncated {
                 needed_bytes: header.blob_bytes,
@@ -132,9 +164,23 @@ impl Header {
         Ok(Lattice::new(bounds, self.resolution))
     }
 
-    /// Whether the bytes that mean nothing yet are zero, as a build leaves them.
-    pub(crate) fn reserved_is_zero(&self) -> bool {
-        self.reserved == [0; 9]
+    /// The configuration that the grid was built with, where the method has such parameters.
+    pub(crate) fn config(&self, default: Config) -> Config {
+        let mut config = Config { density: self.density, ..default };
+        if config.method.has_macrocells() {
+            config.macrocell_factor = self.macrocell_factor;
+        }
+        if config.method.has_subgrids() {
+            config.subdivide_above = self.subdivide_above;
+        }
+        config
+    }
+
+    /// Whether the fields that mean nothing to the method are zero, as a build leaves them.
+    pub(crate) fn unused_is_zero(&self, method: Method) -> bool {
+        (method.has_macrocells() || self.macrocell_factor == 0)
+            && (method.has_subgrids() || self.subdivide_above == 0)
+            && self.reserved == [0; 6]
     }
 }
 

@@ -45,6 +45,14 @@ impl CellRange {
         core::array::from_fn(|axis| u64::from(self.max[axis] - self.min[axis]) + 1)
     }
 
+    /// The cells, along x, then y, then z.
+    pub(crate) fn cells(self) -> impl Iterator<Item = [u32; 3]> {
+        let Self { min, max } = self;
+        (min[2]..=max[2]).flat_map(move |z| {
+            (min[1]..=max[1]).flat_map(move |y| (min[0]..=max[0]).map(move |x| [x, y, z]))
+        })
+    }
+
     /// Whether a cell is one of them.
     pub(crate) fn contains(&self, cell: [u32; 3]) -> bool {
         (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&cell[axis]))
@@ -128,14 +136,24 @@ impl Lattice {
     /// The cells into which a triangle with this box belongs.
     #[inline(always)]
     pub(crate) fn range(&self, triangle: &Aabb) -> CellRange {
+        cells_between(self.reach(triangle), self.resolution)
+    }
+
+    /// A triangle's box, grown by the margin, in cells.
+    #[inline(always)]
+    pub(crate) fn reach(&self, triangle: &Aabb) -> Aabb {
         let origin = Vec3A::from_array(self.min);
         let cells_per_unit = Vec3A::from_array(self.cells_per_unit);
         let margin = Vec3A::from_array(self.margin);
-        let end = Vec3A::from_array(self.resolution.map(as_f32)) - 0.5;
-        let min = (triangle.min - origin) * cells_per_unit - margin;
-        let max = (triangle.max - origin) * cells_per_unit + margin;
-        let clamp = |position: Vec3A| position.max(Vec3A::ZERO).min(end);
-        CellRange { min: whole(clamp(min)), max: whole(clamp(max)) }
+        Aabb {
+            min: (triangle.min - origin) * cells_per_unit - margin,
+            max: (triangle.max - origin) * cells_per_unit + margin,
+        }
+    }
+
+    /// The extent of a cell on each axis, up to a common factor.
+    pub(crate) fn cell_size(&self) -> Vec3A {
+        1.0 / Vec3A::from_array(self.cells_per_unit)
     }
 
     /// Where a coordinate lies, in cells from the box's corner.
@@ -144,11 +162,10 @@ impl Lattice {
         (coordinate - f64::from(self.min[axis])) * self.cells_per_unit(axis)
     }
 
-    /// The cell of a position, the nearest one if it lies outside.
+    /// The last cell on each axis.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped by min")]
-    pub(crate) fn clamp(&self, axis: usize, position: f64) -> u32 {
-        (position.max(0.0) as u32).min(self.resolution[axis] - 1)
+    pub(crate) fn last(&self) -> [u32; 3] {
+        self.resolution.map(|cells| cells - 1)
     }
 
     #[inline(always)]
@@ -161,6 +178,14 @@ impl Lattice {
     pub(crate) fn finest(&self) -> f64 {
         self.cells_per_unit.map(f64::from).into_iter().fold(0.0, f64::max)
     }
+}
+
+/// The cells that a box in cells overlaps; those at the border if it lies outside.
+#[inline(always)]
+pub(crate) fn cells_between(reach: Aabb, resolution: [u32; 3]) -> CellRange {
+    let end = Vec3A::from_array(resolution.map(as_f32)) - 0.5;
+    let clamp = |position: Vec3A| position.max(Vec3A::ZERO).min(end);
+    CellRange { min: wholes(clamp(reach.min)), max: wholes(clamp(reach.max)) }
 }
 
 /// How far a triangle's box is grown before it is spread over cells; see the module's head.
@@ -178,13 +203,20 @@ pub(crate) const fn as_f32(cell: u32) -> f32 {
     cell as f32
 }
 
-/// The whole part of positions between 0 and [`MAX_RESOLUTION`]; an odd whole number may count as
+/// The whole part of a position; 0 if it is negative or no number.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+pub(crate) const fn whole(position: f32) -> u32 {
+    position as u32
+}
+
+/// The whole parts of positions between 0 and [`MAX_RESOLUTION`]; an odd whole number may count as
 /// the end of the cell before it, which the margin allows.
 ///
-/// Adding 1.5 * 2^23 rounds to whole numbers and leaves them in the low bits: 15 % of a build less
-/// than with casts, which must saturate.
+/// Adding 1.5 * 2^23 rounds to whole numbers and leaves them in the low bits: 5 to 10 % of a build
+/// less than with casts, which must saturate.
 #[inline(always)]
-fn whole(position: Vec3A) -> [u32; 3] {
+fn wholes(position: Vec3A) -> [u32; 3] {
     let shifted = position - Vec3A::splat(0.5) + Vec3A::splat(12_582_912.0);
     shifted.to_array().map(|bits| bits.to_bits() & 0x003f_ffff)
 }

@@ -12,23 +12,54 @@ pub enum Method {
     /// One level, row displacement compression (Lagae and Dutré 2008; the paper's baseline).
     #[default]
     OneLevel = 1,
+    /// A fine one-level grid under macrocell levels (the paper's multi-level fixed grid, §3.2).
+    Fixed = 2,
+    /// A one-level grid whose crowded cells hold one-level grids of their own (the paper's
+    /// multi-level variable grid, §3.1).
+    Variable = 3,
 }
 
 impl Method {
+    /// All methods, in the order of the paper's Table 1 but for its baseline, which comes last.
+    pub const ALL: &[Self] = &[Self::OneLevel, Self::Variable, Self::Fixed];
+
+    /// The name that commands and tables use.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OneLevel => "one-level",
+            Self::Fixed => "fixed",
+            Self::Variable => "variable",
+        }
+    }
+
     /// The method that a number in a blob or from C means.
     #[must_use]
     pub const fn from_u32(value: u32) -> Option<Self> {
         match value {
             1 => Some(Self::OneLevel),
+            2 => Some(Self::Fixed),
+            3 => Some(Self::Variable),
             _ => None,
         }
+    }
+
+    /// Whether [`Config::macrocell_factor`] means something to it.
+    pub(crate) const fn has_macrocells(self) -> bool {
+        matches!(self, Self::Fixed)
+    }
+
+    /// Whether [`Config::subdivide_above`] means something to it.
+    pub(crate) const fn has_subgrids(self) -> bool {
+        matches!(self, Self::Variable)
     }
 
     /// The density that the paper uses with this method.
     #[must_use]
     pub const fn default_density(self) -> f32 {
         match self {
-            Self::OneLevel => 4.0,
+            Self::OneLevel | Self::Variable => 4.0,
+            Self::Fixed => 32.0,
         }
     }
 }
@@ -49,6 +80,11 @@ pub struct Config {
     pub method: Method,
     /// Cells per primitive (the paper's rho): more cells mean fewer tests, more steps, more memory.
     pub density: f32,
+    /// For [`Method::Fixed`]: cells of a level in one macrocell of the level above, on each axis (the
+    /// paper's S), at least 2.
+    pub macrocell_factor: u32,
+    /// For [`Method::Variable`]: a cell with more primitives than this gets a subgrid.
+    pub subdivide_above: u32,
     /// Choices that are either on or off.
     pub flags: BuildFlags,
 }
@@ -57,13 +93,22 @@ impl Config {
     /// The paper's parameters for a method.
     #[must_use]
     pub const fn new(method: Method) -> Self {
-        Self { method, density: method.default_density(), flags: BuildFlags::empty() }
+        Self {
+            method,
+            density: method.default_density(),
+            macrocell_factor: 6,
+            subdivide_above: 16,
+            flags: BuildFlags::empty(),
+        }
     }
 
     /// Refuses values that no build can use.
     pub(crate) fn check(&self) -> Result<(), Error> {
         if !self.density_is_valid() {
             return Err(Error::InvalidConfig(ConfigField::Density));
+        }
+        if self.method.has_macrocells() && self.macrocell_factor < 2 {
+            return Err(Error::InvalidConfig(ConfigField::MacrocellFactor));
         }
         if self.flags.bits() & !BuildFlags::all().bits() != 0 {
             return Err(Error::InvalidConfig(ConfigField::Flags));

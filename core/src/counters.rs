@@ -6,9 +6,9 @@
 pub struct Counters {
     /// Ray-triangle tests ("primitive intersections").
     pub primitive_tests: u64,
-    /// Cells entered ("cell traversals"), empty ones included.
+    /// Cells and macrocells entered ("cell traversals"), empty ones included.
     pub cell_steps: u64,
-    /// Subgrids or macrocell levels entered ("grid traversals"); 0 for a one-level grid.
+    /// Macrocells gone down into and subgrids entered ("grid traversals"); 0 for a one-level grid.
     pub grid_steps: u64,
 }
 
@@ -16,6 +16,7 @@ pub struct Counters {
 pub(crate) trait Tally {
     fn primitive_test(&mut self);
     fn cell_step(&mut self);
+    fn grid_step(&mut self);
 }
 
 impl Tally for () {
@@ -23,6 +24,8 @@ impl Tally for () {
     fn primitive_test(&mut self) {}
     #[inline(always)]
     fn cell_step(&mut self) {}
+    #[inline(always)]
+    fn grid_step(&mut self) {}
 }
 
 impl Tally for Counters {
@@ -33,5 +36,9 @@ impl Tally for Counters {
     #[inline(always)]
     fn cell_step(&mut self) {
         self.cell_steps += 1;
+    }
+    #[inline(always)]
+    fn grid_step(&mut self) {
+        self.grid_steps += 1;
     }
 }

@@ -1,44 +1,71 @@
 //! Walking a ray through cells without drift (Amanatides and Woo 1987; robust as in LD08).
 //!
-//! Distances are measured in cells along the ray's longest axis, from where the walk starts; so
-//! they need no scene scale. The distance to the next cell border is computed from the integer
-//! cell at every step, `base + cell * delta`, and never summed up: its error stays a few roundings
+//! Distances are measured in cells along the ray's longest axis, from where the ray enters the box;
+//! so they need no scene scale. The distance to the next border is computed from the integer cell
+//! at every step, `base + cell * delta`, and never summed up: its error stays a few roundings
 //! however long the walk, and what error remains lies inside the margin by which triangles were
 //! spread over cells.
+//!
+//! A [`Line`] is the ray in a lattice; a [`Walk`] goes along it through equal cells, those of the
+//! lattice or larger ones of a macrocell level.
 
 use crate::approach::Approach;
-use crate::cell::{Lattice, as_f32};
+use crate::cell::{Lattice, as_f32, whole};
 use crate::ray::{Ray, round};
 
-/// A walk through the cells of a lattice.
+/// A ray in the cells of a lattice, from where it enters the box.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Dda {
+pub(crate) struct Line {
+    /// Where the line starts, in cells.
+    position: [f32; 3],
+    /// Cells for each unit of distance; zero on an axis that the ray runs parallel to.
+    rate: [f32; 3],
+    /// Distance for each cell, negative where the ray runs downwards; zero if parallel.
+    delta: [f32; 3],
+    /// Distance at which the ray ends.
+    pub(crate) end: f32,
+    /// The `t` at which the line starts.
+    start: f64,
+    /// Distance for each unit of `t`.
+    scale: f64,
+}
+
+/// A walk along a line through cells of one size.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Walk {
     /// The cell the walk is in.
     pub(crate) cell: [u32; 3],
+    /// Distance at which it was entered.
+    pub(crate) entered: f32,
     /// Distance at which the ray leaves the cell through its border on each axis.
     next: [f32; 3],
     /// Distance from one border to the next, negative where the ray runs downwards.
     delta: [f32; 3],
-    /// Distance of border 0 (for the side the ray leaves by).
+    /// Distance of the border through which the ray leaves cell 0.
     base: [f32; 3],
     /// What to add to the cell on each axis: 1 or, in wrapping arithmetic, -1.
     step: [u32; 3],
-    /// The first cell outside on each axis.
+    /// The first cell on each axis that the walk does not enter.
     outside: [u32; 3],
-    /// Distance at which the ray ends.
-    pub(crate) end: f32,
-    /// The `t` at which the walk starts.
-    start: f64,
-    /// Distance for each unit of `t`.
-    scale: f64,
+}
+
+/// What became of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// The walk is in the next cell.
+    Inside,
+    /// The walk left its cells.
+    Outside,
+    /// The ray ended in the cell.
+    Ended,
 }
 
 /// A direction component this much smaller than the largest moves the ray by less than the margin
 /// of the cells over the whole box: the axis counts as parallel.
 const PARALLEL: f64 = 1.0 / 1_099_511_627_776.0; // 2^-40
 
-impl Dda {
-    /// Starts a walk for a ray that was brought to the lattice's box; `None` if it ends before.
+impl Line {
+    /// The line of a ray that was brought to the lattice's box; `None` if it ends before.
     #[inline]
     pub(crate) fn new(lattice: &Lattice, ray: &Ray, approach: &Approach) -> Option<Self> {
         // A `t` is rounded to f32 before it is compared: what it was before may lie half an ulp out.
@@ -51,33 +78,24 @@ impl Dda {
         let longest = direction.map(f64::abs).into_iter().fold(0.0, f64::max);
         let scale = longest * lattice.finest();
 
-        let mut walk = Self {
-            cell: [0; 3],
-            next: [f32::INFINITY; 3],
+        let mut line = Self {
+            position: [0.0; 3],
+            rate: [0.0; 3],
             delta: [0.0; 3],
-            base: [f32::INFINITY; 3],
-            step: [0; 3],
-            outside: [u32::MAX; 3],
             end: round((end - start) * scale),
-            scale,
             start: approach.t + start,
+            scale,
         };
         for (axis, &direction) in direction.iter().enumerate() {
             let point = f64::from(approach.anchor[axis]) + start * direction;
-            let position = lattice.position(axis, point);
-            walk.cell[axis] = lattice.clamp(axis, position);
-            if direction.abs() < longest * PARALLEL {
-                continue;
+            line.position[axis] = round(lattice.position(axis, point));
+            if direction.abs() >= longest * PARALLEL {
+                let speed = direction * lattice.cells_per_unit(axis);
+                line.rate[axis] = round(speed / scale);
+                line.delta[axis] = round(scale / speed);
             }
-            let delta = scale / (direction * lattice.cells_per_unit(axis));
-            let upwards = direction > 0.0;
-            walk.delta[axis] = round(delta);
-            walk.base[axis] = round((f64::from(u8::from(upwards)) - position) * delta);
-            walk.step[axis] = if upwards { 1 } else { u32::MAX };
-            walk.outside[axis] = if upwards { lattice.resolution[axis] } else { u32::MAX };
-            walk.aim(axis);
         }
-        Some(walk)
+        Some(line)
     }
 
     /// The distance behind which every `t` is larger than this one, its rounding included.
@@ -86,31 +104,103 @@ impl Dda {
         round((f64::from(t.next_up()) - self.start) * self.scale)
     }
 
-    /// Enters the next cell, unless the ray leaves the grid or has `limit` behind it by then.
+    /// The same line in the cells of a subgrid, whose corner lies at `origin` and which has `scale`
+    /// cells for one of this line's. Distances stay what they are.
+    #[inline]
+    pub(crate) fn zoom(&self, origin: [f32; 3], scale: [f32; 3]) -> Self {
+        let mut zoomed = *self;
+        for axis in 0..3 {
+            zoomed.position[axis] = (self.position[axis] - origin[axis]) * scale[axis];
+            zoomed.rate[axis] = self.rate[axis] * scale[axis];
+            zoomed.delta[axis] = self.delta[axis] / scale[axis];
+        }
+        zoomed
+    }
+
+    /// A walk through a box of so many cells, from `entered` or where the line enters the box;
+    /// `None` if it passes the box or has left it by then.
+    #[inline]
+    pub(crate) fn walk_in(&self, entered: f32, resolution: [u32; 3]) -> Option<Walk> {
+        let (mut near, mut far) = (entered, f32::INFINITY);
+        for (axis, &cells) in resolution.iter().enumerate() {
+            let (low, high) = (-self.position[axis], as_f32(cells) - self.position[axis]);
+            let delta = self.delta[axis];
+            if delta > 0.0 {
+                near = near.max(low * delta);
+                far = far.min(high * delta);
+            } else if delta < 0.0 {
+                near = near.max(high * delta);
+                far = far.min(low * delta);
+            } else if low > 0.0 || high < 0.0 {
+                return None;
+            }
+        }
+        let last = resolution.map(|cells| cells.saturating_sub(1));
+        (near <= far).then(|| self.walk(near, 1.0, [0; 3], last))
+    }
+
+    /// A walk from a distance on through the cells `min..=max`, each `size` cells of the lattice
+    /// wide.
+    #[inline(always)]
+    pub(crate) fn walk(&self, from: f32, size: f32, min: [u32; 3], max: [u32; 3]) -> Walk {
+        let mut walk = Walk {
+            cell: min,
+            entered: from,
+            next: [f32::INFINITY; 3],
+            delta: [0.0; 3],
+            base: [f32::INFINITY; 3],
+            step: [0; 3],
+            outside: [u32::MAX; 3],
+        };
+        for axis in 0..3 {
+            let position = (self.position[axis] + from * self.rate[axis]) / size;
+            walk.cell[axis] = whole(position).max(min[axis]).min(max[axis]);
+            let delta = self.delta[axis];
+            if delta > 0.0 {
+                walk.base[axis] = (size - self.position[axis]) * delta;
+                walk.step[axis] = 1;
+                walk.outside[axis] = max[axis].wrapping_add(1);
+            } else if delta < 0.0 {
+                walk.base[axis] = -self.position[axis] * delta;
+                walk.step[axis] = u32::MAX;
+                walk.outside[axis] = min[axis].wrapping_sub(1);
+            } else {
+                continue;
+            }
+            walk.delta[axis] = delta * size;
+            walk.aim(axis);
+        }
+        walk
+    }
+}
+
+impl Walk {
+    /// Enters the next cell, unless the walk leaves its cells or has `limit` behind it by then.
     ///
     /// Every call moves one axis towards its end, whatever the floats say: a walk takes at most as
-    /// many steps as the three resolutions sum up to.
+    /// many steps as it has cells on the three axes together.
     #[inline(always)]
-    pub(crate) fn advance(&mut self, limit: f32) -> bool {
+    pub(crate) fn advance(&mut self, limit: f32) -> Step {
         let [x, y, z] = self.next;
         // One arm for each axis: an axis chosen at run time would keep the walk in memory.
         if x < y && x < z {
-            self.step::<0>(limit)
+            self.step_along::<0>(limit)
         } else if y < z {
-            self.step::<1>(limit)
+            self.step_along::<1>(limit)
         } else {
-            self.step::<2>(limit)
+            self.step_along::<2>(limit)
         }
     }
 
     #[inline(always)]
-    fn step<const AXIS: usize>(&mut self, limit: f32) -> bool {
-        if limit <= self.next[AXIS] {
-            return false;
+    fn step_along<const AXIS: usize>(&mut self, limit: f32) -> Step {
+        self.entered = self.next[AXIS];
+        if limit <= self.entered {
+            return Step::Ended;
         }
         self.cell[AXIS] = self.cell[AXIS].wrapping_add(self.step[AXIS]);
         self.aim(AXIS);
-        self.cell[AXIS] != self.outside[AXIS]
+        if self.cell[AXIS] == self.outside[AXIS] { Step::Outside } else { Step::Inside }
     }
 
     /// Computes the distance to the next border on an axis from the cell.

@@ -30,6 +30,8 @@ pub enum ConfigField {
     /// Zero, negative, NaN, or so large that an axis would need more than
     /// [`MAX_RESOLUTION`](crate::MAX_RESOLUTION) cells.
     Density,
+    /// Below 2, for a method with macrocells.
+    MacrocellFactor,
     /// A flag that this version does not know.
     Flags,
 }
@@ -133,6 +135,9 @@ impl fmt::Display for Error {
                 "density must be above 0 and ask for at most {} cells on an axis",
                 crate::MAX_RESOLUTION
             ),
+            Self::InvalidConfig(ConfigField::MacrocellFactor) => {
+                f.write_str("macrocell_factor must be at least 2")
+            }
             Self::InvalidConfig(ConfigField::Flags) => f.write_str("unknown build flag"),
             Self::NotAGrid => f.write_str("the bytes are not a grid"),
             Self::WrongByteOrder => {

@@ -6,12 +6,14 @@ use crate::blob::{Header, corrupt};
 use crate::cell::Lattice;
 use crate::config::{Config, Method};
 use crate::counters::{Counters, Tally};
-use crate::dda::Dda;
+use crate::dda::Line;
 use crate::error::{Error, Region};
+use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{self, OneLevel};
 use crate::ray::{Hit, Ray};
 use crate::triangle::TriangleTest;
+use crate::variable::{self, Variable};
 
 /// A built grid and the mesh it was built for, ready for queries.
 ///
@@ -29,6 +31,8 @@ pub struct Grid<'a> {
 #[derive(Debug, Clone, Copy)]
 enum Structure<'a> {
     OneLevel(OneLevel<'a>),
+    Fixed(Fixed<'a>),
+    Variable(Variable<'a>),
 }
 
 impl<'a> Grid<'a> {
@@ -71,7 +75,11 @@ impl<'a> Grid<'a> {
         check_alignment(index, Region::Index)?;
         check_alignment(scratch, Region::Scratch)?;
         let blob = match config.method {
-            Method::OneLevel => one_level::build(&mesh, config, index, scratch)?,
+            Method::OneLevel => one_level::build(&mesh, config, &(), index, scratch)?,
+            Method::Fixed => {
+                one_level::build(&mesh, config, &Macrocells::of(config), index, scratch)?
+            }
+            Method::Variable => variable::build(&mesh, config, index, scratch)?,
         };
         Self::open(blob, mesh)
     }
@@ -92,7 +100,11 @@ impl<'a> Grid<'a> {
         let bytes = usize::try_from(header.blob_bytes).ok().and_then(|bytes| blob.get(..bytes));
         let blob = bytes.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
         let structure = match Method::from_u32(header.method) {
-            Some(Method::OneLevel) => Structure::OneLevel(OneLevel::open(&header, blob)?),
+            Some(Method::OneLevel) => {
+                Structure::OneLevel(OneLevel::open(&header, &lattice, &(), blob)?)
+            }
+            Some(Method::Fixed) => Structure::Fixed(Fixed::open(&header, &lattice, blob)?),
+            Some(Method::Variable) => Structure::Variable(Variable::open(&header, &lattice, blob)?),
             None => return Err(corrupt(core::mem::offset_of!(Header, method))),
         };
         Ok(Self { mesh, blob, lattice, structure })
@@ -108,8 +120,15 @@ impl<'a> Grid<'a> {
     /// [`Error::IndexOutOfRange`] if the mesh itself is damaged.
     pub fn validate(&self) -> Result<(), Error> {
         let header = Header::read(self.blob, &self.mesh)?;
+        if !header.unused_is_zero(self.method()) {
+            return Err(corrupt(core::mem::offset_of!(Header, macrocell_factor)));
+        }
         match &self.structure {
             Structure::OneLevel(grid) => {
+                grid.validate(&header, &self.lattice, self.blob, &self.mesh)
+            }
+            Structure::Fixed(grid) => grid.validate(&header, &self.lattice, self.blob, &self.mesh),
+            Structure::Variable(grid) => {
                 grid.validate(&header, &self.lattice, self.blob, &self.mesh)
             }
         }
@@ -144,11 +163,11 @@ impl<'a> Grid<'a> {
     #[inline(always)]
     fn query<const ANY: bool, T: Tally>(&self, ray: &Ray, tally: &mut T) -> Option<Hit> {
         let approach = Approach::new(ray, &self.lattice.bounds())?;
-        let walk = Dda::new(&self.lattice, ray, &approach)?;
+        let line = Line::new(&self.lattice, ray, &approach)?;
         let test = TriangleTest::from(ray, &approach);
 
         let mut best = None;
-        let mut limit = walk.end;
+        let mut limit = line.end;
         let leaf = |references: &[u32], tally: &mut T| {
             for &id in references {
                 tally.primitive_test();
@@ -160,13 +179,15 @@ impl<'a> Grid<'a> {
                 }
                 if best.is_none_or(|best| hit.on(id).is_closer(&best)) {
                     best = Some(hit.on(id));
-                    limit = walk.distance(hit.t);
+                    limit = line.distance(hit.t);
                 }
             }
             limit
         };
         match &self.structure {
-            Structure::OneLevel(grid) => grid.traverse(walk, tally, leaf),
+            Structure::OneLevel(grid) => grid.traverse(&line, tally, leaf),
+            Structure::Fixed(grid) => grid.traverse(&line, tally, leaf),
+            Structure::Variable(grid) => grid.traverse(&line, tally, leaf),
         }
         best
     }
@@ -189,11 +210,16 @@ impl<'a> Grid<'a> {
         self.blob.len()
     }
 
-    /// Bytes of scratch that the build took.
+    /// Bytes of scratch that the build of this grid took, or at most took if it is a variable one.
     #[must_use]
-    pub const fn scratch_bytes(&self) -> u64 {
+    pub fn scratch_bytes(&self) -> u64 {
+        let resolution = self.lattice.resolution;
         match self.structure {
-            Structure::OneLevel(_) => one_level::scratch_bytes(self.lattice.resolution),
+            Structure::OneLevel(_) | Structure::Fixed(_) => one_level::scratch_bytes(resolution),
+            Structure::Variable(_) => {
+                let triangles = self.mesh.triangle_count();
+                variable::scratch_bytes_at_most(resolution, triangles, self.density())
+            }
         }
     }
 
@@ -215,6 +241,8 @@ impl<'a> Grid<'a> {
     pub const fn method(&self) -> Method {
         match self.structure {
             Structure::OneLevel(_) => Method::OneLevel,
+            Structure::Fixed(_) => Method::Fixed,
+            Structure::Variable(_) => Method::Variable,
         }
     }
 
@@ -222,7 +250,14 @@ impl<'a> Grid<'a> {
     /// mesh would have needed more than 16 references a triangle.
     #[must_use]
     pub fn density(&self) -> f32 {
-        self.header().map_or(0.0, |header| header.density)
+        self.config().density
+    }
+
+    /// A configuration that builds this grid of this mesh again.
+    #[must_use]
+    pub fn config(&self) -> Config {
+        let config = Config::new(self.method());
+        self.header().map_or(config, |header| header.config(config))
     }
 
     /// Triangles left out because a coordinate is not finite.

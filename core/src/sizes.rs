@@ -2,8 +2,10 @@
 
 use crate::config::{Config, Method};
 use crate::error::{Error, Region};
+use crate::fixed;
 use crate::mesh::TriangleMesh;
 use crate::one_level;
+use crate::variable;
 
 /// Bytes of the two regions that a build takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +41,9 @@ impl Sizes {
             return None;
         }
         let (index, scratch) = match config.method {
-            Method::OneLevel => one_level::bound(triangles, config.density),
+            Method::OneLevel => one_level::bound(triangles, config.density, 0),
+            Method::Fixed => fixed::bound(triangles, config),
+            Method::Variable => variable::bound(triangles, config),
         };
         if index > usize::MAX as u64 || scratch > usize::MAX as u64 {
             return None;
@@ -90,6 +94,8 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
     config.check()?;
     crate::arena::check_alignment(scratch, Region::Scratch)?;
     match config.method {
-        Method::OneLevel => one_level::sizes(mesh, config, scratch),
+        Method::OneLevel => one_level::sizes(mesh, config, &(), scratch),
+        Method::Fixed => one_level::sizes(mesh, config, &fixed::Macrocells::of(config), scratch),
+        Method::Variable => variable::sizes(mesh, config, scratch),
     }
 }

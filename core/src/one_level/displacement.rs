@@ -26,7 +26,7 @@ const WINDOW_SLOTS: usize = 4096;
 ///
 /// `domain_bits` holds the rows, `width` bits each; `occupied` must have one zero bit for every cell
 /// and a word more, and is left with the slots in use.
-pub(super) fn displace(
+pub(crate) fn displace(
     domain_bits: &[u64],
     width: usize,
     row_offsets: &mut [i32],
@@ -107,7 +107,7 @@ mod tests {
         let mut state = 1_u64;
         let mut bit = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            u64::from((state >> 33) % sparsity == 0)
+            u64::from((state >> 33).is_multiple_of(sparsity))
         };
         let mut words = vec![0; cells.div_ceil(64)];
         (0..cells).for_each(|cell| words[cell / 64] |= bit() << (cell % 64));

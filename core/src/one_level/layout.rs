@@ -1,8 +1,9 @@
 //! How many bytes a one-level grid takes and where they lie: one struct answers both.
 //!
 //! ```text
-//! index    | header | row_offsets | domain_bits | hash     | references |
-//!            128 B    i32 a row     1 bit a cell  u32 a slot  u32 each
+//! index    | header | row_offsets | domain_bits | hash       | references | overlay |
+//!            128 B    i32 a row     1 bit a cell  u32 a slot   u32 each     none, or what a
+//!                                                                           structure above adds
 //! scratch  | row_offsets | domain_bits | occupied  |
 //!            i32 a row     1 bit a cell  1 bit a slot
 //! ```
@@ -27,6 +28,8 @@ pub(crate) struct Layout {
     pub(crate) hash_count: u32,
     /// Primitive ids in all cells together.
     pub(crate) reference_count: u32,
+    /// Words that a structure above this one keeps behind it.
+    pub(crate) overlay_words: u64,
 }
 
 /// The sections of an index, behind its header.
@@ -36,6 +39,7 @@ pub(crate) struct Sections<'a> {
     pub(crate) domain_bits: &'a [u64],
     pub(crate) hash: &'a [u32],
     pub(crate) references: &'a [u32],
+    pub(crate) overlay: &'a [u64],
 }
 
 /// The same sections while they are written.
@@ -46,6 +50,7 @@ pub(crate) struct SectionsMut<'a> {
     pub(crate) domain_bits: &'a mut [u64],
     pub(crate) hash: &'a mut [u32],
     pub(crate) references: &'a mut [u32],
+    pub(crate) overlay: &'a mut [u64],
 }
 
 /// The sections of the scratch region.
@@ -54,13 +59,26 @@ pub(crate) struct Scratch<'a> {
     pub(crate) row_offsets: &'a mut [i32],
     pub(crate) domain_bits: &'a mut [u64],
     pub(crate) occupied: &'a mut [u64],
+    /// What is behind them.
+    pub(crate) rest: &'a mut [u8],
+}
+
+/// No axis of a grid of so many triangles has more cells, but for rounding.
+pub(crate) const fn longest(triangles: u32, density: f32) -> f64 {
+    cube_root(density as f64 * triangles as f64).min(MAX_RESOLUTION as f64)
 }
 
 impl Layout {
     /// The layout of a grid with this resolution and these counts.
-    pub(crate) const fn new(resolution: [u32; 3], hash_count: u32, reference_count: u32) -> Self {
+    pub(crate) const fn new(
+        resolution: [u32; 3],
+        hash_count: u32,
+        reference_count: u32,
+        overlay_words: u64,
+    ) -> Self {
         let rows = resolution[1] as u64 * resolution[2] as u64;
-        Self { rows, cells: rows * resolution[0] as u64, hash_count, reference_count }
+        let cells = rows * resolution[0] as u64;
+        Self { rows, cells, hash_count, reference_count, overlay_words }
     }
 
     /// A layout that is at least as large as that of any mesh with so many triangles.
@@ -68,8 +86,8 @@ impl Layout {
     /// With `n = cbrt(density * triangles)` no axis has more than `n` cells, and the longest has
     /// them all; so there are at most `n^3` cells in `n^2` rows.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded down")]
-    pub(crate) const fn bound(triangles: u32, density: f32) -> Self {
-        let longest = cube_root(density as f64 * triangles as f64).min(MAX_RESOLUTION as f64);
+    pub(crate) const fn bound(triangles: u32, density: f32, overlay_words: u64) -> Self {
+        let longest = longest(triangles, density);
         let cells = (longest * longest * longest) as u64 + 1;
         let rows = (longest * longest) as u64 + 1;
         Self {
@@ -77,7 +95,13 @@ impl Layout {
             cells,
             hash_count: if cells < u32::MAX as u64 { cells as u32 } else { u32::MAX },
             reference_count: super::reference_limit(triangles),
+            overlay_words,
         }
+    }
+
+    /// The same layout with other references.
+    pub(crate) const fn with_references(self, reference_count: u32) -> Self {
+        Self { reference_count, ..self }
     }
 
     /// Bytes of the blob, header included.
@@ -87,6 +111,7 @@ impl Layout {
             + section_bytes::<u64>(self.domain_words())
             + section_bytes::<u32>(self.hash_count as u64 + 1)
             + section_bytes::<u32>(self.reference_count as u64)
+            + section_bytes::<u64>(self.overlay_words)
     }
 
     /// Bytes that the build needs beside the index.
@@ -111,8 +136,9 @@ impl Layout {
         let (row_offsets, rest) = split(blob.get(HEADER_BYTES..)?, self.rows)?;
         let (domain_bits, rest) = split(rest, self.domain_words())?;
         let (hash, rest) = split(rest, u64::from(self.hash_count) + 1)?;
-        let (references, _) = split(rest, self.reference_count.into())?;
-        Some(Sections { row_offsets, domain_bits, hash, references })
+        let (references, rest) = split(rest, self.reference_count.into())?;
+        let (overlay, _) = split(rest, self.overlay_words)?;
+        Some(Sections { row_offsets, domain_bits, hash, references, overlay })
     }
 
     /// The sections of a blob for writing, their padding zeroed.
@@ -121,16 +147,17 @@ impl Layout {
         let (row_offsets, rest) = split_mut(rest, self.rows)?;
         let (domain_bits, rest) = split_mut(rest, self.domain_words())?;
         let (hash, rest) = split_mut(rest, u64::from(self.hash_count) + 1)?;
-        let (references, _) = split_mut(rest, self.reference_count.into())?;
-        Some(SectionsMut { header, row_offsets, domain_bits, hash, references })
+        let (references, rest) = split_mut(rest, self.reference_count.into())?;
+        let (overlay, _) = split_mut(rest, self.overlay_words)?;
+        Some(SectionsMut { header, row_offsets, domain_bits, hash, references, overlay })
     }
 
     /// The sections of a scratch region.
     pub(crate) fn scratch<'a>(&self, bytes: &'a mut [u8]) -> Option<Scratch<'a>> {
         let (row_offsets, rest) = split_mut(bytes, self.rows)?;
         let (domain_bits, rest) = split_mut(rest, self.domain_words())?;
-        let (occupied, _) = split_mut(rest, self.occupied_words())?;
-        Some(Scratch { row_offsets, domain_bits, occupied })
+        let (occupied, rest) = split_mut(rest, self.occupied_words())?;
+        Some(Scratch { row_offsets, domain_bits, occupied, rest })
     }
 }
 
@@ -145,7 +172,7 @@ mod tests {
     fn the_sections_fill_exactly_the_bytes_that_the_layout_asks_for() {
         for resolution in [[1, 1, 1], [64, 3, 5], [65, 1, 1], [200, 7, 1], [1, 100, 100]] {
             for (hash, references) in [(0, 0), (1, 7), (1000, 12345)] {
-                let layout = Layout::new(resolution, hash, references);
+                let layout = Layout::new(resolution, hash, references, u64::from(hash % 7));
                 let bytes = usize::try_from(layout.index_bytes()).unwrap();
                 let mut blob = vec![Block::ZERO; Block::count_for(bytes)];
                 let blob = Block::bytes_mut(&mut blob);
@@ -161,13 +188,13 @@ mod tests {
     fn the_bound_holds_for_every_shape() {
         for triangles in [0, 1, 2, 7, 100, 12_345, 1_000_000] {
             for density in [0.01, 1.0, 4.0, 32.0] {
-                let bound = Layout::bound(triangles, density);
+                let bound = Layout::bound(triangles, density, 0);
                 for size in [[1.0, 1.0, 1.0], [1.0, 0.5, 0.0], [1e-3, 1.0, 0.1], [1.0, 1.0, 1e-9]] {
                     let size = glam::Vec3A::from_array(size);
                     let resolution = crate::cell::woo(size, f64::from(density), triangles).unwrap();
-                    let most = u32::try_from(Layout::new(resolution, 0, 0).cells).unwrap();
+                    let most = u32::try_from(Layout::new(resolution, 0, 0, 0).cells).unwrap();
                     let limit = super::super::reference_limit(triangles);
-                    let layout = Layout::new(resolution, most, limit);
+                    let layout = Layout::new(resolution, most, limit, 0);
                     assert!(layout.index_bytes() <= bound.index_bytes());
                     assert!(layout.scratch_bytes() <= bound.scratch_bytes());
                 }

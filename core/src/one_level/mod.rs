@@ -17,83 +17,130 @@
 mod build;
 mod displacement;
 mod layout;
+mod spread;
 mod validate;
 
 use crate::bits::is_set;
 use crate::blob::{Header, corrupt};
+use crate::cell::Lattice;
 use crate::config::Config;
 use crate::counters::Tally;
-use crate::dda::Dda;
+use crate::dda::{Line, Step};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::sizes::Sizes;
-pub(crate) use build::build;
-use build::{Plan, reference_limit};
-use layout::{Layout, Sections};
+pub(crate) use build::{MeshSpread, Overlay, Plan, Rows, build, copy, reference_limit};
+pub(crate) use displacement::displace;
+use layout::Sections;
+pub(crate) use layout::{Layout, longest};
+pub(crate) use spread::{Spread, fill, mark};
+pub(crate) use validate::check_header;
 
 /// A view of a built one-level grid.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OneLevel<'a> {
-    width: u32,
-    height: u32,
+    /// The last cell on each axis.
+    last: [u32; 3],
     sections: Sections<'a>,
 }
 
 /// The row of the cells with this y and z.
 #[inline(always)]
-const fn row(height: u32, y: u32, z: u32) -> usize {
+pub(crate) const fn row(height: u32, y: u32, z: u32) -> usize {
     z as usize * height as usize + y as usize
 }
 
 /// The slot of a cell in the hash table.
 #[inline(always)]
-fn slot(row_offset: i32, x: u32) -> Option<usize> {
+pub(crate) fn slot(row_offset: i32, x: u32) -> Option<usize> {
     usize::try_from(row_offset.wrapping_add_unsigned(x)).ok()
 }
 
 /// The most memory that a mesh with so many triangles can need.
-pub(crate) const fn bound(triangles: u32, density: f32) -> (u64, u64) {
-    let layout = Layout::bound(triangles, density);
+pub(crate) const fn bound(triangles: u32, density: f32, overlay_words: u64) -> (u64, u64) {
+    let layout = Layout::bound(triangles, density, overlay_words);
     (layout.index_bytes(), layout.scratch_bytes())
 }
 
 /// The scratch that a build with this resolution takes.
 pub(crate) const fn scratch_bytes(resolution: [u32; 3]) -> u64 {
-    Layout::new(resolution, 0, 0).scratch_bytes()
+    Layout::new(resolution, 0, 0, 0).scratch_bytes()
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to plan in.
 pub(crate) fn sizes(
     mesh: &TriangleMesh<'_>,
     config: &Config,
+    overlay: &impl Overlay,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    let plan = Plan::new(mesh, config, scratch)?;
+    let plan = Plan::new(mesh, config, overlay, scratch)?;
     Sizes::new(plan.layout.index_bytes(), plan.layout.scratch_bytes(), plan.is_exact())
 }
 
 impl<'a> OneLevel<'a> {
     /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
-    pub(crate) fn open(header: &Header, blob: &'a [u8]) -> Result<Self, Error> {
-        let layout = Layout::new(header.resolution, header.hash_count, header.reference_count);
+    pub(crate) fn open(
+        header: &Header,
+        lattice: &Lattice,
+        overlay: &impl Overlay,
+        blob: &'a [u8],
+    ) -> Result<Self, Error> {
+        let Header { resolution, hash_count, reference_count, .. } = *header;
+        let overlay_words = overlay.words(resolution);
+        let layout = Layout::new(resolution, hash_count, reference_count, overlay_words);
         let sections = layout
             .sections(blob)
             .filter(|_| header.blob_bytes == layout.index_bytes())
             .ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
-        let [width, height, _] = header.resolution;
-        Ok(Self { width, height, sections })
+        Ok(Self { last: lattice.last(), sections })
+    }
+
+    /// The last cell on each axis.
+    pub(crate) const fn last(&self) -> [u32; 3] {
+        self.last
+    }
+
+    /// All lists, one behind the other.
+    pub(crate) const fn lists(&self) -> &'a [u32] {
+        self.sections.references
+    }
+
+    /// One bit a cell, row after row: whether it has primitives.
+    pub(crate) const fn domain_bits(&self) -> &'a [u64] {
+        self.sections.domain_bits
+    }
+
+    /// What a structure above this one keeps behind it.
+    pub(crate) const fn overlay(&self) -> &'a [u64] {
+        self.sections.overlay
     }
 
     /// The primitive ids in a cell, ascending; `None` if it is empty.
     #[inline(always)]
-    fn references(&self, [x, y, z]: [u32; 3]) -> Option<&'a [u32]> {
-        let row = row(self.height, y, z);
-        if !is_set(self.sections.domain_bits, row * self.width as usize + x as usize) {
+    pub(crate) fn references(&self, cell: [u32; 3]) -> Option<&'a [u32]> {
+        let [start, end] = self.ends(cell)?;
+        self.sections.references.get(start as usize..end as usize)
+    }
+
+    /// Whether the domain bit of a cell is set.
+    #[inline(always)]
+    pub(crate) fn is_marked(&self, [x, y, z]: [u32; 3]) -> bool {
+        let [width, height, _] = self.last.map(|last| last as usize + 1);
+        let row = z as usize * height + y as usize;
+        is_set(self.sections.domain_bits, row * width + x as usize)
+    }
+
+    /// The two words of the hash table that say where a cell's list lies; `None` if it is empty.
+    #[inline(always)]
+    pub(crate) fn ends(&self, cell: [u32; 3]) -> Option<[u32; 2]> {
+        if !self.is_marked(cell) {
             return None;
         }
+        let [x, y, z] = cell;
+        let row = row(self.last[1] + 1, y, z);
         let slot = slot(*self.sections.row_offsets.get(row)?, x)?;
-        let ends = self.sections.hash.get(slot..)?.first_chunk::<2>()?;
-        self.sections.references.get(ends[0] as usize..ends[1] as usize)
+        self.sections.hash.get(slot..)?.first_chunk().copied()
     }
 
     /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any.
@@ -103,17 +150,18 @@ impl<'a> OneLevel<'a> {
     #[inline(always)]
     pub(crate) fn traverse<T: Tally>(
         &self,
-        mut walk: Dda,
+        line: &Line,
         tally: &mut T,
         mut leaf: impl FnMut(&[u32], &mut T) -> f32,
     ) {
-        let mut limit = walk.end;
+        let mut limit = line.end;
+        let mut walk = line.walk(0.0, 1.0, [0; 3], self.last);
         loop {
             tally.cell_step();
             if let Some(references) = self.references(walk.cell) {
                 limit = leaf(references, tally);
             }
-            if !walk.advance(limit) {
+            if walk.advance(limit) != Step::Inside {
                 return;
             }
         }

@@ -5,11 +5,16 @@
 //! each listed triangle covering the list's cell, every listed pair (cell, triangle) is a right one
 //! and none is listed twice; so there are as many pairs as the ranges have cells if and only if
 //! none is missing. No bitmap, no sorting: one sum against another.
+//!
+//! Two cells with equal lists could still share a slot while another slot stays orphaned: right
+//! answers, but no build's work. A sum of scrambled slot numbers over the cells and one over the
+//! slots with lists tell that apart.
 
 use glam::Vec3A;
 
-use super::OneLevel;
-use super::build::count_references;
+use super::build::MeshSpread;
+use super::spread::count_references;
+use super::{OneLevel, slot};
 use crate::aabb::Aabb;
 use crate::bits::{WORD_BITS, each_one, extent};
 use crate::blob::{Header, corrupt};
@@ -18,6 +23,28 @@ use crate::config::BuildFlags;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
+
+/// Whether the header says what the mesh says: its box, its resolution, what was skipped.
+pub(crate) fn check_header(
+    header: &Header,
+    lattice: &Lattice,
+    mesh: &TriangleMesh<'_>,
+) -> Result<(), Error> {
+    let survey = Survey::of(mesh, BuildFlags::empty())?;
+    if header.skipped_count != survey.skipped_count {
+        return Err(corrupt(core::mem::offset_of!(Header, skipped_count)));
+    }
+    if lattice.bounds() != Lattice::pad(&survey.bounds) {
+        return Err(corrupt(core::mem::offset_of!(Header, bounds_min)));
+    }
+    let size = lattice.bounds().size();
+    let is_density = header.density > 0.0 && header.density.is_finite();
+    let resolution = woo(size, f64::from(header.density), survey.finite_count);
+    if !is_density || resolution != Some(lattice.resolution) {
+        return Err(corrupt(core::mem::offset_of!(Header, resolution)));
+    }
+    Ok(())
+}
 
 impl OneLevel<'_> {
     /// Whether this is what a build makes of the mesh; the error names the first byte that is not.
@@ -31,21 +58,9 @@ impl OneLevel<'_> {
         let at = |section: usize, index: usize| corrupt(section - blob.as_ptr().addr() + index);
         let sections = &self.sections;
 
-        // The header says what the mesh says.
-        let survey = Survey::of(mesh, BuildFlags::empty())?;
-        if header.skipped_count != survey.skipped_count {
-            return Err(corrupt(core::mem::offset_of!(Header, skipped_count)));
-        }
-        if lattice.bounds() != Lattice::pad(&survey.bounds) {
-            return Err(corrupt(core::mem::offset_of!(Header, bounds_min)));
-        }
-        let size = lattice.bounds().size();
-        let is_density = header.density > 0.0 && header.density.is_finite();
-        let resolution = woo(size, f64::from(header.density), survey.finite_count);
-        if !is_density || resolution != Some(lattice.resolution) {
-            return Err(corrupt(core::mem::offset_of!(Header, resolution)));
-        }
-        let expected = count_references(mesh, lattice, header.reference_count, |_| {});
+        check_header(header, lattice, mesh)?;
+        let expected =
+            count_references(&MeshSpread { mesh, lattice }, header.reference_count, |_| {});
         if expected != Some(header.reference_count) {
             return Err(corrupt(core::mem::offset_of!(Header, reference_count)));
         }
@@ -56,7 +71,9 @@ impl OneLevel<'_> {
         if hash.first() != Some(&0) {
             return Err(at(hash_at, 0));
         }
-        if let Some(slot) = hash.windows(2).position(|ends| ends[0] > ends[1]) {
+        if let Some(slot) =
+            hash.windows(2).position(|ends| matches!(ends, [start, end] if start > end))
+        {
             return Err(at(hash_at, (slot + 1) * size_of::<u32>()));
         }
         if hash.last() != Some(&header.reference_count) {
@@ -68,6 +85,11 @@ impl OneLevel<'_> {
         let width = width as usize;
         let domain_at = sections.domain_bits.as_ptr().addr();
         let mut listed = 0;
+        let mut slots = hash
+            .windows(2)
+            .zip(0..)
+            .filter(|(ends, _)| matches!(ends, [start, end] if start < end))
+            .fold(0_u64, |sum, (_, slot)| sum.wrapping_add(scramble(slot)));
         for (row, &offset) in sections.row_offsets.iter().enumerate() {
             if offset != 0 && extent(sections.domain_bits, row * width, width).is_none() {
                 return Err(at(sections.row_offsets.as_ptr().addr(), row * size_of::<i32>()));
@@ -75,7 +97,11 @@ impl OneLevel<'_> {
             let mut damage = None;
             each_one(sections.domain_bits, row * width, width, |x| {
                 match self.list(lattice, mesh, cell_of(row, x, height)) {
-                    Ok(list) => listed += list.len() as u64,
+                    Ok(list) => {
+                        listed += list.len() as u64;
+                        let slot = u32::try_from(x).ok().and_then(|x| slot(offset, x));
+                        slots = slots.wrapping_sub(scramble(slot.unwrap_or(0) as u64));
+                    }
                     Err(Some(list)) => damage = Some(at(list.as_ptr().addr(), 0)),
                     Err(None) => damage = Some(at(domain_at, (row * width + x) / 8)),
                 }
@@ -92,8 +118,8 @@ impl OneLevel<'_> {
         if listed != u64::from(header.reference_count) {
             return Err(at(sections.references.as_ptr().addr(), 0));
         }
-        if !header.reserved_is_zero() {
-            return Err(corrupt(core::mem::offset_of!(Header, reserved)));
+        if slots != 0 {
+            return Err(at(sections.row_offsets.as_ptr().addr(), 0));
         }
         Ok(())
     }
@@ -108,13 +134,20 @@ impl OneLevel<'_> {
     ) -> Result<&[u32], Option<&[u32]>> {
         let cell = cell.ok_or(None)?;
         let list = self.references(cell).filter(|list| !list.is_empty()).ok_or(None)?;
-        let ascends = list.windows(2).all(|ids| ids[0] < ids[1]);
+        let ascends = list.windows(2).all(|ids| matches!(ids, [id, next] if id < next));
         let covers = |&id: &u32| {
             let bounds = mesh.corners(id, Vec3A::new).and_then(Aabb::of);
             bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
         };
         if ascends && list.iter().all(covers) { Ok(list) } else { Err(Some(list)) }
     }
+}
+
+/// A number whose sums do not meet by chance (the finisher of `SplitMix`).
+const fn scramble(slot: u64) -> u64 {
+    let z = (slot ^ (slot >> 30)).wrapping_add(1).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
 }
 
 /// The cell at bit `x` of a row.

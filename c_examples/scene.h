@@ -1,0 +1,27 @@
+/* A triangle mesh for the ray tracer, from a formula or a file. */
+#ifndef SCENE_H
+#define SCENE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct {
+    float (*positions)[3];
+    size_t vertex_count;
+    uint32_t (*indices)[3];
+    size_t triangle_count;
+} scene;
+
+/* The built-in scene (knot.c). */
+scene make_knot(void);
+
+/* A mesh file (ply.c). Ends the program if it cannot be read. */
+scene load_ply(const char *path);
+
+/* Ends the program with a message (raytracer.c). */
+void fail(const char *format, ...);
+
+/* Memory for so many elements (raytracer.c), or the end of the program. */
+void *allocate(size_t count, size_t size);
+
+#endif

@@ -1,0 +1,272 @@
+//! The C ABI of hgrid.
+//!
+//! Every function checks what it was given, calls core, and writes the answer. The docs of all that
+//! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
+//! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
+//! structs and threads that they rely on. [`raw`] holds every use of a pointer.
+//!
+//! There is no allocation, no global state and no thread here, and no panic that a caller could
+//! reach; a test looks for the symbols of all four in the library.
+#![no_std]
+
+mod input;
+mod raw;
+mod span;
+mod status;
+mod types;
+mod version;
+
+use core::ffi::{c_char, c_void};
+use core::ptr::{NonNull, null_mut};
+
+use hgrid_core::Grid;
+
+pub use crate::status::*;
+pub use crate::types::*;
+pub use crate::version::*;
+
+use crate::span::Region;
+use crate::status::{status_of, text};
+use crate::version::VERSION;
+
+/// Nothing in this library or in core panics, so link-time optimisation drops this again.
+#[panic_handler]
+const fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    loop {}
+}
+
+/// Tells how much memory a build of this mesh takes.
+///
+/// Without scratch (NULL, 0) the answer takes two passes over the triangles: the report's
+/// `scratch_bytes` is exact, `index_bytes` is enough, for a scan up to twice what the grid will
+/// take, and `is_exact` is 0. With `scratch_bytes` of scratch the grid is planned there, for about half
+/// the time of a build: `index_bytes` is exact and `is_exact` is 1. The scratch holds nothing of use
+/// afterwards.
+///
+/// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. Returns `HGRID_OK` or
+/// the reason, with the triangle that is to blame in the report; scratch that is too small is no
+/// error, and counts as none.
+///
+/// Threads: any number of calls at once, as long as each has a scratch and a report of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_sizes(
+    mesh: *const hgrid_mesh,
+    config: *const hgrid_config,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+    report: *mut hgrid_report,
+) -> hgrid_status {
+    if report.is_null() {
+        return HGRID_ERROR_NULL_ARGUMENT;
+    }
+    let none = Region { start: null_mut(), bytes: 0 };
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let call = |report: &mut hgrid_report| {
+        // SAFETY: the caller's promise.
+        unsafe { raw::input(mesh, config, [none, scratch]) }?.measure(report)
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting(report, call) }
+}
+
+/// Builds a grid in memory that the caller brings.
+///
+/// `index` keeps the grid (it is the blob afterwards), `scratch` is free again when the call
+/// returns. Both start at a multiple of `HGRID_ALIGNMENT`, overlap neither each other nor the mesh
+/// nor any struct of this call, and may hold anything before. `hgrid_sizes` tells how large they
+/// must be, `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` how large is always enough; what is more
+/// than needed is not touched. The same mesh and configuration give the same bytes on every machine
+/// of the same byte order.
+///
+/// `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `index` and `scratch` may
+/// be NULL if their size is 0. `report` may be NULL.
+///
+/// Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `index` and
+/// `grid` as they were. The report is written in both cases: what was built; or, if a region is too
+/// small, what both need; or the triangle that is to blame.
+///
+/// Threads: any number of calls at once, as long as each has regions, a view and a report of its
+/// own. The call starts no thread.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_build(
+    mesh: *const hgrid_mesh,
+    config: *const hgrid_config,
+    index: *mut c_void,
+    index_bytes: usize,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+    grid: *mut hgrid_grid,
+    report: *mut hgrid_report,
+) -> hgrid_status {
+    let index = Region { start: index, bytes: index_bytes };
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let call = |report: &mut hgrid_report| {
+        let to = NonNull::new(grid).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        let input = unsafe { raw::input(mesh, config, [index, scratch]) }?;
+        let built = input.build(report)?;
+        // SAFETY: the caller's promise.
+        unsafe { raw::write_grid(to, &built) };
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting(report, call) }
+}
+
+/// Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
+///
+/// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
+/// in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
+/// ignored. The mesh is the one it was built for, which only its counts are checked for.
+///
+/// What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
+/// nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
+/// not change while the grid is in use: map a file that others write as a private copy.
+///
+/// No argument may be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
+/// and leaves `grid` as it was.
+///
+/// Threads: any number of calls at once, also on the same blob, each with a view of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_open(
+    blob: *const c_void,
+    blob_bytes: usize,
+    mesh: *const hgrid_mesh,
+    grid: *mut hgrid_grid,
+) -> hgrid_status {
+    let (false, Some(to)) = (blob.is_null(), NonNull::new(grid)) else {
+        return HGRID_ERROR_NULL_ARGUMENT;
+    };
+    // SAFETY: the caller's promise.
+    match unsafe { raw::open(blob, blob_bytes, mesh) } {
+        Ok(opened) => {
+            // SAFETY: the caller's promise.
+            unsafe { raw::write_grid(to, &opened) };
+            HGRID_OK
+        }
+        Err(status) => status,
+    }
+}
+
+/// Proves that a blob is the grid of its mesh, and so that every answer will be right.
+///
+/// Takes about the time of a build and no memory. A grid that was just built needs no proof; a blob
+/// from a file, a network or another process may.
+///
+/// Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
+/// that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view that was never built or opened;
+/// `HGRID_ERROR_NULL_ARGUMENT`.
+///
+/// Threads: any number of calls and queries on the same grid at once.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_validate(grid: *const hgrid_grid) -> hgrid_status {
+    // SAFETY: the caller's promise.
+    match unsafe { raw::grid(grid) } {
+        Ok(grid) => grid.validate().map_or_else(status_of, |()| HGRID_OK),
+        Err(status) => status,
+    }
+}
+
+/// Finds the closest triangle that a ray hits.
+///
+/// Returns true and writes `hit`; or returns false and writes nothing. Where several triangles are
+/// hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count.
+/// A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
+/// without area, or one that is seen exactly edge-on, is not hit.
+///
+/// `options` may be NULL: the defaults. With another NULL, with a view that was never built or
+/// opened, or with options that break the rules for structs, nothing is hit.
+///
+/// A query allocates nothing, needs a few hundred bytes of stack and takes at most as many steps as
+/// the three resolutions sum up to.
+///
+/// Threads: any number of queries on the same grid at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_intersect(
+    grid: *const hgrid_grid,
+    ray: *const hgrid_ray,
+    options: *const hgrid_query_options,
+    hit: *mut hgrid_hit,
+) -> bool {
+    let Some(to) = NonNull::new(hit) else { return false };
+    let ask = |grid: &Grid<'_>, ray: &_, counters: Option<&mut _>| match counters {
+        None => grid.intersect(ray),
+        Some(counters) => grid.intersect_counted(ray, counters),
+    };
+    // SAFETY: the caller's promise.
+    let Some(found) = unsafe { raw::query(grid, ray, options, ask) }.flatten() else {
+        return false;
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::write(to, found.into()) };
+    true
+}
+
+/// Tells whether a ray hits anything: what `hgrid_intersect` would return, but sooner.
+///
+/// This is the query for shadows and visibility. It stops at the first triangle it finds in the
+/// ray's range, which need not be the closest.
+///
+/// `options` may be NULL: the defaults. With another NULL, with a view that was never built or
+/// opened, or with options that break the rules for structs, the answer is false.
+///
+/// Threads: any number of queries on the same grid at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluded(
+    grid: *const hgrid_grid,
+    ray: *const hgrid_ray,
+    options: *const hgrid_query_options,
+) -> bool {
+    let ask = |grid: &Grid<'_>, ray: &_, counters: Option<&mut _>| match counters {
+        None => grid.occluded(ray),
+        Some(counters) => grid.occluded_counted(ray, counters),
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::query(grid, ray, options, ask) }.unwrap_or(false)
+}
+
+/// Says in words what a status means and what to do.
+///
+/// Never NULL: a number that is no status gives "unknown status". The text is static, in English,
+/// without a full stop; programs compare numbers, not texts.
+///
+/// Threads: any number of calls at once.
+#[unsafe(no_mangle)]
+pub const extern "C" fn hgrid_status_string(status: hgrid_status) -> *const c_char {
+    text(status).as_ptr()
+}
+
+/// The version of the library that is linked, to be compared with the `HGRID_VERSION` of the header
+/// that was compiled against.
+///
+/// Threads: any number of calls at once.
+#[unsafe(no_mangle)]
+pub const extern "C" fn hgrid_version() -> u32 {
+    HGRID_VERSION
+}
+
+/// The version of the library that is linked, as text: never NULL, static.
+///
+/// Threads: any number of calls at once.
+#[unsafe(no_mangle)]
+pub const extern "C" fn hgrid_version_string() -> *const c_char {
+    VERSION.as_ptr()
+}

@@ -1,0 +1,40 @@
+//! Ranges of memory by their addresses, compared before anything becomes a reference.
+//!
+//! Two mutable references to the same byte would be undefined behaviour in Rust, so whether the
+//! caller's regions lie apart is asked while they are still numbers.
+
+use core::ffi::c_void;
+
+/// A region as the caller passes it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Region {
+    pub(crate) start: *mut c_void,
+    pub(crate) bytes: usize,
+}
+
+impl Region {
+    pub(crate) fn span(self) -> Span {
+        Span::new(self.start, self.bytes)
+    }
+}
+
+/// The addresses `start..end`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Span {
+    start: usize,
+    end: usize,
+}
+
+impl Span {
+    pub(crate) fn new(start: *const c_void, bytes: usize) -> Self {
+        let start = start.addr();
+        Self { start, end: start.saturating_add(bytes) }
+    }
+
+    /// Whether any byte lies in both; an empty span shares none.
+    pub(crate) const fn overlaps(self, other: Self) -> bool {
+        let start = if self.start > other.start { self.start } else { other.start };
+        let end = if self.end < other.end { self.end } else { other.end };
+        start < end
+    }
+}

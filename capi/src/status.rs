@@ -1,0 +1,154 @@
+//! What a call answers: one pinned number for each cause, and what to do about it in words.
+//!
+//! The numbers are ABI. They have gaps between the groups and are never used for anything else.
+
+use core::ffi::CStr;
+
+use hgrid_core::{ConfigField, Error, MeshField, Region};
+
+/// What a call answers: `HGRID_OK`, or below zero why not. `hgrid_status_string` has it in words.
+#[allow(non_camel_case_types, reason = "the C name")]
+pub type hgrid_status = i32;
+
+/// Success.
+pub const HGRID_OK: hgrid_status = 0;
+
+/// A pointer is NULL that may not be.
+pub const HGRID_ERROR_NULL_ARGUMENT: hgrid_status = -1;
+
+/// A struct's `struct_size` is smaller than the struct, or larger and what is behind the known
+/// fields is not zero. The usual cause is a struct that was not initialised with its `_INIT` macro.
+pub const HGRID_ERROR_STRUCT_SIZE: hgrid_status = -2;
+
+/// The index, the scratch or the blob does not start at a multiple of `HGRID_ALIGNMENT`.
+pub const HGRID_ERROR_MISALIGNED: hgrid_status = -3;
+
+/// The index or the scratch overlaps the other one or the mesh.
+pub const HGRID_ERROR_OVERLAP: hgrid_status = -4;
+
+/// The index is too small. The report says how many bytes it needs.
+pub const HGRID_ERROR_INDEX_TOO_SMALL: hgrid_status = -10;
+
+/// The scratch is too small. The report says how many bytes it needs.
+pub const HGRID_ERROR_SCRATCH_TOO_SMALL: hgrid_status = -11;
+
+/// The position stride is below 12 bytes, or the vertices do not fit into memory.
+pub const HGRID_ERROR_INVALID_POSITIONS: hgrid_status = -20;
+
+/// The index stride is below three indices, or the indices do not fit into memory.
+pub const HGRID_ERROR_INVALID_INDICES: hgrid_status = -21;
+
+/// The mesh's `index_type` is none that this version knows.
+pub const HGRID_ERROR_INVALID_INDEX_TYPE: hgrid_status = -22;
+
+/// The mesh has more than 4294967294 triangles.
+pub const HGRID_ERROR_TOO_MANY_TRIANGLES: hgrid_status = -23;
+
+/// A triangle names a vertex that the mesh does not have. The report says which triangle.
+pub const HGRID_ERROR_INDEX_OUT_OF_RANGE: hgrid_status = -24;
+
+/// A triangle has a coordinate that is NaN, infinite or beyond 2^120, and `HGRID_BUILD_STRICT` is
+/// set. The report says which triangle.
+pub const HGRID_ERROR_NON_FINITE: hgrid_status = -25;
+
+/// The configuration's `method` is none that this version knows.
+pub const HGRID_ERROR_INVALID_METHOD: hgrid_status = -30;
+
+/// The density is NaN, infinite or not above 0, or asks for more than 4096 cells on an axis.
+pub const HGRID_ERROR_INVALID_DENSITY: hgrid_status = -31;
+
+/// The configuration's `flags` have a bit that this version does not know.
+pub const HGRID_ERROR_INVALID_FLAGS: hgrid_status = -32;
+
+/// The bytes, or the view, are not a grid.
+pub const HGRID_ERROR_NOT_A_GRID: hgrid_status = -40;
+
+/// The blob was built on a machine of the other byte order.
+pub const HGRID_ERROR_WRONG_BYTE_ORDER: hgrid_status = -41;
+
+/// The blob has a format of another version than `HGRID_BLOB_VERSION`.
+pub const HGRID_ERROR_UNSUPPORTED_VERSION: hgrid_status = -42;
+
+/// The bytes end before the blob does.
+pub const HGRID_ERROR_TRUNCATED: hgrid_status = -43;
+
+/// The blob was built for a mesh with another number of vertices or triangles.
+pub const HGRID_ERROR_MESH_MISMATCH: hgrid_status = -44;
+
+/// The blob contradicts itself or its mesh.
+pub const HGRID_ERROR_CORRUPT: hgrid_status = -45;
+
+/// The status that stands for an error of core.
+pub(crate) fn status_of(error: Error) -> hgrid_status {
+    match error {
+        Error::OutOfMemory { region: Region::Index, .. } => HGRID_ERROR_INDEX_TOO_SMALL,
+        Error::OutOfMemory { region: Region::Scratch, .. } => HGRID_ERROR_SCRATCH_TOO_SMALL,
+        Error::Misaligned { .. } => HGRID_ERROR_MISALIGNED,
+        Error::InvalidMesh(MeshField::Positions) => HGRID_ERROR_INVALID_POSITIONS,
+        Error::InvalidMesh(MeshField::Indices) => HGRID_ERROR_INVALID_INDICES,
+        Error::TooManyTriangles => HGRID_ERROR_TOO_MANY_TRIANGLES,
+        Error::IndexOutOfRange { .. } => HGRID_ERROR_INDEX_OUT_OF_RANGE,
+        Error::NonFiniteTriangle { .. } => HGRID_ERROR_NON_FINITE,
+        Error::InvalidConfig(ConfigField::Density) => HGRID_ERROR_INVALID_DENSITY,
+        Error::InvalidConfig(ConfigField::Flags) => HGRID_ERROR_INVALID_FLAGS,
+        // What else there is belongs to methods, and C cannot set it.
+        Error::InvalidConfig(_) => HGRID_ERROR_INVALID_METHOD,
+        Error::NotAGrid => HGRID_ERROR_NOT_A_GRID,
+        Error::WrongByteOrder => HGRID_ERROR_WRONG_BYTE_ORDER,
+        Error::UnsupportedVersion { .. } => HGRID_ERROR_UNSUPPORTED_VERSION,
+        Error::Truncated { .. } => HGRID_ERROR_TRUNCATED,
+        Error::MeshMismatch => HGRID_ERROR_MESH_MISMATCH,
+        // The enum may grow for Rust callers; here the two crates are always of one version.
+        Error::Corrupt { .. } | _ => HGRID_ERROR_CORRUPT,
+    }
+}
+
+/// What a status means and what to do.
+pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
+    match status {
+        HGRID_OK => c"success",
+        HGRID_ERROR_NULL_ARGUMENT => c"a pointer is NULL: pass what the function asks for",
+        HGRID_ERROR_STRUCT_SIZE => {
+            c"wrong struct_size: initialise the struct with its HGRID_..._INIT macro"
+        }
+        HGRID_ERROR_MISALIGNED => {
+            c"misaligned region: start index, scratch and blob at a multiple of 64 bytes"
+        }
+        HGRID_ERROR_OVERLAP => c"overlapping regions: keep index, scratch and mesh apart",
+        HGRID_ERROR_INDEX_TOO_SMALL => c"index too small: bring the report's index_bytes",
+        HGRID_ERROR_SCRATCH_TOO_SMALL => c"scratch too small: bring the report's scratch_bytes",
+        HGRID_ERROR_INVALID_POSITIONS => {
+            c"invalid positions: check vertex_count, and position_stride (0, or 12 and more)"
+        }
+        HGRID_ERROR_INVALID_INDICES => {
+            c"invalid indices: check triangle_count, and index_stride (0, or three indices and more)"
+        }
+        HGRID_ERROR_INVALID_INDEX_TYPE => {
+            c"unknown index_type: use HGRID_INDEX_U32 or HGRID_INDEX_U16"
+        }
+        HGRID_ERROR_TOO_MANY_TRIANGLES => c"more than 4294967294 triangles: split the mesh",
+        HGRID_ERROR_INDEX_OUT_OF_RANGE => {
+            c"a vertex number is out of range: repair the report's triangle"
+        }
+        HGRID_ERROR_NON_FINITE => {
+            c"a coordinate is not finite: repair the report's triangle, or build without \
+              HGRID_BUILD_STRICT to leave it out"
+        }
+        HGRID_ERROR_INVALID_METHOD => c"unknown method: use one of HGRID_METHOD_...",
+        HGRID_ERROR_INVALID_DENSITY => {
+            c"invalid density: above 0, and at most 4096 cells on an axis"
+        }
+        HGRID_ERROR_INVALID_FLAGS => c"unknown flag: use 0 or HGRID_BUILD_...",
+        HGRID_ERROR_NOT_A_GRID => c"not a grid: build or open one first",
+        HGRID_ERROR_WRONG_BYTE_ORDER => {
+            c"a blob of the other byte order: build it again on this machine"
+        }
+        HGRID_ERROR_UNSUPPORTED_VERSION => c"a blob of another version: build it again",
+        HGRID_ERROR_TRUNCATED => c"a truncated blob: bring all of its bytes",
+        HGRID_ERROR_MESH_MISMATCH => {
+            c"a blob of another mesh: bring the mesh it was built for, or build it again"
+        }
+        HGRID_ERROR_CORRUPT => c"a damaged blob, or one of another mesh: build it again",
+        _ => c"unknown status",
+    }
+}

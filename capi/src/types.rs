@@ -1,0 +1,318 @@
+//! The structs that cross the boundary, as C sees them, and what they mean to core.
+//!
+//! The docs here are the text of `hgrid.h`: they are written for C readers.
+
+use core::ffi::c_void;
+
+use hgrid_core::{
+    BuildFlags, Config, Counters, Error, Grid, Hit, INVALID_ID, IndexType, MAX_TRIANGLES, Method,
+    Ray, Sizes,
+};
+
+use crate::status::{
+    HGRID_ERROR_INVALID_FLAGS, HGRID_ERROR_INVALID_INDEX_TYPE, HGRID_ERROR_INVALID_INDICES,
+    HGRID_ERROR_INVALID_METHOD, HGRID_ERROR_INVALID_POSITIONS, HGRID_ERROR_TOO_MANY_TRIANGLES,
+    hgrid_status, status_of,
+};
+
+/// Every memory region starts at a multiple of this many bytes: index, scratch and blob.
+pub const HGRID_ALIGNMENT: usize = 64;
+
+/// The version of the blob format. A blob of another version is refused: build it again.
+pub const HGRID_BLOB_VERSION: u32 = 1;
+
+/// Indices of 32 bits: the default of `hgrid_mesh`.
+pub const HGRID_INDEX_U32: u32 = 0;
+
+/// Indices of 16 bits.
+pub const HGRID_INDEX_U16: u32 = 1;
+
+/// One hashed grid with a single cell size: the default of `hgrid_config`.
+pub const HGRID_METHOD_ONE_LEVEL: u32 = 1;
+
+/// A build flag: refuse a mesh with a triangle that is not finite, instead of leaving it out.
+pub const HGRID_BUILD_STRICT: u32 = 1;
+
+const _: () = assert!(HGRID_ALIGNMENT == hgrid_core::ALIGNMENT);
+const _: () = assert!(HGRID_BLOB_VERSION == hgrid_core::BLOB_VERSION);
+const _: () = assert!(HGRID_METHOD_ONE_LEVEL == Method::OneLevel as u32);
+const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
+
+/// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.
+///
+/// A point of the ray is `origin + t * direction`. The direction has any length but zero, and every
+/// `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`, both ends included. A ray
+/// with a NaN anywhere, with an infinite origin or direction, with a zero direction or with
+/// `t_min > t_max` hits nothing.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_ray {
+    /// Where `t` is 0, in scene units.
+    pub origin: [f32; 3],
+    /// The smallest `t` that is accepted, usually 0; negative reaches behind the origin.
+    pub t_min: f32,
+    /// The direction, any length but zero.
+    pub direction: [f32; 3],
+    /// The largest `t` that is accepted; `INFINITY` and `FLT_MAX` are both fine.
+    pub t_max: f32,
+}
+
+/// Where a ray meets a triangle: 16 bytes.
+///
+/// The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
+/// triangle's vertices `a`, `b`, `c`, up to rounding.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_hit {
+    /// Distance in multiples of the ray's direction.
+    pub t: f32,
+    /// Weight of the triangle's second vertex, 0 to 1.
+    pub u: f32,
+    /// Weight of the triangle's third vertex, 0 to 1.
+    pub v: f32,
+    /// The triangle: its position in the index array.
+    pub primitive: u32,
+}
+
+/// Work done by queries. A query adds to it, so one struct can sum up a whole picture.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_counters {
+    /// Ray-triangle tests.
+    pub primitive_tests: u64,
+    /// Cells entered, empty ones included.
+    pub cell_steps: u64,
+    /// Subgrids entered; 0 for a grid of one level.
+    pub grid_steps: u64,
+}
+
+/// A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
+///
+/// The arrays are read where they lie, never copied and never changed, and not one byte behind the
+/// last element's own bytes. They need no alignment, so both may be fields of the caller's structs.
+/// Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
+/// struct itself is only read during the call.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_mesh {
+    /// `sizeof(hgrid_mesh)`.
+    pub struct_size: u32,
+    /// `HGRID_INDEX_U32` or `HGRID_INDEX_U16`.
+    pub index_type: u32,
+    /// The first vertex: three floats x, y, z, in scene units. NULL only without vertices.
+    pub positions: *const c_void,
+    /// Bytes from one vertex to the next, at least 12; 0 means 12.
+    pub position_stride: usize,
+    /// Number of vertices.
+    pub vertex_count: usize,
+    /// The first triangle: three vertex numbers, from 0. NULL only without triangles.
+    pub indices: *const c_void,
+    /// Bytes from one triangle to the next, at least three indices; 0 means exactly three indices.
+    pub index_stride: usize,
+    /// Number of triangles, at most 4294967294.
+    pub triangle_count: usize,
+}
+
+/// What a build may be told. Initialise it with `HGRID_CONFIG_INIT`; NULL means the same.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_config {
+    /// `sizeof(hgrid_config)`.
+    pub struct_size: u32,
+    /// The structure to build: `HGRID_METHOD_ONE_LEVEL`.
+    pub method: u32,
+    /// Cells per triangle, above 0; the default is 4. More cells mean fewer tests, more steps, more
+    /// memory.
+    pub density: f32,
+    /// 0 or `HGRID_BUILD_STRICT`.
+    pub flags: u32,
+}
+
+/// What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_query_options {
+    /// `sizeof(hgrid_query_options)`.
+    pub struct_size: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Where to add up the work, or NULL. Each thread needs its own.
+    pub counters: *mut hgrid_counters,
+}
+
+/// What a build, or a question for sizes, found out. Initialise it with `HGRID_REPORT_INIT`.
+///
+/// Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
+/// what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_report {
+    /// `sizeof(hgrid_report)`.
+    pub struct_size: u32,
+    /// 1 if `index_bytes` is what the grid takes, to the byte; 0 if it is only enough.
+    pub is_exact: u32,
+    /// Bytes that the index region needs; after a build, the size of the blob.
+    pub index_bytes: u64,
+    /// Bytes that the scratch region needs: always exact.
+    pub scratch_bytes: u64,
+    /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
+    pub triangle: u32,
+    /// Triangles left out because a coordinate is not finite. Known after a build, as are all below.
+    pub skipped_count: u32,
+    /// Triangle ids in all cells together.
+    pub reference_count: u32,
+    /// Cells per triangle: what was asked for, or a half, a quarter, ... of it where the mesh would
+    /// have needed more than 16 references for each triangle.
+    pub density: f32,
+    /// Cells on each axis.
+    pub resolution: [u32; 3],
+    /// 0.
+    pub reserved: u32,
+}
+
+/// A built grid and its mesh, ready for queries: a view, held by value.
+///
+/// It owns nothing, so there is nothing to close or free, and it can be copied by assignment. It
+/// holds the addresses of blob and mesh and is good for as long as both stay where they are,
+/// unchanged. It means nothing in another process or a file: store the blob instead, and open it
+/// there. A view that is all zero is recognised and answers every query with a miss.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_grid {
+    /// Private.
+    pub opaque: [u64; 64],
+}
+
+impl From<hgrid_ray> for Ray {
+    fn from(ray: hgrid_ray) -> Self {
+        let hgrid_ray { origin, t_min, direction, t_max } = ray;
+        Self { origin, t_min, direction, t_max }
+    }
+}
+
+impl From<Hit> for hgrid_hit {
+    fn from(hit: Hit) -> Self {
+        let Hit { t, u, v, primitive } = hit;
+        Self { t, u, v, primitive }
+    }
+}
+
+impl hgrid_counters {
+    /// Adds the work of a query.
+    pub(crate) fn add(&mut self, work: &Counters) {
+        self.primitive_tests = self.primitive_tests.wrapping_add(work.primitive_tests);
+        self.cell_steps = self.cell_steps.wrapping_add(work.cell_steps);
+        self.grid_steps = self.grid_steps.wrapping_add(work.grid_steps);
+    }
+}
+
+impl hgrid_config {
+    /// The configuration as core knows it. The density is core's to judge.
+    pub(crate) fn to_core(self) -> Result<Config, hgrid_status> {
+        let method = match self.method {
+            HGRID_METHOD_ONE_LEVEL => Method::OneLevel,
+            _ => return Err(HGRID_ERROR_INVALID_METHOD),
+        };
+        let flags = BuildFlags::from_bits(self.flags).ok_or(HGRID_ERROR_INVALID_FLAGS)?;
+        Ok(Config { density: self.density, flags, ..Config::new(method) })
+    }
+}
+
+impl hgrid_report {
+    /// The report of a call that found out nothing.
+    pub(crate) const fn empty(struct_size: u32) -> Self {
+        Self {
+            struct_size,
+            is_exact: 0,
+            index_bytes: 0,
+            scratch_bytes: 0,
+            triangle: INVALID_ID,
+            skipped_count: 0,
+            reference_count: 0,
+            density: 0.0,
+            resolution: [0; 3],
+            reserved: 0,
+        }
+    }
+
+    /// Notes what a build needs.
+    pub(crate) fn note_sizes(&mut self, sizes: &Sizes) {
+        self.is_exact = sizes.is_exact.into();
+        self.index_bytes = sizes.index_bytes as u64;
+        self.scratch_bytes = sizes.scratch_bytes as u64;
+    }
+
+    /// Notes what was built.
+    pub(crate) fn note_grid(&mut self, grid: &Grid<'_>) {
+        self.is_exact = 1;
+        self.index_bytes = grid.blob_bytes() as u64;
+        self.scratch_bytes = grid.scratch_bytes();
+        self.skipped_count = grid.skipped_count();
+        self.reference_count = grid.reference_count();
+        self.density = grid.density();
+        self.resolution = grid.resolution();
+    }
+
+    /// Notes which triangle is to blame and passes the error on.
+    pub(crate) fn note_error(&mut self, error: Error) -> hgrid_status {
+        if let Error::IndexOutOfRange { triangle } | Error::NonFiniteTriangle { triangle } = error {
+            self.triangle = triangle;
+        }
+        status_of(error)
+    }
+}
+
+/// Where the elements of one of a mesh's arrays lie: numbers, nothing is read yet.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Elements {
+    pub(crate) start: *const c_void,
+    pub(crate) stride: usize,
+    pub(crate) count: usize,
+    /// From the first element's first byte to the last element's last.
+    pub(crate) bytes: usize,
+}
+
+impl Elements {
+    /// `None` if the elements do not fit into memory.
+    fn new(start: *const c_void, stride: usize, count: usize, size: usize) -> Option<Self> {
+        let stride = if stride == 0 { size } else { stride };
+        let bytes = match count.checked_sub(1) {
+            Some(last) => last.checked_mul(stride)?.checked_add(size)?,
+            None => 0,
+        };
+        isize::try_from(bytes).ok()?;
+        Some(Self { start, stride, count, bytes })
+    }
+}
+
+impl hgrid_mesh {
+    /// The width of the indices.
+    pub(crate) fn index_type(&self) -> Result<IndexType, hgrid_status> {
+        match self.index_type {
+            HGRID_INDEX_U32 => Ok(IndexType::U32),
+            HGRID_INDEX_U16 => Ok(IndexType::U16),
+            _ => Err(HGRID_ERROR_INVALID_INDEX_TYPE),
+        }
+    }
+
+    /// The vertices.
+    pub(crate) fn position_elements(&self) -> Result<Elements, hgrid_status> {
+        let Self { positions, position_stride, vertex_count, .. } = *self;
+        Elements::new(positions, position_stride, vertex_count, size_of::<[f32; 3]>())
+            .ok_or(HGRID_ERROR_INVALID_POSITIONS)
+    }
+
+    /// The triangles. Their number is judged first: no array of so many would fit into memory.
+    pub(crate) fn index_elements(&self) -> Result<Elements, hgrid_status> {
+        let Self { indices, index_stride, triangle_count, .. } = *self;
+        let size = match self.index_type()? {
+            IndexType::U32 => size_of::<[u32; 3]>(),
+            IndexType::U16 => size_of::<[u16; 3]>(),
+        };
+        if triangle_count > MAX_TRIANGLES {
+            return Err(HGRID_ERROR_TOO_MANY_TRIANGLES);
+        }
+        Elements::new(indices, index_stride, triangle_count, size)
+            .ok_or(HGRID_ERROR_INVALID_INDICES)
+    }
+}

@@ -1,0 +1,34 @@
+//! The version, told once in `Cargo.toml` and checked here.
+
+use core::ffi::CStr;
+
+/// Raised when programs must change to go on working.
+pub const HGRID_VERSION_MAJOR: u32 = 0;
+
+/// Raised when something was added. While the major version is 0, it may also break programs.
+pub const HGRID_VERSION_MINOR: u32 = 1;
+
+/// Raised when something was repaired.
+pub const HGRID_VERSION_PATCH: u32 = 0;
+
+/// The three numbers as one that can be compared.
+pub const HGRID_VERSION: u32 =
+    HGRID_VERSION_MAJOR << 16 | HGRID_VERSION_MINOR << 8 | HGRID_VERSION_PATCH;
+
+/// The package's version with the zero that C wants behind it.
+pub(crate) const VERSION: &CStr =
+    match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+        Ok(version) => version,
+        Err(_) => c"",
+    };
+
+const _: () = {
+    let package = [
+        env!("CARGO_PKG_VERSION_MAJOR"),
+        env!("CARGO_PKG_VERSION_MINOR"),
+        env!("CARGO_PKG_VERSION_PATCH"),
+    ];
+    assert!(matches!(u32::from_str_radix(package[0], 10), Ok(HGRID_VERSION_MAJOR)));
+    assert!(matches!(u32::from_str_radix(package[1], 10), Ok(HGRID_VERSION_MINOR)));
+    assert!(matches!(u32::from_str_radix(package[2], 10), Ok(HGRID_VERSION_PATCH)));
+};

@@ -1,0 +1,277 @@
+//! Macrocell levels: bit arrays that overlay coarser and coarser grids (CP10 §3.2, Wald et al. 2006).
+//!
+//! ```text
+//! level 0   the cells of the hashed grid, one domain bit each         303 x 213 x 135
+//! level 1   one bit for factor^3 cells of level 0: any of them full?   51 x  36 x  23
+//! level 2   one bit for factor^3 bits of level 1                        9 x   6 x   4
+//! level 3                                                               2 x   1 x   1
+//! ```
+//!
+//! The levels end with the first that has at most [`FEW_CELLS`] cells, or with [`MAX_LEVELS`]. They follow each other in one
+//! section, each starting at a new word; where one lies follows from the resolution and the factor.
+
+use core::num::{NonZeroU32, NonZeroUsize};
+
+use crate::bits::{WORD_BITS, each_one, extent, is_set};
+
+/// A level of so few cells needs no coarser one above it.
+const FEW_CELLS: u64 = 64;
+
+/// The most levels: factor 6 needs at most 4. Small factors end with a level of more cells, but no
+/// query has to set up a longer stack.
+pub(super) const MAX_LEVELS: usize = 6;
+
+/// One level: its resolution and where its words start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Level {
+    pub(super) resolution: [u32; 3],
+    start: u64,
+}
+
+impl Level {
+    /// No level.
+    const NONE: Self = Self { resolution: [0; 3], start: 0 };
+
+    /// Number of cells.
+    const fn cells(&self) -> u64 {
+        let [x, y, z] = self.resolution;
+        x as u64 * y as u64 * z as u64
+    }
+
+    /// Where the next level's words start.
+    const fn end(&self) -> u64 {
+        self.start + self.cells().div_ceil(WORD_BITS as u64)
+    }
+
+    /// The bit of a cell among all words.
+    #[inline(always)]
+    fn bit(&self, [x, y, z]: [u32; 3]) -> usize {
+        let [width, height, _] = self.resolution.map(|cells| cells as usize);
+        (z as usize * height + y as usize) * width + x as usize + self.first_bit()
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "the words are in memory")]
+    const fn first_bit(&self) -> usize {
+        self.start as usize * WORD_BITS
+    }
+}
+
+/// The levels above a grid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Levels {
+    /// Level 1 first; level 0 is the grid itself.
+    all: [Level; MAX_LEVELS],
+    count: usize,
+    factor: NonZeroU32,
+}
+
+impl Levels {
+    /// The levels above a grid with this resolution. A factor below 2 counts as 2.
+    pub(super) const fn new(resolution: [u32; 3], factor: u32) -> Self {
+        let nonzero = match NonZeroU32::new(factor) {
+            Some(factor) if factor.get() > 1 => factor,
+            _ => NonZeroU32::MIN.saturating_add(1),
+        };
+        let factor = nonzero.get();
+        let mut levels = Self { all: [Level::NONE; MAX_LEVELS], count: 0, factor: nonzero };
+        let [mut x, mut y, mut z] = resolution;
+        let mut start = 0;
+        while levels.count < MAX_LEVELS {
+            [x, y, z] = [x.div_ceil(factor), y.div_ceil(factor), z.div_ceil(factor)];
+            let level = Level { resolution: [x, y, z], start };
+            levels.all[levels.count] = level;
+            levels.count += 1;
+            if level.cells() <= FEW_CELLS {
+                break;
+            }
+            start = level.end();
+        }
+        levels
+    }
+
+    /// Words of all levels together.
+    pub(super) const fn words(&self) -> u64 {
+        let mut words = 0;
+        let mut rest = self.all.as_slice();
+        let mut number = 0;
+        while let [level, others @ ..] = rest {
+            if number < self.count {
+                words = level.end();
+            }
+            rest = others;
+            number += 1;
+        }
+        words
+    }
+
+    /// Number of levels, the grid not counted.
+    pub(super) const fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Cells of the grid in a macrocell of a level, on each axis.
+    #[inline(always)]
+    pub(super) fn size(&self, level: usize) -> u32 {
+        (0..level).fold(1, |size: u32, _| size.saturating_mul(self.factor.get()))
+    }
+
+    /// How many cells of the level below a macrocell has on each axis.
+    pub(super) const fn factor(&self) -> NonZeroU32 {
+        self.factor
+    }
+
+    /// A level, 1 the finest.
+    #[inline(always)]
+    pub(super) fn level(&self, level: usize) -> Level {
+        self.all.get(level.wrapping_sub(1)).copied().unwrap_or(Level::NONE)
+    }
+
+    /// Whether anything is in a macrocell.
+    #[inline(always)]
+    pub(super) fn is_full(&self, words: &[u64], level: usize, cell: [u32; 3]) -> bool {
+        is_set(words, self.level(level).bit(cell))
+    }
+
+    /// Writes all levels, the finest from the domain bits of the grid, each other one from the level
+    /// below it: the paper's bitmap scaling.
+    pub(super) fn fill(&self, resolution: [u32; 3], domain_bits: &[u64], words: &mut [u64]) {
+        words.fill(0);
+        let mut below = Level { resolution, start: 0 };
+        for number in 1..=self.count {
+            let level = self.level(number);
+            let Some((lower, upper)) = usize::try_from(level.start)
+                .ok()
+                .and_then(|start| words.split_at_mut_checked(start))
+            else {
+                return;
+            };
+            let from = if number == 1 { domain_bits } else { lower };
+            scale_down(&below, from, &Level { start: 0, ..level }, upper, self.factor);
+            below = level;
+        }
+    }
+}
+
+impl Levels {
+    /// The first word that [`fill`](Self::fill) would write otherwise; needs no memory.
+    pub(super) fn first_wrong_word(
+        &self,
+        resolution: [u32; 3],
+        domain_bits: &[u64],
+        words: &[u64],
+    ) -> Option<usize> {
+        let mut below = (Level { resolution, start: 0 }, domain_bits);
+        for number in 1..=self.count {
+            let level = self.level(number);
+            let [width, height, depth] = level.resolution;
+            for z in 0..depth {
+                for y in 0..height {
+                    for x in 0..width {
+                        let bit = level.bit([x, y, z]);
+                        if is_set(words, bit)
+                            != below.0.any_in(below.1, [x, y, z], self.factor.get())
+                        {
+                            return Some(bit / WORD_BITS);
+                        }
+                    }
+                }
+            }
+            // No bit is set behind the last macrocell.
+            let end = level.bit([0, 0, depth]);
+            if extent(words, end, end.next_multiple_of(WORD_BITS) - end).is_some() {
+                return Some(end / WORD_BITS);
+            }
+            below = (level, words);
+        }
+        None
+    }
+}
+
+impl Level {
+    /// Whether any cell of a macrocell on the level above is full.
+    fn any_in(&self, words: &[u64], [x, y, z]: [u32; 3], factor: u32) -> bool {
+        let [width, height, depth] = self.resolution;
+        let span = |cell: u32, end: u32| cell * factor..(cell + 1).saturating_mul(factor).min(end);
+        let xs = span(x, width);
+        let row = |y, z| extent(words, self.bit([xs.start, y, z]), xs.len()).is_some();
+        span(z, depth).any(|z| span(y, height).any(|y| row(y, z)))
+    }
+}
+
+/// Sets the bit of every macrocell that has a bit set below it.
+fn scale_down(below: &Level, from: &[u64], above: &Level, to: &mut [u64], factor: NonZeroU32) {
+    let [width, height, depth] = below.resolution;
+    let step = NonZeroUsize::try_from(factor).unwrap_or(NonZeroUsize::MIN);
+    for z in 0..depth {
+        for y in 0..height {
+            let row = above.bit([0, y / factor, z / factor]);
+            each_one(from, below.bit([0, y, z]), width as usize, |x| {
+                let bit = row + x / step;
+                if let Some(word) = to.get_mut(bit / WORD_BITS) {
+                    *word |= 1 << (bit % WORD_BITS);
+                }
+                true
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use super::*;
+
+    #[test]
+    fn levels_end_with_few_cells() {
+        for resolution in [[1, 1, 1], [4, 4, 4], [5, 4, 4], [303, 213, 135], [4096, 4096, 4096]] {
+            for factor in [2, 3, 6, 100] {
+                let levels = Levels::new(resolution, factor);
+                assert!(levels.count() >= 1);
+                let is_complete = levels.level(levels.count()).cells() <= FEW_CELLS;
+                assert!(is_complete || levels.count() == MAX_LEVELS && factor <= 3);
+                let below = (1..levels.count()).map(|number| levels.level(number).cells());
+                assert!(below.into_iter().all(|cells| cells > FEW_CELLS));
+            }
+        }
+    }
+
+    #[test]
+    fn a_macrocell_is_full_if_a_cell_below_it_is() {
+        let resolution = [131, 37, 50];
+        let mut domain_bits = vec![0; (131 * 37 * 50_usize).div_ceil(64)];
+        let full = |x: u32, y: u32, z: u32| (x * 7 + y * 31 + z * 101).is_multiple_of(997);
+        let grid = Level { resolution, start: 0 };
+        let cells = |[w, h, d]: [u32; 3]| {
+            (0..d).flat_map(move |z| (0..h).flat_map(move |y| (0..w).map(move |x| [x, y, z])))
+        };
+        for cell @ [x, y, z] in cells(resolution) {
+            let bit = grid.bit(cell);
+            domain_bits[bit / 64] |= u64::from(full(x, y, z)) << (bit % 64);
+        }
+        let levels = Levels::new(resolution, 3);
+        let mut words = vec![u64::MAX; usize::try_from(levels.words()).unwrap()];
+        levels.fill(resolution, &domain_bits, &mut words);
+        for number in 1..=levels.count() {
+            let size = 3_u32.pow(u32::try_from(number).unwrap());
+            let level = levels.level(number);
+            let mut expected = vec![false; usize::try_from(level.cells()).unwrap()];
+            let at = |[x, y, z]: [u32; 3]| Level { start: 0, ..level }.bit([x, y, z]);
+            for [x, y, z] in cells(resolution).filter(|&[x, y, z]| full(x, y, z)) {
+                expected[at([x / size, y / size, z / size])] = true;
+            }
+            for cell in cells(level.resolution) {
+                assert_eq!(levels.is_full(&words, number, cell), expected[at(cell)]);
+            }
+        }
+        assert_eq!(levels.first_wrong_word(resolution, &domain_bits, &words), None);
+        for word in 0..words.len() {
+            for bit in 0..64 {
+                words[word] ^= 1 << bit;
+                assert_eq!(levels.first_wrong_word(resolution, &domain_bits, &words), Some(word));
+                words[word] ^= 1 << bit;
+            }
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Spreading primitives over cells: mark, count, and sort them into lists.
+//!
+//! Two passes of a compact grid (LD08) over a hash table: count the references of every slot, sum
+//! up, and fill in reverse, so that every list ascends by id. What is spread comes from a
+//! [`Spread`]: the triangles of a mesh over a lattice, or the triangles of one cell over a subgrid.
+
+use super::{row, slot};
+use crate::bits::set_range;
+use crate::cell::CellRange;
+
+/// Primitives with the cells that each belongs into.
+pub(crate) trait Spread {
+    /// Cells per axis.
+    fn resolution(&self) -> [u32; 3];
+
+    /// The primitives with their cells, ascending by id: the same ones at every call.
+    fn ranges(&self) -> impl DoubleEndedIterator<Item = (u32, CellRange)>;
+}
+
+/// Marks the cells that primitives overlap and counts the references, up to a limit.
+pub(crate) fn mark(spread: &impl Spread, domain_bits: &mut [u64], limit: u32) -> Option<u32> {
+    domain_bits.fill(0);
+    let [width, height, _] = spread.resolution();
+    count_references(spread, limit, |range| {
+        let [from, to] = [range.min[0] as usize, range.max[0] as usize];
+        for_each_row(height, range, |row| {
+            set_range(domain_bits, row * width as usize + from, to - from);
+        });
+    })
+}
+
+/// Counts the references of a grid, showing every primitive's cells to `visit`; `None` if there are
+/// more than `limit`.
+#[inline(always)]
+pub(crate) fn count_references(
+    spread: &impl Spread,
+    limit: u32,
+    mut visit: impl FnMut(&CellRange),
+) -> Option<u32> {
+    let mut count = 0;
+    for (_, range) in spread.ranges() {
+        count += range.count();
+        if count > u64::from(limit) {
+            return None;
+        }
+        visit(&range);
+    }
+    u32::try_from(count).ok()
+}
+
+/// Sorts the primitives into the cells' lists: count, sum up, fill in reverse.
+pub(crate) fn fill(
+    spread: &impl Spread,
+    row_offsets: &[i32],
+    hash: &mut [u32],
+    references: &mut [u32],
+) {
+    let [_, height, _] = spread.resolution();
+
+    // Count the references of each slot.
+    hash.fill(0);
+    for (_, range) in spread.ranges() {
+        for_each_slot(height, &range, row_offsets, hash, |count| *count += 1);
+    }
+
+    // Sum up: every slot now says where its list ends.
+    let mut end = 0_u32;
+    for slot in &mut *hash {
+        end = end.wrapping_add(*slot);
+        *slot = end;
+    }
+
+    // Put every primitive before the end of its lists, the last one first: lists ascend by id.
+    for (id, range) in spread.ranges().rev() {
+        for_each_slot(height, &range, row_offsets, hash, |end| {
+            *end = end.wrapping_sub(1);
+            if let Some(reference) = references.get_mut(*end as usize) {
+                *reference = id;
+            }
+        });
+    }
+}
+
+/// Shows `visit` the rows that a range of cells touches.
+#[inline(always)]
+fn for_each_row(height: u32, range: &CellRange, mut visit: impl FnMut(usize)) {
+    for z in range.min[2]..=range.max[2] {
+        for y in range.min[1]..=range.max[1] {
+            visit(row(height, y, z));
+        }
+    }
+}
+
+/// Shows `visit` the slots of the hash table that a range of cells has.
+#[inline(always)]
+fn for_each_slot(
+    height: u32,
+    range: &CellRange,
+    row_offsets: &[i32],
+    hash: &mut [u32],
+    mut visit: impl FnMut(&mut u32),
+) {
+    let length = (range.max[0] - range.min[0]) as usize + 1;
+    for_each_row(height, range, |row| {
+        let Some(&offset) = row_offsets.get(row) else { return };
+        let Some(start) = slot(offset, range.min[0]) else { return };
+        for slot in hash.get_mut(start..start + length).into_iter().flatten() {
+            visit(slot);
+        }
+    });
+}

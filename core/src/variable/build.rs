@@ -1,0 +1,330 @@
+//! Building a variable grid: a one-level plan, its lists in the scratch, then cell by cell into the
+//! pool.
+//!
+//! ```text
+//! scratch | plan of the top | hash | references | owners of slots | rows, bits, slots of a subgrid |
+//! index   | header | row_offsets | domain_bits | hash | pool, a bump allocator ->
+//! ```
+//!
+//! The pool is filled in the order of the slots, so a list ends where the next one starts and
+//! nothing is moved. When the pool runs out the build goes on planning subgrids and counting words:
+//! at the end it knows, exactly, what index it would have needed. That is also how `sizes` answers.
+
+use glam::Vec3A;
+
+use super::SUBGRID;
+use super::subgrid::{Frame, SubLayout};
+use crate::aabb::Aabb;
+use crate::arena::{section_bytes, split_mut};
+use crate::bits::{WORD_BITS, each_one, halves};
+use crate::bump::Bump;
+use crate::cell::{CellRange, Lattice};
+use crate::config::Config;
+use crate::error::{ConfigField, Error, Region};
+use crate::mesh::TriangleMesh;
+use crate::one_level::{
+    Layout, MeshSpread, Plan, Rows, Spread, copy, displace, fill, mark, reference_limit, slot,
+};
+use crate::sizes::Sizes;
+
+/// The primitives of one cell over its subgrid.
+struct CellSpread<'m> {
+    mesh: &'m TriangleMesh<'m>,
+    lattice: &'m Lattice,
+    cell: [u32; 3],
+    ids: &'m [u32],
+    frame: Frame,
+}
+
+impl CellSpread<'_> {
+    /// What a primitive reaches, in cells of the top.
+    fn reach(&self, id: u32) -> Option<Aabb> {
+        let bounds = self.mesh.corners(id, Vec3A::new).and_then(Aabb::of)?;
+        Some(self.lattice.reach(&bounds))
+    }
+}
+
+impl Spread for CellSpread<'_> {
+    fn resolution(&self) -> [u32; 3] {
+        self.frame.resolution
+    }
+
+    fn ranges(&self) -> impl DoubleEndedIterator<Item = (u32, CellRange)> {
+        self.ids.iter().filter_map(|&id| Some((id, self.frame.range(self.cell, &self.reach(id)?))))
+    }
+}
+
+/// Arrays in which one subgrid after the other is planned.
+struct Bench<'s> {
+    row_offsets: &'s mut [i32],
+    domain_bits: &'s mut [u64],
+    occupied: &'s mut [u64],
+}
+
+/// The scratch behind the plan of the top.
+struct Lists<'s> {
+    hash: &'s mut [u32],
+    references: &'s mut [u32],
+    /// The cell of every slot, or [`NOBODY`].
+    owners: &'s mut [u32],
+    rest: &'s mut [u8],
+}
+
+/// The owner of a slot that no cell uses.
+const NOBODY: u32 = u32::MAX;
+
+impl<'s> Lists<'s> {
+    fn new(layout: &Layout, scratch: &'s mut [u8]) -> Option<Self> {
+        let (hash, rest) = split_mut(scratch, u64::from(layout.hash_count) + 1)?;
+        let (references, rest) = split_mut(rest, layout.reference_count.into())?;
+        let (owners, rest) = split_mut(rest, layout.hash_count.into())?;
+        Some(Self { hash, references, owners, rest })
+    }
+}
+
+/// Bytes of scratch that are enough for a top with this layout, whatever its lists turn out to be.
+const fn scratch_bytes(layout: &Layout, triangles: u32, density: f32) -> u64 {
+    layout.scratch_bytes()
+        + section_bytes::<u32>(layout.cells + 1)
+        + section_bytes::<u32>(layout.reference_count as u64)
+        + section_bytes::<u32>(layout.cells)
+        + Layout::bound(triangles, density, 0).scratch_bytes()
+}
+
+/// The same for a grid of which only the resolution is known.
+pub(crate) const fn scratch_bytes_at_most(
+    resolution: [u32; 3],
+    triangles: u32,
+    density: f32,
+) -> u64 {
+    let layout = Layout::new(resolution, 0, reference_limit(triangles), 0);
+    scratch_bytes(&layout, triangles, density)
+}
+
+/// The most words of pool that so many references in the top can lead to.
+///
+/// A subgrid of n primitives has at most `density * n + 1` cells, each of which takes a bit, a slot
+/// and at most a row, and [`reference_limit`] references.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bound, rounded up")]
+const fn pool_words(references: u32, config: &Config) -> u32 {
+    let per_reference = 2.1 * config.density as f64 + 16.0;
+    let per_subgrid = 3.0 + 2.1 + 2.0 + reference_limit(0) as f64;
+    let subgrids = references as f64 / (config.subdivide_above as f64 + 1.0);
+    (references as f64 * per_reference + subgrids * per_subgrid) as u32
+}
+
+/// The most memory that a mesh with so many triangles can need.
+pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
+    let top = Layout::bound(triangles, config.density, 0);
+    let index = top.with_references(pool_words(top.reference_count, config)).index_bytes();
+    (index, scratch_bytes(&top, triangles, config.density))
+}
+
+/// The memory that a mesh needs: exact if the scratch is large enough to plan in.
+pub(crate) fn sizes(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+) -> Result<Sizes, Error> {
+    let exact = if scratch.is_empty() { None } else { Some(run(mesh, config, &mut [], scratch)) };
+    let plan = Plan::new(mesh, config, &(), &mut [])?;
+    let scratch_bytes = scratch_bytes(&plan.layout, mesh.triangle_count(), config.density);
+    match exact {
+        Some(Ok(index_bytes)) => Sizes::new(index_bytes, scratch_bytes, true),
+        Some(Err(error)) if !is_scratch(&error) => Err(error),
+        _ => {
+            let pool = pool_words(plan.layout.reference_count, config);
+            let index_bytes = plan.layout.with_references(pool).index_bytes();
+            Sizes::new(index_bytes, scratch_bytes, false)
+        }
+    }
+}
+
+/// Whether an error says that the scratch is too small.
+const fn is_scratch(error: &Error) -> bool {
+    matches!(error, Error::OutOfMemory { region: Region::Scratch, .. })
+}
+
+/// Builds into `index` and returns the part of it that is the blob.
+pub(crate) fn build<'a>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &'a mut [u8],
+    scratch: &mut [u8],
+) -> Result<&'a [u8], Error> {
+    let available_bytes = index.len() as u64;
+    let needed_bytes = run(mesh, config, index, scratch)?;
+    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
+    usize::try_from(needed_bytes).ok().and_then(|bytes| index.get(..bytes)).ok_or(too_small)
+}
+
+/// Builds as much as the index holds and returns the bytes that all of it takes.
+fn run(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &mut [u8],
+    scratch: &mut [u8],
+) -> Result<u64, Error> {
+    let available_bytes = scratch.len() as u64;
+    let mut plan = Plan::new(mesh, config, &(), scratch)?;
+    let needed_bytes = scratch_bytes(&plan.layout, mesh.triangle_count(), config.density);
+    let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
+    let Rows { offsets, domain_bits, rest } = plan.rows.take().ok_or(too_small)?;
+
+    // Sort the triangles into the lists of the top, and find the longest.
+    let lists = Lists::new(&plan.layout, rest).ok_or(too_small)?;
+    let Lists { hash, references, owners, rest } = lists;
+    fill(&MeshSpread { mesh, lattice: &plan.lattice }, offsets, hash, references);
+    let longest = hash.windows(2).map(|ends| ends[1].wrapping_sub(ends[0])).max().unwrap_or(0);
+    let bench = Layout::bound(longest, config.density, 0).scratch(rest).ok_or(too_small)?;
+    let mut bench = Bench {
+        row_offsets: bench.row_offsets,
+        domain_bits: bench.domain_bits,
+        occupied: bench.occupied,
+    };
+    assign(plan.lattice.resolution, offsets, domain_bits, owners);
+
+    // Cut the index into the sections of the top and the pool behind them, if it is large enough.
+    let top = plan.layout.with_references(0);
+    let split = usize::try_from(top.index_bytes()).ok();
+    let (head, pool) = match split.and_then(|bytes| index.split_at_mut_checked(bytes)) {
+        Some((head, pool)) => (top.sections_mut(head), pool),
+        None => (None, &mut [][..]),
+    };
+    let whole_words = pool.len() / size_of::<u32>() * size_of::<u32>();
+    let pool = pool.get_mut(..whole_words).and_then(|pool| bytemuck::try_cast_slice_mut(pool).ok());
+    let mut pool = Bump::new(pool.unwrap_or_default());
+    let mut head = head.map(|sections| {
+        copy(offsets, sections.row_offsets);
+        copy(domain_bits, sections.domain_bits);
+        (sections.header, sections.hash)
+    });
+
+    // Move list after list into the pool, crowded ones as subgrids.
+    let mut entry = |slot: usize, value: u32| {
+        if let Some(entry) = head.as_mut().and_then(|(_, hash)| hash.get_mut(slot)) {
+            *entry = value;
+        }
+    };
+    let lists = hash.windows(2).map(|ends| match ends {
+        &[start, end] => references.get(start as usize..end as usize).unwrap_or_default(),
+        _ => &[],
+    });
+    for (slot, (ids, &owner)) in lists.zip(&*owners).enumerate() {
+        let start = offset(&pool)?;
+        let cell = cell_of(owner, plan.lattice.resolution);
+        let spread = CellSpread { mesh, lattice: &plan.lattice, cell, ids, frame: Frame::WHOLE };
+        let is_crowded = ids.len() > config.subdivide_above as usize;
+        if is_crowded && spread.subdivide(config.density, &mut bench, &mut pool) {
+            entry(slot, start | SUBGRID);
+        } else {
+            entry(slot, start);
+            if let Some(words) = pool.take(ids.len()) {
+                copy(ids, words);
+            }
+        }
+    }
+    let pool_words = offset(&pool)?;
+    entry(owners.len(), pool_words);
+
+    // The header says how long the pool became; what is behind it is padding.
+    plan.layout = plan.layout.with_references(pool_words);
+    let needed_bytes = plan.layout.index_bytes();
+    if let Some((header, _)) = head {
+        *header = plan.header(config, mesh).to_bytes();
+    }
+    let used = top.index_bytes() + u64::from(pool_words) * size_of::<u32>() as u64;
+    let range = usize::try_from(used).ok().zip(usize::try_from(needed_bytes).ok());
+    if let Some(padding) = range.and_then(|(from, to)| index.get_mut(from..to)) {
+        padding.fill(0);
+    }
+    Ok(needed_bytes)
+}
+
+/// Where the pool goes on, if a hash entry can say so.
+fn offset(pool: &Bump<'_>) -> Result<u32, Error> {
+    let offset = u32::try_from(pool.asked()).ok().filter(|offset| offset & SUBGRID == 0);
+    offset.ok_or(Error::InvalidConfig(ConfigField::Density))
+}
+
+/// Notes the cell of every slot.
+fn assign([width, ..]: [u32; 3], row_offsets: &[i32], domain_bits: &[u64], owners: &mut [u32]) {
+    owners.fill(NOBODY);
+    for (row, &offset) in row_offsets.iter().enumerate() {
+        let first = row * width as usize;
+        each_one(domain_bits, first, width as usize, |x| {
+            let owner = u32::try_from(x).ok().and_then(|x| owners.get_mut(slot(offset, x)?));
+            if let (Some(owner), Ok(cell)) = (owner, u32::try_from(first + x)) {
+                *owner = cell;
+            }
+            true
+        });
+    }
+}
+
+/// The cell with this number, counted along x, then y, then z.
+fn cell_of(number: u32, [width, height, _]: [u32; 3]) -> [u32; 3] {
+    let row = number.checked_div(width).unwrap_or(0);
+    [
+        number.checked_rem(width).unwrap_or(0),
+        row.checked_rem(height).unwrap_or(0),
+        row.checked_div(height).unwrap_or(0),
+    ]
+}
+
+impl CellSpread<'_> {
+    /// Puts a subgrid of the primitives into the pool; `false` if it would gain too little.
+    ///
+    /// A subgrid pays if its cells list on average at most half of the primitives. A pile of
+    /// triangles that all reach everywhere stays a list.
+    fn subdivide(mut self, density: f32, bench: &mut Bench<'_>, pool: &mut Bump<'_>) -> bool {
+        let Some(layout) = self.plan(density, bench) else { return false };
+        let Some(sections) = pool.take(layout.words()).and_then(|words| layout.sections_mut(words))
+        else {
+            return true;
+        };
+        let rows = bench.row_offsets.get(..sections.row_offsets.len()).unwrap_or_default();
+        for (to, from) in sections.row_offsets.iter_mut().zip(rows) {
+            *to = from.cast_unsigned();
+        }
+        let halves = bench.domain_bits.iter().flat_map(|&word| halves(word));
+        for (to, from) in sections.domain_bits.iter_mut().zip(halves) {
+            *to = from;
+        }
+        fill(&self, rows, sections.hash, sections.references);
+        true
+    }
+
+    /// Plans a subgrid: its frame, and its rows on the bench.
+    fn plan(&mut self, density: f32, bench: &mut Bench<'_>) -> Option<SubLayout> {
+        let reaches = self.ids.iter().filter_map(|&id| self.reach(id));
+        let reach = reaches.reduce(|all, reach| all.union(&reach))?;
+        self.frame = Frame::around(&reach, self.cell);
+        let count = u32::try_from(self.ids.len()).ok()?;
+
+        // Settle the density as for the top.
+        let mut density = f64::from(density);
+        let (cells, reference_count) = loop {
+            let is_cut = self.frame.cut(self.lattice.cell_size(), density, count);
+            density *= 0.5;
+            if !is_cut {
+                continue;
+            }
+            let cells = self.frame.cells();
+            let domain_bits = bench.domain_bits.get_mut(..cells.div_ceil(WORD_BITS))?;
+            if let Some(references) = mark(self, domain_bits, reference_limit(count)) {
+                break (cells, references);
+            }
+        };
+        if 2 * u64::from(reference_count) > u64::from(count) * cells as u64 {
+            return None;
+        }
+
+        let [width, height, depth] = self.frame.resolution.map(|cells| cells as usize);
+        let row_offsets = bench.row_offsets.get_mut(..height * depth)?;
+        let occupied = bench.occupied.get_mut(..cells.div_ceil(WORD_BITS) + 1)?;
+        occupied.fill(0);
+        let hash_count = displace(bench.domain_bits, width, row_offsets, occupied)?;
+        Some(SubLayout { frame: self.frame, hash_count, reference_count })
+    }
+}

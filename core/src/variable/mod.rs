@@ -1,0 +1,110 @@
+//! The multi-level variable hashed grid (CP10 §3.1): crowded cells hold grids of their own.
+//!
+//! The top is a one-level grid at density 4. A cell with more primitives than
+//! `Config::subdivide_above` does not list them: it holds a subgrid, built by the same algorithm from
+//! the cell's primitives, cut to the part of the cell that they reach. Two levels, as in the paper.
+//!
+//! ```text
+//! blob | header | row_offsets | domain_bits | hash | pool |
+//!
+//! hash[slot] .. hash[slot + 1]      the cell's part of the pool
+//!   top bit of hash[slot] clear     primitive ids, ascending
+//!   top bit set                     a subgrid, see subgrid.rs
+//! ```
+//!
+//! The paper names no threshold. 16 is where the time to image is lowest or within 3 % of it on all
+//! scans; lab/results/subdivision.md has the sweep.
+
+mod build;
+mod subgrid;
+mod validate;
+
+use crate::blob::Header;
+use crate::cell::Lattice;
+use crate::counters::Tally;
+use crate::dda::{Line, Step};
+use crate::error::Error;
+use crate::one_level::OneLevel;
+pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
+use subgrid::Subgrid;
+
+/// The bit of a hash entry that says "subgrid". Offsets into the pool have the others.
+const SUBGRID: u32 = 1 << 31;
+
+/// What a cell of the top holds.
+#[derive(Debug, Clone, Copy)]
+enum Content<'a> {
+    /// Primitive ids, ascending.
+    List(&'a [u32]),
+    /// The words of a subgrid.
+    Subgrid(&'a [u32]),
+}
+
+/// A view of a built variable grid.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Variable<'a> {
+    top: OneLevel<'a>,
+}
+
+impl<'a> Variable<'a> {
+    /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
+    pub(crate) fn open(header: &Header, lattice: &Lattice, blob: &'a [u8]) -> Result<Self, Error> {
+        Ok(Self { top: OneLevel::open(header, lattice, &(), blob)? })
+    }
+
+    /// What a cell holds; `None` if it is empty.
+    #[inline(always)]
+    fn content(&self, cell: [u32; 3]) -> Option<Content<'a>> {
+        let [start, end] = self.top.ends(cell)?;
+        let part = (start & !SUBGRID) as usize..(end & !SUBGRID) as usize;
+        let words = self.top.lists().get(part)?;
+        Some(if start & SUBGRID == 0 { Content::List(words) } else { Content::Subgrid(words) })
+    }
+
+    /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any; see
+    /// [`OneLevel::traverse`].
+    #[inline(always)]
+    pub(crate) fn traverse<T: Tally>(
+        &self,
+        line: &Line,
+        tally: &mut T,
+        mut leaf: impl FnMut(&[u32], &mut T) -> f32,
+    ) {
+        let mut limit = line.end;
+        let mut walk = line.walk(0.0, 1.0, [0; 3], self.top.last());
+        // While the walk is in a subgrid: the subgrid, and the walk around it.
+        let mut inside: Option<(Subgrid<'a>, _)> = None;
+        loop {
+            tally.cell_step();
+            let content = match &inside {
+                None => self.content(walk.cell),
+                Some((subgrid, _)) => subgrid.references(walk.cell).map(Content::List),
+            };
+            match content {
+                None => {}
+                Some(Content::List(ids)) => limit = leaf(ids, tally),
+                Some(Content::Subgrid(words)) => {
+                    let subgrid = Subgrid::open(words);
+                    let enter = subgrid.and_then(|grid| Some((grid, grid.walk(line, &walk)?)));
+                    if let Some((subgrid, within)) = enter {
+                        tally.grid_step();
+                        inside = Some((subgrid, walk));
+                        walk = within;
+                        continue;
+                    }
+                }
+            }
+            // Take a step; where the subgrid ends, take it around the subgrid.
+            loop {
+                match walk.advance(limit) {
+                    Step::Inside => break,
+                    Step::Ended => return,
+                    Step::Outside => match inside.take() {
+                        Some((_, around)) => walk = around,
+                        None => return,
+                    },
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,740 @@
+/*
+ * hgrid: a ray-tracing acceleration structure that a renderer links and a microcontroller can carry.
+ *
+ * It turns a triangle mesh into a hashed grid, in time proportional to the number of triangles and
+ * in memory that you bring, and answers ray queries on it. This file is the whole manual. It is
+ * made from the sources in capi/: change it there.
+ *
+ * Three calls
+ * -----------
+ *   hgrid_sizes       how much memory does this mesh take?     optional: there are bounds, too
+ *   hgrid_build       mesh + memory -> grid
+ *   hgrid_intersect   grid + ray -> hit;  hgrid_occluded only says whether there is one
+ *
+ * And for grids that are stored: hgrid_open, hgrid_validate.
+ *
+ *   #include <hgrid.h>
+ *   #include <math.h>
+ *   #include <stdio.h>
+ *
+ *   static const float positions[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+ *   static const uint32_t indices[2][3] = {{0, 1, 2}, {2, 1, 3}};
+ *   HGRID_ALIGNED static unsigned char index[HGRID_INDEX_BOUND(2)], scratch[HGRID_SCRATCH_BOUND(2)];
+ *
+ *   int main(void)
+ *   {
+ *       hgrid_mesh mesh = HGRID_MESH_INIT;
+ *       mesh.positions = positions, mesh.vertex_count = 4;
+ *       mesh.indices = indices, mesh.triangle_count = 2;
+ *       hgrid_grid grid;
+ *       hgrid_status status = hgrid_build(&mesh, NULL, index, sizeof index, scratch, sizeof scratch,
+ *                                         &grid, NULL);
+ *       if (status != HGRID_OK)
+ *           return fprintf(stderr, "%s\n", hgrid_status_string(status)), 1;
+ *       hgrid_ray ray = {{0.25f, 0.25f, 1}, 0, {0, 0, -1}, INFINITY};
+ *       hgrid_hit hit;
+ *       if (hgrid_intersect(&grid, &ray, NULL, &hit))
+ *           printf("triangle %u at t = %g\n", (unsigned)hit.primitive, hit.t);
+ *       return 0;
+ *   }
+ *
+ *   cargo build --release -p hgrid-capi
+ *   cc program.c -Iinclude -Ltarget/release -lhgrid -Wl,-rpath,"$PWD/target/release"
+ *
+ * The linker prefers libhgrid.so, which the program then looks for when it starts: the rpath says
+ * where (or LD_LIBRARY_PATH does). With target/release/libhgrid.a instead of -L and -l the program
+ * is static. Neither needs any other library or flag.
+ *
+ * Memory
+ * ------
+ * You bring two regions. The index keeps the grid; the scratch is free again after the build. Both
+ * start at a multiple of HGRID_ALIGNMENT (64) bytes and overlap nothing else that the call uses.
+ * They may hold anything before. The library allocates nothing, keeps nothing, touches nothing
+ * outside the regions, and there is nothing to free.
+ *
+ * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are enough for every mesh with so many
+ * triangles and fit into an array declaration; hgrid_sizes knows the mesh and asks for less. Where
+ * the system hands out memory page by page, an index that is too large costs nothing: pages that
+ * are not touched are never taken.
+ *
+ * The index is a blob: no pointer in it, so it can be copied to another region at a multiple of 64,
+ * written to a file, mapped from one, sent, or put in flash, and opened there with hgrid_open. The
+ * byte order must be the same. hgrid_grid is only a view of blob and mesh.
+ *
+ * The mesh stays yours and stays where it is: it is read at every query. To change vertices, change
+ * them while no query runs, and build again, in the same regions if you like.
+ *
+ * Pointers
+ * --------
+ * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
+ * valid during the call. Regions, blobs, positions and indices point to as many bytes as the sizes
+ * next to them say. Each function says which of its pointers may be NULL; any other NULL is answered
+ * with HGRID_ERROR_NULL_ARGUMENT, or by a query with false. Outputs come last. They are written when
+ * a call succeeds and not touched when it fails, except for the report, which is written in both
+ * cases.
+ *
+ * Structs
+ * -------
+ * A struct that may grow starts with struct_size. Initialise it with its macro, then set what you
+ * need:
+ *
+ *   hgrid_config config = HGRID_CONFIG_INIT;
+ *   config.density = 8;
+ *
+ * A later version may add fields at the end, where 0 means what was before. A larger struct from a
+ * program that was compiled with a later header is accepted as long as all that this version does
+ * not know is 0. A value that this version does not know is an error, never ignored.
+ *
+ * Errors
+ * ------
+ * Every call that can fail returns an hgrid_status: HGRID_OK, which is 0, or a negative number that
+ * is never used for anything else. hgrid_status_string says in words what to do. Details (how many
+ * bytes, which triangle) are in the report. A miss is not an error. Odd meshes are none either: an
+ * empty mesh builds and is never hit, and a triangle with a NaN or infinite vertex is left out and
+ * counted, unless HGRID_BUILD_STRICT says otherwise.
+ *
+ * Threads
+ * -------
+ * There is no global state, no lock and no thread in the library. Any number of threads may query
+ * one grid at once, and calls that share no memory they write never disturb each other. Each
+ * function says it again for itself.
+ *
+ * Results
+ * -------
+ * Meshes and hits are in your units; t is in multiples of the ray's direction, whatever its length.
+ * There is no epsilon, so the scale of a mesh does not matter. Only IEEE + - * / are used, in a
+ * fixed order: the same input gives the same bits on every machine.
+ *
+ * Versions
+ * --------
+ * HGRID_VERSION is what you compiled against, hgrid_version() what you linked. While the major
+ * version is 0, both should be of the same minor version. HGRID_BLOB_VERSION is that of stored
+ * grids.
+ *
+ * SPDX-License-Identifier: MIT OR Apache-2.0
+ */
+
+#ifndef HGRID_H
+#define HGRID_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifndef HGRID_ALIGNED
+/**
+ * Put in front of the declaration of an array, makes it a region:
+ * `HGRID_ALIGNED static unsigned char index[HGRID_INDEX_BOUND(1000)];`
+ */
+#if defined(_MSC_VER)
+#define HGRID_ALIGNED __declspec(align(64))
+#elif defined(__GNUC__)
+#define HGRID_ALIGNED __attribute__((aligned(64)))
+#elif defined(__cplusplus)
+#define HGRID_ALIGNED alignas(64)
+#else
+#define HGRID_ALIGNED _Alignas(64)
+#endif
+#endif
+
+/**
+ * Bytes of index that are enough for any mesh with so many triangles, wherever they lie, with the
+ * default configuration: a constant expression. A scan takes about a tenth of it.
+ */
+#define HGRID_INDEX_BOUND(triangles) ((size_t)85 * (triangles) + 1280)
+
+/**
+ * Bytes of scratch that are enough for any mesh with so many triangles, wherever they lie, with the
+ * default configuration: a constant expression.
+ */
+#define HGRID_SCRATCH_BOUND(triangles) ((size_t)5 * (triangles) + 1024)
+
+/**
+ * The id that no triangle has.
+ */
+#define HGRID_INVALID_ID UINT32_MAX
+
+/**
+ * The version of this header, as text.
+ */
+#define HGRID_VERSION_STRING "0.1.0"
+
+/**
+ * Every memory region starts at a multiple of this many bytes: index, scratch and blob.
+ */
+#define HGRID_ALIGNMENT 64
+
+/**
+ * The version of the blob format. A blob of another version is refused: build it again.
+ */
+#define HGRID_BLOB_VERSION 1
+
+/**
+ * Indices of 32 bits: the default of `hgrid_mesh`.
+ */
+#define HGRID_INDEX_U32 0
+
+/**
+ * Indices of 16 bits.
+ */
+#define HGRID_INDEX_U16 1
+
+/**
+ * One hashed grid with a single cell size: the default of `hgrid_config`.
+ */
+#define HGRID_METHOD_ONE_LEVEL 1
+
+/**
+ * A build flag: refuse a mesh with a triangle that is not finite, instead of leaving it out.
+ */
+#define HGRID_BUILD_STRICT 1
+
+/**
+ * Raised when programs must change to go on working.
+ */
+#define HGRID_VERSION_MAJOR 0
+
+/**
+ * Raised when something was added. While the major version is 0, it may also break programs.
+ */
+#define HGRID_VERSION_MINOR 1
+
+/**
+ * Raised when something was repaired.
+ */
+#define HGRID_VERSION_PATCH 0
+
+/**
+ * The three numbers as one that can be compared.
+ */
+#define HGRID_VERSION (((HGRID_VERSION_MAJOR << 16) | (HGRID_VERSION_MINOR << 8)) | HGRID_VERSION_PATCH)
+
+/**
+ * What a call answers: `HGRID_OK`, or below zero why not. `hgrid_status_string` has it in words.
+ */
+typedef int32_t hgrid_status;
+
+/**
+ * A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
+ *
+ * The arrays are read where they lie, never copied and never changed, and not one byte behind the
+ * last element's own bytes. They need no alignment, so both may be fields of the caller's structs.
+ * Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
+ * struct itself is only read during the call.
+ */
+typedef struct hgrid_mesh {
+    /**
+     * `sizeof(hgrid_mesh)`.
+     */
+    uint32_t struct_size;
+    /**
+     * `HGRID_INDEX_U32` or `HGRID_INDEX_U16`.
+     */
+    uint32_t index_type;
+    /**
+     * The first vertex: three floats x, y, z, in scene units. NULL only without vertices.
+     */
+    const void *positions;
+    /**
+     * Bytes from one vertex to the next, at least 12; 0 means 12.
+     */
+    size_t position_stride;
+    /**
+     * Number of vertices.
+     */
+    size_t vertex_count;
+    /**
+     * The first triangle: three vertex numbers, from 0. NULL only without triangles.
+     */
+    const void *indices;
+    /**
+     * Bytes from one triangle to the next, at least three indices; 0 means exactly three indices.
+     */
+    size_t index_stride;
+    /**
+     * Number of triangles, at most 4294967294.
+     */
+    size_t triangle_count;
+} hgrid_mesh;
+
+/**
+ * What a build may be told. Initialise it with `HGRID_CONFIG_INIT`; NULL means the same.
+ */
+typedef struct hgrid_config {
+    /**
+     * `sizeof(hgrid_config)`.
+     */
+    uint32_t struct_size;
+    /**
+     * The structure to build: `HGRID_METHOD_ONE_LEVEL`.
+     */
+    uint32_t method;
+    /**
+     * Cells per triangle, above 0; the default is 4. More cells mean fewer tests, more steps, more
+     * memory.
+     */
+    float density;
+    /**
+     * 0 or `HGRID_BUILD_STRICT`.
+     */
+    uint32_t flags;
+} hgrid_config;
+
+/**
+ * What a build, or a question for sizes, found out. Initialise it with `HGRID_REPORT_INIT`.
+ *
+ * Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
+ * what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`.
+ */
+typedef struct hgrid_report {
+    /**
+     * `sizeof(hgrid_report)`.
+     */
+    uint32_t struct_size;
+    /**
+     * 1 if `index_bytes` is what the grid takes, to the byte; 0 if it is only enough.
+     */
+    uint32_t is_exact;
+    /**
+     * Bytes that the index region needs; after a build, the size of the blob.
+     */
+    uint64_t index_bytes;
+    /**
+     * Bytes that the scratch region needs: always exact.
+     */
+    uint64_t scratch_bytes;
+    /**
+     * The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
+     */
+    uint32_t triangle;
+    /**
+     * Triangles left out because a coordinate is not finite. Known after a build, as are all below.
+     */
+    uint32_t skipped_count;
+    /**
+     * Triangle ids in all cells together.
+     */
+    uint32_t reference_count;
+    /**
+     * Cells per triangle: what was asked for, or a half, a quarter, ... of it where the mesh would
+     * have needed more than 16 references for each triangle.
+     */
+    float density;
+    /**
+     * Cells on each axis.
+     */
+    uint32_t resolution[3];
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+} hgrid_report;
+
+/**
+ * A built grid and its mesh, ready for queries: a view, held by value.
+ *
+ * It owns nothing, so there is nothing to close or free, and it can be copied by assignment. It
+ * holds the addresses of blob and mesh and is good for as long as both stay where they are,
+ * unchanged. It means nothing in another process or a file: store the blob instead, and open it
+ * there. A view that is all zero is recognised and answers every query with a miss.
+ */
+typedef struct hgrid_grid {
+    /**
+     * Private.
+     */
+    uint64_t opaque[64];
+} hgrid_grid;
+
+/**
+ * A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.
+ *
+ * A point of the ray is `origin + t * direction`. The direction has any length but zero, and every
+ * `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`, both ends included. A ray
+ * with a NaN anywhere, with an infinite origin or direction, with a zero direction or with
+ * `t_min > t_max` hits nothing.
+ */
+typedef struct hgrid_ray {
+    /**
+     * Where `t` is 0, in scene units.
+     */
+    float origin[3];
+    /**
+     * The smallest `t` that is accepted, usually 0; negative reaches behind the origin.
+     */
+    float t_min;
+    /**
+     * The direction, any length but zero.
+     */
+    float direction[3];
+    /**
+     * The largest `t` that is accepted; `INFINITY` and `FLT_MAX` are both fine.
+     */
+    float t_max;
+} hgrid_ray;
+
+/**
+ * Work done by queries. A query adds to it, so one struct can sum up a whole picture.
+ */
+typedef struct hgrid_counters {
+    /**
+     * Ray-triangle tests.
+     */
+    uint64_t primitive_tests;
+    /**
+     * Cells entered, empty ones included.
+     */
+    uint64_t cell_steps;
+    /**
+     * Subgrids entered; 0 for a grid of one level.
+     */
+    uint64_t grid_steps;
+} hgrid_counters;
+
+/**
+ * What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
+ */
+typedef struct hgrid_query_options {
+    /**
+     * `sizeof(hgrid_query_options)`.
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+    /**
+     * Where to add up the work, or NULL. Each thread needs its own.
+     */
+    struct hgrid_counters *counters;
+} hgrid_query_options;
+
+/**
+ * Where a ray meets a triangle: 16 bytes.
+ *
+ * The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
+ * triangle's vertices `a`, `b`, `c`, up to rounding.
+ */
+typedef struct hgrid_hit {
+    /**
+     * Distance in multiples of the ray's direction.
+     */
+    float t;
+    /**
+     * Weight of the triangle's second vertex, 0 to 1.
+     */
+    float u;
+    /**
+     * Weight of the triangle's third vertex, 0 to 1.
+     */
+    float v;
+    /**
+     * The triangle: its position in the index array.
+     */
+    uint32_t primitive;
+} hgrid_hit;
+
+/**
+ * Success.
+ */
+#define HGRID_OK 0
+
+/**
+ * A pointer is NULL that may not be.
+ */
+#define HGRID_ERROR_NULL_ARGUMENT -1
+
+/**
+ * A struct's `struct_size` is smaller than the struct, or larger and what is behind the known
+ * fields is not zero. The usual cause is a struct that was not initialised with its `_INIT` macro.
+ */
+#define HGRID_ERROR_STRUCT_SIZE -2
+
+/**
+ * The index, the scratch or the blob does not start at a multiple of `HGRID_ALIGNMENT`.
+ */
+#define HGRID_ERROR_MISALIGNED -3
+
+/**
+ * The index or the scratch overlaps the other one or the mesh.
+ */
+#define HGRID_ERROR_OVERLAP -4
+
+/**
+ * The index is too small. The report says how many bytes it needs.
+ */
+#define HGRID_ERROR_INDEX_TOO_SMALL -10
+
+/**
+ * The scratch is too small. The report says how many bytes it needs.
+ */
+#define HGRID_ERROR_SCRATCH_TOO_SMALL -11
+
+/**
+ * The position stride is below 12 bytes, or the vertices do not fit into memory.
+ */
+#define HGRID_ERROR_INVALID_POSITIONS -20
+
+/**
+ * The index stride is below three indices, or the indices do not fit into memory.
+ */
+#define HGRID_ERROR_INVALID_INDICES -21
+
+/**
+ * The mesh's `index_type` is none that this version knows.
+ */
+#define HGRID_ERROR_INVALID_INDEX_TYPE -22
+
+/**
+ * The mesh has more than 4294967294 triangles.
+ */
+#define HGRID_ERROR_TOO_MANY_TRIANGLES -23
+
+/**
+ * A triangle names a vertex that the mesh does not have. The report says which triangle.
+ */
+#define HGRID_ERROR_INDEX_OUT_OF_RANGE -24
+
+/**
+ * A triangle has a coordinate that is NaN, infinite or beyond 2^120, and `HGRID_BUILD_STRICT` is
+ * set. The report says which triangle.
+ */
+#define HGRID_ERROR_NON_FINITE -25
+
+/**
+ * The configuration's `method` is none that this version knows.
+ */
+#define HGRID_ERROR_INVALID_METHOD -30
+
+/**
+ * The density is NaN, infinite or not above 0, or asks for more than 4096 cells on an axis.
+ */
+#define HGRID_ERROR_INVALID_DENSITY -31
+
+/**
+ * The configuration's `flags` have a bit that this version does not know.
+ */
+#define HGRID_ERROR_INVALID_FLAGS -32
+
+/**
+ * The bytes, or the view, are not a grid.
+ */
+#define HGRID_ERROR_NOT_A_GRID -40
+
+/**
+ * The blob was built on a machine of the other byte order.
+ */
+#define HGRID_ERROR_WRONG_BYTE_ORDER -41
+
+/**
+ * The blob has a format of another version than `HGRID_BLOB_VERSION`.
+ */
+#define HGRID_ERROR_UNSUPPORTED_VERSION -42
+
+/**
+ * The bytes end before the blob does.
+ */
+#define HGRID_ERROR_TRUNCATED -43
+
+/**
+ * The blob was built for a mesh with another number of vertices or triangles.
+ */
+#define HGRID_ERROR_MESH_MISMATCH -44
+
+/**
+ * The blob contradicts itself or its mesh.
+ */
+#define HGRID_ERROR_CORRUPT -45
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * Tells how much memory a build of this mesh takes.
+ *
+ * Without scratch (NULL, 0) the answer takes two passes over the triangles: the report's
+ * `scratch_bytes` is exact, `index_bytes` is enough, for a scan up to twice what the grid will
+ * take, and `is_exact` is 0. With `scratch_bytes` of scratch the grid is planned there, for about half
+ * the time of a build: `index_bytes` is exact and `is_exact` is 1. The scratch holds nothing of use
+ * afterwards.
+ *
+ * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. Returns `HGRID_OK` or
+ * the reason, with the triangle that is to blame in the report; scratch that is too small is no
+ * error, and counts as none.
+ *
+ * Threads: any number of calls at once, as long as each has a scratch and a report of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
+                         const struct hgrid_config *config,
+                         void *scratch,
+                         size_t scratch_bytes,
+                         struct hgrid_report *report);
+
+/**
+ * Builds a grid in memory that the caller brings.
+ *
+ * `index` keeps the grid (it is the blob afterwards), `scratch` is free again when the call
+ * returns. Both start at a multiple of `HGRID_ALIGNMENT`, overlap neither each other nor the mesh
+ * nor any struct of this call, and may hold anything before. `hgrid_sizes` tells how large they
+ * must be, `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` how large is always enough; what is more
+ * than needed is not touched. The same mesh and configuration give the same bytes on every machine
+ * of the same byte order.
+ *
+ * `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `index` and `scratch` may
+ * be NULL if their size is 0. `report` may be NULL.
+ *
+ * Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `index` and
+ * `grid` as they were. The report is written in both cases: what was built; or, if a region is too
+ * small, what both need; or the triangle that is to blame.
+ *
+ * Threads: any number of calls at once, as long as each has regions, a view and a report of its
+ * own. The call starts no thread.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
+                         const struct hgrid_config *config,
+                         void *index,
+                         size_t index_bytes,
+                         void *scratch,
+                         size_t scratch_bytes,
+                         struct hgrid_grid *grid,
+                         struct hgrid_report *report);
+
+/**
+ * Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
+ *
+ * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
+ * in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
+ * ignored. The mesh is the one it was built for, which only its counts are checked for.
+ *
+ * What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
+ * nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
+ * not change while the grid is in use: map a file that others write as a private copy.
+ *
+ * No argument may be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
+ * and leaves `grid` as it was.
+ *
+ * Threads: any number of calls at once, also on the same blob, each with a view of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_open(const void *blob,
+                        size_t blob_bytes,
+                        const struct hgrid_mesh *mesh,
+                        struct hgrid_grid *grid);
+
+/**
+ * Proves that a blob is the grid of its mesh, and so that every answer will be right.
+ *
+ * Takes about the time of a build and no memory. A grid that was just built needs no proof; a blob
+ * from a file, a network or another process may.
+ *
+ * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
+ * that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view that was never built or opened;
+ * `HGRID_ERROR_NULL_ARGUMENT`.
+ *
+ * Threads: any number of calls and queries on the same grid at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_validate(const struct hgrid_grid *grid);
+
+/**
+ * Finds the closest triangle that a ray hits.
+ *
+ * Returns true and writes `hit`; or returns false and writes nothing. Where several triangles are
+ * hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count.
+ * A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
+ * without area, or one that is seen exactly edge-on, is not hit.
+ *
+ * `options` may be NULL: the defaults. With another NULL, with a view that was never built or
+ * opened, or with options that break the rules for structs, nothing is hit.
+ *
+ * A query allocates nothing, needs a few hundred bytes of stack and takes at most as many steps as
+ * the three resolutions sum up to.
+ *
+ * Threads: any number of queries on the same grid at once; each thread with counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_intersect(const struct hgrid_grid *grid,
+                     const struct hgrid_ray *ray,
+                     const struct hgrid_query_options *options,
+                     struct hgrid_hit *hit);
+
+/**
+ * Tells whether a ray hits anything: what `hgrid_intersect` would return, but sooner.
+ *
+ * This is the query for shadows and visibility. It stops at the first triangle it finds in the
+ * ray's range, which need not be the closest.
+ *
+ * `options` may be NULL: the defaults. With another NULL, with a view that was never built or
+ * opened, or with options that break the rules for structs, the answer is false.
+ *
+ * Threads: any number of queries on the same grid at once; each thread with counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_occluded(const struct hgrid_grid *grid,
+                    const struct hgrid_ray *ray,
+                    const struct hgrid_query_options *options);
+
+/**
+ * Says in words what a status means and what to do.
+ *
+ * Never NULL: a number that is no status gives "unknown status". The text is static, in English,
+ * without a full stop; programs compare numbers, not texts.
+ *
+ * Threads: any number of calls at once.
+ */
+const char *hgrid_status_string(hgrid_status status);
+
+/**
+ * The version of the library that is linked, to be compared with the `HGRID_VERSION` of the header
+ * that was compiled against.
+ *
+ * Threads: any number of calls at once.
+ */
+uint32_t hgrid_version(void);
+
+/**
+ * The version of the library that is linked, as text: never NULL, static.
+ *
+ * Threads: any number of calls at once.
+ */
+const char *hgrid_version_string(void);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* HGRID_H */
+
+/**
+ * An empty mesh of tight arrays: set positions, vertex_count, indices and triangle_count.
+ */
+#define HGRID_MESH_INIT {sizeof(hgrid_mesh), HGRID_INDEX_U32, NULL, 0, 0, NULL, 0, 0}
+
+/**
+ * The default configuration.
+ */
+#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 0}
+
+/**
+ * The default options of a query.
+ */
+#define HGRID_QUERY_OPTIONS_INIT {sizeof(hgrid_query_options), 0, NULL}
+
+/**
+ * A report before its call.
+ */
+#define HGRID_REPORT_INIT {sizeof(hgrid_report), 0, 0, 0, HGRID_INVALID_ID, 0, 0, 0.0f, {0, 0, 0}, 0}

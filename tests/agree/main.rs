@@ -1,0 +1,7 @@
+//! Does every query agree with brute force, at the boundaries above all?
+
+mod exact;
+mod forms;
+mod scans;
+mod snapped;
+mod watertight;

@@ -1,0 +1,145 @@
+//! Real scans: the picture that brute force makes, and no holes along any edge.
+
+use std::collections::HashMap;
+use std::thread;
+
+use hgrid_core::{Config, Grid, Ray};
+use hgrid_lab::camera::{Camera, Up, View};
+use hgrid_lab::scene::{Bounds, Scene};
+use hgrid_tests::meshes::Mesh;
+use hgrid_tests::owned::Owned;
+use hgrid_tests::random::Random;
+use hgrid_tests::{methods, oracle, scans};
+
+/// Pixels on a side: brute force looks at every triangle for every pixel.
+const SIZE: u16 = 64;
+
+fn agrees_on_a_picture(mesh: &Mesh, frame: Bounds) {
+    let view = mesh.view();
+    let owned: Vec<Owned> =
+        methods::configs().map(|config| Owned::build(&view, &config).unwrap()).collect();
+    let grids: Vec<Grid<'_>> = owned.iter().map(|owned| owned.open(&view).unwrap()).collect();
+    grids.iter().for_each(|grid| grid.validate().unwrap());
+    let camera = Camera::framing(frame, View::Front, Up::Y);
+    let hits = |rows: std::ops::Range<u16>| {
+        let pixels = rows.flat_map(|row| (0..SIZE).map(move |column| (column, row)));
+        let rays = pixels.map(|(column, row)| camera.ray(column, row, SIZE));
+        rays.filter(|ray| {
+            let expected = oracle::brute_force(&grids[0], ray);
+            for grid in &grids {
+                assert_eq!(grid.intersect(ray), expected, "{:?} {ray:?}", grid.method());
+                assert_eq!(grid.occluded(ray), expected.is_some(), "{:?} {ray:?}", grid.method());
+            }
+            expected.is_some()
+        })
+        .count()
+    };
+    let (upper, lower) = thread::scope(|scope| {
+        let upper = scope.spawn(|| hits(0..SIZE / 2));
+        (hits(SIZE / 2..SIZE), upper.join().unwrap())
+    });
+    assert!(upper + lower > 200, "the picture shows the scan: {upper} + {lower} pixels");
+}
+
+/// Aims rays at points of edges whose two triangles face the eye the same way, and not too flat:
+/// the surface covers such an edge on both sides, so each ray must hit there or before.
+fn has_no_holes(mesh: &Mesh, rays: usize) {
+    let view = mesh.view();
+    let owned: Vec<Owned> =
+        methods::configs().map(|config| Owned::build(&view, &config).unwrap()).collect();
+    let grids: Vec<Grid<'_>> = owned.iter().map(|owned| owned.open(&view).unwrap()).collect();
+    let camera = Camera::framing(grids[0].bounds(), View::Front, Up::Y);
+    let eye = camera.ray(0, 0, 1).origin;
+    let edges = covered_edges(mesh, eye);
+    let mut random = Random(23);
+    let mut holes = 0;
+    for i in 0..rays {
+        let [a, b] = edges[random.below(edges.len())].map(|vertex| mesh.positions[vertex as usize]);
+        // Not closer to a vertex than rounding may move the ray: what covers that, nobody asked.
+        let along = 0.001 + 0.998 * random.unit();
+        let target: [f32; 3] = std::array::from_fn(|k| a[k] + (b[k] - a[k]) * along);
+        // From the eye and from points between.
+        let scale = [1.0, 0.5, 0.1][random.below(3)];
+        let direction: [f32; 3] = std::array::from_fn(|k| (target[k] - eye[k]) * scale);
+        let origin = std::array::from_fn(|k| target[k] - direction[k]);
+        let hit = grids[i % grids.len()].intersect(&Ray::new(origin, direction));
+        holes += usize::from(!hit.is_some_and(|hit| hit.t <= 1.0 + 1e-4));
+    }
+    assert_eq!(holes, 0, "holes among {rays} rays at {} edges", edges.len());
+}
+
+fn covered_edges(mesh: &Mesh, eye: [f32; 3]) -> Vec<[u32; 2]> {
+    let facing = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].map(f64::from));
+        let sub = |p: [f64; 3], q: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| p[k] - q[k]) };
+        let (e, f, d) = (sub(b, a), sub(c, a), sub(a, eye.map(f64::from)));
+        let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+        let dot = |p: [f64; 3], q: [f64; 3]| (0..3).map(|k| p[k] * q[k]).sum::<f64>();
+        dot(n, d) / (dot(n, n) * dot(d, d)).sqrt()
+    };
+    // An edge counts if exactly two triangles pass it, in opposite directions.
+    let mut sides: HashMap<[u32; 2], Vec<(bool, f64)>> = HashMap::new();
+    for triangle in &mesh.indices {
+        let cosine = facing(triangle);
+        for k in 0..3 {
+            let [a, b] = [triangle[k], triangle[(k + 1) % 3]];
+            sides.entry([a.min(b), a.max(b)]).or_default().push((a < b, cosine));
+        }
+    }
+    let mut edges: Vec<[u32; 2]> = sides
+        .into_iter()
+        .filter_map(|(edge, sides)| match sides.as_slice() {
+            [(p, s), (q, t)] if p != q && s * t > 0.0 && s.abs().min(t.abs()) > 0.05 => Some(edge),
+            _ => None,
+        })
+        .collect();
+    edges.sort_unstable();
+    edges
+}
+
+fn scan(name: &str) {
+    let Some(mesh) = scans::load(name) else { return };
+    agrees_on_a_picture(&mesh, framed(&mesh));
+    has_no_holes(&mesh, 1_000_000);
+}
+
+fn framed(mesh: &Mesh) -> Bounds {
+    let view = mesh.view();
+    let owned = Owned::build(&view, &Config::default()).unwrap();
+    owned.open(&view).unwrap().bounds()
+}
+
+#[test]
+fn a_procedural_surface() {
+    let Scene { positions, indices, .. } = Scene::load("procedural:knot:50000").unwrap();
+    let mesh = Mesh { positions, indices };
+    agrees_on_a_picture(&mesh, framed(&mesh));
+    has_no_holes(&mesh, 200_000);
+}
+
+#[test]
+fn a_small_object_in_a_large_scene() {
+    let scene = Scene::load("procedural:stage:20000").unwrap();
+    let frame = scene.framed_bounds();
+    agrees_on_a_picture(&Mesh { positions: scene.positions, indices: scene.indices }, frame);
+}
+
+#[test]
+fn bunny() {
+    scan("bunny");
+}
+
+#[test]
+fn dragon() {
+    scan("dragon");
+}
+
+#[test]
+fn buddha() {
+    scan("buddha");
+}
+
+#[test]
+fn sponza() {
+    scan("sponza");
+}

@@ -1,0 +1,63 @@
+/* Builds the mesh and asks the rays that come in, and sends out the blob and the answers: the test
+ * compares them with what core says in Rust.
+ *
+ *   in   counts of vertices, triangles and rays; positions; indices; rays
+ *   out  bytes of the blob; the blob; for each ray a hit (zero if none) and whether it is occluded;
+ *        the counters of all closest-hit queries
+ */
+
+#include "check.h"
+
+static void receive(void *to, size_t bytes)
+{
+    CHECK(fread(to, 1, bytes, stdin) == bytes);
+}
+
+static void *receive_array(size_t bytes)
+{
+    void *array = guarded(bytes);
+    receive(array, bytes);
+    return array;
+}
+
+static void send(const void *from, size_t bytes)
+{
+    CHECK(fwrite(from, 1, bytes, stdout) == bytes);
+}
+
+int main(void)
+{
+    uint32_t counts[3];
+    receive(counts, sizeof counts);
+    hgrid_mesh mesh = HGRID_MESH_INIT;
+    mesh.vertex_count = counts[0];
+    mesh.positions = receive_array(12 * mesh.vertex_count);
+    mesh.triangle_count = counts[1];
+    mesh.indices = receive_array(12 * mesh.triangle_count);
+
+    /* The bounds are enough for any mesh. */
+    const size_t index_bytes = HGRID_INDEX_BOUND(counts[1]) / 64 * 64;
+    const size_t scratch_bytes = HGRID_SCRATCH_BOUND(counts[1]) / 64 * 64;
+    void *index = guarded(index_bytes), *scratch = guarded(scratch_bytes);
+    hgrid_grid grid;
+    hgrid_report report = HGRID_REPORT_INIT;
+    CHECK(hgrid_build(&mesh, NULL, index, index_bytes, scratch, scratch_bytes, &grid, &report) ==
+          HGRID_OK);
+    send(&report.index_bytes, sizeof report.index_bytes);
+    send(index, (size_t)report.index_bytes);
+
+    hgrid_counters counters = {0, 0, 0};
+    hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+    options.counters = &counters;
+    for (uint32_t i = 0; i < counts[2]; i++) {
+        hgrid_ray ray;
+        hgrid_hit hit = {0, 0, 0, 0};
+        receive(&ray, sizeof ray);
+        const bool is_hit = hgrid_intersect(&grid, &ray, &options, &hit);
+        const uint32_t answers[2] = {is_hit, hgrid_occluded(&grid, &ray, NULL)};
+        send(&hit, sizeof hit);
+        send(answers, sizeof answers);
+    }
+    send(&counters, sizeof counters);
+    return 0;
+}

@@ -1,0 +1,144 @@
+/* What happens to blobs that are not what they were? Each lies at a page that nobody may touch. */
+
+#include "check.h"
+
+/* Where the header of a blob has its fields (core/src/blob.rs). */
+enum { BYTE_ORDER_AT = 8, VERSION_AT = 12, SIZE_AT = 16, TRIANGLES_AT = 32, RESOLUTION_AT = 72 };
+
+static sheet mesh_data;
+static hgrid_mesh mesh;
+static unsigned char *blob;
+static size_t blob_bytes;
+
+static void build(void)
+{
+    make_sheet(&mesh_data);
+    mesh = mesh_of(&mesh_data);
+    const hgrid_report need = exact_sizes(&mesh, NULL);
+    blob_bytes = (size_t)need.index_bytes;
+    blob = (unsigned char *)guarded(blob_bytes);
+    void *scratch = guarded(need.scratch_bytes);
+    hgrid_grid grid;
+    EXPECT(HGRID_OK, hgrid_build(&mesh, NULL, blob, blob_bytes, scratch, need.scratch_bytes, &grid,
+                                 NULL));
+}
+
+/* What opening says once some bytes are others; the view stays untouched. */
+static hgrid_status open_with(size_t at, const void *bytes, size_t count)
+{
+    unsigned char *changed = (unsigned char *)guarded_copy(blob, blob_bytes);
+    memcpy(changed + at, bytes, count);
+    hgrid_grid grid;
+    memset(&grid, 0xc7, sizeof grid);
+    const hgrid_status status = hgrid_open(changed, blob_bytes, &mesh, &grid);
+    CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
+    return status;
+}
+
+static void headers_are_checked(void)
+{
+    const uint32_t next_version = HGRID_BLOB_VERSION + 1, zero = 0;
+    const uint64_t larger = blob_bytes + 1, smaller = blob_bytes - 64;
+    unsigned char swapped[4];
+    for (int i = 0; i < 4; i++)
+        swapped[i] = blob[BYTE_ORDER_AT + 3 - i];
+
+    EXPECT(HGRID_ERROR_NOT_A_GRID, open_with(0, "HGRID", 5));
+    EXPECT(HGRID_ERROR_WRONG_BYTE_ORDER, open_with(BYTE_ORDER_AT, swapped, sizeof swapped));
+    EXPECT(HGRID_ERROR_NOT_A_GRID, open_with(BYTE_ORDER_AT, &zero, sizeof zero));
+    EXPECT(HGRID_ERROR_UNSUPPORTED_VERSION,
+           open_with(VERSION_AT, &next_version, sizeof next_version));
+    /* The rest of the header has a checksum. */
+    EXPECT(HGRID_ERROR_CORRUPT, open_with(SIZE_AT, &larger, sizeof larger));
+    EXPECT(HGRID_ERROR_CORRUPT, open_with(SIZE_AT, &smaller, sizeof smaller));
+    EXPECT(HGRID_ERROR_CORRUPT, open_with(TRIANGLES_AT, &zero, sizeof zero));
+    EXPECT(HGRID_ERROR_CORRUPT, open_with(RESOLUTION_AT, &zero, sizeof zero));
+}
+
+static void every_shorter_blob_is_refused(void)
+{
+    for (size_t bytes = 0; bytes < blob_bytes; bytes += bytes < 200 ? 1 : 64) {
+        /* A region starts at a multiple of 64, so only these sizes can end at the page. */
+        const void *start = bytes % 64 == 0 ? guarded_copy(blob, bytes) : blob;
+        hgrid_grid grid;
+        const hgrid_status status = hgrid_open(start, bytes, &mesh, &grid);
+        CHECK(status == (bytes < 8 ? HGRID_ERROR_NOT_A_GRID : HGRID_ERROR_TRUNCATED));
+    }
+    hgrid_grid grid;
+    EXPECT(HGRID_ERROR_TRUNCATED, hgrid_open(blob, blob_bytes - 1, &mesh, &grid));
+}
+
+static void another_mesh_is_refused(void)
+{
+    hgrid_grid grid;
+    hgrid_mesh other = mesh;
+    other.triangle_count--;
+    EXPECT(HGRID_ERROR_MESH_MISMATCH, hgrid_open(blob, blob_bytes, &other, &grid));
+    other = mesh;
+    other.vertex_count--;
+    EXPECT(HGRID_ERROR_MESH_MISMATCH, hgrid_open(blob, blob_bytes, &other, &grid));
+}
+
+/* The counts agree, so opening does; only validation looks at the triangles. */
+static void a_changed_mesh_is_found(void)
+{
+    static sheet changed;
+    changed = mesh_data;
+    changed.positions[40][2] += 0.5f;
+    const hgrid_mesh moved = mesh_of(&changed);
+    hgrid_grid grid;
+    EXPECT(HGRID_OK, hgrid_open(blob, blob_bytes, &moved, &grid));
+    EXPECT(HGRID_ERROR_CORRUPT, hgrid_validate(&grid));
+    changed = mesh_data;
+    changed.indices[7][1] = VERTICES;
+    EXPECT(HGRID_ERROR_INDEX_OUT_OF_RANGE, hgrid_validate(&grid));
+}
+
+static void answers(const hgrid_grid *grid, hgrid_hit hits[64])
+{
+    memset(hits, 0xc7, 64 * sizeof *hits);
+    for (int i = 0; i < 64; i++) {
+        hgrid_ray ray = ray_down((float)(i % 8) / 7, (float)(i / 8) / 7);
+        ray.direction[0] = (float)(i % 5 - 2) / 4;
+        hgrid_intersect(grid, &ray, NULL, &hits[i]);
+    }
+}
+
+/* One bit of every byte at a time: queries end and stay inside, and what validation lets pass
+ * answers as the whole blob does. */
+static void damage_is_harmless_and_found(void)
+{
+    unsigned char *damaged = (unsigned char *)guarded_copy(blob, blob_bytes);
+    hgrid_grid grid;
+    hgrid_hit expected[64], found[64];
+    EXPECT(HGRID_OK, hgrid_open(damaged, blob_bytes, &mesh, &grid));
+    answers(&grid, expected);
+
+    size_t opened = 0, passed = 0;
+    for (size_t at = 0; at < blob_bytes; at++) {
+        const unsigned char bit = (unsigned char)(1 << (at * 5 % 8));
+        damaged[at] ^= bit;
+        if (hgrid_open(damaged, blob_bytes, &mesh, &grid) == HGRID_OK) {
+            opened++;
+            answers(&grid, found);
+            if (hgrid_validate(&grid) == HGRID_OK) {
+                passed++;
+                CHECK(memcmp(expected, found, sizeof found) == 0);
+            }
+        }
+        damaged[at] ^= bit;
+    }
+    CHECK(opened > blob_bytes / 2);
+    CHECK(passed < blob_bytes / 100);
+}
+
+int main(void)
+{
+    build();
+    headers_are_checked();
+    every_shorter_blob_is_refused();
+    another_mesh_is_refused();
+    a_changed_mesh_is_found();
+    damage_is_harmless_and_found();
+    return 0;
+}

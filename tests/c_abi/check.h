@@ -1,0 +1,125 @@
+/* What the C programs of this folder share. All of them also compile as C++. */
+#ifndef CHECK_H
+#define CHECK_H
+
+#include <hgrid.h>
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+/* Ends the program with the line that failed. */
+#define CHECK(condition) \
+    do { \
+        if (!(condition)) { \
+            fprintf(stderr, "%s:%d: failed: %s\n", __FILE__, __LINE__, #condition); \
+            exit(1); \
+        } \
+    } while (0)
+
+/* Checks what a call returns, and tells the test which statuses were reached. */
+#define EXPECT(expected, call) \
+    do { \
+        const hgrid_status status_ = (call); \
+        if (status_ != (expected)) { \
+            fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, #call, \
+                    hgrid_status_string(status_)); \
+            exit(1); \
+        } \
+        printf("reached %d\n", (int)status_); \
+    } while (0)
+
+/* Memory that ends where a page ends that nobody may touch, so that reading or writing one byte
+ * behind it stops the program, also inside a library that no sanitizer watches. Filled with a
+ * pattern that is no sensible float, index or count. Never freed. */
+static inline void *guarded(size_t bytes)
+{
+    const size_t page = (size_t)sysconf(_SC_PAGESIZE);
+    const size_t pages = (bytes + page - 1) / page + 2;
+    unsigned char *all = (unsigned char *)mmap(NULL, pages * page, PROT_READ | PROT_WRITE,
+                                               MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    CHECK(all != MAP_FAILED);
+    CHECK(mprotect(all, page, PROT_NONE) == 0);
+    CHECK(mprotect(all + (pages - 1) * page, page, PROT_NONE) == 0);
+    memset(all + page, 0xc7, (pages - 2) * page);
+    return all + (pages - 1) * page - bytes;
+}
+
+/* A copy in such memory. */
+static inline void *guarded_copy(const void *from, size_t bytes)
+{
+    void *copy = guarded(bytes);
+    if (bytes > 0)
+        memcpy(copy, from, bytes);
+    return copy;
+}
+
+static inline bool all_bytes_are(const void *memory, size_t bytes, unsigned char value)
+{
+    const unsigned char *byte = (const unsigned char *)memory;
+    while (bytes-- > 0)
+        if (*byte++ != value)
+            return false;
+    return true;
+}
+
+/* A wavy sheet of SIDE * SIDE squares over the unit square, seen from above without a hole. */
+enum { SIDE = 12, VERTICES = (SIDE + 1) * (SIDE + 1), TRIANGLES = 2 * SIDE * SIDE };
+
+typedef struct {
+    float positions[VERTICES][3];
+    uint32_t indices[TRIANGLES][3];
+} sheet;
+
+static inline void make_sheet(sheet *s)
+{
+    for (uint32_t y = 0; y <= SIDE; y++)
+        for (uint32_t x = 0; x <= SIDE; x++) {
+            float *p = s->positions[y * (SIDE + 1) + x];
+            p[0] = (float)x / SIDE;
+            p[1] = (float)y / SIDE;
+            p[2] = (float)((x * 5 + y * 3) % 7) / 70;
+        }
+    for (uint32_t y = 0; y < SIDE; y++)
+        for (uint32_t x = 0; x < SIDE; x++) {
+            const uint32_t a = y * (SIDE + 1) + x, b = a + 1, d = a + SIDE + 1, c = d + 1;
+            const uint32_t square[2][3] = {{a, b, c}, {a, c, d}};
+            memcpy(s->indices[2 * (y * SIDE + x)], square, sizeof square);
+        }
+}
+
+static inline hgrid_mesh mesh_of(const sheet *s)
+{
+    hgrid_mesh mesh = HGRID_MESH_INIT;
+    mesh.positions = s->positions;
+    mesh.vertex_count = VERTICES;
+    mesh.indices = s->indices;
+    mesh.triangle_count = TRIANGLES;
+    return mesh;
+}
+
+/* A ray straight down onto the sheet. */
+static inline hgrid_ray ray_down(float x, float y)
+{
+    const hgrid_ray ray = {{x, y, 1}, 0, {0, 0, -1}, INFINITY};
+    return ray;
+}
+
+/* Exact sizes, by both questions. */
+static inline hgrid_report exact_sizes(const hgrid_mesh *mesh, const hgrid_config *config)
+{
+    hgrid_report enough = HGRID_REPORT_INIT, exact = HGRID_REPORT_INIT;
+    EXPECT(HGRID_OK, hgrid_sizes(mesh, config, NULL, 0, &enough));
+    void *scratch = guarded(enough.scratch_bytes);
+    EXPECT(HGRID_OK, hgrid_sizes(mesh, config, scratch, enough.scratch_bytes, &exact));
+    CHECK(enough.is_exact == 0 && exact.is_exact == 1);
+    CHECK(exact.scratch_bytes == enough.scratch_bytes);
+    CHECK(exact.index_bytes <= enough.index_bytes);
+    return exact;
+}
+
+#endif

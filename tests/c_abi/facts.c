@@ -1,0 +1,136 @@
+/* Prints what the header says as numbers, one "name value" a line, for the test to compare. */
+
+#include <hgrid.h>
+
+#include <stdio.h>
+
+#define NUMBER(name) printf(#name " %lld\n", (long long)(name))
+#define SIZE(type) printf(#type " %zu\n", sizeof(type))
+#define OFFSET(type, field) printf(#type "." #field " %zu\n", offsetof(type, field))
+#define BOUNDS(count) \
+    printf("bounds %lu %zu %zu\n", (unsigned long)(count), HGRID_INDEX_BOUND(count), \
+           HGRID_SCRATCH_BOUND(count))
+
+static void layout(void)
+{
+    SIZE(hgrid_status);
+    SIZE(hgrid_ray);
+    OFFSET(hgrid_ray, origin);
+    OFFSET(hgrid_ray, t_min);
+    OFFSET(hgrid_ray, direction);
+    OFFSET(hgrid_ray, t_max);
+    SIZE(hgrid_hit);
+    OFFSET(hgrid_hit, t);
+    OFFSET(hgrid_hit, u);
+    OFFSET(hgrid_hit, v);
+    OFFSET(hgrid_hit, primitive);
+    SIZE(hgrid_counters);
+    OFFSET(hgrid_counters, primitive_tests);
+    OFFSET(hgrid_counters, cell_steps);
+    OFFSET(hgrid_counters, grid_steps);
+    SIZE(hgrid_mesh);
+    OFFSET(hgrid_mesh, struct_size);
+    OFFSET(hgrid_mesh, index_type);
+    OFFSET(hgrid_mesh, positions);
+    OFFSET(hgrid_mesh, position_stride);
+    OFFSET(hgrid_mesh, vertex_count);
+    OFFSET(hgrid_mesh, indices);
+    OFFSET(hgrid_mesh, index_stride);
+    OFFSET(hgrid_mesh, triangle_count);
+    SIZE(hgrid_config);
+    OFFSET(hgrid_config, struct_size);
+    OFFSET(hgrid_config, method);
+    OFFSET(hgrid_config, density);
+    OFFSET(hgrid_config, flags);
+    SIZE(hgrid_query_options);
+    OFFSET(hgrid_query_options, struct_size);
+    OFFSET(hgrid_query_options, reserved);
+    OFFSET(hgrid_query_options, counters);
+    SIZE(hgrid_report);
+    OFFSET(hgrid_report, struct_size);
+    OFFSET(hgrid_report, is_exact);
+    OFFSET(hgrid_report, index_bytes);
+    OFFSET(hgrid_report, scratch_bytes);
+    OFFSET(hgrid_report, triangle);
+    OFFSET(hgrid_report, skipped_count);
+    OFFSET(hgrid_report, reference_count);
+    OFFSET(hgrid_report, density);
+    OFFSET(hgrid_report, resolution);
+    OFFSET(hgrid_report, reserved);
+    SIZE(hgrid_grid);
+}
+
+static void constants(void)
+{
+    NUMBER(HGRID_ALIGNMENT);
+    NUMBER(HGRID_INVALID_ID);
+    NUMBER(HGRID_BLOB_VERSION);
+    NUMBER(HGRID_INDEX_U32);
+    NUMBER(HGRID_INDEX_U16);
+    NUMBER(HGRID_METHOD_ONE_LEVEL);
+    NUMBER(HGRID_BUILD_STRICT);
+    NUMBER(HGRID_OK);
+    NUMBER(HGRID_ERROR_NULL_ARGUMENT);
+    NUMBER(HGRID_ERROR_STRUCT_SIZE);
+    NUMBER(HGRID_ERROR_MISALIGNED);
+    NUMBER(HGRID_ERROR_OVERLAP);
+    NUMBER(HGRID_ERROR_INDEX_TOO_SMALL);
+    NUMBER(HGRID_ERROR_SCRATCH_TOO_SMALL);
+    NUMBER(HGRID_ERROR_INVALID_POSITIONS);
+    NUMBER(HGRID_ERROR_INVALID_INDICES);
+    NUMBER(HGRID_ERROR_INVALID_INDEX_TYPE);
+    NUMBER(HGRID_ERROR_TOO_MANY_TRIANGLES);
+    NUMBER(HGRID_ERROR_INDEX_OUT_OF_RANGE);
+    NUMBER(HGRID_ERROR_NON_FINITE);
+    NUMBER(HGRID_ERROR_INVALID_METHOD);
+    NUMBER(HGRID_ERROR_INVALID_DENSITY);
+    NUMBER(HGRID_ERROR_INVALID_FLAGS);
+    NUMBER(HGRID_ERROR_NOT_A_GRID);
+    NUMBER(HGRID_ERROR_WRONG_BYTE_ORDER);
+    NUMBER(HGRID_ERROR_UNSUPPORTED_VERSION);
+    NUMBER(HGRID_ERROR_TRUNCATED);
+    NUMBER(HGRID_ERROR_MESH_MISMATCH);
+    NUMBER(HGRID_ERROR_CORRUPT);
+}
+
+static void versions(void)
+{
+    printf("macros %d.%d.%d\n", HGRID_VERSION_MAJOR, HGRID_VERSION_MINOR, HGRID_VERSION_PATCH);
+    printf("macro %lu\n", (unsigned long)HGRID_VERSION);
+    printf("text %s\n", HGRID_VERSION_STRING);
+    printf("function %lu\n", (unsigned long)hgrid_version());
+    printf("function_text %s\n", hgrid_version_string());
+}
+
+static void defaults(void)
+{
+    const hgrid_mesh mesh = HGRID_MESH_INIT;
+    const hgrid_config config = HGRID_CONFIG_INIT;
+    const hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+    const hgrid_report report = HGRID_REPORT_INIT;
+    printf("mesh %lu\n", (unsigned long)mesh.struct_size);
+    printf("options %lu\n", (unsigned long)options.struct_size);
+    printf("report %lu\n", (unsigned long)report.struct_size);
+    printf("config %lu %lu %g %lu\n", (unsigned long)config.struct_size,
+           (unsigned long)config.method, (double)config.density, (unsigned long)config.flags);
+}
+
+static void bounds(void)
+{
+    unsigned long count;
+    for (count = 0; count < 3000; count++)
+        BOUNDS(count);
+    for (; count < 4000000000UL; count += count / 7)
+        BOUNDS(count);
+    BOUNDS(4294967294UL);
+}
+
+int main(void)
+{
+    layout();
+    constants();
+    versions();
+    defaults();
+    bounds();
+    return 0;
+}

@@ -1,0 +1,210 @@
+//! The header: is it current, and does it hold what it promises without any help?
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::process::Command;
+use std::sync::OnceLock;
+
+use hgrid_core::{Config, Sizes};
+use hgrid_tests::artefact::{compiler, is_installed, root, run, static_library, warnings};
+use tempfile::TempDir;
+
+/// The dialects that renderers are written in.
+const DIALECTS: [&str; 7] = ["c99", "c11", "c17", "c++11", "c++14", "c++17", "c++20"];
+
+/// The committed header.
+pub(crate) fn committed() -> String {
+    fs::read_to_string(root().join("include/hgrid.h")).expect("include/hgrid.h")
+}
+
+/// The functions that the header declares.
+pub(crate) fn functions() -> Vec<String> {
+    let header = committed();
+    let calls = header.lines().filter(|line| !line.starts_with([' ', '#', '/']));
+    let names = calls.filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next());
+    names.map(str::to_owned).collect()
+}
+
+/// The statuses that the header defines.
+pub(crate) fn statuses() -> BTreeMap<String, i32> {
+    let header = committed();
+    let lines = header.lines().filter_map(|line| line.strip_prefix("#define "));
+    let pairs = lines.filter_map(|line| line.split_once(' '));
+    pairs
+        .filter(|(name, _)| *name == "HGRID_OK" || name.starts_with("HGRID_ERROR_"))
+        .map(|(name, value)| (name.to_owned(), value.parse().expect("a number")))
+        .collect()
+}
+
+/// What `facts.c` prints.
+fn facts() -> &'static str {
+    static FACTS: OnceLock<String> = OnceLock::new();
+    FACTS.get_or_init(|| {
+        let dir = TempDir::new().expect("a folder");
+        let program = dir.path().join("facts");
+        let source = root().join("tests/c_abi/facts.c");
+        run(compiler("c99").arg(source).arg(static_library()).arg("-o").arg(&program));
+        String::from_utf8(run(&mut Command::new(program)).stdout).expect("text")
+    })
+}
+
+/// The value of a fact.
+fn fact(name: &str) -> &'static str {
+    let value = facts().lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    value.unwrap_or_else(|| panic!("no {name} in facts.c"))
+}
+
+#[test]
+fn it_is_current() {
+    let package = root().join("capi");
+    let config = cbindgen::Config::from_file(package.join("cbindgen.toml")).expect("cbindgen.toml");
+    let builder = cbindgen::Builder::new().with_config(config).with_crate(package);
+    let mut generated = Vec::new();
+    builder.generate().expect("cbindgen understands the sources").write(&mut generated);
+    let generated = String::from_utf8(generated).expect("text");
+
+    if std::env::var_os("HGRID_BLESS").is_some() {
+        // In one step: the other tests are reading it.
+        let fresh = root().join("include/hgrid.h.fresh");
+        fs::write(&fresh, &generated).expect("include/ can be written");
+        fs::rename(fresh, root().join("include/hgrid.h")).expect("include/ can be written");
+    }
+    assert!(
+        committed() == generated,
+        "include/hgrid.h is out of date: HGRID_BLESS=1 cargo test -p hgrid-tests --test c_abi"
+    );
+}
+
+#[test]
+fn it_compiles_alone_in_every_dialect() {
+    let dir = TempDir::new().expect("a folder");
+    let source = dir.path().join("twice.c");
+    fs::write(&source, "#include <hgrid.h>\n#include <hgrid.h>\n").expect("a file");
+    for_every_compiler(|compiler, language| {
+        run(compiler.args(["-fsyntax-only", "-x", language]).arg(&source));
+    });
+}
+
+#[test]
+fn its_macros_give_no_warning_in_any_dialect() {
+    let dir = TempDir::new().expect("a folder");
+    let program = dir.path().join("macros");
+    let source = root().join("tests/c_abi/macros.c");
+    for_every_compiler(|compiler, language| {
+        let compiler = compiler.args(["-Wconversion", "-Wsign-conversion", "-x", language]);
+        run(compiler
+            .arg(&source)
+            .args(["-x", "none"])
+            .arg(static_library())
+            .arg("-o")
+            .arg(&program));
+        run(&mut Command::new(&program));
+    });
+}
+
+/// Shows `visit` each compiler in each dialect with the language's name.
+fn for_every_compiler(mut visit: impl FnMut(&mut Command, &str)) {
+    let has_clang = is_installed("clang");
+    for dialect in DIALECTS {
+        let language = if dialect.starts_with("c++") { "c++" } else { "c" };
+        visit(&mut compiler(dialect), language);
+        if has_clang {
+            visit(&mut warnings(Command::new("clang"), dialect), language);
+        }
+    }
+}
+
+#[test]
+fn sizes_offsets_and_numbers_never_change() {
+    let pinned = include_str!("abi.txt");
+    let is_for_this_machine = |line: &&str| cfg!(target_pointer_width = "64") || is_number(line);
+    let printed = facts().lines().take(pinned.lines().count()).filter(is_for_this_machine);
+    assert!(printed.eq(pinned.lines().filter(is_for_this_machine)), "{}", facts());
+    for (name, value) in statuses() {
+        let line = format!("{name} {value}");
+        assert!(pinned.lines().any(|pinned| pinned == line), "abi.txt lacks {line}");
+    }
+}
+
+/// Whether a line of the table is the same on machines with pointers of 32 bits.
+fn is_number(line: &str) -> bool {
+    line.starts_with("HGRID_")
+}
+
+#[test]
+fn versions_are_those_of_the_package() {
+    let package = env!("CARGO_PKG_VERSION");
+    for name in ["macros", "text", "function_text"] {
+        assert_eq!(fact(name), package, "{name}");
+    }
+    let number = package.split('.').fold(0u32, |number, part| {
+        number << 8 | part.parse::<u32>().expect("a version without letters")
+    });
+    for name in ["macro", "function"] {
+        assert_eq!(fact(name), number.to_string(), "{name}");
+    }
+    assert_eq!(fact("HGRID_BLOB_VERSION"), hgrid_core::BLOB_VERSION.to_string());
+}
+
+#[test]
+fn initialisers_are_the_defaults() {
+    for name in ["mesh", "options", "report"] {
+        let struct_name = if name == "options" { "query_options" } else { name };
+        assert_eq!(fact(name), fact(&format!("hgrid_{struct_name}")), "{name}");
+    }
+    let Config { method, density, flags, .. } = Config::default();
+    let size = fact("hgrid_config");
+    assert_eq!(fact("config"), format!("{size} {} {density} {}", method as u32, flags.bits()));
+}
+
+#[test]
+fn bounds_are_no_less_than_those_of_core() {
+    let mut count = 0;
+    for line in facts().lines().filter_map(|line| line.strip_prefix("bounds ")) {
+        let numbers: Vec<usize> = line.split(' ').map(|word| word.parse().unwrap()).collect();
+        let [triangles, index, scratch] = numbers[..] else { panic!("{line}") };
+        let bound = Sizes::bound(u32::try_from(triangles).unwrap(), &Config::default()).unwrap();
+        assert!(index >= bound.index_bytes && scratch >= bound.scratch_bytes, "{line}: {bound:?}");
+        // Nobody is asked for much more than what a static array in Rust takes.
+        let slack = bound.index_bytes / 16 + 1280;
+        assert!(triangles > 1_000_000 || index <= bound.index_bytes + slack, "{line}: {bound:?}");
+        count += 1;
+    }
+    assert!(count > 3000);
+}
+
+#[test]
+fn every_function_says_what_callers_must_know() {
+    let header = committed();
+    for function in functions() {
+        let (before, _) = header.rsplit_once(&format!("{function}(")).expect("its declaration");
+        let (_, text) = before.rsplit_once("/**").expect("a comment");
+        assert!(text.contains("Threads: "), "{function} says nothing about threads");
+        let takes_pointers =
+            header.contains(&format!("{function}(const ")) || function == "hgrid_open";
+        assert!(!takes_pointers || text.contains("NULL"), "{function} says nothing about NULL");
+    }
+}
+
+#[test]
+fn its_example_runs() {
+    let header = committed();
+    let lines = header.lines().filter_map(|line| line.strip_prefix(" *"));
+    let lines = lines.skip_while(|line| !line.contains("#include")).map(str::trim_end);
+    let program: Vec<_> = lines.take_while(|line| !line.contains("cargo build")).collect();
+    let dir = TempDir::new().expect("a folder");
+    let source = dir.path().join("example.c");
+    fs::write(&source, program.join("\n")).expect("a file");
+    let example = dir.path().join("example");
+    run(compiler("c99").arg(source).arg(static_library()).arg("-o").arg(&example));
+    let printed = run(&mut Command::new(example)).stdout;
+    assert_eq!(String::from_utf8(printed).as_deref(), Ok("triangle 0 at t = 1\n"));
+}
+
+#[test]
+fn it_speaks_c() {
+    let header = committed();
+    for word in ["slice", "crate", "Option<", "Some(", "Result<", "`&", "[`", "usize", "trait"] {
+        assert!(!header.contains(word), "`{word}` is no word for C readers");
+    }
+}

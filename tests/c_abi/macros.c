@@ -1,0 +1,30 @@
+/* Uses every macro the way a program does, in every dialect, without a warning. */
+
+#include <hgrid.h>
+#include <hgrid.h>
+
+HGRID_ALIGNED static unsigned char index_region[HGRID_INDEX_BOUND(3)];
+HGRID_ALIGNED unsigned char scratch_region[HGRID_SCRATCH_BOUND(3)];
+
+static hgrid_mesh mesh = HGRID_MESH_INIT;
+static const hgrid_config config = HGRID_CONFIG_INIT;
+
+#if HGRID_VERSION < 0x000100 || HGRID_BLOB_VERSION < 1 || HGRID_ALIGNMENT != 64
+#error "the numbers work in the preprocessor, too"
+#endif
+
+int main(void)
+{
+    HGRID_ALIGNED unsigned char local[HGRID_ALIGNMENT] = {0};
+    hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+    hgrid_report report = HGRID_REPORT_INIT;
+    hgrid_grid grid;
+    const hgrid_ray ray = {{0, 0, 0}, 0, {0, 0, 1}, 1};
+    hgrid_hit hit;
+
+    size_t misplaced = ((size_t)index_region | (size_t)scratch_region | (size_t)local) % 64;
+    hgrid_status status = hgrid_build(&mesh, &config, index_region, sizeof index_region,
+                                      scratch_region, sizeof scratch_region, &grid, &report);
+    return misplaced != 0 || status != HGRID_OK || report.triangle != HGRID_INVALID_ID ||
+           hgrid_intersect(&grid, &ray, &options, &hit) || hgrid_occluded(&grid, &ray, NULL);
+}

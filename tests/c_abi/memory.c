@@ -1,0 +1,184 @@
+/* Is all memory touched that was said, and none beside it? Every array ends at a page that nobody
+ * may touch (see guarded in check.h). */
+
+#include "check.h"
+
+static sheet mesh_data;
+static hgrid_mesh tight;
+static hgrid_report need;
+static unsigned char *expected_blob;
+
+/* Builds a mesh that is the sheet in another form: the blob must be the same, byte by byte. */
+static void check_form(const hgrid_mesh *mesh)
+{
+    void *index = guarded(need.index_bytes), *scratch = guarded(need.scratch_bytes);
+    hgrid_grid grid;
+    EXPECT(HGRID_OK, hgrid_build(mesh, NULL, index, need.index_bytes, scratch, need.scratch_bytes,
+                                 &grid, NULL));
+    CHECK(memcmp(index, expected_blob, need.index_bytes) == 0);
+    EXPECT(HGRID_OK, hgrid_validate(&grid));
+    const hgrid_ray ray = ray_down(0.99f, 0.98f);
+    hgrid_hit hit;
+    CHECK(hgrid_intersect(&grid, &ray, NULL, &hit) && hit.primitive >= TRIANGLES - 2);
+}
+
+static void build_the_expected_blob(void)
+{
+    make_sheet(&mesh_data);
+    tight = mesh_of(&mesh_data);
+    need = exact_sizes(&tight, NULL);
+    expected_blob = (unsigned char *)guarded(need.index_bytes);
+    void *scratch = guarded(need.scratch_bytes);
+    hgrid_grid grid;
+    EXPECT(HGRID_OK, hgrid_build(&tight, NULL, expected_blob, need.index_bytes, scratch,
+                                 need.scratch_bytes, &grid, NULL));
+}
+
+static void tight_arrays_are_read_to_their_last_byte_and_no_further(void)
+{
+    hgrid_mesh mesh = tight;
+    mesh.positions = guarded_copy(mesh_data.positions, sizeof mesh_data.positions);
+    mesh.indices = guarded_copy(mesh_data.indices, sizeof mesh_data.indices);
+    check_form(&mesh);
+    mesh.position_stride = 12;
+    mesh.index_stride = 12;
+    check_form(&mesh);
+}
+
+/* The caller's own structs, at an odd address, cut off behind the last element's own bytes. */
+static void strides_need_no_alignment_and_no_padding_at_the_end(void)
+{
+    for (size_t extra = 1; extra < 9; extra++) {
+        const size_t stride = 12 + extra;
+        const size_t position_bytes = (VERTICES - 1) * stride + 12;
+        const size_t index_bytes = (TRIANGLES - 1) * stride + 12;
+        unsigned char *positions = (unsigned char *)guarded(position_bytes);
+        unsigned char *indices = (unsigned char *)guarded(index_bytes);
+        for (size_t i = 0; i < VERTICES; i++)
+            memcpy(positions + i * stride, mesh_data.positions[i], 12);
+        for (size_t i = 0; i < TRIANGLES; i++)
+            memcpy(indices + i * stride, mesh_data.indices[i], 12);
+        hgrid_mesh mesh = tight;
+        mesh.positions = positions, mesh.position_stride = stride;
+        mesh.indices = indices, mesh.index_stride = stride;
+        check_form(&mesh);
+    }
+}
+
+static void indices_of_16_bits_are_read_as_such(void)
+{
+    for (size_t stride = 6; stride < 12; stride++) {
+        unsigned char *indices = (unsigned char *)guarded((TRIANGLES - 1) * stride + 6);
+        for (size_t i = 0; i < TRIANGLES; i++) {
+            uint16_t triangle[3];
+            for (int corner = 0; corner < 3; corner++)
+                triangle[corner] = (uint16_t)mesh_data.indices[i][corner];
+            memcpy(indices + i * stride, triangle, 6);
+        }
+        hgrid_mesh mesh = tight;
+        mesh.index_type = HGRID_INDEX_U16;
+        mesh.indices = indices;
+        mesh.index_stride = stride == 6 ? 0 : stride;
+        check_form(&mesh);
+    }
+}
+
+static void one_byte_less_is_refused_and_nothing_is_touched(void)
+{
+    unsigned char *index = (unsigned char *)guarded(need.index_bytes);
+    unsigned char *scratch = (unsigned char *)guarded(need.scratch_bytes);
+    hgrid_grid grid;
+    memset(&grid, 0xc7, sizeof grid);
+
+    hgrid_report report = HGRID_REPORT_INIT;
+    EXPECT(HGRID_ERROR_INDEX_TOO_SMALL,
+           hgrid_build(&tight, NULL, index, need.index_bytes - 1, scratch, need.scratch_bytes,
+                       &grid, &report));
+    CHECK(report.index_bytes == need.index_bytes && report.is_exact == 1);
+    CHECK(report.scratch_bytes == need.scratch_bytes);
+    CHECK(report.triangle == HGRID_INVALID_ID);
+
+    const size_t less = (size_t)need.scratch_bytes - 1;
+    memset(scratch, 0xc7, need.scratch_bytes);
+    EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL, hgrid_build(&tight, NULL, index, need.index_bytes,
+                                                      scratch, less, &grid, &report));
+    CHECK(report.scratch_bytes == need.scratch_bytes);
+    CHECK(report.index_bytes >= need.index_bytes && report.is_exact == 0);
+    CHECK(scratch[less] == 0xc7);
+
+    /* With nothing at all, the report names enough of both. */
+    EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL,
+           hgrid_build(&tight, NULL, NULL, 0, NULL, 0, &grid, &report));
+    CHECK(report.scratch_bytes == need.scratch_bytes && report.index_bytes >= need.index_bytes);
+    EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_build(&tight, NULL, NULL, 0, scratch,
+                                                    need.scratch_bytes, &grid, &report));
+    CHECK(report.index_bytes == need.index_bytes && report.is_exact == 1);
+
+    CHECK(all_bytes_are(index, need.index_bytes, 0xc7));
+    CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
+}
+
+static void what_is_more_than_needed_is_not_touched(void)
+{
+    const size_t more = 4096;
+    unsigned char *index = (unsigned char *)guarded(need.index_bytes + more);
+    unsigned char *scratch = (unsigned char *)guarded(need.scratch_bytes + more);
+    hgrid_grid grid;
+    hgrid_report report = HGRID_REPORT_INIT;
+    EXPECT(HGRID_OK, hgrid_sizes(&tight, NULL, scratch, need.scratch_bytes + more, &report));
+    CHECK(report.index_bytes == need.index_bytes && report.is_exact == 1);
+    EXPECT(HGRID_OK, hgrid_build(&tight, NULL, index, need.index_bytes + more, scratch,
+                                 need.scratch_bytes + more, &grid, &report));
+    CHECK(memcmp(index, expected_blob, need.index_bytes) == 0);
+    CHECK(all_bytes_are(index + need.index_bytes, more, 0xc7));
+    CHECK(all_bytes_are(scratch + need.scratch_bytes, more, 0xc7));
+}
+
+/* Straight from malloc, as most programs do it. A tool that tracks uninitialised memory watches. */
+static void regions_may_hold_anything(void)
+{
+    for (int fill = 0; fill < 3; fill++) {
+        unsigned char *memory = (unsigned char *)malloc(need.index_bytes + need.scratch_bytes + 63);
+        CHECK(memory != NULL);
+        unsigned char *index = memory + (64 - (uintptr_t)memory % 64) % 64;
+        if (fill > 0)
+            memset(index, fill == 1 ? 0 : 0xff, need.index_bytes + need.scratch_bytes);
+        hgrid_grid grid;
+        EXPECT(HGRID_OK, hgrid_build(&tight, NULL, index, need.index_bytes,
+                                     index + need.index_bytes, need.scratch_bytes, &grid, NULL));
+        CHECK(memcmp(index, expected_blob, need.index_bytes) == 0);
+        EXPECT(HGRID_OK, hgrid_validate(&grid));
+        free(memory);
+    }
+}
+
+static void an_empty_mesh_needs_no_arrays(void)
+{
+    hgrid_mesh mesh = HGRID_MESH_INIT;
+    HGRID_ALIGNED static unsigned char index[HGRID_INDEX_BOUND(0)];
+    HGRID_ALIGNED static unsigned char scratch[HGRID_SCRATCH_BOUND(0)];
+    hgrid_grid grid;
+    EXPECT(HGRID_OK, hgrid_build(&mesh, NULL, index, sizeof index, scratch, sizeof scratch, &grid,
+                                 NULL));
+    EXPECT(HGRID_OK, hgrid_validate(&grid));
+    const hgrid_ray ray = ray_down(0, 0);
+    CHECK(!hgrid_occluded(&grid, &ray, NULL));
+
+    mesh.positions = mesh_data.positions;
+    mesh.vertex_count = VERTICES;
+    EXPECT(HGRID_OK, hgrid_build(&mesh, NULL, index, sizeof index, scratch, sizeof scratch, &grid,
+                                 NULL));
+}
+
+int main(void)
+{
+    build_the_expected_blob();
+    tight_arrays_are_read_to_their_last_byte_and_no_further();
+    strides_need_no_alignment_and_no_padding_at_the_end();
+    indices_of_16_bits_are_read_as_such();
+    one_byte_less_is_refused_and_nothing_is_touched();
+    what_is_more_than_needed_is_not_touched();
+    regions_may_hold_anything();
+    an_empty_mesh_needs_no_arrays();
+    return 0;
+}

@@ -1,0 +1,105 @@
+//! C programs that use the library as a stranger would: by the header and the archive alone.
+//!
+//! Each program ends at the first check that fails. They run with sanitizers, as C++, with the shared
+//! library, and under valgrind, which unlike the sanitizers also watches what the library does.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use hgrid_tests::artefact::{
+    compiler, is_installed, library_dir, root, run, shared_library, static_library,
+};
+use tempfile::TempDir;
+
+use crate::header::statuses;
+
+/// Programs that check for themselves and tell which statuses they reached.
+const PROGRAMS: [&str; 4] = ["queries", "memory", "refusals", "blobs"];
+
+const SANITIZERS: [&str; 3] =
+    ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"];
+
+/// Compiles a program of this folder against a library.
+pub(crate) fn compile(
+    name: &str,
+    dialect: &str,
+    flags: &[&str],
+    library: &Path,
+    dir: &Path,
+) -> PathBuf {
+    let program = dir.join(name);
+    let language = if dialect.starts_with("c++") { "c++" } else { "c" };
+    let source = root().join("tests/c_abi").join(name).with_extension("c");
+    // The programs, not the library, want more than plain C: pages with protection.
+    let mut compiler = compiler(dialect);
+    compiler.args(["-D_DEFAULT_SOURCE", "-g", "-O1"]).args(flags);
+    compiler.args(["-x", language]).arg(source).args(["-x", "none"]).arg(library);
+    run(compiler.arg("-o").arg(&program));
+    program
+}
+
+/// Compiles and runs all programs.
+fn run_all(dialect: &str, flags: &[&str], library: &Path) {
+    let dir = TempDir::new().expect("a folder");
+    for name in PROGRAMS {
+        let program = compile(name, dialect, flags, library, dir.path());
+        run(Command::new(program).env("LD_LIBRARY_PATH", library_dir()));
+    }
+}
+
+#[test]
+fn they_pass_as_c99_with_sanitizers() {
+    run_all("c99", &SANITIZERS, &static_library());
+}
+
+#[test]
+fn they_pass_as_cpp_with_sanitizers() {
+    run_all("c++17", &SANITIZERS, &static_library());
+}
+
+#[test]
+fn they_pass_with_the_shared_library() {
+    run_all("c11", &[], &shared_library());
+}
+
+#[test]
+fn they_pass_under_valgrind() {
+    if !is_installed("valgrind") {
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    for name in PROGRAMS {
+        let program = compile(name, "c99", &[], &static_library(), dir.path());
+        run(Command::new("valgrind").args(["--quiet", "--error-exitcode=99"]).arg(program));
+    }
+}
+
+#[test]
+fn the_library_links_by_its_name_alone() {
+    let dir = TempDir::new().expect("a folder");
+    let program = dir.path().join("queries");
+    let mut compiler = compiler("c99");
+    compiler.arg("-D_DEFAULT_SOURCE").arg(root().join("tests/c_abi/queries.c"));
+    compiler.arg("-L").arg(library_dir()).arg("-lhgrid").arg("-o").arg(&program);
+    run(compiler.arg(format!("-Wl,-rpath,{}", library_dir().display())));
+    // Cargo has a path of its own for shared libraries, and it would come first.
+    run(Command::new(program).env_remove("LD_LIBRARY_PATH"));
+}
+
+#[test]
+fn every_status_is_reached_and_described() {
+    let dir = TempDir::new().expect("a folder");
+    let [mut reached, mut described] = [BTreeSet::new(), BTreeSet::new()];
+    for name in PROGRAMS {
+        let program = compile(name, "c99", &[], &static_library(), dir.path());
+        let printed = String::from_utf8(run(&mut Command::new(program)).stdout).expect("text");
+        for (word, status) in printed.lines().filter_map(|line| line.split_once(' ')) {
+            let set = if word == "reached" { &mut reached } else { &mut described };
+            set.insert(status.parse::<i32>().expect("a number"));
+        }
+    }
+    let all: BTreeSet<_> = statuses().into_values().collect();
+    assert_eq!(described, all);
+    assert_eq!(reached, all);
+}

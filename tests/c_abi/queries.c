@@ -1,0 +1,212 @@
+/* Do queries answer, through every way to hold a grid? */
+
+#include "check.h"
+
+static sheet mesh_data;
+static hgrid_grid grid;
+static hgrid_report built;
+static void *blob;
+
+static void build(void)
+{
+    make_sheet(&mesh_data);
+    const hgrid_mesh mesh = mesh_of(&mesh_data);
+    const hgrid_report need = exact_sizes(&mesh, NULL);
+    blob = guarded(need.index_bytes);
+    void *scratch = guarded(need.scratch_bytes);
+    hgrid_report report = HGRID_REPORT_INIT;
+    EXPECT(HGRID_OK, hgrid_build(&mesh, NULL, blob, need.index_bytes, scratch, need.scratch_bytes,
+                                 &grid, &report));
+    CHECK(report.index_bytes == need.index_bytes && report.is_exact == 1);
+    CHECK(report.scratch_bytes == need.scratch_bytes);
+    CHECK(report.triangle == HGRID_INVALID_ID && report.skipped_count == 0);
+    CHECK(report.density == 4 && report.reference_count >= TRIANGLES);
+    CHECK(report.resolution[0] > 5 && report.resolution[1] > 5 && report.resolution[2] > 0);
+    EXPECT(HGRID_OK, hgrid_validate(&grid));
+    built = report;
+}
+
+/* A hit is where its triangle and its ray say. */
+static void check_hit(const hgrid_ray *ray, const hgrid_hit *hit)
+{
+    CHECK(hit->primitive < TRIANGLES);
+    const uint32_t *corners = mesh_data.indices[hit->primitive];
+    for (int axis = 0; axis < 3; axis++) {
+        const float a = mesh_data.positions[corners[0]][axis];
+        const float b = mesh_data.positions[corners[1]][axis];
+        const float c = mesh_data.positions[corners[2]][axis];
+        const float on_triangle = (1 - hit->u - hit->v) * a + hit->u * b + hit->v * c;
+        const float on_ray = ray->origin[axis] + hit->t * ray->direction[axis];
+        CHECK(fabsf(on_triangle - on_ray) < 1e-5f);
+    }
+}
+
+/* The same answers as the first grid's, bit by bit. */
+static void check_same(const hgrid_grid *other)
+{
+    for (int y = 0; y < 40; y++)
+        for (int x = 0; x < 40; x++) {
+            const hgrid_ray ray = ray_down((float)x / 36 - 0.02f, (float)y / 36 - 0.02f);
+            hgrid_hit expected, found;
+            memset(&expected, 0xc7, sizeof expected);
+            memset(&found, 0xc7, sizeof found);
+            const bool is_hit = hgrid_intersect(&grid, &ray, NULL, &expected);
+            CHECK(hgrid_intersect(other, &ray, NULL, &found) == is_hit);
+            CHECK(memcmp(&expected, &found, sizeof found) == 0);
+            CHECK(hgrid_occluded(other, &ray, NULL) == is_hit);
+            CHECK(is_hit || all_bytes_are(&found, sizeof found, 0xc7));
+        }
+}
+
+static void every_triangle_is_hit_in_its_middle(void)
+{
+    for (uint32_t id = 0; id < TRIANGLES; id++) {
+        const uint32_t *corners = mesh_data.indices[id];
+        float x = 0, y = 0;
+        for (int i = 0; i < 3; i++) {
+            x += mesh_data.positions[corners[i]][0] / 3;
+            y += mesh_data.positions[corners[i]][1] / 3;
+        }
+        const hgrid_ray ray = ray_down(x, y);
+        hgrid_hit hit;
+        CHECK(hgrid_intersect(&grid, &ray, NULL, &hit));
+        CHECK(hit.primitive == id);
+        check_hit(&ray, &hit);
+    }
+}
+
+/* The next float, for a positive one. */
+static float next_up(float x)
+{
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits++;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+static void the_range_of_a_ray_is_closed(void)
+{
+    hgrid_ray ray = ray_down(0.4f, 0.3f);
+    hgrid_hit hit, again;
+    CHECK(hgrid_intersect(&grid, &ray, NULL, &hit));
+    ray.t_min = ray.t_max = hit.t;
+    CHECK(hgrid_intersect(&grid, &ray, NULL, &again) && again.t == hit.t);
+    CHECK(hgrid_occluded(&grid, &ray, NULL));
+    ray.t_min = next_up(hit.t);
+    ray.t_max = FLT_MAX;
+    CHECK(!hgrid_intersect(&grid, &ray, NULL, &again) && !hgrid_occluded(&grid, &ray, NULL));
+}
+
+static void odd_rays_miss(void)
+{
+    for (int i = 0; i < 5; i++) {
+        hgrid_ray ray = ray_down(0.5f, 0.5f);
+        hgrid_hit hit;
+        CHECK(hgrid_intersect(&grid, &ray, NULL, &hit));
+        memset(&hit, 0xc7, sizeof hit);
+        switch (i) {
+        case 0: ray.origin[0] = NAN; break;
+        case 1: ray.direction[2] = 0; break;
+        case 2: ray.direction[1] = INFINITY; break;
+        case 3: ray.t_max = NAN; break;
+        case 4: ray.t_min = 1, ray.t_max = 0; break;
+        }
+        CHECK(!hgrid_intersect(&grid, &ray, NULL, &hit) && !hgrid_occluded(&grid, &ray, NULL));
+        CHECK(all_bytes_are(&hit, sizeof hit, 0xc7));
+    }
+}
+
+static void a_view_is_a_value(void)
+{
+    hgrid_grid copy = grid, *moved = (hgrid_grid *)guarded(sizeof *moved);
+    check_same(&copy);
+    memcpy(moved, &copy, sizeof copy);
+    memset(&copy, 0, sizeof copy);
+    check_same(moved);
+    EXPECT(HGRID_OK, hgrid_validate(moved));
+}
+
+static void a_blob_opens_elsewhere(void)
+{
+    const void *elsewhere = guarded_copy(blob, built.index_bytes);
+    const sheet *mesh_elsewhere = (const sheet *)guarded_copy(&mesh_data, sizeof mesh_data);
+    const hgrid_mesh mesh = mesh_of(mesh_elsewhere);
+    hgrid_grid opened;
+    EXPECT(HGRID_OK, hgrid_open(elsewhere, built.index_bytes, &mesh, &opened));
+    EXPECT(HGRID_OK, hgrid_validate(&opened));
+    check_same(&opened);
+
+    /* Bytes behind the blob are nobody's business. */
+    unsigned char *longer = (unsigned char *)guarded(built.index_bytes + 64);
+    memcpy(longer, blob, built.index_bytes);
+    EXPECT(HGRID_OK, hgrid_open(longer, built.index_bytes + 64, &mesh, &opened));
+    check_same(&opened);
+}
+
+static void an_empty_view_hits_nothing(void)
+{
+    hgrid_grid empty;
+    memset(&empty, 0, sizeof empty);
+    const hgrid_ray ray = ray_down(0.5f, 0.5f);
+    hgrid_hit hit;
+    CHECK(!hgrid_intersect(&empty, &ray, NULL, &hit) && !hgrid_occluded(&empty, &ray, NULL));
+    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_validate(&empty));
+}
+
+static void counters_add_up(void)
+{
+    hgrid_counters once = {0, 0, 0}, twice = {0, 0, 0};
+    hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+    const hgrid_ray ray = ray_down(0.5f, 0.5f), beside = ray_down(5, 5);
+    hgrid_hit plain, counted;
+
+    CHECK(hgrid_intersect(&grid, &ray, &options, &plain));
+    options.counters = &once;
+    CHECK(hgrid_intersect(&grid, &ray, &options, &counted));
+    CHECK(memcmp(&plain, &counted, sizeof plain) == 0);
+    CHECK(once.primitive_tests > 0 && once.cell_steps > 0 && once.grid_steps == 0);
+
+    options.counters = &twice;
+    CHECK(hgrid_intersect(&grid, &ray, &options, &counted));
+    CHECK(hgrid_intersect(&grid, &ray, &options, &counted));
+    CHECK(!hgrid_intersect(&grid, &beside, &options, &counted));
+    CHECK(twice.primitive_tests == 2 * once.primitive_tests);
+    CHECK(twice.cell_steps == 2 * once.cell_steps);
+
+    options.counters = &once;
+    CHECK(hgrid_occluded(&grid, &ray, &options));
+    CHECK(once.cell_steps * 2 > twice.cell_steps);
+}
+
+static void the_lowest_of_equal_triangles_wins(void)
+{
+    static const float positions[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    static const uint32_t indices[3][3] = {{0, 1, 2}, {2, 0, 1}, {1, 2, 0}};
+    HGRID_ALIGNED static unsigned char index[HGRID_INDEX_BOUND(3)];
+    HGRID_ALIGNED static unsigned char scratch[HGRID_SCRATCH_BOUND(3)];
+    hgrid_mesh mesh = HGRID_MESH_INIT;
+    mesh.positions = positions, mesh.vertex_count = 3;
+    mesh.indices = indices, mesh.triangle_count = 3;
+    hgrid_grid equal;
+    EXPECT(HGRID_OK, hgrid_build(&mesh, NULL, index, sizeof index, scratch, sizeof scratch, &equal,
+                                 NULL));
+    const hgrid_ray ray = ray_down(0.25f, 0.5f);
+    hgrid_hit hit;
+    CHECK(hgrid_intersect(&equal, &ray, NULL, &hit));
+    CHECK(hit.primitive == 0 && hit.t == 1 && hit.u == 0.25f && hit.v == 0.5f);
+}
+
+int main(void)
+{
+    build();
+    every_triangle_is_hit_in_its_middle();
+    the_range_of_a_ray_is_closed();
+    odd_rays_miss();
+    a_view_is_a_value();
+    a_blob_opens_elsewhere();
+    an_empty_view_hits_nothing();
+    counters_add_up();
+    the_lowest_of_equal_triangles_wins();
+    return 0;
+}

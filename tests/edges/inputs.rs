@@ -1,0 +1,164 @@
+//! Meshes and configurations that are wrong get an error that names what is; meshes that are only
+//! odd get a grid.
+
+use hgrid_core::{
+    BuildFlags, Config, ConfigField, Error, IndexType, MAX_COORDINATE, MeshField, Ray, Strided,
+    TriangleMesh, sizes,
+};
+use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
+use hgrid_tests::oracle;
+use hgrid_tests::owned::Owned;
+use hgrid_tests::random::Random;
+
+fn build(mesh: &Mesh) -> Result<Owned, Error> {
+    Owned::build(&mesh.view(), &Config::default())
+}
+
+#[test]
+fn an_index_out_of_range_is_named() {
+    let mut mesh = ball(4, 1.0);
+    for bad in [u32::try_from(mesh.positions.len()).unwrap(), u32::MAX] {
+        for corner in 0..3 {
+            let good = mesh.indices[17];
+            mesh.indices[17][corner] = bad;
+            assert_eq!(build(&mesh).unwrap_err(), Error::IndexOutOfRange { triangle: 17 });
+            mesh.indices[17] = good;
+        }
+    }
+    assert!(build(&mesh).is_ok());
+}
+
+#[test]
+fn triangles_that_are_not_finite_are_skipped_and_counted() {
+    let sound = ball(6, 1.0);
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, MAX_COORDINATE.next_up(), f32::MAX] {
+        for axis in 0..3 {
+            for corner in 0..3 {
+                let mut mesh = sound.clone();
+                let mut triangle = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 3.0, 3.0]];
+                triangle[corner][axis] = bad;
+                mesh.push(triangle);
+                let view = mesh.view();
+                let owned = build(&mesh).unwrap();
+                let grid = owned.open(&view).unwrap();
+                assert_eq!(grid.skipped_count(), 1);
+                let sound = build(&sound).unwrap();
+                // Its other coordinates do not stretch the box, its id is not used.
+                assert_eq!(
+                    grid.bounds().0,
+                    sound.open(&Mesh::view(&ball(6, 1.0))).unwrap().bounds().0
+                );
+                let mut random = Random(9);
+                for _ in 0..20 {
+                    oracle::check(
+                        &grid,
+                        &Ray::new(random.point().map(|c| c * 3.0), random.point()),
+                    );
+                }
+                let strict = Config { flags: BuildFlags::STRICT, ..Config::default() };
+                let triangle = view.triangle_count() - 1;
+                let error = Owned::build(&view, &strict).unwrap_err();
+                assert_eq!(error, Error::NonFiniteTriangle { triangle });
+            }
+        }
+    }
+}
+
+#[test]
+fn the_largest_coordinate_is_finite() {
+    let mesh = ball(4, 1.0).scaled(MAX_COORDINATE);
+    let view = mesh.view();
+    let owned = build(&mesh).unwrap();
+    let grid = owned.open(&view).unwrap();
+    assert_eq!(grid.skipped_count(), 0);
+    let ray = Ray::new([0.0; 3], [0.1, 0.2, 0.97]);
+    assert!(grid.intersect(&ray).is_some());
+    oracle::check(&grid, &ray);
+}
+
+#[test]
+fn densities_outside_the_range_are_refused() {
+    let mesh = ball(4, 1.0);
+    for density in [0.0, -0.0, -1.0, f32::NAN, f32::INFINITY, 1e30] {
+        let config = Config { density, ..Config::default() };
+        let error = Error::InvalidConfig(ConfigField::Density);
+        assert_eq!(sizes(&mesh.view(), &config, &mut []), Err(error), "{density}");
+        assert_eq!(Owned::build(&mesh.view(), &config).unwrap_err(), error, "{density}");
+    }
+    for density in [f32::MIN_POSITIVE, 1e-10, 1000.0] {
+        assert!(Owned::build(&mesh.view(), &Config { density, ..Config::default() }).is_ok());
+    }
+}
+
+#[test]
+fn unknown_flags_are_refused() {
+    let flags = BuildFlags::from_bits_retain(1 << 31);
+    let config = Config { flags, ..Config::default() };
+    let error = Error::InvalidConfig(ConfigField::Flags);
+    assert_eq!(Owned::build(&ball(1, 0.0).view(), &config).unwrap_err(), error);
+}
+
+#[test]
+fn arrays_that_end_early_are_refused() {
+    let bytes = [0_u8; 100];
+    let strided = |len: usize, stride, count| Strided { bytes: &bytes[..len], stride, count };
+    let mesh = |positions, indices| TriangleMesh::strided(positions, indices, IndexType::U32);
+    let positions = Err(MeshField::Positions);
+    let indices = Err(MeshField::Indices);
+    for (given, expected) in [
+        (mesh(strided(36, 12, 3), strided(12, 12, 1)), Ok(())),
+        (mesh(strided(35, 12, 3), strided(12, 12, 1)), positions),
+        (mesh(strided(44, 16, 3), strided(12, 12, 1)), Ok(())),
+        (mesh(strided(43, 16, 3), strided(12, 12, 1)), positions),
+        (mesh(strided(36, 11, 3), strided(12, 12, 1)), positions),
+        (mesh(strided(36, 0, 3), strided(12, 12, 1)), positions),
+        (mesh(strided(36, usize::MAX, 3), strided(12, 12, 1)), positions),
+        (mesh(strided(36, 12, usize::MAX), strided(12, 12, 1)), positions),
+        (mesh(strided(36, 12, 3), strided(11, 12, 1)), indices),
+        (mesh(strided(36, 12, 3), strided(27, 16, 2)), indices),
+        (mesh(strided(36, 12, 3), strided(28, 16, 2)), Ok(())),
+        (mesh(strided(36, 12, 3), strided(12, 11, 1)), indices),
+        (mesh(strided(0, 0, 0), strided(0, 0, 0)), Ok(())),
+    ] {
+        assert_eq!(given.map(|_| ()), expected.map_err(Error::InvalidMesh));
+    }
+    let narrow =
+        |len| TriangleMesh::strided(strided(36, 12, 3), strided(len, 6, 1), IndexType::U16);
+    assert!(narrow(6).is_ok() && narrow(5).is_err());
+}
+
+#[test]
+fn every_error_says_something_of_its_own() {
+    let errors = [
+        Error::Misaligned { region: hgrid_core::Region::Index },
+        Error::InvalidMesh(MeshField::Positions),
+        Error::InvalidMesh(MeshField::Indices),
+        Error::TooManyTriangles,
+        Error::IndexOutOfRange { triangle: 17 },
+        Error::NonFiniteTriangle { triangle: 17 },
+        Error::InvalidConfig(ConfigField::Method),
+        Error::InvalidConfig(ConfigField::Density),
+        Error::InvalidConfig(ConfigField::Flags),
+        Error::NotAGrid,
+        Error::WrongByteOrder,
+        Error::UnsupportedVersion { found: 17 },
+        Error::Truncated { needed_bytes: 17, available_bytes: 3 },
+        Error::MeshMismatch,
+        Error::Corrupt { offset: 17 },
+    ];
+    let texts: std::collections::HashSet<String> = errors.iter().map(ToString::to_string).collect();
+    assert_eq!(texts.len(), errors.len());
+    assert!(texts.iter().all(|text| text.len() > 10));
+}
+
+#[test]
+fn unused_vertices_do_not_matter() {
+    let mut mesh = soup(50, 0.2, 5);
+    let expected = build(&mesh).unwrap().open(&mesh.view()).unwrap().bounds();
+    mesh.positions.push([1e20; 3]);
+    mesh.positions.push([f32::NAN; 3]);
+    let owned = build(&mesh).unwrap();
+    let grid = owned.open(&mesh.view()).unwrap();
+    assert_eq!((grid.bounds(), grid.skipped_count()), (expected, 0));
+    assert!(build(&one_triangle()).is_ok());
+}

@@ -1,0 +1,6 @@
+//! What happens at the edges: odd meshes, odd rays, odd numbers, damaged bytes?
+
+mod blobs;
+mod inputs;
+mod rays;
+mod shapes;

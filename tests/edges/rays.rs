@@ -1,0 +1,119 @@
+//! Rays that are no rays miss; rays at the limits of what is one are answered as brute force does.
+
+use hgrid_core::{Config, Grid, Ray};
+use hgrid_tests::meshes::{Mesh, ball};
+use hgrid_tests::owned::Owned;
+use hgrid_tests::random::Random;
+use hgrid_tests::{methods, oracle};
+
+fn ask(mesh: &Mesh, rays: impl IntoIterator<Item = Ray>) -> usize {
+    let view = mesh.view();
+    let owned: Vec<Owned> =
+        methods::configs().map(|config| Owned::build(&view, &config).unwrap()).collect();
+    let grids: Vec<Grid<'_>> = owned.iter().map(|owned| owned.open(&view).unwrap()).collect();
+    rays.into_iter()
+        .map(|ray| {
+            grids.iter().for_each(|grid| oracle::check(grid, &ray));
+            usize::from(grids[0].intersect(&ray).is_some())
+        })
+        .sum()
+}
+
+#[test]
+fn rays_that_are_no_rays_miss() {
+    let mesh = ball(4, 1.0);
+    let sound = Ray::new([0.1, 0.2, 3.0], [0.0, 0.01, -1.0]);
+    assert_eq!(ask(&mesh, [sound]), 1);
+    let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    let mut rays = Vec::new();
+    for axis in 0..3 {
+        for value in bad {
+            let (mut origin, mut direction) = (sound, sound);
+            origin.origin[axis] = value;
+            direction.direction[axis] = value;
+            rays.extend([origin, direction]);
+        }
+    }
+    rays.push(Ray { direction: [0.0, -0.0, 0.0], ..sound });
+    rays.push(Ray { t_min: f32::NAN, ..sound });
+    rays.push(Ray { t_max: f32::NAN, ..sound });
+    rays.push(Ray { t_min: 2.0, t_max: 1.0, ..sound });
+    rays.push(Ray { t_min: f32::INFINITY, ..sound });
+    rays.push(Ray { t_max: f32::NEG_INFINITY, ..sound });
+    assert_eq!(ask(&mesh, rays), 0);
+    assert_eq!(ask(&mesh, [Ray { t_min: f32::NEG_INFINITY, ..sound }]), 1);
+}
+
+/// Zero, negative zero, denormal and tiny components, alone and together.
+#[test]
+fn directions_along_axes_and_nearly_so() {
+    let mesh = ball(8, 0.0);
+    let tiny = [0.0, -0.0, 1e-45, -1e-45, 1e-38, 1e-20, -1e-12, 1e-7, 3e-6];
+    let mut rays = Vec::new();
+    let mut random = Random(31);
+    for axis in 0..3 {
+        for along in [1.0_f32, -1.0, 1e-30, -1e30] {
+            for (i, &first) in tiny.iter().enumerate() {
+                let second = tiny[(i * 5 + 2) % tiny.len()];
+                let mut direction = [along, first * along.abs(), second * along.abs()];
+                direction.rotate_right(axis);
+                // On borders of cells, on faces, on edges, on corners and just anywhere.
+                for origin in [[0.0; 3], [0.25; 3], [1.0; 3], [-1.0, 1.0, 0.5], [-3.0, 0.5, 1.0]] {
+                    rays.push(Ray::new(origin, direction));
+                }
+                rays.push(Ray::new(random.point(), direction));
+            }
+        }
+    }
+    assert!(ask(&mesh, rays.iter().copied()) > rays.len() / 4);
+}
+
+#[test]
+fn origins_on_vertices_edges_and_faces() {
+    let mesh = ball(6, 1.0);
+    let mut random = Random(37);
+    let rays = (0..3000).map(|i| {
+        let triangle = mesh.indices[random.below(mesh.indices.len())];
+        let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
+        let origin = match i % 3 {
+            0 => a,
+            1 => std::array::from_fn(|k| f32::midpoint(a[k], b[k])),
+            _ => std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0),
+        };
+        Ray::new(origin, random.point())
+    });
+    assert!(ask(&mesh, rays.collect::<Vec<_>>()) > 1000);
+}
+
+#[test]
+fn origins_far_away() {
+    let mesh = ball(6, 1.0);
+    let mut random = Random(41);
+    let mut rays = Vec::new();
+    for distance in [5.0, 100.0, 1e4, 1e8, 1e20, 1e30] {
+        for _ in 0..200 {
+            let (target, towards) = (random.point().map(|c| c * 0.5), random.point());
+            let origin = std::array::from_fn(|k| target[k] - towards[k] * distance);
+            rays.push(Ray::new(origin, towards));
+            rays.push(Ray::new(origin, std::array::from_fn(|k| target[k] - origin[k])));
+            rays.push(Ray { t_min: distance, ..Ray::new(origin, towards) });
+        }
+    }
+    assert!(ask(&mesh, rays) > 1000);
+}
+
+#[test]
+fn directions_of_any_length_give_t_in_their_multiples() {
+    let mesh = ball(6, 1.0);
+    let view = mesh.view();
+    let owned = Owned::build(&view, &Config::default()).unwrap();
+    let grid = owned.open(&view).unwrap();
+    for exponent in -120..=120 {
+        let length = 2_f32.powi(exponent);
+        let ray = Ray::new([0.3, 0.1, 2.0], [0.0, 0.05, -1.0].map(|c| c * length));
+        let unit = Ray::new([0.3, 0.1, 2.0], [0.0, 0.05, -1.0]);
+        let (hit, expected) = (grid.intersect(&ray).unwrap(), grid.intersect(&unit).unwrap());
+        assert_eq!((hit.t * length, hit.u, hit.v), (expected.t, expected.u, expected.v));
+        assert_eq!(hit.primitive, expected.primitive);
+    }
+}

@@ -1,0 +1,164 @@
+//! Meshes of odd shapes answer as brute force does and stay within the memory they were promised.
+
+use hgrid_core::{Config, Ray, Sizes};
+use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
+use hgrid_tests::owned::Owned;
+use hgrid_tests::random::Random;
+use hgrid_tests::{methods, oracle};
+
+/// Rays through and around the mesh, from inside and outside its box, at its vertices and beside.
+fn agrees(mesh: &Mesh) {
+    let view = mesh.view();
+    for config in [0.3, 4.0, 40.0].into_iter().flat_map(methods::configs_with) {
+        let owned = Owned::build(&view, &config).unwrap();
+        let bound = Sizes::bound(view.triangle_count(), &config).unwrap();
+        assert!(owned.bytes().len() <= bound.index_bytes);
+        let grid = owned.open(&view).unwrap();
+        grid.validate().unwrap();
+        let (min, max) = grid.bounds();
+        let mut random = Random(43);
+        for i in 0..200 {
+            let mut point = |reach: f32| -> [f32; 3] {
+                std::array::from_fn(|k| {
+                    let half = max[k] / 2.0 - min[k] / 2.0;
+                    min[k] + half + half * reach * (random.unit() * 2.0 - 1.0)
+                })
+            };
+            let (origin, mut target) = (point(if i % 2 == 0 { 1.0 } else { 3.0 }), point(1.0));
+            if i % 3 == 0 && !mesh.positions.is_empty() {
+                target = mesh.positions[i * 7 % mesh.positions.len()];
+            }
+            let direction = std::array::from_fn(|k| target[k] - origin[k]);
+            oracle::check(&grid, &Ray::new(origin, direction));
+        }
+    }
+}
+
+#[test]
+fn nothing() {
+    agrees(&Mesh::default());
+    let view_of_nothing = Mesh { positions: vec![[1.0; 3]], indices: Vec::new() };
+    agrees(&view_of_nothing);
+    let mut only_nan = Mesh::default();
+    only_nan.push([[f32::NAN; 3]; 3]);
+    agrees(&only_nan);
+}
+
+#[test]
+fn one_and_a_few_triangles() {
+    agrees(&one_triangle());
+    for count in 2..10 {
+        agrees(&soup(count, 0.5, count as u64));
+    }
+}
+
+#[test]
+fn identical_triangles_are_answered_by_the_first() {
+    let mut mesh = Mesh::default();
+    for _ in 0..2000 {
+        mesh.push([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]]);
+    }
+    agrees(&mesh);
+    let view = mesh.view();
+    let owned = Owned::build(&view, &Config::default()).unwrap();
+    let hit = owned.open(&view).unwrap().intersect(&Ray::new([0.2, 0.2, 3.0], [0.0, 0.0, -1.0]));
+    assert_eq!(hit.map(|hit| hit.primitive), Some(0));
+}
+
+#[test]
+fn flat_scenes() {
+    for axis in 0..3 {
+        for height in [0.0, 1.0, -1e10, 1e-30] {
+            let flat = soup(300, 0.1, 3).map(|mut p| {
+                p[axis] = height;
+                p
+            });
+            agrees(&flat);
+        }
+        let line = soup(300, 0.1, 3).map(|p| {
+            let mut q = [0.5; 3];
+            q[axis] = p[axis];
+            q
+        });
+        agrees(&line);
+    }
+    agrees(&soup(100, 0.1, 3).map(|_| [1.0, 2.0, 3.0]));
+    agrees(&soup(100, 0.1, 3).map(|_| [0.0; 3]));
+}
+
+#[test]
+fn tiny_and_huge_scenes() {
+    for scale in [1e-38, 1e-30, 1e-10, 1e10, 1e30, 1e36] {
+        agrees(&soup(300, 0.1, 3).scaled(scale));
+        agrees(&ball(6, 1.0).scaled(scale));
+    }
+}
+
+#[test]
+fn scenes_far_from_the_origin() {
+    for shift in [1e2, 1e4, 1e6, 1e10] {
+        agrees(&soup(300, 0.1, 3).map(|p| p.map(|c| c + shift)));
+        agrees(&ball(6, 1.0).map(|[x, y, z]| [x + shift, y, z - shift]));
+    }
+}
+
+#[test]
+fn degenerate_triangles_are_never_hit() {
+    let mut mesh = ball(4, 1.0);
+    let sound = u32::try_from(mesh.indices.len()).unwrap();
+    for i in 0..sound {
+        mesh.indices.push([i, i, i + 1]);
+        mesh.indices.push([i, i, i]);
+    }
+    mesh.indices.retain(|t| t.iter().all(|&i| (i as usize) < mesh.positions.len()));
+    mesh.push([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
+    agrees(&mesh);
+    let view = mesh.view();
+    let owned = Owned::build(&view, &Config::default()).unwrap();
+    let grid = owned.open(&view).unwrap();
+    let mut random = Random(3);
+    for _ in 0..2000 {
+        let hit = grid.intersect(&Ray::new(random.point().map(|c| c * 2.0), random.point()));
+        assert!(hit.is_none_or(|hit| hit.primitive < sound));
+    }
+}
+
+#[test]
+fn one_huge_triangle_among_many_tiny_ones() {
+    let mut mesh = soup(3000, 0.01, 13);
+    mesh.push([[-100.0, -100.0, 0.0], [100.0, -100.0, 0.1], [0.0, 200.0, -0.1]]);
+    agrees(&mesh);
+}
+
+#[test]
+fn long_thin_triangles_and_triangles_that_span_the_scene() {
+    let mut random = Random(19);
+    let mut needles = Mesh::default();
+    for _ in 0..500 {
+        let (a, b) = (random.point(), random.point());
+        needles.push([a, b, b.map(|c| c + 1e-3)]);
+    }
+    agrees(&needles);
+    agrees(&soup(500, 2.0, 19));
+}
+
+#[test]
+fn dense_rows_and_a_crowded_corner() {
+    agrees(&soup(5000, 0.02, 29));
+    let mut crowded = soup(2000, 0.001, 29).scaled(0.01);
+    crowded.append(&ball(2, 0.0));
+    agrees(&crowded);
+}
+
+/// What would need more references than a grid may have is built with a lower density, and says so.
+#[test]
+fn a_mesh_of_spanning_triangles_lowers_the_density() {
+    let mesh = soup(4000, 2.0, 23);
+    let view = mesh.view();
+    let config = Config { density: 32.0, ..Config::default() };
+    let owned = Owned::build(&view, &config).unwrap();
+    let grid = owned.open(&view).unwrap();
+    assert!(grid.density() < 32.0 && grid.reference_count() <= 16 * 4000 + 64);
+    let ratio = 32.0 / grid.density();
+    assert!(ratio.log2().fract() == 0.0, "halved, again and again: {ratio}");
+}

@@ -1,0 +1,125 @@
+//! The ray tracer says what is wrong and ends with 1; no file makes it crash.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use tempfile::TempDir;
+
+use crate::pictures::{ascii, binary};
+use crate::programs::{attempt, watched_raytracer};
+
+/// What a refused program says.
+fn refusal(program: &mut Command) -> String {
+    let output = attempt(program);
+    let said = String::from_utf8(output.stderr).expect("text");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.starts_with("raytracer: ") && said.ends_with('\n'), "{said:?}");
+    said
+}
+
+/// What it says about a file.
+fn refusal_of(dir: &Path, contents: &[u8]) -> String {
+    let path = dir.join("bad.ply");
+    fs::write(&path, contents).expect("a file");
+    refusal(watched_raytracer().arg(path).args(["--size", "4", "-o"]).arg(dir.join("none.ppm")))
+}
+
+fn replaced(from: &str, to: &str) -> Vec<u8> {
+    let text = String::from_utf8(ascii()).expect("text");
+    assert!(text.contains(from), "{from}");
+    text.replacen(from, to, 1).into_bytes()
+}
+
+#[test]
+fn bad_arguments_are_refused() {
+    for (words, message) in [
+        (&["--size"][..], "--size needs a value"),
+        (&["-o"], "-o needs a value"),
+        (&["--size", "0"], "--size is a number from 1 to 16384, not `0`"),
+        (&["--size", "-7"], "not `-7`"),
+        (&["--size", "16385"], "not `16385`"),
+        (&["--size", "12x"], "not `12x`"),
+        (&["--size", "99999999999999999999"], "not `99999999999999999999`"),
+        (&["--fast"], "unknown option --fast: raytracer [FILE.ply]"),
+        (&["a.ply", "b.ply"], "one scene at a time: a.ply or b.ply?"),
+        (&["no/such/file.ply"], "no/such/file.ply: cannot be opened"),
+        (&["--size", "4", "-o", "no/such/folder/a.ppm"], "no/such/folder/a.ppm: cannot be written"),
+    ] {
+        let said = refusal(watched_raytracer().args(words));
+        assert!(said.contains(message), "{words:?}: {said}");
+    }
+}
+
+#[test]
+fn a_full_disk_is_noticed() {
+    if Path::new("/dev/full").exists() {
+        let dir = TempDir::new().expect("a folder");
+        let path = dir.path().join("house.ply");
+        fs::write(&path, ascii()).expect("a file");
+        let said = refusal(watched_raytracer().arg(path).args(["-o", "/dev/full"]));
+        assert!(said.contains("/dev/full: cannot be written to the end"), "{said}");
+    } else {
+        println!("skipped: this system has no /dev/full");
+    }
+}
+
+#[test]
+fn bad_files_are_refused_with_the_reason() {
+    let dir = TempDir::new().expect("a folder");
+    let big_endian = "the format is `binary_big_endian`: convert it";
+    for (contents, message) in [
+        (Vec::new(), "not a PLY file: it is empty"),
+        (b"solid house\n".to_vec(), "not a PLY file"),
+        (b"ply\nformat ascii 1.0\n".to_vec(), "no end_header line"),
+        (replaced("format ascii", "format binary_big_endian"), big_endian),
+        (replaced("element face 7", "element face many"), "cannot read `element face many`"),
+        (replaced("property int id", "property integer id"), "unknown type in `property integer"),
+        (replaced("float y", "float w"), "the vertices have no x, y, z"),
+        (replaced("5 0 1 5 8 4", "5 0 1 5 8 door"), "has no number, in face 0 of 7"),
+        (replaced("5 0 1 5 8 4", "-5 0 1 5 8 4"), "a list of length -5 in face 0"),
+    ] {
+        let said = refusal_of(dir.path(), &contents);
+        assert!(said.contains(message), "{message}: {said}");
+    }
+    assert!(!dir.path().join("none.ppm").exists());
+}
+
+/// The reader passes these on; the library knows which triangle is to blame.
+#[test]
+fn vertices_that_do_not_exist_are_named_by_their_triangle() {
+    let dir = TempDir::new().expect("a folder");
+    for number in ["10", "-1", "4294967295", "5000000000", "nan"] {
+        let contents = replaced("4 0 3 7 4 ", &format!("4 0 3 7 {number} "));
+        let said = refusal_of(dir.path(), &contents);
+        // The pentagons before it make three triangles each.
+        assert!(said.contains("triangle 7: a vertex number is out of range"), "{number}: {said}");
+    }
+}
+
+#[test]
+fn truncated_files_are_refused_wherever_they_end() {
+    let dir = TempDir::new().expect("a folder");
+    for whole in [ascii(), binary()] {
+        // The last number of a text may be cut short and still be one.
+        for end in (0..whole.len() - 4).step_by(3) {
+            let said = refusal_of(dir.path(), &whole[..end]);
+            assert!(said.contains("bad.ply: "), "{end}: {said}");
+        }
+    }
+}
+
+#[test]
+fn damaged_files_never_crash_it() {
+    let dir = TempDir::new().expect("a folder");
+    let path = dir.path().join("damaged.ply");
+    for whole in [ascii(), binary()] {
+        for at in (0..whole.len()).step_by(5) {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 1 << (at % 8);
+            fs::write(&path, damaged).expect("a file");
+            let output = dir.path().join("picture.ppm");
+            attempt(watched_raytracer().arg(&path).args(["--size", "4", "-o"]).arg(output));
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! The C library as its users get it, and the C compiler that links it.
+//!
+//! The library is built by the same cargo, in the release profile, once for each test program, into
+//! a folder of its own below the target folder: a test program holds the lock of the outer one.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// The root of the repository.
+#[must_use]
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the repository")
+}
+
+/// A target folder that no other cargo of this test run works in.
+#[must_use]
+pub fn target_dir() -> PathBuf {
+    let program = env::current_exe().expect("a test program knows its path");
+    // target/PROFILE/deps/PROGRAM
+    program.ancestors().nth(3).expect("cargo runs it in its target folder").join("artefacts")
+}
+
+/// A cargo command for this repository that nothing in the environment bends.
+#[must_use]
+pub fn cargo(subcommand: &str) -> Command {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.arg(subcommand).args(["--quiet", "--offline", "--target-dir"]).arg(target_dir());
+    cargo.current_dir(root());
+    for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET"] {
+        cargo.env_remove(name);
+    }
+    cargo
+}
+
+/// Where `libhgrid.a` and `libhgrid.so` lie, fresh from the compiler.
+pub fn library_dir() -> &'static Path {
+    static DIR: OnceLock<PathBuf> = OnceLock::new();
+    DIR.get_or_init(|| {
+        run(cargo("build").args(["--release", "-p", "hgrid-capi"]));
+        target_dir().join("release")
+    })
+}
+
+/// The static library.
+#[must_use]
+pub fn static_library() -> PathBuf {
+    library_dir().join("libhgrid.a")
+}
+
+/// The shared library.
+#[must_use]
+pub fn shared_library() -> PathBuf {
+    let name = format!("{}hgrid{}", env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX);
+    library_dir().join(name)
+}
+
+/// A compiler for a dialect like `c99` or `c++17`, with the header on its path and every warning an
+/// error: `$CC` or `$CXX`, or `cc` or `c++`.
+#[must_use]
+pub fn compiler(dialect: &str) -> Command {
+    let [variable, default] =
+        if dialect.starts_with("c++") { ["CXX", "c++"] } else { ["CC", "cc"] };
+    let program = env::var_os(variable).unwrap_or_else(|| default.into());
+    warnings(Command::new(program), dialect)
+}
+
+/// The same for a compiler by name.
+#[must_use]
+pub fn warnings(mut compiler: Command, dialect: &str) -> Command {
+    compiler
+        .arg(format!("-std={dialect}"))
+        .args(["-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-I"])
+        .arg(root().join("include"));
+    compiler
+}
+
+/// Whether there is a program of this name. If not, the test says so and goes on without it.
+pub fn is_installed(program: &str) -> bool {
+    let found = Command::new(program).arg("--version").output().is_ok();
+    if !found {
+        println!("skipped: `{program}` is not installed");
+    }
+    found
+}
+
+/// Runs a command that must succeed.
+///
+/// # Panics
+/// If it does not, with all that it said.
+pub fn run(command: &mut Command) -> Output {
+    let output = output(command);
+    let [out, err] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
+    assert!(output.status.success(), "{command:?}: {}\n{out}{err}", output.status);
+    output
+}
+
+/// Runs a command that may fail.
+///
+/// # Panics
+/// If there is no such program.
+pub fn output(command: &mut Command) -> Output {
+    command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"))
+}

@@ -1,0 +1,31 @@
+//! Real scans, where they are at hand.
+//!
+//! They are not part of the project (their makers hold the rights). A test that wants one looks in
+//! the folder that `HGRID_SCENES` names, or in `../shared/scenes` beside the checkout, and skips
+//! with one line if it is not there.
+
+use std::path::{Path, PathBuf};
+
+use crate::meshes::Mesh;
+
+/// The scan of this name, or `None` after a line that says so.
+///
+/// # Panics
+/// If the file is there but cannot be read.
+pub fn load(name: &str) -> Option<Mesh> {
+    let path = folder().join(name).with_extension("ply");
+    if !path.is_file() {
+        println!("skipped: {name}.ply is not here (set HGRID_SCENES to the folder that has it)");
+        return None;
+    }
+    let path = path.to_str().expect("a path in UTF-8");
+    let scene = hgrid_lab::scene::Scene::load(path).expect("a scan can be read");
+    Some(Mesh { positions: scene.positions, indices: scene.indices })
+}
+
+fn folder() -> PathBuf {
+    std::env::var_os("HGRID_SCENES").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes"),
+        PathBuf::from,
+    )
+}
