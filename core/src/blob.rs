@@ -62,7 +62,9 @@ pub(crate) struct Header {
     pub(crate) macrocell_factor: u32,
     /// A cell with more primitives has a subgrid; 0 for a method without subgrids.
     pub(crate) subdivide_above: u32,
-    reserved: [u32; 6],
+    /// Levels of grids; 0 for a method without nested grids.
+    pub(crate) depth: u32,
+    reserved: [u32; 5],
     /// Over all bytes before it: a header is what a build wrote, or `open` refuses it.
     checksum: u32,
 }
@@ -83,6 +85,7 @@ impl Header {
                 0
             },
             subdivide_above: if config.method.has_subgrids() { config.subdivide_above } else { 0 },
+            depth: if config.method.has_depth() { config.depth } else { 0 },
             triangle_count: mesh.triangle_count(),
             vertex_count: mesh.vertex_count() as u64,
             bounds_min: lattice.min,
@@ -173,6 +176,9 @@ impl Header {
         if config.method.has_subgrids() {
             config.subdivide_above = self.subdivide_above;
         }
+        if config.method.has_depth() {
+            config.depth = self.depth;
+        }
         config
     }
 
@@ -180,7 +186,8 @@ impl Header {
     pub(crate) fn unused_is_zero(&self, method: Method) -> bool {
         (method.has_macrocells() || self.macrocell_factor == 0)
             && (method.has_subgrids() || self.subdivide_above == 0)
-            && self.reserved == [0; 6]
+            && (method.has_depth() || self.depth == 0)
+            && self.reserved == [0; 5]
     }
 }
 

@@ -42,7 +42,7 @@ impl CellRange {
 
     #[inline(always)]
     fn lengths(&self) -> [u64; 3] {
-        core::array::from_fn(|axis| u64::from(self.max[axis] - self.min[axis]) + 1)
+        core::array::from_fn(|axis| u64::from(self.max[axis].saturating_sub(self.min[axis])) + 1)
     }
 
     /// The cells, along x, then y, then z.
@@ -149,6 +149,18 @@ impl Lattice {
             min: (triangle.min - origin) * cells_per_unit - margin,
             max: (triangle.max - origin) * cells_per_unit + margin,
         }
+    }
+
+    /// A point in cells.
+    #[inline(always)]
+    pub(crate) fn place(&self, point: Vec3A) -> Vec3A {
+        (point - Vec3A::from_array(self.min)) * Vec3A::from_array(self.cells_per_unit)
+    }
+
+    /// By how much boxes are grown, in cells.
+    #[inline(always)]
+    pub(crate) fn margin(&self) -> Vec3A {
+        Vec3A::from_array(self.margin)
     }
 
     /// The extent of a cell on each axis, up to a common factor.

@@ -3,6 +3,7 @@
 use bitflags::bitflags;
 
 use crate::error::{ConfigField, Error};
+use crate::recursive::MAX_DEPTH;
 
 /// The structure to build.
 #[non_exhaustive]
@@ -17,11 +18,13 @@ pub enum Method {
     /// A one-level grid whose crowded cells hold one-level grids of their own (the paper's
     /// multi-level variable grid, §3.1).
     Variable = 3,
+    /// An uncompressed recursive grid, as in the Manta ray tracer: what the paper compares with.
+    Recursive = 4,
 }
 
 impl Method {
     /// All methods, in the order of the paper's Table 1 but for its baseline, which comes last.
-    pub const ALL: &[Self] = &[Self::OneLevel, Self::Variable, Self::Fixed];
+    pub const ALL: &[Self] = &[Self::OneLevel, Self::Variable, Self::Fixed, Self::Recursive];
 
     /// The name that commands and tables use.
     #[must_use]
@@ -30,6 +33,7 @@ impl Method {
             Self::OneLevel => "one-level",
             Self::Fixed => "fixed",
             Self::Variable => "variable",
+            Self::Recursive => "recursive",
         }
     }
 
@@ -40,6 +44,7 @@ impl Method {
             1 => Some(Self::OneLevel),
             2 => Some(Self::Fixed),
             3 => Some(Self::Variable),
+            4 => Some(Self::Recursive),
             _ => None,
         }
     }
@@ -54,12 +59,18 @@ impl Method {
         matches!(self, Self::Variable)
     }
 
+    /// Whether [`Config::depth`] means something to it.
+    pub(crate) const fn has_depth(self) -> bool {
+        matches!(self, Self::Recursive)
+    }
+
     /// The density that the paper uses with this method.
     #[must_use]
     pub const fn default_density(self) -> f32 {
         match self {
             Self::OneLevel | Self::Variable => 4.0,
             Self::Fixed => 32.0,
+            Self::Recursive => 8.0,
         }
     }
 }
@@ -85,6 +96,8 @@ pub struct Config {
     pub macrocell_factor: u32,
     /// For [`Method::Variable`]: a cell with more primitives than this gets a subgrid.
     pub subdivide_above: u32,
+    /// For [`Method::Recursive`]: levels of grids, 1 to [`MAX_DEPTH`](crate::MAX_DEPTH).
+    pub depth: u32,
     /// Choices that are either on or off.
     pub flags: BuildFlags,
 }
@@ -98,6 +111,7 @@ impl Config {
             density: method.default_density(),
             macrocell_factor: 6,
             subdivide_above: 16,
+            depth: 3,
             flags: BuildFlags::empty(),
         }
     }
@@ -109,6 +123,9 @@ impl Config {
         }
         if self.method.has_macrocells() && self.macrocell_factor < 2 {
             return Err(Error::InvalidConfig(ConfigField::MacrocellFactor));
+        }
+        if self.method.has_depth() && !(1..=MAX_DEPTH).contains(&self.depth) {
+            return Err(Error::InvalidConfig(ConfigField::Depth));
         }
         if self.flags.bits() & !BuildFlags::all().bits() != 0 {
             return Err(Error::InvalidConfig(ConfigField::Flags));

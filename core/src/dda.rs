@@ -22,6 +22,8 @@ pub(crate) struct Line {
     rate: [f32; 3],
     /// Distance for each cell, negative where the ray runs downwards; zero if parallel.
     delta: [f32; 3],
+    /// How far off its cells a line may be, in cells.
+    margin: [f32; 3],
     /// Distance at which the ray ends.
     pub(crate) end: f32,
     /// The `t` at which the line starts.
@@ -82,6 +84,7 @@ impl Line {
             position: [0.0; 3],
             rate: [0.0; 3],
             delta: [0.0; 3],
+            margin: lattice.margin().to_array(),
             end: round((end - start) * scale),
             start: approach.t + start,
             scale,
@@ -113,17 +116,19 @@ impl Line {
             zoomed.position[axis] = (self.position[axis] - origin[axis]) * scale[axis];
             zoomed.rate[axis] = self.rate[axis] * scale[axis];
             zoomed.delta[axis] = self.delta[axis] / scale[axis];
+            zoomed.margin[axis] = self.margin[axis] * scale[axis];
         }
         zoomed
     }
 
     /// A walk through a box of so many cells, from `entered` or where the line enters the box;
-    /// `None` if it passes the box or has left it by then.
+    /// `None` if it passes the box or has left it by then. A line that runs along the border is in.
     #[inline]
     pub(crate) fn walk_in(&self, entered: f32, resolution: [u32; 3]) -> Option<Walk> {
         let (mut near, mut far) = (entered, f32::INFINITY);
         for (axis, &cells) in resolution.iter().enumerate() {
-            let (low, high) = (-self.position[axis], as_f32(cells) - self.position[axis]);
+            let (position, margin) = (self.position[axis], self.margin[axis]);
+            let (low, high) = (-margin - position, as_f32(cells) + margin - position);
             let delta = self.delta[axis];
             if delta > 0.0 {
                 near = near.max(low * delta);

@@ -32,6 +32,8 @@ pub enum ConfigField {
     Density,
     /// Below 2, for a method with macrocells.
     MacrocellFactor,
+    /// 0 or above [`MAX_DEPTH`](crate::MAX_DEPTH), for a method with nested grids.
+    Depth,
     /// A flag that this version does not know.
     Flags,
 }
@@ -137,6 +139,9 @@ impl fmt::Display for Error {
             ),
             Self::InvalidConfig(ConfigField::MacrocellFactor) => {
                 f.write_str("macrocell_factor must be at least 2")
+            }
+            Self::InvalidConfig(ConfigField::Depth) => {
+                write!(f, "depth must be 1 to {}", crate::MAX_DEPTH)
             }
             Self::InvalidConfig(ConfigField::Flags) => f.write_str("unknown build flag"),
             Self::NotAGrid => f.write_str("the bytes are not a grid"),

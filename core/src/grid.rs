@@ -12,6 +12,7 @@ use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{self, OneLevel};
 use crate::ray::{Hit, Ray};
+use crate::recursive::{self, Recursive};
 use crate::triangle::TriangleTest;
 use crate::variable::{self, Variable};
 
@@ -33,6 +34,7 @@ enum Structure<'a> {
     OneLevel(OneLevel<'a>),
     Fixed(Fixed<'a>),
     Variable(Variable<'a>),
+    Recursive(Recursive<'a>),
 }
 
 impl<'a> Grid<'a> {
@@ -80,6 +82,7 @@ impl<'a> Grid<'a> {
                 one_level::build(&mesh, config, &Macrocells::of(config), index, scratch)?
             }
             Method::Variable => variable::build(&mesh, config, index, scratch)?,
+            Method::Recursive => recursive::build(&mesh, config, index, scratch)?,
         };
         Self::open(blob, mesh)
     }
@@ -105,6 +108,7 @@ impl<'a> Grid<'a> {
             }
             Some(Method::Fixed) => Structure::Fixed(Fixed::open(&header, &lattice, blob)?),
             Some(Method::Variable) => Structure::Variable(Variable::open(&header, &lattice, blob)?),
+            Some(Method::Recursive) => Structure::Recursive(Recursive::open(&header, blob)?),
             None => return Err(corrupt(core::mem::offset_of!(Header, method))),
         };
         Ok(Self { mesh, blob, lattice, structure })
@@ -131,6 +135,7 @@ impl<'a> Grid<'a> {
             Structure::Variable(grid) => {
                 grid.validate(&header, &self.lattice, self.blob, &self.mesh)
             }
+            Structure::Recursive(grid) => grid.validate(&header, &self.lattice, &self.mesh),
         }
     }
 
@@ -188,6 +193,7 @@ impl<'a> Grid<'a> {
             Structure::OneLevel(grid) => grid.traverse(&line, tally, leaf),
             Structure::Fixed(grid) => grid.traverse(&line, tally, leaf),
             Structure::Variable(grid) => grid.traverse(&line, tally, leaf),
+            Structure::Recursive(grid) => grid.traverse(&line, tally, leaf),
         }
         best
     }
@@ -210,14 +216,15 @@ impl<'a> Grid<'a> {
         self.blob.len()
     }
 
-    /// Bytes of scratch that the build of this grid took, or at most took if it is a variable one.
+    /// Bytes of scratch that the build of this grid took, or at most took where a bump allocator gave it.
     #[must_use]
     pub fn scratch_bytes(&self) -> u64 {
         let resolution = self.lattice.resolution;
+        let triangles = self.mesh.triangle_count();
         match self.structure {
             Structure::OneLevel(_) | Structure::Fixed(_) => one_level::scratch_bytes(resolution),
+            Structure::Recursive(_) => recursive::scratch_bytes(triangles, self.config().depth),
             Structure::Variable(_) => {
-                let triangles = self.mesh.triangle_count();
                 variable::scratch_bytes_at_most(resolution, triangles, self.density())
             }
         }
@@ -243,6 +250,7 @@ impl<'a> Grid<'a> {
             Structure::OneLevel(_) => Method::OneLevel,
             Structure::Fixed(_) => Method::Fixed,
             Structure::Variable(_) => Method::Variable,
+            Structure::Recursive(_) => Method::Recursive,
         }
     }
 

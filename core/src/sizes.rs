@@ -5,6 +5,7 @@ use crate::error::{Error, Region};
 use crate::fixed;
 use crate::mesh::TriangleMesh;
 use crate::one_level;
+use crate::recursive;
 use crate::variable;
 
 /// Bytes of the two regions that a build takes.
@@ -44,6 +45,7 @@ impl Sizes {
             Method::OneLevel => one_level::bound(triangles, config.density, 0),
             Method::Fixed => fixed::bound(triangles, config),
             Method::Variable => variable::bound(triangles, config),
+            Method::Recursive => recursive::bound(triangles, config),
         };
         if index > usize::MAX as u64 || scratch > usize::MAX as u64 {
             return None;
@@ -97,5 +99,6 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
         Method::OneLevel => one_level::sizes(mesh, config, &(), scratch),
         Method::Fixed => one_level::sizes(mesh, config, &fixed::Macrocells::of(config), scratch),
         Method::Variable => variable::sizes(mesh, config, scratch),
+        Method::Recursive => recursive::sizes(mesh, config, scratch),
     }
 }

@@ -147,9 +147,12 @@ fn flipped_bits(config: &Config) {
                         found += 1;
                         continue;
                     }
-                    // Valid is what a build makes, but for words of a variable grid that no query
-                    // reads.
-                    assert_eq!(grid.method(), Method::Variable, "bit {bit} of byte {at}");
+                    // Valid is what a build makes, perhaps with other parameters; in structures
+                    // that a bump allocator filled also words that no query reads.
+                    let is_rebuilt = Owned::build(&mesh.view(), &grid.config())
+                        .is_ok_and(|rebuilt| rebuilt.bytes() == copy.bytes());
+                    let is_bumped = matches!(grid.method(), Method::Variable | Method::Recursive);
+                    assert!(is_rebuilt || is_bumped, "bit {bit} of byte {at}");
                     harmless += 1;
                     for _ in 0..100 {
                         let ray = Ray::new(random.point().map(|c| c * 2.0), random.point());
@@ -161,7 +164,7 @@ fn flipped_bits(config: &Config) {
         copy.set(at, &[owned.bytes()[at]]);
         copy.sign();
     }
-    assert!(refused > 600 && found > 20 * harmless, "{refused} {found} {harmless}");
+    assert!(refused > 600 && found > 5 * harmless, "{refused} {found} {harmless}");
     open(&copy, &mesh).unwrap().validate().unwrap();
 }
 

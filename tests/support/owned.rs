@@ -1,11 +1,37 @@
 //! A grid and the memory it lives in.
 
-use hgrid_core::{Block, Config, Error, Grid, TriangleMesh, sizes};
+use hgrid_core::{ALIGNMENT, Config, Error, Grid, TriangleMesh, sizes};
+
+/// Aligned memory of zeros. Pages that nobody touches cost nothing.
+#[derive(Debug, Clone)]
+struct Region {
+    bytes: Vec<u8>,
+    length: usize,
+}
+
+impl Region {
+    fn new(length: usize) -> Self {
+        Self { bytes: vec![0; length + ALIGNMENT], length }
+    }
+
+    fn start(&self) -> usize {
+        self.bytes.as_ptr().align_offset(ALIGNMENT)
+    }
+
+    fn bytes(&self) -> &[u8] {
+        &self.bytes[self.start()..][..self.length]
+    }
+
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        let start = self.start();
+        &mut self.bytes[start..][..self.length]
+    }
+}
 
 /// Memory with a built grid in it.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Owned {
-    index: Vec<Block>,
+    index: Region,
 }
 
 impl Owned {
@@ -15,17 +41,12 @@ impl Owned {
     /// Those of the build.
     pub fn build(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Self, Error> {
         let bound = sizes(mesh, config, &mut [])?;
-        let mut scratch = vec![Block::ZERO; Block::count_for(bound.scratch_bytes)];
-        let exact = sizes(mesh, config, Block::bytes_mut(&mut scratch))?;
+        let mut scratch = Region::new(bound.scratch_bytes);
+        let exact = sizes(mesh, config, scratch.bytes_mut())?;
         assert!(exact.is_exact && exact.index_bytes <= bound.index_bytes);
         assert_eq!(exact.scratch_bytes, bound.scratch_bytes);
-        let mut index = vec![Block::ZERO; Block::count_for(exact.index_bytes)];
-        let grid = Grid::build(
-            *mesh,
-            config,
-            Block::bytes_mut(&mut index),
-            Block::bytes_mut(&mut scratch),
-        )?;
+        let mut index = Region::new(exact.index_bytes);
+        let grid = Grid::build(*mesh, config, index.bytes_mut(), scratch.bytes_mut())?;
         assert_eq!(grid.blob_bytes(), exact.index_bytes);
         Ok(Self { index })
     }
@@ -35,11 +56,11 @@ impl Owned {
     /// # Errors
     /// Those of opening, if the mesh is another.
     pub fn open<'a>(&'a self, mesh: &TriangleMesh<'a>) -> Result<Grid<'a>, Error> {
-        Grid::open(Block::bytes(&self.index), *mesh)
+        Grid::open(self.index.bytes(), *mesh)
     }
 
     /// The grid's bytes.
     pub fn bytes(&self) -> &[u8] {
-        Block::bytes(&self.index)
+        self.index.bytes()
     }
 }

@@ -275,8 +275,8 @@ fn cell_of(number: u32, [width, height, _]: [u32; 3]) -> [u32; 3] {
 impl CellSpread<'_> {
     /// Puts a subgrid of the primitives into the pool; `false` if it would gain too little.
     ///
-    /// A subgrid pays if its cells list on average at most half of the primitives. A pile of
-    /// triangles that all reach everywhere stays a list.
+    /// It must separate: the lists of its cells hold on average at most three quarters of the
+    /// primitives. A pile of equal triangles stays a list.
     fn subdivide(mut self, density: f32, bench: &mut Bench<'_>, pool: &mut Bump<'_>) -> bool {
         let Some(layout) = self.plan(density, bench) else { return false };
         let Some(sections) = pool.take(layout.words()).and_then(|words| layout.sections_mut(words))
@@ -316,7 +316,9 @@ impl CellSpread<'_> {
                 break (cells, references);
             }
         };
-        if 2 * u64::from(reference_count) > u64::from(count) * cells as u64 {
+        let domain_bits = bench.domain_bits.get(..cells.div_ceil(WORD_BITS))?;
+        let lists: u32 = domain_bits.iter().map(|word| word.count_ones()).sum();
+        if 4 * u64::from(reference_count) > 3 * u64::from(count) * u64::from(lists) {
             return None;
         }
 

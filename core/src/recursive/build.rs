@@ -1,0 +1,384 @@
+//! Building a recursive grid: count, then fill, one grid after the other, depth first.
+//!
+//! ```text
+//! scratch | starts and ids of the root | of its child | of the child's child |   a stack
+//! index   | header | pool, a bump allocator ->
+//! ```
+//!
+//! The lists of a grid are made in the scratch, then moved into the pool cell by cell; a crowded cell
+//! becomes a grid, whose own lists stack up behind. When the pool runs out the build goes on and
+//! counts: at the end it knows, exactly, what index it would have needed.
+//!
+//! Resolution as in Manta: with n primitives at depth d of D, `m = (8 n)^(1 / (2 D + 1 - 2 d))` and
+//! `m * size / cbrt(volume)` cells on each axis, rounded; at least 8 cells.
+
+use glam::Vec3A;
+
+use super::FEW;
+use super::node::{GRID, HEAD_WORDS, MAX_RESOLUTION, Node};
+use super::overlap::Overlap;
+use crate::aabb::Aabb;
+use crate::arena::{section_bytes, split_mut};
+use crate::blob::{HEADER_BYTES, Header};
+use crate::bump::Bump;
+use crate::cell::{CellRange, Lattice, as_f32, cells_between};
+use crate::config::Config;
+use crate::error::{ConfigField, Error, Region};
+use crate::mesh::TriangleMesh;
+use crate::one_level::{copy, reference_limit, row};
+use crate::sizes::Sizes;
+use crate::survey::{Survey, boxes};
+
+/// Words of scratch for one grid of so many primitives: where lists start, and their ids.
+const fn scratch_words(primitives: u32) -> u64 {
+    // At most 8 cells a primitive, and what rounding adds on three axes.
+    let cells = 32 * primitives as u64 + 64;
+    cells + 1 + reference_limit(primitives) as u64
+}
+
+/// Bytes of scratch for so many triangles, whatever they look like: their ids, and one grid on each
+/// level.
+pub(crate) const fn scratch_bytes(triangles: u32, depth: u32) -> u64 {
+    section_bytes::<u32>(triangles as u64 + depth as u64 * scratch_words(triangles))
+}
+
+/// The most memory that a mesh with so many triangles can need: all that a pool can address.
+pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
+    let level = 64 * (triangles as u64 + 1);
+    let mut words = level;
+    let mut depth = 1;
+    while depth < config.depth {
+        words = words.saturating_mul(32);
+        depth += 1;
+    }
+    let words = if words < GRID as u64 { words } else { GRID as u64 };
+    (HEADER_BYTES as u64 + section_bytes::<u32>(words), scratch_bytes(triangles, config.depth))
+}
+
+/// The memory that a mesh needs: exact if the scratch is large enough to build in.
+pub(crate) fn sizes(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+) -> Result<Sizes, Error> {
+    let (index_bytes, scratch_bytes) = bound(mesh.triangle_count(), config);
+    if (scratch.len() as u64) < scratch_bytes {
+        Survey::of(mesh, config.flags)?;
+        return Sizes::new(index_bytes, scratch_bytes, false);
+    }
+    Sizes::new(run(mesh, config, &mut [], scratch)?, scratch_bytes, true)
+}
+
+/// Builds into `index` and returns the part of it that is the blob.
+pub(crate) fn build<'a>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &'a mut [u8],
+    scratch: &mut [u8],
+) -> Result<&'a [u8], Error> {
+    let available_bytes = index.len() as u64;
+    let needed_bytes = run(mesh, config, index, scratch)?;
+    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
+    usize::try_from(needed_bytes).ok().and_then(|bytes| index.get(..bytes)).ok_or(too_small)
+}
+
+/// Builds as much as the index holds and returns the bytes that all of it takes.
+fn run(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &mut [u8],
+    scratch: &mut [u8],
+) -> Result<u64, Error> {
+    let survey = Survey::of(mesh, config.flags)?;
+    let available_bytes = scratch.len() as u64;
+    let needed_bytes = scratch_bytes(mesh.triangle_count(), config.depth);
+    let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
+    if available_bytes < needed_bytes {
+        return Err(too_small);
+    }
+    let (scratch, _) = split_mut::<u32>(scratch, needed_bytes / 4).ok_or(too_small)?;
+
+    // The root's own cells are the unit of all boxes.
+    let bounds = Lattice::pad(&survey.bounds);
+    let rule = Rule { density: f64::from(config.density), depth: config.depth };
+    let resolution =
+        rule.resolution(bounds.size().to_array().map(f64::from), survey.finite_count, 0);
+    let lattice =
+        Lattice::new(bounds, resolution.ok_or(Error::InvalidConfig(ConfigField::Density))?);
+
+    let (head, pool) = match index.split_first_chunk_mut::<HEADER_BYTES>() {
+        Some((head, pool)) => (Some(head), pool),
+        None => (None, &mut [][..]),
+    };
+    let whole_words = pool.len() / size_of::<u32>() * size_of::<u32>();
+    let pool = pool.get_mut(..whole_words).and_then(|pool| bytemuck::try_cast_slice_mut(pool).ok());
+    let mut builder =
+        Builder { mesh, lattice: &lattice, rule, pool: Bump::new(pool.unwrap_or_default()) };
+
+    let finite = usize::try_from(survey.finite_count).unwrap_or(usize::MAX);
+    let (ids, scratch) = scratch.split_at_mut_checked(finite).ok_or(too_small)?;
+    for (slot, (id, _)) in ids.iter_mut().zip(boxes(mesh)) {
+        *slot = id;
+    }
+    let root = Aabb { min: Vec3A::ZERO, max: Vec3A::from_array(lattice.resolution.map(as_f32)) };
+    builder.grid(ids, &root, 0, scratch)?;
+    let words = builder.offset()?;
+
+    let mut header = Header::new(config, mesh, &lattice);
+    header.blob_bytes = HEADER_BYTES as u64 + section_bytes::<u32>(words.into());
+    header.skipped_count = survey.skipped_count;
+    header.density = config.density;
+    header.reference_count = words;
+    if let Some(head) = head {
+        *head = header.to_bytes();
+    }
+    let used = HEADER_BYTES as u64 + u64::from(words) * size_of::<u32>() as u64;
+    let range = usize::try_from(used).ok().zip(usize::try_from(header.blob_bytes).ok());
+    if let Some(padding) = range.and_then(|(from, to)| index.get_mut(from..to)) {
+        padding.fill(0);
+    }
+    Ok(header.blob_bytes)
+}
+
+/// How finely a grid is cut.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rule {
+    pub(super) density: f64,
+    pub(super) depth: u32,
+}
+
+impl Rule {
+    /// Manta's resolution for a box of this size with so many primitives at this depth; `None` if an
+    /// axis would need more cells than a grid can have.
+    pub(super) fn resolution(
+        &self,
+        size: [f64; 3],
+        primitives: u32,
+        depth: u32,
+    ) -> Option<[u32; 3]> {
+        let cells = (self.density * f64::from(primitives)).max(1.0);
+        let m = root(cells, 2 * (self.depth - depth) + 1);
+        let volume = size.iter().product::<f64>();
+        let mut parts = size.map(|s| s * m / root(volume, 3));
+
+        // What an axis has less than one cell of, the others share; a second such axis leaves all
+        // cells to the third.
+        for axis in 0..3 {
+            if parts[axis] < 1.0 {
+                let share = root(parts[axis], 2);
+                let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
+                parts[axis] = 1.0;
+                parts[next] *= share;
+                parts[last] *= share;
+                for (small, large) in [(next, last), (last, next)] {
+                    if parts[small] < 1.0 {
+                        parts[large] *= parts[small];
+                        parts[small] = 1.0;
+                    }
+                }
+            }
+        }
+        if parts.iter().any(|&part| part + 0.5 >= f64::from(MAX_RESOLUTION + 1)) {
+            return None;
+        }
+        let resolution = parts.map(rounded);
+        let is_coarse = resolution.iter().product::<u32>() < 8;
+        Some(if is_coarse { [2; 3] } else { resolution })
+    }
+}
+
+/// A root of a positive number by Newton's method, from above: the same bits everywhere.
+fn root(x: f64, degree: u32) -> f64 {
+    const BIAS: i64 = 1023;
+    let exponent = (x.to_bits() >> 52 & 0x7ff).cast_signed() - BIAS;
+    let above = exponent.div_euclid(i64::from(degree)) + 1 + BIAS;
+    let mut root = f64::from_bits(above.cast_unsigned() << 52);
+    for _ in 0..24 {
+        let power = (1..degree).fold(1.0, |power, _| power * root);
+        root -= (root - x / power) / f64::from(degree);
+    }
+    root
+}
+
+/// The nearest whole number of cells, at least one.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to MAX_RESOLUTION")]
+const fn rounded(part: f64) -> u32 {
+    let cells = (part + 0.5) as u32;
+    if cells > 1 { cells } else { 1 }
+}
+
+/// A triangle in the cells of the root.
+pub(super) struct Placed {
+    /// Its box, grown by the margin.
+    pub(super) reach: Aabb,
+    overlap: Overlap,
+    margin: Vec3A,
+}
+
+impl Placed {
+    pub(super) fn new(mesh: &TriangleMesh<'_>, lattice: &Lattice, id: u32) -> Option<Self> {
+        let corners = mesh.corners(id, Vec3A::new)?;
+        let reach = lattice.reach(&Aabb::of(corners)?);
+        let overlap = Overlap::new(corners.map(|corner| lattice.place(corner)));
+        Some(Self { reach, overlap, margin: lattice.margin() })
+    }
+
+    /// Shows `visit` the cells of a grid that the triangle overlaps, with their numbers.
+    pub(super) fn each_cell(&self, node: &Node, mut visit: impl FnMut(usize, [u32; 3])) {
+        let (origin, scale) = (Vec3A::from_array(node.origin), Vec3A::from_array(node.scale));
+        let [width, height, _] = node.resolution;
+        let number = |[x, y, z]: [u32; 3]| row(height, y, z) * width as usize + x as usize;
+        let within = |position: Vec3A| (position - origin) * scale;
+        let reach = Aabb { min: within(self.reach.min), max: within(self.reach.max) };
+        let range = cells_between(reach, node.resolution);
+        if range.count() == 1 {
+            return visit(number(range.min), range.min);
+        }
+        let size = 1.0 / scale;
+        let half = size * 0.5 + self.margin;
+        for cell in range.cells() {
+            let center = origin + (Vec3A::from_array(cell.map(as_f32)) + 0.5) * size;
+            if self.overlap.with(center, half) {
+                visit(number(cell), cell);
+            }
+        }
+    }
+}
+
+/// A build on its way.
+struct Builder<'m, 'p> {
+    mesh: &'m TriangleMesh<'m>,
+    lattice: &'m Lattice,
+    rule: Rule,
+    pool: Bump<'p>,
+}
+
+impl Builder<'_, '_> {
+    /// Where the pool goes on, if an entry can say so.
+    fn offset(&self) -> Result<u32, Error> {
+        let offset = u32::try_from(self.pool.asked()).ok().filter(|offset| offset & GRID == 0);
+        offset.ok_or(Error::InvalidConfig(ConfigField::Density))
+    }
+
+    fn place(&self, id: u32) -> Option<Placed> {
+        Placed::new(self.mesh, self.lattice, id)
+    }
+
+    /// Puts a grid of these primitives in this box into the pool, and all grids in it.
+    ///
+    /// Answers `false`, and puts nothing, where a grid separates too little: if the lists of its cells
+    /// hold on average more than three quarters of the primitives, as in a pile of equal triangles.
+    /// The root is always put.
+    fn grid(
+        &mut self,
+        ids: &[u32],
+        bounds: &Aabb,
+        depth: u32,
+        scratch: &mut [u32],
+    ) -> Result<bool, Error> {
+        let count = u32::try_from(ids.len()).unwrap_or(u32::MAX);
+        let at = self.offset()?;
+
+        // Count the references of each cell, in coarser grids if they get out of hand.
+        let cell_size = self.lattice.cell_size().to_array().map(f64::from);
+        let extent = bounds.size().to_array();
+        let size: [f64; 3] = core::array::from_fn(|axis| cell_size[axis] * f64::from(extent[axis]));
+        let mut primitives = count;
+        let (node, references) = loop {
+            let resolution = if depth == 0 {
+                Some(self.lattice.resolution)
+            } else {
+                self.rule.resolution(size, primitives, depth)
+            };
+            let is_last = primitives == 0;
+            primitives /= 2;
+            let Some(resolution) = resolution.or(is_last.then_some([1; 3])) else { continue };
+            let node = Node::new(at as usize, bounds.min, bounds.max, resolution);
+            let starts = scratch.get_mut(..=node.cells()).unwrap_or_default();
+            starts.fill(0);
+            let limit = u64::from(reference_limit(count));
+            let mut references = 0_u64;
+            for placed in ids.iter().filter_map(|&id| self.place(id)) {
+                if references > limit && !is_last {
+                    break;
+                }
+                placed.each_cell(&node, |cell, _| {
+                    references += 1;
+                    if let Some(start) = starts.get_mut(cell) {
+                        *start += 1;
+                    }
+                });
+            }
+            if references <= limit || is_last {
+                break (node, references);
+            }
+        };
+        let starts = scratch.get(..node.cells()).unwrap_or_default();
+        let lists = starts.iter().filter(|&&start| start != 0).count() as u64;
+        if depth > 0 && 4 * references > 3 * u64::from(count) * lists {
+            return Ok(false);
+        }
+
+        // Sum up, and fill in reverse: every list ascends by id.
+        let (starts, rest) = scratch.split_at_mut_checked(node.cells() + 1).unwrap_or_default();
+        let references = usize::try_from(references).unwrap_or(usize::MAX);
+        let (lists, rest) = rest.split_at_mut_checked(references).unwrap_or_default();
+        let mut end = 0;
+        for start in &mut *starts {
+            end += *start;
+            *start = end;
+        }
+        for &id in ids.iter().rev() {
+            let Some(placed) = self.place(id) else { continue };
+            placed.each_cell(&node, |cell, _| {
+                let Some(start) = starts.get_mut(cell) else { return };
+                *start = start.wrapping_sub(1);
+                if let Some(reference) = lists.get_mut(*start as usize) {
+                    *reference = id;
+                }
+            });
+        }
+
+        // Move list after list into the pool, crowded ones as grids.
+        let words = HEAD_WORDS + node.cells() + 1;
+        let mut entries = self.pool.take(words).and_then(|words| {
+            let (head, entries) = words.split_first_chunk_mut()?;
+            *head = node.head();
+            Some(entries)
+        });
+        let mut entry = |cell: usize, value: u32| {
+            if let Some(entry) = entries.as_mut().and_then(|entries| entries.get_mut(cell)) {
+                *entry = value;
+            }
+        };
+        let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
+        for (number, cell) in all.cells().enumerate() {
+            let ends = starts.get(number..).and_then(|ends| ends.first_chunk::<2>());
+            let list = ends.and_then(|ends| lists.get(ends[0] as usize..ends[1] as usize));
+            let list = list.unwrap_or_default();
+            let start = self.offset()?;
+            let is_crowded = list.len() > FEW && depth + 1 < self.rule.depth;
+            if is_crowded && self.grid(list, &self.inside(&node, cell, list), depth + 1, rest)? {
+                entry(number, start | GRID);
+            } else {
+                entry(number, start);
+                if let Some(words) = self.pool.take(list.len()) {
+                    copy(list, words);
+                }
+            }
+        }
+        entry(node.cells(), self.offset()?);
+        Ok(true)
+    }
+
+    /// The part of a cell that its primitives reach.
+    fn inside(&self, node: &Node, cell: [u32; 3], ids: &[u32]) -> Aabb {
+        let Aabb { min, max } = node.cell_box(cell);
+        let reaches = ids.iter().filter_map(|&id| Some(self.place(id)?.reach));
+        let reach = reaches.fold(Aabb::EMPTY, |all, reach| all.union(&reach));
+        // A reach that only touches the cell leaves a sliver as wide as the margin.
+        let least = self.lattice.margin();
+        let low = reach.min.max(min).min(max - least);
+        Aabb { min: low, max: reach.max.min(max).max(low + least) }
+    }
+}

@@ -1,0 +1,109 @@
+//! The recursive grid that the paper compares with: Manta's (Bigler 2006; resolution after Ize,
+//! Shirley, Parker 2007), uncompressed, depth 3.
+//!
+//! Every cell of a grid has an entry. A cell with more than [`FEW`] primitives holds a grid of its own,
+//! around the part of the cell that they reach, until the depth is used up. Primitives are listed
+//! only in cells that they really overlap. The best traversal of the paper's methods, the longest
+//! build and several times the memory.
+//!
+//! ```text
+//! blob | header | pool |
+//! grid in the pool | origin 3 | scale 3 | resolution | entries, one a cell and one more | contents |
+//!
+//! entry[cell] .. entry[cell + 1]     the cell's part of the pool
+//!   top bit of entry[cell] clear     primitive ids, ascending
+//!   top bit set                      a grid
+//! ```
+//!
+//! Origin and scale (cells for each cell of the root) are in the root's cells.
+
+mod build;
+mod node;
+mod overlap;
+mod validate;
+
+use crate::arena::{section_bytes, split};
+use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::counters::Tally;
+use crate::dda::{Line, Step};
+use crate::error::Error;
+pub(crate) use build::{bound, build, scratch_bytes, sizes};
+use node::{Content, Node};
+
+/// A cell with no more primitives than this is not divided.
+const FEW: usize = 4;
+
+/// The deepest that grids may be nested: a query keeps one walk for each level.
+pub const MAX_DEPTH: u32 = 4;
+
+/// No ray of a built grid takes so many steps; on damaged bytes grids may hold grids in every cell.
+const MAX_STEPS: u32 = 1 << 22;
+
+/// A view of a built recursive grid.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Recursive<'a> {
+    pool: &'a [u32],
+}
+
+impl<'a> Recursive<'a> {
+    /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
+    pub(crate) fn open(header: &Header, blob: &'a [u8]) -> Result<Self, Error> {
+        let words = u64::from(header.reference_count);
+        let is_whole = header.blob_bytes == HEADER_BYTES as u64 + section_bytes::<u32>(words);
+        let pool =
+            blob.get(HEADER_BYTES..).filter(|_| is_whole).and_then(|rest| split(rest, words));
+        let (pool, _) = pool.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
+        Ok(Self { pool })
+    }
+
+    /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any; see
+    /// [`OneLevel::traverse`](crate::one_level::OneLevel::traverse).
+    #[inline(always)]
+    pub(crate) fn traverse<T: Tally>(
+        &self,
+        line: &Line,
+        tally: &mut T,
+        mut leaf: impl FnMut(&[u32], &mut T) -> f32,
+    ) {
+        let Some(mut node) = Node::open(self.pool, 0) else { return };
+        let Some(mut walk) = node.walk(line, 0.0) else { return };
+        let mut limit = line.end;
+        let mut around = [(node, walk); MAX_DEPTH as usize];
+        let mut depth = 0;
+        for _ in 0..MAX_STEPS {
+            tally.cell_step();
+            match node.content(self.pool, walk.cell) {
+                None => {}
+                Some(Content::List(ids)) => limit = leaf(ids, tally),
+                Some(Content::Grid(at)) => {
+                    // Go down, unless the ray passes the grid within its cell.
+                    let slot = around.get_mut(depth);
+                    let inner = Node::open(self.pool, at);
+                    let enter =
+                        inner.and_then(|inner| Some((inner, inner.walk(line, walk.entered)?)));
+                    if let (Some(slot), Some((inner, within))) = (slot, enter) {
+                        tally.grid_step();
+                        *slot = (node, walk);
+                        (node, walk) = (inner, within);
+                        depth += 1;
+                        continue;
+                    }
+                }
+            }
+            // Take a step; where a grid ends, take it in the grid around it.
+            loop {
+                match walk.advance(limit) {
+                    Step::Inside => break,
+                    Step::Ended => return,
+                    Step::Outside => match depth.checked_sub(1).and_then(|up| around.get(up)) {
+                        Some(outer) => {
+                            (node, walk) = *outer;
+                            depth -= 1;
+                        }
+                        None => return,
+                    },
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! One grid of the recursion: seven words in the pool, then its entries.
+
+use glam::Vec3A;
+
+use crate::aabb::Aabb;
+use crate::cell::as_f32;
+use crate::dda::{Line, Walk};
+use crate::one_level::row;
+
+/// The bit of an entry that says "grid". Offsets into the pool have the others.
+pub(super) const GRID: u32 = 1 << 31;
+
+/// The most cells of a grid on an axis: three such numbers share a word.
+pub(super) const MAX_RESOLUTION: u32 = (1 << RESOLUTION_BITS) - 1;
+
+pub(super) const HEAD_WORDS: usize = 7;
+const RESOLUTION_BITS: u32 = 10;
+
+/// What a cell holds.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Content<'a> {
+    /// Primitive ids, ascending.
+    List(&'a [u32]),
+    /// Where in the pool its grid starts.
+    Grid(usize),
+}
+
+/// A grid: where it lies and how finely it is cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Node {
+    /// Where its entries start in the pool.
+    entries: usize,
+    /// Its least corner, in cells of the root.
+    pub(super) origin: [f32; 3],
+    /// Its cells for each cell of the root.
+    pub(super) scale: [f32; 3],
+    pub(super) resolution: [u32; 3],
+}
+
+impl Node {
+    /// A grid whose words start at `at`.
+    pub(super) fn new(at: usize, min: Vec3A, max: Vec3A, resolution: [u32; 3]) -> Self {
+        let cells = Vec3A::from_array(resolution.map(as_f32));
+        Self {
+            entries: at.saturating_add(HEAD_WORDS),
+            origin: min.to_array(),
+            scale: (cells / (max - min)).to_array(),
+            resolution,
+        }
+    }
+
+    /// The head of its words.
+    pub(super) fn head(&self) -> [u32; HEAD_WORDS] {
+        let ([a, b, c], [d, e, f]) = (self.origin.map(f32::to_bits), self.scale.map(f32::to_bits));
+        let [x, y, z] = self.resolution;
+        [a, b, c, d, e, f, x | y << RESOLUTION_BITS | z << (2 * RESOLUTION_BITS)]
+    }
+
+    /// The grid whose words start at `at`; `None` if they cannot be one.
+    #[inline]
+    pub(super) fn open(pool: &[u32], at: usize) -> Option<Self> {
+        let [a, b, c, d, e, f, cells] = *pool.get(at..)?.first_chunk::<HEAD_WORDS>()?;
+        let axis = |shift: u32| cells >> shift & MAX_RESOLUTION;
+        let resolution = [axis(0), axis(RESOLUTION_BITS), axis(2 * RESOLUTION_BITS)];
+        let node = Self {
+            entries: at + HEAD_WORDS,
+            origin: [a, b, c].map(f32::from_bits),
+            scale: [d, e, f].map(f32::from_bits),
+            resolution,
+        };
+        let is_sound = node.origin.iter().all(|o| o.is_finite())
+            && node.scale.iter().all(|&s| s > 0.0 && s.is_finite())
+            && !resolution.contains(&0);
+        is_sound.then_some(node)
+    }
+
+    /// Number of cells.
+    pub(super) fn cells(&self) -> usize {
+        self.resolution.iter().map(|&cells| cells as usize).product()
+    }
+
+    /// Its box, in cells of the root.
+    pub(super) fn bounds(&self) -> Aabb {
+        let min = Vec3A::from_array(self.origin);
+        let cells = Vec3A::from_array(self.resolution.map(as_f32));
+        Aabb { min, max: min + cells / Vec3A::from_array(self.scale) }
+    }
+
+    /// The box of a cell, in cells of the root.
+    pub(super) fn cell_box(&self, cell: [u32; 3]) -> Aabb {
+        let size = 1.0 / Vec3A::from_array(self.scale);
+        let min = Vec3A::from_array(self.origin) + Vec3A::from_array(cell.map(as_f32)) * size;
+        Aabb { min, max: min + size }
+    }
+
+    /// A walk through this grid along a line of the root, from `entered` or where it enters.
+    #[inline]
+    pub(super) fn walk(&self, line: &Line, entered: f32) -> Option<Walk> {
+        line.zoom(self.origin, self.scale).walk_in(entered, self.resolution)
+    }
+
+    /// What a cell holds; `None` if it is empty.
+    #[inline(always)]
+    pub(super) fn content<'a>(&self, pool: &'a [u32], [x, y, z]: [u32; 3]) -> Option<Content<'a>> {
+        let [width, height, _] = self.resolution;
+        let cell = row(height, y, z) * width as usize + x as usize;
+        let ends = pool.get(self.entries.checked_add(cell)?..)?.first_chunk::<2>()?;
+        let (start, end) = ((ends[0] & !GRID) as usize, (ends[1] & !GRID) as usize);
+        if ends[0] & GRID != 0 {
+            Some(Content::Grid(start))
+        } else if start < end {
+            pool.get(start..end).map(Content::List)
+        } else {
+            None
+        }
+    }
+}
