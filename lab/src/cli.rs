@@ -2,13 +2,19 @@
 
 use std::path::PathBuf;
 
-use clap::{Parser, Subcommand, ValueEnum};
-use hgrid_core::Method;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use hgrid_core::{Config, Method};
 
-use crate::camera::{Point, Up, View};
+use crate::camera::{Camera, Point, Up, View};
+use crate::heat::Counter;
+use crate::scene::Scene;
 
 /// The picture that is written when nobody names one.
 pub const DEFAULT_OUTPUT: &str = "hgrid.png";
+
+/// The folder that figures are written into when nobody names one.
+pub const DEFAULT_FOLDER: &str = "figures";
 
 /// The scene that is rendered when nobody names one.
 pub const DEFAULT_SCENE: &str = "procedural:knot:500K";
@@ -18,11 +24,40 @@ Examples:
   hgrid                                      the built-in scene, to hgrid.png
   hgrid render bunny.ply -o bunny.png        a mesh of yours, seen from the front
   hgrid render bunny.ply --shading heat      what each ray costs, from blue to red
+  hgrid table bunny.ply dragon.ply           all methods side by side, as in the paper
+  hgrid figures buddha.ply -o pictures       the paper's charts, as SVG and PNG
+  hgrid help render                          all about one command";
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  hgrid render bunny.ply -o bunny.png        a mesh of yours, seen from the front
   hgrid render bunny.ply --density 8         more cells: fewer tests, more steps, more memory
+  hgrid render bunny.ply --method fixed --macrocell-factor 4
+  hgrid render bunny.ply --shading heat      what each ray costs, from blue to red
+  hgrid render bunny.ply --shading heat --counter primitive-tests --heat-top 50
   hgrid render procedural:stage --view 40,15
   hgrid render stadium.ply --up z --view three-quarter
   hgrid render sponza.ply --eye 0,3,0 --target 10,3,0
   hgrid render bunny.ply --repeat 9 --json   medians, for programs";
+
+const TABLE_EXAMPLES: &str = "\
+Examples:
+  hgrid table bunny.ply dragon.ply buddha.ply
+  hgrid table procedural:knot:100K --size 512 --repeat 9
+  hgrid table dragon.ply --methods one-level,fixed --macrocell-factor 4
+  hgrid table dragon.ply --markdown > table.md
+  hgrid table dragon.ply --json > table.json     every single time, and the machine
+
+Close what else is running: the times are those of one thread, and they believe the clock.";
+
+const FIGURES_EXAMPLES: &str = "\
+Examples:
+  hgrid figures bunny.ply dragon.ply buddha.ply -o pictures
+  hgrid figures bunny.ply buddha.ply --figure1 buddha.ply --densities 1,4,16,64
+  hgrid figures procedural:knot:100K --size 512 --repeat 1     a first impression
+
+The folder then holds figure1 (times against density, one scene) and figure2 (memory and times of
+every scene and method) as .svg, as .png and, the numbers alone, as .json.";
 
 const SCENES: &str = "\
 Scenes:
@@ -30,8 +65,9 @@ Scenes:
   procedural:knot[:TRIANGLES]     a closed, finely bumped surface, like a scan
   procedural:stage[:TRIANGLES]    the same on a floor eighty times its size
   procedural:soup[:TRIANGLES]     a cube full of small triangles
-  TRIANGLES is a number like 5000, 20K or 3M, up to 100M
+  TRIANGLES is a number like 5000, 20K or 3M, up to 100M";
 
+const VIEWS: &str = "\
 Views:
   front, back, left, right, top, bottom, three-quarter,
   or AZIMUTH,ELEVATION in degrees: 0,0 is the front, 90,0 the right, 0,90 the top.
@@ -50,8 +86,14 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Renders a scene with one thread and one ray per pixel, and prints what it took
-    #[command(after_help = SCENES, after_long_help = [SCENES, EXAMPLES].join("\n\n"))]
+    #[command(after_help = [RENDER_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
     Render(RenderArgs),
+    /// Measures every method on every scene: the paper's Table 1
+    #[command(after_help = [TABLE_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
+    Table(TableArgs),
+    /// Measures and draws the paper's figures: times against density, and bars for every method
+    #[command(after_help = [FIGURES_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
+    Figures(FiguresArgs),
 }
 
 /// What to render and how.
@@ -63,62 +105,173 @@ pub struct RenderArgs {
     /// The picture to write, as PNG
     #[arg(short, long, value_name = "FILE", default_value = DEFAULT_OUTPUT)]
     pub output: PathBuf,
-    /// Pixels on each side
-    #[arg(long, value_name = "PIXELS", default_value_t = 1024,
-          value_parser = clap::value_parser!(u16).range(1..=16_384))]
-    pub size: u16,
     /// The structure to build
-    #[arg(long, value_enum, default_value_t = MethodName::OneLevel)]
-    pub method: MethodName,
+    #[arg(long, value_parser = method_parser(), default_value = Method::default().name())]
+    pub method: Method,
     /// Cells per triangle [default: the paper's for the method]
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true)]
     pub density: Option<f32>,
-    /// From which side to look
-    #[arg(long, allow_hyphen_values = true)]
-    pub view: Option<View>,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub tuning: Tuning,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub picture: Picture,
     /// Look from this point instead, as X,Y,Z
     #[arg(long, value_name = "X,Y,Z", conflicts_with = "view", allow_hyphen_values = true)]
     pub eye: Option<Point>,
     /// Look at this point [default: the middle of the scene]
     #[arg(long, value_name = "X,Y,Z", requires = "eye", allow_hyphen_values = true)]
     pub target: Option<Point>,
-    /// Which axis of the scene is up
-    #[arg(long, value_enum, default_value_t = Up::Y)]
-    pub up: Up,
     /// What the colours mean
     #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
     pub shading: Shading,
+    /// For heat: which work is shown [default: cost]
+    #[arg(long, value_enum)]
+    pub counter: Option<Counter>,
+    /// For heat: the number that is red, to compare pictures [default: what 99 of 100 rays take]
+    #[arg(long, value_name = "NUMBER")]
+    pub heat_top: Option<u32>,
     /// Build and render so many times and report the medians
     #[arg(long, value_name = "TIMES", default_value_t = 1,
           value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
-    /// Print the figures as a JSON object
+    /// Print the numbers as a JSON object
     #[arg(long)]
     pub json: bool,
 }
 
-/// A structure by its name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodName {
-    /// One grid, its empty cells compressed by row displacement
-    OneLevel,
-}
-
-impl MethodName {
-    /// The structure that the name means.
+impl RenderArgs {
+    /// The grid that the words ask for.
     #[must_use]
-    pub const fn method(self) -> Method {
-        match self {
-            Self::OneLevel => Method::OneLevel,
-        }
+    pub fn config(&self) -> Config {
+        let config = self.tuning.config(self.method);
+        Config { density: self.density.unwrap_or(config.density), ..config }
     }
 
-    /// The name as it is written.
+    /// The camera that the words ask for.
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::OneLevel => "one-level",
+    pub fn camera(&self, scene: &Scene) -> Camera {
+        let Some(eye) = self.eye else { return self.picture.camera(scene) };
+        let target = self.target.unwrap_or_else(|| Point::centre_of(scene.framed_bounds()));
+        Camera::between(eye, target, self.picture.up)
+    }
+}
+
+/// What to measure and how to print it.
+#[derive(Debug, Parser)]
+pub struct TableArgs {
+    /// Mesh files or procedural:NAME:TRIANGLES, one column each
+    #[arg(required = true)]
+    pub scenes: Vec<String>,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub race: Race,
+    /// Print Markdown, for a README
+    #[arg(long, conflicts_with = "json")]
+    pub markdown: bool,
+    /// Print a JSON object with every number and the machine they come from
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What to draw and where to.
+#[derive(Debug, Parser)]
+pub struct FiguresArgs {
+    /// Mesh files or procedural:NAME:TRIANGLES, one group of bars each
+    #[arg(required = true)]
+    pub scenes: Vec<String>,
+    /// The folder for the pictures and their numbers; it is made if it is missing
+    #[arg(short, long, value_name = "DIR", default_value = DEFAULT_FOLDER)]
+    pub output: PathBuf,
+    /// The scene of figure 1 [default: the first one]
+    #[arg(long, value_name = "SCENE")]
+    pub figure1: Option<String>,
+    /// The densities of figure 1, between commas
+    #[arg(long, value_name = "CELLS", value_delimiter = ',',
+          default_values_t = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])]
+    pub densities: Vec<f32>,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub race: Race,
+}
+
+/// Which methods compete, and how often.
+#[derive(Debug, Clone, Args)]
+pub struct Race {
+    /// The structures to build, between commas [default: all]
+    #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
+    methods: Vec<Method>,
+    /// Build and render so many times, taking turns, and report the medians
+    #[arg(long, value_name = "TIMES", default_value_t = 3,
+          value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeat: u32,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub tuning: Tuning,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub picture: Picture,
+}
+
+impl Race {
+    /// A configuration for each method, at the paper's density.
+    #[must_use]
+    pub fn configs(&self) -> Vec<Config> {
+        let methods = if self.methods.is_empty() { Method::ALL } else { &self.methods };
+        methods.iter().map(|&method| self.tuning.config(method)).collect()
+    }
+}
+
+/// Parameters of single methods; the others ignore them.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Tuning {
+    /// For `fixed`: cells in a macrocell on each axis [default: the paper's, 6]
+    #[arg(long, value_name = "CELLS")]
+    pub macrocell_factor: Option<u32>,
+    /// For `variable`: a cell with more triangles than this gets a subgrid [default: 16]
+    #[arg(long, value_name = "TRIANGLES")]
+    pub subdivide_above: Option<u32>,
+    /// For `recursive`: levels of grids [default: the paper's, 3]
+    #[arg(long, value_name = "LEVELS")]
+    pub depth: Option<u32>,
+}
+
+impl Tuning {
+    /// The method with these parameters and the paper's where none are given.
+    #[must_use]
+    pub fn config(&self, method: Method) -> Config {
+        let default = Config::new(method);
+        Config {
+            macrocell_factor: self.macrocell_factor.unwrap_or(default.macrocell_factor),
+            subdivide_above: self.subdivide_above.unwrap_or(default.subdivide_above),
+            depth: self.depth.unwrap_or(default.depth),
+            ..default
         }
+    }
+}
+
+/// How large a picture is and from where it is taken.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Picture {
+    /// Pixels on each side
+    #[arg(long, value_name = "PIXELS", default_value_t = 1024,
+          value_parser = clap::value_parser!(u16).range(1..=16_384))]
+    pub size: u16,
+    /// From which side to look
+    #[arg(long, allow_hyphen_values = true)]
+    pub view: Option<View>,
+    /// Which axis of the scene is up
+    #[arg(long, value_enum, default_value_t = Up::Y)]
+    pub up: Up,
+}
+
+impl Picture {
+    /// The camera that frames a scene.
+    #[must_use]
+    pub fn camera(&self, scene: &Scene) -> Camera {
+        let bounds = scene.framed_bounds();
+        Camera::framing(bounds, self.view.unwrap_or_else(|| View::of(bounds, self.up)), self.up)
     }
 }
 
@@ -129,8 +282,17 @@ pub enum Shading {
     Diffuse,
     /// Surface normals: red to the right, green up, blue toward the viewer
     Normals,
-    /// Cell steps, grid steps and primitive tests of each ray, from blue to red
+    /// The work of each ray, from blue to red
     Heat,
+}
+
+/// A method by its name.
+fn method_parser() -> impl TypedValueParser<Value = Method> {
+    let names = Method::ALL.iter().copied().map(Method::name);
+    PossibleValuesParser::new(names).try_map(|word| {
+        let method = Method::ALL.iter().copied().find(|method| method.name() == word);
+        method.ok_or("no such method")
+    })
 }
 
 #[cfg(test)]
@@ -147,17 +309,21 @@ mod tests {
     #[test]
     fn bad_values_are_refused() {
         for words in [
-            "--size 0",
-            "--size 16385",
-            "--repeat 0",
-            "--view above",
-            "--eye 1,2",
-            "--target 1,2,3",
-            "--eye 1,2,3 --view top",
-            "--density many",
-            "--method bvh",
+            "render --size 0",
+            "render --size 16385",
+            "render --repeat 0",
+            "render --view above",
+            "render --eye 1,2",
+            "render --target 1,2,3",
+            "render --eye 1,2,3 --view top",
+            "render --density many",
+            "render --method bvh",
+            "render --macrocell-factor -1",
+            "table",
+            "table a.ply --methods fixed,bvh",
+            "table a.ply --json --markdown",
         ] {
-            let words = ["hgrid", "render"].into_iter().chain(words.split(' '));
+            let words = ["hgrid"].into_iter().chain(words.split(' '));
             assert!(Cli::try_parse_from(words.clone()).is_err(), "{:?}", words.collect::<Vec<_>>());
         }
     }
@@ -168,5 +334,33 @@ mod tests {
             let words = ["hgrid", "render"].into_iter().chain(words.split(' '));
             Cli::try_parse_from(words).unwrap();
         }
+    }
+
+    #[test]
+    fn methods_have_their_names_and_all_compete_unless_some_are_named() {
+        for &method in Method::ALL {
+            let args = RenderArgs::parse_from(["hgrid", "--method", method.name()]);
+            assert_eq!(args.config(), Config::new(method));
+        }
+        let methods = |words: &[&str]| -> Vec<Method> {
+            let words = ["hgrid", "a.ply"].iter().chain(words);
+            TableArgs::parse_from(words).race.configs().iter().map(|c| c.method).collect()
+        };
+        assert_eq!(methods(&[]), Method::ALL);
+        assert_eq!(methods(&["--methods", "fixed,one-level"]), [Method::Fixed, Method::OneLevel]);
+    }
+
+    #[test]
+    fn parameters_reach_the_configuration() {
+        let words = "hgrid --macrocell-factor 4 --subdivide-above 9 --depth 2 --density 2";
+        let config = RenderArgs::parse_from(words.split(' ')).config();
+        let expected = Config {
+            macrocell_factor: 4,
+            subdivide_above: 9,
+            depth: 2,
+            density: 2.0,
+            ..Config::default()
+        };
+        assert_eq!(config, expected);
     }
 }

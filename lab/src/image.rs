@@ -26,19 +26,19 @@ pub fn check_writable(path: &Path) -> Result<()> {
     attempt.with_context(|| format!("cannot write `{}`", path.display()))
 }
 
-/// Writes a square picture, rows from the top.
+/// Writes a picture of this width and height, rows from the top.
 ///
 /// # Errors
 /// Those of writing the file.
-pub fn write_png(path: &Path, size: u16, pixels: &[Rgb]) -> Result<()> {
+pub fn write_png(path: &Path, size: (u32, u32), pixels: &[Rgb]) -> Result<()> {
     encode(size, pixels)
         .and_then(|bytes| Ok(fs::write(path, bytes)?))
         .with_context(|| format!("cannot write `{}`", path.display()))
 }
 
-fn encode(size: u16, pixels: &[Rgb]) -> Result<Vec<u8>> {
+fn encode((width, height): (u32, u32), pixels: &[Rgb]) -> Result<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
-    let mut encoder = png::Encoder::new(&mut bytes, u32::from(size), u32::from(size));
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     let mut writer = encoder.write_header()?;
@@ -53,14 +53,14 @@ mod tests {
 
     #[test]
     fn a_png_reads_back() {
-        let pixels = [[1, 2, 3], [4, 5, 6], [7, 8, 9], [250, 251, 252]];
-        let bytes = encode(2, &pixels).unwrap();
+        let pixels = [[1, 2, 3], [4, 5, 6], [7, 8, 9], [250, 251, 252], [0; 3], [9; 3]];
+        let bytes = encode((3, 2), &pixels).unwrap();
         let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
         let mut read = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut read).unwrap();
-        assert_eq!((info.width, info.height), (2, 2));
+        assert_eq!((info.width, info.height), (3, 2));
         assert_eq!(read, pixels.as_flattened());
-        assert!(encode(2, &pixels[1..]).is_err());
+        assert!(encode((3, 2), &pixels[1..]).is_err());
     }
 
     #[test]
@@ -73,7 +73,7 @@ mod tests {
         fs::write(&path, "before").unwrap();
         check_writable(&path).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"before");
-        write_png(&path, 1, &[[0; 3]]).unwrap();
+        write_png(&path, (1, 1), &[[0; 3]]).unwrap();
         let message = format!("{:#}", check_writable(&folder).unwrap_err());
         assert!(message.starts_with("cannot write `"), "{message}");
         assert!(check_writable(&folder.join("missing/picture.png")).is_err());

@@ -4,16 +4,24 @@
 //! and the same camera, so that a number and a picture always speak of the same rays.
 //!
 //! ```text
-//! scene -> hgrid_core::Grid -> render (camera, shade) -> image
-//!                                   '-> figures: a table, or JSON
+//! scene -> measure (hgrid_core::Grid, camera, shade) -> render: a picture and a report
+//!                                                    |-> table: the paper's Table 1
+//!                                                    '-> figures: its charts, by plot
 //! ```
 
 pub mod camera;
 pub mod cli;
 pub mod figures;
+pub mod heat;
 pub mod image;
+pub mod machine;
+pub mod measure;
+mod plot;
 pub mod progress;
 pub mod render;
+pub mod report;
+pub mod resident;
 pub mod scene;
 pub mod shade;
+pub mod table;
 mod vector;

@@ -5,11 +5,13 @@ use std::process::ExitCode;
 
 use clap::Parser as _;
 use hgrid_lab::cli::{Cli, Command, RenderArgs};
-use hgrid_lab::render;
+use hgrid_lab::{figures, render, table};
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Table(args)) => table::run(&args),
+        Some(Command::Figures(args)) => figures::run(&args),
         None => render::run(&RenderArgs::parse_from(["hgrid"])).and_then(|()| {
             let next = "next: hgrid render YOUR.ply, or hgrid render --help";
             Ok(writeln!(std::io::stdout(), "{next}")?)

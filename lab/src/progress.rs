@@ -2,7 +2,7 @@
 //!
 //! It appears on standard error after a second, only if that is a terminal, and disappears when
 //! the work is done: standard output belongs to the results, and a bar that flashes by says
-//! nothing. Generating, loading and rendering share it.
+//! nothing. Generating, loading and measuring share it.
 
 use core::fmt;
 use core::time::Duration;
@@ -16,20 +16,21 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// The progress of one piece of work.
 pub struct Progress {
     bar: ProgressBar,
+    scope: String,
     is_shown: bool,
 }
 
 impl Progress {
     /// Starts counting to `total`, in any unit.
     #[must_use]
-    pub fn new(what: &'static str, total: u64) -> Self {
+    pub fn new(what: impl Into<String>, total: u64) -> Self {
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
         let template = "{msg:<10} {bar:40} {percent:>3} %, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        bar.set_message(what);
-        Self { bar, is_shown: false }
+        bar.set_message(what.into());
+        Self { bar, scope: String::new(), is_shown: false }
     }
 
     /// Counts `amount` more. Call it per row or per buffer, not per element.
@@ -39,6 +40,16 @@ impl Progress {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
             self.is_shown = true;
         }
+    }
+
+    /// Says what is being worked on.
+    pub fn set_message(&self, what: &str) {
+        self.bar.set_message(format!("{}{what}", self.scope));
+    }
+
+    /// Says what the messages to come are about.
+    pub fn set_scope(&mut self, scope: &str) {
+        self.scope = format!("{scope}: ");
     }
 
     /// A reader whose bytes are counted.

@@ -1,4 +1,4 @@
-//! From hits to colours: a grey solid, normals, or the cost of each ray.
+//! From hits to colours: a grey solid, or its normals.
 //!
 //! Normals come from the triangle alone, in `f64`, so that they are the same at every scene size.
 //! Every surface has two sides, because many files disagree with themselves about the front.
@@ -83,20 +83,6 @@ fn normal_of(triangle: &Triangle) -> Option<Vector> {
     unit(cross(offset(b, -1.0, a), offset(c, -1.0, a)))
 }
 
-/// The costs of rays as colours, from dark blue (nothing) to red, and the cost that is red.
-///
-/// The scale ends at the 99th percentile: a few rays along an edge must not darken the picture.
-#[must_use]
-pub fn heat(costs: &[u32]) -> (Vec<Rgb>, u32) {
-    let mut sorted = costs.to_vec();
-    sorted.sort_unstable();
-    let top = sorted.get(sorted.len().saturating_sub(1) * 99 / 100).copied().unwrap_or(0).max(1);
-    let color = |&cost: &u32| {
-        colorous::TURBO.eval_continuous(f64::from(cost.min(top)) / f64::from(top)).as_array()
-    };
-    (costs.iter().map(color).collect(), top)
-}
-
 /// Linear light as a screen wants it; a square root is close to its curve.
 fn display(color: Vector) -> Rgb {
     color.map(|c| byte(c.max(0.0).sqrt()))
@@ -137,17 +123,5 @@ mod tests {
             shader.diffuse(&ray, hit)
         });
         assert!(colors[0] == colors[1] && colors[1] == colors[2]);
-    }
-
-    #[test]
-    fn heat_ignores_the_last_percent() {
-        let mut costs: Vec<u32> = (0..1000).collect();
-        costs[999] = 1_000_000;
-        let (colors, top) = heat(&costs);
-        assert_eq!(top, 989);
-        assert_eq!(colors[999], colors[990]);
-        assert_ne!(colors[0], colors[500]);
-        assert_eq!(heat(&[]), (Vec::new(), 1));
-        assert_eq!(heat(&[0, 0]).1, 1);
     }
 }

@@ -53,8 +53,13 @@ fn rays() -> impl Strategy<Value = Vec<Ray>> {
     prop::collection::vec(ray, 1..30)
 }
 
+/// As many cases as `PROPTEST_CASES` says, or what takes some seconds.
+fn cases() -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(6000)
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 6000, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
 
     #[test]
     fn every_entry_point_agrees(

@@ -10,7 +10,13 @@ use hgrid_tests::random::Random;
 
 /// Aims rays from `origin`, which the closed mesh surrounds, at random edges and vertices. Returns
 /// how many hit nothing.
-fn leaks(grid: &Grid<'_>, mesh: &Mesh, origin: [f32; 3], rays: usize, seed: u64) -> usize {
+pub(crate) fn leaks(
+    grid: &Grid<'_>,
+    mesh: &Mesh,
+    origin: [f32; 3],
+    rays: usize,
+    seed: u64,
+) -> usize {
     let mut random = Random(seed);
     (0..rays)
         .filter(|i| {

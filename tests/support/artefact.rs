@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+use cc::Tool;
+
 /// The root of the repository.
 #[must_use]
 pub fn root() -> &'static Path {
@@ -57,13 +59,28 @@ pub fn shared_library() -> PathBuf {
 }
 
 /// A compiler for a dialect like `c99` or `c++17`, with the header on its path and every warning an
-/// error: `$CC` or `$CXX`, or `cc` or `c++`.
+/// error: the one that a build script would use, so `$CC` or `$CXX` if they are set.
 #[must_use]
 pub fn compiler(dialect: &str) -> Command {
-    let [variable, default] =
-        if dialect.starts_with("c++") { ["CXX", "c++"] } else { ["CC", "cc"] };
-    let program = env::var_os(variable).unwrap_or_else(|| default.into());
-    warnings(Command::new(program), dialect)
+    static TOOLS: [OnceLock<Tool>; 2] = [const { OnceLock::new() }; 2];
+    let is_cpp = dialect.starts_with("c++");
+    let find = || {
+        let mut build = cc::Build::new();
+        build.host(host()).target(host()).opt_level(0).cargo_metadata(false).cpp(is_cpp);
+        build.get_compiler()
+    };
+    warnings(TOOLS[usize::from(is_cpp)].get_or_init(find).to_command(), dialect)
+}
+
+/// The triple of this machine, as its Rust compiler tells it.
+fn host() -> &'static str {
+    static HOST: OnceLock<String> = OnceLock::new();
+    HOST.get_or_init(|| {
+        let rustc = env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+        let version = String::from_utf8(run(Command::new(rustc).arg("-vV")).stdout).expect("text");
+        let host = version.lines().find_map(|line| line.strip_prefix("host: "));
+        host.expect("rustc names its host").to_owned()
+    })
 }
 
 /// The same for a compiler by name.

@@ -1,0 +1,90 @@
+//! The paper's figures, measured here: the `figures` command.
+//!
+//! Figure 1 shows times against density for one scene, figure 2 memory and times of every method
+//! on every scene. Each is an SVG, a PNG and, the numbers alone, a JSON file.
+
+mod bars;
+mod density;
+
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use hgrid_core::Method;
+use plotters::prelude::RGBColor;
+use serde::Serialize;
+
+use crate::cli::FiguresArgs;
+use crate::plot::{COLORS, Drawing, save};
+use crate::table::Results;
+
+/// Measures, draws and writes.
+///
+/// # Errors
+/// If a scene cannot be loaded or built, or a file cannot be written.
+pub fn run(args: &FiguresArgs) -> Result<()> {
+    let folder = &args.output;
+    let context = || format!("cannot write into `{}`", folder.display());
+    fs::create_dir_all(folder).with_context(context)?;
+
+    let curves = density::Curves::measure(args)?;
+    write(&density::Figure(&curves), &curves, folder, "figure1")?;
+    let results = Results::measure(&args.scenes, &args.race)?;
+    write(&bars::Figure(&results), &results, folder, "figure2")?;
+
+    let names = ["figure1", "figure2"].map(|name| folder.join(name).display().to_string());
+    writeln!(io::stdout(), "wrote {} as .svg, .png and .json", names.join(" and "))?;
+    Ok(())
+}
+
+fn write(
+    drawing: &impl Drawing,
+    numbers: &impl Serialize,
+    folder: &Path,
+    name: &str,
+) -> Result<()> {
+    save(drawing, folder, name)?;
+    let path = folder.join(name).with_extension("json");
+    let json = serde_json::to_string_pretty(numbers)? + "\n";
+    fs::write(&path, json).with_context(|| format!("cannot write `{}`", path.display()))
+}
+
+/// The colour of a method, the same in every picture.
+fn color_of(name: &str) -> RGBColor {
+    let place = Method::ALL.iter().position(|method| method.name() == name).unwrap_or(0);
+    COLORS[place % COLORS.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+
+    #[test]
+    fn every_file_is_written_and_names_what_it_shows() {
+        let folder = std::env::temp_dir().join(format!("hgrid-figures-{}", std::process::id()));
+        let words = "hgrid procedural:knot:800 procedural:soup:600 --size 16 --repeat 1 \
+            --figure1 procedural:soup:900 --densities 1,8,32 -o";
+        let words = words.split_whitespace().map(Into::into).chain([folder.clone().into()]);
+        run(&FiguresArgs::parse_from::<_, std::ffi::OsString>(words)).unwrap();
+        for (name, expected) in [("figure1", "soup:900"), ("figure2", "knot:800")] {
+            let path = folder.join(name);
+            let svg = fs::read_to_string(path.with_extension("svg")).unwrap();
+            assert!(svg.contains(expected) && svg.contains("one-level"), "{svg}");
+            assert!(path.with_extension("png").exists());
+            let json = fs::read_to_string(path.with_extension("json")).unwrap();
+            assert!(
+                serde_json::from_str::<serde_json::Value>(&json).unwrap()["machine"].is_object()
+            );
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn methods_differ_in_colour() {
+        let colors: Vec<_> = Method::ALL.iter().map(|method| color_of(method.name())).collect();
+        assert!(colors.iter().all(|a| colors.iter().filter(|b| a == *b).count() == 1));
+    }
+}

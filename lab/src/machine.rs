@@ -1,0 +1,95 @@
+//! Where numbers come from: what a reader needs in order to measure them again.
+
+use std::env;
+use std::fs;
+use std::path::Path;
+use std::time::SystemTime;
+
+use serde::Serialize;
+
+/// The machine, the compiler, the day and the words that a measurement was started with.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Machine {
+    /// The processor's name, if the system tells.
+    pub cpu: Option<String>,
+    /// Operating system and architecture.
+    pub system: String,
+    /// The compiler that this program was built with.
+    pub rustc: String,
+    /// The day, in UTC, as YYYY-MM-DD.
+    pub date: String,
+    /// The words of the command line; of the program's own path only the name.
+    pub command: String,
+}
+
+impl Machine {
+    /// The facts of here and now.
+    #[must_use]
+    pub fn here() -> Self {
+        let cpu = fs::read_to_string("/proc/cpuinfo").ok();
+        let mut now = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
+        now.truncate("YYYY-MM-DD".len());
+        Self {
+            cpu: cpu.as_deref().and_then(cpu_name).map(str::to_owned),
+            system: format!("{}, {}", env::consts::OS, env::consts::ARCH),
+            rustc: rustc_version_runtime::version().to_string(),
+            date: now,
+            command: command(env::args()),
+        }
+    }
+
+    /// All but the command, as one line.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let cpu = self.cpu.as_deref().unwrap_or("unknown processor");
+        format!("{cpu} (one thread), {}, rustc {}, {}", self.system, self.rustc, self.date)
+    }
+}
+
+/// The name in the text of /proc/cpuinfo.
+fn cpu_name(text: &str) -> Option<&str> {
+    let is_name = |key: &str| matches!(key.trim(), "model name" | "Model" | "cpu model");
+    let mut lines = text.lines().filter_map(|line| line.split_once(':'));
+    lines.find(|(key, _)| is_name(key)).map(|(_, name)| name.trim())
+}
+
+/// The words of a command line, in quotes where a shell needs them.
+fn command(mut words: impl Iterator<Item = String>) -> String {
+    let program = words.next().unwrap_or_default();
+    let name = Path::new(&program).file_stem().unwrap_or_default().to_string_lossy();
+    let words = words.map(|word| {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:=+@%".contains(c);
+        let is_plain = !word.is_empty() && word.chars().all(is_plain);
+        if is_plain { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
+    });
+    core::iter::once(name.into_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_facts_of_here_are_complete() {
+        let machine = Machine::here();
+        assert!(machine.rustc.starts_with("1.") && machine.date.starts_with("20"), "{machine:?}");
+        assert_eq!(machine.date.len(), 10);
+        assert!(machine.summary().contains("one thread"));
+    }
+
+    #[test]
+    fn the_processor_is_found() {
+        let text =
+            "processor\t: 0\nvendor_id\t: X\nmodel name\t: Some CPU @ 3: GHz \nflags\t: a b\n";
+        assert_eq!(cpu_name(text), Some("Some CPU @ 3: GHz"));
+        assert_eq!(cpu_name("processor: 0\n"), None);
+    }
+
+    #[test]
+    fn commands_can_be_pasted() {
+        let words = ["/some/where/hgrid", "table", "my bunny.ply", "--view", "-3,4", "it's", ""];
+        let expected = r"hgrid table 'my bunny.ply' --view -3,4 'it'\''s' ''";
+        assert_eq!(command(words.into_iter().map(str::to_owned)), expected);
+        assert_eq!(command(core::iter::empty()), "");
+    }
+}

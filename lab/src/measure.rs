@@ -1,0 +1,397 @@
+//! One race for all numbers: every method builds and renders the same scene, in turn.
+//!
+//! ```text
+//! repetition 1:  build A, render A | build B, render B | ...
+//! repetition 2:  build A, render A | build B, render B | ...      medians of each column
+//! last one:      build A, render A, count A | build B, ...
+//! ```
+//!
+//! Taking turns lets a machine that warms up or that others use disturb all methods alike. Each
+//! build gets memory of its own from the system, which a page costs when it is first written: every
+//! method pays for the pages that it writes, in every build, and not for what it asked for and left
+//! alone. Asking for the sizes, getting the memory and building are all in the build time, because a
+//! first picture needs all of them. (A heap would hand pages of the build before to some methods and
+//! not to others, depending on their sizes, and would fill with zeros what the sizes only allow for.)
+//!
+//! Rendering is one thread, one ray per pixel, rows from the top; the timed pass traces and shades
+//! and does nothing else, and the work is counted in a pass of its own.
+
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, ensure};
+use hgrid_core::{Config, Counters, Grid, Hit, Ray, TriangleMesh, sizes};
+use memmap2::{MmapMut, MmapOptions};
+use serde::Serialize;
+
+use crate::camera::Camera;
+use crate::progress::Progress;
+use crate::resident::resident_bytes;
+use crate::scene::Scene;
+use crate::shade::{Rgb, Shader};
+
+/// A scene as the paper's Table 1 describes it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SceneFacts {
+    /// The scene's name.
+    pub scene: String,
+    /// Triangles in the scene.
+    pub triangles: usize,
+    /// Vertices in the scene.
+    pub vertices: usize,
+    /// Twelve bytes for each triangle and each vertex.
+    pub scene_bytes: usize,
+}
+
+impl SceneFacts {
+    /// The facts of a scene.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            scene: scene.name.clone(),
+            triangles: scene.indices.len(),
+            vertices: scene.positions.len(),
+            scene_bytes: size_of_val(&*scene.indices) + size_of_val(&*scene.positions),
+        }
+    }
+}
+
+/// What a method took for a picture of a scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Measurement {
+    /// The structure.
+    pub method: &'static str,
+    /// Cells per triangle that were asked for.
+    pub configured_density: f32,
+    /// Cells per triangle that the grid was built for: fewer where it would hold too many ids.
+    pub density: f32,
+    /// Cells per axis.
+    pub resolution: [u32; 3],
+    /// Triangle ids in all cells together.
+    pub references: u32,
+    /// Triangles without finite coordinates, which the grid leaves out.
+    pub skipped_triangles: u32,
+    /// Bytes of the built grid, without the mesh.
+    pub index_bytes: usize,
+    /// The same for each triangle.
+    pub index_bytes_per_triangle: f64,
+    /// Bytes that only the build was given.
+    pub scratch_bytes: usize,
+    /// Bytes for the grid that were asked for, because its size is known only after the build.
+    pub allocated_index_bytes: usize,
+    /// Bytes of index and scratch that the build wrote, in whole pages; where the system does not
+    /// tell, the bytes of the grid and of all scratch.
+    pub peak_bytes: usize,
+    /// Pixels on each side of the picture.
+    pub size: u16,
+    /// One for each pixel.
+    pub rays: u64,
+    /// Rays that hit something.
+    pub hits: u64,
+    /// Work of all rays divided by their number.
+    pub primitive_tests_per_ray: f64,
+    /// Cells entered, likewise.
+    pub cell_steps_per_ray: f64,
+    /// Subgrids and levels entered, likewise.
+    pub grid_steps_per_ray: f64,
+    /// The most tests and steps that one ray took.
+    pub largest_ray_cost: u64,
+    /// Asking for sizes, getting memory and building.
+    pub build_seconds: f64,
+    /// Tracing and shading every pixel.
+    pub render_seconds: f64,
+    /// Build and render: from a mesh in memory to a picture.
+    pub time_to_image_seconds: f64,
+    /// The builds that the time is the median of, in the order of time.
+    pub build_samples: Vec<f64>,
+    /// The renderings, likewise.
+    pub render_samples: Vec<f64>,
+}
+
+/// A mesh and the picture to take of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Subject<'a> {
+    /// What the grids are built for.
+    pub mesh: TriangleMesh<'a>,
+    /// From where it is seen.
+    pub camera: Camera,
+    /// Pixels on each side of the picture.
+    pub size: u16,
+}
+
+/// What a race gave.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The numbers of every configuration.
+    pub measurements: Vec<Measurement>,
+    /// The picture that all of them gave, row by row from the upper left.
+    pub pixels: Vec<Rgb>,
+    /// What each pixel's ray cost with the last configuration.
+    pub costs: Vec<u32>,
+}
+
+/// Rows that [`measure`] reports to its progress.
+#[must_use]
+pub fn rows(size: u16, methods: usize, repeat: u32) -> u64 {
+    u64::from(size) * methods as u64 * (u64::from(repeat) + 1)
+}
+
+/// Builds and renders with every configuration in turn, `repeat` times, and counts once.
+///
+/// `cost` tells what of a ray's counters is its cost.
+///
+/// # Errors
+/// If a grid cannot be built, or if two methods do not give the same picture.
+pub fn measure(
+    subject: &Subject<'_>,
+    configs: &[Config],
+    repeat: u32,
+    shade: impl Fn(&Shader<'_>, &Ray, Option<Hit>) -> Rgb,
+    cost: impl Fn(&Counters) -> u64,
+    progress: &mut Progress,
+) -> Result<Outcome> {
+    let Subject { mesh, camera, size } = *subject;
+    let shader = Shader::new(mesh, &camera);
+    let mut samples = vec![(Vec::new(), Vec::new()); configs.len()];
+    let mut outcome = Outcome { measurements: Vec::new(), pixels: Vec::new(), costs: Vec::new() };
+    for repetition in 1..=repeat {
+        for (config, (builds, renders)) in configs.iter().zip(&mut samples) {
+            let name = config.method.name();
+            let turn = format!("{name}, {repetition} of {repeat}:");
+            progress.set_message(&format!("{turn} building"));
+            let start = Instant::now();
+            let built =
+                build(mesh, config).with_context(|| format!("cannot build the {name} grid"))?;
+            builds.push(start.elapsed().as_secs_f64());
+            let Built { index, scratch } = built;
+            let memory = Memory::of(&index, &scratch, repetition == repeat);
+            drop(scratch);
+            let grid = Grid::open(&index, mesh)?;
+
+            progress.set_message(&format!("{turn} rendering"));
+            let start = Instant::now();
+            let pixels =
+                trace(&camera, size, progress, |ray| shade(&shader, ray, grid.intersect(ray)));
+            renders.push(start.elapsed().as_secs_f64());
+
+            if repetition == repeat {
+                progress.set_message(&format!("{turn} counting"));
+                let work = count(&grid, &camera, size, &cost, progress);
+                if let Some(first) = outcome.measurements.first() {
+                    let differ = outcome.pixels.iter().zip(&pixels).filter(|(a, b)| a != b).count();
+                    ensure!(differ == 0, "{} and {name} differ in {differ} pixels", first.method);
+                }
+                let samples = [&**builds, renders];
+                outcome.measurements.push(numbers(&grid, config, memory, &work, size, samples));
+                (outcome.pixels, outcome.costs) = (pixels, work.costs);
+            }
+        }
+    }
+    Ok(outcome)
+}
+
+/// A grid's memory.
+struct Built {
+    index: MmapMut,
+    scratch: MmapMut,
+}
+
+/// Builds as a user does who has nothing but the mesh: ask for sizes, get memory, build.
+fn build(mesh: TriangleMesh<'_>, config: &Config) -> Result<Built> {
+    let sizes = sizes(&mesh, config, &mut [])?;
+    let (mut index, mut scratch) = (memory(sizes.index_bytes)?, memory(sizes.scratch_bytes)?);
+    Grid::build(mesh, config, &mut index, &mut scratch)?;
+    Ok(Built { index, scratch })
+}
+
+/// Pages that the system provides when they are first written.
+fn memory(bytes: usize) -> Result<MmapMut> {
+    let mut options = MmapOptions::new();
+    options
+        .len(bytes.max(1))
+        .no_reserve_swap()
+        .map_anon()
+        .with_context(|| format!("cannot get {bytes} bytes of memory"))
+}
+
+/// Bytes that a build asked for and used.
+#[derive(Clone, Copy)]
+struct Memory {
+    index: usize,
+    scratch: usize,
+    resident: Option<usize>,
+}
+
+impl Memory {
+    /// What is known of two regions after a build; counting pages takes a while.
+    fn of(index: &[u8], scratch: &[u8], is_counted: bool) -> Self {
+        let resident = |region| if is_counted { resident_bytes(region) } else { None };
+        Self {
+            index: index.len(),
+            scratch: scratch.len(),
+            resident: resident(index).zip(resident(scratch)).map(|(a, b)| a + b),
+        }
+    }
+}
+
+/// What becomes of the ray of every pixel, row by row from the upper left.
+fn trace<T>(
+    camera: &Camera,
+    size: u16,
+    progress: &mut Progress,
+    mut pixel: impl FnMut(&Ray) -> T,
+) -> Vec<T> {
+    let mut pixels = Vec::with_capacity(usize::from(size) * usize::from(size));
+    for row in 0..size {
+        pixels.extend((0..size).map(|column| pixel(&camera.ray(column, row, size))));
+        progress.advance(1);
+    }
+    pixels
+}
+
+/// The work of every ray of a picture.
+struct Work {
+    counters: Counters,
+    hits: u64,
+    largest: u64,
+    costs: Vec<u32>,
+}
+
+/// Traces a picture again and counts.
+fn count(
+    grid: &Grid<'_>,
+    camera: &Camera,
+    size: u16,
+    cost: impl Fn(&Counters) -> u64,
+    progress: &mut Progress,
+) -> Work {
+    let (mut total, mut hits, mut largest) = (Counters::default(), 0, 0);
+    let costs = trace(camera, size, progress, |ray| {
+        let mut counters = Counters::default();
+        hits += u64::from(grid.intersect_counted(ray, &mut counters).is_some());
+        let Counters { primitive_tests, cell_steps, grid_steps } = counters;
+        total.primitive_tests += primitive_tests;
+        total.cell_steps += cell_steps;
+        total.grid_steps += grid_steps;
+        largest = largest.max(primitive_tests + cell_steps + grid_steps);
+        u32::try_from(cost(&counters)).unwrap_or(u32::MAX)
+    });
+    Work { counters: total, hits, largest, costs }
+}
+
+fn numbers(
+    grid: &Grid<'_>,
+    config: &Config,
+    memory: Memory,
+    work: &Work,
+    size: u16,
+    [builds, renders]: [&[f64]; 2],
+) -> Measurement {
+    let rays = u64::from(size) * u64::from(size);
+    let index_bytes = grid.blob_bytes();
+    let (build_seconds, render_seconds) = (median(builds), median(renders));
+    Measurement {
+        method: grid.method().name(),
+        configured_density: config.density,
+        density: grid.density(),
+        resolution: grid.resolution(),
+        references: grid.reference_count(),
+        skipped_triangles: grid.skipped_count(),
+        index_bytes,
+        index_bytes_per_triangle: ratio(index_bytes as u64, grid.mesh().triangle_count().into()),
+        scratch_bytes: memory.scratch,
+        allocated_index_bytes: memory.index,
+        peak_bytes: memory.resident.unwrap_or(index_bytes + memory.scratch),
+        size,
+        rays,
+        hits: work.hits,
+        primitive_tests_per_ray: ratio(work.counters.primitive_tests, rays),
+        cell_steps_per_ray: ratio(work.counters.cell_steps, rays),
+        grid_steps_per_ray: ratio(work.counters.grid_steps, rays),
+        largest_ray_cost: work.largest,
+        build_seconds,
+        render_seconds,
+        time_to_image_seconds: build_seconds + render_seconds,
+        build_samples: builds.to_vec(),
+        render_samples: renders.to_vec(),
+    }
+}
+
+/// `a / b`, or 0 where there is nothing to divide by.
+#[expect(clippy::cast_precision_loss, reason = "numbers for people: 15 digits are enough")]
+#[must_use]
+pub fn ratio(a: u64, b: u64) -> f64 {
+    if b == 0 { 0.0 } else { a as f64 / b as f64 }
+}
+
+/// The middle value, the upper one of two.
+fn median(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use hgrid_core::Method;
+
+    use super::*;
+    use crate::camera::{Up, View};
+
+    fn race(configs: &[Config], repeat: u32) -> Outcome {
+        let scene = Scene::load("procedural:knot:2000").unwrap();
+        let mesh = TriangleMesh::new(&scene.positions, &scene.indices).unwrap();
+        let camera = Camera::framing(scene.framed_bounds(), View::ThreeQuarter, Up::Y);
+        let subject = Subject { mesh, camera, size: 40 };
+        let cost = |work: &Counters| work.primitive_tests + work.cell_steps + work.grid_steps;
+        let mut progress = Progress::new("", 0);
+        let is_hit = |_: &Shader<'_>, _: &Ray, hit: Option<Hit>| [u8::from(hit.is_some()); 3];
+        measure(&subject, configs, repeat, is_hit, cost, &mut progress).unwrap()
+    }
+
+    #[test]
+    fn every_method_sees_the_same() {
+        let configs: Vec<_> = Method::ALL.iter().copied().map(Config::new).collect();
+        let Outcome { measurements, pixels, .. } = race(&configs, 1);
+        let hits = pixels.iter().filter(|pixel| pixel[0] == 1).count();
+        assert!((300..900).contains(&hits), "{hits}");
+        assert_eq!(measurements.len(), configs.len());
+        for (m, config) in measurements.iter().zip(configs) {
+            assert_eq!((m.method, m.hits), (config.method.name(), hits as u64));
+            assert!(m.allocated_index_bytes >= m.index_bytes && m.peak_bytes >= m.index_bytes);
+        }
+    }
+
+    #[test]
+    fn counts_are_complete() {
+        for &method in Method::ALL {
+            let Outcome { measurements, costs, .. } = race(&[Config::new(method)], 1);
+            let m = &measurements[0];
+            let work = m.primitive_tests_per_ray + m.cell_steps_per_ray + m.grid_steps_per_ray;
+            let sum: u64 = costs.iter().copied().map(u64::from).sum();
+            assert!((work - ratio(sum, m.rays)).abs() < 1e-9);
+            assert_eq!(m.largest_ray_cost, u64::from(*costs.iter().max().unwrap()));
+        }
+    }
+
+    #[test]
+    fn times_are_medians_of_all_repetitions() {
+        for m in race(&[Config::default(), Config::default()], 3).measurements {
+            assert_eq!((m.build_samples.len(), m.render_samples.len()), (3, 3));
+            assert!(m.build_samples.contains(&m.build_seconds));
+            assert!(m.time_to_image_seconds > m.render_seconds);
+        }
+    }
+
+    #[test]
+    fn medians_and_ratios_of_nothing_are_zero() {
+        assert!(median(&[]).abs() < 1e-9 && ratio(3, 0).abs() < 1e-9);
+        assert!((median(&[3.0, 1.0, 2.0]) - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_scene_is_as_large_as_in_the_paper() {
+        let scene = Scene::load("procedural:knot:2000").unwrap();
+        let facts = SceneFacts::of(&scene);
+        assert_eq!(facts.scene_bytes, 12 * (facts.triangles + facts.vertices));
+    }
+}

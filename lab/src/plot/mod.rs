@@ -1,0 +1,209 @@
+//! Drawings that exist twice, as SVG and as PNG, from one description.
+//!
+//! ```text
+//! Drawing --> plotters' SVG backend ------------------------> name.svg
+//!         '-> Raster: pixels, 4 x 4 for each unit --average-> name.png, 2 x 2 for each unit
+//! ```
+//!
+//! The PNG is drawn twice as large as it is written, so that every edge is smooth, and written
+//! twice as large as the SVG says, so that it is sharp on today's screens. Text comes from a font
+//! in the program: the same picture on a machine that has none. An SVG names the font and leaves
+//! the rest to its reader.
+
+mod axis;
+mod chart;
+mod raster;
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context as _, Result, anyhow};
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+pub(crate) use axis::{Scale, Stops, number};
+pub(crate) use chart::{HEADING, WORDS, Words, chart, heading};
+pub(crate) use raster::Raster;
+
+use crate::image;
+use crate::shade::Rgb;
+
+/// The font of drawings, and what a reader of an SVG may take instead.
+const FONT: &str = "Noto Sans, DejaVu Sans, Helvetica, Arial, sans-serif";
+
+/// Text, axes and grid lines, from dark to light.
+pub(crate) const INK: RGBColor = RGBColor(0x22, 0x28, 0x30);
+pub(crate) const MUTED: RGBColor = RGBColor(0x6a, 0x72, 0x7c);
+pub(crate) const FAINT: RGBColor = RGBColor(0xd9, 0xdd, 0xe2);
+
+/// Colours that differ for every kind of colour vision (Okabe and Ito 2008).
+pub(crate) const COLORS: [RGBColor; 6] = [
+    RGBColor(0x00, 0x72, 0xb2),
+    RGBColor(0xe6, 0x9f, 0x00),
+    RGBColor(0x00, 0x9e, 0x73),
+    RGBColor(0xd5, 0x5e, 0x00),
+    RGBColor(0xcc, 0x79, 0xa7),
+    RGBColor(0x56, 0xb4, 0xe9),
+];
+
+/// Where a drawing goes.
+pub(crate) type Area<B> = DrawingArea<B, Shift>;
+
+/// What can go wrong there.
+pub(crate) type AreaResult<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+
+/// A picture of lines, areas and words.
+pub(crate) trait Drawing {
+    /// Width and height, in units that are a pixel of an ordinary screen.
+    fn size(&self) -> (u32, u32);
+
+    /// Draws on an area of that size on the pen's scale.
+    fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B>;
+}
+
+/// Turns units into pixels.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pen {
+    /// Pixels in a unit.
+    pub(crate) scale: u32,
+}
+
+impl Pen {
+    /// A length.
+    pub(crate) const fn px(self, units: u32) -> u32 {
+        units * self.scale
+    }
+
+    /// A coordinate.
+    pub(crate) const fn at(self, units: i32) -> i32 {
+        units * self.scale.cast_signed()
+    }
+
+    /// A line.
+    pub(crate) fn line(self, color: impl Color, width: u32) -> ShapeStyle {
+        color.stroke_width(self.px(width))
+    }
+
+    /// Words with their left end at the point; `size` is that of CSS.
+    pub(crate) fn text(self, size: u32, color: RGBColor) -> TextStyle<'static> {
+        // The SVG backend divides by 1.24, and so does Raster.
+        let size = f64::from(self.px(size)) * 1.24;
+        let font = FontDesc::new(FontFamily::Name(FONT), size, FontStyle::Normal);
+        let pos = Pos::new(HPos::Left, VPos::Center);
+        TextStyle { font, color: color.to_backend_color(), pos }
+    }
+
+    /// The same, in bold.
+    pub(crate) fn title(self, size: u32) -> TextStyle<'static> {
+        let style = self.text(size, INK);
+        TextStyle { font: style.font.style(FontStyle::Bold), ..style }
+    }
+}
+
+/// Words around the point instead of to its right.
+pub(crate) fn centred(style: &TextStyle<'static>) -> TextStyle<'static> {
+    style.pos(Pos::new(HPos::Center, VPos::Center))
+}
+
+/// Writes `name.svg` and `name.png` into a folder.
+///
+/// # Errors
+/// Those of writing the files.
+pub(crate) fn save(drawing: &impl Drawing, folder: &Path, name: &str) -> Result<()> {
+    let path = folder.join(name).with_extension("svg");
+    fs::write(&path, svg(drawing)?)
+        .with_context(|| format!("cannot write `{}`", path.display()))?;
+    let (size, pixels) = pixels(drawing)?;
+    image::write_png(&path.with_extension("png"), size, &pixels)
+}
+
+fn svg(drawing: &impl Drawing) -> Result<String> {
+    let mut text = String::new();
+    {
+        let area = SVGBackend::with_string(&mut text, drawing.size()).into_drawing_area();
+        draw(drawing, &area, Pen { scale: 1 })?;
+    }
+    Ok(text)
+}
+
+/// Pixels of a unit in a PNG, and pixels that each of those is the average of, on each axis.
+const SHARPNESS: u32 = 2;
+const SMOOTHNESS: u32 = 2;
+
+fn pixels(drawing: &impl Drawing) -> Result<((u32, u32), Vec<Rgb>)> {
+    let pen = Pen { scale: SHARPNESS * SMOOTHNESS };
+    let (width, height) = drawing.size();
+    let fine = (pen.px(width), pen.px(height));
+    let mut bytes = vec![0; 3 * fine.0 as usize * fine.1 as usize];
+    {
+        let area = Raster::new(&mut bytes, fine)?.into_drawing_area();
+        draw(drawing, &area, pen)?;
+    }
+    let size = (SHARPNESS * width, SHARPNESS * height);
+    Ok((size, averages(&bytes, size)))
+}
+
+fn draw<B: DrawingBackend>(drawing: &impl Drawing, area: &Area<B>, pen: Pen) -> Result<()> {
+    let drawn = area.fill(&WHITE).and_then(|()| drawing.draw(area, pen));
+    drawn.and_then(|()| area.present()).map_err(|error| anyhow!("cannot draw: {error}"))
+}
+
+/// The pixels of a picture of this size from one that is `SMOOTHNESS` times as large.
+fn averages(fine: &[u8], (width, height): (u32, u32)) -> Vec<Rgb> {
+    let (fine, _) = fine.as_chunks::<3>();
+    let row = (width * SMOOTHNESS) as usize;
+    let pixel = |x: u32, y: u32| {
+        let mut sum = [0u32; 3];
+        for line in fine.chunks_exact(row).skip((y * SMOOTHNESS) as usize).take(SMOOTHNESS as usize)
+        {
+            for color in line.iter().skip((x * SMOOTHNESS) as usize).take(SMOOTHNESS as usize) {
+                sum = [0, 1, 2].map(|i| sum[i] + u32::from(color[i]));
+            }
+        }
+        sum.map(|c| u8::try_from(c / (SMOOTHNESS * SMOOTHNESS)).unwrap_or(u8::MAX))
+    };
+    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A black square in the middle, and a word above it.
+    struct Square;
+
+    impl Drawing for Square {
+        fn size(&self) -> (u32, u32) {
+            (20, 30)
+        }
+
+        fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B> {
+            let corners = [(pen.at(5), pen.at(10)), (pen.at(15), pen.at(20))];
+            area.draw(&Rectangle::new(corners, BLACK.filled()))?;
+            area.draw(&Text::new("Hm", (pen.at(10), pen.at(5)), centred(&pen.title(8))))
+        }
+    }
+
+    #[test]
+    fn both_files_show_the_drawing() {
+        let folder = std::env::temp_dir().join(format!("hgrid-plot-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        save(&Square, &folder, "square").unwrap();
+        let svg = fs::read_to_string(folder.join("square.svg")).unwrap();
+        assert!(svg.contains("Hm") && svg.contains("<rect") && svg.contains("Noto Sans"), "{svg}");
+        assert!(fs::read(folder.join("square.png")).unwrap().starts_with(b"\x89PNG"));
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn pixels_are_where_they_belong() {
+        let ((width, height), pixels) = pixels(&Square).unwrap();
+        assert_eq!((width, height), (40, 60));
+        let at = |x: usize, y: usize| pixels[y * 40 + x];
+        assert_eq!([at(20, 30), at(5, 30), at(20, 50)], [[0; 3], [255; 3], [255; 3]]);
+        let letters = (0..20).flat_map(|y| (0..40).map(move |x| (x, y)));
+        let dark = letters.filter(|&(x, y)| at(x, y)[0] < 128).count();
+        assert!((40..200).contains(&dark), "{dark}");
+    }
+}

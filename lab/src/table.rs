@@ -1,0 +1,285 @@
+//! The paper's Table 1: every method on every scene, side by side.
+//!
+//! Rows come in groups, one for each method, and scenes are columns, as in the paper. Below the
+//! paper's six rows of a method stand its bytes, which the paper only draws.
+
+use std::io::{self, Write as _};
+
+use anyhow::{Context as _, Result, ensure};
+use comfy_table::{CellAlignment, Table, presets};
+use hgrid_core::{Config, Counters, Ray, TriangleMesh};
+use serde::Serialize;
+
+use crate::cli::{Race, TableArgs};
+use crate::machine::Machine;
+use crate::measure::{Measurement, SceneFacts, Subject, measure, ratio, rows};
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::shade::Shader;
+
+/// Measures and prints.
+///
+/// # Errors
+/// If a scene cannot be loaded or built, or a method draws another picture than the first one.
+pub fn run(args: &TableArgs) -> Result<()> {
+    let results = Results::measure(&args.scenes, &args.race)?;
+    let mut out = io::stdout();
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(&results)?)?;
+    } else if args.markdown {
+        writeln!(out, "{}", results.markdown())?;
+    } else {
+        writeln!(out, "{}", results.text())?;
+    }
+    Ok(())
+}
+
+/// Every number of a race over some scenes, and where they come from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Results {
+    /// Where the numbers come from.
+    pub machine: Machine,
+    /// Pixels on each side of the pictures.
+    pub size: u16,
+    /// Builds and renderings that times are medians of.
+    pub repeats: u32,
+    /// In the order of the command line.
+    pub scenes: Vec<SceneResults>,
+}
+
+/// The numbers of all methods on one scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SceneResults {
+    /// The scene.
+    #[serde(flatten)]
+    pub facts: SceneFacts,
+    /// In the order of the command line.
+    pub methods: Vec<Measurement>,
+}
+
+impl Results {
+    /// Runs the race on one scene after the other.
+    ///
+    /// # Errors
+    /// Those of [`run`].
+    pub fn measure(scenes: &[String], race: &Race) -> Result<Self> {
+        let configs = race.configs();
+        let size = race.picture.size;
+        let total = scenes.len() as u64 * rows(size, configs.len(), race.repeat);
+        let mut progress = Progress::new("starting", total);
+        let scenes = scenes.iter().map(|spec| {
+            let scene = Scene::load(spec)?;
+            ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
+            let facts = SceneFacts::of(&scene);
+            progress.set_scope(&display_name(&facts.scene));
+            let methods = measure_diffuse(&scene, &configs, race, &mut progress)
+                .with_context(|| format!("cannot measure `{spec}`"))?;
+            Ok(SceneResults { facts, methods })
+        });
+        let scenes = scenes.collect::<Result<_>>()?;
+        Ok(Self { machine: Machine::here(), size, repeats: race.repeat, scenes })
+    }
+
+    /// The table as aligned text, then what its numbers mean and where they come from.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut table = self.table(|title| format!("\n{title}"), "  ");
+        table.load_style(presets::NOTHING);
+        let notes = self.notes().join("\n");
+        [table.trim_fmt(), notes, self.machine.summary()].join("\n\n")
+    }
+
+    /// The same as Markdown.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let mut table = self.table(|title| format!("**{title}**"), "");
+        table.load_style(presets::ASCII_MARKDOWN);
+        let mut lines: Vec<_> = table.trim_fmt().lines().map(str::to_owned).collect();
+        if let Some(rule) = lines.get_mut(1) {
+            // Markdown aligns a column to the right where its rule ends in a colon.
+            *rule = rule.replace("-|", ":|").replacen(":|", "-|", 1);
+        }
+        let source = format!("{}. Command: `{}`.", self.machine.summary(), self.machine.command);
+        [lines.join("\n"), self.notes().join(" "), source].join("\n\n")
+    }
+
+    /// The rows; `titled` makes a heading of the title of a group, and the others are indented.
+    fn table(&self, titled: impl Fn(&str) -> String, indent: &str) -> Table {
+        let mut table = Table::new();
+        let names = self.scenes.iter().map(|scene| display_name(&scene.facts.scene));
+        table.set_header(core::iter::once(String::new()).chain(names));
+        for column in table.column_iter_mut().skip(1) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        let mut row = |name: &str, cell: &dyn Fn(&SceneResults) -> String| {
+            table.add_row(core::iter::once(name.to_owned()).chain(self.scenes.iter().map(cell)));
+        };
+
+        let indented = |name: &str| format!("{indent}{name}");
+        row(&titled("scene"), &|_| String::new());
+        row(&indented("triangles"), &|scene| count(scene.facts.triangles));
+        row(&indented("memory (MiB)"), &|scene| {
+            format!("{:.1}", mebibytes(scene.facts.scene_bytes))
+        });
+        let methods = self.scenes.first().map(|scene| &*scene.methods).unwrap_or_default();
+        for (index, Measurement { method, configured_density, .. }) in methods.iter().enumerate() {
+            row(&titled(&format!("{method}, density {configured_density}")), &|_| String::new());
+            let mut row = |name: &str, cell: &dyn Fn(&Measurement) -> String| {
+                row(&indented(name), &|scene| {
+                    scene.methods.get(index).map(cell).unwrap_or_default()
+                });
+            };
+            row("primitive tests / ray", &|m| format!("{:.2}", m.primitive_tests_per_ray));
+            row("cell steps / ray", &|m| format!("{:.2}", m.cell_steps_per_ray));
+            row("grid steps / ray", &|m| format!("{:.2}", m.grid_steps_per_ray));
+            row("build (s)", &|m| seconds(m.build_seconds));
+            row("render (s)", &|m| seconds(m.render_seconds));
+            row("time to image (s)", &|m| seconds(m.time_to_image_seconds));
+            row("index (MiB)", &|m| format!("{:.1}", mebibytes(m.index_bytes)));
+            row("index (bytes / triangle)", &|m| format!("{:.1}", m.index_bytes_per_triangle));
+            row("peak (MiB)", &|m| format!("{:.1}", mebibytes(m.peak_bytes)));
+        }
+        table
+    }
+
+    /// What the numbers mean, and where a grid is not what its heading says.
+    fn notes(&self) -> Vec<String> {
+        let Self { size, repeats, .. } = self;
+        let mut notes = vec![
+            format!("{size} x {size} pixels, one ray each, diffuse shading; {}.", times(*repeats)),
+            "Peak is what the build wrote: index and scratch. 1 MiB is 2^20 bytes, the paper's MB."
+                .to_owned(),
+        ];
+        for scene in &self.scenes {
+            let name = display_name(&scene.facts.scene);
+            let is_thinner = |m: &&Measurement| m.density < m.configured_density;
+            for Measurement { method, density, .. } in scene.methods.iter().filter(is_thinner) {
+                notes.push(format!("{name}: {method} at density {density}, for its references."));
+            }
+        }
+        notes
+    }
+}
+
+/// Runs the race on one scene, for the pictures of the paper.
+pub(crate) fn measure_diffuse(
+    scene: &Scene,
+    configs: &[Config],
+    race: &Race,
+    progress: &mut Progress,
+) -> Result<Vec<Measurement>> {
+    let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
+    let subject = Subject { mesh, camera: race.picture.camera(scene), size: race.picture.size };
+    let shade = |shader: &Shader<'_>, ray: &Ray, hit| shader.diffuse(ray, hit);
+    let cost = |_: &Counters| 0;
+    Ok(measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements)
+}
+
+/// What times are, as part of a sentence.
+pub(crate) fn times(repeats: u32) -> String {
+    match repeats {
+        1 => "times of one run".to_owned(),
+        _ => format!("times are medians of {repeats} runs, the methods taking turns"),
+    }
+}
+
+/// A scene's name for people: without the ending of a mesh file.
+pub(crate) fn display_name(name: &str) -> String {
+    let is_mesh = |ending: &str| matches!(ending, "ply" | "obj" | "PLY" | "OBJ");
+    let stem = name.rsplit_once('.').filter(|(_, ending)| is_mesh(ending));
+    let name = stem.map_or(name, |(stem, _)| stem);
+    name.strip_prefix("procedural:").unwrap_or(name).to_owned()
+}
+
+/// A count as the paper writes it: 69.45K, 1.09M.
+fn count(count: usize) -> String {
+    let count = count as u64;
+    match count {
+        0..1000 => count.to_string(),
+        1000..1_000_000 => format!("{:.2}K", ratio(count, 1000)),
+        _ => format!("{:.2}M", ratio(count, 1_000_000)),
+    }
+}
+
+/// Bytes in units of 2^20.
+pub(crate) fn mebibytes(bytes: usize) -> f64 {
+    ratio(bytes as u64, 1 << 20)
+}
+
+/// A time in seconds with three digits that count, but no more than milliseconds have.
+fn seconds(seconds: f64) -> String {
+    match seconds {
+        s if s >= 100.0 => format!("{s:.0}"),
+        s if s >= 10.0 => format!("{s:.1}"),
+        s if s >= 1.0 => format!("{s:.2}"),
+        s if s >= 0.1 => format!("{s:.3}"),
+        s => format!("{s:.4}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+    use hgrid_core::Method;
+
+    use super::*;
+
+    fn results(words: &str) -> Result<Results> {
+        let args = TableArgs::parse_from(["hgrid"].into_iter().chain(words.split(' ')));
+        Results::measure(&args.scenes, &args.race)
+    }
+
+    #[test]
+    fn every_method_has_a_group_and_every_scene_a_column() {
+        let results =
+            results("procedural:knot:500 procedural:soup:300 --size 16 --repeat 2").unwrap();
+        let text = results.text();
+        assert!(text.contains("knot:"), "{text}");
+        for method in Method::ALL {
+            assert!(text.contains(&format!("{}, density", method.name())), "{text}");
+        }
+        assert_eq!(text.matches("time to image").count(), Method::ALL.len());
+        assert!(text.contains("medians of 2 runs"));
+    }
+
+    #[test]
+    fn markdown_is_a_table() {
+        let results = results("procedural:knot:500 --size 16 --repeat 1 --methods fixed").unwrap();
+        let markdown = results.markdown();
+        let table: Vec<_> = markdown.lines().take_while(|line| !line.is_empty()).collect();
+        assert!(table.iter().all(|line| line.matches('|').count() == 3), "{markdown}");
+        assert!(table[1].starts_with("|--") && table[1].ends_with("--:|"), "{markdown}");
+        assert!(markdown.contains("**fixed, density 32**"), "{markdown}");
+        assert!(markdown.contains("fixed at density 16"), "{markdown}");
+    }
+
+    #[test]
+    fn json_has_the_machine_and_every_number() {
+        let results = results("procedural:knot:500 --size 16 --repeat 1").unwrap();
+        let json = serde_json::to_value(&results).unwrap();
+        assert!(json["machine"]["rustc"].is_string());
+        let methods = json["scenes"][0]["methods"].as_array().unwrap();
+        assert_eq!(methods.len(), Method::ALL.len());
+        assert_eq!(methods[0]["build_samples"].as_array().unwrap().len(), 1);
+    }
+
+    #[test]
+    fn failures_name_the_scene() {
+        for words in ["no/such.ply", "procedural:knot:500 --size 16 --macrocell-factor 1"] {
+            let message = format!("{:#}", results(words).unwrap_err());
+            assert!(message.contains(words.split(' ').next().unwrap()), "{message}");
+        }
+    }
+
+    #[test]
+    fn numbers_read_like_the_papers() {
+        assert_eq!(
+            [999, 69_451, 871_414, 10_000_000].map(count),
+            ["999", "69.45K", "871.41K", "10.00M"]
+        );
+        assert_eq!(display_name("some.bunny.ply"), "some.bunny");
+        assert_eq!(display_name("procedural:knot:500"), "knot:500");
+        let times = [123.4, 12.34, 1.234, 0.1234, 0.012_34].map(seconds);
+        assert_eq!(times, ["123", "12.3", "1.23", "0.123", "0.0123"]);
+    }
+}
