@@ -4,9 +4,15 @@
  *     raytracer                          the built-in scene, to raytracer.ppm
  *     raytracer bunny.ply -o bunny.ppm   a mesh of yours
  *     raytracer --size 256               pixels on each side
+ *     raytracer --method variable        one-level, fixed, variable or recursive
+ *     raytracer --density 8              cells for each triangle
  *
- * What to look at: build_grid (sizes, memory, build) and render (the query). Camera and light are
- * those of the project's own renderer in lab/, so the two draw the same picture, byte by byte.
+ * What to look at: allocate_grid (sizes, memory), main (the build) and render (the query). Camera
+ * and light are those of the project's own renderer in lab/, so the two draw the same picture, byte
+ * by byte.
+ *
+ * What it prints: `sizes` is the time of asking hgrid_sizes and of malloc, `build` is that of
+ * hgrid_build alone, `time to image` is all from the mesh to the last pixel.
  */
 
 #include "scene.h"
@@ -81,18 +87,27 @@ static void check(hgrid_status status, const hgrid_report *report)
     fail("%s", hgrid_status_string(status));
 }
 
-/* Asks, allocates, builds. The question without scratch says enough for the index, not exactly
- * what it takes: where memory comes in pages, those that are never touched cost nothing. */
-static region build_grid(const hgrid_mesh *mesh, hgrid_grid *grid, hgrid_report *report)
+/* The memory of a grid. */
+typedef struct {
+    region index, scratch;
+} memory;
+
+/* Asks how much memory the grid takes, and allocates it.
+ *
+ * The question without scratch says enough for the index, not exactly what it takes: where memory
+ * comes in pages, those that are never touched cost nothing. With the methods that find their size
+ * while they write, enough is far too much, so they are asked again, with scratch, for up to the
+ * time of a build. */
+static memory allocate_grid(const hgrid_mesh *mesh, const hgrid_config *config)
 {
-    check(hgrid_sizes(mesh, NULL, NULL, 0, report), report);
-    const region index = allocate_region(report->index_bytes);
-    const region scratch = allocate_region(report->scratch_bytes);
-    check(hgrid_build(mesh, NULL, index.start, index.bytes, scratch.start, scratch.bytes, grid,
-                      report),
-          report);
-    free(scratch.allocation);
-    return index;
+    hgrid_report report = HGRID_REPORT_INIT;
+    check(hgrid_sizes(mesh, config, NULL, 0, &report), &report);
+    memory m;
+    m.scratch = allocate_region(report.scratch_bytes);
+    if (config->method == HGRID_METHOD_VARIABLE || config->method == HGRID_METHOD_RECURSIVE)
+        check(hgrid_sizes(mesh, config, m.scratch.start, m.scratch.bytes, &report), &report);
+    m.index = allocate_region(report.index_bytes);
+    return m;
 }
 
 /* --- vectors --------------------------------------------------------------------------------- */
@@ -286,32 +301,80 @@ static size_t render(const hgrid_grid *grid, const scene *s, const camera *c, in
 
 /* --- the program ----------------------------------------------------------------------------- */
 
+/* The methods by their names, with their usual numbers. */
+static const struct {
+    const char *name;
+    hgrid_config config;
+} METHODS[] = {
+    {"one-level", HGRID_CONFIG_INIT},
+    {"fixed", HGRID_CONFIG_INIT_FIXED},
+    {"variable", HGRID_CONFIG_INIT_VARIABLE},
+    {"recursive", HGRID_CONFIG_INIT_RECURSIVE},
+};
+
+enum { METHOD_COUNT = sizeof METHODS / sizeof *METHODS };
+
 typedef struct {
     const char *input, *output;
     int size;
+    /* An index of METHODS, and the density if it is not the usual one. */
+    int method;
+    double density;
 } options;
+
+static int parse_size(const char *value)
+{
+    char *end;
+    const long size = strtol(value, &end, 10);
+    if (size < 1 || size > MAX_SIZE || *end != '\0')
+        fail("--size is a number from 1 to %d, not `%s`", MAX_SIZE, value);
+    return (int)size;
+}
+
+static int parse_method(const char *value)
+{
+    for (int i = 0; i < METHOD_COUNT; i++)
+        if (strcmp(value, METHODS[i].name) == 0)
+            return i;
+    fail("--method is one-level, fixed, variable or recursive, not `%s`", value);
+    return 0;
+}
+
+static double parse_density(const char *value)
+{
+    char *end;
+    const double density = strtod(value, &end);
+    if (!(density > 0) || *end != '\0')
+        fail("--density is a number above 0, not `%s`", value);
+    return density;
+}
 
 static options parse(int count, char **words)
 {
-    options o = {NULL, "raytracer.ppm", DEFAULT_SIZE};
+    static const char *const known[] = {"-o", "--size", "--method", "--density"};
+    options o = {NULL, "raytracer.ppm", DEFAULT_SIZE, 0, 0};
     for (int i = 1; i < count; i++) {
-        const char *word = words[i], *value = i + 1 < count ? words[i + 1] : NULL;
-        if (strcmp(word, "--size") == 0 || strcmp(word, "-o") == 0) {
-            if (value == NULL)
-                fail("%s needs a value", word);
-            char *end = NULL;
-            const long size = word[1] == '-' ? strtol(value, &end, 10) : o.size;
-            if (size < 1 || size > MAX_SIZE || (end != NULL && *end != '\0'))
-                fail("--size is a number from 1 to %d, not `%s`", MAX_SIZE, value);
-            o.output = word[1] == 'o' ? value : o.output;
-            o.size = (int)size;
-            i++;
-        } else if (word[0] == '-') {
-            fail("unknown option %s: raytracer [FILE.ply] [--size PIXELS] [-o FILE.ppm]", word);
-        } else if (o.input != NULL) {
-            fail("one scene at a time: %s or %s?", o.input, word);
-        } else {
+        const char *word = words[i];
+        if (word[0] != '-') {
+            if (o.input != NULL)
+                fail("one scene at a time: %s or %s?", o.input, word);
             o.input = word;
+            continue;
+        }
+        size_t option = 0;
+        while (option < 4 && strcmp(word, known[option]) != 0)
+            option++;
+        if (option == 4)
+            fail("unknown option %s: raytracer [FILE.ply] [--size PIXELS] [--method NAME] "
+                 "[--density CELLS] [-o FILE.ppm]",
+                 word);
+        if (++i == count)
+            fail("%s needs a value", word);
+        switch (option) {
+        case 0: o.output = words[i]; break;
+        case 1: o.size = parse_size(words[i]); break;
+        case 2: o.method = parse_method(words[i]); break;
+        case 3: o.density = parse_density(words[i]); break;
         }
     }
     return o;
@@ -332,15 +395,24 @@ int main(int count, char **words)
     const size_t picture_bytes = (size_t)o.size * (size_t)o.size * 3;
     unsigned char *pixels = (unsigned char *)allocate(picture_bytes, 1);
 
-    const clock_t start = clock();
+    hgrid_config config = METHODS[o.method].config;
+    if (o.density > 0)
+        config.density = (float)o.density;
     hgrid_mesh mesh = HGRID_MESH_INIT;
     mesh.positions = s.positions;
     mesh.vertex_count = s.vertex_count;
     mesh.indices = s.indices;
     mesh.triangle_count = s.triangle_count;
+
+    const clock_t start = clock();
+    const memory m = allocate_grid(&mesh, &config);
+    const clock_t allocated = clock();
     hgrid_grid grid;
     hgrid_report report = HGRID_REPORT_INIT;
-    const region index = build_grid(&mesh, &grid, &report);
+    check(hgrid_build(&mesh, &config, m.index.start, m.index.bytes, m.scratch.start,
+                      m.scratch.bytes, &grid, &report),
+          &report);
+    free(m.scratch.allocation);
     const clock_t built = clock();
     const camera c = frame(&s);
     const size_t hits = render(&grid, &s, &c, o.size, pixels);
@@ -354,16 +426,19 @@ int main(int count, char **words)
     printf("scene          %s\n", o.input != NULL ? o.input : "knot, built in");
     printf("triangles      %lu\n", (unsigned long)s.triangle_count);
     printf("skipped        %lu\n", (unsigned long)report.skipped_count);
+    printf("method         %s\n", METHODS[o.method].name);
+    printf("density        %g\n", (double)report.density);
     printf("index bytes    %lu\n", (unsigned long)report.index_bytes);
-    printf("scratch bytes  %lu\n", (unsigned long)report.scratch_bytes);
+    printf("scratch bytes  %lu\n", (unsigned long)m.scratch.bytes);
     printf("hits           %lu of %lu rays\n", (unsigned long)hits,
            (unsigned long)(picture_bytes / 3));
-    printf("build          %.3f s\n", seconds(start, built));
+    printf("sizes          %.3f s\n", seconds(start, allocated));
+    printf("build          %.3f s\n", seconds(allocated, built));
     printf("render         %.3f s\n", seconds(built, rendered));
     printf("time to image  %.3f s\n", seconds(start, rendered));
     printf("wrote %s\n", o.output);
 
-    free(index.allocation);
+    free(m.index.allocation);
     free(pixels);
     free(s.positions);
     free(s.indices);

@@ -53,9 +53,9 @@
  * outside the regions, and there is nothing to free.
  *
  * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are enough for every mesh with so many
- * triangles and fit into an array declaration; hgrid_sizes knows the mesh and asks for less. Where
- * the system hands out memory page by page, an index that is too large costs nothing: pages that
- * are not touched are never taken.
+ * triangles, with the default configuration, and fit into an array declaration; hgrid_sizes knows
+ * the mesh, takes any configuration and asks for less. Where the system hands out memory page by
+ * page, an index that is too large costs nothing: pages that are not touched are never taken.
  *
  * The index is a blob: no pointer in it, so it can be copied to another region at a multiple of 64,
  * written to a file, mapped from one, sent, or put in flash, and opened there with hgrid_open. The
@@ -64,6 +64,22 @@
  * The mesh stays yours and stays where it is: it is read at every query. To change vertices, change
  * them while no query runs, and build again, in the same regions if you like.
  *
+ * Methods
+ * -------
+ * A grid is built by one of four methods, which hgrid_config says; all of them answer every ray the
+ * same, hit for hit and bit for bit.
+ *
+ *   HGRID_METHOD_ONE_LEVEL   the default: one hashed grid; the shortest build, the least memory
+ *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
+ *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
+ *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
+ *
+ *   hgrid_config config = HGRID_CONFIG_INIT_VARIABLE;
+ *
+ * The first two know the size of the index, to the byte, before they write it. The other two find
+ * it while they write: hgrid_sizes tells it in advance if it is given scratch, and an index that
+ * turns out to be too small is lost, see HGRID_ERROR_INDEX_TOO_SMALL.
+ *
  * Pointers
  * --------
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
@@ -71,7 +87,7 @@
  * next to them say. Each function says which of its pointers may be NULL; any other NULL is answered
  * with HGRID_ERROR_NULL_ARGUMENT, or by a query with false. Outputs come last. They are written when
  * a call succeeds and not touched when it fails, except for the report, which is written in both
- * cases.
+ * cases, and for an index that was too small (hgrid_build).
  *
  * Structs
  * -------
@@ -165,7 +181,8 @@
 #define HGRID_ALIGNMENT 64
 
 /**
- * The version of the blob format. A blob of another version is refused: build it again.
+ * The version of the blob format, the same for all methods. A blob of another version is refused:
+ * build it again.
  */
 #define HGRID_BLOB_VERSION 1
 
@@ -181,8 +198,58 @@
 
 /**
  * One hashed grid with a single cell size: the default of `hgrid_config`.
+ *
+ * Choose it for the shortest build in the least memory: meshes that move, and small machines. It
+ * is at its best where triangles are of similar size and everywhere, and slow where all detail is
+ * in a few places of a large scene.
+ *
+ * Memory: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. The build plans every byte in
+ * the scratch before it writes the index.
  */
 #define HGRID_METHOD_ONE_LEVEL 1
+
+/**
+ * A hashed grid of many small cells, and above it levels of macrocells that say where anything is.
+ *
+ * Rays cross empty space in large steps, and the small cells hold few triangles each. Choose it
+ * where many rays are shot for each build. `macrocell_factor` belongs to it.
+ *
+ * Memory: two to three times that of one level. The build plans every byte in the scratch before
+ * it writes the index.
+ */
+#define HGRID_METHOD_FIXED 2
+
+/**
+ * A hashed grid whose crowded cells hold hashed grids of their own: subgrids, cut to what is
+ * there.
+ *
+ * Choose it where detail is uneven, up to the proverbial teapot in a stadium, or where nobody
+ * knows in advance. `subdivide_above` belongs to it.
+ *
+ * Memory: four to seven times that of one level. How much it takes shows only while the index is
+ * written: `hgrid_sizes` without scratch answers with a generous bound, with scratch with the
+ * exact size.
+ */
+#define HGRID_METHOD_VARIABLE 3
+
+/**
+ * Grids in the cells of grids, not hashed, as in the Manta ray tracer: what hashed grids are
+ * compared with.
+ *
+ * It has the fewest ray-triangle tests, and the longest build in the most memory by far. Choose it
+ * to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
+ * it.
+ *
+ * Memory: ten to thirty times that of one level, and about 600 bytes of scratch for each triangle.
+ * How much index it takes shows only while it is written. `hgrid_sizes` without scratch answers
+ * with a bound that no mesh comes near, up to 8 GiB: ask with scratch, which gives the exact size.
+ */
+#define HGRID_METHOD_RECURSIVE 4
+
+/**
+ * The most levels of a recursive grid.
+ */
+#define HGRID_MAX_DEPTH 4
 
 /**
  * A build flag: refuse a mesh with a triangle that is not finite, instead of leaving it out.
@@ -258,7 +325,11 @@ typedef struct hgrid_mesh {
 } hgrid_mesh;
 
 /**
- * What a build may be told. Initialise it with `HGRID_CONFIG_INIT`; NULL means the same.
+ * What a build may be told. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
+ * or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`.
+ *
+ * Each macro sets all fields to what the method's authors use. To change the method later, set
+ * `method` and `density`: a field that belongs to another method is not looked at.
  */
 typedef struct hgrid_config {
     /**
@@ -266,14 +337,28 @@ typedef struct hgrid_config {
      */
     uint32_t struct_size;
     /**
-     * The structure to build: `HGRID_METHOD_ONE_LEVEL`.
+     * The structure to build: one of `HGRID_METHOD_...`, each of which says when to choose it.
      */
     uint32_t method;
     /**
-     * Cells per triangle, above 0; the default is 4. More cells mean fewer tests, more steps, more
-     * memory.
+     * Cells per triangle, above 0: 4 for one level and variable, 32 for fixed, 8 for recursive.
+     * More cells mean fewer tests, more steps, more memory.
      */
     float density;
+    /**
+     * For `HGRID_METHOD_FIXED`: cells of a level in one macrocell of the level above, on each
+     * axis; 2 or more, usually 6.
+     */
+    uint32_t macrocell_factor;
+    /**
+     * For `HGRID_METHOD_VARIABLE`: a cell with more triangles than this gets a subgrid, if that
+     * separates them; any number, usually 16.
+     */
+    uint32_t subdivide_above;
+    /**
+     * For `HGRID_METHOD_RECURSIVE`: levels of grids, 1 to `HGRID_MAX_DEPTH`, usually 3.
+     */
+    uint32_t depth;
     /**
      * 0 or `HGRID_BUILD_STRICT`.
      */
@@ -300,7 +385,8 @@ typedef struct hgrid_report {
      */
     uint64_t index_bytes;
     /**
-     * Bytes that the scratch region needs: always exact.
+     * Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it is enough, but not
+     * exact, and after a build an upper bound of that.
      */
     uint64_t scratch_bytes;
     /**
@@ -308,20 +394,22 @@ typedef struct hgrid_report {
      */
     uint32_t triangle;
     /**
-     * Triangles left out because a coordinate is not finite. Known after a build, as are all below.
+     * Triangles left out because a coordinate is not finite. Known after a build, as are all
+     * below.
      */
     uint32_t skipped_count;
     /**
-     * Triangle ids in all cells together.
+     * Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_RECURSIVE`
+     * the words of 4 bytes that ids and subgrids take together.
      */
     uint32_t reference_count;
     /**
-     * Cells per triangle: what was asked for, or a half, a quarter, ... of it where the mesh would
-     * have needed more than 16 references for each triangle.
+     * The density of the outermost grid: what was asked for, or a half, a quarter, ... of it where
+     * the mesh would have needed more than 16 references for each triangle.
      */
     float density;
     /**
-     * Cells on each axis.
+     * Cells of the outermost grid on each axis, or of the finest level under macrocells.
      */
     uint32_t resolution[3];
     /**
@@ -381,11 +469,11 @@ typedef struct hgrid_counters {
      */
     uint64_t primitive_tests;
     /**
-     * Cells entered, empty ones included.
+     * Cells and macrocells entered, empty ones included.
      */
     uint64_t cell_steps;
     /**
-     * Subgrids entered; 0 for a grid of one level.
+     * How often a ray went down a level, into a macrocell or a subgrid; 0 for a grid of one level.
      */
     uint64_t grid_steps;
 } hgrid_counters;
@@ -461,6 +549,9 @@ typedef struct hgrid_hit {
 
 /**
  * The index is too small. The report says how many bytes it needs.
+ *
+ * With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
+ * methods the grid was written as far as it went, so the index may hold anything.
  */
 #define HGRID_ERROR_INDEX_TOO_SMALL -10
 
@@ -506,7 +597,8 @@ typedef struct hgrid_hit {
 #define HGRID_ERROR_INVALID_METHOD -30
 
 /**
- * The density is NaN, infinite or not above 0, or asks for more than 4096 cells on an axis.
+ * The density is NaN, infinite or not above 0, or asks for too much: more than 4096 cells on an
+ * axis (1023 for `HGRID_METHOD_RECURSIVE`), or more than 8 GiB of ids and subgrids.
  */
 #define HGRID_ERROR_INVALID_DENSITY -31
 
@@ -514,6 +606,17 @@ typedef struct hgrid_hit {
  * The configuration's `flags` have a bit that this version does not know.
  */
 #define HGRID_ERROR_INVALID_FLAGS -32
+
+/**
+ * The configuration's `macrocell_factor` is 0 or 1, and the method is `HGRID_METHOD_FIXED`.
+ */
+#define HGRID_ERROR_INVALID_MACROCELL_FACTOR -33
+
+/**
+ * The configuration's `depth` is 0 or above `HGRID_MAX_DEPTH`, and the method is
+ * `HGRID_METHOD_RECURSIVE`.
+ */
+#define HGRID_ERROR_INVALID_DEPTH -34
 
 /**
  * The bytes, or the view, are not a grid.
@@ -552,11 +655,14 @@ extern "C" {
 /**
  * Tells how much memory a build of this mesh takes.
  *
- * Without scratch (NULL, 0) the answer takes two passes over the triangles: the report's
- * `scratch_bytes` is exact, `index_bytes` is enough, for a scan up to twice what the grid will
- * take, and `is_exact` is 0. With `scratch_bytes` of scratch the grid is planned there, for about half
- * the time of a build: `index_bytes` is exact and `is_exact` is 1. The scratch holds nothing of use
- * afterwards.
+ * Without scratch (NULL, 0) the answer takes a pass or two over the triangles: the report's
+ * `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
+ * more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
+ * with variable; with recursive it is a bound that no mesh comes near.
+ *
+ * With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
+ * is 1. That takes about half the time of a build; with recursive, which has to build the grid and
+ * keeps nothing of it, all of that time. The scratch holds nothing of use afterwards.
  *
  * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. Returns `HGRID_OK` or
  * the reason, with the triangle that is to blame in the report; scratch that is too small is no
@@ -579,16 +685,22 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  * `index` keeps the grid (it is the blob afterwards), `scratch` is free again when the call
  * returns. Both start at a multiple of `HGRID_ALIGNMENT`, overlap neither each other nor the mesh
  * nor any struct of this call, and may hold anything before. `hgrid_sizes` tells how large they
- * must be, `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` how large is always enough; what is more
- * than needed is not touched. The same mesh and configuration give the same bytes on every machine
- * of the same byte order.
+ * must be, `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` how large is always enough with the
+ * default configuration; what is more than needed is not touched. The same mesh and configuration
+ * give the same bytes on every machine of the same byte order.
  *
  * `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `index` and `scratch` may
  * be NULL if their size is 0. `report` may be NULL.
  *
- * Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `index` and
- * `grid` as they were. The report is written in both cases: what was built; or, if a region is too
- * small, what both need; or the triangle that is to blame.
+ * Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `grid` as it
+ * was. The report is written in both cases: what was built; or, if a region is too small, what
+ * both need; or the triangle that is to blame.
+ *
+ * After an error `index` is as it was, with two exceptions: after `HGRID_ERROR_INDEX_TOO_SMALL`
+ * and `HGRID_ERROR_INVALID_DENSITY`, `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_RECURSIVE` may have
+ * left anything in it, so a grid that lay there before is gone. They write as far as the index
+ * reaches and then go on counting: the report's `index_bytes` is exact, and with so many the same
+ * call succeeds.
  *
  * Threads: any number of calls at once, as long as each has regions, a view and a report of its
  * own. The call starts no thread.
@@ -610,7 +722,8 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  *
  * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
  * in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
- * ignored. The mesh is the one it was built for, which only its counts are checked for.
+ * ignored. It says itself which method built it and how. The mesh is the one it was built for,
+ * which only its counts are checked for.
  *
  * What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
  * nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
@@ -632,8 +745,9 @@ hgrid_status hgrid_open(const void *blob,
 /**
  * Proves that a blob is the grid of its mesh, and so that every answer will be right.
  *
- * Takes about the time of a build and no memory. A grid that was just built needs no proof; a blob
- * from a file, a network or another process may.
+ * Takes no memory and at most about the time of a build; with recursive several times as long, on
+ * damaged bytes much longer. A grid that was just built needs no proof; a blob from a file, a
+ * network or another process may.
  *
  * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
  * that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view that was never built or opened;
@@ -657,8 +771,8 @@ hgrid_status hgrid_validate(const struct hgrid_grid *grid);
  * `options` may be NULL: the defaults. With another NULL, with a view that was never built or
  * opened, or with options that break the rules for structs, nothing is hit.
  *
- * A query allocates nothing, needs a few hundred bytes of stack and takes at most as many steps as
- * the three resolutions sum up to.
+ * A query allocates nothing, needs at most about 4 KiB of stack and always ends: on one level
+ * after no more steps than the three resolutions sum up to.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -725,9 +839,24 @@ const char *hgrid_version_string(void);
 #define HGRID_MESH_INIT {sizeof(hgrid_mesh), HGRID_INDEX_U32, NULL, 0, 0, NULL, 0, 0}
 
 /**
- * The default configuration.
+ * The default configuration: one level.
  */
-#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 0}
+#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 6, 16, 3, 0}
+
+/**
+ * The usual configuration of a fixed grid.
+ */
+#define HGRID_CONFIG_INIT_FIXED {sizeof(hgrid_config), HGRID_METHOD_FIXED, 32.0f, 6, 16, 3, 0}
+
+/**
+ * The usual configuration of a variable grid.
+ */
+#define HGRID_CONFIG_INIT_VARIABLE {sizeof(hgrid_config), HGRID_METHOD_VARIABLE, 4.0f, 6, 16, 3, 0}
+
+/**
+ * The usual configuration of a recursive grid.
+ */
+#define HGRID_CONFIG_INIT_RECURSIVE {sizeof(hgrid_config), HGRID_METHOD_RECURSIVE, 8.0f, 6, 16, 3, 0}
 
 /**
  * The default options of a query.

@@ -1,6 +1,6 @@
 //! What a build or a question for sizes works on, once every pointer is checked.
 
-use hgrid_core::{Config, Error, Grid, TriangleMesh, sizes};
+use hgrid_core::{Config, Error, Grid, Region, TriangleMesh, sizes};
 
 use crate::status::hgrid_status;
 use crate::types::hgrid_report;
@@ -17,7 +17,10 @@ pub(crate) struct Input {
 impl Input {
     /// Asks how much memory a build takes and notes the answer.
     pub(crate) fn measure(self, report: &mut hgrid_report) -> Result<(), hgrid_status> {
-        note_sizes(&self.mesh, &self.config, self.scratch, report)
+        let answer = sizes(&self.mesh, &self.config, self.scratch)
+            .map_err(|error| report.note_error(error))?;
+        report.note_sizes(&answer);
+        Ok(())
     }
 
     /// Builds, and notes what was built or what was missing.
@@ -30,22 +33,14 @@ impl Input {
             }
             Err(error) => {
                 // The error knows one region's need; the caller wants to bring both at once.
-                if matches!(error, Error::OutOfMemory { .. }) {
-                    note_sizes(&mesh, &config, scratch, report)?;
+                if let Error::OutOfMemory { region, .. } = error {
+                    if let Ok(enough) = sizes(&mesh, &config, &mut []) {
+                        report.note_sizes(&enough);
+                    }
+                    report.is_exact = (region == Region::Index).into();
                 }
                 Err(report.note_error(error))
             }
         }
     }
-}
-
-fn note_sizes(
-    mesh: &TriangleMesh<'_>,
-    config: &Config,
-    scratch: &mut [u8],
-    report: &mut hgrid_report,
-) -> Result<(), hgrid_status> {
-    let answer = sizes(mesh, config, scratch).map_err(|error| report.note_error(error))?;
-    report.note_sizes(&answer);
-    Ok(())
 }

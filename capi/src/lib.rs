@@ -37,11 +37,14 @@ const fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 
 /// Tells how much memory a build of this mesh takes.
 ///
-/// Without scratch (NULL, 0) the answer takes two passes over the triangles: the report's
-/// `scratch_bytes` is exact, `index_bytes` is enough, for a scan up to twice what the grid will
-/// take, and `is_exact` is 0. With `scratch_bytes` of scratch the grid is planned there, for about half
-/// the time of a build: `index_bytes` is exact and `is_exact` is 1. The scratch holds nothing of use
-/// afterwards.
+/// Without scratch (NULL, 0) the answer takes a pass or two over the triangles: the report's
+/// `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
+/// more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
+/// with variable; with recursive it is a bound that no mesh comes near.
+///
+/// With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
+/// is 1. That takes about half the time of a build; with recursive, which has to build the grid and
+/// keeps nothing of it, all of that time. The scratch holds nothing of use afterwards.
 ///
 /// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. Returns `HGRID_OK` or
 /// the reason, with the triangle that is to blame in the report; scratch that is too small is no
@@ -77,16 +80,22 @@ pub unsafe extern "C" fn hgrid_sizes(
 /// `index` keeps the grid (it is the blob afterwards), `scratch` is free again when the call
 /// returns. Both start at a multiple of `HGRID_ALIGNMENT`, overlap neither each other nor the mesh
 /// nor any struct of this call, and may hold anything before. `hgrid_sizes` tells how large they
-/// must be, `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` how large is always enough; what is more
-/// than needed is not touched. The same mesh and configuration give the same bytes on every machine
-/// of the same byte order.
+/// must be, `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` how large is always enough with the
+/// default configuration; what is more than needed is not touched. The same mesh and configuration
+/// give the same bytes on every machine of the same byte order.
 ///
 /// `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `index` and `scratch` may
 /// be NULL if their size is 0. `report` may be NULL.
 ///
-/// Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `index` and
-/// `grid` as they were. The report is written in both cases: what was built; or, if a region is too
-/// small, what both need; or the triangle that is to blame.
+/// Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `grid` as it
+/// was. The report is written in both cases: what was built; or, if a region is too small, what
+/// both need; or the triangle that is to blame.
+///
+/// After an error `index` is as it was, with two exceptions: after `HGRID_ERROR_INDEX_TOO_SMALL`
+/// and `HGRID_ERROR_INVALID_DENSITY`, `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_RECURSIVE` may have
+/// left anything in it, so a grid that lay there before is gone. They write as far as the index
+/// reaches and then go on counting: the report's `index_bytes` is exact, and with so many the same
+/// call succeeds.
 ///
 /// Threads: any number of calls at once, as long as each has regions, a view and a report of its
 /// own. The call starts no thread.
@@ -123,7 +132,8 @@ pub unsafe extern "C" fn hgrid_build(
 ///
 /// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
 /// in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
-/// ignored. The mesh is the one it was built for, which only its counts are checked for.
+/// ignored. It says itself which method built it and how. The mesh is the one it was built for,
+/// which only its counts are checked for.
 ///
 /// What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
 /// nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
@@ -159,8 +169,9 @@ pub unsafe extern "C" fn hgrid_open(
 
 /// Proves that a blob is the grid of its mesh, and so that every answer will be right.
 ///
-/// Takes about the time of a build and no memory. A grid that was just built needs no proof; a blob
-/// from a file, a network or another process may.
+/// Takes no memory and at most about the time of a build; with recursive several times as long, on
+/// damaged bytes much longer. A grid that was just built needs no proof; a blob from a file, a
+/// network or another process may.
 ///
 /// Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
 /// that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view that was never built or opened;
@@ -189,8 +200,8 @@ pub unsafe extern "C" fn hgrid_validate(grid: *const hgrid_grid) -> hgrid_status
 /// `options` may be NULL: the defaults. With another NULL, with a view that was never built or
 /// opened, or with options that break the rules for structs, nothing is hit.
 ///
-/// A query allocates nothing, needs a few hundred bytes of stack and takes at most as many steps as
-/// the three resolutions sum up to.
+/// A query allocates nothing, needs at most about 4 KiB of stack and always ends: on one level
+/// after no more steps than the three resolutions sum up to.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///

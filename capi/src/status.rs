@@ -27,6 +27,9 @@ pub const HGRID_ERROR_MISALIGNED: hgrid_status = -3;
 pub const HGRID_ERROR_OVERLAP: hgrid_status = -4;
 
 /// The index is too small. The report says how many bytes it needs.
+///
+/// With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
+/// methods the grid was written as far as it went, so the index may hold anything.
 pub const HGRID_ERROR_INDEX_TOO_SMALL: hgrid_status = -10;
 
 /// The scratch is too small. The report says how many bytes it needs.
@@ -54,11 +57,19 @@ pub const HGRID_ERROR_NON_FINITE: hgrid_status = -25;
 /// The configuration's `method` is none that this version knows.
 pub const HGRID_ERROR_INVALID_METHOD: hgrid_status = -30;
 
-/// The density is NaN, infinite or not above 0, or asks for more than 4096 cells on an axis.
+/// The density is NaN, infinite or not above 0, or asks for too much: more than 4096 cells on an
+/// axis (1023 for `HGRID_METHOD_RECURSIVE`), or more than 8 GiB of ids and subgrids.
 pub const HGRID_ERROR_INVALID_DENSITY: hgrid_status = -31;
 
 /// The configuration's `flags` have a bit that this version does not know.
 pub const HGRID_ERROR_INVALID_FLAGS: hgrid_status = -32;
+
+/// The configuration's `macrocell_factor` is 0 or 1, and the method is `HGRID_METHOD_FIXED`.
+pub const HGRID_ERROR_INVALID_MACROCELL_FACTOR: hgrid_status = -33;
+
+/// The configuration's `depth` is 0 or above `HGRID_MAX_DEPTH`, and the method is
+/// `HGRID_METHOD_RECURSIVE`.
+pub const HGRID_ERROR_INVALID_DEPTH: hgrid_status = -34;
 
 /// The bytes, or the view, are not a grid.
 pub const HGRID_ERROR_NOT_A_GRID: hgrid_status = -40;
@@ -79,7 +90,7 @@ pub const HGRID_ERROR_MESH_MISMATCH: hgrid_status = -44;
 pub const HGRID_ERROR_CORRUPT: hgrid_status = -45;
 
 /// The status that stands for an error of core.
-pub(crate) fn status_of(error: Error) -> hgrid_status {
+pub(crate) const fn status_of(error: Error) -> hgrid_status {
     match error {
         Error::OutOfMemory { region: Region::Index, .. } => HGRID_ERROR_INDEX_TOO_SMALL,
         Error::OutOfMemory { region: Region::Scratch, .. } => HGRID_ERROR_SCRATCH_TOO_SMALL,
@@ -89,10 +100,11 @@ pub(crate) fn status_of(error: Error) -> hgrid_status {
         Error::TooManyTriangles => HGRID_ERROR_TOO_MANY_TRIANGLES,
         Error::IndexOutOfRange { .. } => HGRID_ERROR_INDEX_OUT_OF_RANGE,
         Error::NonFiniteTriangle { .. } => HGRID_ERROR_NON_FINITE,
+        Error::InvalidConfig(ConfigField::Method) => HGRID_ERROR_INVALID_METHOD,
         Error::InvalidConfig(ConfigField::Density) => HGRID_ERROR_INVALID_DENSITY,
+        Error::InvalidConfig(ConfigField::MacrocellFactor) => HGRID_ERROR_INVALID_MACROCELL_FACTOR,
+        Error::InvalidConfig(ConfigField::Depth) => HGRID_ERROR_INVALID_DEPTH,
         Error::InvalidConfig(ConfigField::Flags) => HGRID_ERROR_INVALID_FLAGS,
-        // What else there is belongs to methods, and C cannot set it.
-        Error::InvalidConfig(_) => HGRID_ERROR_INVALID_METHOD,
         Error::NotAGrid => HGRID_ERROR_NOT_A_GRID,
         Error::WrongByteOrder => HGRID_ERROR_WRONG_BYTE_ORDER,
         Error::UnsupportedVersion { .. } => HGRID_ERROR_UNSUPPORTED_VERSION,
@@ -136,9 +148,11 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         }
         HGRID_ERROR_INVALID_METHOD => c"unknown method: use one of HGRID_METHOD_...",
         HGRID_ERROR_INVALID_DENSITY => {
-            c"invalid density: above 0, and at most 4096 cells on an axis"
+            c"invalid density: above 0, and lower if the grid would become too fine or too large"
         }
         HGRID_ERROR_INVALID_FLAGS => c"unknown flag: use 0 or HGRID_BUILD_...",
+        HGRID_ERROR_INVALID_MACROCELL_FACTOR => c"invalid macrocell_factor: 2 or more, usually 6",
+        HGRID_ERROR_INVALID_DEPTH => c"invalid depth: 1 to HGRID_MAX_DEPTH, usually 3",
         HGRID_ERROR_NOT_A_GRID => c"not a grid: build or open one first",
         HGRID_ERROR_WRONG_BYTE_ORDER => {
             c"a blob of the other byte order: build it again on this machine"

@@ -6,7 +6,7 @@ use core::ffi::c_void;
 
 use hgrid_core::{
     BuildFlags, Config, Counters, Error, Grid, Hit, INVALID_ID, IndexType, MAX_TRIANGLES, Method,
-    Ray, Sizes,
+    Ray, Region, Sizes,
 };
 
 use crate::status::{
@@ -18,7 +18,8 @@ use crate::status::{
 /// Every memory region starts at a multiple of this many bytes: index, scratch and blob.
 pub const HGRID_ALIGNMENT: usize = 64;
 
-/// The version of the blob format. A blob of another version is refused: build it again.
+/// The version of the blob format, the same for all methods. A blob of another version is refused:
+/// build it again.
 pub const HGRID_BLOB_VERSION: u32 = 1;
 
 /// Indices of 32 bits: the default of `hgrid_mesh`.
@@ -28,7 +29,49 @@ pub const HGRID_INDEX_U32: u32 = 0;
 pub const HGRID_INDEX_U16: u32 = 1;
 
 /// One hashed grid with a single cell size: the default of `hgrid_config`.
+///
+/// Choose it for the shortest build in the least memory: meshes that move, and small machines. It
+/// is at its best where triangles are of similar size and everywhere, and slow where all detail is
+/// in a few places of a large scene.
+///
+/// Memory: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. The build plans every byte in
+/// the scratch before it writes the index.
 pub const HGRID_METHOD_ONE_LEVEL: u32 = 1;
+
+/// A hashed grid of many small cells, and above it levels of macrocells that say where anything is.
+///
+/// Rays cross empty space in large steps, and the small cells hold few triangles each. Choose it
+/// where many rays are shot for each build. `macrocell_factor` belongs to it.
+///
+/// Memory: two to three times that of one level. The build plans every byte in the scratch before
+/// it writes the index.
+pub const HGRID_METHOD_FIXED: u32 = 2;
+
+/// A hashed grid whose crowded cells hold hashed grids of their own: subgrids, cut to what is
+/// there.
+///
+/// Choose it where detail is uneven, up to the proverbial teapot in a stadium, or where nobody
+/// knows in advance. `subdivide_above` belongs to it.
+///
+/// Memory: four to seven times that of one level. How much it takes shows only while the index is
+/// written: `hgrid_sizes` without scratch answers with a generous bound, with scratch with the
+/// exact size.
+pub const HGRID_METHOD_VARIABLE: u32 = 3;
+
+/// Grids in the cells of grids, not hashed, as in the Manta ray tracer: what hashed grids are
+/// compared with.
+///
+/// It has the fewest ray-triangle tests, and the longest build in the most memory by far. Choose it
+/// to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
+/// it.
+///
+/// Memory: ten to thirty times that of one level, and about 600 bytes of scratch for each triangle.
+/// How much index it takes shows only while it is written. `hgrid_sizes` without scratch answers
+/// with a bound that no mesh comes near, up to 8 GiB: ask with scratch, which gives the exact size.
+pub const HGRID_METHOD_RECURSIVE: u32 = 4;
+
+/// The most levels of a recursive grid.
+pub const HGRID_MAX_DEPTH: u32 = 4;
 
 /// A build flag: refuse a mesh with a triangle that is not finite, instead of leaving it out.
 pub const HGRID_BUILD_STRICT: u32 = 1;
@@ -36,6 +79,10 @@ pub const HGRID_BUILD_STRICT: u32 = 1;
 const _: () = assert!(HGRID_ALIGNMENT == hgrid_core::ALIGNMENT);
 const _: () = assert!(HGRID_BLOB_VERSION == hgrid_core::BLOB_VERSION);
 const _: () = assert!(HGRID_METHOD_ONE_LEVEL == Method::OneLevel as u32);
+const _: () = assert!(HGRID_METHOD_FIXED == Method::Fixed as u32);
+const _: () = assert!(HGRID_METHOD_VARIABLE == Method::Variable as u32);
+const _: () = assert!(HGRID_METHOD_RECURSIVE == Method::Recursive as u32);
+const _: () = assert!(HGRID_MAX_DEPTH == hgrid_core::MAX_DEPTH);
 const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
 
 /// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.
@@ -80,9 +127,9 @@ pub struct hgrid_hit {
 pub struct hgrid_counters {
     /// Ray-triangle tests.
     pub primitive_tests: u64,
-    /// Cells entered, empty ones included.
+    /// Cells and macrocells entered, empty ones included.
     pub cell_steps: u64,
-    /// Subgrids entered; 0 for a grid of one level.
+    /// How often a ray went down a level, into a macrocell or a subgrid; 0 for a grid of one level.
     pub grid_steps: u64,
 }
 
@@ -113,17 +160,29 @@ pub struct hgrid_mesh {
     pub triangle_count: usize,
 }
 
-/// What a build may be told. Initialise it with `HGRID_CONFIG_INIT`; NULL means the same.
+/// What a build may be told. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
+/// or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`.
+///
+/// Each macro sets all fields to what the method's authors use. To change the method later, set
+/// `method` and `density`: a field that belongs to another method is not looked at.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_config {
     /// `sizeof(hgrid_config)`.
     pub struct_size: u32,
-    /// The structure to build: `HGRID_METHOD_ONE_LEVEL`.
+    /// The structure to build: one of `HGRID_METHOD_...`, each of which says when to choose it.
     pub method: u32,
-    /// Cells per triangle, above 0; the default is 4. More cells mean fewer tests, more steps, more
-    /// memory.
+    /// Cells per triangle, above 0: 4 for one level and variable, 32 for fixed, 8 for recursive.
+    /// More cells mean fewer tests, more steps, more memory.
     pub density: f32,
+    /// For `HGRID_METHOD_FIXED`: cells of a level in one macrocell of the level above, on each
+    /// axis; 2 or more, usually 6.
+    pub macrocell_factor: u32,
+    /// For `HGRID_METHOD_VARIABLE`: a cell with more triangles than this gets a subgrid, if that
+    /// separates them; any number, usually 16.
+    pub subdivide_above: u32,
+    /// For `HGRID_METHOD_RECURSIVE`: levels of grids, 1 to `HGRID_MAX_DEPTH`, usually 3.
+    pub depth: u32,
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
 }
@@ -153,18 +212,21 @@ pub struct hgrid_report {
     pub is_exact: u32,
     /// Bytes that the index region needs; after a build, the size of the blob.
     pub index_bytes: u64,
-    /// Bytes that the scratch region needs: always exact.
+    /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it is enough, but not
+    /// exact, and after a build an upper bound of that.
     pub scratch_bytes: u64,
     /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
     pub triangle: u32,
-    /// Triangles left out because a coordinate is not finite. Known after a build, as are all below.
+    /// Triangles left out because a coordinate is not finite. Known after a build, as are all
+    /// below.
     pub skipped_count: u32,
-    /// Triangle ids in all cells together.
+    /// Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_RECURSIVE`
+    /// the words of 4 bytes that ids and subgrids take together.
     pub reference_count: u32,
-    /// Cells per triangle: what was asked for, or a half, a quarter, ... of it where the mesh would
-    /// have needed more than 16 references for each triangle.
+    /// The density of the outermost grid: what was asked for, or a half, a quarter, ... of it where
+    /// the mesh would have needed more than 16 references for each triangle.
     pub density: f32,
-    /// Cells on each axis.
+    /// Cells of the outermost grid on each axis, or of the finest level under macrocells.
     pub resolution: [u32; 3],
     /// 0.
     pub reserved: u32,
@@ -207,14 +269,12 @@ impl hgrid_counters {
 }
 
 impl hgrid_config {
-    /// The configuration as core knows it. The density is core's to judge.
+    /// The configuration as core knows it. The numbers are core's to judge.
     pub(crate) fn to_core(self) -> Result<Config, hgrid_status> {
-        let method = match self.method {
-            HGRID_METHOD_ONE_LEVEL => Method::OneLevel,
-            _ => return Err(HGRID_ERROR_INVALID_METHOD),
-        };
+        let Self { density, macrocell_factor, subdivide_above, depth, .. } = self;
+        let method = Method::from_u32(self.method).ok_or(HGRID_ERROR_INVALID_METHOD)?;
         let flags = BuildFlags::from_bits(self.flags).ok_or(HGRID_ERROR_INVALID_FLAGS)?;
-        Ok(Config { density: self.density, flags, ..Config::new(method) })
+        Ok(Config { method, density, macrocell_factor, subdivide_above, depth, flags })
     }
 }
 
@@ -253,10 +313,19 @@ impl hgrid_report {
         self.resolution = grid.resolution();
     }
 
-    /// Notes which triangle is to blame and passes the error on.
-    pub(crate) fn note_error(&mut self, error: Error) -> hgrid_status {
-        if let Error::IndexOutOfRange { triangle } | Error::NonFiniteTriangle { triangle } = error {
-            self.triangle = triangle;
+    /// Notes what was missing or which triangle is to blame, and passes the error on.
+    pub(crate) const fn note_error(&mut self, error: Error) -> hgrid_status {
+        match error {
+            Error::OutOfMemory { region: Region::Index, needed_bytes, .. } => {
+                self.index_bytes = needed_bytes;
+            }
+            Error::OutOfMemory { region: Region::Scratch, needed_bytes, .. } => {
+                self.scratch_bytes = needed_bytes;
+            }
+            Error::IndexOutOfRange { triangle } | Error::NonFiniteTriangle { triangle } => {
+                self.triangle = triangle;
+            }
+            _ => {}
         }
         status_of(error)
     }

@@ -46,21 +46,25 @@ impl Aabb {
     }
 
     /// The part `(near, far)` of a line inside the box, in multiples of its direction.
+    ///
+    /// The line is given with the inverse of its direction, infinite where that is zero.
     #[inline]
-    pub(crate) fn clip(&self, origin: [f32; 3], direction: [f32; 3]) -> Option<(f64, f64)> {
+    pub(crate) fn clip(&self, origin: [f32; 3], inverse: [f64; 3]) -> Option<(f64, f64)> {
         let (min, max) = (self.min.to_array(), self.max.to_array());
         let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
         for axis in 0..3 {
-            let (origin, direction) = (f64::from(origin[axis]), f64::from(direction[axis]));
+            let (origin, inverse) = (f64::from(origin[axis]), inverse[axis]);
             let (low, high) = (f64::from(min[axis]) - origin, f64::from(max[axis]) - origin);
-            if direction > 0.0 {
-                near = near.max(low / direction);
-                far = far.min(high / direction);
-            } else if direction < 0.0 {
-                near = near.max(high / direction);
-                far = far.min(low / direction);
-            } else if low > 0.0 || high < 0.0 {
-                return None;
+            if inverse.is_infinite() {
+                if low > 0.0 || high < 0.0 {
+                    return None;
+                }
+            } else if inverse > 0.0 {
+                near = near.max(low * inverse);
+                far = far.min(high * inverse);
+            } else {
+                near = near.max(high * inverse);
+                far = far.min(low * inverse);
             }
         }
         (near <= far).then_some((near, far))

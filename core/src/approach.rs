@@ -26,6 +26,8 @@ pub(crate) struct Approach {
     pub(crate) near: f64,
     /// Where it leaves the box.
     pub(crate) far: f64,
+    /// One over the direction.
+    pub(crate) inverse: [f64; 3],
 }
 
 impl Approach {
@@ -35,17 +37,18 @@ impl Approach {
         if !ray.is_valid() {
             return None;
         }
-        let (near, far) = bounds.clip(ray.origin, ray.direction)?;
+        let inverse = ray.direction.map(|direction| 1.0 / f64::from(direction));
+        let (near, far) = bounds.clip(ray.origin, inverse)?;
         let center = (bounds.min + bounds.max) * 0.5;
         let distance = (Vec3A::from_array(ray.origin) - center).abs().max_element();
         if distance <= FAR_EXTENTS * bounds.size().max_element() {
-            return Some(Self { anchor: ray.origin, t: 0.0, near, far });
+            return Some(Self { anchor: ray.origin, t: 0.0, near, far, inverse });
         }
         let anchor = core::array::from_fn(|axis| {
             round(f64::from(ray.origin[axis]) + near * f64::from(ray.direction[axis]))
         });
         let t = near;
-        let (near, far) = bounds.clip(anchor, ray.direction)?;
-        Some(Self { anchor, t, near, far })
+        let (near, far) = bounds.clip(anchor, inverse)?;
+        Some(Self { anchor, t, near, far, inverse })
     }
 }

@@ -56,7 +56,7 @@ pub(crate) struct Header {
     pub(crate) resolution: [u32; 3],
     /// Slots of the hash table.
     pub(crate) hash_count: u32,
-    /// Primitive ids in all cells together.
+    /// Primitive ids in all cells together, or words of the pool for a method that has one.
     pub(crate) reference_count: u32,
     /// Cells of a level in one of the level above, on each axis; 0 for a method without levels.
     pub(crate) macrocell_factor: u32,

@@ -79,6 +79,7 @@ impl Line {
         let direction = ray.direction.map(f64::from);
         let longest = direction.map(f64::abs).into_iter().fold(0.0, f64::max);
         let scale = longest * lattice.finest();
+        let inverse_scale = 1.0 / scale;
 
         let mut line = Self {
             position: [0.0; 3],
@@ -94,8 +95,9 @@ impl Line {
             line.position[axis] = round(lattice.position(axis, point));
             if direction.abs() >= longest * PARALLEL {
                 let speed = direction * lattice.cells_per_unit(axis);
-                line.rate[axis] = round(speed / scale);
-                line.delta[axis] = round(scale / speed);
+                line.rate[axis] = round(speed * inverse_scale);
+                let fineness = lattice.finest() / lattice.cells_per_unit(axis);
+                line.delta[axis] = round(longest * approach.inverse[axis] * fineness);
             }
         }
         Some(line)

@@ -19,8 +19,8 @@ use crate::variable::{self, Variable};
 /// A built grid and the mesh it was built for, ready for queries.
 ///
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
-/// number of threads may query it at once. Queries never fail, never allocate, never panic, take
-/// at most as many steps as the three resolutions sum up to, and need a few hundred bytes of stack.
+/// number of threads may query it at once. Queries never fail, never allocate and never panic; their
+/// steps are bounded by the resolutions (one level: by their sum), their stack is about 2 KiB.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,
@@ -49,7 +49,8 @@ impl<'a> Grid<'a> {
     /// [`Error::OutOfMemory`] names the region and its need, [`Error::Misaligned`] the region;
     /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
     /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field. After an
-    /// error the index region is as it was.
+    /// error the index region is as it was, but for variable and recursive grids, which fill it as
+    /// they go: there it holds nothing of use. Either way both regions can be used again.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
@@ -120,7 +121,7 @@ impl<'a> Grid<'a> {
     /// that came from a file, a network or another process may.
     ///
     /// # Errors
-    /// [`Error::Corrupt`] with the first byte that a build would not have written so;
+    /// [`Error::Corrupt`] with a byte that a build would not have written so;
     /// [`Error::IndexOutOfRange`] if the mesh itself is damaged.
     pub fn validate(&self) -> Result<(), Error> {
         let header = Header::read(self.blob, &self.mesh)?;
@@ -223,7 +224,7 @@ impl<'a> Grid<'a> {
         let triangles = self.mesh.triangle_count();
         match self.structure {
             Structure::OneLevel(_) | Structure::Fixed(_) => one_level::scratch_bytes(resolution),
-            Structure::Recursive(_) => recursive::scratch_bytes(triangles, self.config().depth),
+            Structure::Recursive(_) => recursive::scratch_bytes(triangles, &self.config()),
             Structure::Variable(_) => {
                 variable::scratch_bytes_at_most(resolution, triangles, self.density())
             }
@@ -274,7 +275,7 @@ impl<'a> Grid<'a> {
         self.header().map_or(0, |header| header.skipped_count)
     }
 
-    /// Primitive ids in all cells together.
+    /// Primitive ids in all cells together; words of the pool for a variable or recursive grid.
     #[must_use]
     pub fn reference_count(&self) -> u32 {
         self.header().map_or(0, |header| header.reference_count)

@@ -23,10 +23,10 @@
 //! # Ok::<(), hgrid_core::Error>(())
 //! ```
 //!
-//! The house, from the ground up: nouns ([`error`](Error), [`ray`](Ray), `aabb`,
-//! [`mesh`](TriangleMesh), `approach`, [`triangle`](TriangleTest), [`config`](Config), [`arena`](Block), `bits`,
-//! `cell`, `dda`, [`counters`](Counters), `survey`, `blob`), one folder per structure above them
-//! (`one_level`), and [`grid`](Grid) on top: the view that queries run on.
+//! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `approach`, `triangle`,
+//! `config`, `arena`, `bump`, `bits`, `cell`, `dda`, `counters`, `survey`, `blob`), one folder per
+//! structure above them (`one_level`; `fixed` and `variable` on top of it; `recursive`), and `grid`: the
+//! view that queries run on. core/DESIGN.md tells how it all works and what was left out.
 //!
 //! Keys used in these pages: **CP10** Costa, Pereira, Jorge 2010; **LD08** Lagae and Dutré,
 //! *Compact, Fast and Robust Grids for Ray Tracing*, 2008.
@@ -35,6 +35,11 @@
 
 #[cfg(test)]
 extern crate alloc;
+
+/// The README's example runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
 
 const _: () = assert!(usize::BITS >= 32, "hgrid needs pointers of 32 bits or more");
 

@@ -16,14 +16,14 @@ pub struct Sizes {
     /// For the region that only the build needs.
     pub scratch_bytes: usize,
     /// Whether `index_bytes` is what the grid will take, to the byte, or only no less than that.
-    /// `scratch_bytes` is always exact.
+    /// `scratch_bytes` is exact for one-level and fixed grids, and enough for the others.
     pub is_exact: bool,
 }
 
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A scan needs a fifth of it. `None` if the density is no density or the sizes do not fit the
+    /// A one-level grid of a scan takes an eighth of it. Generous beyond use for recursive grids. `None` if the density is no density or the sizes do not fit the
     /// machine's address space.
     ///
     /// ```
@@ -74,10 +74,11 @@ impl Sizes {
 
 /// The memory that a build of this mesh takes.
 ///
-/// With an empty `scratch` the answer takes two passes over the triangles; `scratch_bytes` is
-/// exact and `index_bytes` enough, about twice what a scan will take. With `scratch_bytes` of
-/// scratch (same alignment rule as for a build) the grid is planned in it and `index_bytes` is
-/// exact too, for about half the time of a build. The scratch holds nothing of use afterwards.
+/// With an empty `scratch` the answer takes two passes over the triangles and `index_bytes` is
+/// enough: for a one-level or fixed grid of a scan about twice what it will take, for the other two a
+/// generous multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid is
+/// planned in it and `index_bytes` is exact, for about half the time of a build, up to all of it
+/// for a variable or recursive grid. The scratch holds nothing of use afterwards.
 ///
 /// # Errors
 /// Those of [`Grid::build`](crate::Grid::build), but for index memory.

@@ -1,11 +1,13 @@
 //! Does C get what Rust gets, bit by bit?
 
 use std::io::Write as _;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
-use hgrid_core::{Counters, Hit, Ray};
+use hgrid_core::{Config, Counters, Hit, Method, Ray};
 use hgrid_tests::artefact::static_library;
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
+use hgrid_tests::methods::configs;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use tempfile::TempDir;
@@ -24,10 +26,19 @@ fn rays(count: usize) -> Vec<Ray> {
     (0..count).map(|_| ray()).collect()
 }
 
+/// The words of a `hgrid_config`.
+fn words(config: &Config) -> [u32; 7] {
+    let Config { method, density, macrocell_factor, subdivide_above, depth, flags } = *config;
+    let size = size_of::<[u32; 7]>() as u32;
+    let density = density.to_bits();
+    [size, method as u32, density, macrocell_factor, subdivide_above, depth, flags.bits()]
+}
+
 /// What `answers.c` reads.
-fn question(mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
-    let counts = [mesh.positions.len(), mesh.indices.len(), rays.len()];
-    let mut bytes: Vec<u8> = counts.iter().flat_map(|&n| (n as u32).to_ne_bytes()).collect();
+fn question(config: &Config, mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
+    let counts = [mesh.positions.len(), mesh.indices.len(), rays.len()].map(|n| n as u32);
+    let numbers = words(config).into_iter().chain(counts);
+    let mut bytes: Vec<u8> = numbers.flat_map(u32::to_ne_bytes).collect();
     bytes.extend(mesh.positions.iter().flatten().flat_map(|c| c.to_ne_bytes()));
     bytes.extend(mesh.indices.iter().flatten().flat_map(|i| i.to_ne_bytes()));
     for ray in rays {
@@ -38,8 +49,8 @@ fn question(mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
 }
 
 /// What `answers.c` must write.
-fn answer(mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
-    let owned = Owned::build(&mesh.view(), &hgrid_core::Config::default()).expect("a sound mesh");
+fn answer(config: &Config, mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
+    let owned = Owned::build(&mesh.view(), config).expect("a sound mesh");
     let grid = owned.open(&mesh.view()).expect("its own mesh");
     let mut bytes = (grid.blob_bytes() as u64).to_ne_bytes().to_vec();
     bytes.extend(grid.blob());
@@ -57,25 +68,32 @@ fn answer(mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
     bytes
 }
 
+/// What a program answers to a question.
+fn ask(program: &Path, question: Vec<u8>) -> Vec<u8> {
+    let mut child = Command::new(program)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut stdin = child.stdin.take().expect("a pipe");
+    let writer = std::thread::spawn(move || stdin.write_all(&question));
+    let output = child.wait_with_output().expect("the program ends");
+    writer.join().expect("no panic").expect("the program reads everything");
+    assert!(output.status.success(), "{}", output.status);
+    output.stdout
+}
+
 #[test]
 fn c_gets_the_bits_that_rust_gets() {
     let dir = TempDir::new().expect("a folder");
     let program = compile("answers", "c99", &["-O2"], &static_library(), dir.path());
+    let rays = rays(2000);
     let meshes =
         [Mesh::default(), one_triangle(), ball(20, 1.0), soup(3000, 0.1, 1), soup(200, 2.0, 2)];
-    for mesh in &meshes {
-        let rays = rays(2000);
-        let mut child = Command::new(&program)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
-        let mut stdin = child.stdin.take().expect("a pipe");
-        let question = question(mesh, &rays);
-        let writer = std::thread::spawn(move || stdin.write_all(&question));
-        let output = child.wait_with_output().expect("the program ends");
-        writer.join().expect("no panic").expect("the program reads everything");
-        assert!(output.status.success(), "{}", output.status);
-        assert!(output.stdout == answer(mesh, &rays), "{} triangles", mesh.indices.len());
+    let configs: Vec<_> = Method::ALL.iter().copied().map(Config::new).chain(configs()).collect();
+    for (config, mesh) in configs.iter().flat_map(|c| meshes.iter().map(move |mesh| (c, mesh))) {
+        let found = ask(&program, question(config, mesh, &rays));
+        let triangles = mesh.indices.len();
+        assert!(found == answer(config, mesh, &rays), "{triangles} triangles, {config:?}");
     }
 }

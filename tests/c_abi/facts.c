@@ -41,6 +41,9 @@ static void layout(void)
     OFFSET(hgrid_config, struct_size);
     OFFSET(hgrid_config, method);
     OFFSET(hgrid_config, density);
+    OFFSET(hgrid_config, macrocell_factor);
+    OFFSET(hgrid_config, subdivide_above);
+    OFFSET(hgrid_config, depth);
     OFFSET(hgrid_config, flags);
     SIZE(hgrid_query_options);
     OFFSET(hgrid_query_options, struct_size);
@@ -68,6 +71,10 @@ static void constants(void)
     NUMBER(HGRID_INDEX_U32);
     NUMBER(HGRID_INDEX_U16);
     NUMBER(HGRID_METHOD_ONE_LEVEL);
+    NUMBER(HGRID_METHOD_FIXED);
+    NUMBER(HGRID_METHOD_VARIABLE);
+    NUMBER(HGRID_METHOD_RECURSIVE);
+    NUMBER(HGRID_MAX_DEPTH);
     NUMBER(HGRID_BUILD_STRICT);
     NUMBER(HGRID_OK);
     NUMBER(HGRID_ERROR_NULL_ARGUMENT);
@@ -85,6 +92,8 @@ static void constants(void)
     NUMBER(HGRID_ERROR_INVALID_METHOD);
     NUMBER(HGRID_ERROR_INVALID_DENSITY);
     NUMBER(HGRID_ERROR_INVALID_FLAGS);
+    NUMBER(HGRID_ERROR_INVALID_MACROCELL_FACTOR);
+    NUMBER(HGRID_ERROR_INVALID_DEPTH);
     NUMBER(HGRID_ERROR_NOT_A_GRID);
     NUMBER(HGRID_ERROR_WRONG_BYTE_ORDER);
     NUMBER(HGRID_ERROR_UNSUPPORTED_VERSION);
@@ -105,14 +114,20 @@ static void versions(void)
 static void defaults(void)
 {
     const hgrid_mesh mesh = HGRID_MESH_INIT;
-    const hgrid_config config = HGRID_CONFIG_INIT;
+    const hgrid_config configs[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
+                                    HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE};
     const hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
     const hgrid_report report = HGRID_REPORT_INIT;
     printf("mesh %lu\n", (unsigned long)mesh.struct_size);
     printf("options %lu\n", (unsigned long)options.struct_size);
     printf("report %lu\n", (unsigned long)report.struct_size);
-    printf("config %lu %lu %g %lu\n", (unsigned long)config.struct_size,
-           (unsigned long)config.method, (double)config.density, (unsigned long)config.flags);
+    for (size_t i = 0; i < sizeof configs / sizeof *configs; i++) {
+        const hgrid_config *c = &configs[i];
+        printf("config_%lu %lu %g %lu %lu %lu %lu\n", (unsigned long)c->method,
+               (unsigned long)c->struct_size, (double)c->density,
+               (unsigned long)c->macrocell_factor, (unsigned long)c->subdivide_above,
+               (unsigned long)c->depth, (unsigned long)c->flags);
+    }
 }
 
 static void bounds(void)

@@ -5,7 +5,7 @@ use std::fs;
 use std::process::Command;
 use std::sync::OnceLock;
 
-use hgrid_core::{Config, Sizes};
+use hgrid_core::{Config, Method, Sizes};
 use hgrid_tests::artefact::{compiler, is_installed, root, run, static_library, warnings};
 use tempfile::TempDir;
 
@@ -152,9 +152,14 @@ fn initialisers_are_the_defaults() {
         let struct_name = if name == "options" { "query_options" } else { name };
         assert_eq!(fact(name), fact(&format!("hgrid_{struct_name}")), "{name}");
     }
-    let Config { method, density, flags, .. } = Config::default();
-    let size = fact("hgrid_config");
-    assert_eq!(fact("config"), format!("{size} {} {density} {}", method as u32, flags.bits()));
+    for config in Method::ALL.iter().copied().map(Config::new) {
+        let Config { method, density, macrocell_factor, subdivide_above, depth, flags } = config;
+        let (size, flags) = (fact("hgrid_config"), flags.bits());
+        let fields =
+            format!("{size} {density} {macrocell_factor} {subdivide_above} {depth} {flags}");
+        assert_eq!(fact(&format!("config_{}", method as u32)), fields, "{method:?}");
+    }
+    assert_eq!(fact("HGRID_METHOD_ONE_LEVEL"), (Config::default().method as u32).to_string());
 }
 
 #[test]

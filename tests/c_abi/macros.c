@@ -8,8 +8,10 @@ HGRID_ALIGNED unsigned char scratch_region[HGRID_SCRATCH_BOUND(3)];
 
 static hgrid_mesh mesh = HGRID_MESH_INIT;
 static const hgrid_config config = HGRID_CONFIG_INIT;
+static const hgrid_config others[] = {HGRID_CONFIG_INIT_FIXED, HGRID_CONFIG_INIT_VARIABLE,
+                                      HGRID_CONFIG_INIT_RECURSIVE};
 
-#if HGRID_VERSION < 0x000100 || HGRID_BLOB_VERSION < 1 || HGRID_ALIGNMENT != 64
+#if HGRID_VERSION < 0x000100 || HGRID_BLOB_VERSION < 1 || HGRID_ALIGNMENT != 64 || HGRID_MAX_DEPTH < 1
 #error "the numbers work in the preprocessor, too"
 #endif
 
@@ -25,6 +27,8 @@ int main(void)
     size_t misplaced = ((size_t)index_region | (size_t)scratch_region | (size_t)local) % 64;
     hgrid_status status = hgrid_build(&mesh, &config, index_region, sizeof index_region,
                                       scratch_region, sizeof scratch_region, &grid, &report);
+    for (size_t i = 0; i < sizeof others / sizeof *others && status == HGRID_OK; i++)
+        status = hgrid_sizes(&mesh, &others[i], NULL, 0, &report);
     return misplaced != 0 || status != HGRID_OK || report.triangle != HGRID_INVALID_ID ||
            hgrid_intersect(&grid, &ray, &options, &hit) || hgrid_occluded(&grid, &ray, NULL);
 }

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 use crate::header::statuses;
 
 /// Programs that check for themselves and tell which statuses they reached.
-const PROGRAMS: [&str; 4] = ["queries", "memory", "refusals", "blobs"];
+const PROGRAMS: [&str; 5] = ["queries", "memory", "methods", "refusals", "blobs"];
 
 const SANITIZERS: [&str; 3] =
     ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"];

@@ -246,11 +246,12 @@ static void regions_must_lie_apart(void)
 
 static void unknown_values_are_errors(void)
 {
-    const uint32_t unknown[] = {0, 100, 0x7fffffffu, 0x80000000u, UINT32_MAX};
+    const uint32_t unknown[] = {0, 5, 100, 0x7fffffffu, 0x80000000u, UINT32_MAX};
     for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) {
         hgrid_config config = HGRID_CONFIG_INIT;
         config.method = unknown[i];
         refuse(HGRID_ERROR_INVALID_METHOD, &mesh, &config);
+        /* All of them have a bit that no flag has. */
         if (unknown[i] != 0) {
             hgrid_config flags = HGRID_CONFIG_INIT;
             flags.flags = unknown[i];
@@ -265,6 +266,47 @@ static void unknown_values_are_errors(void)
         hgrid_config config = HGRID_CONFIG_INIT;
         config.density = densities[i];
         refuse(HGRID_ERROR_INVALID_DENSITY, &mesh, &config);
+    }
+}
+
+/* A method's own fields are checked, those of the others are not looked at. */
+static void fields_of_methods_are_checked(void)
+{
+    const hgrid_config usual[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
+                                  HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE};
+    const uint32_t depths[] = {0, HGRID_MAX_DEPTH + 1, UINT32_MAX};
+    for (size_t i = 0; i < sizeof usual / sizeof *usual; i++) {
+        const uint32_t method = usual[i].method;
+        for (uint32_t factor = 0; factor < 2; factor++) {
+            hgrid_config config = usual[i];
+            config.macrocell_factor = factor;
+            if (method == HGRID_METHOD_FIXED)
+                refuse(HGRID_ERROR_INVALID_MACROCELL_FACTOR, &mesh, &config);
+            else
+                exact_sizes(&mesh, &config);
+        }
+        for (size_t d = 0; d < sizeof depths / sizeof *depths; d++) {
+            hgrid_config config = usual[i];
+            config.depth = depths[d];
+            if (method == HGRID_METHOD_RECURSIVE)
+                refuse(HGRID_ERROR_INVALID_DEPTH, &mesh, &config);
+            else
+                exact_sizes(&mesh, &config);
+        }
+        const float densities[] = {0, -1, NAN, INFINITY};
+        for (size_t d = 0; d < sizeof densities / sizeof *densities; d++) {
+            hgrid_config config = usual[i];
+            config.density = densities[d];
+            refuse(HGRID_ERROR_INVALID_DENSITY, &mesh, &config);
+        }
+        hgrid_config config = usual[i];
+        config.flags = 0x80000000u;
+        refuse(HGRID_ERROR_INVALID_FLAGS, &mesh, &config);
+        config = usual[i];
+        config.macrocell_factor = UINT32_MAX;
+        config.subdivide_above = i % 2 == 0 ? 0 : UINT32_MAX;
+        config.depth = HGRID_MAX_DEPTH;
+        exact_sizes(&mesh, &config);
     }
 }
 
@@ -357,6 +399,7 @@ int main(void)
     regions_must_be_aligned();
     regions_must_lie_apart();
     unknown_values_are_errors();
+    fields_of_methods_are_checked();
     impossible_arrays_are_refused();
     bad_triangles_are_named();
     every_status_has_words_of_its_own();

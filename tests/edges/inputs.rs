@@ -162,3 +162,55 @@ fn unused_vertices_do_not_matter() {
     assert_eq!((grid.bounds(), grid.skipped_count()), (expected, 0));
     assert!(build(&one_triangle()).is_ok());
 }
+
+/// A recursive grid takes any density that its axes can: more cells, or an error, never a grid that
+/// leaves triangles out.
+#[test]
+fn recursive_grids_of_every_density_answer_right() {
+    let mesh = ball(6, 1.0);
+    let view = mesh.view();
+    for depth in 1..=hgrid_core::MAX_DEPTH {
+        for density in [1e-3, 1.0, 32.0, 200.0, 5000.0, 1e6, 1e8, 1e12] {
+            let config = Config { density, depth, ..Config::new(hgrid_core::Method::Recursive) };
+            let answer = sizes(&view, &config, &mut []);
+            let is_too_fine = Err(Error::InvalidConfig(ConfigField::Density));
+            if answer == is_too_fine || answer.is_ok_and(|need| need.scratch_bytes > 1 << 30) {
+                continue;
+            }
+            let owned = Owned::build(&view, &config).unwrap();
+            let grid = owned.open(&view).unwrap();
+            let mut random = Random(67);
+            for _ in 0..50 {
+                oracle::check(&grid, &Ray::new(random.point().map(|c| c * 2.0), random.point()));
+            }
+        }
+    }
+}
+
+#[test]
+fn parameters_outside_their_range_are_refused() {
+    use hgrid_core::Method;
+    let mesh = ball(2, 1.0);
+    for factor in [0, 1] {
+        let config = Config { macrocell_factor: factor, ..Config::new(Method::Fixed) };
+        let error = Error::InvalidConfig(ConfigField::MacrocellFactor);
+        assert_eq!(Owned::build(&mesh.view(), &config).unwrap_err(), error);
+    }
+    for depth in [0, hgrid_core::MAX_DEPTH + 1, u32::MAX] {
+        let config = Config { depth, ..Config::new(Method::Recursive) };
+        let error = Error::InvalidConfig(ConfigField::Depth);
+        assert_eq!(Owned::build(&mesh.view(), &config).unwrap_err(), error);
+    }
+    for config in [
+        Config { macrocell_factor: u32::MAX, ..Config::new(Method::Fixed) },
+        Config { macrocell_factor: 5000, ..Config::new(Method::Fixed) },
+        Config { subdivide_above: 0, ..Config::new(Method::Variable) },
+        Config { subdivide_above: u32::MAX, ..Config::new(Method::Variable) },
+    ] {
+        let view = mesh.view();
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        grid.validate().unwrap();
+        oracle::check(&grid, &Ray::new([0.1, 0.2, 3.0], [0.0, 0.0, -1.0]));
+    }
+}

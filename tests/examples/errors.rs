@@ -33,6 +33,8 @@ fn replaced(from: &str, to: &str) -> Vec<u8> {
 
 #[test]
 fn bad_arguments_are_refused() {
+    // Where the picture goes that one of them begins to draw.
+    let dir = TempDir::new().expect("a folder");
     for (words, message) in [
         (&["--size"][..], "--size needs a value"),
         (&["-o"], "-o needs a value"),
@@ -41,12 +43,20 @@ fn bad_arguments_are_refused() {
         (&["--size", "16385"], "not `16385`"),
         (&["--size", "12x"], "not `12x`"),
         (&["--size", "99999999999999999999"], "not `99999999999999999999`"),
+        (&["--method"], "--method needs a value"),
+        (&["--method", "octree"], "is one-level, fixed, variable or recursive, not `octree`"),
+        (&["--density"], "--density needs a value"),
+        (&["--density", "0"], "--density is a number above 0, not `0`"),
+        (&["--density", "-1"], "not `-1`"),
+        (&["--density", "nan"], "not `nan`"),
+        (&["--density", "4cells"], "not `4cells`"),
+        (&["--density", "inf"], "invalid density: above 0"),
         (&["--fast"], "unknown option --fast: raytracer [FILE.ply]"),
         (&["a.ply", "b.ply"], "one scene at a time: a.ply or b.ply?"),
         (&["no/such/file.ply"], "no/such/file.ply: cannot be opened"),
         (&["--size", "4", "-o", "no/such/folder/a.ppm"], "no/such/folder/a.ppm: cannot be written"),
     ] {
-        let said = refusal(watched_raytracer().args(words));
+        let said = refusal(watched_raytracer().current_dir(dir.path()).args(words));
         assert!(said.contains(message), "{words:?}: {said}");
     }
 }

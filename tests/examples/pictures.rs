@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use hgrid_core::{Config, TriangleMesh};
+use hgrid_core::{Config, Method, TriangleMesh};
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_lab::scene::Scene;
 use hgrid_lab::shade::Shader;
@@ -48,9 +48,42 @@ fn the_built_in_scene_looks_as_in_the_lab() {
     let rays = usize::from(SIZE) * usize::from(SIZE);
     assert!(hits > rays / 4 && hits < rays / 2);
     assert!(printed.contains(&format!("hits           {hits} of {rays} rays\n")), "{printed}");
-    for line in ["index bytes    ", "scratch bytes  ", "build          ", "render         "] {
+    for line in ["scratch bytes  ", "sizes          ", "build          ", "render         "] {
         assert!(printed.contains(line), "{line} is missing in {printed}");
     }
+}
+
+#[test]
+fn every_method_draws_the_same_picture() {
+    let dir = TempDir::new().expect("a folder");
+    let path = dir.path().join("knot.ppm");
+    let scene = Scene::load(KNOT).expect("a scene");
+    let mesh = TriangleMesh::new(&scene.positions, &scene.indices).expect("a sound mesh");
+    let (picture, _) = expected(&scene);
+    for config in Method::ALL.iter().copied().map(Config::new) {
+        let name = config.method.name();
+        let mut raytracer = raytracer();
+        raytracer.args(["--size", &SIZE.to_string(), "--method", name, "-o"]).arg(&path);
+        let printed = String::from_utf8(run(&mut raytracer).stdout).expect("text");
+        assert!(fs::read(&path).expect("the picture") == picture, "{name}");
+
+        let owned = Owned::build(&mesh, &config).expect("a sound mesh");
+        let density = format!("density        {}\n", config.density);
+        let bytes = format!("index bytes    {}\n", owned.bytes().len());
+        for line in [format!("method         {name}\n"), density, bytes] {
+            assert!(printed.contains(&line), "{line} is missing in {printed}");
+        }
+    }
+}
+
+#[test]
+fn a_density_is_passed_on() {
+    let dir = TempDir::new().expect("a folder");
+    let mut raytracer = raytracer();
+    raytracer.args(["--density", "2.5", "--method", "fixed", "--size", "8", "-o"]);
+    let printed = run(raytracer.arg(dir.path().join("knot.ppm"))).stdout;
+    let printed = String::from_utf8(printed).expect("text");
+    assert!(printed.contains("method         fixed\ndensity        2.5\n"), "{printed}");
 }
 
 /// Vertices of a house without a floor: four walls as one square each, a roof of two.

@@ -69,7 +69,11 @@ pub fn compiler(dialect: &str) -> Command {
         build.host(host()).target(host()).opt_level(0).cargo_metadata(false).cpp(is_cpp);
         build.get_compiler()
     };
-    warnings(TOOLS[usize::from(is_cpp)].get_or_init(find).to_command(), dialect)
+    let tool = TOOLS[usize::from(is_cpp)].get_or_init(find);
+    // Not `to_command`: it sets the whole environment, which a failing test would print.
+    let mut compiler = Command::new(tool.path());
+    compiler.args(tool.args());
+    warnings(compiler, dialect)
 }
 
 /// The triple of this machine, as its Rust compiler tells it.

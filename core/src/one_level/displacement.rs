@@ -20,7 +20,7 @@ use crate::bits::{WORD_BITS, each_one, extent, load};
 /// How far back from the end of the table a row looks for holes.
 ///
 /// More finds more holes and takes longer; lab/results/displacement.md has the sweep.
-const WINDOW_SLOTS: usize = 4096;
+const WINDOW_SLOTS: usize = 2048;
 
 /// Finds an offset for every row and returns the number of slots, or `None` beyond `i32::MAX`.
 ///

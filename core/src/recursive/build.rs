@@ -30,29 +30,40 @@ use crate::sizes::Sizes;
 use crate::survey::{Survey, boxes};
 
 /// Words of scratch for one grid of so many primitives: where lists start, and their ids.
-const fn scratch_words(primitives: u32) -> u64 {
-    // At most 8 cells a primitive, and what rounding adds on three axes.
-    let cells = 32 * primitives as u64 + 64;
+///
+/// The rule asks for at most `density * n` cells; rounding makes at most 1.5 times as many of them on
+/// each of three axes, and no grid has fewer than 8.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bound, rounded up")]
+const fn scratch_words(primitives: u32, density: f32) -> u64 {
+    let cells = (3.5 * density as f64 * primitives as f64) as u64 + 64;
     cells + 1 + reference_limit(primitives) as u64
 }
 
 /// Bytes of scratch for so many triangles, whatever they look like: their ids, and one grid on each
 /// level.
-pub(crate) const fn scratch_bytes(triangles: u32, depth: u32) -> u64 {
-    section_bytes::<u32>(triangles as u64 + depth as u64 * scratch_words(triangles))
+pub(crate) const fn scratch_bytes(triangles: u32, config: &Config) -> u64 {
+    let level = scratch_words(triangles, config.density);
+    section_bytes::<u32>(
+        (triangles as u64).saturating_add(level.saturating_mul(config.depth as u64)),
+    )
 }
 
-/// The most memory that a mesh with so many triangles can need: all that a pool can address.
+/// The most memory that a mesh with so many triangles can need, or all that a pool can address.
+///
+/// Grids on one level that share n references, at least 5 each, have at most `(3.5 * density + 44) n`
+/// words and hand down at most `29 n` references.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bound, rounded up")]
 pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
-    let level = 64 * (triangles as u64 + 1);
-    let mut words = level;
-    let mut depth = 1;
+    let mut references = triangles as f64 + 5.0;
+    let mut words = 0.0;
+    let mut depth = 0;
     while depth < config.depth {
-        words = words.saturating_mul(32);
+        words += (3.5 * config.density as f64 + 44.0) * references;
+        references *= 29.0;
         depth += 1;
     }
-    let words = if words < GRID as u64 { words } else { GRID as u64 };
-    (HEADER_BYTES as u64 + section_bytes::<u32>(words), scratch_bytes(triangles, config.depth))
+    let words = if words < GRID as f64 { words as u64 } else { GRID as u64 };
+    (HEADER_BYTES as u64 + section_bytes::<u32>(words), scratch_bytes(triangles, config))
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to build in.
@@ -63,8 +74,9 @@ pub(crate) fn sizes(
 ) -> Result<Sizes, Error> {
     let (index_bytes, scratch_bytes) = bound(mesh.triangle_count(), config);
     if (scratch.len() as u64) < scratch_bytes {
-        Survey::of(mesh, config.flags)?;
-        return Sizes::new(index_bytes, scratch_bytes, false);
+        Root::of(mesh, config)?;
+        // No machine has a region larger than it can address.
+        return Sizes::new(index_bytes.min(isize::MAX.unsigned_abs() as u64), scratch_bytes, false);
     }
     Sizes::new(run(mesh, config, &mut [], scratch)?, scratch_bytes, true)
 }
@@ -82,6 +94,27 @@ pub(crate) fn build<'a>(
     usize::try_from(needed_bytes).ok().and_then(|bytes| index.get(..bytes)).ok_or(too_small)
 }
 
+/// The outermost grid.
+struct Root {
+    survey: Survey,
+    /// Its own cells are the unit of all boxes below it.
+    lattice: Lattice,
+    rule: Rule,
+}
+
+impl Root {
+    fn of(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Self, Error> {
+        let survey = Survey::of(mesh, config.flags)?;
+        let bounds = Lattice::pad(&survey.bounds);
+        let rule = Rule { density: f64::from(config.density), depth: config.depth };
+        let size = bounds.size().to_array().map(f64::from);
+        let resolution = rule
+            .resolution(size, survey.finite_count, 0)
+            .ok_or(Error::InvalidConfig(ConfigField::Density))?;
+        Ok(Self { survey, lattice: Lattice::new(bounds, resolution), rule })
+    }
+}
+
 /// Builds as much as the index holds and returns the bytes that all of it takes.
 fn run(
     mesh: &TriangleMesh<'_>,
@@ -89,22 +122,14 @@ fn run(
     index: &mut [u8],
     scratch: &mut [u8],
 ) -> Result<u64, Error> {
-    let survey = Survey::of(mesh, config.flags)?;
+    let Root { survey, lattice, rule } = Root::of(mesh, config)?;
     let available_bytes = scratch.len() as u64;
-    let needed_bytes = scratch_bytes(mesh.triangle_count(), config.depth);
+    let needed_bytes = scratch_bytes(mesh.triangle_count(), config);
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
     if available_bytes < needed_bytes {
         return Err(too_small);
     }
     let (scratch, _) = split_mut::<u32>(scratch, needed_bytes / 4).ok_or(too_small)?;
-
-    // The root's own cells are the unit of all boxes.
-    let bounds = Lattice::pad(&survey.bounds);
-    let rule = Rule { density: f64::from(config.density), depth: config.depth };
-    let resolution =
-        rule.resolution(bounds.size().to_array().map(f64::from), survey.finite_count, 0);
-    let lattice =
-        Lattice::new(bounds, resolution.ok_or(Error::InvalidConfig(ConfigField::Density))?);
 
     let (head, pool) = match index.split_first_chunk_mut::<HEADER_BYTES>() {
         Some((head, pool)) => (Some(head), pool),
@@ -245,6 +270,9 @@ impl Placed {
     }
 }
 
+/// The error for a grid that its scratch does not hold: nothing is left out in silence.
+const TOO_FINE: Error = Error::InvalidConfig(ConfigField::Density);
+
 /// A build on its way.
 struct Builder<'m, 'p> {
     mesh: &'m TriangleMesh<'m>,
@@ -294,7 +322,7 @@ impl Builder<'_, '_> {
             primitives /= 2;
             let Some(resolution) = resolution.or(is_last.then_some([1; 3])) else { continue };
             let node = Node::new(at as usize, bounds.min, bounds.max, resolution);
-            let starts = scratch.get_mut(..=node.cells()).unwrap_or_default();
+            let starts = scratch.get_mut(..=node.cells()).ok_or(TOO_FINE)?;
             starts.fill(0);
             let limit = u64::from(reference_limit(count));
             let mut references = 0_u64;
@@ -313,16 +341,16 @@ impl Builder<'_, '_> {
                 break (node, references);
             }
         };
-        let starts = scratch.get(..node.cells()).unwrap_or_default();
+        let starts = scratch.get(..node.cells()).ok_or(TOO_FINE)?;
         let lists = starts.iter().filter(|&&start| start != 0).count() as u64;
         if depth > 0 && 4 * references > 3 * u64::from(count) * lists {
             return Ok(false);
         }
 
         // Sum up, and fill in reverse: every list ascends by id.
-        let (starts, rest) = scratch.split_at_mut_checked(node.cells() + 1).unwrap_or_default();
+        let (starts, rest) = scratch.split_at_mut_checked(node.cells() + 1).ok_or(TOO_FINE)?;
         let references = usize::try_from(references).unwrap_or(usize::MAX);
-        let (lists, rest) = rest.split_at_mut_checked(references).unwrap_or_default();
+        let (lists, rest) = rest.split_at_mut_checked(references).ok_or(TOO_FINE)?;
         let mut end = 0;
         for start in &mut *starts {
             end += *start;

@@ -68,7 +68,9 @@ impl Node {
             scale: [d, e, f].map(f32::from_bits),
             resolution,
         };
-        let is_sound = node.origin.iter().all(|o| o.is_finite())
+        let end = node.entries.checked_add(node.cells())?;
+        let is_sound = end < pool.len()
+            && node.origin.iter().all(|o| o.is_finite())
             && node.scale.iter().all(|&s| s > 0.0 && s.is_finite())
             && !resolution.contains(&0);
         is_sound.then_some(node)
