@@ -39,11 +39,8 @@ impl Survey {
     }
 }
 
-/// The finite triangles of a mesh with their boxes, in the order of their ids: what every pass of
-/// every build runs over, so that all of them see the same triangles.
+/// The finite triangles of a mesh with their boxes, in the order of their ids.
 #[inline(always)]
-pub(crate) fn boxes<'m>(
-    mesh: &'m TriangleMesh<'_>,
-) -> impl DoubleEndedIterator<Item = (u32, Aabb)> + 'm {
+pub(crate) fn boxes<'m>(mesh: &'m TriangleMesh<'_>) -> impl Iterator<Item = (u32, Aabb)> + 'm {
     (0..mesh.triangle_count()).filter_map(|id| Some((id, Aabb::of(mesh.corners(id, Vec3A::new)?)?)))
 }

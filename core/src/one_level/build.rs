@@ -16,15 +16,18 @@
 //! this does not happen: a mesh that would need more is built with half the density, again and
 //! again until it fits. Scans take 2 to 5 references a triangle and never come near it.
 
+use glam::Vec3A;
+
 use super::displacement::displace;
 use super::layout::{Layout, Scratch};
 use super::spread::{Spread, count_references, fill, mark};
+use crate::aabb::Aabb;
 use crate::blob::Header;
 use crate::cell::{CellRange, Lattice, woo};
 use crate::config::Config;
 use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
-use crate::survey::{Survey, boxes};
+use crate::survey::Survey;
 
 /// The triangles of a mesh over a lattice.
 #[derive(Debug)]
@@ -38,9 +41,14 @@ impl Spread for MeshSpread<'_> {
         self.lattice.resolution
     }
 
+    fn count(&self) -> u32 {
+        self.mesh.triangle_count()
+    }
+
     #[inline(always)]
-    fn ranges(&self) -> impl DoubleEndedIterator<Item = (u32, CellRange)> {
-        boxes(self.mesh).map(|(id, bounds)| (id, self.lattice.range(&bounds)))
+    fn at(&self, place: u32) -> Option<(u32, CellRange)> {
+        let bounds = self.mesh.corners(place, Vec3A::new).and_then(Aabb::of)?;
+        Some((place, self.lattice.range(&bounds)))
     }
 }
 

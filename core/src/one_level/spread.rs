@@ -13,8 +13,11 @@ pub(crate) trait Spread {
     /// Cells per axis.
     fn resolution(&self) -> [u32; 3];
 
-    /// The primitives with their cells, ascending by id: the same ones at every call.
-    fn ranges(&self) -> impl DoubleEndedIterator<Item = (u32, CellRange)>;
+    /// Number of places where a primitive may be.
+    fn count(&self) -> u32;
+
+    /// The primitive at a place and its cells, or nothing. Ids ascend; every call answers the same.
+    fn at(&self, place: u32) -> Option<(u32, CellRange)>;
 }
 
 /// Marks the cells that primitives overlap and counts the references, up to a limit.
@@ -38,7 +41,8 @@ pub(crate) fn count_references(
     mut visit: impl FnMut(&CellRange),
 ) -> Option<u32> {
     let mut count = 0;
-    for (_, range) in spread.ranges() {
+    for place in 0..spread.count() {
+        let Some((_, range)) = spread.at(place) else { continue };
         count += range.count();
         if count > u64::from(limit) {
             return None;
@@ -59,7 +63,8 @@ pub(crate) fn fill(
 
     // Count the references of each slot.
     hash.fill(0);
-    for (_, range) in spread.ranges() {
+    for place in 0..spread.count() {
+        let Some((_, range)) = spread.at(place) else { continue };
         for_each_slot(height, &range, row_offsets, hash, |count| *count += 1);
     }
 
@@ -71,7 +76,8 @@ pub(crate) fn fill(
     }
 
     // Put every primitive before the end of its lists, the last one first: lists ascend by id.
-    for (id, range) in spread.ranges().rev() {
+    for place in (0..spread.count()).rev() {
+        let Some((id, range)) = spread.at(place) else { continue };
         for_each_slot(height, &range, row_offsets, hash, |end| {
             *end = end.wrapping_sub(1);
             if let Some(reference) = references.get_mut(*end as usize) {
@@ -104,7 +110,8 @@ fn for_each_slot(
     for_each_row(height, range, |row| {
         let Some(&offset) = row_offsets.get(row) else { return };
         let Some(start) = slot(offset, range.min[0]) else { return };
-        for slot in hash.get_mut(start..start + length).into_iter().flatten() {
+        let Some(slots) = hash.get_mut(start..start + length) else { return };
+        for slot in slots {
             visit(slot);
         }
     });

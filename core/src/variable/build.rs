@@ -49,8 +49,14 @@ impl Spread for CellSpread<'_> {
         self.frame.resolution
     }
 
-    fn ranges(&self) -> impl DoubleEndedIterator<Item = (u32, CellRange)> {
-        self.ids.iter().filter_map(|&id| Some((id, self.frame.range(self.cell, &self.reach(id)?))))
+    fn count(&self) -> u32 {
+        u32::try_from(self.ids.len()).unwrap_or(u32::MAX)
+    }
+
+    #[inline(always)]
+    fn at(&self, place: u32) -> Option<(u32, CellRange)> {
+        let id = *self.ids.get(place as usize)?;
+        Some((id, self.frame.range(self.cell, &self.reach(id)?)))
     }
 }
 
