@@ -19,7 +19,7 @@
  *
  *   static const float positions[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
  *   static const uint32_t indices[2][3] = {{0, 1, 2}, {2, 1, 3}};
- *   HGRID_ALIGNED static unsigned char index[HGRID_INDEX_BOUND(2)], scratch[HGRID_SCRATCH_BOUND(2)];
+ *   HGRID_ALIGNED static unsigned char memory[HGRID_INDEX_BOUND(2)], scratch[HGRID_SCRATCH_BOUND(2)];
  *
  *   int main(void)
  *   {
@@ -27,7 +27,7 @@
  *       mesh.positions = positions, mesh.vertex_count = 4;
  *       mesh.indices = indices, mesh.triangle_count = 2;
  *       hgrid_grid grid;
- *       hgrid_status status = hgrid_build(&mesh, NULL, index, sizeof index, scratch, sizeof scratch,
+ *       hgrid_status status = hgrid_build(&mesh, NULL, memory, sizeof memory, scratch, sizeof scratch,
  *                                         &grid, NULL);
  *       if (status != HGRID_OK)
  *           return fprintf(stderr, "%s\n", hgrid_status_string(status)), 1;
@@ -140,7 +140,7 @@
 #ifndef HGRID_ALIGNED
 /**
  * Put in front of the declaration of an array, makes it a region:
- * `HGRID_ALIGNED static unsigned char index[HGRID_INDEX_BOUND(1000)];`
+ * `HGRID_ALIGNED static unsigned char memory[HGRID_INDEX_BOUND(1000)];`
  */
 #if defined(_MSC_VER)
 #define HGRID_ALIGNED __declspec(align(64))
@@ -723,11 +723,12 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
  * in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
  * ignored. It says itself which method built it and how. The mesh is the one it was built for,
- * which only its counts are checked for.
+ * of which only the counts are compared.
  *
  * What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
  * nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
- * not change while the grid is in use: map a file that others write as a private copy.
+ * not change while the grid is in use: a file that others may write is not for mapping, read it into
+ * memory of your own.
  *
  * No argument may be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
  * and leaves `grid` as it was.
@@ -750,7 +751,7 @@ hgrid_status hgrid_open(const void *blob,
  * network or another process may.
  *
  * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
- * that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view that was never built or opened;
+ * that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
  * `HGRID_ERROR_NULL_ARGUMENT`.
  *
  * Threads: any number of calls and queries on the same grid at once.
@@ -768,7 +769,7 @@ hgrid_status hgrid_validate(const struct hgrid_grid *grid);
  * A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
  * without area, or one that is seen exactly edge-on, is not hit.
  *
- * `options` may be NULL: the defaults. With another NULL, with a view that was never built or
+ * `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
  * opened, or with options that break the rules for structs, nothing is hit.
  *
  * A query allocates nothing, needs at most about 4 KiB of stack and always ends: on one level
@@ -790,7 +791,7 @@ bool hgrid_intersect(const struct hgrid_grid *grid,
  * This is the query for shadows and visibility. It stops at the first triangle it finds in the
  * ray's range, which need not be the closest.
  *
- * `options` may be NULL: the defaults. With another NULL, with a view that was never built or
+ * `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
  * opened, or with options that break the rules for structs, the answer is false.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
@@ -867,3 +868,9 @@ const char *hgrid_version_string(void);
  * A report before its call.
  */
 #define HGRID_REPORT_INIT {sizeof(hgrid_report), 0, 0, 0, HGRID_INVALID_ID, 0, 0, 0.0f, {0, 0, 0}, 0}
+
+/**
+ * Initialises a `hgrid_grid` with zeros: a view that no build or open has written, which is
+ * recognised and hits nothing. After a failed build or open a view is what it was before.
+ */
+#define HGRID_GRID_INIT {{0}}

@@ -133,11 +133,12 @@ pub unsafe extern "C" fn hgrid_build(
 /// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
 /// in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
 /// ignored. It says itself which method built it and how. The mesh is the one it was built for,
-/// which only its counts are checked for.
+/// of which only the counts are compared.
 ///
 /// What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
 /// nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
-/// not change while the grid is in use: map a file that others write as a private copy.
+/// not change while the grid is in use: a file that others may write is not for mapping, read it into
+/// memory of your own.
 ///
 /// No argument may be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
 /// and leaves `grid` as it was.
@@ -174,7 +175,7 @@ pub unsafe extern "C" fn hgrid_open(
 /// network or another process may.
 ///
 /// Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
-/// that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view that was never built or opened;
+/// that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
 /// `HGRID_ERROR_NULL_ARGUMENT`.
 ///
 /// Threads: any number of calls and queries on the same grid at once.
@@ -197,7 +198,7 @@ pub unsafe extern "C" fn hgrid_validate(grid: *const hgrid_grid) -> hgrid_status
 /// A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
 /// without area, or one that is seen exactly edge-on, is not hit.
 ///
-/// `options` may be NULL: the defaults. With another NULL, with a view that was never built or
+/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
 /// opened, or with options that break the rules for structs, nothing is hit.
 ///
 /// A query allocates nothing, needs at most about 4 KiB of stack and always ends: on one level
@@ -233,7 +234,7 @@ pub unsafe extern "C" fn hgrid_intersect(
 /// This is the query for shadows and visibility. It stops at the first triangle it finds in the
 /// ray's range, which need not be the closest.
 ///
-/// `options` may be NULL: the defaults. With another NULL, with a view that was never built or
+/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
 /// opened, or with options that break the rules for structs, the answer is false.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.

@@ -117,14 +117,14 @@ impl Config {
     }
 
     /// Refuses values that no build can use.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub(crate) const fn check(&self) -> Result<(), Error> {
         if !self.density_is_valid() {
             return Err(Error::InvalidConfig(ConfigField::Density));
         }
         if self.method.has_macrocells() && self.macrocell_factor < 2 {
             return Err(Error::InvalidConfig(ConfigField::MacrocellFactor));
         }
-        if self.method.has_depth() && !(1..=MAX_DEPTH).contains(&self.depth) {
+        if self.method.has_depth() && (self.depth < 1 || self.depth > MAX_DEPTH) {
             return Err(Error::InvalidConfig(ConfigField::Depth));
         }
         if self.flags.bits() & !BuildFlags::all().bits() != 0 {

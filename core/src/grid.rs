@@ -20,7 +20,7 @@ use crate::variable::{self, Variable};
 ///
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
 /// number of threads may query it at once. Queries never fail, never allocate and never panic; their
-/// steps are bounded by the resolutions (one level: by their sum), their stack is about 2 KiB.
+/// steps are bounded by the resolutions (one level: by their sum), their stack is below 4 KiB.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,
@@ -174,7 +174,11 @@ impl<'a> Grid<'a> {
 
         let mut best = None;
         let mut limit = line.end;
+        // A ray meets every list at most once; damaged bytes may list everything in every cell.
+        let mut unread = self.list_words();
         let leaf = |references: &[u32], tally: &mut T| {
+            let Some(rest) = unread.checked_sub(references.len()) else { return f32::NEG_INFINITY };
+            unread = rest;
             for &id in references {
                 tally.primitive_test();
                 let Some(triangle) = self.mesh.triangle(id) else { continue };
@@ -197,6 +201,17 @@ impl<'a> Grid<'a> {
             Structure::Recursive(grid) => grid.traverse(&line, tally, leaf),
         }
         best
+    }
+
+    /// No ray is shown more primitives than this.
+    #[inline]
+    const fn list_words(&self) -> usize {
+        match &self.structure {
+            Structure::OneLevel(grid) => grid.lists().len(),
+            Structure::Fixed(grid) => grid.list_words(),
+            Structure::Variable(grid) => grid.list_words(),
+            Structure::Recursive(grid) => grid.list_words(),
+        }
     }
 
     /// The mesh that the grid was built for.

@@ -23,8 +23,9 @@ pub struct Sizes {
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A one-level grid of a scan takes an eighth of it. Generous beyond use for recursive grids. `None` if the density is no density or the sizes do not fit the
-    /// machine's address space.
+    /// A one-level grid of a scan takes an eighth of it; for recursive grids it is generous beyond
+    /// use. `None` if no build takes the configuration, or the sizes do not fit the machine's address
+    /// space.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Method, Sizes};
@@ -38,7 +39,7 @@ impl Sizes {
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "compared before")]
     pub const fn bound(triangles: u32, config: &Config) -> Option<Self> {
-        if !config.density_is_valid() {
+        if config.check().is_err() {
             return None;
         }
         let (index, scratch) = match config.method {
@@ -74,8 +75,8 @@ impl Sizes {
 
 /// The memory that a build of this mesh takes.
 ///
-/// With an empty `scratch` the answer takes two passes over the triangles and `index_bytes` is
-/// enough: for a one-level or fixed grid of a scan about twice what it will take, for the other two a
+/// With an empty `scratch` the answer takes two passes over the triangles, one more for each halving
+/// of the density, and `index_bytes` is enough: for a one-level or fixed grid of a scan about twice what it will take, for the other two a
 /// generous multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid is
 /// planned in it and `index_bytes` is exact, for about half the time of a build, up to all of it
 /// for a variable or recursive grid. The scratch holds nothing of use afterwards.

@@ -1,6 +1,6 @@
 //! Meshes of odd shapes answer as brute force does and stay within the memory they were promised.
 
-use hgrid_core::{Config, Ray, Sizes};
+use hgrid_core::{Config, Method, Ray, Sizes};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
@@ -150,15 +150,31 @@ fn dense_rows_and_a_crowded_corner() {
     agrees(&crowded);
 }
 
-/// What would need more references than a grid may have is built with a lower density, and says so.
+/// What would need more references than a grid may have is built with a lower density, and says so:
+/// the configuration that the grid tells builds it again.
 #[test]
 fn a_mesh_of_spanning_triangles_lowers_the_density() {
-    let mesh = soup(4000, 2.0, 23);
+    let mesh = soup(1500, 2.0, 23);
     let view = mesh.view();
-    let config = Config { density: 32.0, ..Config::default() };
-    let owned = Owned::build(&view, &config).unwrap();
-    let grid = owned.open(&view).unwrap();
-    assert!(grid.density() < 32.0 && grid.reference_count() <= 16 * 4000 + 64);
-    let ratio = 32.0 / grid.density();
-    assert!(ratio.log2().fract() == 0.0, "halved, again and again: {ratio}");
+    let depths = 1..=hgrid_core::MAX_DEPTH;
+    for (config, depth) in
+        methods::configs_with(64.0).flat_map(|c| depths.clone().map(move |d| (c, d)))
+    {
+        if depth > 1 && config.method != Method::Recursive {
+            continue;
+        }
+        let owned = Owned::build(&view, &Config { depth, ..config }).unwrap();
+        let grid = owned.open(&view).unwrap();
+        grid.validate().unwrap();
+        let ratio = 64.0 / grid.density();
+        assert!(ratio.log2().fract() == 0.0, "halved, again and again: {ratio}");
+        // A deep recursive grid has few cells at the root, whatever the triangles.
+        assert!(ratio > 1.0 || depth > 1, "{config:?}");
+        let rebuilt = Owned::build(&view, &grid.config()).unwrap();
+        assert_eq!(rebuilt.bytes(), owned.bytes(), "{config:?}");
+        let mut random = Random(71);
+        for _ in 0..100 {
+            oracle::check(&grid, &Ray::new(random.point().map(|c| c * 4.0), random.point()));
+        }
+    }
 }

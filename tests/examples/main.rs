@@ -8,3 +8,4 @@ mod knot;
 mod minimal;
 mod pictures;
 mod programs;
+mod readme;

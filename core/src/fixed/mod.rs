@@ -77,6 +77,11 @@ impl<'a> Fixed<'a> {
         Ok(Self { cells, levels: Levels::new(lattice.resolution, factor) })
     }
 
+    /// No ray is shown more primitives than this.
+    pub(crate) const fn list_words(&self) -> usize {
+        self.cells.lists().len()
+    }
+
     /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any; see
     /// [`OneLevel::traverse`]. Empty macrocells are crossed in one step.
     #[inline(always)]

@@ -14,7 +14,7 @@
 //! The number of references has no bound in the number of triangles: a million triangles that each
 //! span the scene would fill every cell a million times. [`reference_limit`] is the promise that
 //! this does not happen: a mesh that would need more is built with half the density, again and
-//! again until it fits. Scans take 2 to 5 references a triangle and never come near it.
+//! again until it fits. Scans never come near it (core/DESIGN.md has the numbers).
 
 use glam::Vec3A;
 
@@ -95,12 +95,12 @@ pub(crate) struct Plan<'s> {
     pub(crate) layout: Layout,
     pub(crate) survey: Survey,
     pub(crate) lattice: Lattice,
-    density: f32,
+    pub(crate) density: f32,
     pub(crate) rows: Option<Rows<'s>>,
 }
 
 impl<'s> Plan<'s> {
-    /// Plans as far as the scratch allows; without any, two passes over the mesh give a bound.
+    /// Plans as far as the scratch allows; without any, passes over the mesh give a bound.
     pub(crate) fn new(
         mesh: &TriangleMesh<'_>,
         config: &Config,

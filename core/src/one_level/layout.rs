@@ -131,8 +131,14 @@ impl Layout {
         self.cells.div_ceil(WORD_BITS as u64) + 1
     }
 
+    /// Whether the number of every cell's bit fits a word of this machine.
+    fn is_addressable(&self) -> bool {
+        usize::try_from(self.cells + 2 * WORD_BITS as u64).is_ok()
+    }
+
     /// The sections of a blob.
     pub(crate) fn sections<'a>(&self, blob: &'a [u8]) -> Option<Sections<'a>> {
+        self.is_addressable().then_some(())?;
         let (row_offsets, rest) = split(blob.get(HEADER_BYTES..)?, self.rows)?;
         let (domain_bits, rest) = split(rest, self.domain_words())?;
         let (hash, rest) = split(rest, u64::from(self.hash_count) + 1)?;
@@ -154,6 +160,7 @@ impl Layout {
 
     /// The sections of a scratch region.
     pub(crate) fn scratch<'a>(&self, bytes: &'a mut [u8]) -> Option<Scratch<'a>> {
+        self.is_addressable().then_some(())?;
         let (row_offsets, rest) = split_mut(bytes, self.rows)?;
         let (domain_bits, rest) = split_mut(rest, self.domain_words())?;
         let (occupied, rest) = split_mut(rest, self.occupied_words())?;

@@ -94,11 +94,12 @@ pub(crate) fn build<'a>(
     usize::try_from(needed_bytes).ok().and_then(|bytes| index.get(..bytes)).ok_or(too_small)
 }
 
-/// The outermost grid.
+/// The outermost grid, as fine as its references allow.
 struct Root {
     survey: Survey,
     /// Its own cells are the unit of all boxes below it.
     lattice: Lattice,
+    density: f32,
     rule: Rule,
 }
 
@@ -106,13 +107,35 @@ impl Root {
     fn of(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Self, Error> {
         let survey = Survey::of(mesh, config.flags)?;
         let bounds = Lattice::pad(&survey.bounds);
-        let rule = Rule { density: f64::from(config.density), depth: config.depth };
         let size = bounds.size().to_array().map(f64::from);
-        let resolution = rule
-            .resolution(size, survey.finite_count, 0)
-            .ok_or(Error::InvalidConfig(ConfigField::Density))?;
-        Ok(Self { survey, lattice: Lattice::new(bounds, resolution), rule })
+        let limit = u64::from(reference_limit(mesh.triangle_count()));
+        let mut density = config.density;
+        loop {
+            let rule = Rule { density: f64::from(density), depth: config.depth };
+            let resolution = rule.resolution(size, survey.finite_count, 0).ok_or(TOO_FINE)?;
+            let lattice = Lattice::new(bounds, resolution);
+            if references(mesh, &lattice, limit) <= limit {
+                return Ok(Self { survey, lattice, density, rule });
+            }
+            density *= 0.5;
+        }
     }
+}
+
+/// How many references the outermost grid has, or some number above the limit.
+fn references(mesh: &TriangleMesh<'_>, lattice: &Lattice, limit: u64) -> u64 {
+    let max = Vec3A::from_array(lattice.resolution.map(as_f32));
+    let node = Node::new(0, Vec3A::ZERO, max, lattice.resolution);
+    let mut references = 0;
+    for id in 0..mesh.triangle_count() {
+        if let Some(placed) = Placed::new(mesh, lattice, id) {
+            placed.each_cell(&node, |_, _| references += 1);
+        }
+        if references > limit {
+            break;
+        }
+    }
+    references
 }
 
 /// Builds as much as the index holds and returns the bytes that all of it takes.
@@ -122,7 +145,7 @@ fn run(
     index: &mut [u8],
     scratch: &mut [u8],
 ) -> Result<u64, Error> {
-    let Root { survey, lattice, rule } = Root::of(mesh, config)?;
+    let Root { survey, lattice, density, rule } = Root::of(mesh, config)?;
     let available_bytes = scratch.len() as u64;
     let needed_bytes = scratch_bytes(mesh.triangle_count(), config);
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
@@ -152,7 +175,7 @@ fn run(
     let mut header = Header::new(config, mesh, &lattice);
     header.blob_bytes = HEADER_BYTES as u64 + section_bytes::<u32>(words.into());
     header.skipped_count = survey.skipped_count;
-    header.density = config.density;
+    header.density = density;
     header.reference_count = words;
     if let Some(head) = head {
         *head = header.to_bytes();

@@ -36,9 +36,6 @@ const FEW: usize = 4;
 /// The deepest that grids may be nested: a query keeps one walk for each level.
 pub const MAX_DEPTH: u32 = 4;
 
-/// No ray of a built grid takes so many steps; on damaged bytes grids may hold grids in every cell.
-const MAX_STEPS: u32 = 1 << 22;
-
 /// A view of a built recursive grid.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Recursive<'a> {
@@ -56,6 +53,11 @@ impl<'a> Recursive<'a> {
         Ok(Self { pool })
     }
 
+    /// No ray is shown more primitives than this.
+    pub(crate) const fn list_words(&self) -> usize {
+        self.pool.len()
+    }
+
     /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any; see
     /// [`OneLevel::traverse`](crate::one_level::OneLevel::traverse).
     #[inline(always)]
@@ -70,7 +72,9 @@ impl<'a> Recursive<'a> {
         let mut limit = line.end;
         let mut around = [(node, walk); MAX_DEPTH as usize];
         let mut depth = 0;
-        for _ in 0..MAX_STEPS {
+        // A ray meets a cell at most once, and every cell has an entry; where damaged bytes nest grids
+        // without end, the walk ends with the entries.
+        for _ in 0..self.pool.len() {
             tally.cell_step();
             match node.content(self.pool, walk.cell) {
                 None => {}

@@ -81,6 +81,16 @@ impl Node {
         self.resolution.iter().map(|&cells| cells as usize).product()
     }
 
+    /// Where in the pool the contents of its cells start.
+    pub(super) fn contents(&self) -> usize {
+        self.entries.saturating_add(self.cells()).saturating_add(1)
+    }
+
+    /// Where in the pool the content of a cell starts, or ends if the number is one too many.
+    pub(super) fn start(&self, pool: &[u32], number: usize) -> Option<usize> {
+        Some((pool.get(self.entries.checked_add(number)?)? & !GRID) as usize)
+    }
+
     /// Its box, in cells of the root.
     pub(super) fn bounds(&self) -> Aabb {
         let min = Vec3A::from_array(self.origin);

@@ -11,13 +11,17 @@ pub(super) struct Overlap {
     corners: [Vec3A; 3],
     edges: [Vec3A; 3],
     normal: Vec3A,
+    /// How wrong the plane of a thin triangle may be, for each unit of distance from the triangle.
+    slack: f32,
 }
 
 impl Overlap {
     pub(super) fn new(corners: [Vec3A; 3]) -> Self {
         let [a, b, c] = corners;
         let edges = [b - a, c - b, a - c];
-        Self { corners, edges, normal: edges[0].cross(edges[1]) }
+        let reach = edges[0].abs().max_element() * edges[1].abs().max_element();
+        let slack = 8.0 * f32::EPSILON * reach;
+        Self { corners, edges, normal: edges[0].cross(edges[1]), slack }
     }
 
     /// Whether the triangle and a box share a point. The triangle's own box must overlap it.
@@ -25,7 +29,8 @@ impl Overlap {
         let [a, b, c] = self.corners.map(|corner| corner - center);
 
         // The plane must pass the box.
-        if self.normal.dot(a).abs() > half.dot(self.normal.abs()) {
+        let slack = self.slack * a.abs().max_element();
+        if self.normal.dot(a).abs() > half.dot(self.normal.abs()) + slack {
             return false;
         }
         // No axis across an edge of each may separate them: x, y and z of e.cross(unit) at once.
@@ -64,6 +69,31 @@ mod tests {
         assert!(overlaps([[2.9, 0.0, 0.0], [0.0, 2.9, 0.0], [0.0, 0.0, 2.9]]));
         // The plane cuts the box, but an edge axis separates.
         assert!(!overlaps([[1.5, 0.9, 0.0], [0.9, 1.5, 0.0], [1.5, 1.5, 0.1]]));
+    }
+
+    /// Thin triangles far larger than the box, through a point of it.
+    #[test]
+    fn never_misses_a_sliver() {
+        let mut state = 5_u32;
+        let mut unit = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f32::from(u16::try_from(state >> 16).unwrap()) / 32768.0 - 1.0
+        };
+        for width in [1e-2, 1e-3, 1e-4, 1e-5] {
+            for half in [0.1, 0.01] {
+                for _ in 0..300 {
+                    let mut point = || Vec3A::new(unit(), unit(), unit());
+                    let (a, b, aside, at) =
+                        (point() * 6.0, point() * 6.0, point() * width, point());
+                    let triangle = [a, b, b + aside];
+                    let (u, v) = (at.x.abs() * 0.5, at.y.abs() * 0.5);
+                    let inside = a + (b - a) * u + (b + aside - a) * v;
+                    let center = inside + at * half * 0.99;
+                    let overlap = Overlap::new(triangle);
+                    assert!(overlap.with(center, Vec3A::splat(half)), "{triangle:?} {center}");
+                }
+            }
+        }
     }
 
     /// A grid of points of the triangle: if one is inside the box, they overlap.

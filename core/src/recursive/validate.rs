@@ -1,7 +1,7 @@
 //! Proof that a foreign blob is a recursive grid of its mesh in which every query answers right.
 //!
-//! Grid by grid from the root: each lies behind the one that holds it, so the recursion ends, and its
-//! box holds what the triangles reach of the cell around it. Every listed triangle overlaps its cell
+//! Grid by grid from the root: each cell's part of the pool starts where the part before it ends, so
+//! everything is read once, and a grid's box holds what the triangles reach of the cell around it. Every listed triangle overlaps its cell
 //! and the cells around that, and no list has it twice; so there are as many of them as the triangles
 //! have cells if and only if none is missing: one sum against another.
 
@@ -42,7 +42,8 @@ impl Recursive<'_> {
             return Err(corrupt(core::mem::offset_of!(Header, bounds_min)));
         }
         let rule = Rule { density: f64::from(header.density), depth: header.depth };
-        let is_rule = header.density > 0.0 && (1..=MAX_DEPTH).contains(&header.depth);
+        let is_density = header.density > 0.0 && header.density.is_finite();
+        let is_rule = is_density && (1..=MAX_DEPTH).contains(&header.depth);
         let size = lattice.bounds().size().to_array().map(f64::from);
         if !is_rule || rule.resolution(size, survey.finite_count, 0) != Some(lattice.resolution) {
             return Err(corrupt(core::mem::offset_of!(Header, resolution)));
@@ -51,11 +52,18 @@ impl Recursive<'_> {
         let check = Check { pool: self.pool, mesh, lattice };
         let root = Node::open(self.pool, 0).filter(|root| root.resolution == lattice.resolution);
         let root = root.ok_or(corrupt(HEADER_BYTES))?;
-        let listed = check.listed(&root, 0, &mut [None; MAX_DEPTH as usize], 0)?;
+        let mut cursor = 0;
+        let listed = check.listed(&root, &mut cursor, &mut [None; MAX_DEPTH as usize], 0)?;
+        if cursor != self.pool.len() {
+            return Err(Check::wrong(cursor));
+        }
         let mut expected = 0;
         for id in 0..mesh.triangle_count() {
             if let Some(placed) = Placed::new(mesh, lattice, id) {
                 expected += check.expected(&root, &placed, 0)?;
+            }
+            if expected > listed {
+                break;
             }
         }
         if listed == expected { Ok(()) } else { Err(corrupt(HEADER_BYTES)) }
@@ -68,17 +76,23 @@ impl Check<'_> {
         corrupt(HEADER_BYTES + at * size_of::<u32>())
     }
 
-    /// How many ids the lists below a grid hold, all of them rightly.
+    /// How many ids the lists below a grid hold, all of them rightly. `cursor` goes from where the
+    /// grid's words start to where they end.
     fn listed(
         &self,
         node: &Node,
-        at: usize,
+        cursor: &mut usize,
         places: &mut [Option<Place>; MAX_DEPTH as usize],
         depth: usize,
     ) -> Result<u64, Error> {
+        let at = *cursor;
+        *cursor = node.contents();
         let mut listed = 0;
         let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
-        for cell in all.cells() {
+        for (number, cell) in all.cells().enumerate() {
+            if node.start(self.pool, number) != Some(*cursor) {
+                return Err(Self::wrong(at));
+            }
             let place = places.get_mut(depth).ok_or_else(|| Self::wrong(at))?;
             *place = Some((*node, cell));
             match node.content(self.pool, cell) {
@@ -90,13 +104,16 @@ impl Check<'_> {
                         return Err(Self::wrong(at));
                     }
                     listed += ids.len() as u64;
+                    *cursor += ids.len();
                 }
-                Some(Content::Grid(inner_at)) => {
-                    let inner = Node::open(self.pool, inner_at).filter(|_| inner_at > at);
-                    let inner = inner.ok_or_else(|| Self::wrong(at))?;
-                    listed += self.listed(&inner, inner_at, places, depth + 1)?;
+                Some(Content::Grid(inner)) => {
+                    let inner = Node::open(self.pool, inner).ok_or_else(|| Self::wrong(at))?;
+                    listed += self.listed(&inner, cursor, places, depth + 1)?;
                 }
             }
+        }
+        if node.start(self.pool, node.cells()) != Some(*cursor) {
+            return Err(Self::wrong(at));
         }
         Ok(listed)
     }

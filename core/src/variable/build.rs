@@ -116,7 +116,8 @@ const fn pool_words(references: u32, config: &Config) -> u32 {
     let per_reference = 2.1 * config.density as f64 + 16.0;
     let per_subgrid = 3.0 + 2.1 + 2.0 + reference_limit(0) as f64;
     let subgrids = references as f64 / (config.subdivide_above as f64 + 1.0);
-    (references as f64 * per_reference + subgrids * per_subgrid) as u32
+    let words = references as f64 * per_reference + subgrids * per_subgrid;
+    if words < SUBGRID as f64 { words as u32 } else { SUBGRID }
 }
 
 /// The most memory that a mesh with so many triangles can need.
@@ -134,6 +135,7 @@ pub(crate) fn sizes(
 ) -> Result<Sizes, Error> {
     let exact = if scratch.is_empty() { None } else { Some(run(mesh, config, &mut [], scratch)) };
     let plan = Plan::new(mesh, config, &(), &mut [])?;
+    check_cells(&plan.layout)?;
     let scratch_bytes = scratch_bytes(&plan.layout, mesh.triangle_count(), config.density);
     match exact {
         Some(Ok(index_bytes)) => Sizes::new(index_bytes, scratch_bytes, true),
@@ -141,8 +143,18 @@ pub(crate) fn sizes(
         _ => {
             let pool = pool_words(plan.layout.reference_count, config);
             let index_bytes = plan.layout.with_references(pool).index_bytes();
-            Sizes::new(index_bytes, scratch_bytes, false)
+            // No machine has a region larger than it can address.
+            Sizes::new(index_bytes.min(isize::MAX.unsigned_abs() as u64), scratch_bytes, false)
         }
+    }
+}
+
+/// Refuses a top with more cells than a word can number.
+const fn check_cells(layout: &Layout) -> Result<(), Error> {
+    if layout.cells < NOBODY as u64 {
+        Ok(())
+    } else {
+        Err(Error::InvalidConfig(ConfigField::Density))
     }
 }
 
@@ -173,6 +185,7 @@ fn run(
 ) -> Result<u64, Error> {
     let available_bytes = scratch.len() as u64;
     let mut plan = Plan::new(mesh, config, &(), scratch)?;
+    check_cells(&plan.layout)?;
     let needed_bytes = scratch_bytes(&plan.layout, mesh.triangle_count(), config.density);
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
     let Rows { offsets, domain_bits, rest } = plan.rows.take().ok_or(too_small)?;
@@ -182,7 +195,7 @@ fn run(
     let Lists { hash, references, owners, rest } = lists;
     fill(&MeshSpread { mesh, lattice: &plan.lattice }, offsets, hash, references);
     let longest = hash.windows(2).map(|ends| ends[1].wrapping_sub(ends[0])).max().unwrap_or(0);
-    let bench = Layout::bound(longest, config.density, 0).scratch(rest).ok_or(too_small)?;
+    let bench = Layout::bound(longest, plan.density, 0).scratch(rest).ok_or(too_small)?;
     let mut bench = Bench {
         row_offsets: bench.row_offsets,
         domain_bits: bench.domain_bits,
@@ -221,7 +234,7 @@ fn run(
         let cell = cell_of(owner, plan.lattice.resolution);
         let spread = CellSpread { mesh, lattice: &plan.lattice, cell, ids, frame: Frame::WHOLE };
         let is_crowded = ids.len() > config.subdivide_above as usize;
-        if is_crowded && spread.subdivide(config.density, &mut bench, &mut pool) {
+        if is_crowded && spread.subdivide(plan.density, &mut bench, &mut pool) {
             entry(slot, start | SUBGRID);
         } else {
             entry(slot, start);

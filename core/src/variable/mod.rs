@@ -52,6 +52,11 @@ impl<'a> Variable<'a> {
         Ok(Self { top: OneLevel::open(header, lattice, &(), blob)? })
     }
 
+    /// No ray is shown more primitives than this.
+    pub(crate) const fn list_words(&self) -> usize {
+        self.top.lists().len()
+    }
+
     /// What a cell holds; `None` if it is empty.
     #[inline(always)]
     fn content(&self, cell: [u32; 3]) -> Option<Content<'a>> {

@@ -47,7 +47,6 @@ impl Frame {
         let corner = Vec3A::from_array(cell.map(as_f32));
         let part = |position: Vec3A| {
             let inside = (position - corner).max(Vec3A::ZERO).min(Vec3A::ONE) * PARTS;
-            // A border of a part counts to both parts.
             inside.to_array()
         };
         let low = part(reach.min).map(|position| to_u8(position.min(PARTS - 1.0)));

@@ -34,13 +34,20 @@ impl Variable<'_> {
         };
 
         // Every list ascends, and its triangles cover its cell.
-        let mut listed = 0_u64;
+        let (mut listed, mut claimed) = (0_u64, 0);
         let all = CellRange { min: [0; 3], max: lattice.last() };
         for cell in all.cells() {
             match self.content(cell) {
                 None if self.top.is_marked(cell) => return Err(at(self.top.lists())),
                 None => {}
+                Some(Content::List(words) | Content::Subgrid(words))
+                    if claimed + words.len() > self.top.lists().len() =>
+                {
+                    // Cells that share their words would have them read again and again.
+                    return Err(at(words));
+                }
                 Some(Content::List(ids)) => {
+                    claimed += ids.len();
                     let covers = |id| reach(id).is_some_and(|(range, _)| range.contains(cell));
                     if ids.is_empty() || !ascends(ids) || !ids.iter().all(|&id| covers(id)) {
                         return Err(at(ids));
@@ -48,6 +55,7 @@ impl Variable<'_> {
                     listed += ids.len() as u64;
                 }
                 Some(Content::Subgrid(words)) => {
+                    claimed += words.len();
                     let grid = Subgrid::open(words).ok_or_else(|| at(words))?;
                     let last = grid.frame.resolution.map(|cells| cells - 1);
                     for sub in (CellRange { min: [0; 3], max: last }).cells() {
