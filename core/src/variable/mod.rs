@@ -12,8 +12,9 @@
 //!   top bit set                     a subgrid, see subgrid.rs
 //! ```
 //!
-//! The paper names no threshold. 16 is where the time to image is lowest or within 3 % of it on all
-//! scans; lab/results/subdivision.md has the sweep.
+//! The paper names no threshold. 16 is the largest number that divides cells of every scan, with the
+//! tests per ray that the paper reports; no number makes a single picture sooner than no subgrids
+//! (lab/results/subdivision.md has the sweep).
 
 mod build;
 mod subgrid;
