@@ -3,7 +3,7 @@
 //! Every function checks what it was given, calls core, and writes the answer. The docs of all that
 //! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
 //! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
-//! structs and threads that they rely on. [`raw`] holds every use of a pointer.
+//! structs and threads that they rely on. `raw` holds every use of a pointer.
 //!
 //! There is no allocation, no global state and no thread here, and no panic that a caller could
 //! reach; a test looks for the symbols of all four in the library.
