@@ -154,7 +154,7 @@ fn dense_rows_and_a_crowded_corner() {
 /// the configuration that the grid tells builds it again.
 #[test]
 fn a_mesh_of_spanning_triangles_lowers_the_density() {
-    let mesh = soup(1500, 2.0, 23);
+    let mesh = soup(300, 2.0, 23);
     let view = mesh.view();
     let depths = 1..=hgrid_core::MAX_DEPTH;
     for (config, depth) in
