@@ -21,7 +21,7 @@ use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split_mut};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::bump::Bump;
-use crate::cell::{CellRange, Lattice, as_f32, cells_between};
+use crate::cell::{CellRange, Lattice, as_f32, cells_between, whole};
 use crate::config::Config;
 use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
@@ -339,7 +339,7 @@ impl Builder<'_, '_> {
             let resolution = if depth == 0 {
                 Some(self.lattice.resolution)
             } else {
-                self.rule.resolution(size, primitives, depth)
+                self.rule.resolution(size, primitives, depth).map(|cells| self.wide(cells, extent))
             };
             let is_last = primitives == 0;
             primitives /= 2;
@@ -420,6 +420,14 @@ impl Builder<'_, '_> {
         }
         entry(node.cells(), self.offset()?);
         Ok(true)
+    }
+
+    /// The same resolution, but no cell so thin that the margin would put everything into it.
+    fn wide(&self, resolution: [u32; 3], extent: [f32; 3]) -> [u32; 3] {
+        let margin = self.lattice.margin().to_array();
+        core::array::from_fn(|axis| {
+            resolution[axis].min(whole(extent[axis] / (8.0 * margin[axis]))).max(1)
+        })
     }
 
     /// The part of a cell that its primitives reach.
