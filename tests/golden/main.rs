@@ -1,0 +1,63 @@
+//! How much work is done, in numbers that do not depend on the machine?
+//!
+//! Bytes and counters of every method on a few scenes, as a table in counters.txt. A slower algorithm
+//! or a larger blob shows as a difference there, in review and on any machine; `HGRID_BLESS=1` writes
+//! the table anew.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use hgrid_core::{Config, Counters, Method};
+use hgrid_lab::camera::{Camera, Up, View};
+use hgrid_lab::scene::Scene;
+use hgrid_tests::meshes::{Mesh, ball, soup};
+use hgrid_tests::owned::Owned;
+
+/// Pixels on a side of the picture that is counted.
+const SIZE: u16 = 64;
+
+/// A line for a method on a scene.
+fn line(name: &str, mesh: &Mesh, method: Method) -> String {
+    let view = mesh.view();
+    let owned = Owned::build(&view, &Config::new(method)).unwrap();
+    let grid = owned.open(&view).unwrap();
+    let camera = Camera::framing(grid.bounds(), View::ThreeQuarter, Up::Y);
+    let mut counters = Counters::default();
+    let pixels = (0..SIZE).flat_map(|row| (0..SIZE).map(move |column| (column, row)));
+    let hits = pixels
+        .filter(|&(column, row)| {
+            grid.intersect_counted(&camera.ray(column, row, SIZE), &mut counters).is_some()
+        })
+        .count();
+    let Counters { primitive_tests, cell_steps, grid_steps } = counters;
+    let [x, y, z] = grid.resolution();
+    let resolution = format!("{x}x{y}x{z}");
+    format!(
+        "{name:8} {:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6}",
+        method.name(),
+        grid.blob_bytes(),
+    )
+}
+
+#[test]
+fn work_is_what_it_was() {
+    let Scene { positions, indices, .. } = Scene::load("procedural:knot:5000").unwrap();
+    let scenes = [
+        ("knot", Mesh { positions, indices }),
+        ("ball", ball(16, 1.0)),
+        ("soup", soup(3000, 0.05, 1)),
+    ];
+    let mut table =
+        String::from("scene    method     resolution    bytes  hits   tests   steps  grids\n");
+    for (name, mesh) in &scenes {
+        for &method in Method::ALL {
+            writeln!(table, "{}", line(name, mesh, method)).unwrap();
+        }
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/counters.txt");
+    if std::env::var_os("HGRID_BLESS").is_some() {
+        std::fs::write(&path, &table).unwrap();
+    }
+    let expected = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(table, expected, "HGRID_BLESS=1 writes the table anew");
+}
