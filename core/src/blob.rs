@@ -12,14 +12,16 @@
 //! other order is recognised and refused.
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3A;
 
 use crate::aabb::Aabb;
 use crate::arena::{self, ALIGNMENT};
 use crate::bits::halves;
 use crate::cell::{Lattice, MAX_RESOLUTION};
-use crate::config::{Config, Method};
+use crate::config::{BuildFlags, Config, Method};
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
+use crate::survey::Survey;
 
 /// The version of the blob format. A blob of another version is refused.
 pub const BLOB_VERSION: u32 = 1;
@@ -180,6 +182,30 @@ impl Header {
             config.depth = self.depth;
         }
         config
+    }
+
+    /// Whether the header says what the mesh says: what was skipped, its box, and the resolution that
+    /// `rule` has for the box's size and so many triangles.
+    pub(crate) fn check(
+        &self,
+        lattice: &Lattice,
+        mesh: &TriangleMesh<'_>,
+        rule: impl FnOnce(Vec3A, u32) -> Option<[u32; 3]>,
+    ) -> Result<(), Error> {
+        let survey = Survey::of(mesh, BuildFlags::empty())?;
+        if self.skipped_count != survey.skipped_count {
+            return Err(corrupt(core::mem::offset_of!(Self, skipped_count)));
+        }
+        if lattice.bounds() != Lattice::pad(&survey.bounds) {
+            return Err(corrupt(core::mem::offset_of!(Self, bounds_min)));
+        }
+        if !self.config(Config::default()).density_is_valid() {
+            return Err(corrupt(core::mem::offset_of!(Self, density)));
+        }
+        if rule(lattice.bounds().size(), survey.finite_count) != Some(lattice.resolution) {
+            return Err(corrupt(core::mem::offset_of!(Self, resolution)));
+        }
+        Ok(())
     }
 
     /// Whether the fields that mean nothing to the method are zero, as a build leaves them.

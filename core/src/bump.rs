@@ -1,7 +1,19 @@
-//! A bump allocator over words that the caller brought.
+//! A bump allocator over words that the caller brought, for the structures whose size is known only
+//! when they are built.
 //!
 //! It only moves forward and hands out words that nobody else has. When it runs out it goes on
 //! counting: what a build used or would have needed is known at the end, to the word, either way.
+//!
+//! ```text
+//! blob | header | fixed sections, if any | pool of words, list after list ->     | padding |
+//! ```
+
+use crate::arena::section_bytes;
+use crate::blob::{HEADER_BYTES, Header};
+use crate::error::{ConfigField, Error, Region};
+
+/// The bit of an offset into a pool that says "a grid lies there", not a list. The others say where.
+pub(crate) const GRID: u32 = 1 << 31;
 
 /// Words to give away, and how many were asked for.
 #[derive(Debug)]
@@ -13,9 +25,11 @@ pub(crate) struct Bump<'a> {
 }
 
 impl<'a> Bump<'a> {
-    /// An allocator over these words.
-    pub(crate) fn new(words: &'a mut [u32]) -> Self {
-        Self { free: words, asked: 0, is_exhausted: false }
+    /// An allocator over the whole words of a pool.
+    pub(crate) fn over(pool: &'a mut [u8]) -> Self {
+        let whole = pool.len() / size_of::<u32>() * size_of::<u32>();
+        let words = pool.get_mut(..whole).and_then(|pool| bytemuck::try_cast_slice_mut(pool).ok());
+        Self { free: words.unwrap_or_default(), asked: 0, is_exhausted: false }
     }
 
     /// The next `count` words, or `None` if they are not there. From then on there are none.
@@ -33,10 +47,31 @@ impl<'a> Bump<'a> {
         }
     }
 
-    /// Words asked for so far, given or not.
-    pub(crate) const fn asked(&self) -> u64 {
-        self.asked
+    /// Where the pool goes on: the words asked for so far, given or not. An error if [`GRID`] leaves
+    /// no room to say so.
+    pub(crate) fn offset(&self) -> Result<u32, Error> {
+        let offset = u32::try_from(self.asked).ok().filter(|offset| offset & GRID == 0);
+        offset.ok_or(Error::InvalidConfig(ConfigField::Density))
     }
+}
+
+/// Ends a build: puts the header in front of the pool and zeros behind it, and returns the blob; or
+/// says what the index would have needed.
+pub(crate) fn finish(index: &mut [u8], header: Header) -> Result<&[u8], Error> {
+    let (needed_bytes, available_bytes) = (header.blob_bytes, index.len() as u64);
+    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
+    let bytes = usize::try_from(needed_bytes).ok();
+    let blob = bytes.and_then(|bytes| index.get_mut(..bytes)).ok_or(too_small)?;
+    let words = u64::from(header.reference_count);
+    let padding = section_bytes::<u32>(words) - words * size_of::<u32>() as u64;
+    let padding = usize::try_from(padding).ok().and_then(|padding| bytes?.checked_sub(padding));
+    if let Some(padding) = padding.and_then(|start| blob.get_mut(start..)) {
+        padding.fill(0);
+    }
+    if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>() {
+        *head = header.to_bytes();
+    }
+    Ok(blob)
 }
 
 #[cfg(test)]
@@ -46,11 +81,11 @@ mod tests {
     #[test]
     fn it_gives_what_it_has_and_counts_what_it_has_not() {
         let mut words = [7; 10];
-        let mut bump = Bump::new(&mut words);
+        let mut bump = Bump::over(bytemuck::cast_slice_mut(&mut words));
         bump.take(4).unwrap().fill(1);
         bump.take(3).unwrap().fill(2);
         assert!(bump.take(4).is_none() && bump.take(1).is_none() && bump.take(0).is_none());
-        assert_eq!(bump.asked(), 12);
+        assert_eq!(bump.offset(), Ok(12));
         assert_eq!(words, [1, 1, 1, 1, 2, 2, 2, 7, 7, 7]);
     }
 }

@@ -55,8 +55,11 @@ impl Sizes {
         Some(Self { index_bytes, scratch_bytes, is_exact: false })
     }
 
-    /// Sizes from counts in 64 bits; an error if they do not fit the machine's address space.
+    /// Sizes from counts in 64 bits; an error if they do not fit the machine's address space. A bound
+    /// is never larger than the largest region that the machine can have.
     pub(crate) fn new(index_bytes: u64, scratch_bytes: u64, is_exact: bool) -> Result<Self, Error> {
+        let largest = if is_exact { u64::MAX } else { isize::MAX.unsigned_abs() as u64 };
+        let index_bytes = index_bytes.min(largest);
         let fit = |needed_bytes: u64, region| {
             let available_bytes = usize::MAX as u64;
             usize::try_from(needed_bytes).map_err(|_| Error::OutOfMemory {

@@ -54,6 +54,15 @@ impl Level {
     const fn first_bit(&self) -> usize {
         self.start as usize * WORD_BITS
     }
+
+    /// Whether any cell of a macrocell on the level above is full.
+    fn any_in(&self, words: &[u64], [x, y, z]: [u32; 3], factor: u32) -> bool {
+        let [width, height, depth] = self.resolution;
+        let span = |cell: u32, end: u32| cell * factor..(cell + 1).saturating_mul(factor).min(end);
+        let xs = span(x, width);
+        let row = |y, z| extent(words, self.bit([xs.start, y, z]), xs.len()).is_some();
+        span(z, depth).any(|z| span(y, height).any(|y| row(y, z)))
+    }
 }
 
 /// The levels above a grid.
@@ -62,6 +71,8 @@ pub(super) struct Levels {
     /// Level 1 first; level 0 is the grid itself.
     all: [Level; MAX_LEVELS],
     count: usize,
+    /// Words of all levels together.
+    words: u64,
     factor: NonZeroU32,
 }
 
@@ -73,35 +84,25 @@ impl Levels {
             _ => NonZeroU32::MIN.saturating_add(1),
         };
         let factor = nonzero.get();
-        let mut levels = Self { all: [Level::NONE; MAX_LEVELS], count: 0, factor: nonzero };
+        let mut levels =
+            Self { all: [Level::NONE; MAX_LEVELS], count: 0, words: 0, factor: nonzero };
         let [mut x, mut y, mut z] = resolution;
-        let mut start = 0;
         while levels.count < MAX_LEVELS {
             [x, y, z] = [x.div_ceil(factor), y.div_ceil(factor), z.div_ceil(factor)];
-            let level = Level { resolution: [x, y, z], start };
+            let level = Level { resolution: [x, y, z], start: levels.words };
             levels.all[levels.count] = level;
             levels.count += 1;
+            levels.words = level.end();
             if level.cells() <= FEW_CELLS {
                 break;
             }
-            start = level.end();
         }
         levels
     }
 
     /// Words of all levels together.
     pub(super) const fn words(&self) -> u64 {
-        let mut words = 0;
-        let mut rest = self.all.as_slice();
-        let mut number = 0;
-        while let [level, others @ ..] = rest {
-            if number < self.count {
-                words = level.end();
-            }
-            rest = others;
-            number += 1;
-        }
-        words
+        self.words
     }
 
     /// Number of levels, the grid not counted.
@@ -150,9 +151,7 @@ impl Levels {
             below = level;
         }
     }
-}
 
-impl Levels {
     /// The first word that [`fill`](Self::fill) would write otherwise; needs no memory.
     pub(super) fn first_wrong_word(
         &self,
@@ -184,17 +183,6 @@ impl Levels {
             below = (level, words);
         }
         None
-    }
-}
-
-impl Level {
-    /// Whether any cell of a macrocell on the level above is full.
-    fn any_in(&self, words: &[u64], [x, y, z]: [u32; 3], factor: u32) -> bool {
-        let [width, height, depth] = self.resolution;
-        let span = |cell: u32, end: u32| cell * factor..(cell + 1).saturating_mul(factor).min(end);
-        let xs = span(x, width);
-        let row = |y, z| extent(words, self.bit([xs.start, y, z]), xs.len()).is_some();
-        span(z, depth).any(|z| span(y, height).any(|y| row(y, z)))
     }
 }
 

@@ -126,9 +126,9 @@ impl<'a> OneLevel<'a> {
     /// Whether the domain bit of a cell is set.
     #[inline(always)]
     pub(crate) fn is_marked(&self, [x, y, z]: [u32; 3]) -> bool {
-        let [width, height, _] = self.last.map(|last| last as usize + 1);
-        let row = z as usize * height + y as usize;
-        is_set(self.sections.domain_bits, row * width + x as usize)
+        let [width, height, _] = self.last.map(|last| last + 1);
+        let bit = row(height, y, z) * width as usize + x as usize;
+        is_set(self.sections.domain_bits, bit)
     }
 
     /// The two words of the hash table that say where a cell's list lies; `None` if it is empty.

@@ -19,31 +19,16 @@ use crate::aabb::Aabb;
 use crate::bits::{WORD_BITS, each_one, extent};
 use crate::blob::{Header, corrupt};
 use crate::cell::{Lattice, woo};
-use crate::config::BuildFlags;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
-use crate::survey::Survey;
 
-/// Whether the header says what the mesh says: its box, its resolution, what was skipped.
+/// Whether the header says what the mesh and Woo's rule say.
 pub(crate) fn check_header(
     header: &Header,
     lattice: &Lattice,
     mesh: &TriangleMesh<'_>,
 ) -> Result<(), Error> {
-    let survey = Survey::of(mesh, BuildFlags::empty())?;
-    if header.skipped_count != survey.skipped_count {
-        return Err(corrupt(core::mem::offset_of!(Header, skipped_count)));
-    }
-    if lattice.bounds() != Lattice::pad(&survey.bounds) {
-        return Err(corrupt(core::mem::offset_of!(Header, bounds_min)));
-    }
-    let size = lattice.bounds().size();
-    let is_density = header.density > 0.0 && header.density.is_finite();
-    let resolution = woo(size, f64::from(header.density), survey.finite_count);
-    if !is_density || resolution != Some(lattice.resolution) {
-        return Err(corrupt(core::mem::offset_of!(Header, resolution)));
-    }
-    Ok(())
+    header.check(lattice, mesh, |size, count| woo(size, f64::from(header.density), count))
 }
 
 impl OneLevel<'_> {

@@ -15,12 +15,12 @@
 use glam::Vec3A;
 
 use super::FEW;
-use super::node::{GRID, HEAD_WORDS, MAX_RESOLUTION, Node};
+use super::node::{HEAD_WORDS, MAX_RESOLUTION, Node};
 use super::overlap::Overlap;
 use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split_mut};
 use crate::blob::{HEADER_BYTES, Header};
-use crate::bump::Bump;
+use crate::bump::{Bump, GRID, finish};
 use crate::cell::{CellRange, Lattice, as_f32, cells_between, whole};
 use crate::config::Config;
 use crate::error::{ConfigField, Error, Region};
@@ -75,10 +75,9 @@ pub(crate) fn sizes(
     let (index_bytes, scratch_bytes) = bound(mesh.triangle_count(), config);
     if (scratch.len() as u64) < scratch_bytes {
         Root::of(mesh, config)?;
-        // No machine has a region larger than it can address.
-        return Sizes::new(index_bytes.min(isize::MAX.unsigned_abs() as u64), scratch_bytes, false);
+        return Sizes::new(index_bytes, scratch_bytes, false);
     }
-    Sizes::new(run(mesh, config, &mut [], scratch)?, scratch_bytes, true)
+    Sizes::new(run(mesh, config, &mut [], scratch)?.blob_bytes, scratch_bytes, true)
 }
 
 /// Builds into `index` and returns the part of it that is the blob.
@@ -88,10 +87,8 @@ pub(crate) fn build<'a>(
     index: &'a mut [u8],
     scratch: &mut [u8],
 ) -> Result<&'a [u8], Error> {
-    let available_bytes = index.len() as u64;
-    let needed_bytes = run(mesh, config, index, scratch)?;
-    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
-    usize::try_from(needed_bytes).ok().and_then(|bytes| index.get(..bytes)).ok_or(too_small)
+    let header = run(mesh, config, index, scratch)?;
+    finish(index, header)
 }
 
 /// The outermost grid, as fine as its references allow.
@@ -138,13 +135,13 @@ fn references(mesh: &TriangleMesh<'_>, lattice: &Lattice, limit: u64) -> u64 {
     references
 }
 
-/// Builds as much as the index holds and returns the bytes that all of it takes.
+/// Builds as much as the index holds; the header says what all of it takes.
 fn run(
     mesh: &TriangleMesh<'_>,
     config: &Config,
     index: &mut [u8],
     scratch: &mut [u8],
-) -> Result<u64, Error> {
+) -> Result<Header, Error> {
     let Root { survey, lattice, density, rule } = Root::of(mesh, config)?;
     let available_bytes = scratch.len() as u64;
     let needed_bytes = scratch_bytes(mesh.triangle_count(), config);
@@ -154,14 +151,8 @@ fn run(
     }
     let (scratch, _) = split_mut::<u32>(scratch, needed_bytes / 4).ok_or(too_small)?;
 
-    let (head, pool) = match index.split_first_chunk_mut::<HEADER_BYTES>() {
-        Some((head, pool)) => (Some(head), pool),
-        None => (None, &mut [][..]),
-    };
-    let whole_words = pool.len() / size_of::<u32>() * size_of::<u32>();
-    let pool = pool.get_mut(..whole_words).and_then(|pool| bytemuck::try_cast_slice_mut(pool).ok());
-    let mut builder =
-        Builder { mesh, lattice: &lattice, rule, pool: Bump::new(pool.unwrap_or_default()) };
+    let pool = index.get_mut(HEADER_BYTES..).unwrap_or_default();
+    let mut builder = Builder { mesh, lattice: &lattice, rule, pool: Bump::over(pool) };
 
     let finite = usize::try_from(survey.finite_count).unwrap_or(usize::MAX);
     let (ids, scratch) = scratch.split_at_mut_checked(finite).ok_or(too_small)?;
@@ -170,22 +161,14 @@ fn run(
     }
     let root = Aabb { min: Vec3A::ZERO, max: Vec3A::from_array(lattice.resolution.map(as_f32)) };
     builder.grid(ids, &root, 0, scratch)?;
-    let words = builder.offset()?;
+    let words = builder.pool.offset()?;
 
     let mut header = Header::new(config, mesh, &lattice);
     header.blob_bytes = HEADER_BYTES as u64 + section_bytes::<u32>(words.into());
     header.skipped_count = survey.skipped_count;
     header.density = density;
     header.reference_count = words;
-    if let Some(head) = head {
-        *head = header.to_bytes();
-    }
-    let used = HEADER_BYTES as u64 + u64::from(words) * size_of::<u32>() as u64;
-    let range = usize::try_from(used).ok().zip(usize::try_from(header.blob_bytes).ok());
-    if let Some(padding) = range.and_then(|(from, to)| index.get_mut(from..to)) {
-        padding.fill(0);
-    }
-    Ok(header.blob_bytes)
+    Ok(header)
 }
 
 /// How finely a grid is cut.
@@ -305,12 +288,6 @@ struct Builder<'m, 'p> {
 }
 
 impl Builder<'_, '_> {
-    /// Where the pool goes on, if an entry can say so.
-    fn offset(&self) -> Result<u32, Error> {
-        let offset = u32::try_from(self.pool.asked()).ok().filter(|offset| offset & GRID == 0);
-        offset.ok_or(Error::InvalidConfig(ConfigField::Density))
-    }
-
     fn place(&self, id: u32) -> Option<Placed> {
         Placed::new(self.mesh, self.lattice, id)
     }
@@ -328,7 +305,7 @@ impl Builder<'_, '_> {
         scratch: &mut [u32],
     ) -> Result<bool, Error> {
         let count = u32::try_from(ids.len()).unwrap_or(u32::MAX);
-        let at = self.offset()?;
+        let at = self.pool.offset()?;
 
         // Count the references of each cell, in coarser grids if they get out of hand.
         let cell_size = self.lattice.cell_size().to_array().map(f64::from);
@@ -407,7 +384,7 @@ impl Builder<'_, '_> {
             let ends = starts.get(number..).and_then(|ends| ends.first_chunk::<2>());
             let list = ends.and_then(|ends| lists.get(ends[0] as usize..ends[1] as usize));
             let list = list.unwrap_or_default();
-            let start = self.offset()?;
+            let start = self.pool.offset()?;
             let is_crowded = list.len() > FEW && depth + 1 < self.rule.depth;
             if is_crowded && self.grid(list, &self.inside(&node, cell, list), depth + 1, rest)? {
                 entry(number, start | GRID);
@@ -418,7 +395,7 @@ impl Builder<'_, '_> {
                 }
             }
         }
-        entry(node.cells(), self.offset()?);
+        entry(node.cells(), self.pool.offset()?);
         Ok(true)
     }
 

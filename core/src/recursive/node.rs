@@ -3,12 +3,10 @@
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
+use crate::bump::GRID;
 use crate::cell::as_f32;
 use crate::dda::{Line, Walk};
 use crate::one_level::row;
-
-/// The bit of an entry that says "grid". Offsets into the pool have the others.
-pub(super) const GRID: u32 = 1 << 31;
 
 /// The most cells of a grid on an axis: three such numbers share a word.
 pub(super) const MAX_RESOLUTION: u32 = (1 << RESOLUTION_BITS) - 1;

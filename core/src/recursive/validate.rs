@@ -10,10 +10,8 @@ use super::node::{Content, Node};
 use super::{MAX_DEPTH, Recursive};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::{CellRange, Lattice};
-use crate::config::BuildFlags;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
-use crate::survey::Survey;
 
 /// A cell and the grid that it is a cell of.
 type Place = (Node, [u32; 3]);
@@ -33,22 +31,13 @@ impl Recursive<'_> {
         lattice: &Lattice,
         mesh: &TriangleMesh<'_>,
     ) -> Result<(), Error> {
-        // The header says what the mesh says.
-        let survey = Survey::of(mesh, BuildFlags::empty())?;
-        if header.skipped_count != survey.skipped_count {
-            return Err(corrupt(core::mem::offset_of!(Header, skipped_count)));
-        }
-        if lattice.bounds() != Lattice::pad(&survey.bounds) {
-            return Err(corrupt(core::mem::offset_of!(Header, bounds_min)));
+        if !(1..=MAX_DEPTH).contains(&header.depth) {
+            return Err(corrupt(core::mem::offset_of!(Header, depth)));
         }
         let rule = Rule { density: f64::from(header.density), depth: header.depth };
-        let is_density = header.density > 0.0 && header.density.is_finite();
-        let is_rule = is_density && (1..=MAX_DEPTH).contains(&header.depth);
-        let size = lattice.bounds().size().to_array().map(f64::from);
-        if !is_rule || rule.resolution(size, survey.finite_count, 0) != Some(lattice.resolution) {
-            return Err(corrupt(core::mem::offset_of!(Header, resolution)));
-        }
-
+        header.check(lattice, mesh, |size, count| {
+            rule.resolution(size.to_array().map(f64::from), count, 0)
+        })?;
         let check = Check { pool: self.pool, mesh, lattice };
         let root = Node::open(self.pool, 0).filter(|root| root.resolution == lattice.resolution);
         let root = root.ok_or(corrupt(HEADER_BYTES))?;

@@ -12,12 +12,12 @@
 
 use glam::Vec3A;
 
-use super::SUBGRID;
 use super::subgrid::{Frame, SubLayout};
 use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split_mut};
 use crate::bits::{WORD_BITS, each_one, halves};
-use crate::bump::Bump;
+use crate::blob::Header;
+use crate::bump::{Bump, GRID, finish};
 use crate::cell::{CellRange, Lattice};
 use crate::config::Config;
 use crate::error::{ConfigField, Error, Region};
@@ -117,7 +117,7 @@ const fn pool_words(references: u32, config: &Config) -> u32 {
     let per_subgrid = 3.0 + 2.1 + 2.0 + reference_limit(0) as f64;
     let subgrids = references as f64 / (config.subdivide_above as f64 + 1.0);
     let words = references as f64 * per_reference + subgrids * per_subgrid;
-    if words < SUBGRID as f64 { words as u32 } else { SUBGRID }
+    if words < GRID as f64 { words as u32 } else { GRID }
 }
 
 /// The most memory that a mesh with so many triangles can need.
@@ -133,34 +133,17 @@ pub(crate) fn sizes(
     config: &Config,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    let exact = if scratch.is_empty() { None } else { Some(run(mesh, config, &mut [], scratch)) };
-    let plan = Plan::new(mesh, config, &(), &mut [])?;
-    check_cells(&plan.layout)?;
-    let scratch_bytes = scratch_bytes(&plan.layout, mesh.triangle_count(), config.density);
-    match exact {
-        Some(Ok(index_bytes)) => Sizes::new(index_bytes, scratch_bytes, true),
-        Some(Err(error)) if !is_scratch(&error) => Err(error),
-        _ => {
-            let pool = pool_words(plan.layout.reference_count, config);
-            let index_bytes = plan.layout.with_references(pool).index_bytes();
-            // No machine has a region larger than it can address.
-            Sizes::new(index_bytes.min(isize::MAX.unsigned_abs() as u64), scratch_bytes, false)
+    let plan = TopPlan::new(mesh, config, scratch)?;
+    let (top, scratch_bytes) = (plan.top.layout, plan.scratch_bytes);
+    match run(mesh, config, plan, &mut []) {
+        Ok(header) => Sizes::new(header.blob_bytes, scratch_bytes, true),
+        Err(Error::OutOfMemory { region: Region::Scratch, .. }) => {
+            let pool_words = pool_words(top.reference_count, config);
+            let index_bytes = top.with_references(pool_words).index_bytes();
+            Sizes::new(index_bytes, scratch_bytes, false)
         }
+        Err(error) => Err(error),
     }
-}
-
-/// Refuses a top with more cells than a word can number.
-const fn check_cells(layout: &Layout) -> Result<(), Error> {
-    if layout.cells < NOBODY as u64 {
-        Ok(())
-    } else {
-        Err(Error::InvalidConfig(ConfigField::Density))
-    }
-}
-
-/// Whether an error says that the scratch is too small.
-const fn is_scratch(error: &Error) -> bool {
-    matches!(error, Error::OutOfMemory { region: Region::Scratch, .. })
 }
 
 /// Builds into `index` and returns the part of it that is the blob.
@@ -170,23 +153,40 @@ pub(crate) fn build<'a>(
     index: &'a mut [u8],
     scratch: &mut [u8],
 ) -> Result<&'a [u8], Error> {
-    let available_bytes = index.len() as u64;
-    let needed_bytes = run(mesh, config, index, scratch)?;
-    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
-    usize::try_from(needed_bytes).ok().and_then(|bytes| index.get(..bytes)).ok_or(too_small)
+    let plan = TopPlan::new(mesh, config, scratch)?;
+    let header = run(mesh, config, plan, index)?;
+    finish(index, header)
 }
 
-/// Builds as much as the index holds and returns the bytes that all of it takes.
+/// The plan of the top, and the scratch that it was made in.
+struct TopPlan<'s> {
+    top: Plan<'s>,
+    /// Enough for this mesh.
+    scratch_bytes: u64,
+    available_bytes: u64,
+}
+
+impl<'s> TopPlan<'s> {
+    fn new(mesh: &TriangleMesh<'_>, config: &Config, scratch: &'s mut [u8]) -> Result<Self, Error> {
+        let available_bytes = scratch.len() as u64;
+        let top = Plan::new(mesh, config, &(), scratch)?;
+        // Slots note their cell's number in a word.
+        if top.layout.cells >= u64::from(NOBODY) {
+            return Err(Error::InvalidConfig(ConfigField::Density));
+        }
+        let scratch_bytes = scratch_bytes(&top.layout, mesh.triangle_count(), config.density);
+        Ok(Self { top, scratch_bytes, available_bytes })
+    }
+}
+
+/// Builds as much as the index holds; the header says what all of it takes.
 fn run(
     mesh: &TriangleMesh<'_>,
     config: &Config,
+    plan: TopPlan<'_>,
     index: &mut [u8],
-    scratch: &mut [u8],
-) -> Result<u64, Error> {
-    let available_bytes = scratch.len() as u64;
-    let mut plan = Plan::new(mesh, config, &(), scratch)?;
-    check_cells(&plan.layout)?;
-    let needed_bytes = scratch_bytes(&plan.layout, mesh.triangle_count(), config.density);
+) -> Result<Header, Error> {
+    let TopPlan { top: mut plan, scratch_bytes: needed_bytes, available_bytes } = plan;
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
     let Rows { offsets, domain_bits, rest } = plan.rows.take().ok_or(too_small)?;
 
@@ -210,18 +210,16 @@ fn run(
         Some((head, pool)) => (top.sections_mut(head), pool),
         None => (None, &mut [][..]),
     };
-    let whole_words = pool.len() / size_of::<u32>() * size_of::<u32>();
-    let pool = pool.get_mut(..whole_words).and_then(|pool| bytemuck::try_cast_slice_mut(pool).ok());
-    let mut pool = Bump::new(pool.unwrap_or_default());
-    let mut head = head.map(|sections| {
+    let mut pool = Bump::over(pool);
+    let mut slots = head.map(|sections| {
         copy(offsets, sections.row_offsets);
         copy(domain_bits, sections.domain_bits);
-        (sections.header, sections.hash)
+        sections.hash
     });
 
     // Move list after list into the pool, crowded ones as subgrids.
     let mut entry = |slot: usize, value: u32| {
-        if let Some(entry) = head.as_mut().and_then(|(_, hash)| hash.get_mut(slot)) {
+        if let Some(entry) = slots.as_mut().and_then(|hash| hash.get_mut(slot)) {
             *entry = value;
         }
     };
@@ -230,12 +228,12 @@ fn run(
         _ => &[],
     });
     for (slot, (ids, &owner)) in lists.zip(&*owners).enumerate() {
-        let start = offset(&pool)?;
+        let start = pool.offset()?;
         let cell = cell_of(owner, plan.lattice.resolution);
         let spread = CellSpread { mesh, lattice: &plan.lattice, cell, ids, frame: Frame::WHOLE };
         let is_crowded = ids.len() > config.subdivide_above as usize;
         if is_crowded && spread.subdivide(plan.density, &mut bench, &mut pool) {
-            entry(slot, start | SUBGRID);
+            entry(slot, start | GRID);
         } else {
             entry(slot, start);
             if let Some(words) = pool.take(ids.len()) {
@@ -243,27 +241,10 @@ fn run(
             }
         }
     }
-    let pool_words = offset(&pool)?;
+    let pool_words = pool.offset()?;
     entry(owners.len(), pool_words);
-
-    // The header says how long the pool became; what is behind it is padding.
     plan.layout = plan.layout.with_references(pool_words);
-    let needed_bytes = plan.layout.index_bytes();
-    if let Some((header, _)) = head {
-        *header = plan.header(config, mesh).to_bytes();
-    }
-    let used = top.index_bytes() + u64::from(pool_words) * size_of::<u32>() as u64;
-    let range = usize::try_from(used).ok().zip(usize::try_from(needed_bytes).ok());
-    if let Some(padding) = range.and_then(|(from, to)| index.get_mut(from..to)) {
-        padding.fill(0);
-    }
-    Ok(needed_bytes)
-}
-
-/// Where the pool goes on, if a hash entry can say so.
-fn offset(pool: &Bump<'_>) -> Result<u32, Error> {
-    let offset = u32::try_from(pool.asked()).ok().filter(|offset| offset & SUBGRID == 0);
-    offset.ok_or(Error::InvalidConfig(ConfigField::Density))
+    Ok(plan.header(config, mesh))
 }
 
 /// Notes the cell of every slot.

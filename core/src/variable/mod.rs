@@ -21,6 +21,7 @@ mod subgrid;
 mod validate;
 
 use crate::blob::Header;
+use crate::bump::GRID;
 use crate::cell::Lattice;
 use crate::counters::Tally;
 use crate::dda::{Line, Step};
@@ -28,9 +29,6 @@ use crate::error::Error;
 use crate::one_level::OneLevel;
 pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
 use subgrid::Subgrid;
-
-/// The bit of a hash entry that says "subgrid". Offsets into the pool have the others.
-const SUBGRID: u32 = 1 << 31;
 
 /// What a cell of the top holds.
 #[derive(Debug, Clone, Copy)]
@@ -62,9 +60,9 @@ impl<'a> Variable<'a> {
     #[inline(always)]
     fn content(&self, cell: [u32; 3]) -> Option<Content<'a>> {
         let [start, end] = self.top.ends(cell)?;
-        let part = (start & !SUBGRID) as usize..(end & !SUBGRID) as usize;
+        let part = (start & !GRID) as usize..(end & !GRID) as usize;
         let words = self.top.lists().get(part)?;
-        Some(if start & SUBGRID == 0 { Content::List(words) } else { Content::Subgrid(words) })
+        Some(if start & GRID == 0 { Content::List(words) } else { Content::Subgrid(words) })
     }
 
     /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any; see
