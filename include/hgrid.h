@@ -155,7 +155,7 @@
 
 /**
  * Bytes of index that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. A scan takes about a tenth of it.
+ * default configuration: a constant expression. A scan takes a sixth of it or less.
  */
 #define HGRID_INDEX_BOUND(triangles) ((size_t)85 * (triangles) + 1280)
 
@@ -240,7 +240,7 @@
  * to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
  * it.
  *
- * Memory: ten to thirty times that of one level, and about 600 bytes of scratch for each triangle.
+ * Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch for each triangle.
  * How much index it takes shows only while it is written. `hgrid_sizes` without scratch answers
  * with a bound that no mesh comes near, up to 8 GiB: ask with scratch, which gives the exact size.
  */
@@ -655,7 +655,7 @@ extern "C" {
 /**
  * Tells how much memory a build of this mesh takes.
  *
- * Without scratch (NULL, 0) the answer takes a pass or two over the triangles: the report's
+ * Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
  * `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
  * more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
  * with variable; with recursive it is a bound that no mesh comes near.

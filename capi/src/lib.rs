@@ -37,7 +37,7 @@ const fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 
 /// Tells how much memory a build of this mesh takes.
 ///
-/// Without scratch (NULL, 0) the answer takes a pass or two over the triangles: the report's
+/// Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
 /// `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
 /// more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
 /// with variable; with recursive it is a bound that no mesh comes near.

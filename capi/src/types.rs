@@ -65,7 +65,7 @@ pub const HGRID_METHOD_VARIABLE: u32 = 3;
 /// to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
 /// it.
 ///
-/// Memory: ten to thirty times that of one level, and about 600 bytes of scratch for each triangle.
+/// Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch for each triangle.
 /// How much index it takes shows only while it is written. `hgrid_sizes` without scratch answers
 /// with a bound that no mesh comes near, up to 8 GiB: ask with scratch, which gives the exact size.
 pub const HGRID_METHOD_RECURSIVE: u32 = 4;

@@ -23,7 +23,7 @@ pub struct Sizes {
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A one-level grid of a scan takes an eighth of it; for recursive grids it is generous beyond
+    /// A one-level grid of a scan takes a sixth of it or less; for recursive grids it is generous beyond
     /// use. `None` if no build takes the configuration, or the sizes do not fit the machine's address
     /// space.
     ///
@@ -79,10 +79,11 @@ impl Sizes {
 /// The memory that a build of this mesh takes.
 ///
 /// With an empty `scratch` the answer takes two passes over the triangles, one more for each halving
-/// of the density, and `index_bytes` is enough: for a one-level or fixed grid of a scan about twice what it will take, for the other two a
-/// generous multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid is
-/// planned in it and `index_bytes` is exact, for about half the time of a build, up to all of it
-/// for a variable or recursive grid. The scratch holds nothing of use afterwards.
+/// of the density, and `index_bytes` is enough: for a scan up to twice what one level takes, four
+/// times what a fixed grid takes, for the other two a generous multiple. With `scratch_bytes` of
+/// scratch (same alignment rule as for a build) the grid is planned in it and `index_bytes` is exact,
+/// for about half the time of a build, up to all of it for a variable or recursive grid. The scratch
+/// holds nothing of use afterwards.
 ///
 /// # Errors
 /// Those of [`Grid::build`](crate::Grid::build), but for index memory.

@@ -14,12 +14,12 @@
 //! not to others, depending on their sizes, and would fill with zeros what the sizes only allow for.)
 //!
 //! Rendering is one thread, one ray per pixel, rows from the top; the timed pass traces and shades
-//! and does nothing else, and the work is counted in a pass of its own.
+//! and, once a row, moves the progress bar; the work is counted in a pass of its own.
 
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{Config, Counters, Grid, Hit, Ray, TriangleMesh, sizes};
+use hgrid_core::{Config, Counters, Grid, Hit, Method, Ray, TriangleMesh, sizes};
 use memmap2::{MmapMut, MmapOptions};
 use serde::Serialize;
 
@@ -66,8 +66,8 @@ pub struct Measurement {
     pub density: f32,
     /// Cells per axis.
     pub resolution: [u32; 3],
-    /// Triangle ids in all cells together.
-    pub references: u32,
+    /// Triangle ids in all cells together, for the methods that count them.
+    pub references: Option<u32>,
     /// Triangles without finite coordinates, which the grid leaves out.
     pub skipped_triangles: u32,
     /// Bytes of the built grid, without the mesh.
@@ -233,6 +233,11 @@ impl Memory {
     }
 }
 
+/// Whether a method's count of references is one: the others keep ids and grids in one pool.
+const fn has_references(method: Method) -> bool {
+    matches!(method, Method::OneLevel | Method::Fixed)
+}
+
 /// What becomes of the ray of every pixel, row by row from the upper left.
 fn trace<T>(
     camera: &Camera,
@@ -294,7 +299,7 @@ fn numbers(
         configured_density: config.density,
         density: grid.density(),
         resolution: grid.resolution(),
-        references: grid.reference_count(),
+        references: has_references(grid.method()).then(|| grid.reference_count()),
         skipped_triangles: grid.skipped_count(),
         index_bytes,
         index_bytes_per_triangle: ratio(index_bytes as u64, grid.mesh().triangle_count().into()),

@@ -43,7 +43,7 @@ impl fmt::Display for Report {
             ("vertices", HumanCount(scene.vertices as u64).to_string()),
             ("method", format!("{}, density {}", m.method, m.density)),
             ("resolution", format!("{x} x {y} x {z}")),
-            ("references", HumanCount(m.references.into()).to_string()),
+            ("references", m.references.map_or("-".into(), |r| HumanCount(r.into()).to_string())),
             ("index", format!("{index} bytes, {:.1} per triangle", m.index_bytes_per_triangle)),
             ("scratch", format!("{} bytes", HumanCount(m.scratch_bytes as u64))),
             ("rays", format!("{} ({size} x {size})", HumanCount(m.rays), size = m.size)),

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::Path;
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
     BeginList, ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult,
@@ -36,8 +36,11 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Scene> {
     let is_ply = source.fill_buf()?.starts_with(b"ply");
     ensure!(is_ply, "it is not a PLY file: it does not start with `ply`");
     let mut reader = Reader::new(source);
-    let header =
-        Parser::<Skipped>::new().read_header(&mut reader).context("its header is damaged")?;
+    // The parser's error goes on with its own state behind the first line.
+    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|error| {
+        let text = error.to_string();
+        anyhow!("its header is damaged: {}", text.lines().next().unwrap_or_default())
+    })?;
     ensure!(header.elements.contains_key("vertex"), "its header declares no `vertex` element");
     ensure!(
         !header.elements.contains_key("tristrips"),
