@@ -1,13 +1,15 @@
 /*
- * A ray tracer of one file, but for the scene: one thread, one ray per pixel, diffuse light.
+ * A ray tracer of one file, but for the scene: one thread, one ray per pixel, diffuse light. Rays
+ * are traced by tiles of 8 x 8 pixels, all rays of a tile in one call.
  *
  *     raytracer                          the built-in scene, to raytracer.ppm
  *     raytracer bunny.ply -o bunny.ppm   a mesh of yours
  *     raytracer --size 256               pixels on each side
- *     raytracer --method variable        one-level, fixed, variable or recursive
- *     raytracer --density 8              cells for each triangle
+ *     raytracer --method variable        one-level, fixed, variable, recursive or brick
+ *     raytracer --density 8              cells for each triangle, not for brick
+ *     raytracer --cell-size 2            cells twice as wide as usual, for brick
  *
- * What to look at: allocate_grid (sizes, memory), main (the build) and render (the query). Camera
+ * What to look at: allocate_grid (sizes, memory), main (the build) and trace (the query). Camera
  * and light are those of the project's own renderer in lab/, so the two draw the same picture, byte
  * by byte.
  *
@@ -26,7 +28,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { DEFAULT_SIZE = 1024, MAX_SIZE = 16384 };
+enum { DEFAULT_SIZE = 1024, MAX_SIZE = 16384, TILE = 8 };
 
 typedef struct {
     double x, y, z;
@@ -92,6 +94,12 @@ typedef struct {
     region index, scratch;
 } memory;
 
+/* Whether a method knows the size of its index before it writes it. */
+static bool is_planned(const hgrid_config *config)
+{
+    return config->method == HGRID_METHOD_ONE_LEVEL || config->method == HGRID_METHOD_FIXED;
+}
+
 /* Asks how much memory the grid takes, and allocates it.
  *
  * The question without scratch says enough for the index, not exactly what it takes: where memory
@@ -104,7 +112,7 @@ static memory allocate_grid(const hgrid_mesh *mesh, const hgrid_config *config)
     check(hgrid_sizes(mesh, config, NULL, 0, &report), &report);
     memory m;
     m.scratch = allocate_region(report.scratch_bytes);
-    if (config->method == HGRID_METHOD_VARIABLE || config->method == HGRID_METHOD_RECURSIVE)
+    if (!is_planned(config))
         check(hgrid_sizes(mesh, config, m.scratch.start, m.scratch.bytes, &report), &report);
     m.index = allocate_region(report.index_bytes);
     return m;
@@ -279,22 +287,55 @@ static void diffuse(const camera *c, const scene *s, const hgrid_ray *ray, const
         pixel[i] = display(key * KEY[i] + sky * SKY[i] + (1 - sky) * GROUND[i]);
 }
 
-/* Shoots a ray for each pixel; returns how many hit. */
+/* A pixel on its way: ray and hit lie in one struct, and hgrid_intersect_n finds them there. */
+typedef struct {
+    hgrid_ray ray;
+    hgrid_hit hit;
+    unsigned char *pixel;
+} sample;
+
+/* Finds what the rays of a tile hit, all with one call: neighbours share most of their way. */
+static void trace(const hgrid_grid *grid, sample *tile, size_t count)
+{
+    const hgrid_status status =
+        hgrid_intersect_n(grid, &tile->ray, sizeof *tile, &tile->hit, sizeof *tile, count,
+                          HGRID_COHERENCE_COHERENT, NULL);
+    if (status != HGRID_OK)
+        fail("%s", hgrid_status_string(status));
+}
+
+/* Paints the pixels of a tile; returns how many rays hit. */
+static size_t shade(const scene *s, const camera *c, const sample *tile, size_t count)
+{
+    size_t hits = 0;
+    for (const sample *at = tile; at < tile + count; at++)
+        if (at->hit.primitive != HGRID_INVALID_ID) {
+            diffuse(c, s, &at->ray, &at->hit, at->pixel);
+            hits++;
+        } else {
+            background(c, &at->ray, at->pixel);
+        }
+    return hits;
+}
+
+/* Shoots a ray for each pixel, tile by tile; returns how many hit. */
 static size_t render(const hgrid_grid *grid, const scene *s, const camera *c, int size,
                      unsigned char *pixels)
 {
     size_t hits = 0;
-    for (int row = 0; row < size; row++)
-        for (int column = 0; column < size; column++) {
-            const hgrid_ray ray = ray_of(c, column, row, size);
-            hgrid_hit hit;
-            if (hgrid_intersect(grid, &ray, NULL, &hit)) {
-                diffuse(c, s, &ray, &hit, pixels);
-                hits++;
-            } else {
-                background(c, &ray, pixels);
-            }
-            pixels += 3;
+    for (int top = 0; top < size; top += TILE)
+        for (int left = 0; left < size; left += TILE) {
+            /* At the right and lower edge a tile may be smaller. */
+            sample tile[TILE * TILE];
+            size_t count = 0;
+            for (int row = top; row < top + TILE && row < size; row++)
+                for (int column = left; column < left + TILE && column < size; column++) {
+                    sample *at = &tile[count++];
+                    at->ray = ray_of(c, column, row, size);
+                    at->pixel = pixels + 3 * ((size_t)row * (size_t)size + (size_t)column);
+                }
+            trace(grid, tile, count);
+            hits += shade(s, c, tile, count);
         }
     return hits;
 }
@@ -310,6 +351,7 @@ static const struct {
     {"fixed", HGRID_CONFIG_INIT_FIXED},
     {"variable", HGRID_CONFIG_INIT_VARIABLE},
     {"recursive", HGRID_CONFIG_INIT_RECURSIVE},
+    {"brick", HGRID_CONFIG_INIT_BRICK},
 };
 
 enum { METHOD_COUNT = sizeof METHODS / sizeof *METHODS };
@@ -317,9 +359,9 @@ enum { METHOD_COUNT = sizeof METHODS / sizeof *METHODS };
 typedef struct {
     const char *input, *output;
     int size;
-    /* An index of METHODS, and the density if it is not the usual one. */
+    /* An index of METHODS, and density and cell size if they are not the usual ones. */
     int method;
-    double density;
+    double density, cell_size;
 } options;
 
 static int parse_size(const char *value)
@@ -336,23 +378,24 @@ static int parse_method(const char *value)
     for (int i = 0; i < METHOD_COUNT; i++)
         if (strcmp(value, METHODS[i].name) == 0)
             return i;
-    fail("--method is one-level, fixed, variable or recursive, not `%s`", value);
+    fail("--method is one-level, fixed, variable, recursive or brick, not `%s`", value);
     return 0;
 }
 
-static double parse_density(const char *value)
+static double parse_number(const char *option, const char *value)
 {
     char *end;
-    const double density = strtod(value, &end);
-    if (!(density > 0) || *end != '\0')
-        fail("--density is a number above 0, not `%s`", value);
-    return density;
+    const double number = strtod(value, &end);
+    if (!(number > 0) || *end != '\0')
+        fail("%s is a number above 0, not `%s`", option, value);
+    return number;
 }
 
 static options parse(int count, char **words)
 {
-    static const char *const known[] = {"-o", "--size", "--method", "--density"};
-    options o = {NULL, "raytracer.ppm", DEFAULT_SIZE, 0, 0};
+    static const char *const known[] = {"-o", "--size", "--method", "--density", "--cell-size"};
+    const size_t known_count = sizeof known / sizeof *known;
+    options o = {NULL, "raytracer.ppm", DEFAULT_SIZE, 0, 0, 0};
     for (int i = 1; i < count; i++) {
         const char *word = words[i];
         if (word[0] != '-') {
@@ -362,11 +405,11 @@ static options parse(int count, char **words)
             continue;
         }
         size_t option = 0;
-        while (option < 4 && strcmp(word, known[option]) != 0)
+        while (option < known_count && strcmp(word, known[option]) != 0)
             option++;
-        if (option == 4)
+        if (option == known_count)
             fail("unknown option %s: raytracer [FILE.ply] [--size PIXELS] [--method NAME] "
-                 "[--density CELLS] [-o FILE.ppm]",
+                 "[--density CELLS] [--cell-size FACTOR] [-o FILE.ppm]",
                  word);
         if (++i == count)
             fail("%s needs a value", word);
@@ -374,9 +417,13 @@ static options parse(int count, char **words)
         case 0: o.output = words[i]; break;
         case 1: o.size = parse_size(words[i]); break;
         case 2: o.method = parse_method(words[i]); break;
-        case 3: o.density = parse_density(words[i]); break;
+        case 3: o.density = parse_number(word, words[i]); break;
+        case 4: o.cell_size = parse_number(word, words[i]); break;
         }
     }
+    const bool is_brick = METHODS[o.method].config.method == HGRID_METHOD_BRICK;
+    if (is_brick ? o.density > 0 : o.cell_size > 0)
+        fail("--method %s has no %s", METHODS[o.method].name, is_brick ? "density" : "cell size");
     return o;
 }
 
@@ -398,6 +445,8 @@ int main(int count, char **words)
     hgrid_config config = METHODS[o.method].config;
     if (o.density > 0)
         config.density = (float)o.density;
+    if (o.cell_size > 0)
+        config.cell_size = (float)o.cell_size;
     hgrid_mesh mesh = HGRID_MESH_INIT;
     mesh.positions = s.positions;
     mesh.vertex_count = s.vertex_count;
@@ -427,7 +476,10 @@ int main(int count, char **words)
     printf("triangles      %lu\n", (unsigned long)s.triangle_count);
     printf("skipped        %lu\n", (unsigned long)report.skipped_count);
     printf("method         %s\n", METHODS[o.method].name);
-    printf("density        %g\n", (double)report.density);
+    if (config.method == HGRID_METHOD_BRICK)
+        printf("cell size      %g\n", (double)config.cell_size);
+    else
+        printf("density        %g\n", (double)report.density);
     printf("index bytes    %lu\n", (unsigned long)report.index_bytes);
     printf("scratch bytes  %lu\n", (unsigned long)m.scratch.bytes);
     printf("hits           %lu of %lu rays\n", (unsigned long)hits,

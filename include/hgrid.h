@@ -11,7 +11,9 @@
  *   hgrid_build       mesh + memory -> grid
  *   hgrid_intersect   grid + ray -> hit;  hgrid_occluded only says whether there is one
  *
- * And for grids that are stored: hgrid_open, hgrid_validate.
+ * Many rays at once, from your structs into your structs: hgrid_intersect_n, hgrid_occluded_n. And
+ * for grids that are stored: hgrid_open, hgrid_validate. A large scene is built on threads of yours
+ * by hgrid_sizes_parallel and hgrid_build_parallel.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -66,18 +68,19 @@
  *
  * Methods
  * -------
- * A grid is built by one of four methods, which hgrid_config says; all of them answer every ray the
+ * A grid is built by one of five methods, which hgrid_config says; all of them answer every ray the
  * same, hit for hit and bit for bit.
  *
  *   HGRID_METHOD_ONE_LEVEL   the default: one hashed grid; the shortest build, the least memory
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
  *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
  *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
+ *   HGRID_METHOD_BRICK       cells as large as triangles, a bit for each: the fastest rays
  *
  *   hgrid_config config = HGRID_CONFIG_INIT_VARIABLE;
  *
- * The first two know the size of the index, to the byte, before they write it. The other two find
- * it while they write: hgrid_sizes tells it in advance if it is given scratch, and an index that
+ * The first two know the size of the index, to the byte, before they write it. The others find it
+ * while they write: hgrid_sizes tells it in advance if it is given scratch, and an index that
  * turns out to be too small is lost, see HGRID_ERROR_INDEX_TOO_SMALL.
  *
  * Pointers
@@ -85,9 +88,10 @@
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
  * valid during the call. Regions, blobs, positions and indices point to as many bytes as the sizes
  * next to them say. Each function says which of its pointers may be NULL; any other NULL is answered
- * with HGRID_ERROR_NULL_ARGUMENT, or by a query with false. Outputs come last. They are written when
- * a call succeeds and not touched when it fails, except for the report, which is written in both
- * cases, and for an index that was too small (hgrid_build).
+ * with HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of
+ * a batch right after its rays. They are written when a call succeeds and not touched when it
+ * fails, except for the report, which is written in both cases, and for an index that was too small
+ * (hgrid_build).
  *
  * Structs
  * -------
@@ -111,9 +115,10 @@
  *
  * Threads
  * -------
- * There is no global state, no lock and no thread in the library. Any number of threads may query
- * one grid at once, and calls that share no memory they write never disturb each other. Each
- * function says it again for itself.
+ * The library waits for no lock and starts no thread (hgrid_build_parallel uses yours), and it has no
+ * global state but one byte that remembers which vector instructions the processor has. Any number of threads may query one grid at once, and
+ * calls that share no memory they write never disturb each other. Each function says it again for
+ * itself.
  *
  * Results
  * -------
@@ -247,6 +252,21 @@
 #define HGRID_METHOD_RECURSIVE 4
 
 /**
+ * A grid of cells as large as triangles: 4 x 4 x 4 cells are a brick, 4 x 4 x 4 bricks a block, and
+ * a bit for each says whether anything is in it. Not hashed.
+ *
+ * Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
+ * detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
+ * Choose it where many rays are shot for each build. `cell_size` belongs to it, `density` does not.
+ *
+ * Memory: on scans about that of one level. How much index it takes shows only while it is written,
+ * and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch
+ * answers with a bound that no mesh comes near, and with more scratch than a build takes: ask with
+ * scratch, which gives the exact size.
+ */
+#define HGRID_METHOD_BRICK 5
+
+/**
  * The most levels of a recursive grid.
  */
 #define HGRID_MAX_DEPTH 4
@@ -255,6 +275,11 @@
  * A build flag: refuse a mesh with a triangle that is not finite, instead of leaving it out.
  */
 #define HGRID_BUILD_STRICT 1
+
+/**
+ * The most tasks that a parallel build runs at once.
+ */
+#define HGRID_MAX_TASKS 64
 
 /**
  * Raised when programs must change to go on working.
@@ -326,7 +351,8 @@ typedef struct hgrid_mesh {
 
 /**
  * What a build may be told. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
- * or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`.
+ * or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`,
+ * `_BRICK`.
  *
  * Each macro sets all fields to what the method's authors use. To change the method later, set
  * `method` and `density`: a field that belongs to another method is not looked at.
@@ -342,7 +368,8 @@ typedef struct hgrid_config {
     uint32_t method;
     /**
      * Cells per triangle, above 0: 4 for one level and variable, 32 for fixed, 8 for recursive.
-     * More cells mean fewer tests, more steps, more memory.
+     * More cells mean fewer tests, more steps, more memory. `HGRID_METHOD_BRICK` has `cell_size`
+     * instead.
      */
     float density;
     /**
@@ -359,6 +386,12 @@ typedef struct hgrid_config {
      * For `HGRID_METHOD_RECURSIVE`: levels of grids, 1 to `HGRID_MAX_DEPTH`, usually 3.
      */
     uint32_t depth;
+    /**
+     * For `HGRID_METHOD_BRICK`: the width of a cell, above 0, in multiples of the one that suits
+     * the mesh's triangles, so usually 1. Smaller cells mean fewer tests, more steps, more memory.
+     * Cells are made larger where there would be far more of them than triangles.
+     */
+    float cell_size;
     /**
      * 0 or `HGRID_BUILD_STRICT`.
      */
@@ -381,12 +414,14 @@ typedef struct hgrid_report {
      */
     uint32_t is_exact;
     /**
-     * Bytes that the index region needs; after a build, the size of the blob.
+     * Bytes that the index region needs; after a build, the size of the blob, which for
+     * `HGRID_METHOD_BRICK` may be smaller than the index had to be.
      */
     uint64_t index_bytes;
     /**
-     * Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it is enough, but not
-     * exact, and after a build an upper bound of that.
+     * Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_BRICK` it
+     * is enough, but not exact, and after a build an upper bound of that. After
+     * `hgrid_build_parallel`, whether it succeeds or fails, it is that of a build with one task.
      */
     uint64_t scratch_bytes;
     /**
@@ -399,13 +434,14 @@ typedef struct hgrid_report {
      */
     uint32_t skipped_count;
     /**
-     * Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_RECURSIVE`
-     * the words of 4 bytes that ids and subgrids take together.
+     * Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`
+     * and `HGRID_METHOD_BRICK` the words of 4 bytes that ids, subgrids and bricks take together.
      */
     uint32_t reference_count;
     /**
      * The density of the outermost grid: what was asked for, or a half, a quarter, ... of it where
-     * the mesh would have needed more than 16 references for each triangle.
+     * the mesh would have needed more than 16 references for each triangle. 0 for
+     * `HGRID_METHOD_BRICK`, which has none.
      */
     float density;
     /**
@@ -417,6 +453,51 @@ typedef struct hgrid_report {
      */
     uint32_t reserved;
 } hgrid_report;
+
+/**
+ * A part of a build, as `run` of a `hgrid_parallel` gets it: a function of this library.
+ *
+ * It may be called on any thread, on several at once, with the `task_context` that came with it and
+ * an `index` below the `count` that came with it. It starts no thread, waits for none, and never
+ * jumps out.
+ */
+typedef void (*hgrid_task)(void *task_context, uint32_t index);
+
+/**
+ * How a build runs parts of it, its tasks, at once: by a loop of the caller's, over the caller's
+ * threads. Initialise it with `HGRID_PARALLEL_INIT`, which means what NULL means: one task after the
+ * other, on the thread that calls. The grid does not depend on it, to the bit.
+ */
+typedef struct hgrid_parallel {
+    /**
+     * `sizeof(hgrid_parallel)`.
+     */
+    uint32_t struct_size;
+    /**
+     * The most tasks at once, usually the number of cores; each takes scratch of its own. With 0 and
+     * 1 nothing is parallel, and what is above `HGRID_MAX_TASKS` counts as that.
+     */
+    uint32_t tasks;
+    /**
+     * Yours: passed on to `run`.
+     */
+    void *context;
+    /**
+     * Calls `task(task_context, index)` once for every `index` below `count`, in any order, on any
+     * threads, and returns when all these calls have returned: after a join, or after any other
+     * synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
+     * library calls it several times, one after the other, on the thread that builds, with counts up
+     * to `tasks`; where the processor has no atomic operations, it never does. NULL only with `tasks`
+     * 0 or 1.
+     *
+     * A task that is called twice, even at the same time, one that is never called, and an index that
+     * is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`. Undefined
+     * behaviour, as nothing can detect it, is a call of `task` that is made or still running after
+     * `run` has returned, or with another `task_context`; a `run` that is left by `longjmp` or by a
+     * C++ exception; and one that changes what the build works on.
+     */
+    void (*run)(void *context, uint32_t count, hgrid_task task, void *task_context);
+} hgrid_parallel;
 
 /**
  * A built grid and its mesh, ready for queries: a view, held by value.
@@ -473,7 +554,8 @@ typedef struct hgrid_counters {
      */
     uint64_t cell_steps;
     /**
-     * How often a ray went down a level, into a macrocell or a subgrid; 0 for a grid of one level.
+     * How often a ray went down a level, into a macrocell, a subgrid, a block or a brick; 0 for a
+     * grid of one level.
      */
     uint64_t grid_steps;
 } hgrid_counters;
@@ -522,6 +604,12 @@ typedef struct hgrid_hit {
 } hgrid_hit;
 
 /**
+ * What a caller knows about the rays of a batch: one of `HGRID_COHERENCE_...`. It changes how fast
+ * the answers come, never the answers.
+ */
+typedef uint32_t hgrid_coherence;
+
+/**
  * Success.
  */
 #define HGRID_OK 0
@@ -543,7 +631,8 @@ typedef struct hgrid_hit {
 #define HGRID_ERROR_MISALIGNED -3
 
 /**
- * The index or the scratch overlaps the other one or the mesh.
+ * The index or the scratch overlaps the other one or the mesh; or answers of a batch overlap its
+ * rays.
  */
 #define HGRID_ERROR_OVERLAP -4
 
@@ -619,6 +708,17 @@ typedef struct hgrid_hit {
 #define HGRID_ERROR_INVALID_DEPTH -34
 
 /**
+ * The configuration's `cell_size` is NaN, infinite or not above 0, or so small that the grid would
+ * take more than 8 GiB, and the method is `HGRID_METHOD_BRICK`.
+ */
+#define HGRID_ERROR_INVALID_CELL_SIZE -35
+
+/**
+ * The `run` of a `hgrid_parallel` did not run every task exactly once before it returned.
+ */
+#define HGRID_ERROR_PARALLEL_FOR -36
+
+/**
  * The bytes, or the view, are not a grid.
  */
 #define HGRID_ERROR_NOT_A_GRID -40
@@ -648,6 +748,32 @@ typedef struct hgrid_hit {
  */
 #define HGRID_ERROR_CORRUPT -45
 
+/**
+ * The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
+ */
+#define HGRID_ERROR_INVALID_RAYS -50
+
+/**
+ * The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
+ */
+#define HGRID_ERROR_INVALID_ANSWERS -51
+
+/**
+ * The coherence is none that this version knows.
+ */
+#define HGRID_ERROR_INVALID_COHERENCE -52
+
+/**
+ * Nothing is known: random rays, rays after a bounce.
+ */
+#define HGRID_COHERENCE_INCOHERENT 0
+
+/**
+ * Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 64
+ * rays, a tile of 8 x 8 pixels after the other.
+ */
+#define HGRID_COHERENCE_COHERENT 1
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -658,11 +784,11 @@ extern "C" {
  * Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
  * `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
  * more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
- * with variable; with recursive it is a bound that no mesh comes near.
+ * with variable; with recursive and brick it is a bound that no mesh comes near.
  *
  * With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
- * is 1. That takes about half the time of a build; with recursive, which has to build the grid and
- * keeps nothing of it, all of that time. The scratch holds nothing of use afterwards.
+ * is 1. That takes about half the time of a build; with recursive and brick, which have to build
+ * the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
  *
  * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. Returns `HGRID_OK` or
  * the reason, with the triangle that is to blame in the report; scratch that is too small is no
@@ -678,6 +804,31 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
                          void *scratch,
                          size_t scratch_bytes,
                          struct hgrid_report *report);
+
+/**
+ * Tells how much memory a build of this mesh takes that runs so many tasks at once: `hgrid_sizes`
+ * for `hgrid_build_parallel`.
+ *
+ * Each task takes scratch, for `HGRID_METHOD_BRICK`. The index is filled by all of them, and the one
+ * that a build takes may be a little larger than with another number. With the other methods, and
+ * with `parallel` NULL or `tasks` 0 or 1, the answer is that of `hgrid_sizes`. `run` is called for
+ * the answer, too.
+ *
+ * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `parallel` may be NULL:
+ * one task. Returns what `hgrid_sizes` returns, or `HGRID_ERROR_PARALLEL_FOR`.
+ *
+ * Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
+ * call starts no thread; its tasks are called on those that `run` chooses.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_sizes_parallel(const struct hgrid_mesh *mesh,
+                                  const struct hgrid_config *config,
+                                  const struct hgrid_parallel *parallel,
+                                  void *scratch,
+                                  size_t scratch_bytes,
+                                  struct hgrid_report *report);
 
 /**
  * Builds a grid in memory that the caller brings.
@@ -696,11 +847,12 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  * was. The report is written in both cases: what was built; or, if a region is too small, what
  * both need; or the triangle that is to blame.
  *
- * After an error `index` is as it was, with two exceptions: after `HGRID_ERROR_INDEX_TOO_SMALL`
- * and `HGRID_ERROR_INVALID_DENSITY`, `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_RECURSIVE` may have
- * left anything in it, so a grid that lay there before is gone. They write as far as the index
- * reaches and then go on counting: the report's `index_bytes` is exact, and with so many the same
- * call succeeds.
+ * After an error `index` is as it was, with these exceptions: after `HGRID_ERROR_INDEX_TOO_SMALL`,
+ * `HGRID_ERROR_INVALID_DENSITY` and `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_METHOD_VARIABLE`,
+ * `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BRICK` may have left anything in it, so a grid that
+ * lay there before is gone. They write as far as the index reaches and then go on counting: the
+ * report's `index_bytes` is exact (with brick maybe only enough), and with so many the same call
+ * succeeds.
  *
  * Threads: any number of calls at once, as long as each has regions, a view and a report of its
  * own. The call starts no thread.
@@ -716,6 +868,82 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
                          size_t scratch_bytes,
                          struct hgrid_grid *grid,
                          struct hgrid_report *report);
+
+/**
+ * Builds a grid on threads that the caller brings: `hgrid_build`, and byte by byte the same blob.
+ *
+ * `parallel` says how many tasks the build is cut into and how they are run. The library knows no
+ * threads: it calls `run`, on the thread that calls this function, and `run` calls the tasks, on the
+ * threads of a pool or on new ones. With POSIX threads, one for each task:
+ *
+ * ```c
+ * typedef struct {
+ *     pthread_t thread;
+ *     bool has_thread;
+ *     hgrid_task task;
+ *     void *task_context;
+ *     uint32_t index;
+ * } one_task;
+ *
+ * static void *run_one(void *argument)
+ * {
+ *     const one_task *one = (const one_task *)argument;
+ *     one->task(one->task_context, one->index);
+ *     return NULL;
+ * }
+ *
+ * static void run_on_threads(void *context, uint32_t count, hgrid_task task, void *task_context)
+ * {
+ *     one_task all[HGRID_MAX_TASKS];
+ *     for (uint32_t i = 0; i < count; i++) {
+ *         all[i].task = task, all[i].task_context = task_context, all[i].index = i;
+ *         all[i].has_thread = pthread_create(&all[i].thread, NULL, run_one, &all[i]) == 0;
+ *         if (!all[i].has_thread)
+ *             run_one(&all[i]);
+ *     }
+ *     for (uint32_t i = 0; i < count; i++)
+ *         if (all[i].has_thread)
+ *             pthread_join(all[i].thread, NULL);
+ *     (void)context;
+ * }
+ *
+ * static hgrid_status build_on_threads(const hgrid_mesh *mesh, void *index, size_t index_bytes,
+ *                                      void *scratch, size_t scratch_bytes, hgrid_grid *grid)
+ * {
+ *     const hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+ *     hgrid_parallel parallel = HGRID_PARALLEL_INIT;
+ *     parallel.tasks = 8, parallel.run = run_on_threads;
+ *     return hgrid_build_parallel(mesh, &config, &parallel, index, index_bytes, scratch,
+ *                                 scratch_bytes, grid, NULL);
+ * }
+ * ```
+ *
+ * Only `HGRID_METHOD_BRICK` is cut into tasks; the other methods never call `run`.
+ * `hgrid_sizes_parallel` tells how much memory so many tasks take. Where there is less scratch, but
+ * enough for fewer tasks, there are fewer; enough for one is what `hgrid_sizes` tells.
+ *
+ * `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `parallel` may be NULL: one
+ * task, as with `tasks` 0 or 1; with more, its `run` may not be NULL. `index` and `scratch` may be
+ * NULL if their size is 0. `report` may be NULL.
+ *
+ * Returns what `hgrid_build` returns, or `HGRID_ERROR_PARALLEL_FOR` if `run` ran a task twice or not
+ * at all; then the index may hold anything, and both regions can be used again.
+ *
+ * Threads: any number of calls at once, as long as each has regions, a view and a report of its
+ * own. The call starts no thread; its tasks are called on those that `run` chooses.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_build_parallel(const struct hgrid_mesh *mesh,
+                                  const struct hgrid_config *config,
+                                  const struct hgrid_parallel *parallel,
+                                  void *index,
+                                  size_t index_bytes,
+                                  void *scratch,
+                                  size_t scratch_bytes,
+                                  struct hgrid_grid *grid,
+                                  struct hgrid_report *report);
 
 /**
  * Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
@@ -804,6 +1032,105 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
                     const struct hgrid_query_options *options);
 
 /**
+ * Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
+ * each, bit for bit, but sooner.
+ *
+ * A ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of `hits`.
+ * A miss writes a hit, too: with `primitive` equal to `HGRID_INVALID_ID`, `t` equal to `INFINITY`,
+ * `u` and `v` equal to 0. Here is a tile of 8 x 8 pixels:
+ *
+ * ```c
+ * static size_t trace_tile(const hgrid_grid *grid, const hgrid_ray rays[64], float depth[64])
+ * {
+ *     hgrid_hit hits[64];
+ *     size_t found = 0;
+ *     if (hgrid_intersect_n(grid, rays, 0, hits, 0, 64, HGRID_COHERENCE_COHERENT, NULL) != HGRID_OK)
+ *         return 0;
+ *     for (size_t i = 0; i < 64; i++) {
+ *         depth[i] = hits[i].t;
+ *         found += hits[i].primitive != HGRID_INVALID_ID;
+ *     }
+ *     return found;
+ * }
+ * ```
+ *
+ * Rays and hits may lie in structs of yours, also in the same ones: with `struct {hgrid_ray ray;
+ * hgrid_hit hit; int pixel;}` both strides are the size of the struct. A stride of 0 means side by
+ * side. Neither array needs any alignment, and not a byte between its elements is read or written.
+ * No hit may overlap a ray, its own or another; where the two arrays reach into each other, their
+ * strides are the same. Nor do hits overlap anything else that the call uses.
+ *
+ * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
+ * the hits. With `count` 0 nothing is done. Up to 64 rays are read before the first hit is written.
+ *
+ * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With counters
+ * the work of all rays is added up, one ray after the other, which is slower.
+ *
+ * Returns `HGRID_OK` and has written all hits, or returns the reason and has written none:
+ * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` (the options),
+ * `HGRID_ERROR_INVALID_RAYS` and `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is
+ * impossible), `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no
+ * error: it misses.
+ *
+ * The call allocates nothing and needs at most about 16 KiB of stack.
+ *
+ * Threads: any number of queries on the same grid at once; each thread with hits and counters of
+ * its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_intersect_n(const struct hgrid_grid *grid,
+                               const struct hgrid_ray *rays,
+                               size_t ray_stride,
+                               struct hgrid_hit *hits,
+                               size_t hit_stride,
+                               size_t count,
+                               hgrid_coherence coherence,
+                               const struct hgrid_query_options *options);
+
+/**
+ * Tells for each of many rays whether it hits anything: what `hgrid_occluded` would say for each,
+ * but sooner.
+ *
+ * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
+ * from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that hold a ray and
+ * its byte, what may be NULL, coherence, options, statuses, stack. For the shadow rays of a tile,
+ * towards one light:
+ *
+ * ```c
+ * static size_t count_lit(const hgrid_grid *grid, const hgrid_ray *rays, size_t count)
+ * {
+ *     unsigned char occluded[64];
+ *     size_t lit = 0;
+ *     for (size_t first = 0; first < count; first += 64) {
+ *         const size_t n = count - first < 64 ? count - first : 64;
+ *         if (hgrid_occluded_n(grid, rays + first, 0, occluded, 0, n, HGRID_COHERENCE_COHERENT,
+ *                              NULL) != HGRID_OK)
+ *             return 0;
+ *         for (size_t i = 0; i < n; i++)
+ *             lit += !occluded[i];
+ *     }
+ *     return lit;
+ * }
+ * ```
+ *
+ * Threads: any number of queries on the same grid at once; each thread with bytes and counters of
+ * its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
+                              const struct hgrid_ray *rays,
+                              size_t ray_stride,
+                              uint8_t *occluded,
+                              size_t occluded_stride,
+                              size_t count,
+                              hgrid_coherence coherence,
+                              const struct hgrid_query_options *options);
+
+/**
  * Says in words what a status means and what to do.
  *
  * Never NULL: a number that is no status gives "unknown status". The text is static, in English,
@@ -842,22 +1169,32 @@ const char *hgrid_version_string(void);
 /**
  * The default configuration: one level.
  */
-#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 6, 16, 3, 0}
+#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 6, 16, 3, 1.0f, 0}
 
 /**
  * The usual configuration of a fixed grid.
  */
-#define HGRID_CONFIG_INIT_FIXED {sizeof(hgrid_config), HGRID_METHOD_FIXED, 32.0f, 6, 16, 3, 0}
+#define HGRID_CONFIG_INIT_FIXED {sizeof(hgrid_config), HGRID_METHOD_FIXED, 32.0f, 6, 16, 3, 1.0f, 0}
 
 /**
  * The usual configuration of a variable grid.
  */
-#define HGRID_CONFIG_INIT_VARIABLE {sizeof(hgrid_config), HGRID_METHOD_VARIABLE, 4.0f, 6, 16, 3, 0}
+#define HGRID_CONFIG_INIT_VARIABLE {sizeof(hgrid_config), HGRID_METHOD_VARIABLE, 4.0f, 6, 16, 3, 1.0f, 0}
 
 /**
  * The usual configuration of a recursive grid.
  */
-#define HGRID_CONFIG_INIT_RECURSIVE {sizeof(hgrid_config), HGRID_METHOD_RECURSIVE, 8.0f, 6, 16, 3, 0}
+#define HGRID_CONFIG_INIT_RECURSIVE {sizeof(hgrid_config), HGRID_METHOD_RECURSIVE, 8.0f, 6, 16, 3, 1.0f, 0}
+
+/**
+ * The usual configuration of a brick grid.
+ */
+#define HGRID_CONFIG_INIT_BRICK {sizeof(hgrid_config), HGRID_METHOD_BRICK, 4.0f, 6, 16, 3, 1.0f, 0}
+
+/**
+ * One task: set tasks and run, and context if run needs it.
+ */
+#define HGRID_PARALLEL_INIT {sizeof(hgrid_parallel), 1, NULL, NULL}
 
 /**
  * The default options of a query.

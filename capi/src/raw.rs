@@ -27,8 +27,9 @@ use core::ffi::c_void;
 use core::ptr::NonNull;
 use core::slice;
 
-use hgrid_core::{Config, Counters, Grid, Ray, Strided, TriangleMesh};
+use hgrid_core::{Config, Counters, Error, Grid, Ray, Strided, Task, TriangleMesh};
 
+use crate::batch::Batch;
 use crate::input::Input;
 use crate::span::{Region, Span};
 use crate::status::{
@@ -36,8 +37,8 @@ use crate::status::{
     HGRID_ERROR_STRUCT_SIZE, HGRID_OK, hgrid_status, status_of,
 };
 use crate::types::{
-    Elements, hgrid_config, hgrid_counters, hgrid_grid, hgrid_mesh, hgrid_query_options, hgrid_ray,
-    hgrid_report,
+    Elements, hgrid_config, hgrid_counters, hgrid_grid, hgrid_mesh, hgrid_parallel,
+    hgrid_query_options, hgrid_ray, hgrid_report, hgrid_task,
 };
 
 /// The most bytes that a reference may span.
@@ -177,6 +178,55 @@ unsafe fn config(config: *const hgrid_config) -> Result<Config, hgrid_status> {
     unsafe { read_sized(config) }?.to_core()
 }
 
+/// The caller's loop over tasks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Threads {
+    /// 2 or more.
+    pub(crate) tasks: u32,
+    context: *mut c_void,
+    run: unsafe extern "C" fn(*mut c_void, u32, hgrid_task, *mut c_void),
+}
+
+impl Threads {
+    /// Has the caller's loop call a task with every number below the count.
+    pub(crate) fn run(&self, count: u32, task: &Task<'_>) {
+        // SAFETY: a function of this type by the caller's promise, and with `call` all it needs:
+        // * `task` lives until this returns, and by the caller's promise no call comes later;
+        // * it is `Sync`, so that calls may come at once, from any thread;
+        // * core makes sure itself that one too many or too few do no harm.
+        unsafe { (self.run)(self.context, count, call, (&raw const task).cast_mut().cast()) }
+    }
+}
+
+/// What C gets for a task: calls the one whose address is the context.
+///
+/// # Safety
+/// The context is NULL, or it came with this function and the [`Threads::run`] that passed it on has
+/// not returned.
+unsafe extern "C" fn call(task_context: *mut c_void, index: u32) {
+    // SAFETY: `Threads::run` made it from the address of such a reference and is still running.
+    if let Some(task) = unsafe { task_context.cast::<&Task<'_>>().as_ref() } {
+        task(index);
+    }
+}
+
+/// The caller's loop; `None` where nothing is to be parallel.
+///
+/// # Safety
+/// The caller's promise.
+unsafe fn threads(parallel: *const hgrid_parallel) -> Result<Option<Threads>, hgrid_status> {
+    if parallel.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: the caller's promise.
+    let hgrid_parallel { tasks, context, run, .. } = unsafe { read_sized(parallel) }?;
+    if tasks <= 1 {
+        return Ok(None);
+    }
+    let run = run.ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+    Ok(Some(Threads { tasks, context, run }))
+}
+
 /// Index and scratch, once it is sure that they lie apart from each other and from the mesh.
 ///
 /// # Safety
@@ -206,6 +256,7 @@ unsafe fn regions(
 pub(crate) unsafe fn input(
     description: *const hgrid_mesh,
     settings: *const hgrid_config,
+    parallel: *const hgrid_parallel,
     memory: [Region; 2],
 ) -> Result<Input, hgrid_status> {
     // SAFETY: the caller's promise.
@@ -215,8 +266,10 @@ pub(crate) unsafe fn input(
     // SAFETY: the caller's promise.
     let config = unsafe { config(settings) }?;
     // SAFETY: the caller's promise.
+    let threads = unsafe { threads(parallel) }?;
+    // SAFETY: the caller's promise.
     let [index, scratch] = unsafe { regions(&description, memory) }?;
-    Ok(Input { mesh, config, index, scratch })
+    Ok(Input { mesh, config, threads, index, scratch })
 }
 
 /// The grid in a blob.
@@ -307,11 +360,72 @@ pub(crate) unsafe fn query<T>(
     let mut work = Counters::default();
     let answer = ask(grid, &ray, Some(&mut work));
     // SAFETY: the caller's promise.
-    let mut sum = unsafe { read(counters.as_ptr()) }.ok()?;
-    sum.add(&work);
-    // SAFETY: the caller's promise.
-    unsafe { write(counters, sum) };
+    unsafe { add(counters, &work) }.ok()?;
     Some(answer)
+}
+
+/// How many rays of a batch are read before their answers are written: a tile of 8 x 8. The buffers
+/// are 3 KiB.
+const CHUNK: usize = 64;
+
+/// Runs a batch: `many` answers a chunk of rays, or `one` a single ray if the options say that work
+/// is to be counted. `unanswered` is written nowhere.
+///
+/// # Safety
+/// That of [`grid`]; and the elements of both arrays are the caller's to be read and written.
+pub(crate) unsafe fn batch<A: Copy, T: From<A>>(
+    view: *const hgrid_grid,
+    batch: &Batch<T>,
+    options: *const hgrid_query_options,
+    unanswered: A,
+    many: impl Fn(&Grid<'static>, &[Ray], &mut [A]) -> Result<(), Error>,
+    one: impl Fn(&Grid<'static>, &Ray, &mut Counters) -> A,
+) -> Result<(), hgrid_status> {
+    // SAFETY: this function's contract.
+    let grid = unsafe { grid(view) }?;
+    // SAFETY: the caller's promise.
+    let counters = unsafe { counters(options) }?;
+    let mut work = Counters::default();
+    let mut rays = [Ray::new([0.0; 3], [0.0; 3]); CHUNK];
+    let mut answers = [unanswered; CHUNK];
+    for first in (0..batch.count).step_by(CHUNK) {
+        let count = CHUNK.min(batch.count - first);
+        let rays = rays.get_mut(..count).unwrap_or_default();
+        let answers = answers.get_mut(..count).unwrap_or_default();
+        for (index, ray) in (first..).zip(&mut *rays) {
+            // SAFETY: within the array by its index, readable by this function's contract, and any
+            // bytes are a ray.
+            *ray = unsafe { batch.ray(index).read_unaligned() }.into();
+        }
+        if counters.is_some() {
+            for (ray, answer) in rays.iter().zip(&mut *answers) {
+                *answer = one(grid, ray, &mut work);
+            }
+        } else {
+            many(grid, rays, answers).map_err(status_of)?;
+        }
+        for (index, &answer) in (first..).zip(&*answers) {
+            // SAFETY: within the array by its index, writable by this function's contract.
+            unsafe { batch.answer(index).write_unaligned(answer.into()) };
+        }
+    }
+    let Some(counters) = counters else { return Ok(()) };
+    // SAFETY: the caller's promise.
+    unsafe { add(counters, &work) }
+}
+
+/// Adds the work of queries to the caller's.
+///
+/// # Safety
+/// The caller's promise.
+#[inline(always)]
+unsafe fn add(to: NonNull<hgrid_counters>, work: &Counters) -> Result<(), hgrid_status> {
+    // SAFETY: the caller's promise.
+    let mut sum = unsafe { read(to.as_ptr()) }?;
+    sum.add(work);
+    // SAFETY: the caller's promise.
+    unsafe { write(to, sum) };
+    Ok(())
 }
 
 /// Where the options, which may be NULL, say that work is to be counted.

@@ -4,7 +4,7 @@
 
 use core::ffi::CStr;
 
-use hgrid_core::{ConfigField, Error, MeshField, Region};
+use hgrid_core::{BatchField, ConfigField, Error, MeshField, Region};
 
 /// What a call answers: `HGRID_OK`, or below zero why not. `hgrid_status_string` has it in words.
 #[allow(non_camel_case_types, reason = "the C name")]
@@ -23,7 +23,8 @@ pub const HGRID_ERROR_STRUCT_SIZE: hgrid_status = -2;
 /// The index, the scratch or the blob does not start at a multiple of `HGRID_ALIGNMENT`.
 pub const HGRID_ERROR_MISALIGNED: hgrid_status = -3;
 
-/// The index or the scratch overlaps the other one or the mesh.
+/// The index or the scratch overlaps the other one or the mesh; or answers of a batch overlap its
+/// rays.
 pub const HGRID_ERROR_OVERLAP: hgrid_status = -4;
 
 /// The index is too small. The report says how many bytes it needs.
@@ -71,6 +72,13 @@ pub const HGRID_ERROR_INVALID_MACROCELL_FACTOR: hgrid_status = -33;
 /// `HGRID_METHOD_RECURSIVE`.
 pub const HGRID_ERROR_INVALID_DEPTH: hgrid_status = -34;
 
+/// The configuration's `cell_size` is NaN, infinite or not above 0, or so small that the grid would
+/// take more than 8 GiB, and the method is `HGRID_METHOD_BRICK`.
+pub const HGRID_ERROR_INVALID_CELL_SIZE: hgrid_status = -35;
+
+/// The `run` of a `hgrid_parallel` did not run every task exactly once before it returned.
+pub const HGRID_ERROR_PARALLEL_FOR: hgrid_status = -36;
+
 /// The bytes, or the view, are not a grid.
 pub const HGRID_ERROR_NOT_A_GRID: hgrid_status = -40;
 
@@ -89,6 +97,15 @@ pub const HGRID_ERROR_MESH_MISMATCH: hgrid_status = -44;
 /// The blob contradicts itself or its mesh.
 pub const HGRID_ERROR_CORRUPT: hgrid_status = -45;
 
+/// The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
+pub const HGRID_ERROR_INVALID_RAYS: hgrid_status = -50;
+
+/// The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
+pub const HGRID_ERROR_INVALID_ANSWERS: hgrid_status = -51;
+
+/// The coherence is none that this version knows.
+pub const HGRID_ERROR_INVALID_COHERENCE: hgrid_status = -52;
+
 /// The status that stands for an error of core.
 pub(crate) const fn status_of(error: Error) -> hgrid_status {
     match error {
@@ -105,6 +122,10 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
         Error::InvalidConfig(ConfigField::MacrocellFactor) => HGRID_ERROR_INVALID_MACROCELL_FACTOR,
         Error::InvalidConfig(ConfigField::Depth) => HGRID_ERROR_INVALID_DEPTH,
         Error::InvalidConfig(ConfigField::Flags) => HGRID_ERROR_INVALID_FLAGS,
+        Error::InvalidConfig(ConfigField::CellSize) => HGRID_ERROR_INVALID_CELL_SIZE,
+        Error::InvalidParallelFor => HGRID_ERROR_PARALLEL_FOR,
+        Error::InvalidBatch(BatchField::Rays) => HGRID_ERROR_INVALID_RAYS,
+        Error::InvalidBatch(BatchField::Answers) => HGRID_ERROR_INVALID_ANSWERS,
         Error::NotAGrid => HGRID_ERROR_NOT_A_GRID,
         Error::WrongByteOrder => HGRID_ERROR_WRONG_BYTE_ORDER,
         Error::UnsupportedVersion { .. } => HGRID_ERROR_UNSUPPORTED_VERSION,
@@ -126,7 +147,9 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_MISALIGNED => {
             c"misaligned region: start index, scratch and blob at a multiple of 64 bytes"
         }
-        HGRID_ERROR_OVERLAP => c"overlapping regions: keep index, scratch and mesh apart",
+        HGRID_ERROR_OVERLAP => {
+            c"overlapping memory: keep index, scratch and mesh apart, and answers off their rays"
+        }
         HGRID_ERROR_INDEX_TOO_SMALL => c"index too small: bring the report's index_bytes",
         HGRID_ERROR_SCRATCH_TOO_SMALL => c"scratch too small: bring the report's scratch_bytes",
         HGRID_ERROR_INVALID_POSITIONS => {
@@ -153,6 +176,12 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_INVALID_FLAGS => c"unknown flag: use 0 or HGRID_BUILD_...",
         HGRID_ERROR_INVALID_MACROCELL_FACTOR => c"invalid macrocell_factor: 2 or more, usually 6",
         HGRID_ERROR_INVALID_DEPTH => c"invalid depth: 1 to HGRID_MAX_DEPTH, usually 3",
+        HGRID_ERROR_INVALID_CELL_SIZE => {
+            c"invalid cell_size: above 0, usually 1, and larger if the grid would become too large"
+        }
+        HGRID_ERROR_PARALLEL_FOR => {
+            c"tasks run twice or not at all: let run call each one once and wait for all of them"
+        }
         HGRID_ERROR_NOT_A_GRID => c"not a grid: build or open one first",
         HGRID_ERROR_WRONG_BYTE_ORDER => {
             c"a blob of the other byte order: build it again on this machine"
@@ -163,6 +192,11 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
             c"a blob of another mesh: bring the mesh it was built for, or build it again"
         }
         HGRID_ERROR_CORRUPT => c"a damaged blob, or one of another mesh: build it again",
+        HGRID_ERROR_INVALID_RAYS => c"invalid rays: check count, and ray_stride (0, or 32 and more)",
+        HGRID_ERROR_INVALID_ANSWERS => {
+            c"invalid answers: check count, and their stride (0, or the size of one and more)"
+        }
+        HGRID_ERROR_INVALID_COHERENCE => c"unknown coherence: use one of HGRID_COHERENCE_...",
         _ => c"unknown status",
     }
 }

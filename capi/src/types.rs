@@ -5,14 +5,14 @@
 use core::ffi::c_void;
 
 use hgrid_core::{
-    BuildFlags, Config, Counters, Error, Grid, Hit, INVALID_ID, IndexType, MAX_TRIANGLES, Method,
-    Ray, Region, Sizes,
+    BuildFlags, Coherence, Config, Counters, Error, Grid, Hit, INVALID_ID, IndexType,
+    MAX_TRIANGLES, Method, Parallel, Ray, Region, Sizes,
 };
 
 use crate::status::{
-    HGRID_ERROR_INVALID_FLAGS, HGRID_ERROR_INVALID_INDEX_TYPE, HGRID_ERROR_INVALID_INDICES,
-    HGRID_ERROR_INVALID_METHOD, HGRID_ERROR_INVALID_POSITIONS, HGRID_ERROR_TOO_MANY_TRIANGLES,
-    hgrid_status, status_of,
+    HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_FLAGS, HGRID_ERROR_INVALID_INDEX_TYPE,
+    HGRID_ERROR_INVALID_INDICES, HGRID_ERROR_INVALID_METHOD, HGRID_ERROR_INVALID_POSITIONS,
+    HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
 };
 
 /// Every memory region starts at a multiple of this many bytes: index, scratch and blob.
@@ -70,11 +70,39 @@ pub const HGRID_METHOD_VARIABLE: u32 = 3;
 /// with a bound that no mesh comes near, up to 8 GiB: ask with scratch, which gives the exact size.
 pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 
+/// A grid of cells as large as triangles: 4 x 4 x 4 cells are a brick, 4 x 4 x 4 bricks a block, and
+/// a bit for each says whether anything is in it. Not hashed.
+///
+/// Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
+/// detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
+/// Choose it where many rays are shot for each build. `cell_size` belongs to it, `density` does not.
+///
+/// Memory: on scans about that of one level. How much index it takes shows only while it is written,
+/// and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch
+/// answers with a bound that no mesh comes near, and with more scratch than a build takes: ask with
+/// scratch, which gives the exact size.
+pub const HGRID_METHOD_BRICK: u32 = 5;
+
 /// The most levels of a recursive grid.
 pub const HGRID_MAX_DEPTH: u32 = 4;
 
 /// A build flag: refuse a mesh with a triangle that is not finite, instead of leaving it out.
 pub const HGRID_BUILD_STRICT: u32 = 1;
+
+/// The most tasks that a parallel build runs at once.
+pub const HGRID_MAX_TASKS: u32 = 64;
+
+/// What a caller knows about the rays of a batch: one of `HGRID_COHERENCE_...`. It changes how fast
+/// the answers come, never the answers.
+#[allow(non_camel_case_types, reason = "the C name")]
+pub type hgrid_coherence = u32;
+
+/// Nothing is known: random rays, rays after a bounce.
+pub const HGRID_COHERENCE_INCOHERENT: hgrid_coherence = 0;
+
+/// Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 64
+/// rays, a tile of 8 x 8 pixels after the other.
+pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
 
 const _: () = assert!(HGRID_ALIGNMENT == hgrid_core::ALIGNMENT);
 const _: () = assert!(HGRID_BLOB_VERSION == hgrid_core::BLOB_VERSION);
@@ -82,7 +110,11 @@ const _: () = assert!(HGRID_METHOD_ONE_LEVEL == Method::OneLevel as u32);
 const _: () = assert!(HGRID_METHOD_FIXED == Method::Fixed as u32);
 const _: () = assert!(HGRID_METHOD_VARIABLE == Method::Variable as u32);
 const _: () = assert!(HGRID_METHOD_RECURSIVE == Method::Recursive as u32);
+const _: () = assert!(HGRID_METHOD_BRICK == Method::Brick as u32);
+const _: () = assert!(HGRID_COHERENCE_INCOHERENT == Coherence::Incoherent as u32);
+const _: () = assert!(HGRID_COHERENCE_COHERENT == Coherence::Coherent as u32);
 const _: () = assert!(HGRID_MAX_DEPTH == hgrid_core::MAX_DEPTH);
+const _: () = assert!(HGRID_MAX_TASKS == Parallel::MAX_TASKS);
 const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
 
 /// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.
@@ -129,7 +161,8 @@ pub struct hgrid_counters {
     pub primitive_tests: u64,
     /// Cells and macrocells entered, empty ones included.
     pub cell_steps: u64,
-    /// How often a ray went down a level, into a macrocell or a subgrid; 0 for a grid of one level.
+    /// How often a ray went down a level, into a macrocell, a subgrid, a block or a brick; 0 for a
+    /// grid of one level.
     pub grid_steps: u64,
 }
 
@@ -161,7 +194,8 @@ pub struct hgrid_mesh {
 }
 
 /// What a build may be told. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
-/// or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`.
+/// or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`,
+/// `_BRICK`.
 ///
 /// Each macro sets all fields to what the method's authors use. To change the method later, set
 /// `method` and `density`: a field that belongs to another method is not looked at.
@@ -173,7 +207,8 @@ pub struct hgrid_config {
     /// The structure to build: one of `HGRID_METHOD_...`, each of which says when to choose it.
     pub method: u32,
     /// Cells per triangle, above 0: 4 for one level and variable, 32 for fixed, 8 for recursive.
-    /// More cells mean fewer tests, more steps, more memory.
+    /// More cells mean fewer tests, more steps, more memory. `HGRID_METHOD_BRICK` has `cell_size`
+    /// instead.
     pub density: f32,
     /// For `HGRID_METHOD_FIXED`: cells of a level in one macrocell of the level above, on each
     /// axis; 2 or more, usually 6.
@@ -183,8 +218,55 @@ pub struct hgrid_config {
     pub subdivide_above: u32,
     /// For `HGRID_METHOD_RECURSIVE`: levels of grids, 1 to `HGRID_MAX_DEPTH`, usually 3.
     pub depth: u32,
+    /// For `HGRID_METHOD_BRICK`: the width of a cell, above 0, in multiples of the one that suits
+    /// the mesh's triangles, so usually 1. Smaller cells mean fewer tests, more steps, more memory.
+    /// Cells are made larger where there would be far more of them than triangles.
+    pub cell_size: f32,
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
+}
+
+/// A part of a build, as `run` of a `hgrid_parallel` gets it: a function of this library.
+///
+/// It may be called on any thread, on several at once, with the `task_context` that came with it and
+/// an `index` below the `count` that came with it. It starts no thread, waits for none, and never
+/// jumps out.
+#[allow(non_camel_case_types, reason = "the C name")]
+pub type hgrid_task = unsafe extern "C" fn(task_context: *mut c_void, index: u32);
+
+/// How a build runs parts of it, its tasks, at once: by a loop of the caller's, over the caller's
+/// threads. Initialise it with `HGRID_PARALLEL_INIT`, which means what NULL means: one task after the
+/// other, on the thread that calls. The grid does not depend on it, to the bit.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_parallel {
+    /// `sizeof(hgrid_parallel)`.
+    pub struct_size: u32,
+    /// The most tasks at once, usually the number of cores; each takes scratch of its own. With 0 and
+    /// 1 nothing is parallel, and what is above `HGRID_MAX_TASKS` counts as that.
+    pub tasks: u32,
+    /// Yours: passed on to `run`.
+    pub context: *mut c_void,
+    /// Calls `task(task_context, index)` once for every `index` below `count`, in any order, on any
+    /// threads, and returns when all these calls have returned: after a join, or after any other
+    /// synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
+    /// library calls it several times, one after the other, on the thread that builds, with counts up
+    /// to `tasks`; where the processor has no atomic operations, it never does. NULL only with `tasks`
+    /// 0 or 1.
+    ///
+    /// A task that is called twice, even at the same time, one that is never called, and an index that
+    /// is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`. Undefined
+    /// behaviour, as nothing can detect it, is a call of `task` that is made or still running after
+    /// `run` has returned, or with another `task_context`; a `run` that is left by `longjmp` or by a
+    /// C++ exception; and one that changes what the build works on.
+    pub run: Option<
+        unsafe extern "C" fn(
+            context: *mut c_void,
+            count: u32,
+            task: hgrid_task,
+            task_context: *mut c_void,
+        ),
+    >,
 }
 
 /// What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
@@ -210,21 +292,24 @@ pub struct hgrid_report {
     pub struct_size: u32,
     /// 1 if `index_bytes` is what the grid takes, to the byte; 0 if it is only enough.
     pub is_exact: u32,
-    /// Bytes that the index region needs; after a build, the size of the blob.
+    /// Bytes that the index region needs; after a build, the size of the blob, which for
+    /// `HGRID_METHOD_BRICK` may be smaller than the index had to be.
     pub index_bytes: u64,
-    /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it is enough, but not
-    /// exact, and after a build an upper bound of that.
+    /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_BRICK` it
+    /// is enough, but not exact, and after a build an upper bound of that. After
+    /// `hgrid_build_parallel`, whether it succeeds or fails, it is that of a build with one task.
     pub scratch_bytes: u64,
     /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
     pub triangle: u32,
     /// Triangles left out because a coordinate is not finite. Known after a build, as are all
     /// below.
     pub skipped_count: u32,
-    /// Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_RECURSIVE`
-    /// the words of 4 bytes that ids and subgrids take together.
+    /// Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`
+    /// and `HGRID_METHOD_BRICK` the words of 4 bytes that ids, subgrids and bricks take together.
     pub reference_count: u32,
     /// The density of the outermost grid: what was asked for, or a half, a quarter, ... of it where
-    /// the mesh would have needed more than 16 references for each triangle.
+    /// the mesh would have needed more than 16 references for each triangle. 0 for
+    /// `HGRID_METHOD_BRICK`, which has none.
     pub density: f32,
     /// Cells of the outermost grid on each axis, or of the finest level under macrocells.
     pub resolution: [u32; 3],
@@ -271,10 +356,10 @@ impl hgrid_counters {
 impl hgrid_config {
     /// The configuration as core knows it. The numbers are core's to judge.
     pub(crate) fn to_core(self) -> Result<Config, hgrid_status> {
-        let Self { density, macrocell_factor, subdivide_above, depth, .. } = self;
+        let Self { density, macrocell_factor, subdivide_above, depth, cell_size, .. } = self;
         let method = Method::from_u32(self.method).ok_or(HGRID_ERROR_INVALID_METHOD)?;
         let flags = BuildFlags::from_bits(self.flags).ok_or(HGRID_ERROR_INVALID_FLAGS)?;
-        Ok(Config { method, density, macrocell_factor, subdivide_above, depth, flags })
+        Ok(Config { method, density, macrocell_factor, subdivide_above, depth, cell_size, flags })
     }
 }
 
@@ -309,7 +394,7 @@ impl hgrid_report {
         self.scratch_bytes = grid.scratch_bytes();
         self.skipped_count = grid.skipped_count();
         self.reference_count = grid.reference_count();
-        self.density = grid.density();
+        self.density = if grid.method() == Method::Brick { 0.0 } else { grid.density() };
         self.resolution = grid.resolution();
     }
 
@@ -331,7 +416,16 @@ impl hgrid_report {
     }
 }
 
-/// Where the elements of one of a mesh's arrays lie: numbers, nothing is read yet.
+/// The coherence as core knows it.
+pub(crate) const fn coherence(coherence: hgrid_coherence) -> Result<Coherence, hgrid_status> {
+    match coherence {
+        HGRID_COHERENCE_INCOHERENT => Ok(Coherence::Incoherent),
+        HGRID_COHERENCE_COHERENT => Ok(Coherence::Coherent),
+        _ => Err(HGRID_ERROR_INVALID_COHERENCE),
+    }
+}
+
+/// Where the elements of one of the caller's arrays lie: numbers, nothing is read yet.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Elements {
     pub(crate) start: *const c_void,
@@ -343,7 +437,12 @@ pub(crate) struct Elements {
 
 impl Elements {
     /// `None` if the elements do not fit into memory.
-    fn new(start: *const c_void, stride: usize, count: usize, size: usize) -> Option<Self> {
+    pub(crate) fn new(
+        start: *const c_void,
+        stride: usize,
+        count: usize,
+        size: usize,
+    ) -> Option<Self> {
         let stride = if stride == 0 { size } else { stride };
         let bytes = match count.checked_sub(1) {
             Some(last) => last.checked_mul(stride)?.checked_add(size)?,

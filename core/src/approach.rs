@@ -13,7 +13,7 @@ use crate::ray::{Ray, round};
 ///
 /// Up to here the rounding of `vertex - origin` stays far below the margin by which triangles are
 /// spread over cells (see [`cell`](crate::cell)).
-const FAR_EXTENTS: f32 = 4.0;
+pub(crate) const FAR_EXTENTS: f32 = 4.0;
 
 /// Where a ray meets a box.
 #[derive(Debug, Clone, Copy)]

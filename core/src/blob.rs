@@ -66,7 +66,9 @@ pub(crate) struct Header {
     pub(crate) subdivide_above: u32,
     /// Levels of grids; 0 for a method without nested grids.
     pub(crate) depth: u32,
-    reserved: [u32; 5],
+    /// The width of a cell in triangles; 0 for a method that has a density instead.
+    pub(crate) cell_size: f32,
+    reserved: [u32; 4],
     /// Over all bytes before it: a header is what a build wrote, or `open` refuses it.
     checksum: u32,
 }
@@ -88,6 +90,7 @@ impl Header {
             },
             subdivide_above: if config.method.has_subgrids() { config.subdivide_above } else { 0 },
             depth: if config.method.has_depth() { config.depth } else { 0 },
+            cell_size: if config.method.has_cell_size() { config.cell_size } else { 0.0 },
             triangle_count: mesh.triangle_count(),
             vertex_count: mesh.vertex_count() as u64,
             bounds_min: lattice.min,
@@ -171,7 +174,13 @@ impl Header {
 
     /// The configuration that the grid was built with, where the method has such parameters.
     pub(crate) fn config(&self, default: Config) -> Config {
-        let mut config = Config { density: self.density, ..default };
+        let mut config = default;
+        if config.method.has_density() {
+            config.density = self.density;
+        }
+        if config.method.has_cell_size() {
+            config.cell_size = self.cell_size;
+        }
         if config.method.has_macrocells() {
             config.macrocell_factor = self.macrocell_factor;
         }
@@ -213,7 +222,9 @@ impl Header {
         (method.has_macrocells() || self.macrocell_factor == 0)
             && (method.has_subgrids() || self.subdivide_above == 0)
             && (method.has_depth() || self.depth == 0)
-            && self.reserved == [0; 5]
+            && (method.has_cell_size() || self.cell_size.to_bits() == 0)
+            && (method.has_density() || self.density.to_bits() == 0)
+            && self.reserved == [0; 4]
     }
 }
 

@@ -157,6 +157,12 @@ impl Lattice {
         (point - Vec3A::from_array(self.min)) * Vec3A::from_array(self.cells_per_unit)
     }
 
+    /// Cells per unit on each axis.
+    #[inline(always)]
+    pub(crate) fn scale(&self) -> Vec3A {
+        Vec3A::from_array(self.cells_per_unit)
+    }
+
     /// By how much boxes are grown, in cells.
     #[inline(always)]
     pub(crate) fn margin(&self) -> Vec3A {
@@ -229,6 +235,11 @@ pub(crate) const fn whole(position: f32) -> u32 {
 /// less than with casts, which must saturate.
 #[inline(always)]
 fn wholes(position: Vec3A) -> [u32; 3] {
-    let shifted = position - Vec3A::splat(0.5) + Vec3A::splat(12_582_912.0);
-    shifted.to_array().map(|bits| bits.to_bits() & 0x003f_ffff)
+    let shifted = position - Vec3A::splat(0.5) + Vec3A::splat(WHOLE_SHIFT);
+    shifted.to_array().map(|bits| bits.to_bits() & WHOLE_BITS)
 }
+
+/// What is added to round to a whole number: 1.5 * 2^23.
+pub(crate) const WHOLE_SHIFT: f32 = 12_582_912.0;
+/// The bits of the sum that are the number.
+pub(crate) const WHOLE_BITS: u32 = 0x003f_ffff;

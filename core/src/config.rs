@@ -20,11 +20,14 @@ pub enum Method {
     Variable = 3,
     /// An uncompressed recursive grid, as in the Manta ray tracer: what the paper compares with.
     Recursive = 4,
+    /// Occupancy masks and ranks, cells as large as triangles: this project's own.
+    Brick = 5,
 }
 
 impl Method {
     /// All methods, in the order of the paper's Table 1 but for its baseline, which comes last.
-    pub const ALL: &[Self] = &[Self::OneLevel, Self::Variable, Self::Fixed, Self::Recursive];
+    pub const ALL: &[Self] =
+        &[Self::OneLevel, Self::Variable, Self::Fixed, Self::Recursive, Self::Brick];
 
     /// The name that commands and tables use.
     #[must_use]
@@ -34,6 +37,7 @@ impl Method {
             Self::Fixed => "fixed",
             Self::Variable => "variable",
             Self::Recursive => "recursive",
+            Self::Brick => "brick",
         }
     }
 
@@ -45,6 +49,7 @@ impl Method {
             2 => Some(Self::Fixed),
             3 => Some(Self::Variable),
             4 => Some(Self::Recursive),
+            5 => Some(Self::Brick),
             _ => None,
         }
     }
@@ -64,11 +69,21 @@ impl Method {
         matches!(self, Self::Recursive)
     }
 
+    /// Whether [`Config::density`] means something to it.
+    pub(crate) const fn has_density(self) -> bool {
+        !self.has_cell_size()
+    }
+
+    /// Whether [`Config::cell_size`] means something to it.
+    pub(crate) const fn has_cell_size(self) -> bool {
+        matches!(self, Self::Brick)
+    }
+
     /// The density that the paper uses with this method.
     #[must_use]
     pub const fn default_density(self) -> f32 {
         match self {
-            Self::OneLevel | Self::Variable => 4.0,
+            Self::OneLevel | Self::Variable | Self::Brick => 4.0,
             Self::Fixed => 32.0,
             Self::Recursive => 8.0,
         }
@@ -98,6 +113,8 @@ pub struct Config {
     pub subdivide_above: u32,
     /// For [`Method::Recursive`]: levels of grids, 1 to [`MAX_DEPTH`](crate::MAX_DEPTH).
     pub depth: u32,
+    /// For [`Method::Brick`]: the width of a cell in multiples of the one that suits the triangles.
+    pub cell_size: f32,
     /// Choices that are either on or off.
     pub flags: BuildFlags,
 }
@@ -112,6 +129,7 @@ impl Config {
             macrocell_factor: 6,
             subdivide_above: 16,
             depth: 3,
+            cell_size: 1.0,
             flags: BuildFlags::empty(),
         }
     }
@@ -126,6 +144,9 @@ impl Config {
         }
         if self.method.has_depth() && (self.depth < 1 || self.depth > MAX_DEPTH) {
             return Err(Error::InvalidConfig(ConfigField::Depth));
+        }
+        if self.method.has_cell_size() && !(self.cell_size > 0.0 && self.cell_size.is_finite()) {
+            return Err(Error::InvalidConfig(ConfigField::CellSize));
         }
         if self.flags.bits() & !BuildFlags::all().bits() != 0 {
             return Err(Error::InvalidConfig(ConfigField::Flags));

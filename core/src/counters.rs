@@ -15,6 +15,7 @@ pub struct Counters {
 /// A query reports its work here; `()` ignores it and compiles to nothing.
 pub(crate) trait Tally {
     fn primitive_test(&mut self);
+    fn primitive_tests(&mut self, count: usize);
     fn cell_step(&mut self);
     fn grid_step(&mut self);
 }
@@ -22,6 +23,8 @@ pub(crate) trait Tally {
 impl Tally for () {
     #[inline(always)]
     fn primitive_test(&mut self) {}
+    #[inline(always)]
+    fn primitive_tests(&mut self, _: usize) {}
     #[inline(always)]
     fn cell_step(&mut self) {}
     #[inline(always)]
@@ -32,6 +35,10 @@ impl Tally for Counters {
     #[inline(always)]
     fn primitive_test(&mut self) {
         self.primitive_tests += 1;
+    }
+    #[inline(always)]
+    fn primitive_tests(&mut self, count: usize) {
+        self.primitive_tests += count as u64;
     }
     #[inline(always)]
     fn cell_step(&mut self) {

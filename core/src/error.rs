@@ -22,6 +22,15 @@ pub enum MeshField {
     Indices,
 }
 
+/// An array of a batch of rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BatchField {
+    /// The rays.
+    Rays,
+    /// The hits, or the bytes that tell what is occluded.
+    Answers,
+}
+
 /// Which field of a [`Config`](crate::Config) an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ConfigField {
@@ -36,6 +45,8 @@ pub enum ConfigField {
     Depth,
     /// A flag that this version does not know.
     Flags,
+    /// The width of a cell is 0, negative, not finite, or too small for the mesh.
+    CellSize,
 }
 
 /// Why a build or an open was refused. Nothing outside the caller's regions was touched.
@@ -73,6 +84,11 @@ pub enum Error {
     },
     /// A field of the configuration is outside its range.
     InvalidConfig(ConfigField),
+    /// The loop of a parallel build ran a task twice or not at all: see
+    /// [`Parallel::run`](crate::Parallel::run). There is no grid.
+    InvalidParallelFor,
+    /// An array of a batch of rays cannot be what it should: see the field.
+    InvalidBatch(BatchField),
     /// The bytes are not a grid.
     NotAGrid,
     /// The grid was built on a machine of the other byte order: build it again on this one.
@@ -131,6 +147,13 @@ impl fmt::Display for Error {
             Self::NonFiniteTriangle { triangle } => {
                 write!(f, "triangle {triangle} has a coordinate that is NaN, infinite or too large")
             }
+            Self::InvalidBatch(BatchField::Rays) => {
+                f.write_str("the ray bytes end before the last ray, or the stride is below 32")
+            }
+            Self::InvalidBatch(BatchField::Answers) => f.write_str(
+                "there are not as many answers as rays, their bytes end before the last, or the stride is \
+                 below an answer",
+            ),
             Self::InvalidConfig(ConfigField::Method) => f.write_str("unknown method"),
             Self::InvalidConfig(ConfigField::Density) => write!(
                 f,
@@ -144,6 +167,12 @@ impl fmt::Display for Error {
                 write!(f, "depth must be 1 to {}", crate::MAX_DEPTH)
             }
             Self::InvalidConfig(ConfigField::Flags) => f.write_str("unknown build flag"),
+            Self::InvalidConfig(ConfigField::CellSize) => {
+                f.write_str("cell_size must be above 0, and not so small that a grid takes 2^31 words")
+            }
+            Self::InvalidParallelFor => {
+                f.write_str("the parallel_for did not run every task exactly once")
+            }
             Self::NotAGrid => f.write_str("the bytes are not a grid"),
             Self::WrongByteOrder => {
                 f.write_str("the grid was built on a machine of the other byte order")

@@ -3,16 +3,19 @@
 use crate::approach::Approach;
 use crate::arena::check_alignment;
 use crate::blob::{Header, corrupt};
+use crate::brick::{self, Brick, OneRay, Tiles};
 use crate::cell::Lattice;
 use crate::config::{Config, Method};
 use crate::counters::{Counters, Tally};
 use crate::dda::Line;
 use crate::error::{Error, Region};
 use crate::fixed::{Fixed, Macrocells};
-use crate::mesh::TriangleMesh;
+use crate::mesh::{Strided, TriangleMesh};
 use crate::one_level::{self, OneLevel};
 use crate::ray::{Hit, Ray};
 use crate::recursive::{self, Recursive};
+use crate::simd::{SimdLevel, dispatch};
+use crate::tasks::Parallel;
 use crate::triangle::TriangleTest;
 use crate::variable::{self, Variable};
 
@@ -20,13 +23,15 @@ use crate::variable::{self, Variable};
 ///
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
 /// number of threads may query it at once. Queries never fail, never allocate and never panic; their
-/// steps are bounded by the resolutions (one level: by their sum), their stack is below 4 KiB.
+/// steps are bounded by the resolutions (one level: by their sum). A single query's stack is about
+/// 4 KiB, a batch's below 16 KiB.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,
     blob: &'a [u8],
     lattice: Lattice,
     structure: Structure<'a>,
+    simd: SimdLevel,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -35,6 +40,7 @@ enum Structure<'a> {
     Fixed(Fixed<'a>),
     Variable(Variable<'a>),
     Recursive(Recursive<'a>),
+    Brick(Brick<'a>),
 }
 
 impl<'a> Grid<'a> {
@@ -49,8 +55,8 @@ impl<'a> Grid<'a> {
     /// [`Error::OutOfMemory`] names the region and its need, [`Error::Misaligned`] the region;
     /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
     /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field. After an
-    /// error the index region is as it was, but for variable and recursive grids, which fill it as
-    /// they go: there it holds nothing of use. Either way both regions can be used again.
+    /// error the index region is as it was, but for variable, recursive and brick grids, which fill it
+    /// as they go: there it holds nothing of use. Either way both regions can be used again.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
@@ -74,6 +80,26 @@ impl<'a> Grid<'a> {
         index: &'a mut [u8],
         scratch: &mut [u8],
     ) -> Result<Self, Error> {
+        Self::build_parallel(mesh, config, index, scratch, &Parallel::SERIAL)
+    }
+
+    /// Builds a grid on the caller's threads: [`build`](Self::build), and bit by bit the same grid.
+    ///
+    /// Only [`Method::Brick`] is cut into tasks; the other methods build on the thread that calls.
+    /// [`sizes_parallel`](crate::sizes_parallel) and
+    /// [`Sizes::bound_parallel`](crate::Sizes::bound_parallel) tell how much memory so many tasks take;
+    /// where there is less, but enough for fewer, there are fewer.
+    ///
+    /// # Errors
+    /// Those of [`build`](Self::build), and [`Error::InvalidParallelFor`] if a task was run twice or
+    /// not at all.
+    pub fn build_parallel(
+        mesh: TriangleMesh<'a>,
+        config: &Config,
+        index: &'a mut [u8],
+        scratch: &mut [u8],
+        parallel: &Parallel<'_>,
+    ) -> Result<Self, Error> {
         config.check()?;
         check_alignment(index, Region::Index)?;
         check_alignment(scratch, Region::Scratch)?;
@@ -84,6 +110,7 @@ impl<'a> Grid<'a> {
             }
             Method::Variable => variable::build(&mesh, config, index, scratch)?,
             Method::Recursive => recursive::build(&mesh, config, index, scratch)?,
+            Method::Brick => brick::build(&mesh, config, index, scratch, parallel)?,
         };
         Self::open(blob, mesh)
     }
@@ -110,9 +137,10 @@ impl<'a> Grid<'a> {
             Some(Method::Fixed) => Structure::Fixed(Fixed::open(&header, &lattice, blob)?),
             Some(Method::Variable) => Structure::Variable(Variable::open(&header, &lattice, blob)?),
             Some(Method::Recursive) => Structure::Recursive(Recursive::open(&header, blob)?),
+            Some(Method::Brick) => Structure::Brick(Brick::open(&header, &lattice, blob)?),
             None => return Err(corrupt(core::mem::offset_of!(Header, method))),
         };
-        Ok(Self { mesh, blob, lattice, structure })
+        Ok(Self { mesh, blob, lattice, structure, simd: SimdLevel::detect() })
     }
 
     /// Proves that the blob is a grid of the mesh, and so that every answer is right.
@@ -137,6 +165,7 @@ impl<'a> Grid<'a> {
                 grid.validate(&header, &self.lattice, self.blob, &self.mesh)
             }
             Structure::Recursive(grid) => grid.validate(&header, &self.lattice, &self.mesh),
+            Structure::Brick(grid) => grid.validate(&header, &self.lattice, &self.mesh),
         }
     }
 
@@ -171,6 +200,11 @@ impl<'a> Grid<'a> {
         let approach = Approach::new(ray, &self.lattice.bounds())?;
         let line = Line::new(&self.lattice, ray, &approach)?;
         let test = TriangleTest::from(ray, &approach);
+        if let Structure::Brick(brick) = &self.structure {
+            let mesh = &self.mesh;
+            let ray = OneRay::<T, ANY> { brick, mesh, line: &line, test: &test, tally };
+            return dispatch(self.simd, ray);
+        }
 
         let mut best = None;
         let mut limit = line.end;
@@ -199,8 +233,28 @@ impl<'a> Grid<'a> {
             Structure::Fixed(grid) => grid.traverse(&line, tally, leaf),
             Structure::Variable(grid) => grid.traverse(&line, tally, leaf),
             Structure::Recursive(grid) => grid.traverse(&line, tally, leaf),
+            Structure::Brick(_) => {}
         }
         best
+    }
+
+    /// Traces neighbouring rays together where the structure can; tells whether it does. `answer` gets
+    /// the place of each ray and its hit, or `None` for one that must be traced alone.
+    pub(crate) fn tiles<const ANY: bool>(
+        &self,
+        rays: &Strided<'_>,
+        answer: impl FnMut(usize, Option<Hit>),
+    ) -> bool {
+        let Structure::Brick(brick) = &self.structure else { return false };
+        let (lattice, mesh) = (&self.lattice, &self.mesh);
+        dispatch(self.simd, Tiles::<_, ANY> { brick, lattice, mesh, rays, answer });
+        true
+    }
+
+    /// The same grid with queries that use no more than these instructions: the same hits, slower.
+    #[must_use]
+    pub const fn with_simd(self, simd: SimdLevel) -> Self {
+        Self { simd, ..self }
     }
 
     /// No ray is shown more primitives than this.
@@ -211,6 +265,7 @@ impl<'a> Grid<'a> {
             Structure::Fixed(grid) => grid.list_words(),
             Structure::Variable(grid) => grid.list_words(),
             Structure::Recursive(grid) => grid.list_words(),
+            Structure::Brick(grid) => grid.list_words(),
         }
     }
 
@@ -240,6 +295,7 @@ impl<'a> Grid<'a> {
         match self.structure {
             Structure::OneLevel(_) | Structure::Fixed(_) => one_level::scratch_bytes(resolution),
             Structure::Recursive(_) => recursive::scratch_bytes(triangles, &self.config()),
+            Structure::Brick(_) => brick::scratch_bytes_at_most(resolution, triangles),
             Structure::Variable(_) => {
                 variable::scratch_bytes_at_most(resolution, triangles, self.density())
             }
@@ -267,6 +323,7 @@ impl<'a> Grid<'a> {
             Structure::Fixed(_) => Method::Fixed,
             Structure::Variable(_) => Method::Variable,
             Structure::Recursive(_) => Method::Recursive,
+            Structure::Brick(_) => Method::Brick,
         }
     }
 

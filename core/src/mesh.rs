@@ -8,6 +8,9 @@
 //! The last element needs only its own bytes, not its stride. Nothing has to be aligned: every
 //! read goes through bytes, which costs nothing on the machines that matter and removes a rule.
 
+use glam::Vec3A;
+
+use crate::aabb::{Aabb, MAX_COORDINATE};
 use crate::error::{Error, MeshField};
 
 /// The most triangles a mesh may have: ids are 32 bits and one of them means "none".
@@ -47,11 +50,14 @@ pub struct Strided<'a> {
 }
 
 impl<'a> Strided<'a> {
-    /// Whether all elements of `size` bytes lie inside the bytes.
-    fn holds(&self, size: usize) -> bool {
-        let Some(last) = self.count.checked_sub(1) else { return true };
-        let end = last.checked_mul(self.stride).and_then(|start| start.checked_add(size));
-        self.stride >= size && end.is_some_and(|end| end <= self.bytes.len())
+    /// The same elements of `size` bytes without the bytes after the last of them, if all lie inside.
+    pub(crate) fn cut(self, size: usize) -> Option<Self> {
+        let Some(last) = self.count.checked_sub(1) else {
+            return Some(Self { bytes: &[], ..self });
+        };
+        let end = last.checked_mul(self.stride)?.checked_add(size)?;
+        let bytes = self.bytes.get(..end).filter(|_| self.stride >= size)?;
+        Some(Self { bytes, ..self })
     }
 
     /// The first `N` bytes of element `index`.
@@ -109,12 +115,11 @@ impl<'a> TriangleMesh<'a> {
         indices: Strided<'a>,
         index_type: IndexType,
     ) -> Result<Self, Error> {
-        if !positions.holds(size_of::<[f32; 3]>()) {
-            return Err(Error::InvalidMesh(MeshField::Positions));
-        }
-        if !indices.holds(index_type.triangle_bytes()) {
-            return Err(Error::InvalidMesh(MeshField::Indices));
-        }
+        let positions =
+            positions.cut(size_of::<[f32; 3]>()).ok_or(Error::InvalidMesh(MeshField::Positions))?;
+        let indices = indices
+            .cut(index_type.triangle_bytes())
+            .ok_or(Error::InvalidMesh(MeshField::Indices))?;
         if indices.count > MAX_TRIANGLES {
             return Err(Error::TooManyTriangles);
         }
@@ -154,6 +159,36 @@ impl<'a> TriangleMesh<'a> {
         Some([read(a)?, read(b)?, read(c)?])
     }
 
+    /// The box of all vertices whose coordinates are finite and no larger than `MAX_COORDINATE`, used
+    /// or not.
+    pub(crate) fn vertex_bounds(&self) -> Aabb {
+        let limit = Vec3A::splat(MAX_COORDINATE);
+        let mut bounds = Aabb::EMPTY;
+        for vertex in 0..self.positions.count {
+            let Some(at) = self.vertex(vertex).map(|[x, y, z]| Vec3A::new(x, y, z)) else { break };
+            if at.abs().cmple(limit).all() {
+                bounds.min = bounds.min.min(at);
+                bounds.max = bounds.max.max(at);
+            }
+        }
+        bounds
+    }
+
+    /// This mesh for reading many triangles fast.
+    #[inline(always)]
+    pub(crate) fn wide(&self) -> WideMesh<'a> {
+        let stride = |array: &Strided<'_>| u16::try_from(array.stride);
+        match (stride(&self.positions), stride(&self.indices), self.index_type) {
+            (Ok(position_stride), Ok(index_stride), IndexType::U32) => WideMesh {
+                positions: self.positions.bytes,
+                indices: self.indices.bytes,
+                position_stride,
+                index_stride,
+            },
+            _ => WideMesh { positions: &[], indices: &[], position_stride: 0, index_stride: 0 },
+        }
+    }
+
     #[inline(always)]
     fn vertices_of(&self, triangle: u32) -> Option<[usize; 3]> {
         match self.index_type {
@@ -178,4 +213,39 @@ impl<'a> TriangleMesh<'a> {
         let coordinate = |at: usize| f32::from_ne_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]);
         Some([coordinate(0), coordinate(4), coordinate(8)])
     }
+}
+
+/// A mesh whose vertices are read in pieces of sixteen bytes, which is one load and one check each.
+///
+/// Strides of 16 bits leave products of an index without overflow, so that the end of the bytes is
+/// all there is to check: they end with the last element, so what lies inside is an element.
+#[derive(Clone, Copy)]
+pub(crate) struct WideMesh<'a> {
+    positions: &'a [u8],
+    indices: &'a [u8],
+    position_stride: u16,
+    index_stride: u16,
+}
+
+impl<'a> WideMesh<'a> {
+    /// The corners of a triangle, each with the four bytes behind it.
+    ///
+    /// `None` does not mean that there is no such triangle: one with the mesh's last vertex has
+    /// nothing behind it, and some layouts are not read this way at all.
+    #[inline(always)]
+    pub(crate) fn corners(&self, triangle: u32) -> Option<[&'a [u8; 16]; 3]> {
+        let indices: &[u8; 12] = element(self.indices, self.index_stride, triangle)?;
+        let [a, b, c]: [u32; 3] = bytemuck::cast(*indices);
+        let vertex = |index| element(self.positions, self.position_stride, index);
+        Some([vertex(a)?, vertex(b)?, vertex(c)?])
+    }
+}
+
+/// The first `N` bytes of an element, at most 2^16.
+#[inline(always)]
+fn element<const N: usize>(bytes: &[u8], stride: u16, index: u32) -> Option<&[u8; N]> {
+    // Not checked where pointers have 64 bits: the compiler sees that these two cannot overflow.
+    let start = (index as usize).checked_mul(usize::from(stride))?;
+    let end = start.checked_add(N)?;
+    bytes.get(start..end)?.first_chunk()
 }

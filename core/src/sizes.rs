@@ -1,11 +1,13 @@
 //! How much memory a build takes, asked before the build.
 
+use crate::brick;
 use crate::config::{Config, Method};
 use crate::error::{Error, Region};
 use crate::fixed;
 use crate::mesh::TriangleMesh;
 use crate::one_level;
 use crate::recursive;
+use crate::tasks::Parallel;
 use crate::variable;
 
 /// Bytes of the two regions that a build takes.
@@ -37,8 +39,16 @@ impl Sizes {
     ///     [Block::ZERO; Block::count_for(SIZES.index_bytes)];
     /// ```
     #[must_use]
-    #[expect(clippy::cast_possible_truncation, reason = "compared before")]
     pub const fn bound(triangles: u32, config: &Config) -> Option<Self> {
+        Self::bound_parallel(triangles, config, 1)
+    }
+
+    /// Enough for any mesh with so many triangles and a build with so many tasks
+    /// ([`Parallel::tasks`]), each of which takes scratch: four bytes for eight triangles and those of
+    /// the fullest block.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "compared before")]
+    pub const fn bound_parallel(triangles: u32, config: &Config, tasks: u32) -> Option<Self> {
         if config.check().is_err() {
             return None;
         }
@@ -47,6 +57,7 @@ impl Sizes {
             Method::Fixed => fixed::bound(triangles, config),
             Method::Variable => variable::bound(triangles, config),
             Method::Recursive => recursive::bound(triangles, config),
+            Method::Brick => brick::bound(triangles, tasks),
         };
         if index > usize::MAX as u64 || scratch > usize::MAX as u64 {
             return None;
@@ -99,6 +110,23 @@ impl Sizes {
 /// # Ok::<(), hgrid_core::Error>(())
 /// ```
 pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Result<Sizes, Error> {
+    sizes_parallel(mesh, config, scratch, &Parallel::SERIAL)
+}
+
+/// The memory that a parallel build of this mesh takes: [`sizes`], by the caller's threads.
+///
+/// More tasks take more scratch, each as much again as the first. The index is filled in parts, one
+/// for each task, and may take a few bytes more than the grid in it. Only [`Method::Brick`] builds in
+/// parallel; for the others this is [`sizes`].
+///
+/// # Errors
+/// Those of [`Grid::build_parallel`](crate::Grid::build_parallel), but for index memory.
+pub fn sizes_parallel(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+    parallel: &Parallel<'_>,
+) -> Result<Sizes, Error> {
     config.check()?;
     crate::arena::check_alignment(scratch, Region::Scratch)?;
     match config.method {
@@ -106,5 +134,6 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
         Method::Fixed => one_level::sizes(mesh, config, &fixed::Macrocells::of(config), scratch),
         Method::Variable => variable::sizes(mesh, config, scratch),
         Method::Recursive => recursive::sizes(mesh, config, scratch),
+        Method::Brick => brick::sizes(mesh, config, scratch, parallel),
     }
 }

@@ -47,20 +47,20 @@ impl TriangleHit {
 #[derive(Debug, Clone, Copy)]
 pub struct TriangleTest {
     /// The axis along which the direction is longest; it becomes z.
-    axis: Axis,
+    pub(crate) axis: Axis,
     /// Where the sheared space has its origin: the ray's own, or closer to the box.
-    anchor: [f32; 3],
+    pub(crate) anchor: [f32; 3],
     /// Direction x / z and y / z: at most 1.
-    shear: [f32; 2],
-    origin_z: f64,
-    direction_z: f64,
-    t_min: f32,
-    t_max: f32,
+    pub(crate) shear: [f32; 2],
+    pub(crate) origin_z: f64,
+    pub(crate) direction_z: f64,
+    pub(crate) t_min: f32,
+    pub(crate) t_max: f32,
 }
 
 /// The axis that becomes z; x and y follow cyclically.
 #[derive(Debug, Clone, Copy)]
-enum Axis {
+pub(crate) enum Axis {
     X,
     Y,
     Z,
@@ -68,7 +68,7 @@ enum Axis {
 
 impl Axis {
     #[inline(always)]
-    const fn to_z<T: Copy>(self, [x, y, z]: [T; 3]) -> [T; 3] {
+    pub(crate) const fn to_z<T: Copy>(self, [x, y, z]: [T; 3]) -> [T; 3] {
         match self {
             Self::X => [y, z, x],
             Self::Y => [z, x, y],
@@ -98,14 +98,14 @@ impl TriangleTest {
         } else {
             Axis::Z
         };
-        let [x, y, z] = axis.to_z(ray.direction.map(f64::from));
+        let [x, y, z] = axis.to_z(ray.direction);
         let [_, _, origin_z] = axis.to_z(ray.origin);
         Self {
             axis,
             anchor: axis.to_z(approach.anchor),
-            shear: [round(x / z), round(y / z)],
+            shear: [x / z, y / z],
             origin_z: f64::from(origin_z),
-            direction_z: z,
+            direction_z: f64::from(z),
             t_min: ray.t_min,
             t_max: ray.t_max,
         }
@@ -116,20 +116,9 @@ impl TriangleTest {
     /// A triangle of no area, or seen exactly edge on, is never hit.
     #[inline(always)]
     #[must_use]
-    #[expect(clippy::needless_bitwise_bool, reason = "one branch instead of six")]
     pub fn test(&self, triangle: &Triangle) -> Option<TriangleHit> {
-        let [a, b, c] = triangle.map(|corner| self.shear(corner));
-
-        // Drop the triangle if two edge functions have opposite signs. A NaN passes.
-        let u = c[0] * b[1] - c[1] * b[0];
-        let v = a[0] * c[1] - a[1] * c[0];
-        let w = b[0] * a[1] - b[1] * a[0];
-        let any_negative = (u < 0.0) | (v < 0.0) | (w < 0.0);
-        let any_positive = (u > 0.0) | (v > 0.0) | (w > 0.0);
-        if any_negative & any_positive {
-            return None;
-        }
-        self.resolve(triangle, [a, b, c])
+        let sheared = triangle.map(|corner| self.shear(corner));
+        if is_dropped(sheared) { None } else { self.resolve_sheared(triangle, sheared) }
     }
 
     /// A corner relative to the ray, sheared so that the ray is the z axis.
@@ -142,7 +131,13 @@ impl TriangleTest {
 
     /// Decides in f64 what the filter let through.
     #[inline]
-    fn resolve(&self, triangle: &Triangle, sheared: [[f32; 2]; 3]) -> Option<TriangleHit> {
+    pub(crate) fn resolve(&self, triangle: &Triangle) -> Option<TriangleHit> {
+        self.resolve_sheared(triangle, triangle.map(|corner| self.shear(corner)))
+    }
+
+    /// The same for a triangle that was sheared.
+    #[inline]
+    fn resolve_sheared(&self, triangle: &Triangle, sheared: [[f32; 2]; 3]) -> Option<TriangleHit> {
         let [a, b, c] = sheared.map(|corner| corner.map(f64::from));
 
         // Compute the edge functions again: exact products, so the signs are exact.
@@ -157,7 +152,8 @@ impl TriangleTest {
             return None;
         }
         // Adding zero makes the negative zero of a vertex a plain one.
-        let weights = [u / area + 0.0, v / area + 0.0, w / area + 0.0];
+        let share = 1.0 / area;
+        let weights = [u * share + 0.0, v * share + 0.0, w * share + 0.0];
 
         // Interpolate the depth from the ray's own origin, wherever the sheared space has its.
         let depths = triangle.map(|corner| {
@@ -168,6 +164,26 @@ impl TriangleTest {
         let t = round(depth / self.direction_z);
         let hit = TriangleHit { t, u: round(weights[1]), v: round(weights[2]) };
         (t >= self.t_min && t <= self.t_max && t.is_finite()).then_some(hit)
+    }
+}
+
+/// Whether two edge functions of a sheared triangle have opposite signs. A NaN has none.
+#[inline(always)]
+#[expect(clippy::needless_bitwise_bool, reason = "one branch instead of six")]
+fn is_dropped([a, b, c]: [[f32; 2]; 3]) -> bool {
+    let u = c[0] * b[1] - c[1] * b[0];
+    let v = a[0] * c[1] - a[1] * c[0];
+    let w = b[0] * a[1] - b[1] * a[0];
+    let any_negative = (u < 0.0) | (v < 0.0) | (w < 0.0);
+    let any_positive = (u > 0.0) | (v > 0.0) | (w > 0.0);
+    any_negative & any_positive
+}
+
+#[cfg(test)]
+impl TriangleTest {
+    /// Whether the filter lets a triangle through.
+    pub(crate) fn passes(&self, triangle: &Triangle) -> bool {
+        !is_dropped(triangle.map(|corner| self.shear(corner)))
     }
 }
 

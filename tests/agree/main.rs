@@ -1,5 +1,6 @@
 //! Does every query agree with brute force, at the boundaries above all?
 
+mod batches;
 mod exact;
 mod forms;
 mod scans;

@@ -3,7 +3,8 @@
  *
  *   in   the configuration; counts of vertices, triangles and rays; positions; indices; rays
  *   out  bytes of the blob; the blob; for each ray a hit (zero if none) and whether it is occluded;
- *        the counters of all closest-hit queries
+ *        the counters of all closest-hit queries; for each coherence the hits of all rays in one
+ *        batch, and a byte for each that says whether it is occluded
  */
 
 #include "check.h"
@@ -56,15 +57,25 @@ int main(void)
     hgrid_counters counters = {0, 0, 0};
     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
     options.counters = &counters;
-    for (uint32_t i = 0; i < counts[2]; i++) {
-        hgrid_ray ray;
+    const size_t count = counts[2];
+    const hgrid_ray *rays = (const hgrid_ray *)receive_array(count * sizeof *rays);
+    for (size_t i = 0; i < count; i++) {
         hgrid_hit hit = {0, 0, 0, 0};
-        receive(&ray, sizeof ray);
-        const bool is_hit = hgrid_intersect(&grid, &ray, &options, &hit);
-        const uint32_t answers[2] = {is_hit, hgrid_occluded(&grid, &ray, NULL)};
+        const bool is_hit = hgrid_intersect(&grid, &rays[i], &options, &hit);
+        const uint32_t answers[2] = {is_hit, hgrid_occluded(&grid, &rays[i], NULL)};
         send(&hit, sizeof hit);
         send(answers, sizeof answers);
     }
     send(&counters, sizeof counters);
+
+    hgrid_hit *hits = (hgrid_hit *)guarded(count * sizeof *hits);
+    uint8_t *occluded = (uint8_t *)guarded(count);
+    const hgrid_coherence all[] = {HGRID_COHERENCE_INCOHERENT, HGRID_COHERENCE_COHERENT};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, count, all[i], NULL) == HGRID_OK);
+        CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, count, all[i], NULL) == HGRID_OK);
+        send(hits, count * sizeof *hits);
+        send(occluded, count);
+    }
     return 0;
 }

@@ -27,11 +27,13 @@ fn rays(count: usize) -> Vec<Ray> {
 }
 
 /// The words of a `hgrid_config`.
-fn words(config: &Config) -> [u32; 7] {
-    let Config { method, density, macrocell_factor, subdivide_above, depth, flags } = *config;
-    let size = size_of::<[u32; 7]>() as u32;
-    let density = density.to_bits();
-    [size, method as u32, density, macrocell_factor, subdivide_above, depth, flags.bits()]
+fn words(config: &Config) -> [u32; 8] {
+    let Config { method, density, macrocell_factor, subdivide_above, depth, cell_size, flags } =
+        *config;
+    let size = size_of::<[u32; 8]>() as u32;
+    let [density, cell_size] = [density, cell_size].map(f32::to_bits);
+    let flags = flags.bits();
+    [size, method as u32, density, macrocell_factor, subdivide_above, depth, cell_size, flags]
 }
 
 /// What `answers.c` reads.
@@ -65,6 +67,15 @@ fn answer(config: &Config, mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
     }
     let Counters { primitive_tests, cell_steps, grid_steps } = counters;
     bytes.extend([primitive_tests, cell_steps, grid_steps].iter().flat_map(|n| n.to_ne_bytes()));
+    // Both batches, whatever is known of the rays.
+    for _ in 0..2 {
+        for ray in rays {
+            let Hit { t, u, v, primitive } = grid.intersect(ray).unwrap_or(Hit::MISS);
+            bytes.extend([t, u, v].iter().flat_map(|f| f.to_ne_bytes()));
+            bytes.extend(primitive.to_ne_bytes());
+        }
+        bytes.extend(rays.iter().map(|ray| u8::from(grid.occluded(ray))));
+    }
     bytes
 }
 

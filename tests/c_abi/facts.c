@@ -14,6 +14,7 @@
 static void layout(void)
 {
     SIZE(hgrid_status);
+    SIZE(hgrid_coherence);
     SIZE(hgrid_ray);
     OFFSET(hgrid_ray, origin);
     OFFSET(hgrid_ray, t_min);
@@ -44,7 +45,13 @@ static void layout(void)
     OFFSET(hgrid_config, macrocell_factor);
     OFFSET(hgrid_config, subdivide_above);
     OFFSET(hgrid_config, depth);
+    OFFSET(hgrid_config, cell_size);
     OFFSET(hgrid_config, flags);
+    SIZE(hgrid_parallel);
+    OFFSET(hgrid_parallel, struct_size);
+    OFFSET(hgrid_parallel, tasks);
+    OFFSET(hgrid_parallel, context);
+    OFFSET(hgrid_parallel, run);
     SIZE(hgrid_query_options);
     OFFSET(hgrid_query_options, struct_size);
     OFFSET(hgrid_query_options, reserved);
@@ -74,8 +81,12 @@ static void constants(void)
     NUMBER(HGRID_METHOD_FIXED);
     NUMBER(HGRID_METHOD_VARIABLE);
     NUMBER(HGRID_METHOD_RECURSIVE);
+    NUMBER(HGRID_METHOD_BRICK);
     NUMBER(HGRID_MAX_DEPTH);
     NUMBER(HGRID_BUILD_STRICT);
+    NUMBER(HGRID_MAX_TASKS);
+    NUMBER(HGRID_COHERENCE_INCOHERENT);
+    NUMBER(HGRID_COHERENCE_COHERENT);
     NUMBER(HGRID_OK);
     NUMBER(HGRID_ERROR_NULL_ARGUMENT);
     NUMBER(HGRID_ERROR_STRUCT_SIZE);
@@ -94,12 +105,17 @@ static void constants(void)
     NUMBER(HGRID_ERROR_INVALID_FLAGS);
     NUMBER(HGRID_ERROR_INVALID_MACROCELL_FACTOR);
     NUMBER(HGRID_ERROR_INVALID_DEPTH);
+    NUMBER(HGRID_ERROR_INVALID_CELL_SIZE);
+    NUMBER(HGRID_ERROR_PARALLEL_FOR);
     NUMBER(HGRID_ERROR_NOT_A_GRID);
     NUMBER(HGRID_ERROR_WRONG_BYTE_ORDER);
     NUMBER(HGRID_ERROR_UNSUPPORTED_VERSION);
     NUMBER(HGRID_ERROR_TRUNCATED);
     NUMBER(HGRID_ERROR_MESH_MISMATCH);
     NUMBER(HGRID_ERROR_CORRUPT);
+    NUMBER(HGRID_ERROR_INVALID_RAYS);
+    NUMBER(HGRID_ERROR_INVALID_ANSWERS);
+    NUMBER(HGRID_ERROR_INVALID_COHERENCE);
 }
 
 static void versions(void)
@@ -115,18 +131,21 @@ static void defaults(void)
 {
     const hgrid_mesh mesh = HGRID_MESH_INIT;
     const hgrid_config configs[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
-                                    HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE};
+                                    HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
+                                    HGRID_CONFIG_INIT_BRICK};
+    const hgrid_parallel parallel = HGRID_PARALLEL_INIT;
     const hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
     const hgrid_report report = HGRID_REPORT_INIT;
     printf("mesh %lu\n", (unsigned long)mesh.struct_size);
+    printf("parallel %lu\n", (unsigned long)parallel.struct_size);
     printf("options %lu\n", (unsigned long)options.struct_size);
     printf("report %lu\n", (unsigned long)report.struct_size);
     for (size_t i = 0; i < sizeof configs / sizeof *configs; i++) {
         const hgrid_config *c = &configs[i];
-        printf("config_%lu %lu %g %lu %lu %lu %lu\n", (unsigned long)c->method,
+        printf("config_%lu %lu %g %lu %lu %lu %g %lu\n", (unsigned long)c->method,
                (unsigned long)c->struct_size, (double)c->density,
                (unsigned long)c->macrocell_factor, (unsigned long)c->subdivide_above,
-               (unsigned long)c->depth, (unsigned long)c->flags);
+               (unsigned long)c->depth, (double)c->cell_size, (unsigned long)c->flags);
     }
 }
 

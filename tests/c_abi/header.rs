@@ -20,7 +20,8 @@ pub(crate) fn committed() -> String {
 /// The functions that the header declares.
 pub(crate) fn functions() -> Vec<String> {
     let header = committed();
-    let calls = header.lines().filter(|line| !line.starts_with([' ', '#', '/']));
+    let is_code = |line: &&str| !line.starts_with([' ', '#', '/']) && !line.starts_with("typedef");
+    let calls = header.lines().filter(is_code);
     let names = calls.filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next());
     names.map(str::to_owned).collect()
 }
@@ -148,15 +149,17 @@ fn versions_are_those_of_the_package() {
 
 #[test]
 fn initialisers_are_the_defaults() {
-    for name in ["mesh", "options", "report"] {
+    for name in ["mesh", "parallel", "options", "report"] {
         let struct_name = if name == "options" { "query_options" } else { name };
         assert_eq!(fact(name), fact(&format!("hgrid_{struct_name}")), "{name}");
     }
     for config in Method::ALL.iter().copied().map(Config::new) {
-        let Config { method, density, macrocell_factor, subdivide_above, depth, flags } = config;
-        let (size, flags) = (fact("hgrid_config"), flags.bits());
-        let fields =
-            format!("{size} {density} {macrocell_factor} {subdivide_above} {depth} {flags}");
+        let Config { method, density, macrocell_factor, subdivide_above, depth, .. } = config;
+        let (size, cell_size, flags) =
+            (fact("hgrid_config"), config.cell_size, config.flags.bits());
+        let fields = format!(
+            "{size} {density} {macrocell_factor} {subdivide_above} {depth} {cell_size} {flags}"
+        );
         assert_eq!(fact(&format!("config_{}", method as u32)), fields, "{method:?}");
     }
     assert_eq!(fact("HGRID_METHOD_ONE_LEVEL"), (Config::default().method as u32).to_string());
@@ -204,6 +207,23 @@ fn its_example_runs() {
     run(compiler("c99").arg(source).arg(static_library()).arg("-o").arg(&example));
     let printed = run(&mut Command::new(example)).stdout;
     assert_eq!(String::from_utf8(printed).as_deref(), Ok("triangle 0 at t = 1\n"));
+}
+
+#[test]
+fn its_functions_examples_run() {
+    let header = committed();
+    let blocks = header.split("```").skip(1).step_by(2);
+    let blocks: Vec<_> = blocks.filter_map(|block| block.strip_prefix("c\n")).collect();
+    assert_eq!(blocks.len(), 3);
+    let lines = blocks.iter().flat_map(|block| block.lines());
+    let functions: Vec<_> = lines.map(|line| line.trim_start_matches(" *").trim_end()).collect();
+    let source = include_str!("tile.c").replace("FUNCTIONS", &functions.join("\n"));
+
+    let dir = TempDir::new().expect("a folder");
+    let [path, program] = ["tile.c", "tile"].map(|name| dir.path().join(name));
+    fs::write(&path, source).expect("a file");
+    run(compiler("c99").arg("-pthread").arg(path).arg(static_library()).arg("-o").arg(&program));
+    run(&mut Command::new(program));
 }
 
 #[test]

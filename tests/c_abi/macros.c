@@ -9,26 +9,31 @@ HGRID_ALIGNED unsigned char scratch_region[HGRID_SCRATCH_BOUND(3)];
 static hgrid_mesh mesh = HGRID_MESH_INIT;
 static const hgrid_config config = HGRID_CONFIG_INIT;
 static const hgrid_config others[] = {HGRID_CONFIG_INIT_FIXED, HGRID_CONFIG_INIT_VARIABLE,
-                                      HGRID_CONFIG_INIT_RECURSIVE};
+                                      HGRID_CONFIG_INIT_RECURSIVE, HGRID_CONFIG_INIT_BRICK};
 
-#if HGRID_VERSION < 0x000100 || HGRID_BLOB_VERSION < 1 || HGRID_ALIGNMENT != 64 || HGRID_MAX_DEPTH < 1
+#if HGRID_VERSION < 0x000100 || HGRID_BLOB_VERSION < 1 || HGRID_ALIGNMENT != 64 || HGRID_MAX_DEPTH < 1 || \
+    HGRID_MAX_TASKS != 64
 #error "the numbers work in the preprocessor, too"
 #endif
 
 int main(void)
 {
     HGRID_ALIGNED unsigned char local[HGRID_ALIGNMENT] = {0};
+    hgrid_parallel parallel = HGRID_PARALLEL_INIT;
     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
     hgrid_report report = HGRID_REPORT_INIT;
     hgrid_grid grid;
     const hgrid_ray ray = {{0, 0, 0}, 0, {0, 0, 1}, 1};
     hgrid_hit hit;
+    const hgrid_coherence coherence = HGRID_COHERENCE_COHERENT;
 
     size_t misplaced = ((size_t)index_region | (size_t)scratch_region | (size_t)local) % 64;
     hgrid_status status = hgrid_build(&mesh, &config, index_region, sizeof index_region,
                                       scratch_region, sizeof scratch_region, &grid, &report);
     for (size_t i = 0; i < sizeof others / sizeof *others && status == HGRID_OK; i++)
-        status = hgrid_sizes(&mesh, &others[i], NULL, 0, &report);
+        status = hgrid_sizes_parallel(&mesh, &others[i], &parallel, NULL, 0, &report);
     return misplaced != 0 || status != HGRID_OK || report.triangle != HGRID_INVALID_ID ||
-           hgrid_intersect(&grid, &ray, &options, &hit) || hgrid_occluded(&grid, &ray, NULL);
+           hgrid_intersect(&grid, &ray, &options, &hit) || hgrid_occluded(&grid, &ray, NULL) ||
+           hgrid_intersect_n(&grid, &ray, 0, &hit, 0, 1, coherence, &options) != HGRID_OK ||
+           hit.primitive != HGRID_INVALID_ID;
 }

@@ -15,7 +15,8 @@ use tempfile::TempDir;
 use crate::header::statuses;
 
 /// Programs that check for themselves and tell which statuses they reached.
-const PROGRAMS: [&str; 5] = ["queries", "memory", "methods", "refusals", "blobs"];
+const PROGRAMS: [&str; 7] =
+    ["queries", "batches", "memory", "methods", "parallel", "refusals", "blobs"];
 
 const SANITIZERS: [&str; 3] =
     ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"];
@@ -31,9 +32,9 @@ pub(crate) fn compile(
     let program = dir.join(name);
     let language = if dialect.starts_with("c++") { "c++" } else { "c" };
     let source = root().join("tests/c_abi").join(name).with_extension("c");
-    // The programs, not the library, want more than plain C: pages with protection.
+    // The programs, not the library, want more than plain C: pages with protection, and threads.
     let mut compiler = compiler(dialect);
-    compiler.args(["-D_DEFAULT_SOURCE", "-g", "-O1"]).args(flags);
+    compiler.args(["-D_DEFAULT_SOURCE", "-pthread", "-g", "-O1"]).args(flags);
     compiler.args(["-x", language]).arg(source).args(["-x", "none"]).arg(library);
     run(compiler.arg("-o").arg(&program));
     program
@@ -73,6 +74,21 @@ fn they_pass_under_valgrind() {
         let program = compile(name, "c99", &[], &static_library(), dir.path());
         run(Command::new("valgrind").args(["--quiet", "--error-exitcode=99"]).arg(program));
     }
+}
+
+/// The header promises about 4 KiB for a ray and 16 KiB for a batch.
+#[test]
+fn queries_take_little_stack() {
+    let dir = TempDir::new().expect("a folder");
+    let program = compile("stack", "c99", &[], &static_library(), dir.path());
+    let printed = String::from_utf8(run(&mut Command::new(program)).stdout).expect("text");
+    let most = |name: &str| {
+        let line = printed.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+        line.and_then(|bytes| bytes.parse::<usize>().ok()).expect("a number")
+    };
+    let [one, many] = ["one", "many"].map(most);
+    assert!(one > 500 && one < 9 << 9, "{one}");
+    assert!(many > 64 * 48 && many < 16 << 10, "{many}");
 }
 
 #[test]

@@ -127,6 +127,7 @@ static void struct_sizes_are_checked(void)
 {
     LATER(hgrid_mesh) later_mesh = {mesh, {0}};
     LATER(hgrid_config) later_config = {HGRID_CONFIG_INIT, {0}};
+    LATER(hgrid_parallel) later_parallel = {HGRID_PARALLEL_INIT, {0}};
     LATER(hgrid_report) later_report = {HGRID_REPORT_INIT, {0}};
     hgrid_report report = HGRID_REPORT_INIT;
     hgrid_grid grid;
@@ -145,6 +146,11 @@ static void struct_sizes_are_checked(void)
     CHECK_STRUCT_SIZES(later_report,
                        hgrid_build(&mesh, NULL, region_1, index_bytes, region_2, scratch_bytes,
                                    &grid, &later_report.known));
+    CHECK_STRUCT_SIZES(later_parallel, hgrid_sizes_parallel(&mesh, NULL, &later_parallel.known,
+                                                            NULL, 0, &report));
+    CHECK_STRUCT_SIZES(later_parallel,
+                       hgrid_build_parallel(&mesh, NULL, &later_parallel.known, region_1,
+                                            index_bytes, region_2, scratch_bytes, &grid, NULL));
     CHECK_STRUCT_SIZES(later_mesh,
                        hgrid_open(region_1, index_bytes, &later_mesh.known, &grid));
 
@@ -246,7 +252,7 @@ static void regions_must_lie_apart(void)
 
 static void unknown_values_are_errors(void)
 {
-    const uint32_t unknown[] = {0, 5, 100, 0x7fffffffu, 0x80000000u, UINT32_MAX};
+    const uint32_t unknown[] = {0, 6, 100, 0x7fffffffu, 0x80000000u, UINT32_MAX};
     for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) {
         hgrid_config config = HGRID_CONFIG_INIT;
         config.method = unknown[i];
@@ -273,7 +279,8 @@ static void unknown_values_are_errors(void)
 static void fields_of_methods_are_checked(void)
 {
     const hgrid_config usual[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
-                                  HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE};
+                                  HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
+                                  HGRID_CONFIG_INIT_BRICK};
     const uint32_t depths[] = {0, HGRID_MAX_DEPTH + 1, UINT32_MAX};
     for (size_t i = 0; i < sizeof usual / sizeof *usual; i++) {
         const uint32_t method = usual[i].method;
@@ -293,11 +300,16 @@ static void fields_of_methods_are_checked(void)
             else
                 exact_sizes(&mesh, &config);
         }
-        const float densities[] = {0, -1, NAN, INFINITY};
-        for (size_t d = 0; d < sizeof densities / sizeof *densities; d++) {
-            hgrid_config config = usual[i];
-            config.density = densities[d];
-            refuse(HGRID_ERROR_INVALID_DENSITY, &mesh, &config);
+        const float numbers[] = {0, -0.0f, -1, NAN, INFINITY, -INFINITY};
+        for (size_t n = 0; n < sizeof numbers / sizeof *numbers; n++) {
+            hgrid_config density = usual[i], cell_size = usual[i];
+            density.density = cell_size.cell_size = numbers[n];
+            if (method == HGRID_METHOD_BRICK) {
+                refuse(HGRID_ERROR_INVALID_CELL_SIZE, &mesh, &cell_size);
+            } else {
+                refuse(HGRID_ERROR_INVALID_DENSITY, &mesh, &density);
+                exact_sizes(&mesh, &cell_size);
+            }
         }
         hgrid_config config = usual[i];
         config.flags = 0x80000000u;

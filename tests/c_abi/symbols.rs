@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use hgrid_tests::artefact::{is_installed, run, shared_library, static_library};
+use hgrid_tests::artefact::{compiler, is_installed, root, run, shared_library, static_library};
 use tempfile::TempDir;
 
 use crate::header::functions;
@@ -93,6 +93,31 @@ fn nothing_panics_allocates_or_starts_threads() {
         let bad: Vec<_> = all.iter().filter(is_bad).collect();
         assert!(bad.is_empty(), "{bad:#?}, called from\n{}", callers(&words));
     }
+}
+
+/// Two libraries may each have taken in a copy of this one. Nothing but the names that C sees can
+/// meet, so with others for these the second copy lies beside the first.
+#[test]
+fn two_copies_in_one_program_do_not_clash() {
+    if !is_installed("objcopy") {
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    let [copy, program] = ["copy.o", "copies"].map(|name| dir.path().join(name));
+    let mut objcopy = Command::new("objcopy");
+    for function in functions() {
+        objcopy.arg("--redefine-sym").arg(format!("{function}=other_{function}"));
+    }
+    run(objcopy.arg(our_object(dir.path())).arg(&copy));
+    let source = root().join("tests/c_abi/copies.c");
+    run(compiler("c99")
+        .arg("-D_DEFAULT_SOURCE")
+        .arg(source)
+        .arg(copy)
+        .arg(static_library())
+        .arg("-o")
+        .arg(&program));
+    run(&mut Command::new(program));
 }
 
 #[test]

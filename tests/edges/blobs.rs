@@ -7,21 +7,21 @@ use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
 
 /// The bytes in memory that is aligned as blobs must be.
-struct Copy(Vec<Block>, usize);
+pub(crate) struct Copy(Vec<Block>, usize);
 
 impl Copy {
-    fn of(bytes: &[u8]) -> Self {
+    pub(crate) fn of(bytes: &[u8]) -> Self {
         let mut blocks = vec![Block::ZERO; Block::count_for(bytes.len())];
         Block::bytes_mut(&mut blocks)[..bytes.len()].copy_from_slice(bytes);
         Self(blocks, bytes.len())
     }
 
-    fn bytes(&self) -> &[u8] {
+    pub(crate) fn bytes(&self) -> &[u8] {
         &Block::bytes(&self.0)[..self.1]
     }
 
     /// Makes the header's checksum right again: FNV-1a over its words, folded.
-    fn sign(&mut self) {
+    pub(crate) fn sign(&mut self) {
         let bytes = Block::bytes_mut(&mut self.0);
         let words = bytes[..124].chunks_exact(4).map(|word| word.try_into().unwrap());
         let sum = words.map(u32::from_ne_bytes).fold(0xcbf2_9ce4_8422_2325, |sum: u64, word| {
@@ -32,7 +32,7 @@ impl Copy {
         bytes[124..128].copy_from_slice(&folded.to_ne_bytes());
     }
 
-    fn set(&mut self, at: usize, bytes: &[u8]) {
+    pub(crate) fn set(&mut self, at: usize, bytes: &[u8]) {
         Block::bytes_mut(&mut self.0)[at..at + bytes.len()].copy_from_slice(bytes);
     }
 }
@@ -111,7 +111,7 @@ fn truncations(config: &Config) {
 }
 
 /// Rays of every kind; what they answer does not matter, that they do does.
-fn query(grid: &Grid<'_>) {
+pub(crate) fn query(grid: &Grid<'_>) {
     let mut random = Random(47);
     for _ in 0..8 {
         let ray = Ray::new(random.point().map(|c| c * 2.0), random.point());

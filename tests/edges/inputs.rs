@@ -2,8 +2,8 @@
 //! odd get a grid.
 
 use hgrid_core::{
-    BuildFlags, Config, ConfigField, Error, IndexType, MAX_COORDINATE, MeshField, Ray, Strided,
-    TriangleMesh, sizes,
+    BatchField, BuildFlags, Config, ConfigField, Error, IndexType, MAX_COORDINATE, MeshField, Ray,
+    Strided, TriangleMesh, sizes,
 };
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::oracle;
@@ -91,6 +91,30 @@ fn densities_outside_the_range_are_refused() {
 }
 
 #[test]
+fn widths_of_cells_outside_the_range_are_refused() {
+    use hgrid_core::Method;
+    let mesh = ball(4, 1.0);
+    let view = mesh.view();
+    for cell_size in [0.0, -0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let config = Config { cell_size, ..Config::new(Method::Brick) };
+        let error = Error::InvalidConfig(ConfigField::CellSize);
+        assert_eq!(sizes(&view, &config, &mut []), Err(error), "{cell_size}");
+        assert_eq!(Owned::build(&view, &config).unwrap_err(), error, "{cell_size}");
+    }
+    for cell_size in [1e-45, f32::MIN_POSITIVE, 1e-3, 1e3, f32::MAX] {
+        let config = Config { cell_size, ..Config::new(Method::Brick) };
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        grid.validate().unwrap();
+        assert_eq!(grid.config().cell_size.to_bits(), cell_size.to_bits());
+        oracle::check(&grid, &Ray::new([0.1, 0.2, 3.0], [0.0, 0.0, -1.0]));
+    }
+    // No other method minds.
+    let config = Config { cell_size: f32::NAN, ..Config::new(Method::OneLevel) };
+    assert!(Owned::build(&view, &config).is_ok());
+}
+
+#[test]
 fn unknown_flags_are_refused() {
     let flags = BuildFlags::from_bits_retain(1 << 31);
     let config = Config { flags, ..Config::default() };
@@ -139,6 +163,9 @@ fn every_error_says_something_of_its_own() {
         Error::InvalidConfig(ConfigField::Method),
         Error::InvalidConfig(ConfigField::Density),
         Error::InvalidConfig(ConfigField::Flags),
+        Error::InvalidConfig(ConfigField::CellSize),
+        Error::InvalidBatch(BatchField::Rays),
+        Error::InvalidBatch(BatchField::Answers),
         Error::NotAGrid,
         Error::WrongByteOrder,
         Error::UnsupportedVersion { found: 17 },

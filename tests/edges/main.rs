@@ -1,6 +1,8 @@
 //! What happens at the edges: odd meshes, odd rays, odd numbers, damaged bytes?
 
 mod blobs;
+mod bricks;
+mod chunks;
 mod inputs;
 mod rays;
 mod shapes;

@@ -18,6 +18,11 @@ const SIZE: u16 = 64;
 
 /// The lab's picture as a PPM file, and how many rays hit.
 fn expected(scene: &Scene) -> (Vec<u8>, usize) {
+    expected_at(scene, SIZE)
+}
+
+/// The same with so many pixels on each side.
+fn expected_at(scene: &Scene, size: u16) -> (Vec<u8>, usize) {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices).expect("a sound mesh");
     let owned = Owned::build(&mesh, &Config::default()).expect("a sound mesh");
     let grid = owned.open(&mesh).expect("its own mesh");
@@ -26,9 +31,9 @@ fn expected(scene: &Scene) -> (Vec<u8>, usize) {
     let shader = Shader::new(mesh, &camera);
 
     let mut hits = 0;
-    let mut picture = format!("P6\n{SIZE} {SIZE}\n255\n").into_bytes();
-    for (row, column) in (0..SIZE).flat_map(|row| (0..SIZE).map(move |column| (row, column))) {
-        let ray = camera.ray(column, row, SIZE);
+    let mut picture = format!("P6\n{size} {size}\n255\n").into_bytes();
+    for (row, column) in (0..size).flat_map(|row| (0..size).map(move |column| (row, column))) {
+        let ray = camera.ray(column, row, size);
         let hit = grid.intersect(&ray);
         hits += usize::from(hit.is_some());
         picture.extend(shader.diffuse(&ray, hit));
@@ -68,22 +73,45 @@ fn every_method_draws_the_same_picture() {
         assert!(fs::read(&path).expect("the picture") == picture, "{name}");
 
         let owned = Owned::build(&mesh, &config).expect("a sound mesh");
-        let density = format!("density        {}\n", config.density);
+        let cells = match config.method {
+            Method::Brick => format!("cell size      {}\n", config.cell_size),
+            _ => format!("density        {}\n", config.density),
+        };
         let bytes = format!("index bytes    {}\n", owned.bytes().len());
-        for line in [format!("method         {name}\n"), density, bytes] {
+        for line in [format!("method         {name}\n"), cells, bytes] {
             assert!(printed.contains(&line), "{line} is missing in {printed}");
         }
     }
 }
 
 #[test]
-fn a_density_is_passed_on() {
+fn density_and_cell_size_are_passed_on() {
     let dir = TempDir::new().expect("a folder");
-    let mut raytracer = raytracer();
-    raytracer.args(["--density", "2.5", "--method", "fixed", "--size", "8", "-o"]);
-    let printed = run(raytracer.arg(dir.path().join("knot.ppm"))).stdout;
-    let printed = String::from_utf8(printed).expect("text");
-    assert!(printed.contains("method         fixed\ndensity        2.5\n"), "{printed}");
+    for (words, lines) in [
+        (["--density", "2.5", "fixed"], "method         fixed\ndensity        2.5\n"),
+        (["--cell-size", "3.5", "brick"], "method         brick\ncell size      3.5\n"),
+    ] {
+        let [option, value, method] = words;
+        let mut raytracer = raytracer();
+        raytracer.args([option, value, "--method", method, "--size", "8", "-o"]);
+        let printed = run(raytracer.arg(dir.path().join("knot.ppm"))).stdout;
+        let printed = String::from_utf8(printed).expect("text");
+        assert!(printed.contains(lines), "{printed}");
+    }
+}
+
+/// Tiles are cut off at the edges.
+#[test]
+fn a_picture_of_any_size_is_complete() {
+    let dir = TempDir::new().expect("a folder");
+    let path = dir.path().join("house.ply");
+    fs::write(&path, ascii()).expect("a file");
+    let scene = Scene::load(path.to_str().expect("a name in UTF-8")).expect("a sound file");
+    for size in [1, 7, 9, 30] {
+        let output = dir.path().join("picture.ppm");
+        run(watched_raytracer().arg(&path).args(["--size", &size.to_string(), "-o"]).arg(&output));
+        assert!(fs::read(output).expect("the picture") == expected_at(&scene, size).0, "{size}");
+    }
 }
 
 /// Vertices of a house without a floor: four walls as one square each, a roof of two.

@@ -12,7 +12,12 @@ pub fn configs() -> impl Iterator<Item = Config> {
     })
 }
 
-/// The same with another density.
+/// The same with another density, or for a method that has none with cells as much smaller or larger
+/// as that makes them.
 pub fn configs_with(density: f32) -> impl Iterator<Item = Config> {
-    configs().map(move |config| Config { density, ..config })
+    configs().map(move |config| Config {
+        density,
+        cell_size: if density > 0.0 { (4.0 / density).cbrt() } else { 1.0 },
+        ..config
+    })
 }

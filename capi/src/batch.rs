@@ -1,0 +1,84 @@
+//! What a batch of rays works on, once its arrays are checked as numbers.
+//!
+//! Rays and answers may lie in the same structs of the caller, `{ray; hit}` after `{ray; hit}`. Two
+//! references, of which one is mutable, to what is between the first and the last of them would be
+//! undefined behaviour in Rust, and so would be one to the caller's other fields, which another
+//! thread may be writing. So there are none: rays are copied into a buffer through their addresses,
+//! one by one, and answers are copied out of another.
+
+use core::ffi::c_void;
+
+use crate::span::Span;
+use crate::status::{
+    HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_INVALID_RAYS, HGRID_ERROR_NULL_ARGUMENT,
+    HGRID_ERROR_OVERLAP, hgrid_status,
+};
+use crate::types::{Elements, hgrid_ray};
+
+/// An array of the caller's, as it is passed: where it starts, and its stride.
+pub(crate) type Array<T> = (T, usize);
+
+/// As many answers as rays, no byte of them in a ray.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Batch<T> {
+    rays: *const hgrid_ray,
+    ray_stride: usize,
+    answers: *mut T,
+    answer_stride: usize,
+    pub(crate) count: usize,
+}
+
+impl<T> Batch<T> {
+    /// Checks the arrays. A stride of 0 means that elements lie side by side.
+    pub(crate) fn new(
+        (rays, ray_stride): Array<*const hgrid_ray>,
+        (answers, answer_stride): Array<*mut T>,
+        count: usize,
+    ) -> Result<Self, hgrid_status> {
+        let ray_elements = elements::<hgrid_ray>(rays.cast(), ray_stride, count);
+        let ray_elements = ray_elements.ok_or(HGRID_ERROR_INVALID_RAYS)?;
+        let answer_elements = elements::<T>(answers.cast(), answer_stride, count);
+        let answer_elements = answer_elements.ok_or(HGRID_ERROR_INVALID_ANSWERS)?;
+        if count > 0 && (rays.is_null() || answers.is_null()) {
+            return Err(HGRID_ERROR_NULL_ARGUMENT);
+        }
+        if overlap(&ray_elements, &answer_elements, size_of::<T>()) {
+            return Err(HGRID_ERROR_OVERLAP);
+        }
+        let (ray_stride, answer_stride) = (ray_elements.stride, answer_elements.stride);
+        Ok(Self { rays, ray_stride, answers, answer_stride, count })
+    }
+
+    /// The address of a ray, of any alignment.
+    pub(crate) const fn ray(&self, index: usize) -> *const hgrid_ray {
+        self.rays.wrapping_byte_add(index.wrapping_mul(self.ray_stride))
+    }
+
+    /// The address of an answer, of any alignment.
+    pub(crate) const fn answer(&self, index: usize) -> *mut T {
+        self.answers.wrapping_byte_add(index.wrapping_mul(self.answer_stride))
+    }
+}
+
+/// The elements of an array, if none lies in the next one and all fit into memory.
+fn elements<T>(start: *const c_void, stride: usize, count: usize) -> Option<Elements> {
+    let size = size_of::<T>();
+    Elements::new(start, stride, count, size).filter(|elements| elements.stride >= size)
+}
+
+/// Whether a byte of an answer lies in a ray.
+///
+/// With one stride for both, the distance from a ray's start to the start of the next answer is the
+/// same everywhere: the answer lies between two rays, or all of them are hit.
+fn overlap(rays: &Elements, answers: &Elements, answer_bytes: usize) -> bool {
+    let span = |elements: &Elements| Span::new(elements.start, elements.bytes);
+    if !span(rays).overlaps(span(answers)) {
+        return false;
+    }
+    let distance = answers.start.addr().wrapping_sub(rays.start.addr()).cast_signed();
+    let distance = distance.checked_rem_euclid(rays.stride.cast_signed());
+    let is_between = distance.map(isize::cast_unsigned).is_some_and(|distance| {
+        distance >= size_of::<hgrid_ray>() && distance.saturating_add(answer_bytes) <= rays.stride
+    });
+    rays.stride != answers.stride || !is_between
+}

@@ -1,0 +1,712 @@
+//! Building a brick grid: two passes over the triangles, then block after block in cache.
+//!
+//! ```text
+//! settle    box, cell size; a census: entries per block                       (size.rs, pass.rs)
+//! scatter   every triangle's entry to the bins of its blocks                  (pass.rs)
+//! sort      each block's bin into its chunk of the pool                       (sort.rs, pool.rs)
+//! close     the parts of the pool moved together
+//!
+//! index   | header | blocks | pool: large list | part of a task | part of a task |
+//! scratch | heads of a task | heads of a task | benches of a task | benches of a task |
+//! ```
+//!
+//! Each step is cut into tasks: the passes by triangles, the sorting by blocks. What a task writes is
+//! the same however many there are: a bin has the entries of the first triangles first, whoever brings
+//! them; a chunk is told where it starts but holds nothing of it; and parts end up side by side.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "numbers of blocks and of words in a region, checked where they could be larger"
+)]
+
+use fearless_simd::Simd;
+
+use super::layout::{Benches, Block, ENTRY_WORDS, Layout};
+pub(super) use super::pass::home;
+use super::pass::{Census, Ground, Scatter};
+use super::pool::{Filled, Part, Pool};
+use super::size::{MOST_LARGE, Settled, Shares, block_limit, reference_limit, settle_in};
+use super::sort::{Frame, Scene, sort};
+use crate::arena::{ALIGNMENT, section_bytes, split_mut};
+use crate::blob::{HEADER_BYTES, Header};
+use crate::bump::{GRID, finish};
+use crate::config::Config;
+use crate::error::{ConfigField, Error, Region};
+use crate::mesh::TriangleMesh;
+use crate::simd::{Kernel, SimdLevel, dispatch};
+use crate::sizes::Sizes;
+use crate::tasks::{Parallel, Shared, run};
+
+/// Words for the list of the whole grid.
+const fn large_words(census: &Census) -> u64 {
+    1 + census.large as u64
+}
+
+/// Words without which the triangles cannot even be scattered.
+const fn least_words(census: &Census) -> u64 {
+    large_words(census) + census.entries * ENTRY_WORDS as u64
+}
+
+/// Words that the chunks of scans take, and a little more.
+const fn likely_words(census: &Census) -> u64 {
+    let likely = census.references + census.references / 7 + 64;
+    let least = census.entries * ENTRY_WORDS as u64;
+    if likely > least { likely } else { least }
+}
+
+/// The most words that so many references can take.
+///
+/// Each may be the only one of its cell and its brick: six words. Dividing a cell multiplies its
+/// references by four at most, and a part of it may be divided once more.
+const fn words_for(references: u64, large: u64) -> u64 {
+    1 + large + references * 6 * (1 + 4 + 16)
+}
+
+/// Words that are enough for a mesh, whatever comes out when it is sorted.
+fn enough_words(census: &Census) -> u64 {
+    words_for(census.references, census.large.into()).max(least_words(census))
+}
+
+/// The most memory that a mesh with so many triangles can need.
+pub(crate) const fn bound(triangles: u32, tasks: u32) -> (u64, u64) {
+    let words = words_for(reference_limit(triangles), MOST_LARGE as u64);
+    let layout = Layout::largest(block_limit(triangles), triangles);
+    let bins = 1 + MOST_LARGE as u64 + reference_limit(triangles) * ENTRY_WORDS as u64;
+    let scratch = layout.scratch_bytes(clamped(tasks)) + section_bytes::<u32>(bins);
+    (layout.index_bytes(words), scratch)
+}
+
+/// A number of tasks that there can be.
+const fn clamped(tasks: u32) -> u32 {
+    if tasks > Parallel::MAX_TASKS {
+        Parallel::MAX_TASKS
+    } else if tasks == 0 {
+        1
+    } else {
+        tasks
+    }
+}
+
+/// The most scratch that a build by one task takes for a grid with so many cells.
+pub(crate) const fn scratch_bytes_at_most(resolution: [u32; 3], triangles: u32) -> u64 {
+    Layout::new(resolution, triangles).scratch_bytes(1)
+}
+
+/// Room for as many tasks as there may be, or for one: it is on the stack.
+macro_rules! for_tasks {
+    ($parallel:expr, $function:ident($($argument:expr),*)) => {
+        if $parallel.tasks > 1 {
+            $function::<{ Parallel::MAX_TASKS as usize }>($($argument),*, $parallel)
+        } else {
+            $function::<1>($($argument),*, $parallel)
+        }
+    };
+}
+
+/// The memory that a mesh needs: exact if the scratch is large enough to sort in.
+pub(crate) fn sizes(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+    parallel: &Parallel<'_>,
+) -> Result<Sizes, Error> {
+    for_tasks!(parallel, sizes_in(mesh, config, scratch))
+}
+
+fn sizes_in<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+    parallel: &Parallel<'_>,
+) -> Result<Sizes, Error> {
+    let (settled, shares) = settle_in::<N>(mesh, config, scratch, parallel)?;
+    let Settled { layout, census, .. } = &settled;
+    let scratch_bytes = layout.scratch_bytes(shares.wanted);
+    // With the bins in the scratch, too, the answer would be exact.
+    let enough = scratch_bytes + section_bytes::<u32>(least_words(census));
+    let bound = || Sizes::new(layout.index_bytes(enough_words(census)), enough, false);
+    let ground = settled.ground(mesh, config.flags);
+    let Some((mut work, rest)) = Work::new(&ground, &settled, &shares, scratch, parallel) else {
+        return bound();
+    };
+    // The rest of the scratch is a pool that ends too early: all is counted.
+    let least = least_words(census);
+    let words = words_of(rest).and_then(|words| words.get_mut(..usize::try_from(least).ok()?));
+    let Some(words) = words else { return bound() };
+    work.place(least);
+    work.fill(&mut [], words)?;
+    Sizes::new(layout.index_bytes(work.most()), scratch_bytes, true)
+}
+
+/// Builds into `index` and returns the part of it that is the blob.
+pub(crate) fn build<'a>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &'a mut [u8],
+    scratch: &mut [u8],
+    parallel: &Parallel<'_>,
+) -> Result<&'a [u8], Error> {
+    let header = match for_tasks!(parallel, build_in(mesh, config, index, scratch)) {
+        // The heads of many tasks may leave no room for the benches of one.
+        Err(Error::OutOfMemory { region: Region::Scratch, .. }) if parallel.tasks > 1 => {
+            let tasks = clamped(parallel.tasks) / 2;
+            return build(mesh, config, index, scratch, &Parallel { tasks, ..*parallel });
+        }
+        built => built?,
+    };
+    finish(index, header)
+}
+
+/// Fills the index and returns the header that belongs there.
+fn build_in<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &mut [u8],
+    scratch: &mut [u8],
+    parallel: &Parallel<'_>,
+) -> Result<Header, Error> {
+    let available_bytes = scratch.len() as u64;
+    let (settled, shares) = settle_in::<N>(mesh, config, scratch, parallel)?;
+    let Settled { layout, census, .. } = &settled;
+    let ground = settled.ground(mesh, config.flags);
+    let Some((mut work, _)) = Work::new(&ground, &settled, &shares, scratch, parallel) else {
+        let needed_bytes = layout.scratch_bytes(1);
+        return Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes });
+    };
+
+    // Cut the index; at least the bins must find room.
+    let available_bytes = index.len() as u64;
+    let too_small = |words| {
+        let needed_bytes = layout.index_bytes(words);
+        Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes }
+    };
+    let parts = index.split_at_mut_checked(HEADER_BYTES).and_then(|(header, behind)| {
+        let (blocks, pool) = split_mut::<Block>(behind, layout.block_count())?;
+        Some((header, blocks, words_of(pool)?))
+    });
+    let least = least_words(census);
+    let Some((header, blocks, words)) = parts.filter(|(.., words)| words.len() as u64 >= least)
+    else {
+        return Err(too_small(enough_words(census)));
+    };
+
+    // What was here is no grid any more, should the build end with an error.
+    header.fill(0);
+    let room = words.len() as u64;
+    work.place(room);
+    let mut taken = work.fill(blocks, words)?;
+    if taken.is_none() && work.most() <= room {
+        // There is room for what each task needs, now that this is known.
+        work.place_exactly();
+        taken = work.fill(blocks, words)?;
+    }
+    if taken.is_none() && work.part_count > 1 {
+        work.cut(1);
+        work.place(room);
+        taken = work.fill(blocks, words)?;
+    }
+    let Some(taken) = taken else { return Err(too_small(work.most())) };
+    let mut header = Header::new(config, mesh, &settled.lattice);
+    header.skipped_count = census.skipped;
+    header.reference_count = taken;
+    header.blob_bytes = layout.index_bytes(taken.into());
+    Ok(header)
+}
+
+/// The words of a region, as far as whole sections go.
+fn words_of(bytes: &mut [u8]) -> Option<&mut [u32]> {
+    let whole = bytes.len() / ALIGNMENT * ALIGNMENT;
+    bytemuck::try_cast_slice_mut(bytes.get_mut(..whole)?).ok()
+}
+
+/// What is left to do when a grid is settled.
+struct Work<'w, const N: usize> {
+    ground: &'w Ground<'w>,
+    settled: &'w Settled,
+    shares: &'w Shares<N>,
+    parallel: &'w Parallel<'w>,
+    /// For every task and block how many entries it has.
+    heads: [&'w mut [u32]; N],
+    benches: [Option<Benches<'w>>; N],
+    parts: [Part; N],
+    part_count: usize,
+    /// How the parts were filled.
+    filled: [Filled; N],
+}
+
+impl<'w, const N: usize> Work<'w, N> {
+    /// Cuts the scratch and the blocks; `None` if there is no scratch for one task. What is left of
+    /// the scratch is returned, too.
+    fn new(
+        ground: &'w Ground<'w>,
+        settled: &'w Settled,
+        shares: &'w Shares<N>,
+        scratch: &'w mut [u8],
+        parallel: &'w Parallel<'w>,
+    ) -> Option<(Self, &'w mut [u8])> {
+        if !settled.is_counted {
+            return None;
+        }
+        let (heads, rest) = settled.layout.heads(scratch, shares.tasks)?;
+        let (benches, rest) = settled.layout.benches(rest, shares.tasks);
+        let part_count = benches.iter().flatten().count();
+        let (parts, filled) = ([Part::default(); N], [Filled::default(); N]);
+        let mut work =
+            Self { ground, settled, shares, parallel, heads, benches, parts, part_count, filled };
+        work.cut(part_count);
+        (part_count > 0).then_some((work, rest))
+    }
+
+    /// Cuts the blocks into parts with about as many entries each.
+    fn cut(&mut self, count: usize) {
+        self.part_count = count;
+        let all = self.settled.census.entries;
+        let (mut block, mut before) = (0, 0);
+        for (number, part) in (1_u64..).zip(self.parts.iter_mut().take(count)) {
+            let (first, start) = (block, before);
+            let goal = all * number / count as u64;
+            while block < self.settled.layout.block_count() as usize
+                && (before < goal || number == count as u64)
+            {
+                before += entries(&self.heads, block);
+                block += 1;
+            }
+            *part = Part { blocks: [first, block], entries: before - start, ..Part::default() };
+        }
+    }
+
+    /// Gives each part room in proportion to its entries: more than it probably needs, where there
+    /// are several, and not so much that they lie far apart.
+    fn place(&mut self, room: u64) {
+        let census = &self.settled.census;
+        let large = large_words(census);
+        let likely = likely_words(census);
+        let mut room = room.saturating_sub(large);
+        if self.part_count > 1 {
+            room = room.min(likely + likely / 4);
+        }
+        let share = |words: u64, entries: u64| words * entries / census.entries.max(1);
+        let (mut before, mut end) = (0, 0);
+        let last = self.part_count.saturating_sub(1);
+        for (number, part) in self.parts.iter_mut().enumerate().take(self.part_count) {
+            part.start = end;
+            part.taken = if number == 0 { large } else { 0 };
+            before += part.entries;
+            end = large + if number == last { room } else { share(room, before) };
+            part.end = end;
+            let likely = share(likely, part.entries).max(part.bin_words());
+            part.bins = (part.start + part.taken + likely).min(end) - part.bin_words();
+        }
+    }
+
+    /// Gives each part the room that it turned out to need.
+    fn place_exactly(&mut self) {
+        let mut end = 0;
+        for (part, filled) in self.parts.iter_mut().zip(&self.filled).take(self.part_count) {
+            part.start = end;
+            end += filled.most;
+            part.end = end;
+            part.bins = end - part.bin_words();
+        }
+    }
+
+    /// The words that all parts need.
+    fn most(&self) -> u64 {
+        self.filled.iter().map(|filled| filled.most).sum()
+    }
+
+    /// Scatters and sorts into the words, and returns how many of them are the pool; `None` if there
+    /// were not enough for each part.
+    fn fill(&mut self, blocks: &mut [Block], words: &mut [u32]) -> Result<Option<u32>, Error> {
+        // A head is a word's number, and so is the base of a block, but for a bit.
+        let too_fine = Error::InvalidConfig(ConfigField::CellSize);
+        let end = self.parts.iter().map(|part| part.bins + part.bin_words()).max();
+        if end > Some(u32::MAX.into()) {
+            return Err(too_fine);
+        }
+        self.scatter(words)?;
+        self.sort(blocks, words)?;
+        self.recount();
+        if self.filled.iter().any(|filled| filled.is_exhausted) {
+            return Ok(None);
+        }
+        let taken = self.close(blocks, words);
+        let taken = u32::try_from(taken).ok().filter(|taken| taken & GRID == 0);
+        taken.map(Some).ok_or(too_fine)
+    }
+
+    /// Puts every triangle's entries into the bins of its blocks, and the largest triangles into the
+    /// list of the grid.
+    fn scatter(&mut self, words: &mut [u32]) -> Result<(), Error> {
+        let tasks = self.shares.tasks;
+        for part in self.parts.iter().take(self.part_count) {
+            let mut next = part.bins as u32;
+            for block in part.blocks[0]..part.blocks[1] {
+                for head in self.heads.iter_mut().filter_map(|heads| heads.get_mut(block)) {
+                    next += core::mem::replace(head, next) * ENTRY_WORDS as u32;
+                }
+            }
+        }
+        if let Some(count) = words.first_mut() {
+            *count = self.settled.census.large;
+        }
+        let words = Shared::new(words);
+        let mut large = 1;
+        let heads = self.heads.iter_mut().zip(&self.shares.censuses);
+        let scatters = (0..tasks).zip(heads).map(|(task, (heads, census))| {
+            let ids = Shares::<N>::ids(self.ground.mesh.triangle_count(), task, tasks);
+            let first = large;
+            large += census.large;
+            Scatter { ids, heads, large: first, words }
+        });
+        let ground = self.ground;
+        let results: [_; N] =
+            run(self.parallel, scatters, |scatter: Scatter<'_, '_>| scatter.run(ground))?;
+        results.into_iter().flatten().collect()
+    }
+
+    /// Sorts the bins of every part into chunks.
+    fn sort(&mut self, blocks: &mut [Block], words: &mut [u32]) -> Result<(), Error> {
+        let Self { ground, settled, heads, .. } = self;
+        // The entries of the last task are the last ones of a block.
+        let ends: &[u32] = match heads.get(self.shares.tasks as usize - 1) {
+            Some(ends) => ends,
+            None => &[],
+        };
+        let (mut blocks, mut words, mut at) = (blocks, words, 0);
+        let parts = self.parts.iter().zip(self.benches.iter_mut().flatten()).take(self.part_count);
+        let fills = parts.map(|(part, benches)| {
+            let [first, last] = part.blocks;
+            let mut cut = |end: u64| {
+                let count = usize::try_from(end - at).unwrap_or(usize::MAX);
+                at = end;
+                let (cut, rest) =
+                    core::mem::take(&mut words).split_at_mut_checked(count).unwrap_or_default();
+                words = rest;
+                cut
+            };
+            cut(part.start);
+            let words = cut(part.end);
+            let (own, rest) =
+                core::mem::take(&mut blocks).split_at_mut_checked(last - first).unwrap_or_default();
+            blocks = rest;
+            let ends = ends.get(first..last).unwrap_or_default();
+            Fill { ground, settled, part: *part, ends, benches, blocks: own, words }
+        });
+        let results =
+            run(self.parallel, fills, |fill: Fill<'_, '_>| dispatch(SimdLevel::detect(), fill))?;
+        self.filled = results.map(Option::unwrap_or_default);
+        Ok(())
+    }
+
+    /// Turns heads that are the ends of bins back into numbers of entries.
+    fn recount(&mut self) {
+        if self.part_count < 2 {
+            return;
+        }
+        for part in self.parts.iter().take(self.part_count) {
+            let mut start = part.bins as u32;
+            for block in part.blocks[0]..part.blocks[1] {
+                for head in self.heads.iter_mut().filter_map(|heads| heads.get_mut(block)) {
+                    let count = (*head - start) / ENTRY_WORDS as u32;
+                    start = core::mem::replace(head, count);
+                }
+            }
+        }
+    }
+
+    /// Moves the chunks of all parts together and returns where they end.
+    fn close(&self, blocks: &mut [Block], words: &mut [u32]) -> u64 {
+        let mut end = 0;
+        for (part, filled) in self.parts.iter().zip(&self.filled).take(self.part_count) {
+            if part.start > end {
+                shift(words, part.start as usize, end as usize, filled.taken as usize);
+            }
+            if end > 0 {
+                let blocks = blocks.get_mut(part.blocks[0]..part.blocks[1]).unwrap_or_default();
+                for block in blocks.iter_mut().filter(|block| **block != Block::default()) {
+                    block.base += end as u32;
+                }
+            }
+            end += filled.taken;
+        }
+        end
+    }
+}
+
+/// Moves words down, or none if they are not there.
+fn shift(words: &mut [u32], from: usize, to: usize, count: usize) {
+    let gap = from.saturating_sub(to);
+    let window = from.checked_add(count).and_then(|end| words.get_mut(to..end));
+    if let Some(window) = window.filter(|window| gap <= window.len()) {
+        window.copy_within(gap.., 0);
+    }
+}
+
+/// The entries of a block.
+fn entries(heads: &[&mut [u32]], block: usize) -> u64 {
+    heads.iter().filter_map(|heads| heads.get(block)).map(|&count| u64::from(count)).sum()
+}
+
+/// Sorting the bins of a part into chunks.
+struct Fill<'f, 's> {
+    ground: &'f Ground<'f>,
+    settled: &'f Settled,
+    part: Part,
+    /// For every block the word where its bin ends.
+    ends: &'f [u32],
+    benches: &'f mut Benches<'s>,
+    blocks: &'f mut [Block],
+    words: &'f mut [u32],
+}
+
+impl Kernel for Fill<'_, '_> {
+    type Output = Filled;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { ground, settled, part, ends, benches, blocks, words } = self;
+        let scene = Scene { mesh: ground.mesh, lattice: &settled.lattice };
+        let [width, height, _] = settled.layout.blocks.map(|blocks| blocks.max(1));
+        let mut start = part.bins as u32;
+        let mut pool = Pool::new(&part, words);
+        let mut slots = blocks.iter_mut();
+        for (number, &end) in (part.blocks[0] as u32..).zip(ends) {
+            let words = (end - start) as usize;
+            start = end;
+            let mut block = Block::default();
+            if words > 0 {
+                let bench = benches.first_mut().map(|bench| &mut *bench.entries);
+                let groups = pool.read_bin(words, bench.unwrap_or_default()).unwrap_or_default();
+                let at = [number % width, number / width % height, number / width / height];
+                let frame = Frame::of_block(at);
+                let sorted = sort(simd, &scene, &frame, benches, &groups, &mut pool);
+                block = pool.placed(sorted.unwrap_or_default());
+            }
+            if let Some(slot) = slots.next() {
+                *slot = block;
+            }
+        }
+        pool.filled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use alloc::vec;
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::arena::Block as Memory;
+    use crate::config::{BuildFlags, Method};
+    use crate::grid::Grid;
+    use crate::sizes::sizes_parallel;
+
+    type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+    type Loop = dyn Fn(u32, &(dyn Fn(u32) + Sync));
+
+    /// Triangles all over a cube, small and large, and a crowd of them in a corner.
+    fn soup(triangles: u32) -> Mesh {
+        let mut state = 1_u64;
+        #[expect(clippy::cast_precision_loss, reason = "24 bits")]
+        let mut random = || {
+            state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+            (state >> 40) as f32 / 16_777_216.0
+        };
+        let mut positions = Vec::new();
+        for number in 0..triangles {
+            let crowd = if number % 3 == 0 { 0.05 } else { 1.0 };
+            let size = if number % 97 == 0 { 0.4 } else { 0.02 * crowd };
+            let at = [0; 3].map(|_| crowd * random());
+            positions.extend([0; 3].map(|_| at.map(|at| at + size * random())));
+        }
+        let indices = (0..triangles).map(|number| [3 * number, 3 * number + 1, 3 * number + 2]);
+        (positions, indices.collect())
+    }
+
+    fn forward(count: u32, task: &(dyn Fn(u32) + Sync)) {
+        (0..count).for_each(task);
+    }
+
+    fn backward(count: u32, task: &(dyn Fn(u32) + Sync)) {
+        (0..count).rev().for_each(task);
+    }
+
+    fn odd_ones_first(count: u32, task: &(dyn Fn(u32) + Sync)) {
+        (0..count).filter(|index| index % 2 == 1).for_each(task);
+        (0..count).filter(|index| index % 2 == 0).for_each(task);
+    }
+
+    fn threads(count: u32, task: &(dyn Fn(u32) + Sync)) {
+        std::thread::scope(|scope| {
+            for index in 0..count {
+                scope.spawn(move || task(index));
+            }
+        });
+    }
+
+    fn config() -> Config {
+        Config::new(Method::Brick)
+    }
+
+    fn regions(index_bytes: usize, scratch_bytes: usize) -> [Vec<Memory>; 2] {
+        [index_bytes, scratch_bytes].map(|bytes| vec![Memory::ZERO; Memory::count_for(bytes)])
+    }
+
+    /// The blob of a mesh, built in so many bytes.
+    fn blob(
+        (positions, indices): &Mesh,
+        parallel: &Parallel<'_>,
+        bytes: (usize, usize),
+    ) -> Result<Vec<u8>, Error> {
+        let mesh = TriangleMesh::new(positions, indices)?;
+        let [mut index, mut scratch] = regions(bytes.0, bytes.1);
+        let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
+        let grid = Grid::build_parallel(mesh, &config(), index, scratch, parallel)?;
+        Ok(grid.blob().to_vec())
+    }
+
+    /// What a build is told to bring, and with that much scratch what it will take.
+    fn both_sizes(mesh: &Mesh, parallel: &Parallel<'_>) -> [Sizes; 2] {
+        let mesh = TriangleMesh::new(&mesh.0, &mesh.1).unwrap();
+        let enough = sizes_parallel(&mesh, &config(), &mut [], parallel).unwrap();
+        let entries = 64 * (1 + mesh.triangle_count() as usize);
+        let [_, mut scratch] = regions(0, enough.scratch_bytes + entries);
+        let scratch = Memory::bytes_mut(&mut scratch);
+        let exact = sizes_parallel(&mesh, &config(), scratch, parallel).unwrap();
+        assert!(exact.is_exact && !enough.is_exact);
+        assert!(exact.index_bytes <= enough.index_bytes);
+        [enough, exact]
+    }
+
+    #[test]
+    fn bits_do_not_depend_on_the_tasks_nor_on_their_order() {
+        for mesh in [soup(5000), soup(600), soup(1), soup(0)] {
+            let [enough, _] = both_sizes(&mesh, &Parallel { tasks: 64, run: &forward });
+            let bytes = (enough.index_bytes, enough.scratch_bytes);
+            let serial = blob(&mesh, &Parallel::SERIAL, bytes).unwrap();
+            for tasks in (0..=9).chain([19, 64, 1000, u32::MAX]) {
+                let loops: [&Loop; 4] = [&forward, &backward, &odd_ones_first, &threads];
+                for run in loops {
+                    let built = blob(&mesh, &Parallel { tasks, run }, bytes).unwrap();
+                    assert!(built == serial, "{tasks} tasks, {} triangles", mesh.1.len());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn one_block_is_enough_for_many_tasks() {
+        let (mut positions, indices) = soup(4000);
+        for position in &mut positions {
+            *position = position.map(f32::round);
+        }
+        let mesh = (positions, indices);
+        let [enough, _] = both_sizes(&mesh, &Parallel { tasks: 9, run: &forward });
+        let bytes = (enough.index_bytes, enough.scratch_bytes);
+        let serial = blob(&mesh, &Parallel::SERIAL, bytes).unwrap();
+        assert!(blob(&mesh, &Parallel { tasks: 9, run: &threads }, bytes).unwrap() == serial);
+    }
+
+    #[test]
+    fn sizes_hold_to_the_byte_with_any_number_of_tasks() {
+        let mesh = soup(5000);
+        let [_, alone] = both_sizes(&mesh, &Parallel::SERIAL);
+        let bytes = (alone.index_bytes, alone.scratch_bytes);
+        let serial = blob(&mesh, &Parallel::SERIAL, bytes).unwrap();
+        for tasks in 1..=9 {
+            let parallel = Parallel { tasks, run: &backward };
+            let [_, exact] = both_sizes(&mesh, &parallel);
+            assert_eq!(exact.scratch_bytes, tasks as usize * alone.scratch_bytes);
+            let bytes = (exact.index_bytes, exact.scratch_bytes);
+            assert!(blob(&mesh, &parallel, bytes).unwrap() == serial);
+            // With less there are fewer tasks, down to one.
+            let less = (alone.index_bytes, exact.scratch_bytes - 64);
+            if tasks > 1 {
+                assert!(blob(&mesh, &parallel, less).unwrap() == serial);
+            }
+            let too_small = |bytes, region, needed: usize| {
+                let (needed_bytes, available_bytes) = (needed as u64, needed as u64 - 64);
+                let error = Error::OutOfMemory { region, needed_bytes, available_bytes };
+                assert_eq!(blob(&mesh, &parallel, bytes), Err(error));
+            };
+            let index = (alone.index_bytes - 64, exact.scratch_bytes);
+            too_small(index, Region::Index, alone.index_bytes);
+            let scratch = (exact.index_bytes, alone.scratch_bytes - 64);
+            too_small(scratch, Region::Scratch, alone.scratch_bytes);
+        }
+    }
+
+    #[test]
+    fn a_bound_is_enough_for_all_tasks() {
+        let mesh = soup(3000);
+        for tasks in [1, 2, 7, 64] {
+            let parallel = Parallel { tasks, run: &forward };
+            let bound = Sizes::bound_parallel(3000, &config(), tasks).unwrap();
+            for sizes in both_sizes(&mesh, &parallel) {
+                assert!(sizes.index_bytes <= bound.index_bytes);
+                assert!(sizes.scratch_bytes <= bound.scratch_bytes);
+            }
+        }
+        assert_eq!(Sizes::bound(3000, &config()), Sizes::bound_parallel(3000, &config(), 0));
+    }
+
+    #[test]
+    fn a_loop_that_does_not_run_every_task_once_is_an_error_and_leaves_no_grid() {
+        let (positions, indices) = soup(5000);
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        let good = Parallel { tasks: 4, run: &forward };
+        let [enough, _] = both_sizes(&(positions.clone(), indices.clone()), &good);
+        let [mut index, mut scratch] = regions(enough.index_bytes, enough.scratch_bytes);
+        let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
+        let serial = Grid::build(mesh, &config(), index, scratch).unwrap().blob().to_vec();
+
+        let calls = core::cell::Cell::new(0);
+        for broken_call in 0..3 {
+            let loops: [&Loop; 7] = [
+                &|_, _| {},
+                &|count, task| (1..count).for_each(task),
+                &|count, task| (0..count - 1).for_each(task),
+                &|count, task| (0..=count).for_each(task),
+                &|count, task| (0..count).chain([0]).for_each(task),
+                &|count, task| (0..count).for_each(|_| task(0)),
+                &|_, task| task(u32::MAX),
+            ];
+            for broken in loops {
+                calls.set(0);
+                let run = |count: u32, task: &(dyn Fn(u32) + Sync)| {
+                    let call = calls.replace(calls.get() + 1);
+                    if call == broken_call { broken(count, task) } else { forward(count, task) }
+                };
+                let parallel = Parallel { tasks: 4, run: &run };
+                let built = Grid::build_parallel(mesh, &config(), index, scratch, &parallel);
+                assert_eq!(built.err(), Some(Error::InvalidParallelFor));
+                assert_eq!(calls.get(), broken_call + 1);
+                assert!(broken_call == 0 || Grid::open(index, mesh).is_err());
+                let again = Grid::build_parallel(mesh, &config(), index, scratch, &good).unwrap();
+                assert!(again.blob() == serial);
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_bad_triangle_is_named_whatever_the_tasks() {
+        let (mut positions, mut indices) = soup(4000);
+        positions[3 * 1700] = [f32::NAN; 3];
+        positions[3 * 3200] = [f32::INFINITY; 3];
+        let strict = Config { flags: BuildFlags::STRICT, ..config() };
+        for tasks in [1, 3, 8] {
+            let parallel = Parallel { tasks, run: &backward };
+            let error = |indices: &[[u32; 3]]| {
+                let mesh = TriangleMesh::new(&positions, indices).unwrap();
+                sizes_parallel(&mesh, &strict, &mut [], &parallel).err()
+            };
+            assert_eq!(error(&indices), Some(Error::NonFiniteTriangle { triangle: 1700 }));
+            let vertex = core::mem::replace(&mut indices[900][1], u32::MAX);
+            assert_eq!(error(&indices), Some(Error::IndexOutOfRange { triangle: 900 }));
+            indices[900][1] = vertex;
+        }
+    }
+}

@@ -1,0 +1,327 @@
+//! The rays of a tile as arrays: one number of all of them side by side.
+//!
+//! Along one axis, k, all rays of a bundle run forward (it is mirrored if they run backward), at least
+//! half as fast as along any other. So they can be written as lines over k: `u = start + slope * k`.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, mask32x16};
+
+use super::Brick;
+use super::layout::BLOCK;
+use crate::approach::FAR_EXTENTS;
+use crate::cell::{Lattice, as_f32};
+use crate::mesh::Strided;
+use crate::ray::{Ray, round};
+
+/// Rays in a bundle.
+pub(crate) const RAYS: usize = 64;
+
+/// Speeds, in cells for each unit of t, with which lines can be computed.
+const LEAST_SPEED: f32 = 1e-30;
+const MOST_SPEED: f32 = 1e30;
+
+/// A number for each ray.
+pub(super) type PerRay = [f32; RAYS];
+
+/// Up to 64 rays, and those of them that go together.
+#[derive(Debug)]
+pub(super) struct Bundle {
+    /// The rays, by axis.
+    pub(super) origin: [PerRay; 3],
+    pub(super) direction: [PerRay; 3],
+    pub(super) t_min: PerRay,
+    pub(super) t_max: PerRay,
+    /// Bit `i`: ray `i` is one of them.
+    pub(super) members: u64,
+    /// The axes u, v and k.
+    pub(super) axes: [u8; 3],
+    /// Whether k counts from the grid's far end.
+    pub(super) is_mirrored: bool,
+    /// u and v on the plane k = 0, in cells, and what they grow by from plane to plane.
+    pub(super) start: [PerRay; 2],
+    pub(super) slope: [PerRay; 2],
+    /// k at t = 0, and for each unit of t.
+    pub(super) zero: PerRay,
+    pub(super) speed: PerRay,
+    /// k where the rays start, and where they end: closer with every hit.
+    pub(super) from: PerRay,
+    pub(super) to: PerRay,
+    /// How far off places may be, in cells: as much as a triangle's box is grown by.
+    pub(super) margin: f32,
+}
+
+/// Between what the rays lie, on u and v.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    pub(super) low: [Chord; 2],
+    pub(super) high: [Chord; 2],
+}
+
+/// A line in the plane of k and u, or k and v.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Chord {
+    pub(super) start: f32,
+    pub(super) slope: f32,
+}
+
+/// Axes as places in arrays of three: said again so that the compiler knows, and checks nothing.
+#[inline(always)]
+pub(super) fn below_three([u, v, k]: [u8; 3]) -> [usize; 3] {
+    [usize::from(u % 3), usize::from(v % 3), usize::from(k % 3)]
+}
+
+/// Sixteen rays at once.
+const WIDTH: usize = 16;
+
+/// Bit `i` for ray `i` where a comparison of two numbers holds.
+#[inline(always)]
+pub(super) fn rays_where<S: Simd>(
+    simd: S,
+    [a, b]: [&PerRay; 2],
+    test: impl Fn(f32x16<S>, f32x16<S>) -> mask32x16<S>,
+) -> u64 {
+    let mut rays = 0;
+    for (row, (&a, &b)) in a.as_chunks().0.iter().zip(b.as_chunks().0).enumerate() {
+        let (a, b) = (f32x16::simd_from(simd, a), f32x16::simd_from(simd, b));
+        rays |= (test(a, b).to_bitmask() & 0xffff) << (row * WIDTH);
+    }
+    rays
+}
+
+impl Bundle {
+    /// No rays.
+    pub(super) const EMPTY: Self = Self {
+        origin: [[0.0; RAYS]; 3],
+        direction: [[0.0; RAYS]; 3],
+        t_min: [0.0; RAYS],
+        t_max: [0.0; RAYS],
+        members: 0,
+        axes: [0, 1, 2],
+        is_mirrored: false,
+        start: [[0.0; RAYS]; 2],
+        slope: [[0.0; RAYS]; 2],
+        zero: [0.0; RAYS],
+        speed: [0.0; RAYS],
+        from: [0.0; RAYS],
+        to: [0.0; RAYS],
+        margin: 0.0,
+    };
+
+    /// Replaces the rays by `count` of the caller's, and makes those that run along the same axis as
+    /// the first valid one the members.
+    #[inline(always)]
+    pub(super) fn load<S: Simd>(
+        &mut self,
+        simd: S,
+        brick: &Brick<'_>,
+        lattice: &Lattice,
+        rays: &Strided<'_>,
+        first: usize,
+        count: usize,
+    ) {
+        let mut leader = None;
+        for lane in 0..count.min(RAYS) {
+            let ray: Ray = rays.read(first + lane);
+            for axis in 0..3 {
+                self.origin[axis][lane] = ray.origin[axis];
+                self.direction[axis][lane] = ray.direction[axis];
+            }
+            self.t_min[lane] = ray.t_min;
+            self.t_max[lane] = ray.t_max;
+            if leader.is_none() && ray.is_valid() {
+                leader = Some(ray.direction);
+            }
+        }
+        self.members = 0;
+        let Some(leader) = leader else { return };
+        let [x, y, z] = [leader[0].abs(), leader[1].abs(), leader[2].abs()];
+        self.is_mirrored = match (x >= y && x >= z, y >= z) {
+            (true, _) => self.along::<0, S>(simd, brick, lattice, leader[0] < 0.0),
+            (_, true) => self.along::<1, S>(simd, brick, lattice, leader[1] < 0.0),
+            _ => self.along::<2, S>(simd, brick, lattice, leader[2] < 0.0),
+        };
+        self.members &= u64::MAX >> (RAYS - count.clamp(1, RAYS));
+    }
+
+    /// Makes the rays that run along an axis lines over it.
+    #[inline(always)]
+    fn along<const K: usize, S: Simd>(
+        &mut self,
+        simd: S,
+        brick: &Brick<'_>,
+        lattice: &Lattice,
+        is_mirrored: bool,
+    ) -> bool {
+        let axes = [(K + 1) % 3, (K + 2) % 3, K];
+        self.axes = match K {
+            0 => [1, 2, 0],
+            1 => [2, 0, 1],
+            _ => [0, 1, 2],
+        };
+        let sign = if is_mirrored { -1.0 } else { 1.0 };
+        let bounds = lattice.bounds();
+        let center = ((bounds.min + bounds.max) * 0.5).to_array();
+        let reach = FAR_EXTENTS * bounds.size().max_element();
+        let rate = [0, 1, 2].map(|axis| round(lattice.cells_per_unit(axis)));
+        let width = as_f32(brick.width[K] * BLOCK);
+        self.margin = lattice.margin().max_element();
+
+        let [ox, oy, oz] = &self.origin;
+        let [dx, dy, dz] = &self.direction;
+        let mut belongs = [0.0; RAYS];
+        #[expect(clippy::needless_bitwise_bool, reason = "no branch: lanes side by side")]
+        for lane in 0..RAYS {
+            // Who belongs to the bundle: runs along the axis, from nearby, with numbers that are some.
+            let along = self.direction[K][lane] * sign;
+            let turn = dx[lane].abs().max(dy[lane].abs()).max(dz[lane].abs());
+            let is_near = ((ox[lane] - center[0]).abs() <= reach)
+                & ((oy[lane] - center[1]).abs() <= reach)
+                & ((oz[lane] - center[2]).abs() <= reach);
+            let nothing = dx[lane] * 0.0 + dy[lane] * 0.0 + dz[lane] * 0.0;
+            let speed = along * rate[K];
+            let fastest = (dx[lane].abs() * rate[0])
+                .max(dy[lane].abs() * rate[1])
+                .max(dz[lane].abs() * rate[2]);
+            let is_along = (along >= 0.5 * turn) & (speed > LEAST_SPEED) & (fastest < MOST_SPEED);
+            let is_member =
+                is_near & is_along & (nothing >= 0.0) & (self.t_min[lane] <= self.t_max[lane]);
+            belongs[lane] = if is_member { 1.0 } else { 0.0 };
+
+            // Its line in cells, k growing.
+            let speed = if is_member { speed } else { 1.0 };
+            let inverse = 1.0 / speed;
+            let at = (self.origin[K][lane] - lattice.min[K]) * rate[K];
+            let zero = if is_mirrored { width - at } else { at };
+            self.speed[lane] = speed;
+            self.zero[lane] = zero;
+            self.from[lane] = zero + speed * self.t_min[lane] - self.margin;
+            self.to[lane] = zero + speed * self.t_max[lane] + self.margin;
+            for (side, axis) in [axes[0], axes[1]].into_iter().enumerate() {
+                let at = (self.origin[axis][lane] - lattice.min[axis]) * rate[axis];
+                let slope = self.direction[axis][lane] * rate[axis] * inverse;
+                self.slope[side][lane] = slope;
+                self.start[side][lane] = at - slope * zero;
+            }
+        }
+        let half = f32x16::splat(simd, 0.5);
+        self.members = rays_where(
+            simd,
+            [&belongs, &belongs],
+            #[inline(always)]
+            |belongs, _| belongs.simd_gt(half),
+        );
+        is_mirrored
+    }
+
+    /// The axes u, v and k.
+    #[inline(always)]
+    pub(super) fn axes(&self) -> [usize; 3] {
+        below_three(self.axes)
+    }
+
+    /// The first k of any member, and the last.
+    #[inline(always)]
+    pub(super) fn ends(&self) -> (f32, f32) {
+        let (mut first, mut last) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
+        for row in 0..RAYS / WIDTH {
+            for lane in 0..WIDTH {
+                let ray = row * WIDTH + lane;
+                let is_member = self.members >> ray & 1 == 1;
+                first[lane] =
+                    first[lane].min(if is_member { self.from[ray] } else { f32::INFINITY });
+                last[lane] =
+                    last[lane].max(if is_member { self.to[ray] } else { f32::NEG_INFINITY });
+            }
+        }
+        let first = first.into_iter().fold(f32::INFINITY, f32::min);
+        (first, last.into_iter().fold(f32::NEG_INFINITY, f32::max))
+    }
+
+    /// Chords around the members between two planes; `None` if they are too far apart.
+    #[inline(always)]
+    pub(super) fn bounds(&self, planes: [f32; 2]) -> Option<Bounds> {
+        /// The most cells that a bundle may be wide.
+        const WIDEST: f32 = 64.0;
+        let none = Chord { start: 0.0, slope: 0.0 };
+        let mut bounds = Bounds { low: [none; 2], high: [none; 2] };
+        for side in 0..2 {
+            let (mut low, mut high) =
+                ([[f32::INFINITY; WIDTH]; 2], [[f32::NEG_INFINITY; WIDTH]; 2]);
+            for row in 0..RAYS / WIDTH {
+                for lane in 0..WIDTH {
+                    let ray = row * WIDTH + lane;
+                    let is_member = self.members >> ray & 1 == 1;
+                    let (start, slope) = (self.start[side][ray], self.slope[side][ray]);
+                    for end in 0..2 {
+                        let at = start + slope * planes[end];
+                        let (least, most) =
+                            if is_member { (at, at) } else { (f32::INFINITY, f32::NEG_INFINITY) };
+                        low[end][lane] = low[end][lane].min(least);
+                        high[end][lane] = high[end][lane].max(most);
+                    }
+                }
+            }
+            let least = |lanes: &[f32; WIDTH]| lanes.iter().copied().fold(f32::INFINITY, f32::min);
+            let most =
+                |lanes: &[f32; WIDTH]| lanes.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            let (low, high) = ([least(&low[0]), least(&low[1])], [most(&high[0]), most(&high[1])]);
+            let is_narrow = |width: f32| (0.0..=WIDEST).contains(&width);
+            if !(is_narrow(high[0] - low[0]) && is_narrow(high[1] - low[1])) {
+                return None;
+            }
+            bounds.low[side] = Chord::new(planes, low);
+            bounds.high[side] = Chord::new(planes, high);
+        }
+        Some(bounds)
+    }
+
+    /// The members between two planes, unless they have ended before.
+    #[inline(always)]
+    pub(super) fn between<S: Simd>(&self, simd: S, [near, far]: [f32; 2]) -> u64 {
+        let (near, far) = (f32x16::splat(simd, near), f32x16::splat(simd, far));
+        self.members
+            & rays_where(
+                simd,
+                [&self.from, &self.to],
+                #[inline(always)]
+                |from, to| from.simd_le(far) & to.simd_ge(near),
+            )
+    }
+}
+
+impl Chord {
+    /// A chord of what lies at `a` on plane `from` and at `b` on plane `to`.
+    fn new([from, to]: [f32; 2], [a, b]: [f32; 2]) -> Self {
+        let slope = if to > from { (b - a) / (to - from) } else { 0.0 };
+        Self { start: a - slope * from, slope }
+    }
+
+    #[inline(always)]
+    fn at(self, plane: f32) -> f32 {
+        self.start + self.slope * plane
+    }
+}
+
+impl Bounds {
+    /// The first and the last of `count` cells on an axis that rays may meet between two planes, each
+    /// cell `size` wide; `None` if they pass all of them.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    pub(super) fn cells(
+        &self,
+        axis: usize,
+        planes: [f32; 2],
+        size: f32,
+        count: u32,
+        margin: f32,
+    ) -> Option<[u32; 2]> {
+        let low = planes.map(|plane| self.low[axis].at(plane));
+        let high = planes.map(|plane| self.high[axis].at(plane));
+        let low = (low[0].min(low[1]) - margin) / size;
+        let high = (high[0].max(high[1]) + margin) / size;
+        if high < 0.0 || low >= as_f32(count) {
+            return None;
+        }
+        Some([low as u32, (high as u32).min(count - 1)])
+    }
+}

@@ -1,0 +1,348 @@
+//! Where everything lies: the blocks, bricks, cells and lists of a grid, and the scratch of a build.
+//!
+//! A block is 16 cells wide, a brick 4. A cell's number in its block is its brick's number and its
+//! number in the brick, so that 64 numbers in a row are one occupancy mask:
+//!
+//! ```text
+//! number  zz yy xx | zz yy xx
+//!         brick      cell in the brick
+//! ```
+
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "at most 2^24 blocks and as many tasks as asked for"
+)]
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::arena::{section_bytes, split_mut};
+use crate::blob::HEADER_BYTES;
+
+/// Cells of a block on each axis.
+pub(super) const BLOCK: u32 = 16;
+/// Bricks of a block, and cells of a brick.
+pub(super) const MASK_BITS: usize = 64;
+/// Cells of a block.
+pub(super) const BLOCK_CELLS: usize = 4096;
+
+/// What the pool has of a block, or of a cell that is divided like one.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
+pub(super) struct Block {
+    /// A bit for each brick that has anything; lower half, upper half.
+    pub(super) mask: [u32; 2],
+    /// Where its words start: in the pool for a block, behind the start of its block for a cell.
+    pub(super) base: u32,
+    /// Where the list of primitives that belong to the whole block lies behind the start of the
+    /// block, plus 1; 0 if there is none.
+    pub(super) list: u32,
+}
+
+/// What the pool has of a brick.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
+pub(super) struct Brick {
+    /// A bit for each cell that has primitives.
+    pub(super) mask: [u32; 2],
+    /// Where the starts of its cells' lists lie, behind the start of the block.
+    pub(super) cells: u32,
+    /// Where the list of primitives that belong to the whole brick lies, plus 1; 0 if none.
+    pub(super) list: u32,
+}
+
+/// Words of a [`Block`] and of a [`Brick`].
+pub(super) const RECORD_WORDS: usize = 4;
+/// Words of a divided cell's record: a [`Block`], and its cells per axis.
+pub(super) const CHILD_WORDS: usize = RECORD_WORDS + 1;
+
+/// Both halves of a mask.
+#[inline(always)]
+pub(super) fn mask([low, high]: [u32; 2]) -> u64 {
+    u64::from(low) | u64::from(high) << 32
+}
+
+/// How many of a mask's bits lie below a bit.
+#[inline(always)]
+pub(super) const fn rank(mask: u64, bit: u32) -> usize {
+    (mask & ((1 << bit) - 1)).count_ones() as usize
+}
+
+/// The number of a cell in its block, or with a shift of 2 that of a brick.
+#[inline(always)]
+pub(super) const fn number([x, y, z]: [u32; 3]) -> u32 {
+    (x & 0xc) << 4 | (x & 3) | (y & 0xc) << 6 | (y & 3) << 2 | (z & 0xc) << 8 | (z & 3) << 4
+}
+
+/// The place of a cell in its block, from its number.
+#[inline(always)]
+pub(super) const fn place(number: u32) -> [u32; 3] {
+    [
+        (number >> 4 & 0xc) | (number & 3),
+        (number >> 6 & 0xc) | (number >> 2 & 3),
+        (number >> 8 & 0xc) | (number >> 4 & 3),
+    ]
+}
+
+/// A triangle in a block: its id, what it is listed for, and its cells there.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
+pub(super) struct Entry {
+    pub(super) id: u32,
+    /// First and last cell in twelve bits each, then the class, then the group.
+    cells: u32,
+}
+
+/// Words of an [`Entry`].
+pub(super) const ENTRY_WORDS: usize = 2;
+
+/// What lists a triangle: each of its cells, bricks or blocks, so that a large one is in few lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Class {
+    /// Every cell it may touch.
+    Cells = 0,
+    /// Every brick.
+    Bricks = 1,
+    /// Every block.
+    Blocks = 2,
+}
+
+impl Class {
+    /// How far cells are shifted for what lists the class.
+    #[inline(always)]
+    pub(super) const fn shift(self) -> u32 {
+        2 * self as u32
+    }
+}
+
+impl Entry {
+    /// A triangle with its cells in a block, both ends included and below 16.
+    #[inline(always)]
+    pub(super) const fn new(id: u32, min: [u32; 3], max: [u32; 3], class: Class) -> Self {
+        let [x, y, z] =
+            [max[0].wrapping_sub(min[0]), max[1].wrapping_sub(min[1]), max[2].wrapping_sub(min[2])];
+        let is_small = x | y | z <= 1 && matches!(class, Class::Cells);
+        let group = if is_small { x | y << 1 | z << 2 } else { OTHERS };
+        let cells = number(min) | number(max) << 12;
+        Self { id, cells: cells | (class as u32) << 24 | group << GROUP }
+    }
+
+    /// An entry from its words.
+    #[inline(always)]
+    pub(super) const fn of(id: u32, cells: u32) -> Self {
+        Self { id, cells }
+    }
+
+    /// The part in one of its blocks of an entry in two cells an axis: `straddles` are the axes on
+    /// which the second cell is the first of the next block, `far` those on which this is the block.
+    #[inline(always)]
+    pub(super) const fn beside(self, straddles: u32, far: u32) -> Self {
+        /// The bits of each set of axes at either end.
+        const ENDS: [u32; 8] = {
+            let mut ends = [0; 8];
+            let mut axes = 0;
+            while axes < 8 {
+                let mut axis = 0;
+                while axis < 3 {
+                    if axes >> axis & 1 == 1 {
+                        ends[axes] |= AXES[axis] | AXES[axis] << 12;
+                    }
+                    axis += 1;
+                }
+                axes += 1;
+            }
+            ends
+        };
+        let near = ENDS[(straddles & !far & 7) as usize];
+        let others = !(ENDS[(straddles & 7) as usize] | straddles << GROUP);
+        Self { id: self.id, cells: self.cells & others | near }
+    }
+
+    /// Its words.
+    #[inline(always)]
+    pub(super) const fn words(self) -> [u32; ENTRY_WORDS] {
+        [self.id, self.cells]
+    }
+
+    /// The bits of the class.
+    pub(super) const CLASS: u32 = 3 << 24;
+
+    #[inline(always)]
+    pub(super) const fn class(self) -> Class {
+        match self.cells >> 24 & 3 {
+            0 => Class::Cells,
+            1 => Class::Bricks,
+            _ => Class::Blocks,
+        }
+    }
+
+    /// The axes on which it is in two cells, a bit for each, if it is in cells and in no more than
+    /// two on any; [`OTHERS`] if not.
+    #[inline(always)]
+    pub(super) const fn group(self) -> u32 {
+        self.cells >> GROUP
+    }
+
+    /// The number of the first cell.
+    #[inline(always)]
+    pub(super) const fn min(self) -> u32 {
+        self.cells & 0xfff
+    }
+
+    /// The number of the last cell.
+    #[inline(always)]
+    pub(super) const fn max(self) -> u32 {
+        self.cells >> 12 & 0xfff
+    }
+}
+
+/// The bits of a cell's number that belong to each axis.
+pub(super) const AXES: [u32; 3] = [0x0c3, 0x30c, 0xc30];
+
+/// The first bit of [`Entry::group`].
+pub(super) const GROUP: u32 = 26;
+/// The group of entries that are not alike.
+pub(super) const OTHERS: u32 = 8;
+
+/// What is known of a grid's memory before its triangles are sorted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layout {
+    /// Blocks per axis.
+    pub(super) blocks: [u32; 3],
+    /// Triangles in the fullest block.
+    pub(super) fullest: u32,
+}
+
+/// How often a cell can be divided.
+pub(super) const MAX_CHILDREN: usize = 2;
+/// A cell with more triangles is divided if that separates them.
+pub(super) const CROWDED: u32 = 128;
+
+/// Where a task sorts: a bench for blocks, and one for each depth of divided cells.
+pub(super) type Benches<'s> = [Bench<'s>; 1 + MAX_CHILDREN];
+
+/// Where one block after the other is sorted.
+#[derive(Debug, Default)]
+pub(super) struct Bench<'s> {
+    /// For every cell its number of triangles, then where its next one goes.
+    pub(super) cells: &'s mut [u32],
+    /// The same for every brick.
+    pub(super) bricks: &'s mut [u32],
+    /// The cells that are divided.
+    pub(super) divided: &'s mut [u64],
+    /// The triangles.
+    pub(super) entries: &'s mut [Entry],
+}
+
+impl<'s> Bench<'s> {
+    fn take(scratch: &'s mut [u8], entries: u64) -> Option<(Self, &'s mut [u8])> {
+        let (cells, rest) = split_mut(scratch, BLOCK_CELLS as u64)?;
+        let (bricks, rest) = split_mut(rest, MASK_BITS as u64)?;
+        let (divided, rest) = split_mut(rest, MASK_BITS as u64)?;
+        let (entries, rest) = split_mut(rest, entries)?;
+        Some((Self { cells, bricks, divided, entries }, rest))
+    }
+
+    const fn bytes(entries: u64) -> u64 {
+        section_bytes::<u32>(BLOCK_CELLS as u64)
+            + section_bytes::<u32>(MASK_BITS as u64)
+            + section_bytes::<u64>(MASK_BITS as u64)
+            + section_bytes::<Entry>(entries)
+    }
+}
+
+impl Layout {
+    /// The layout for so many cells per axis, if no block has more triangles than that.
+    pub(super) const fn new(resolution: [u32; 3], fullest: u32) -> Self {
+        let [x, y, z] = resolution;
+        let blocks = [x.div_ceil(BLOCK), y.div_ceil(BLOCK), z.div_ceil(BLOCK)];
+        Self { blocks, fullest }
+    }
+
+    /// The largest layout with so many blocks.
+    pub(super) const fn largest(blocks: u64, triangles: u32) -> Self {
+        let blocks = [blocks as u32, 1, 1];
+        Self { blocks, fullest: triangles }
+    }
+
+    /// Number of blocks: at most 2^24.
+    pub(super) const fn block_count(&self) -> u64 {
+        self.blocks[0] as u64 * self.blocks[1] as u64 * self.blocks[2] as u64
+    }
+
+    /// Bytes before the pool.
+    pub(super) const fn head_bytes(&self) -> u64 {
+        HEADER_BYTES as u64 + section_bytes::<Block>(self.block_count())
+    }
+
+    /// Bytes of a blob with so many words in its pool.
+    pub(super) const fn index_bytes(&self, words: u64) -> u64 {
+        self.head_bytes() + section_bytes::<u32>(words)
+    }
+
+    /// Whether a cell can be crowded.
+    const fn has_children(&self) -> bool {
+        self.fullest > CROWDED
+    }
+
+    /// Bytes of scratch for so many tasks: each has heads and benches.
+    pub(super) const fn scratch_bytes(&self, tasks: u32) -> u64 {
+        let entries = self.fullest as u64;
+        let child = if self.has_children() { Bench::bytes(entries) } else { 0 };
+        let task = self.heads_bytes() + Bench::bytes(entries) + MAX_CHILDREN as u64 * child;
+        (tasks as u64).saturating_mul(task)
+    }
+
+    /// Bytes of the heads of one task.
+    const fn heads_bytes(&self) -> u64 {
+        section_bytes::<u32>(self.block_count())
+    }
+
+    /// How many of so many tasks find room for their heads.
+    pub(super) const fn tasks_in(&self, scratch: &[u8], tasks: u32) -> u32 {
+        match (scratch.len() as u64).checked_div(self.heads_bytes()) {
+            Some(room) if room < tasks as u64 => room as u32,
+            _ => tasks,
+        }
+    }
+
+    /// Cuts the heads from the scratch: for every task and block how many entries it has, then where
+    /// the next one goes.
+    pub(super) fn heads<'s, const N: usize>(
+        &self,
+        mut scratch: &'s mut [u8],
+        tasks: u32,
+    ) -> Option<([&'s mut [u32]; N], &'s mut [u8])> {
+        let mut all: [&mut [u32]; N] = core::array::from_fn(|_| Default::default());
+        for heads in all.iter_mut().take(tasks as usize) {
+            (*heads, scratch) = split_mut(scratch, self.block_count())?;
+        }
+        Some((all, scratch))
+    }
+
+    /// Cuts the benches of as many of so many tasks as there is room for from the rest.
+    pub(super) fn benches<'s, const N: usize>(
+        &self,
+        mut rest: &'s mut [u8],
+        tasks: u32,
+    ) -> ([Option<Benches<'s>>; N], &'s mut [u8]) {
+        let entries = u64::from(self.fullest);
+        let depth = if self.has_children() { 1 + MAX_CHILDREN } else { 1 };
+        let bytes = usize::try_from(Bench::bytes(entries) * depth as u64).unwrap_or(usize::MAX);
+        let mut all = [const { None }; N];
+        for benches in all.iter_mut().take(tasks as usize) {
+            if rest.len() < bytes {
+                break;
+            }
+            let (mut part, behind) =
+                core::mem::take(&mut rest).split_at_mut_checked(bytes).unwrap_or_default();
+            rest = behind;
+            let mut taken = Benches::default();
+            for bench in taken.iter_mut().take(depth) {
+                let Some((cut, behind)) = Bench::take(part, entries) else { break };
+                (*bench, part) = (cut, behind);
+            }
+            *benches = Some(taken);
+        }
+        (all, rest)
+    }
+}

@@ -1,0 +1,180 @@
+//! The brick grid: occupancy masks of 4^3 bits in blocks of 16^3 cells, ranks instead of a hash.
+//!
+//! What the paper's fixed grid does with macrocells and row displacement, done with the two
+//! instructions that machines have for it: a mask of 64 cells answers which of them hold anything, and
+//! the number of bits below a cell's bit is the place of its list. Nothing is searched for, and what
+//! belongs to a block lies together.
+//!
+//! ```text
+//! blob | header | blocks | pool |
+//!
+//! blocks   for each block of 16^3 cells: mask of its bricks, where its chunk lies, its list
+//! pool     list of the grid, and the chunk of each block:
+//!          | bricks: mask, cells, list | starts of cells, end | lists of cells | of bricks | of the block |
+//! ```
+//!
+//! A cell is a few triangles wide, whatever their number ([`size`]). A triangle that would be in too
+//! many cells is in the lists of bricks, of blocks, or of the grid: large ones cost little memory. A
+//! crowded cell is divided like a block, up to 16 cells wide, twice at most ([`sort`]).
+
+mod build;
+mod bundle;
+mod layout;
+mod pass;
+mod pool;
+mod size;
+mod sort;
+mod tests;
+mod tile;
+mod validate;
+mod walk;
+
+use fearless_simd::Simd;
+
+use crate::arena::split;
+use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::cell::Lattice;
+use crate::error::Error;
+use crate::mesh::{Strided, TriangleMesh};
+use crate::ray::Hit;
+use crate::simd::Kernel;
+pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
+use bundle::RAYS;
+use layout::{Block, Layout};
+pub(crate) use walk::OneRay;
+
+/// A view of a built brick grid.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Brick<'a> {
+    blocks: &'a [Block],
+    pool: &'a [u32],
+    /// Blocks per axis.
+    width: [u32; 3],
+    /// The last cell on each axis.
+    last: [u32; 3],
+}
+
+impl<'a> Brick<'a> {
+    /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
+    pub(crate) fn open(header: &Header, lattice: &Lattice, blob: &'a [u8]) -> Result<Self, Error> {
+        let layout = Layout::new(lattice.resolution, 0);
+        let words = header.reference_count.into();
+        let sections = blob.get(HEADER_BYTES..).and_then(|behind| {
+            let (blocks, behind) = split(behind, layout.block_count())?;
+            Some((blocks, split(behind, words)?.0))
+        });
+        let (blocks, pool) = sections
+            .filter(|_| header.blob_bytes == layout.index_bytes(words))
+            .ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
+        Ok(Self { blocks, pool, width: layout.blocks, last: lattice.last() })
+    }
+
+    /// The words of all lists and what leads to them: no ray is shown more primitives.
+    pub(crate) const fn list_words(&self) -> usize {
+        self.pool.len()
+    }
+
+    /// The block at a place, if it has anything.
+    #[inline(always)]
+    fn block(&self, [x, y, z]: [u32; 3]) -> Option<Chunk<'a>> {
+        let block = *self.blocks.get((x + self.width[0] * (y + self.width[1] * z)) as usize)?;
+        let words = self.pool.get(block.base as usize..)?;
+        Some(Chunk { words, bricks: 0, mask: layout::mask(block.mask), list: block.list })
+    }
+
+    /// The primitives that are in no block.
+    fn large(&self) -> &'a [u32] {
+        list(self.pool, 1).unwrap_or_default()
+    }
+}
+
+/// Neighbouring rays on their way through a grid, 64 at a time.
+#[derive(Debug)]
+pub(crate) struct Tiles<'q, F, const ANY: bool> {
+    pub(crate) brick: &'q Brick<'q>,
+    pub(crate) lattice: &'q Lattice,
+    pub(crate) mesh: &'q TriangleMesh<'q>,
+    pub(crate) rays: &'q Strided<'q>,
+    /// Gets the place of each ray and its hit, or `None` if the ray did not go with its tile.
+    pub(crate) answer: F,
+}
+
+impl<F: FnMut(usize, Option<Hit>), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(mut self, simd: S) {
+        let mut tile = tile::Tile::<ANY>::new(self.brick, self.lattice, self.mesh);
+        for first in (0..self.rays.count).step_by(RAYS) {
+            let count = RAYS.min(self.rays.count - first);
+            let members = tile.trace(simd, self.rays, first, count);
+            for lane in 0..count {
+                let hit = (members >> lane & 1 == 1).then(|| tile.hit(lane));
+                (self.answer)(first + lane, hit);
+            }
+        }
+    }
+}
+
+/// The words of a block, and which of them are its own or those of one of its cells.
+#[derive(Debug, Clone, Copy)]
+struct Chunk<'a> {
+    /// From the block's first word on.
+    words: &'a [u32],
+    /// Where its bricks lie.
+    bricks: u32,
+    /// The bricks that have anything.
+    mask: u64,
+    /// Where its list lies, plus 1.
+    list: u32,
+}
+
+/// The list of ids behind its length, `at` being the place of the length plus 1; `None` for 0.
+#[inline(always)]
+fn list(words: &[u32], at: u32) -> Option<&[u32]> {
+    let start = (at as usize).checked_sub(1)?;
+    let (&length, ids) = words.get(start..)?.split_first()?;
+    ids.get(..length as usize)
+}
+
+/// What a cell holds.
+#[derive(Debug, Clone, Copy)]
+enum Content<'a> {
+    /// Primitive ids.
+    List(&'a [u32]),
+    /// A divided cell, and how many cells it has on each axis.
+    Chunk(Chunk<'a>, u32),
+}
+
+impl<'a> Chunk<'a> {
+    /// The primitives that belong to all of it.
+    #[inline(always)]
+    fn list(&self) -> Option<&'a [u32]> {
+        list(self.words, self.list)
+    }
+
+    /// A brick that the mask has.
+    #[inline(always)]
+    fn brick(&self, bit: u32) -> Option<layout::Brick> {
+        let rank = layout::rank(self.mask, bit);
+        let at = (self.bricks as usize).checked_add(rank * layout::RECORD_WORDS)?;
+        let words = self.words.get(at..)?.first_chunk::<{ layout::RECORD_WORDS }>()?;
+        Some(bytemuck::cast(*words))
+    }
+
+    /// What a cell holds that the mask of its brick has.
+    #[inline(always)]
+    fn content(&self, brick: &layout::Brick, bit: u32) -> Option<Content<'a>> {
+        let rank = layout::rank(layout::mask(brick.mask), bit);
+        let at = (brick.cells as usize).checked_add(rank)?;
+        let &[start, end] = self.words.get(at..)?.first_chunk()?;
+        let part = (start & !crate::bump::GRID) as usize..(end & !crate::bump::GRID) as usize;
+        let words = self.words.get(part)?;
+        if start & crate::bump::GRID == 0 {
+            return Some(Content::List(words));
+        }
+        let &[low, high, bricks, list, cells] = words.first_chunk()?;
+        let chunk = Chunk { words: self.words, bricks, mask: layout::mask([low, high]), list };
+        (2..=layout::BLOCK).contains(&cells).then_some(Content::Chunk(chunk, cells))
+    }
+}

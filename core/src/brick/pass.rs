@@ -1,0 +1,491 @@
+//! The pass over the triangles, twice: once to count the entries of each block, once to write them.
+//!
+//! Almost all triangles lie in at most two cells an axis, and most of these in one block. For them
+//! everything is done in vectors; what is larger, or has no number, is looked at once more.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "the few triangles of a batch, the two words of an entry"
+)]
+
+use core::ops::Range;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x8, u8x16, u32x8};
+use glam::{Vec3A, Vec4};
+
+use super::layout::{Class, Entry, GROUP};
+use super::sort::{classify, lists};
+use crate::aabb::{Aabb, MAX_COORDINATE};
+use crate::cell::{CellRange, Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
+use crate::config::BuildFlags;
+use crate::error::Error;
+use crate::mesh::TriangleMesh;
+use crate::simd::{Kernel, SimdLevel, dispatch};
+use crate::tasks::Shared;
+
+/// What the mesh will be in its blocks.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Census {
+    /// Triangles in blocks: one that reaches into three counts three times.
+    pub(super) entries: u64,
+    /// Triangles in lists.
+    pub(super) references: u64,
+    /// Triangles too large for any list but the one of the grid.
+    pub(super) large: u32,
+    /// Triangles without finite coordinates.
+    pub(super) skipped: u32,
+}
+
+impl Census {
+    /// This and that of other triangles.
+    pub(super) const fn plus(self, other: Self) -> Self {
+        Self {
+            entries: self.entries + other.entries,
+            references: self.references + other.references,
+            large: self.large + other.large,
+            skipped: self.skipped + other.skipped,
+        }
+    }
+}
+
+/// What both passes go over.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ground<'g> {
+    pub(super) mesh: &'g TriangleMesh<'g>,
+    pub(super) lattice: &'g Lattice,
+    /// Blocks per axis.
+    pub(super) blocks: [u32; 3],
+    /// A triangle in more blocks than this is in the list of the whole grid.
+    pub(super) most_blocks: u64,
+    pub(super) flags: BuildFlags,
+}
+
+/// Where a triangle with these corners belongs: its cells, and what lists it, if not the whole grid.
+/// `None` if a coordinate is not finite.
+#[inline(always)]
+pub(super) fn home(
+    lattice: &Lattice,
+    most_blocks: u64,
+    corners: [Vec3A; 3],
+) -> Option<(CellRange, Option<Class>)> {
+    let range = lattice.range(&Aabb::of(corners)?);
+    Some((range, classify(range.min, range.max, most_blocks)))
+}
+
+/// The blocks of a range of cells, and the cells there.
+#[inline(always)]
+fn each_block(
+    blocks: [u32; 3],
+    range: &CellRange,
+    mut visit: impl FnMut(usize, [u32; 3], [u32; 3]),
+) {
+    let CellRange { min, max } = *range;
+    let (low, high) = (min.map(|cell| cell >> 4), max.map(|cell| cell >> 4));
+    let first = |axis: usize, at: u32| if at == low[axis] { min[axis] & 15 } else { 0 };
+    let last = |axis: usize, at: u32| if at == high[axis] { max[axis] & 15 } else { 15 };
+    for z in low[2]..=high[2] {
+        for y in low[1]..=high[1] {
+            for x in low[0]..=high[0] {
+                let block = x + blocks[0] * (y + blocks[1] * z);
+                let (first, last) =
+                    ([first(0, x), first(1, y), first(2, z)], [last(0, x), last(1, y), last(2, z)]);
+                visit(block as usize, first, last);
+            }
+        }
+    }
+}
+
+/// What is done with the entries of triangles.
+trait Visit {
+    /// An entry of a block.
+    fn entry(&mut self, block: usize, entry: Entry);
+
+    /// All entries of a triangle that so many lists take.
+    fn listed(&mut self, references: u64);
+
+    /// A triangle for the list of the grid.
+    fn large(&mut self, id: u32);
+
+    /// A triangle that has no place.
+    fn skipped(&mut self, id: u32) -> Result<(), Error>;
+}
+
+/// Triangles whose places are found before any of them is visited.
+///
+/// In between nothing is called, so that all constants stay in vector registers.
+const BATCH: usize = 64;
+const LANES: usize = 8;
+/// The first of three bits above the group of simple triangles.
+const STRADDLES: u32 = GROUP + 3;
+
+/// Where the triangles of a batch lie.
+struct Places {
+    /// The number of the first block.
+    blocks: [[u32; LANES]; BATCH / LANES],
+    /// The cells, as an entry has them, and above them the axes on which the second one is in the
+    /// next block.
+    cells: [[u32; LANES]; BATCH / LANES],
+    /// Which of them are in at most two cells an axis. The others are not found.
+    simple: u64,
+}
+
+/// What takes coordinates on one axis to cells.
+#[derive(Clone, Copy)]
+struct Axis<S: Simd> {
+    origin: f32x8<S>,
+    cells_per_unit: f32x8<S>,
+    margin: f32x8<S>,
+    end: f32x8<S>,
+}
+
+impl<S: Simd> Axis<S> {
+    #[inline(always)]
+    fn new(simd: S, lattice: &Lattice, axis: usize) -> Self {
+        let splat = |value| f32x8::splat(simd, value);
+        Self {
+            origin: splat(lattice.min[axis]),
+            cells_per_unit: splat(lattice.scale()[axis]),
+            margin: splat(lattice.margin()[axis]),
+            end: splat(as_f32(lattice.resolution[axis]) - 0.5),
+        }
+    }
+
+    /// The first and the last cell of triangles. The same bits as [`Lattice::range`].
+    #[inline(always)]
+    fn range(&self, simd: S, a: f32x8<S>, b: f32x8<S>, c: f32x8<S>) -> Span<S> {
+        let (min, max) = (a.min(b).min(c), a.max(b).max(c));
+        let min = (min - self.origin) * self.cells_per_unit - self.margin;
+        let max = (max - self.origin) * self.cells_per_unit + self.margin;
+        Span { min: self.whole(simd, min), max: self.whole(simd, max) }
+    }
+
+    #[inline(always)]
+    fn whole(&self, simd: S, position: f32x8<S>) -> u32x8<S> {
+        let clamped = position.max(f32x8::splat(simd, 0.0)).min(self.end);
+        (clamped - 0.5 + WHOLE_SHIFT).bitcast::<u32x8<S>>() & WHOLE_BITS
+    }
+}
+
+/// First and last cells on an axis.
+#[derive(Clone, Copy)]
+struct Span<S: Simd> {
+    min: u32x8<S>,
+    max: u32x8<S>,
+}
+
+impl<S: Simd> Span<S> {
+    /// Whether the second cell is in the next block: the lowest bit of the block's number then differs.
+    #[inline(always)]
+    fn straddles(self) -> u32x8<S> {
+        ((self.min ^ self.max) >> 4) & 1
+    }
+
+    /// What the axis adds to the cells of an entry, if it is x: at either end two bits for the brick
+    /// and two for the cell in it.
+    #[inline(always)]
+    fn inside(self) -> u32x8<S> {
+        let ends = (self.min & 15) | ((self.max & 15) << 12);
+        (ends & 0x3003) | ((ends & 0xc00c) << 4)
+    }
+
+    /// What the axis adds to the group of an entry, if it is x.
+    #[inline(always)]
+    fn group(self) -> u32x8<S> {
+        (self.max - self.min) << GROUP
+    }
+}
+
+/// Corners of eight triangles.
+#[derive(Clone, Copy)]
+struct Corners<S: Simd> {
+    x: f32x8<S>,
+    y: f32x8<S>,
+    z: f32x8<S>,
+}
+
+impl<S: Simd> Corners<S> {
+    #[inline(always)]
+    fn load(simd: S, rows: &[Rows<'_>; LANES], corner: usize) -> Self {
+        let [a, b, c, d, e, f, g, h] = rows;
+        let low = Self::four(simd, a[corner], b[corner], c[corner], d[corner]);
+        let high = Self::four(simd, e[corner], f[corner], g[corner], h[corner]);
+        Self { x: low.0.combine(high.0), y: low.1.combine(high.1), z: low.2.combine(high.2) }
+    }
+
+    #[inline(always)]
+    fn four(
+        simd: S,
+        a: &[u8; 16],
+        b: &[u8; 16],
+        c: &[u8; 16],
+        d: &[u8; 16],
+    ) -> (f32x4<S>, f32x4<S>, f32x4<S>) {
+        let a = u8x16::simd_from(simd, *a).bitcast::<f32x4<S>>();
+        let b = u8x16::simd_from(simd, *b).bitcast::<f32x4<S>>();
+        let c = u8x16::simd_from(simd, *c).bitcast::<f32x4<S>>();
+        let d = u8x16::simd_from(simd, *d).bitcast::<f32x4<S>>();
+        let (ac_xy, bd_xy) = (a.zip_low(c), b.zip_low(d));
+        let (ac_z, bd_z) = (a.zip_high(c), b.zip_high(d));
+        (ac_xy.zip_low(bd_xy), ac_xy.zip_high(bd_xy), ac_z.zip_low(bd_z))
+    }
+
+    /// The largest magnitudes, as the bits that they have: those of what is not finite or no number
+    /// are larger than all others.
+    #[inline(always)]
+    fn largest(self) -> u32x8<S> {
+        let x = self.x.bitcast::<u32x8<S>>() & 0x7fff_ffff;
+        let y = self.y.bitcast::<u32x8<S>>() & 0x7fff_ffff;
+        let z = self.z.bitcast::<u32x8<S>>() & 0x7fff_ffff;
+        x.max(y).max(z)
+    }
+}
+
+/// The bytes of a triangle's corners.
+type Rows<'m> = [&'m [u8; 16]; 3];
+
+/// The places of eight triangles: blocks, cells, and whether they are simple.
+///
+/// What works on vectors is a function of its own, always inlined: closures and arrays' own functions
+/// are not, and what is not inlined is not compiled for the level.
+#[inline(always)]
+fn places<S: Simd>(
+    simd: S,
+    axes: &[Axis<S>; 3],
+    [width, height, _]: [u32; 3],
+    rows: &[Rows<'_>; LANES],
+) -> ([u32; LANES], [u32; LANES], u64) {
+    let a = Corners::load(simd, rows, 0);
+    let b = Corners::load(simd, rows, 1);
+    let c = Corners::load(simd, rows, 2);
+    let limit = u32x8::splat(simd, MAX_COORDINATE.to_bits());
+    let is_finite = a.largest().max(b.largest()).max(c.largest()).simd_le(limit);
+
+    let x = axes[0].range(simd, a.x, b.x, c.x);
+    let y = axes[1].range(simd, a.y, b.y, c.y);
+    let z = axes[2].range(simd, a.z, b.z, c.z);
+    let steps = (x.max - x.min) | (y.max - y.min) | (z.max - z.min);
+    let is_simple = steps.simd_le(u32x8::splat(simd, 1)) & is_finite;
+
+    let block = (x.min >> 4) + ((y.min >> 4) + (z.min >> 4) * height) * width;
+    let ends = x.inside() | (y.inside() << 2) | (z.inside() << 4);
+    let group = x.group() | (y.group() << 1) | (z.group() << 2);
+    let straddles = x.straddles() | (y.straddles() << 1) | (z.straddles() << 2);
+    let cells = ends | group | (straddles << STRADDLES);
+    (block.into(), cells.into(), is_simple.to_bitmask())
+}
+
+/// Visits the entries of triangles.
+#[inline(always)]
+fn visit<S: Simd>(
+    simd: S,
+    ground: &Ground<'_>,
+    ids: Range<u32>,
+    visitor: &mut impl Visit,
+) -> Result<(), Error> {
+    /// Of a triangle that is not there: no number.
+    const NONE: [u8; 16] = [0xff; 16];
+    let axis = |axis| Axis::new(simd, ground.lattice, axis);
+    let axes = [axis(0), axis(1), axis(2)];
+    let wide = ground.mesh.wide();
+    let [x, y, z] = [1, ground.blocks[0], ground.blocks[0] * ground.blocks[1]];
+    let offsets = [0, x, y, x + y, z, x + z, y + z, x + y + z];
+    let mut batch = Places { blocks: Default::default(), cells: Default::default(), simple: 0 };
+    let mut first = ids.start;
+    while first < ids.end {
+        batch.simple = 0;
+        let slots = batch.blocks.iter_mut().zip(&mut batch.cells);
+        for (at, (blocks, cells)) in (0_u32..).step_by(LANES).zip(slots) {
+            let row = |lane: u32| wide.corners(first.wrapping_add(at + lane)).unwrap_or([&NONE; 3]);
+            let rows = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)];
+            let simple;
+            (*blocks, *cells, simple) = places(simd, &axes, ground.blocks, &rows);
+            batch.simple |= simple << at;
+        }
+
+        let count = (ids.end - first).min(BATCH as u32);
+        let found = batch.blocks.as_flattened().iter().zip(batch.cells.as_flattened());
+        for (at, (&block, &cells)) in (0..count).zip(found) {
+            let id = first + at;
+            if batch.simple >> at & 1 == 0 {
+                visit_any(simd, ground, id, visitor)?;
+                continue;
+            }
+            let straddles = cells >> STRADDLES;
+            visitor.listed(1 << (cells >> GROUP & 7).count_ones());
+            if straddles == 0 {
+                visitor.entry(block as usize, Entry::of(id, cells));
+                continue;
+            }
+            // Each of its blocks: those on the far side of the axes of every subset.
+            let entry = Entry::of(id, cells & !(7 << STRADDLES));
+            let mut far = 0;
+            loop {
+                let offset = offsets.get(far as usize).copied().unwrap_or(0);
+                visitor.entry((block + offset) as usize, entry.beside(straddles, far));
+                if far == straddles {
+                    break;
+                }
+                far = far.wrapping_sub(straddles) & straddles;
+            }
+        }
+        first += count;
+    }
+    Ok(())
+}
+
+/// Visits the entries of a triangle wherever it lies.
+#[inline(never)]
+fn visit_any<S: Simd>(
+    simd: S,
+    ground: &Ground<'_>,
+    id: u32,
+    visitor: &mut impl Visit,
+) -> Result<(), Error> {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let corners = match ground.mesh.wide().corners(id) {
+                Some([a, b, c]) => Some([vector(a), vector(b), vector(c)]),
+                None => ground.mesh.corners(id, Vec3A::new),
+            };
+            let Some(corners) = corners else {
+                return Err(Error::IndexOutOfRange { triangle: id });
+            };
+            match home(ground.lattice, ground.most_blocks, corners) {
+                Some((range, Some(class))) => {
+                    visitor.listed(lists(range.min, range.max, class.shift()));
+                    each_block(ground.blocks, &range, |block, first, last| {
+                        visitor.entry(block, Entry::new(id, first, last, class));
+                    });
+                }
+                Some((_, None)) => visitor.large(id),
+                None => visitor.skipped(id)?,
+            }
+            Ok(())
+        },
+    )
+}
+
+/// A corner from its bytes and those behind it.
+#[inline(always)]
+fn vector(bytes: &[u8; 16]) -> Vec3A {
+    let row: [f32; 4] = bytemuck::cast(*bytes);
+    Vec3A::from_vec4(Vec4::from_array(row))
+}
+
+/// Counts the entries of every block, in `heads` if there is room.
+pub(super) struct Count<'h> {
+    pub(super) ids: Range<u32>,
+    pub(super) heads: &'h mut [u32],
+}
+
+impl Count<'_> {
+    pub(super) fn run(self, ground: &Ground<'_>) -> Result<Census, Error> {
+        dispatch(SimdLevel::detect(), Pass { ground, work: self })
+    }
+}
+
+/// A pass over triangles.
+struct Pass<'g, W> {
+    ground: &'g Ground<'g>,
+    work: W,
+}
+
+/// A pass that counts.
+struct Counting<'h> {
+    heads: &'h mut [u32],
+    census: Census,
+    is_strict: bool,
+}
+
+impl Visit for Counting<'_> {
+    #[inline(always)]
+    fn entry(&mut self, block: usize, _: Entry) {
+        self.census.entries += 1;
+        if let Some(count) = self.heads.get_mut(block) {
+            *count += 1;
+        }
+    }
+
+    #[inline(always)]
+    fn listed(&mut self, references: u64) {
+        self.census.references += references;
+    }
+
+    fn large(&mut self, _: u32) {
+        self.census.large += 1;
+    }
+
+    fn skipped(&mut self, id: u32) -> Result<(), Error> {
+        if self.is_strict {
+            return Err(Error::NonFiniteTriangle { triangle: id });
+        }
+        self.census.skipped += 1;
+        Ok(())
+    }
+}
+
+impl Kernel for Pass<'_, Count<'_>> {
+    type Output = Result<Census, Error>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let Count { ids, heads } = self.work;
+        heads.fill(0);
+        let is_strict = self.ground.flags.contains(BuildFlags::STRICT);
+        let mut counting = Counting { heads, census: Census::default(), is_strict };
+        visit(simd, self.ground, ids, &mut counting)?;
+        Ok(counting.census)
+    }
+}
+
+/// Writes every triangle's entries into the bins of its blocks, and the largest triangles into the
+/// list of the grid. Afterwards a block's entries end at its head.
+pub(super) struct Scatter<'h, 'w> {
+    pub(super) ids: Range<u32>,
+    /// For each block the word where the next entry goes.
+    pub(super) heads: &'h mut [u32],
+    /// The word where the next large triangle goes.
+    pub(super) large: u32,
+    pub(super) words: Shared<'w>,
+}
+
+impl Scatter<'_, '_> {
+    pub(super) fn run(self, ground: &Ground<'_>) -> Result<(), Error> {
+        dispatch(SimdLevel::detect(), Pass { ground, work: self })
+    }
+}
+
+impl Visit for Scatter<'_, '_> {
+    #[inline(always)]
+    fn entry(&mut self, block: usize, entry: Entry) {
+        if let Some(head) = self.heads.get_mut(block) {
+            let words = entry.words();
+            self.words.set(*head, words);
+            *head = head.wrapping_add(words.len() as u32);
+        }
+    }
+
+    #[inline(always)]
+    fn listed(&mut self, _: u64) {}
+
+    fn large(&mut self, id: u32) {
+        self.words.set(self.large, [id]);
+        self.large = self.large.wrapping_add(1);
+    }
+
+    fn skipped(&mut self, _: u32) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+impl Kernel for Pass<'_, Scatter<'_, '_>> {
+    type Output = Result<(), Error>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let mut scatter = self.work;
+        visit(simd, self.ground, scatter.ids.clone(), &mut scatter)
+    }
+}

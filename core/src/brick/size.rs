@@ -1,0 +1,271 @@
+//! How large a cell is: as large as the triangles make it, not as their number does.
+//!
+//! A box with extents `e` lies in `(1 + e.x/h) (1 + e.y/h) (1 + e.z/h)` cells of width `h`, wherever
+//! the cells begin. The width is the one with which a sample of the triangles lies in
+//! [`REFERENCES`] cells on average: so many references and bytes a triangle takes, whatever the mesh,
+//! and cells grow in number with the surface. (A number of cells proportional to the triangles, as in
+//! [`woo`](crate::cell::woo), fills cells of a surface more and more: as the cube root of N.)
+//!
+//! A triangle counts for no more than [`MOST`] cells: large ones are listed elsewhere and must not
+//! make the cells of all others coarse. Memory has the last word: cells are made larger until there
+//! are no more than one block for eight triangles, and no more than [`reference_limit`] references.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "counts that are no larger than others of their type"
+)]
+
+use core::ops::Range;
+
+use glam::Vec3A;
+
+use super::layout::Layout;
+use super::pass::{Census, Count, Ground};
+use super::sort::MOST_BLOCKS;
+use crate::aabb::Aabb;
+use crate::cell::{Lattice, MAX_RESOLUTION};
+use crate::config::{BuildFlags, Config};
+use crate::error::Error;
+use crate::mesh::TriangleMesh;
+use crate::survey::Survey;
+use crate::tasks::{Parallel, run};
+
+/// The most references of a mesh with so many triangles.
+pub(super) const fn reference_limit(triangles: u32) -> u64 {
+    /// Three times what scans need.
+    const PER_TRIANGLE: u64 = 8;
+    const AT_LEAST: u64 = 64;
+    triangles as u64 * PER_TRIANGLE + AT_LEAST
+}
+
+/// The most blocks for so many triangles.
+pub(super) const fn block_limit(triangles: u32) -> u64 {
+    triangles as u64 / 8 + 8
+}
+
+/// What a cell grows by where there are too many: half as many cells.
+const LARGER: f64 = 1.26;
+
+/// The most triangles in the list of the whole grid.
+pub(super) const MOST_LARGE: u32 = 256;
+
+/// What is settled before anything is sorted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Settled {
+    pub(super) lattice: Lattice,
+    /// With all triangles in the fullest block where nobody counted.
+    pub(super) layout: Layout,
+    pub(super) census: Census,
+    /// A triangle in more blocks than this is in the list of the whole grid.
+    pub(super) most_blocks: u64,
+    /// Whether the entries of each block were counted.
+    pub(super) is_counted: bool,
+}
+
+impl Settled {
+    /// The ground that the passes over the triangles go over.
+    pub(super) const fn ground<'g>(
+        &'g self,
+        mesh: &'g TriangleMesh<'g>,
+        flags: BuildFlags,
+    ) -> Ground<'g> {
+        let Self { lattice, layout, most_blocks, .. } = self;
+        Ground { mesh, lattice, blocks: layout.blocks, most_blocks: *most_blocks, flags }
+    }
+}
+
+/// The triangles of each task.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shares<const N: usize> {
+    pub(super) tasks: u32,
+    /// How many there would be with scratch for all.
+    pub(super) wanted: u32,
+    pub(super) censuses: [Census; N],
+}
+
+impl<const N: usize> Shares<N> {
+    /// The triangles of a task.
+    pub(super) fn ids(triangles: u32, task: u32, tasks: u32) -> Range<u32> {
+        let at = |task: u32| u64::from(triangles) * u64::from(task) / u64::from(tasks.max(1));
+        at(task) as u32..at(task + 1) as u32
+    }
+}
+
+/// [`settle_in`] without scratch.
+pub(super) fn settle(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+) -> Result<Settled, Error> {
+    Ok(settle_in::<1>(mesh, config, scratch, &Parallel::SERIAL)?.0)
+}
+
+/// Chooses the cells of a mesh and counts what they will hold. The heads of each task get the entries
+/// of every block if there is room for them; nothing else is written.
+pub(super) fn settle_in<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+    parallel: &Parallel<'_>,
+) -> Result<(Settled, Shares<N>), Error> {
+    let sample = Sample::of(mesh);
+    let bounds = Lattice::pad(&bounds(mesh, &sample, config.flags)?);
+    let size = bounds.size();
+    let mut cell = f64::from(config.cell_size) * sample.cell(mesh, f64::from(size.max_element()));
+    loop {
+        let resolution = size.to_array().map(|extent| cells(extent, cell));
+        let layout = Layout::new(resolution, mesh.triangle_count());
+        let most = block_limit(mesh.triangle_count());
+        if layout.block_count() > most || resolution.iter().any(|&r| r > MAX_RESOLUTION) {
+            cell *= LARGER;
+            continue;
+        }
+        let lattice = Lattice::new(bounds, resolution);
+        let mut ground = Ground {
+            mesh,
+            lattice: &lattice,
+            blocks: layout.blocks,
+            most_blocks: MOST_BLOCKS,
+            flags: config.flags,
+        };
+        let (mut settled, shares) = loop {
+            let (settled, shares) = census(&ground, layout, scratch, parallel)?;
+            if settled.census.large <= MOST_LARGE {
+                break (settled, shares);
+            }
+            ground.most_blocks = u64::MAX;
+        };
+        let limit = reference_limit(mesh.triangle_count());
+        if settled.census.entries.max(settled.census.references) <= limit {
+            if settled.is_counted {
+                settled.layout.fullest = fullest(&layout, shares.tasks, scratch);
+            }
+            return Ok((settled, shares));
+        }
+        cell *= LARGER;
+    }
+}
+
+/// Counts the entries of every block.
+fn census<const N: usize>(
+    ground: &Ground<'_>,
+    layout: Layout,
+    scratch: &mut [u8],
+    parallel: &Parallel<'_>,
+) -> Result<(Settled, Shares<N>), Error> {
+    let triangles = ground.mesh.triangle_count();
+    let wanted = task_count::<N>(triangles, parallel);
+    let room = layout.tasks_in(scratch, wanted);
+    let (is_counted, tasks) = (room > 0, if room > 0 { room } else { wanted });
+    let heads = if is_counted { layout.heads::<N>(scratch, tasks) } else { None };
+    let heads =
+        heads.map_or_else(|| core::array::from_fn(|_| Default::default()), |(heads, _)| heads);
+    let counts = (0..tasks).zip(heads).map(|(task, heads)| {
+        let ids = Shares::<N>::ids(triangles, task, tasks);
+        Count { ids, heads }
+    });
+    let results: [_; N] = run(parallel, counts, |count: Count<'_>| count.run(ground))?;
+    // The first error is that of the first triangle.
+    let mut censuses = [Census::default(); N];
+    let mut census = Census::default();
+    for (slot, result) in censuses.iter_mut().zip(results.into_iter().flatten()) {
+        *slot = result?;
+        census = census.plus(*slot);
+    }
+    let (lattice, most_blocks) = (*ground.lattice, ground.most_blocks);
+    let settled = Settled { lattice, layout, census, most_blocks, is_counted };
+    Ok((settled, Shares { tasks, wanted, censuses }))
+}
+
+/// Into how many tasks the work is cut.
+fn task_count<const N: usize>(triangles: u32, parallel: &Parallel<'_>) -> u32 {
+    /// Fewer would not be worth the caller's thread.
+    const LEAST_TRIANGLES: u32 = 256;
+    parallel.tasks.min(triangles / LEAST_TRIANGLES).clamp(1, N as u32)
+}
+
+/// The entries of the fullest block.
+fn fullest(layout: &Layout, tasks: u32, scratch: &mut [u8]) -> u32 {
+    let heads = layout.heads::<{ Parallel::MAX_TASKS as usize }>(scratch, tasks);
+    let Some((heads, _)) = heads else { return 0 };
+    let sums = (0..layout.block_count() as usize)
+        .map(|block| heads.iter().filter_map(|heads| heads.get(block)).sum());
+    sums.max().unwrap_or(0)
+}
+
+/// Cells of a size along an extent, one more than [`MAX_RESOLUTION`] where it is too many.
+#[expect(clippy::cast_sign_loss, reason = "clamped before")]
+fn cells(extent: f32, cell: f64) -> u32 {
+    let most = f64::from(MAX_RESOLUTION + 1);
+    ((f64::from(extent) / cell).min(most) as u32).max(1)
+}
+
+/// The box of the mesh.
+///
+/// That of all finite vertices takes a tenth of the time of that of all triangles. It is too large
+/// where vertices lie about that no triangle uses: the sample tells.
+fn bounds(mesh: &TriangleMesh<'_>, sample: &Sample, flags: BuildFlags) -> Result<Aabb, Error> {
+    const SUSPICIOUS: f32 = 2.0;
+    let all = mesh.vertex_bounds();
+    let (size, sampled) = (all.size().max_element(), sample.bounds.size().max_element());
+    if size <= SUSPICIOUS * sampled { Ok(all) } else { Ok(Survey::of(mesh, flags)?.bounds) }
+}
+
+/// Cells in which a triangle lies on average.
+const REFERENCES: f64 = 2.4;
+/// Cells in which a triangle lies at most, for the average.
+const MOST: f64 = 8.0;
+
+/// Some triangles of the mesh, evenly spread over their ids.
+struct Sample {
+    step: u32,
+    bounds: Aabb,
+}
+
+impl Sample {
+    const TRIANGLES: u32 = 1024;
+
+    fn of(mesh: &TriangleMesh<'_>) -> Self {
+        // An odd step does not keep time with meshes made of pairs.
+        let step = (mesh.triangle_count() / Self::TRIANGLES) | 1;
+        let all = boxes(mesh, step).fold(Aabb::EMPTY, |all, bounds| all.union(&bounds));
+        Self { step, bounds: all }
+    }
+
+    /// The width of cells that triangles of the sample lie in [`REFERENCES`] of, for a box with this
+    /// extent.
+    fn cell(&self, mesh: &TriangleMesh<'_>, extent: f64) -> f64 {
+        /// No cell is smaller: none could be.
+        const LEAST: f64 = 1.0 / 16_384.0;
+        /// To 3 percent.
+        const BITS: u32 = 4;
+        let is_enough = |cell: f64| self.references(mesh, cell) <= REFERENCES;
+        let mut high = extent;
+        while high > extent * LEAST && is_enough(0.5 * high) {
+            high *= 0.5;
+        }
+        let mut low = 0.5 * high;
+        for _ in 0..BITS {
+            let middle = 0.5 * (low + high);
+            *(if is_enough(middle) { &mut high } else { &mut low }) = middle;
+        }
+        high
+    }
+
+    /// The mean number of cells of a width in which a triangle lies.
+    fn references(&self, mesh: &TriangleMesh<'_>, cell: f64) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for bounds in boxes(mesh, self.step) {
+            let [x, y, z] = bounds.size().to_array().map(|e| 1.0 + f64::from(e) / cell);
+            sum += (x * y * z).min(MOST);
+            count += 1.0;
+        }
+        sum / f64::max(count, 1.0)
+    }
+}
+
+/// The boxes of every `step`-th triangle that has one.
+fn boxes(mesh: &TriangleMesh<'_>, step: u32) -> impl Iterator<Item = Aabb> {
+    let ids = (0..mesh.triangle_count()).step_by(step.max(1) as usize);
+    ids.filter_map(|id| mesh.corners(id, Vec3A::new).and_then(Aabb::of))
+}

@@ -1,0 +1,437 @@
+//! A tile: up to 64 neighbouring rays that go through the grid together, slice by slice.
+//!
+//! The axis that the rays run along fastest becomes k. Between two planes of k, one cell apart, a ray
+//! stays in a rectangle of u and v; where a cell that lists something meets rectangles, its triangles
+//! are gathered once and tested against just those rays. Along k there is nothing to search and no
+//! order to keep but that of the slices: a ray is done when its closest hit lies before the next.
+//!
+//! ```text
+//! k ->   | block slice: 16 cells | ...        per slice, from the bounds of all rays: which blocks,
+//!        | | | |  brick slices               which bricks, which cells have anything
+//!        |||||    cell slices                 per cell: which rays meet it, 64 at a time
+//!
+//! u  ----.____                               bounds: all rays lie between two chords, from the
+//!    ----.    '----.____                     extremes on the first plane to those on the last
+//! ```
+//!
+//! Rays that turn off the axis of the others, and tiles that spread over too many cells, are left to
+//! the walk of single rays.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, u8x64};
+
+use super::bundle::{Bounds, Bundle, PerRay, RAYS, below_three};
+use super::layout::{BLOCK, mask as mask_of, place};
+use super::tests::Tests;
+use super::{Brick, Chunk, Content, list};
+use crate::cell::{Lattice, as_f32, whole};
+use crate::mesh::{Strided, TriangleMesh};
+use crate::ray::Hit;
+
+/// A part of the grid that is cut into up to 16 cells an axis: a block, or a divided cell.
+#[derive(Debug, Clone, Copy)]
+struct Part<'a> {
+    chunk: Chunk<'a>,
+    /// Its corner on u, v and k, in cells of the lattice.
+    corner: [f32; 3],
+    /// Its cells in one of the lattice.
+    scale: f32,
+    /// Its cells on an axis.
+    cells: u32,
+    /// How often cells of it may be divided.
+    depth: u32,
+}
+
+/// The rays of a tile on their way through a grid. Several KiB: keep one for many tiles.
+#[derive(Debug)]
+pub(super) struct Tile<'a, const ANY: bool> {
+    brick: &'a Brick<'a>,
+    lattice: &'a Lattice,
+    mesh: &'a TriangleMesh<'a>,
+    bundle: Bundle,
+    tests: Tests,
+    /// Primitives that may still be shown, over all rays: damaged bytes may list everything in every
+    /// cell.
+    unread: u64,
+}
+
+/// The whole part of a number, between 0 and 255; of a whole one perhaps one less, which the margin
+/// allows. Without a cast, which would have to saturate lane by lane.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the low bits are what is wanted")]
+fn byte(number: f32) -> u8 {
+    let number = if number > 0.5 { number } else { 0.5 };
+    let number = if number < 255.0 { number } else { 255.0 };
+    // Adding 1.5 * 2^23 rounds to a whole number and leaves it in the low bits.
+    ((number - 0.5) + 12_582_912.0).to_bits() as u8
+}
+
+/// The cells of a part that each ray may meet in a slice, on one axis, counted from 1: 0 and
+/// 255 are outside.
+#[derive(Debug, Clone, Copy)]
+struct Reach {
+    low: [u8; RAYS],
+    high: [u8; RAYS],
+}
+
+impl Reach {
+    /// Between two planes.
+    #[inline(always)]
+    fn new(start: &PerRay, slope: &PerRay, planes: [f32; 2], margin: f32) -> Self {
+        let mut reach = Self { low: [0; RAYS], high: [0; RAYS] };
+        let Self { low, high } = &mut reach;
+        for (((start, slope), low), high) in start.iter().zip(slope).zip(low).zip(high) {
+            let a = start + slope * planes[0];
+            let b = start + slope * planes[1];
+            *low = byte(if a < b { a } else { b } + (1.0 - margin));
+            *high = byte(if a < b { b } else { a } + (1.0 + margin));
+        }
+        reach
+    }
+
+    /// The rays that meet any of the cells `first..=last`.
+    #[inline(always)]
+    fn meets<S: Simd>(&self, simd: S, [first, last]: [u32; 2]) -> u64 {
+        let byte = |cell: u32| (cell + 1).min(254) as u8;
+        let (first, last) = (u8x64::splat(simd, byte(first)), u8x64::splat(simd, byte(last)));
+        let low = u8x64::simd_from(simd, self.low).simd_le(last);
+        let high = u8x64::simd_from(simd, self.high).simd_ge(first);
+        (low & high).to_bitmask()
+    }
+}
+
+/// For each axis and range of four places, the cells of a brick or bricks of a block that lie there.
+const LAYERS: [[[u64; 4]; 4]; 3] = {
+    let mut layers = [[[0; 4]; 4]; 3];
+    let mut bit = 0;
+    while bit < 64 {
+        let at = [bit & 3, bit >> 2 & 3, bit >> 4];
+        let mut axis = 0;
+        while axis < 3 {
+            let (mut first, mut last) = (0, 0);
+            while first < 4 {
+                if first <= at[axis] && at[axis] <= last {
+                    layers[axis][first][last] |= 1 << bit;
+                }
+                last += 1;
+                if last == 4 {
+                    first += 1;
+                    last = 0;
+                }
+            }
+            axis += 1;
+        }
+        bit += 1;
+    }
+    layers
+};
+
+/// Of four places from `first` on, those inside a range; none if they are all outside.
+#[inline(always)]
+fn layer(axis: usize, first: u32, [low, high]: [u32; 2]) -> u64 {
+    if high < first || low > first + 3 {
+        return 0;
+    }
+    let (low, high) = (low.saturating_sub(first), (high - first).min(3));
+    LAYERS[axis % 3][(low & 3) as usize][(high & 3) as usize]
+}
+
+/// A part as the rays see it: in its own cells, from its corner on.
+struct View<'a> {
+    part: Part<'a>,
+    axes: [u8; 3],
+    is_mirrored: bool,
+    /// u and v of each ray on the first plane.
+    start: [PerRay; 2],
+    bounds: Bounds,
+    margin: f32,
+}
+
+impl<'a> View<'a> {
+    #[inline(always)]
+    fn new(bundle: &Bundle, part: &Part<'a>, bounds: &Bounds) -> Self {
+        let [_, _, near] = part.corner;
+        let (mut start, mut bounds) = (bundle.start, *bounds);
+        for side in 0..2 {
+            let place =
+                |start: f32, slope: f32| (start + slope * near - part.corner[side]) * part.scale;
+            for (start, &slope) in start[side].iter_mut().zip(&bundle.slope[side]) {
+                *start = place(*start, slope);
+            }
+            for chord in [&mut bounds.low[side], &mut bounds.high[side]] {
+                chord.start = place(chord.start, chord.slope);
+            }
+        }
+        let (axes, is_mirrored) = (bundle.axes, bundle.is_mirrored);
+        Self { part: *part, axes, is_mirrored, start, bounds, margin: bundle.margin * part.scale }
+    }
+
+    /// The planes of k between which cells lie, from the first to before the end.
+    #[inline(always)]
+    fn planes(&self, [first, end]: [u32; 2]) -> [f32; 2] {
+        let cells = self.part.cells;
+        if self.is_mirrored {
+            [as_f32(cells - end), as_f32(cells - first)]
+        } else {
+            [as_f32(first), as_f32(end)]
+        }
+    }
+
+    /// The axes u, v and k.
+    #[inline(always)]
+    fn axes(&self) -> [usize; 3] {
+        below_three(self.axes)
+    }
+
+    /// A step in the order of k as one in that of cells.
+    #[inline(always)]
+    const fn in_order(&self, step: u32, count: u32) -> u32 {
+        if self.is_mirrored { count - 1 - step } else { step }
+    }
+
+    /// A place in cells of the lattice.
+    #[inline(always)]
+    fn corner(&self, at: [f32; 3]) -> [f32; 3] {
+        core::array::from_fn(|axis| self.part.corner[axis] + at[axis] / self.part.scale)
+    }
+
+    /// The cells on u and v that rays may meet beside some on k; `None` if they pass the part.
+    #[inline(always)]
+    fn cells(&self, run: [u32; 2]) -> Option<[[u32; 2]; 2]> {
+        let (planes, cells) = (self.planes(run), self.part.cells);
+        let on = |side| self.bounds.cells(side, planes, 1.0, cells, self.margin);
+        Some([on(0)?, on(1)?])
+    }
+
+    /// The rays that look for hits beside some cells on k.
+    #[inline(always)]
+    fn between<S: Simd>(&self, simd: S, bundle: &Bundle, run: [u32; 2]) -> u64 {
+        let lattice = |plane: f32| self.part.corner[2] + plane / self.part.scale;
+        let [near, far] = self.planes(run);
+        bundle.between(simd, [lattice(near), lattice(far)])
+    }
+
+    /// What each ray may meet between two planes.
+    #[inline(always)]
+    fn reach(&self, bundle: &Bundle, planes: [f32; 2]) -> [Reach; 2] {
+        let ([u, v], [du, dv]) = (&self.start, &bundle.slope);
+        [Reach::new(u, du, planes, self.margin), Reach::new(v, dv, planes, self.margin)]
+    }
+}
+
+impl<'a, const ANY: bool> Tile<'a, ANY> {
+    /// A tile without rays.
+    pub(super) const fn new(
+        brick: &'a Brick<'a>,
+        lattice: &'a Lattice,
+        mesh: &'a TriangleMesh<'a>,
+    ) -> Self {
+        Self { brick, lattice, mesh, bundle: Bundle::EMPTY, tests: Tests::EMPTY, unread: 0 }
+    }
+
+    /// Traces up to 64 rays, and tells which of them: the others need a way of their own.
+    #[inline(always)]
+    pub(super) fn trace<S: Simd>(
+        &mut self,
+        simd: S,
+        rays: &Strided<'_>,
+        first: usize,
+        count: usize,
+    ) -> u64 {
+        self.bundle.load(simd, self.brick, self.lattice, rays, first, count);
+        self.tests.clear();
+        self.unread = self.brick.list_words() as u64 * RAYS as u64;
+        let members = self.bundle.members;
+        if members != 0 && self.go(simd) { members } else { 0 }
+    }
+
+    /// The hit of a ray that was traced, or [`Hit::MISS`].
+    #[inline(always)]
+    pub(super) fn hit(&self, lane: usize) -> Hit {
+        self.tests.hit(lane)
+    }
+
+    /// Goes through the grid; `false` if the tile is too wide for it.
+    #[inline(always)]
+    fn go<S: Simd>(&mut self, simd: S) -> bool {
+        let brick = self.brick;
+        let large = brick.large();
+        if !large.is_empty() {
+            self.test(simd, large, self.bundle.members);
+        }
+        let [u, v, k] = self.bundle.axes();
+        let width = as_f32(brick.width[k] * BLOCK);
+        // Where the rays are inside on k; what the last block has too many is at its beginning if
+        // k is mirrored.
+        let depth = as_f32(brick.last[k] + 1);
+        let inside = if self.bundle.is_mirrored { [width - depth, width] } else { [0.0, depth] };
+        let (first, last) = self.bundle.ends();
+        let planes = [first.max(inside[0]), last.min(inside[1])];
+        if planes[0] > planes[1] {
+            return true;
+        }
+        let Some(bounds) = self.bundle.bounds(planes) else { return false };
+
+        let slice = |plane: f32| whole(plane) / BLOCK;
+        for step in slice(planes[0])..=slice(planes[1]).min(brick.width[k] - 1) {
+            let corner = as_f32(step * BLOCK);
+            let planes = [corner.max(planes[0]), (corner + as_f32(BLOCK)).min(planes[1])];
+            if self.bundle.members == 0 {
+                return true;
+            }
+            let cells = |side: usize, axis: usize| {
+                bounds.cells(side, planes, as_f32(BLOCK), brick.width[axis], self.bundle.margin)
+            };
+            let (Some([u0, u1]), Some([v0, v1])) = (cells(0, u), cells(1, v)) else { continue };
+            for at_v in v0..=v1 {
+                for at_u in u0..=u1 {
+                    let mut block = [0; 3];
+                    block[u] = at_u;
+                    block[v] = at_v;
+                    block[k] =
+                        if self.bundle.is_mirrored { brick.width[k] - 1 - step } else { step };
+                    let Some(chunk) = brick.block(block) else { continue };
+                    if chunk.mask == 0 && chunk.list == 0 {
+                        continue;
+                    }
+                    let corner = [as_f32(at_u * BLOCK), as_f32(at_v * BLOCK), corner];
+                    let part = Part { chunk, corner, scale: 1.0, cells: BLOCK, depth: 2 };
+                    self.through(simd, &part, &bounds);
+                }
+            }
+        }
+        true
+    }
+
+    /// Goes through a part of the grid. It is part of itself where cells are divided, so it is not
+    /// inlined and says once more what vectors it is compiled for.
+    fn through<S: Simd>(&mut self, simd: S, part: &Part<'a>, bounds: &Bounds) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let view = View::new(&self.bundle, part, bounds);
+                if let Some(ids) = part.chunk.list() {
+                    let all = [0, part.cells];
+                    let [u, v] = view.reach(&self.bundle, view.planes(all));
+                    let cells = [0, part.cells - 1];
+                    let rays = u.meets(simd, cells) & v.meets(simd, cells);
+                    self.test(simd, ids, rays & view.between(simd, &self.bundle, all));
+                }
+                let slices = part.cells.div_ceil(4);
+                for step in 0..slices {
+                    self.bricks(simd, &view, view.in_order(step, slices), bounds);
+                }
+            },
+        );
+    }
+
+    /// Goes through a slice of bricks.
+    #[inline(always)]
+    fn bricks<S: Simd>(&mut self, simd: S, view: &View<'a>, slice: u32, bounds: &Bounds) {
+        let Part { chunk, cells, .. } = view.part;
+        let [u, v, k] = view.axes();
+        let run = [4 * slice, (4 * slice + 4).min(cells)];
+        let Some([us, vs]) = view.cells(run) else { return };
+        let bricks = chunk.mask
+            & LAYERS[k][slice as usize & 3][slice as usize & 3]
+            & layer(u, 0, us.map(|cell| cell >> 2))
+            & layer(v, 0, vs.map(|cell| cell >> 2));
+        if bricks == 0 || view.between(simd, &self.bundle, run) == 0 {
+            return;
+        }
+        let mut all_cells = 0;
+        for bit in ones(bricks) {
+            let Some(brick) = chunk.brick(bit) else { continue };
+            all_cells |= mask_of(brick.mask);
+            if let Some(ids) = list(chunk.words, brick.list) {
+                let at = place(bit).map(|brick| 4 * brick);
+                let [in_u, in_v] = view.reach(&self.bundle, view.planes(run));
+                let rays = in_u.meets(simd, [at[u], at[u] + 3]);
+                let rays = rays & in_v.meets(simd, [at[v], at[v] + 3]);
+                self.test(simd, ids, rays & view.between(simd, &self.bundle, run));
+            }
+        }
+        for step in 0..run[1] - run[0] {
+            let cell = run[0] + view.in_order(step, run[1] - run[0]);
+            if all_cells & LAYERS[k][cell as usize & 3][cell as usize & 3] != 0 {
+                self.cells(simd, view, bricks, cell, bounds);
+            }
+        }
+    }
+
+    /// Goes through a slice of cells, those of some bricks.
+    #[inline(always)]
+    fn cells<S: Simd>(
+        &mut self,
+        simd: S,
+        view: &View<'a>,
+        bricks: u64,
+        slice: u32,
+        bounds: &Bounds,
+    ) {
+        let Part { chunk, depth, .. } = view.part;
+        let [u, v, k] = view.axes();
+        let run = [slice, slice + 1];
+        let alive = view.between(simd, &self.bundle, run);
+        let Some([us, vs]) = view.cells(run).filter(|_| alive != 0) else { return };
+        let in_slice = LAYERS[k][slice as usize & 3][slice as usize & 3];
+        let planes = view.planes(run);
+        let mut reach = None;
+        for bit in ones(bricks) {
+            let Some(brick) = chunk.brick(bit) else { continue };
+            let at = place(bit).map(|brick| 4 * brick);
+            let cells = mask_of(brick.mask) & in_slice & layer(u, at[u], us) & layer(v, at[v], vs);
+            if cells == 0 {
+                continue;
+            }
+            let [in_u, in_v] = reach.get_or_insert_with(|| view.reach(&self.bundle, planes));
+            for bit in ones(cells) {
+                let inside = place(bit);
+                let [cell_u, cell_v] = [at[u] + inside[u], at[v] + inside[v]];
+                let rays = in_u.meets(simd, [cell_u; 2]) & in_v.meets(simd, [cell_v; 2]) & alive;
+                if rays == 0 {
+                    continue;
+                }
+                match chunk.content(&brick, bit) {
+                    Some(Content::List(ids)) => self.test(simd, ids, rays),
+                    Some(Content::Chunk(chunk, cells)) if depth > 0 => {
+                        let corner = view.corner([as_f32(cell_u), as_f32(cell_v), planes[0]]);
+                        let (scale, depth) = (view.part.scale * as_f32(cells), depth - 1);
+                        // Entering costs, too: damaged bytes may divide every cell.
+                        self.spend(RAYS as u64 * u64::from(1 + chunk.mask.count_ones()));
+                        self.through(simd, &Part { chunk, corner, scale, cells, depth }, bounds);
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    /// Pays for work; who cannot is done: only damaged bytes ask for so much.
+    #[inline(always)]
+    fn spend(&mut self, work: u64) {
+        match self.unread.checked_sub(work) {
+            Some(rest) => self.unread = rest,
+            None => self.bundle.members = 0,
+        }
+    }
+
+    /// Tests rays against the triangles of a list.
+    #[inline(always)]
+    fn test<S: Simd>(&mut self, simd: S, ids: &[u32], rays: u64) {
+        let rays = rays & self.bundle.members;
+        self.spend(ids.len().max(1) as u64 * u64::from(rays.count_ones()));
+        let rays = rays & self.bundle.members;
+        self.tests.test::<S, ANY>(simd, &mut self.bundle, self.mesh, ids, rays);
+    }
+}
+
+/// The places of the ones of a mask, in order.
+#[inline(always)]
+fn ones(mut mask: u64) -> impl Iterator<Item = u32> {
+    core::iter::from_fn(move || {
+        let bit = mask.trailing_zeros();
+        mask &= mask.wrapping_sub(1);
+        (bit < 64).then_some(bit)
+    })
+}

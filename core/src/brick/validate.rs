@@ -1,0 +1,385 @@
+//! Proof that a foreign blob is a brick grid of its mesh in which every query answers right.
+//!
+//! Block by block, each chunk starts where the one before it ended, and all in it lies in the order in
+//! which [`sort`](super::sort) writes it: everything is read once and nothing is left over. Every
+//! listed triangle belongs where it is listed and is there once; so there are as many of them as the
+//! triangles have cells, bricks and blocks if and only if none is missing: one sum against another.
+//!
+//! A list has no triangle twice if its ids ascend. They need to do so only among triangles of one
+//! shape, as sorting leaves them: a triangle that came twice would have the same shape both times.
+
+use glam::Vec3A;
+
+use super::build::home;
+use super::layout::{
+    BLOCK, Block, CHILD_WORDS, Class, Layout, MAX_CHILDREN, RECORD_WORDS, mask, number, place,
+};
+use super::size::{Settled, settle};
+use super::sort::{Frame, classify, lists};
+use super::{Brick, Chunk, Content, list};
+use crate::aabb::Aabb;
+use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::bump::GRID;
+use crate::cell::{CellRange, Lattice};
+use crate::config::{Config, Method};
+use crate::error::Error;
+use crate::mesh::TriangleMesh;
+
+impl Brick<'_> {
+    /// Whether this is a grid of the mesh in which every query answers right; the error names a byte
+    /// that no build writes so.
+    pub(crate) fn validate(
+        &self,
+        header: &Header,
+        lattice: &Lattice,
+        mesh: &TriangleMesh<'_>,
+    ) -> Result<(), Error> {
+        // The header says what the mesh says.
+        let config = header.config(Config::new(Method::Brick));
+        if config.check().is_err() {
+            return Err(corrupt(core::mem::offset_of!(Header, cell_size)));
+        }
+        let settled = settle(mesh, &config, &mut [])?;
+        if header.skipped_count != settled.census.skipped {
+            return Err(corrupt(core::mem::offset_of!(Header, skipped_count)));
+        }
+        if lattice.bounds() != settled.lattice.bounds() {
+            return Err(corrupt(core::mem::offset_of!(Header, bounds_min)));
+        }
+        if lattice.resolution != settled.lattice.resolution {
+            return Err(corrupt(core::mem::offset_of!(Header, resolution)));
+        }
+        if header.hash_count != 0 {
+            return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
+        }
+
+        // What is listed belongs there, and nothing is missing.
+        let mut check = Check {
+            grid: self,
+            mesh,
+            settled: &settled,
+            last: [0; SHAPES * SHAPES * SHAPES],
+            listed: 0,
+            has_children: false,
+        };
+        check.pool()?;
+        let mut expected = 0;
+        for id in 0..mesh.triangle_count() {
+            expected += check.expected(id);
+            if expected > check.listed {
+                break;
+            }
+        }
+        if check.listed == expected { Ok(()) } else { Err(check.wrong(0)) }
+    }
+}
+
+/// Shapes of a triangle in a block: one or two cells on each axis, or more on any.
+const SHAPES: usize = 9;
+
+const _: () = assert!(MAX_CHILDREN == 2, "a triangle has a shape in each of three domains");
+
+/// What a check runs over.
+struct Check<'a> {
+    grid: &'a Brick<'a>,
+    mesh: &'a TriangleMesh<'a>,
+    settled: &'a Settled,
+    /// For each shape the last id of a list, plus 1.
+    last: [u32; SHAPES * SHAPES * SHAPES],
+    /// Ids in all lists so far.
+    listed: u64,
+    /// Whether any cell is divided.
+    has_children: bool,
+}
+
+/// A block, or a cell that is divided like one.
+struct Domain<'d> {
+    frame: Frame,
+    /// How many domains are around it.
+    depth: usize,
+    within: Within<'d>,
+}
+
+/// Where a domain lies.
+enum Within<'d> {
+    /// It is this block.
+    Lattice([u32; 3]),
+    /// It is this cell of that domain.
+    Domain(&'d Domain<'d>, [u32; 3]),
+}
+
+/// A triangle in a domain.
+struct Placed {
+    range: CellRange,
+    class: Class,
+    /// Its shapes in the domain and in those around it, as one number.
+    shape: usize,
+}
+
+impl Placed {
+    fn new(range: CellRange, class: Class, around: usize) -> Self {
+        let [x, y, z] = core::array::from_fn(|axis| (range.max[axis] - range.min[axis]) as usize);
+        let shape = if x | y | z <= 1 { x | y << 1 | z << 2 } else { SHAPES - 1 };
+        Self { range, class, shape: around * SHAPES + shape }
+    }
+}
+
+impl Domain<'_> {
+    /// A triangle in this domain, if it belongs to it.
+    fn place(&self, settled: &Settled, corners: [Vec3A; 3]) -> Option<Placed> {
+        match self.within {
+            Within::Lattice(block) => {
+                let (range, class) = home(&settled.lattice, settled.most_blocks, corners)?;
+                let first = block.map(|at| at * BLOCK);
+                let is_in = |k: usize| range.min[k] < first[k] + BLOCK && range.max[k] >= first[k];
+                if !(0..3).all(is_in) {
+                    return None;
+                }
+                let min = core::array::from_fn(|k| range.min[k].saturating_sub(first[k]));
+                let max = core::array::from_fn(|k| (range.max[k] - first[k]).min(BLOCK - 1));
+                Some(Placed::new(CellRange { min, max }, class?, 0))
+            }
+            Within::Domain(around, cell) => {
+                let placed = around.place(settled, corners)?;
+                let reach = settled.lattice.reach(&Aabb::of(corners)?);
+                let (range, class) = inside(&self.frame, &reach);
+                let is_in = placed.class == Class::Cells && placed.range.contains(cell);
+                is_in.then(|| Placed::new(range, class, placed.shape))
+            }
+        }
+    }
+}
+
+/// Where a triangle of a divided cell belongs in it.
+fn inside(frame: &Frame, reach: &Aabb) -> (CellRange, Class) {
+    let range = frame.range(reach);
+    (range, classify(range.min, range.max, 1).unwrap_or(Class::Blocks))
+}
+
+impl Check<'_> {
+    /// The error for a word of the pool.
+    fn wrong(&self, at: usize) -> Error {
+        let head = Layout::new(self.settled.lattice.resolution, 0).head_bytes();
+        let at = at.min(self.grid.pool.len().saturating_sub(1));
+        Error::Corrupt { offset: head + (at * size_of::<u32>()) as u64 }
+    }
+
+    /// Checks every list, and that nothing else is in the pool.
+    fn pool(&mut self) -> Result<(), Error> {
+        let pool = self.grid.pool;
+        let wrong = self.wrong(0);
+        let large = list(pool, 1).ok_or(wrong)?;
+        let Settled { lattice, most_blocks, .. } = self.settled;
+        let is_large = |&id: &u32| {
+            let corners = self.mesh.corners(id, Vec3A::new);
+            let home = corners.and_then(|corners| home(lattice, *most_blocks, corners));
+            matches!(home, Some((_, None)))
+        };
+        let ascends = large.windows(2).all(|ids| matches!(ids, [id, next] if id < next));
+        if !ascends || !large.iter().all(is_large) {
+            return Err(wrong);
+        }
+        self.listed += large.len() as u64;
+
+        let mut cursor = 1 + large.len();
+        // Never 0, which the compiler cannot see.
+        let [width, height, _] = self.grid.width.map(|blocks| blocks.max(1));
+        for (number, block) in self.grid.blocks.iter().enumerate() {
+            if *block == Block::default() {
+                continue;
+            }
+            let wrong = corrupt(HEADER_BYTES + number * size_of::<Block>());
+            let number = u32::try_from(number).map_err(|_| wrong)?;
+            let at = [number % width, number / width % height, number / width / height];
+            let chunk = self.grid.block(at).filter(|_| block.base as usize == cursor);
+            let within = Within::Lattice(at);
+            let domain = Domain { frame: Frame::of_block(at), depth: 0, within };
+            cursor += self.chunk(cursor, &chunk.ok_or(wrong)?, &domain)?;
+        }
+        if cursor == pool.len() { Ok(()) } else { Err(self.wrong(cursor)) }
+    }
+
+    /// Checks a chunk and those of its divided cells. All places in it count from `base`, the start of
+    /// the block; so does the answer, where they end.
+    fn chunk(
+        &mut self,
+        base: usize,
+        chunk: &Chunk<'_>,
+        domain: &Domain<'_>,
+    ) -> Result<usize, Error> {
+        let mut record_at = chunk.bricks as usize;
+        let wrong = self.wrong(base + record_at);
+        if chunk.mask == 0 && chunk.list == 0 {
+            return Err(wrong);
+        }
+        let mut cells = 0;
+        for bit in ones(chunk.mask) {
+            cells += ones(mask(chunk.brick(bit).ok_or(wrong)?.mask)).count();
+        }
+
+        // The lists of cells, each where the one before it ended.
+        let mut start_at = record_at + RECORD_WORDS * ones(chunk.mask).count();
+        let mut list_at = start_at + cells + usize::from(cells > 0);
+        let mut is_divided = false;
+        let start = |at: usize| chunk.words.get(at).copied();
+        for bit in ones(chunk.mask) {
+            let brick = chunk.brick(bit).ok_or(wrong)?;
+            let is_empty = brick.mask == [0; 2] && brick.list == 0;
+            if is_empty || brick.cells as usize != start_at {
+                return Err(self.wrong(base + record_at));
+            }
+            for cell in ones(mask(brick.mask)) {
+                let wrong = self.wrong(base + start_at);
+                if start(start_at).is_none_or(|start| (start & !GRID) as usize != list_at) {
+                    return Err(wrong);
+                }
+                match chunk.content(&brick, cell).ok_or(wrong)? {
+                    Content::List(ids) => {
+                        let cell = place(bit << 6 | cell);
+                        self.list(base + list_at, ids, domain, Class::Cells, cell)?;
+                        list_at += ids.len();
+                    }
+                    Content::Chunk(..) => {
+                        is_divided = true;
+                        list_at += CHILD_WORDS;
+                    }
+                }
+                start_at += 1;
+            }
+            record_at += RECORD_WORDS;
+        }
+        if cells > 0 && start(start_at).is_none_or(|end| end as usize != list_at) {
+            return Err(self.wrong(base + start_at));
+        }
+
+        // Those of bricks and of all of it.
+        let of_bricks = ones(chunk.mask)
+            .filter_map(|bit| Some((chunk.brick(bit)?.list, Class::Bricks, place(bit << 6))));
+        for (at, class, cell) in of_bricks.chain([(chunk.list, Class::Blocks, [0; 3])]) {
+            if at == 0 {
+                continue;
+            }
+            let ids = list(chunk.words, at).filter(|_| at as usize == list_at + 1);
+            let ids = ids.ok_or(self.wrong(base + list_at))?;
+            self.list(base + list_at, ids, domain, class, cell)?;
+            list_at += 1 + ids.len();
+        }
+
+        // The divided cells.
+        if !is_divided {
+            return Ok(list_at);
+        }
+        self.has_children = true;
+        for bit in ones(chunk.mask) {
+            let brick = chunk.brick(bit).ok_or(wrong)?;
+            for cell in ones(mask(brick.mask)) {
+                let Some(Content::Chunk(child, count)) = chunk.content(&brick, cell) else {
+                    continue;
+                };
+                if child.bricks as usize != list_at || domain.depth == MAX_CHILDREN {
+                    return Err(self.wrong(base + list_at));
+                }
+                let cell = place(bit << 6 | cell);
+                let frame = domain.frame.child(cell, count);
+                let within = Within::Domain(domain, cell);
+                let inner = Domain { frame, depth: domain.depth + 1, within };
+                list_at = self.chunk(base, &child, &inner)?;
+            }
+        }
+        Ok(list_at)
+    }
+
+    /// Checks a list of a cell, of the brick with that cell, or of all of a domain: some triangles,
+    /// each once, that all belong there.
+    fn list(
+        &mut self,
+        at: usize,
+        ids: &[u32],
+        domain: &Domain<'_>,
+        class: Class,
+        cell: [u32; 3],
+    ) -> Result<(), Error> {
+        let wrong = self.wrong(at);
+        if ids.is_empty() {
+            return Err(wrong);
+        }
+        let shapes = [SHAPES, SHAPES * SHAPES, self.last.len()];
+        let shapes = shapes.get(domain.depth).and_then(|&count| self.last.get_mut(..count));
+        shapes.ok_or(wrong)?.fill(0);
+        let shift = class.shift();
+        for &id in ids {
+            let corners = self.mesh.corners(id, Vec3A::new).ok_or(wrong)?;
+            let placed = domain.place(self.settled, corners).ok_or(wrong)?;
+            let CellRange { min, max } = placed.range;
+            let is_in =
+                |k: usize| (min[k] >> shift..=max[k] >> shift).contains(&(cell[k] >> shift));
+            let last = self.last.get_mut(placed.shape).ok_or(wrong)?;
+            if placed.class != class || !(0..3).all(is_in) || *last > id {
+                return Err(wrong);
+            }
+            *last = id + 1;
+        }
+        self.listed += ids.len() as u64;
+        Ok(())
+    }
+
+    /// How many lists must have a triangle.
+    fn expected(&self, id: u32) -> u64 {
+        let Settled { lattice, most_blocks, .. } = self.settled;
+        let corners = self.mesh.corners(id, Vec3A::new);
+        let home = corners.and_then(|corners| {
+            let reach = lattice.reach(&Aabb::of(corners)?);
+            Some((home(lattice, *most_blocks, corners)?, reach))
+        });
+        match home {
+            Some(((range, Some(Class::Cells)), reach)) if self.has_children => {
+                let parts = |cell: [u32; 3]| {
+                    let block = cell.map(|c| c / BLOCK);
+                    let chunk = self.grid.block(block);
+                    let frame = Frame::of_block(block);
+                    chunk.map_or(1, |chunk| {
+                        parts(&chunk, &frame, cell.map(|c| c % BLOCK), &reach, 0)
+                    })
+                };
+                range.cells().map(parts).sum()
+            }
+            Some(((range, Some(class)), _)) => lists(range.min, range.max, class.shift()),
+            Some(((_, None), _)) => 1,
+            None => 0,
+        }
+    }
+}
+
+/// How many lists of a cell must have a triangle that reaches it: one, or more if it is divided.
+fn parts(chunk: &Chunk<'_>, frame: &Frame, cell: [u32; 3], reach: &Aabb, depth: usize) -> u64 {
+    match content(chunk, cell) {
+        Some(Content::Chunk(child, count)) if depth < MAX_CHILDREN => {
+            let frame = frame.child(cell, count);
+            match inside(&frame, reach) {
+                (range, Class::Cells) => {
+                    range.cells().map(|cell| parts(&child, &frame, cell, reach, depth + 1)).sum()
+                }
+                (range, class) => lists(range.min, range.max, class.shift()),
+            }
+        }
+        _ => 1,
+    }
+}
+
+/// What a cell holds.
+fn content<'a>(chunk: &Chunk<'a>, cell: [u32; 3]) -> Option<Content<'a>> {
+    let number = number(cell);
+    let (brick, bit) = (number >> 6, number & 63);
+    if chunk.mask >> brick & 1 == 0 {
+        return None;
+    }
+    let brick = chunk.brick(brick)?;
+    if mask(brick.mask) >> bit & 1 == 0 { None } else { chunk.content(&brick, bit) }
+}
+
+/// The bits of a mask that are set.
+fn ones(mask: u64) -> impl Iterator<Item = u32> {
+    let first = Some(mask).filter(|&rest| rest != 0);
+    let next = |&rest: &u64| Some(rest & (rest - 1)).filter(|&rest| rest != 0);
+    core::iter::successors(first, next).map(u64::trailing_zeros)
+}

@@ -1,0 +1,202 @@
+//! The walk of one ray: from block to block, in full ones from brick to brick, in full ones from cell
+//! to cell.
+
+use fearless_simd::Simd;
+
+use super::layout::{BLOCK, mask, number};
+use super::{Brick, Chunk, Content, list};
+use crate::cell::as_f32;
+use crate::counters::Tally;
+use crate::dda::{Line, Step};
+use crate::eight::{Eight, LANES};
+use crate::mesh::TriangleMesh;
+use crate::ray::Hit;
+use crate::simd::Kernel;
+use crate::triangle::TriangleTest;
+
+/// A ray, and what it is traced through.
+#[derive(Debug)]
+pub(crate) struct OneRay<'q, T, const ANY: bool> {
+    pub(crate) brick: &'q Brick<'q>,
+    pub(crate) mesh: &'q TriangleMesh<'q>,
+    pub(crate) line: &'q Line,
+    pub(crate) test: &'q TriangleTest,
+    pub(crate) tally: &'q mut T,
+}
+
+/// What a ray has found.
+struct Search<'q, T, const ANY: bool> {
+    mesh: &'q TriangleMesh<'q>,
+    line: &'q Line,
+    test: &'q TriangleTest,
+    tally: &'q mut T,
+    best: Option<Hit>,
+    /// The distance at which the ray now ends.
+    limit: f32,
+    /// A ray meets every list at most once; damaged bytes may list everything in every cell.
+    unread: usize,
+    eight: Eight,
+}
+
+/// A block, or a divided cell.
+#[derive(Clone, Copy)]
+struct Part<'a, 'l> {
+    chunk: Chunk<'a>,
+    line: &'l Line,
+    /// Its first cell on the line's axes.
+    corner: [u32; 3],
+    /// Its last one.
+    last: [u32; 3],
+    /// How often it may be divided: damaged bytes may say for ever.
+    depth: u32,
+}
+
+impl<T: Tally, const ANY: bool> Kernel for OneRay<'_, T, ANY> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { brick, mesh, line, test, tally } = self;
+        let (limit, unread, eight) = (line.end, brick.list_words(), Eight::EMPTY);
+        let mut search: Search<'_, T, ANY> =
+            Search { mesh, line, test, tally, best: None, limit, unread, eight };
+        search.blocks(simd, brick);
+        search.best
+    }
+}
+
+impl<T: Tally, const ANY: bool> Search<'_, T, ANY> {
+    /// Walks from block to block.
+    #[inline(always)]
+    fn blocks<S: Simd>(&mut self, simd: S, brick: &Brick<'_>) {
+        let large = brick.large();
+        if !large.is_empty() {
+            self.test(simd, large);
+        }
+        let line = self.line;
+        let mut walk = line.walk(0.0, as_f32(BLOCK), [0; 3], brick.width.map(|blocks| blocks - 1));
+        loop {
+            self.tally.cell_step();
+            if let Some(chunk) = brick.block(walk.cell) {
+                if let Some(ids) = chunk.list() {
+                    self.test(simd, ids);
+                }
+                if chunk.mask != 0 {
+                    let corner = walk.cell.map(|block| block * BLOCK);
+                    let last =
+                        core::array::from_fn(|axis| (corner[axis] + 15).min(brick.last[axis]));
+                    self.part(simd, &Part { chunk, line, corner, last, depth: 2 }, walk.entered);
+                }
+            }
+            if walk.advance(self.limit) != Step::Inside {
+                return;
+            }
+        }
+    }
+
+    /// Walks from brick to brick, from a distance on.
+    #[inline(always)]
+    fn part<S: Simd>(&mut self, simd: S, part: &Part<'_, '_>, from: f32) {
+        let Part { chunk, line, corner, last, .. } = *part;
+        self.tally.grid_step();
+        let mut walk = line.walk(from, 4.0, corner.map(|c| c >> 2), last.map(|c| c >> 2));
+        loop {
+            self.tally.cell_step();
+            let bit = number(walk.cell.map(|brick| (brick & 3) << 2)) >> 6;
+            if chunk.mask >> bit & 1 != 0
+                && let Some(brick) = chunk.brick(bit)
+            {
+                if let Some(ids) = list(chunk.words, brick.list) {
+                    self.test(simd, ids);
+                }
+                if mask(brick.mask) != 0 {
+                    self.cells(simd, part, &brick, walk.cell.map(|at| at << 2), walk.entered);
+                }
+            }
+            if walk.advance(self.limit) != Step::Inside {
+                return;
+            }
+        }
+    }
+
+    /// Walks from cell to cell of a brick, from a distance on.
+    #[inline(always)]
+    fn cells<S: Simd>(
+        &mut self,
+        simd: S,
+        part: &Part<'_, '_>,
+        brick: &super::layout::Brick,
+        min: [u32; 3],
+        from: f32,
+    ) {
+        let Part { chunk, line, last, depth, .. } = *part;
+        self.tally.grid_step();
+        let max = core::array::from_fn(|axis| (min[axis] + 3).min(last[axis]));
+        let mut walk = line.walk(from, 1.0, min, max);
+        loop {
+            self.tally.cell_step();
+            let bit = number(walk.cell.map(|cell| cell & 3));
+            if mask(brick.mask) >> bit & 1 != 0 {
+                match chunk.content(brick, bit) {
+                    Some(Content::List(ids)) => self.test(simd, ids),
+                    Some(Content::Chunk(chunk, cells)) if depth > 0 => {
+                        let line = line.zoom(walk.cell.map(as_f32), [as_f32(cells); 3]);
+                        let (corner, last) = ([0; 3], [cells - 1; 3]);
+                        let part = Part { chunk, line: &line, corner, last, depth: depth - 1 };
+                        self.divided(simd, &part, walk.entered);
+                    }
+                    _ => {}
+                }
+            }
+            if walk.advance(self.limit) != Step::Inside {
+                return;
+            }
+        }
+    }
+
+    /// Walks through a divided cell. It is one of [`cells`](Self::cells) that calls it, so it is not
+    /// inlined and says once more what vectors it is compiled for.
+    fn divided<S: Simd>(&mut self, simd: S, part: &Part<'_, '_>, from: f32) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                if let Some(ids) = part.chunk.list() {
+                    self.test(simd, ids);
+                }
+                if let Some(walk) = part.line.walk_in(from, part.last.map(|last| last + 1)) {
+                    self.part(simd, part, walk.entered);
+                }
+            },
+        );
+    }
+
+    /// Tests the ray against the triangles of a list.
+    #[inline(always)]
+    fn test<S: Simd>(&mut self, simd: S, ids: &[u32]) {
+        let Some(rest) = self.unread.checked_sub(ids.len()) else {
+            self.limit = f32::NEG_INFINITY;
+            return;
+        };
+        self.unread = rest;
+        self.tally.primitive_tests(ids.len());
+        let (best, limit, line) = (&mut self.best, &mut self.limit, self.line);
+        for ids in ids.chunks(LANES) {
+            self.eight.gather(self.mesh, ids);
+            self.test.test_eight(
+                simd,
+                &self.eight,
+                #[inline(always)]
+                |lane, hit| {
+                    let Some(hit) = ids.get(lane).map(|&id| hit.on(id)) else { return };
+                    if best.is_none_or(|best| hit.is_closer(&best)) {
+                        *best = Some(hit);
+                        *limit = if ANY { f32::NEG_INFINITY } else { line.distance(hit.t) };
+                    }
+                },
+            );
+            if ANY && best.is_some() {
+                return;
+            }
+        }
+    }
+}

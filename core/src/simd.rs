@@ -1,0 +1,331 @@
+//! Which vector instructions queries use: found once, asked for by name, never more than there is.
+//!
+//! A [`Kernel`] is code generic over the vectors of `fearless_simd`; [`dispatch`] compiles it once
+//! for each level that the target may meet and runs the one that was asked for. Every level gives
+//! the same bits: the kernels use nothing that rounds differently, in particular no fused
+//! multiply-add.
+//!
+//! ```text
+//! target          at build time                     at run time
+//! x86-64, i686    Sse2                              Avx2, Avx512 (an Ice Lake's, Zen 4 on)
+//! AArch64         Neon
+//! wasm32          Simd128, if built with +simd128
+//! all others      Scalar
+//! ```
+//!
+//! Here is all the `unsafe` of the crate: the questions to the processor, and the tokens that stand
+//! for its answers.
+
+use fearless_simd::Simd;
+
+/// The vector instructions that queries use. All give the same hits, bit for bit.
+///
+/// What the machine lacks cannot be forced on it: queries then use the nearest level below that it
+/// has.
+///
+/// ```
+/// use hgrid_core::SimdLevel;
+/// let best = SimdLevel::detect();
+/// assert!(best.is_available());
+/// assert_eq!(SimdLevel::available().last(), Some(best));
+/// ```
+#[non_exhaustive]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum SimdLevel {
+    /// No vectors: for targets whose compiler may use none.
+    Scalar,
+    /// Four lanes on `WebAssembly`, in modules built for them.
+    Simd128,
+    /// Four lanes on `AArch64`.
+    Neon,
+    /// Four lanes on x86, where every 64-bit processor has them.
+    Sse2,
+    /// Eight lanes on x86 (the level x86-64-v3).
+    Avx2,
+    /// Eight lanes, twice the registers and masks on x86 (the AVX-512 of Ice Lake and Zen 4).
+    Avx512,
+}
+
+impl SimdLevel {
+    /// Every level of every target, from narrow to wide where one machine may have several.
+    pub const ALL: &'static [Self] =
+        &[Self::Scalar, Self::Simd128, Self::Neon, Self::Sse2, Self::Avx2, Self::Avx512];
+
+    /// The best level of this machine.
+    ///
+    /// Asks the processor the first time, and whether the operating system keeps the wide registers.
+    #[inline]
+    #[must_use]
+    pub fn detect() -> Self {
+        machine::detect()
+    }
+
+    /// The levels of this machine, the best one last.
+    pub fn available() -> impl Iterator<Item = Self> {
+        Self::ALL.iter().copied().filter(|level| level.is_available())
+    }
+
+    /// Whether this machine has this level.
+    #[must_use]
+    pub fn is_available(self) -> bool {
+        machine::BASE <= self && self <= Self::detect()
+    }
+
+    /// Its name in lower case.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Simd128 => "simd128",
+            Self::Neon => "neon",
+            Self::Sse2 => "sse2",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+}
+
+/// Code for any vector instructions.
+///
+/// What `run` calls on vectors must be `#[inline(always)]` down to the last function: only what ends
+/// up inside [`dispatch`] is compiled for the level.
+pub(crate) trait Kernel {
+    type Output;
+
+    fn run<S: Simd>(self, simd: S) -> Self::Output;
+}
+
+/// Runs a kernel at a level, or at the nearest one below that the machine has.
+#[inline(always)]
+pub(crate) fn dispatch<K: Kernel>(level: SimdLevel, kernel: K) -> K::Output {
+    machine::dispatch(level, kernel)
+}
+
+/// x86 with the vectors that its 64-bit processors all have: wider ones are found at run time.
+#[cfg(all(
+    any(target_arch = "x86", target_arch = "x86_64"),
+    target_feature = "sse2",
+    target_feature = "fxsr"
+))]
+mod machine {
+    #[cfg(target_arch = "x86")]
+    use core::arch::x86::{__cpuid, __cpuid_count, _xgetbv};
+    #[cfg(target_arch = "x86_64")]
+    use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
+    use core::sync::atomic::{AtomicU8, Ordering};
+
+    use fearless_simd::Simd;
+    use fearless_simd::x86::{Avx2, Avx512, Sse2};
+
+    use super::{Kernel, SimdLevel};
+
+    pub(super) const BASE: SimdLevel = SimdLevel::Sse2;
+
+    /// The answer of [`ask`], for an instruction that takes a hundred cycles and under a hypervisor
+    /// thousands. Whoever comes first writes what all others would.
+    static DETECTED: AtomicU8 = AtomicU8::new(UNKNOWN);
+    const UNKNOWN: u8 = u8::MAX;
+
+    #[inline]
+    pub(super) fn detect() -> SimdLevel {
+        const AVX2: u8 = SimdLevel::Avx2 as u8;
+        const AVX512: u8 = SimdLevel::Avx512 as u8;
+        match DETECTED.load(Ordering::Relaxed) {
+            AVX512 => SimdLevel::Avx512,
+            AVX2 => SimdLevel::Avx2,
+            UNKNOWN => {
+                let level = ask();
+                DETECTED.store(level as u8, Ordering::Relaxed);
+                level
+            }
+            _ => BASE,
+        }
+    }
+
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "a token is a promise about the machine, kept by `detect`")]
+    pub(super) fn dispatch<K: Kernel>(level: SimdLevel, kernel: K) -> K::Output {
+        match level.min(detect()) {
+            SimdLevel::Avx512 => {
+                // SAFETY: `detect` found every instruction set that `Avx512` names.
+                let simd = unsafe { Avx512::assume_supported() };
+                simd.vectorize(
+                    #[inline(always)]
+                    || kernel.run(simd),
+                )
+            }
+            SimdLevel::Avx2 => {
+                // SAFETY: `detect` found every instruction set that `Avx2` names.
+                let simd = unsafe { Avx2::assume_supported() };
+                simd.vectorize(
+                    #[inline(always)]
+                    || kernel.run(simd),
+                )
+            }
+            _ => {
+                // SAFETY: this module exists where the target promises `sse2` and `fxsr`.
+                let simd = unsafe { Sse2::assume_supported() };
+                simd.vectorize(
+                    #[inline(always)]
+                    || kernel.run(simd),
+                )
+            }
+        }
+    }
+
+    /// Asks the processor for all that the tokens promise, not only for what gives them the name.
+    #[cold]
+    #[allow(unused_unsafe, reason = "__cpuid is safe since Rust 1.94, _xgetbv is not")]
+    #[expect(unsafe_code, reason = "the question to the processor")]
+    fn ask() -> SimdLevel {
+        // An enclave may not ask, and Miri has no processor.
+        if cfg!(any(miri, target_env = "sgx")) {
+            return BASE;
+        }
+        let leaf = |leaf, sub_leaf| {
+            // SAFETY: every processor with SSE2 has `cpuid`, and no leaf of it has side effects.
+            let last = unsafe { __cpuid(leaf & 0x8000_0000) }.eax;
+            // SAFETY: as above.
+            (leaf <= last).then(|| unsafe { __cpuid_count(leaf, sub_leaf) })
+        };
+        let (Some(basic), Some(extended), Some(states), Some(amd)) =
+            (leaf(1, 0), leaf(7, 0), leaf(0xd, 1), leaf(0x8000_0001, 0))
+        else {
+            return BASE;
+        };
+        let has = |word: u32, bits: &[u32]| bits.iter().all(|bit| word >> bit & 1 == 1);
+
+        // xsave and its use by the operating system, then the registers that it saves.
+        if !has(basic.ecx, &[26, 27]) {
+            return BASE;
+        }
+        // SAFETY: the bit above says that the instruction may be used; register 0 always exists.
+        let saved = unsafe { _xgetbv(0) };
+        let saves = |mask| saved & mask == mask;
+        let (xmm_ymm, xmm_ymm_zmm) = (0b110, 0b1110_0110);
+
+        // fma, cmpxchg16b, movbe, popcnt, avx, f16c; bmi1, avx2, bmi2; lzcnt.
+        let is_avx2 = saves(xmm_ymm)
+            && has(basic.ecx, &[12, 13, 22, 23, 28, 29])
+            && has(extended.ebx, &[3, 5, 8])
+            && has(amd.ecx, &[5]);
+        // pclmulqdq, aes, rdrand; avx512f, avx512dq, rdseed, adx, avx512ifma, avx512cd, sha,
+        // avx512bw, avx512vl; avx512vbmi, avx512vbmi2, gfni, vaes, vpclmulqdq, avx512vnni,
+        // avx512bitalg, avx512vpopcntdq; xsaveopt, xsavec, xsaves.
+        let is_avx512 = is_avx2
+            && saves(xmm_ymm_zmm)
+            && has(basic.ecx, &[1, 25, 30])
+            && has(extended.ebx, &[16, 17, 18, 19, 21, 28, 29, 30, 31])
+            && has(extended.ecx, &[1, 6, 8, 9, 10, 11, 12, 14])
+            && has(states.eax, &[0, 1, 3]);
+        if is_avx512 {
+            SimdLevel::Avx512
+        } else if is_avx2 {
+            SimdLevel::Avx2
+        } else {
+            BASE
+        }
+    }
+}
+
+/// All other targets: what they have is known when they are built.
+#[cfg(not(all(
+    any(target_arch = "x86", target_arch = "x86_64"),
+    target_feature = "sse2",
+    target_feature = "fxsr"
+)))]
+mod machine {
+    use fearless_simd::Simd;
+
+    use super::{Kernel, SimdLevel};
+
+    pub(super) const BASE: SimdLevel =
+        if cfg!(all(target_arch = "aarch64", target_feature = "neon")) {
+            SimdLevel::Neon
+        } else if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
+            SimdLevel::Simd128
+        } else {
+            SimdLevel::Scalar
+        };
+
+    #[inline]
+    pub(super) const fn detect() -> SimdLevel {
+        BASE
+    }
+
+    #[inline(always)]
+    pub(super) fn dispatch<K: Kernel>(_: SimdLevel, kernel: K) -> K::Output {
+        let simd = token();
+        simd.vectorize(
+            #[inline(always)]
+            || kernel.run(simd),
+        )
+    }
+
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "a token is a promise about the machine, made by the target")]
+    fn token() -> impl Simd {
+        // SAFETY: this function exists where the target promises `neon`.
+        unsafe { fearless_simd::aarch64::Neon::assume_supported() }
+    }
+
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    #[inline(always)]
+    fn token() -> impl Simd {
+        fearless_simd::wasm32::WasmSimd128::assume_supported()
+    }
+
+    #[cfg(not(any(
+        all(target_arch = "aarch64", target_feature = "neon"),
+        all(target_arch = "wasm32", target_feature = "simd128")
+    )))]
+    #[inline(always)]
+    const fn token() -> impl Simd {
+        fearless_simd::Fallback::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+
+    struct Name;
+
+    impl Kernel for Name {
+        type Output = alloc::string::String;
+
+        fn run<S: Simd>(self, _: S) -> Self::Output {
+            core::any::type_name::<S>().rsplit(':').next().unwrap_or_default().to_lowercase()
+        }
+    }
+
+    #[test]
+    fn a_level_runs_as_itself_or_as_the_next_below() {
+        let available: Vec<_> = SimdLevel::available().collect();
+        assert_eq!(available.first(), Some(&machine::BASE));
+        assert_eq!(available.last(), Some(&SimdLevel::detect()));
+        for &level in SimdLevel::ALL {
+            let below = available.iter().rfind(|&&available| available <= level);
+            let runs = below.unwrap_or(&machine::BASE);
+            let name = if *runs == SimdLevel::Scalar { "fallback" } else { runs.name() };
+            assert!(dispatch(level, Name).ends_with(name), "{level:?}");
+        }
+    }
+
+    #[test]
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    fn detection_agrees_with_the_standard_librarys() {
+        extern crate std;
+        let avx512 = std::is_x86_feature_detected!("avx512vl")
+            && std::is_x86_feature_detected!("avx512vpopcntdq")
+            && std::is_x86_feature_detected!("xsaves")
+            && std::is_x86_feature_detected!("sha");
+        let avx2 = std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("movbe");
+        let level = SimdLevel::detect();
+        assert!(level < SimdLevel::Avx512 || avx512, "{level:?}");
+        assert!(level < SimdLevel::Avx2 || avx2, "{level:?}");
+        assert!(level >= SimdLevel::Avx2 || !avx2, "{level:?}");
+    }
+}

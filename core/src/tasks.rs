@@ -1,0 +1,242 @@
+//! Work cut into tasks that the caller runs, on threads of the caller's if it has any.
+//!
+//! Every task owns what it changes and is taken out of its slot by whoever runs it: a task that is
+//! run twice finds the slot empty, one that was never run is still there at the end. Words that all
+//! tasks write, each its own but in no order, are [`Shared`].
+//!
+//! A processor without atomic operations has one core: there the build runs its tasks itself.
+
+use core::fmt;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use crate::error::Error;
+
+/// What a build hands to the caller's loop: does the task with a number.
+pub type Task<'t> = dyn Fn(u32) + Sync + 't;
+
+/// How a build runs its tasks: the caller's loop, over the caller's threads.
+///
+/// The grid does not depend on it, to the bit.
+///
+/// ```
+/// use hgrid_core::{Block, Config, Grid, Method, Parallel, TriangleMesh, sizes_parallel};
+/// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+/// let config = Config::new(Method::Brick);
+///
+/// let run = |count: u32, task: &(dyn Fn(u32) + Sync)| {
+///     std::thread::scope(|scope| {
+///         for index in 0..count {
+///             scope.spawn(move || task(index));
+///         }
+///     });
+/// };
+/// let parallel = Parallel { tasks: 4, run: &run };
+/// let sizes = sizes_parallel(&mesh, &config, &mut [], &parallel)?;
+/// let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+/// let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+/// let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+/// let grid = Grid::build_parallel(mesh, &config, index, scratch, &parallel)?;
+/// assert_eq!(grid.mesh().triangle_count(), 1);
+/// # Ok::<(), hgrid_core::Error>(())
+/// ```
+#[derive(Clone, Copy)]
+pub struct Parallel<'p> {
+    /// The most tasks that run at once, from 1 to [`MAX_TASKS`](Self::MAX_TASKS): what is outside
+    /// counts as the nearest of both. Each takes scratch of its own.
+    pub tasks: u32,
+    /// Calls the task with every number below the count exactly once, in any order, and returns when
+    /// all calls have returned. It is called several times in a build, with counts up to
+    /// [`tasks`](Self::tasks).
+    ///
+    /// On targets without atomic operations it is never called.
+    pub run: &'p dyn for<'t> Fn(u32, &'t Task<'t>),
+}
+
+impl fmt::Debug for Parallel<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Parallel").field("tasks", &self.tasks).finish_non_exhaustive()
+    }
+}
+
+impl Parallel<'_> {
+    /// The most tasks at once.
+    pub const MAX_TASKS: u32 = 64;
+
+    /// One task after the other.
+    pub(crate) const SERIAL: Parallel<'static> = Parallel {
+        tasks: 1,
+        run: &|count, task| {
+            for index in 0..count {
+                task(index);
+            }
+        },
+    };
+}
+
+/// What is in the slot of a task.
+enum State<T, R> {
+    /// There is no such task, or it is being run.
+    Nothing,
+    Task(T),
+    Result(R),
+}
+
+/// Runs tasks and returns what each of them returns, in their order. An error if the caller's loop
+/// did not run each of them once.
+pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
+    parallel: &Parallel<'_>,
+    tasks: impl Iterator<Item = T>,
+    work: impl Fn(T) -> R + Sync,
+) -> Result<[Option<R>; N], Error> {
+    let mut tasks = tasks.fuse();
+    let mut count = 0;
+    let slots: [Slot<State<T, R>>; N] = core::array::from_fn(|_| {
+        Slot::new(tasks.next().map_or(State::Nothing, |task| {
+            count += 1;
+            State::Task(task)
+        }))
+    });
+    let is_broken = AtomicBool::new(false);
+    let step = |index: u32| {
+        let slot = slots.get(index as usize);
+        let state = slot.and_then(|slot| slot.replace(State::Nothing)).unwrap_or(State::Nothing);
+        match (state, slot) {
+            (State::Task(task), Some(slot)) => {
+                let result = work(task);
+                // Whoever comes in between finds nothing, and says so.
+                if slot.replace(State::Result(result)).is_none() {
+                    is_broken.store(true, Ordering::Relaxed);
+                }
+            }
+            _ => is_broken.store(true, Ordering::Relaxed),
+        }
+    };
+    each(parallel, count, &step);
+    let results = slots.map(|slot| match slot.into_inner() {
+        State::Result(result) => Some(result),
+        _ => None,
+    });
+    let done = results.iter().filter(|result| result.is_some()).count();
+    if is_broken.into_inner() || done != count as usize {
+        return Err(Error::InvalidParallelFor);
+    }
+    Ok(results)
+}
+
+#[cfg(target_has_atomic = "32")]
+mod with_atomics {
+    use core::sync::atomic::{AtomicU32, Ordering};
+
+    use zerocopy::{FromBytes as _, IntoBytes as _};
+
+    use super::Parallel;
+
+    /// What tasks take along and bring back.
+    pub(crate) use core::marker::Send as Portable;
+
+    /// A place from which one of several threads takes something.
+    pub(super) struct Slot<T>(spin::Mutex<T>);
+
+    impl<T> Slot<T> {
+        pub(super) const fn new(value: T) -> Self {
+            Self(spin::Mutex::new(value))
+        }
+
+        /// What was there, if nobody else is looking: only who runs the same task could be.
+        pub(super) fn replace(&self, value: T) -> Option<T> {
+            Some(core::mem::replace(&mut *self.0.try_lock()?, value))
+        }
+
+        pub(super) fn into_inner(self) -> T {
+            self.0.into_inner()
+        }
+    }
+
+    pub(super) fn each(parallel: &Parallel<'_>, count: u32, step: &(dyn Fn(u32) + Sync)) {
+        (parallel.run)(count, step);
+    }
+
+    /// Words that several tasks write, no two of them the same.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Shared<'w>(&'w [AtomicU32]);
+
+    impl<'w> Shared<'w> {
+        pub(crate) fn new(words: &'w mut [u32]) -> Self {
+            let words = <[AtomicU32]>::mut_from_bytes(words.as_mut_bytes());
+            Self(words.map_or(&[], |words| words))
+        }
+
+        /// Writes words that lie there, if they do.
+        #[inline(always)]
+        pub(crate) fn set<const N: usize>(&self, at: u32, words: [u32; N]) {
+            let slots = self.0.get(at as usize..).and_then(<[_]>::first_chunk::<N>);
+            for (slot, word) in slots.into_iter().flatten().zip(words) {
+                slot.store(word, Ordering::Relaxed);
+            }
+        }
+    }
+}
+#[cfg(target_has_atomic = "32")]
+pub(crate) use with_atomics::Shared;
+#[cfg(target_has_atomic = "32")]
+use with_atomics::{Portable, Slot, each};
+
+#[cfg(not(target_has_atomic = "32"))]
+mod without_atomics {
+    use core::cell::{Cell, RefCell};
+
+    use super::Parallel;
+
+    /// What tasks take along and bring back: on one core anything.
+    pub(crate) trait Portable {}
+
+    impl<T> Portable for T {}
+
+    /// A place from which one of several tasks takes something.
+    pub(super) struct Slot<T>(RefCell<T>);
+
+    impl<T> Slot<T> {
+        pub(super) const fn new(value: T) -> Self {
+            Self(RefCell::new(value))
+        }
+
+        /// What was there, if nobody else is looking.
+        pub(super) fn replace(&self, value: T) -> Option<T> {
+            Some(core::mem::replace(&mut *self.0.try_borrow_mut().ok()?, value))
+        }
+
+        pub(super) fn into_inner(self) -> T {
+            self.0.into_inner()
+        }
+    }
+
+    pub(super) fn each(_: &Parallel<'_>, count: u32, step: &dyn Fn(u32)) {
+        for index in 0..count {
+            step(index);
+        }
+    }
+
+    /// Words that several tasks write, no two of them the same.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Shared<'w>(&'w [Cell<u32>]);
+
+    impl<'w> Shared<'w> {
+        pub(crate) fn new(words: &'w mut [u32]) -> Self {
+            Self(Cell::from_mut(words).as_slice_of_cells())
+        }
+
+        /// Writes words that lie there, if they do.
+        #[inline(always)]
+        pub(crate) fn set<const N: usize>(&self, at: u32, words: [u32; N]) {
+            let slots = self.0.get(at as usize..).and_then(<[_]>::first_chunk::<N>);
+            for (slot, word) in slots.into_iter().flatten().zip(words) {
+                slot.set(word);
+            }
+        }
+    }
+}
+#[cfg(not(target_has_atomic = "32"))]
+pub(crate) use without_atomics::Shared;
+#[cfg(not(target_has_atomic = "32"))]
+use without_atomics::{Portable, Slot, each};

@@ -1,0 +1,310 @@
+//! Many rays at once answer as each of them alone, bit for bit: whatever the caller says of them,
+//! however they lie in memory, with every kind of vectors.
+
+use hgrid_core::{
+    BatchField, Coherence, Config, Error, Grid, Hit, Method, Ray, SimdLevel, Strided, StridedMut,
+};
+use hgrid_lab::camera::{Camera, Up, View};
+use hgrid_tests::meshes::{Mesh, ball, soup};
+use hgrid_tests::owned::Owned;
+use hgrid_tests::random::Random;
+use hgrid_tests::{methods, oracle};
+
+const COHERENCES: [Coherence; 2] = [Coherence::Coherent, Coherence::Incoherent];
+
+/// A ball in a soup of small and large triangles, with a crowd on it.
+fn scene() -> Mesh {
+    let mut mesh = ball(12, 1.0);
+    mesh.append(&soup(300, 0.1, 5));
+    mesh.append(&soup(6, 2.0, 7));
+    mesh.append(&soup(500, 0.05, 11).scaled(0.02).map(|[x, y, z]| [x + 0.9, y, z]));
+    mesh
+}
+
+/// A tile of a camera's pixels, 64 rays in rows of 8.
+fn tile(bounds: ([f32; 3], [f32; 3]), view: View, [left, top]: [u16; 2]) -> Vec<Ray> {
+    let camera = Camera::framing(bounds, view, Up::Y);
+    let ray = |i: u16| camera.ray(left + i % 8, top + i / 8, 64);
+    (0..64).map(ray).collect()
+}
+
+/// What no kernel for many rays may stumble over.
+fn odd_rays() -> Vec<Ray> {
+    let sound = Ray::new([0.1, 0.2, 3.0], [0.01, 0.02, -1.0]);
+    let mut rays = vec![
+        sound,
+        Ray { direction: [0.0, -0.0, 0.0], ..sound },
+        Ray { direction: [f32::NAN, 0.0, 1.0], ..sound },
+        Ray { origin: [0.0, f32::NAN, 0.0], ..sound },
+        Ray { origin: [0.0, f32::INFINITY, 0.0], ..sound },
+        Ray { t_min: f32::NAN, ..sound },
+        Ray { t_max: f32::NAN, ..sound },
+        Ray { t_min: 5.0, t_max: 1.0, ..sound },
+        Ray { t_min: 1.5, t_max: 1.5, ..sound },
+        Ray { t_min: f32::NEG_INFINITY, ..sound },
+        Ray { t_min: f32::INFINITY, ..sound },
+        Ray { direction: sound.direction.map(|c| c * 1e-30), ..sound },
+        Ray { direction: sound.direction.map(|c| c * 1e30), ..sound },
+        Ray::new([0.0; 3], [1e-45, 0.0, 1.0]),
+        Ray::new([1e6, 2e6, 3e6], [-1.0, -2.0, -3.0]),
+        Ray::new([-1e20, 0.0, 0.0], [1.0, 0.0, 0.0]),
+    ];
+    for axis in 0..3 {
+        for along in [1.0, -1.0] {
+            let mut direction = [0.0_f32, -0.0, -0.0];
+            direction[axis] = along;
+            let inside = [0.25, -0.5, 0.0];
+            let mut outside = inside;
+            outside[axis] = -2.0 * along;
+            rays.extend([Ray::new(outside, direction), Ray::new(inside, direction)]);
+        }
+    }
+    rays
+}
+
+/// Rays of every kind: tiles, tiles with strangers in them, random ones, odd ones alone and mixed.
+fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
+    let mut random = Random(73);
+    let mut rays = Vec::new();
+    for view in [View::Front, View::ThreeQuarter] {
+        for corner in [[0, 0], [24, 24], [32, 24], [40, 8]] {
+            rays.extend(tile(bounds, view, corner));
+        }
+    }
+    // One origin and all directions; one direction and all origins; ends before and behind.
+    rays.extend((0..64).map(|_| Ray::new([0.1, 0.2, 0.3], random.point())));
+    rays.extend((0..64).map(|_| Ray::new(random.point().map(|c| 2.0 * c), [0.3, -0.5, 0.7])));
+    rays.extend(
+        (0..64)
+            .map(|i| Ray { t_max: i as f32 * 0.1, ..Ray::new([-3.0, 0.1, 0.1], [1.0, 0.01, 0.0]) }),
+    );
+    rays.extend((0..100).map(|_| Ray::new(random.point().map(|c| 3.0 * c), random.point())));
+    rays.extend(odd_rays());
+    // Strangers among neighbours: other octants, other axes, and no rays at all.
+    let odd = odd_rays();
+    for corner in [[16, 24], [24, 32], [32, 32]] {
+        let mut mixed = tile(bounds, View::Front, corner);
+        for slot in &mut mixed {
+            match random.below(8) {
+                0 => *slot = odd[random.below(odd.len())],
+                1 => *slot = Ray { direction: slot.direction.map(|c| -c), ..*slot },
+                2 => slot.direction.rotate_left(1),
+                3 => slot.t_max = random.unit() * 4.0,
+                4 => *slot = Ray::new(random.point(), random.point()),
+                _ => {}
+            }
+        }
+        rays.extend(mixed);
+    }
+    assert!(rays.len() >= 1000, "{}", rays.len());
+    rays
+}
+
+/// A hit, or none, in bits: -0.0 is not 0.0.
+fn bits(hit: &Hit) -> [u32; 4] {
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
+}
+
+fn alone(grid: &Grid<'_>, rays: &[Ray]) -> Vec<Hit> {
+    rays.iter().map(|ray| grid.intersect(ray).unwrap_or(Hit::MISS)).collect()
+}
+
+fn levels() -> Vec<SimdLevel> {
+    SimdLevel::available().collect()
+}
+
+#[test]
+fn every_method_coherence_level_and_number_of_rays_agrees() {
+    let mesh = scene();
+    let view = mesh.view();
+    for config in methods::configs() {
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let rays = rays(grid.bounds());
+        let expected = alone(&grid, &rays);
+        for (ray, hit) in rays.iter().zip(&expected).step_by(7) {
+            assert_eq!(oracle::brute_force(&grid, ray).unwrap_or(Hit::MISS), *hit, "{ray:?}");
+        }
+        let hits = expected.iter().filter(|hit| **hit != Hit::MISS).count();
+        assert!(hits > 200 && hits < rays.len() - 200, "{hits} of {}", rays.len());
+        // Other methods have no vectors in them.
+        let levels =
+            if config.method == Method::Brick { levels() } else { vec![SimdLevel::detect()] };
+        for (level, coherence) in levels.into_iter().flat_map(|l| COHERENCES.map(|c| (l, c))) {
+            let grid = grid.with_simd(level);
+            for n in [0, 1, 7, 63, 64, 65, 1000] {
+                // From another ray on, so that tiles are cut at other places.
+                for from in [0, rays.len() - n] {
+                    let what = format!("{:?} {level:?} {coherence:?} {n} {from}", config.method);
+                    let rays = &rays[from..from + n];
+                    let expected = &expected[from..from + n];
+                    let mut hits = vec![Hit { t: 7.0, u: 7.0, v: 7.0, primitive: 7 }; n];
+                    let mut occluded = vec![7_u8; n];
+                    let strided = Strided::new(rays);
+                    grid.intersect_n(&strided, &mut StridedMut::new(&mut hits), coherence).unwrap();
+                    grid.occluded_n(&strided, &mut StridedMut::new(&mut occluded), coherence)
+                        .unwrap();
+                    for (i, (hit, expected)) in hits.iter().zip(expected).enumerate() {
+                        assert_eq!(bits(hit), bits(expected), "{what}: ray {i} {:?}", rays[i]);
+                        let is_hit = u8::from(*expected != Hit::MISS);
+                        assert_eq!(occluded[i], is_hit, "{what}: ray {i} {:?}", rays[i]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// One ray at a time, too, gives the same bits with all vectors.
+/// What a ray moves in a unit of `t` may be far from what a cell is wide.
+#[test]
+fn rays_of_any_speed_agree_at_any_scale() {
+    for scale in [1e-30_f32, 1e-20, 1e-10, 1.0, 1e10, 1e20, 1e30] {
+        let mesh = scene().scaled(scale);
+        let view = mesh.view();
+        let owned = Owned::build(&view, &Config::new(Method::Brick)).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let (mut hits, mut counts) = ([Hit::MISS; 64], Vec::new());
+        for length in [1e-37_f32, 1e-30, 1e-20, 1e-10, 1.0, 1e10, 1e20, 5e29, 1e37] {
+            let at_speed = |ray: &Ray| Ray { direction: ray.direction.map(|c| c * length), ..*ray };
+            let straight = |i: u16| {
+                let place = |i: u16| (f32::from(i) - 3.5) * 0.2 * scale;
+                let origin = [place(i % 8), place(i / 8), 3.0 * scale];
+                at_speed(&Ray::new(origin, [0.0, 0.0, -1.0]))
+            };
+            let tilted: Vec<_> =
+                tile(grid.bounds(), View::Front, [24, 24]).iter().map(at_speed).collect();
+            let straight: Vec<_> = (0..64).map(straight).collect();
+            for rays in [tilted, straight] {
+                let answers = &mut StridedMut::new(&mut hits);
+                grid.intersect_n(&Strided::new(&rays), answers, Coherence::Coherent).unwrap();
+                assert_eq!(hits.as_slice(), alone(&grid, &rays), "{scale:e} {length:e}");
+                counts.push(hits.iter().filter(|hit| **hit != Hit::MISS).count());
+            }
+        }
+        let most = counts.iter().filter(|&&count| count > 10).count();
+        assert!(most >= counts.len() / 3, "{scale:e}: {counts:?}");
+    }
+}
+
+#[test]
+fn single_rays_agree_at_every_level() {
+    let mesh = scene();
+    let view = mesh.view();
+    let owned = Owned::build(&view, &Config::new(Method::Brick)).unwrap();
+    let grid = owned.open(&view).unwrap();
+    let rays = rays(grid.bounds());
+    for level in levels() {
+        let grid = grid.with_simd(level);
+        for (i, ray) in rays.iter().enumerate() {
+            if i % 9 == 0 {
+                oracle::check(&grid, ray);
+            }
+        }
+    }
+}
+
+/// The bytes of elements, one every `stride` bytes, junk between them and nothing behind the last.
+fn scatter<const N: usize>(elements: impl Iterator<Item = [u8; N]>, stride: usize) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for (i, element) in elements.enumerate() {
+        bytes.resize(i * stride, 0xa5);
+        bytes.extend(element);
+    }
+    bytes
+}
+
+fn ray_bytes(ray: &Ray) -> [u8; 32] {
+    let Ray { origin: [a, b, c], t_min, direction: [d, e, f], t_max } = *ray;
+    let words = [a, b, c, t_min, d, e, f, t_max].map(f32::to_ne_bytes);
+    words.concat().try_into().expect("eight words")
+}
+
+fn hit_bytes(hit: &Hit) -> [u8; 16] {
+    bits(hit).map(u32::to_ne_bytes).concat().try_into().expect("four words")
+}
+
+#[test]
+fn elements_may_lie_anywhere_and_what_is_between_them_stays() {
+    let mesh = scene();
+    let view = mesh.view();
+    for config in methods::configs() {
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let rays = &rays(grid.bounds())[512..712];
+        let expected = alone(&grid, rays);
+        for (ray_stride, hit_stride, byte_stride) in [(32, 17, 2), (33, 16, 1), (48, 64, 100)] {
+            let bytes = scatter(rays.iter().map(ray_bytes), ray_stride);
+            let strided = Strided { bytes: &bytes, stride: ray_stride, count: rays.len() };
+            for coherence in COHERENCES {
+                let last = rays.len() - 1;
+                let mut hits = vec![0xa5_u8; last * hit_stride + 16];
+                let mut answers =
+                    StridedMut { bytes: &mut hits, stride: hit_stride, count: rays.len() };
+                grid.intersect_n(&strided, &mut answers, coherence).unwrap();
+                let expected_hits = scatter(expected.iter().map(hit_bytes), hit_stride);
+                assert!(hits == expected_hits, "{:?} {coherence:?} {hit_stride}", config.method);
+
+                let mut occluded = vec![0xa5_u8; last * byte_stride + 1];
+                let mut answers =
+                    StridedMut { bytes: &mut occluded, stride: byte_stride, count: rays.len() };
+                grid.occluded_n(&strided, &mut answers, coherence).unwrap();
+                let is_hit = expected.iter().map(|hit| [u8::from(*hit != Hit::MISS)]);
+                assert!(
+                    occluded == scatter(is_hit, byte_stride),
+                    "{:?} {coherence:?}",
+                    config.method
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn arrays_that_cannot_be_are_refused_and_nothing_is_written() {
+    let mesh = ball(3, 1.0);
+    let view = mesh.view();
+    let owned = Owned::build(&view, &Config::new(Method::Brick)).unwrap();
+    let grid = owned.open(&view).unwrap();
+    let sound = Ray::new([0.1, 0.2, 3.0], [0.0, 0.0, -1.0]);
+    let bytes = scatter([sound; 3].iter().map(ray_bytes), 32);
+    let (no_rays, no_answers) =
+        (Err(Error::InvalidBatch(BatchField::Rays)), Err(Error::InvalidBatch(BatchField::Answers)));
+    // Bytes, stride and count of the rays, then of the hits.
+    for (rays, hits, expected) in [
+        ((96, 32, 3), (48, 16, 3), Ok(())),
+        ((0, 0, 0), (0, 0, 0), Ok(())),
+        ((96, 0, 0), (48, 0, 0), Ok(())),
+        ((32, 0, 1), (16, 16, 1), no_rays),
+        ((96, 31, 3), (48, 16, 3), no_rays),
+        ((95, 32, 3), (48, 16, 3), no_rays),
+        ((96, 33, 3), (48, 16, 3), no_rays),
+        ((96, usize::MAX, 3), (48, 16, 3), no_rays),
+        ((96, 32, usize::MAX), (48, 16, usize::MAX), no_rays),
+        ((96, 32, 3), (48, 15, 3), no_answers),
+        ((96, 32, 3), (47, 16, 3), no_answers),
+        ((96, 32, 3), (48, 17, 3), no_answers),
+        ((96, 32, 3), (48, usize::MAX, 3), no_answers),
+        ((96, 32, 3), (48, 16, 2), no_answers),
+        ((64, 32, 2), (48, 16, 3), no_answers),
+        ((96, 32, 3), (48, 16, 0), no_answers),
+    ] {
+        for coherence in COHERENCES {
+            let mut answers = [0xa5_u8; 48];
+            let (length, stride, count) = rays;
+            let rays = Strided { bytes: &bytes[..length], stride, count };
+            let (length, stride, count) = hits;
+            let mut strided = StridedMut { bytes: &mut answers[..length], stride, count };
+            assert_eq!(grid.intersect_n(&rays, &mut strided, coherence), expected, "{hits:?}");
+            let is_untouched = answers.iter().all(|&byte| byte == 0xa5);
+            assert_eq!(is_untouched, expected.is_err() || count == 0);
+        }
+    }
+    let rays = Strided { bytes: &bytes, stride: 32, count: 3 };
+    for (length, stride, count) in [(3, 0, 3), (2, 1, 3), (3, 2, 3), (3, 1, 2)] {
+        let mut answers = [7_u8; 3];
+        let mut strided = StridedMut { bytes: &mut answers[..length], stride, count };
+        let result = grid.occluded_n(&rays, &mut strided, Coherence::Coherent);
+        assert_eq!((result, answers), (no_answers, [7; 3]));
+    }
+}

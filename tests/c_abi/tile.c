@@ -1,0 +1,43 @@
+/* The examples in the header's functions, put in place of FUNCTIONS and run: one triangle fills the
+ * lower left half of a tile. POSIX threads are what one of them is about. */
+
+#include "hgrid.h"
+
+#include <math.h>
+#include <pthread.h>
+
+FUNCTIONS
+
+int main(void)
+{
+    static const float positions[3][3] = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}};
+    static const uint32_t indices[1][3] = {{0, 1, 2}};
+    HGRID_ALIGNED static unsigned char index[HGRID_INDEX_BOUND(1)], scratch[HGRID_SCRATCH_BOUND(1)];
+    hgrid_mesh mesh = HGRID_MESH_INIT;
+    mesh.positions = positions, mesh.vertex_count = 3;
+    mesh.indices = indices, mesh.triangle_count = 1;
+    hgrid_grid grid;
+    if (hgrid_build(&mesh, NULL, index, sizeof index, scratch, sizeof scratch, &grid, NULL))
+        return 1;
+
+    hgrid_ray rays[128];
+    float depth[64];
+    for (int i = 0; i < 128; i++) {
+        const hgrid_ray ray = {{(float)(i % 8) + 0.25f, (float)(i / 8) + 0.25f, 1}, 0, {0, 0, -1},
+                               INFINITY};
+        rays[i] = ray;
+    }
+    if (trace_tile(&grid, rays, depth) != 36)
+        return 2;
+    for (int i = 0; i < 64; i++)
+        if (i % 8 + i / 8 < 8 ? depth[i] != 1 : depth[i] != INFINITY)
+            return 3;
+    if (count_lit(&grid, rays, 100) != 100 - 36)
+        return 4;
+
+    HGRID_ALIGNED static unsigned char more_index[1 << 16], more_scratch[1 << 16];
+    if (build_on_threads(&mesh, more_index, sizeof more_index, more_scratch, sizeof more_scratch,
+                         &grid))
+        return 5;
+    return trace_tile(&grid, rays, depth) == 36 ? 0 : 6;
+}
