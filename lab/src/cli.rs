@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use hgrid_core::{Config, Method};
+use hgrid_core::{Config, Method, Parallel};
 
 use crate::camera::{Camera, Point, Up, View};
+use crate::compare::peers::Peer;
 use crate::heat::Counter;
 use crate::scene::Scene;
 
@@ -26,6 +27,8 @@ Examples:
   hgrid render bunny.ply --shading heat      what each ray costs, from blue to red
   hgrid table bunny.ply dragon.ply           all methods side by side, as in the paper
   hgrid figures buddha.ply -o pictures       the paper's charts, as SVG and PNG
+  hgrid animate bunny.ply --threads 4        a moving mesh, built again for every frame
+  hgrid compare bunny.ply dragon.ply         hgrid and other ray tracers, over the same rays
   hgrid help render                          all about one command";
 
 const RENDER_EXAMPLES: &str = "\
@@ -48,7 +51,8 @@ Examples:
   hgrid table dragon.ply --markdown > table.md
   hgrid table dragon.ply --json > table.json     every single time, and the machine
 
-Close what else is running: the times are those of one thread, and they believe the clock.";
+Close what else is running: the times are those of one thread, but for builds with --threads, and
+they believe the clock.";
 
 const FIGURES_EXAMPLES: &str = "\
 Examples:
@@ -58,6 +62,23 @@ Examples:
 
 The folder then holds figure1 (times against density, one scene) and figure2 (memory and times of
 every scene and method) as .svg, as .png and, the numbers alone, as .json.";
+
+const COMPARE_EXAMPLES: &str = "\
+Examples:
+  hgrid compare bunny.ply dragon.ply buddha.ply
+  hgrid compare dragon.ply --methods one-level --peers embree-low,embree-medium
+  hgrid compare bunny.ply dragon.ply --markdown --json compare.json -o pictures
+
+This needs a program with the peers in it; lab/COMPARE.md tells how they are set up and measured:
+  apt-get install libembree-dev g++
+  RUSTFLAGS='-C target-cpu=native' cargo run --release -p hgrid-lab --features peers -- compare ...";
+
+const ANIMATE_EXAMPLES: &str = "\
+Examples:
+  hgrid animate dragon.ply                   30 frames, built and rendered with one thread
+  hgrid animate dragon.ply --frames 100 --threads 4
+  hgrid animate bunny.ply --method one-level --size 512
+  hgrid animate bunny.ply -o frames          every frame as a picture, too";
 
 const SCENES: &str = "\
 Scenes:
@@ -94,6 +115,12 @@ pub enum Command {
     /// Measures and draws the paper's figures: times against density, and bars for every method
     #[command(after_help = [FIGURES_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
     Figures(FiguresArgs),
+    /// Deforms a mesh and builds and renders it again for every frame, in the same memory
+    #[command(after_help = [ANIMATE_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
+    Animate(AnimateArgs),
+    /// Measures every method and other ray tracers, its peers, over the same rays
+    #[command(after_help = [COMPARE_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
+    Compare(CompareArgs),
 }
 
 /// What to render and how.
@@ -136,6 +163,9 @@ pub struct RenderArgs {
     #[arg(long, value_name = "TIMES", default_value_t = 1,
           value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub builders: Builders,
     /// Print the numbers as a JSON object
     #[arg(long)]
     pub json: bool,
@@ -196,6 +226,66 @@ pub struct FiguresArgs {
     pub race: Race,
 }
 
+/// What to animate and how.
+#[derive(Debug, Parser)]
+pub struct AnimateArgs {
+    /// A mesh file or procedural:NAME:TRIANGLES
+    #[arg(default_value = DEFAULT_SCENE)]
+    pub scene: String,
+    /// How many frames
+    #[arg(long, value_name = "NUMBER", default_value_t = 30,
+          value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// The structure to build
+    #[arg(long, value_parser = method_parser(), default_value = Method::Brick.name())]
+    pub method: Method,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub tuning: Tuning,
+    /// Threads that build, for `brick`, and render
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = thread_parser())]
+    pub threads: u32,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub picture: Picture,
+    /// Print the numbers as a JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// Write every frame into this folder, as PNG; it is made if it is missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+}
+
+/// What to measure against what.
+#[derive(Debug, Parser)]
+pub struct CompareArgs {
+    /// Mesh files or procedural:NAME:TRIANGLES
+    #[arg(required = true)]
+    pub scenes: Vec<String>,
+    /// The structures of hgrid, between commas [default: all]
+    #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
+    pub methods: Vec<Method>,
+    /// The other structures, between commas [default: all that this program has]
+    #[arg(long, value_name = "PEERS", value_delimiter = ',', value_enum)]
+    pub peers: Vec<Peer>,
+    /// Build and trace so many times, taking turns, and report the medians
+    #[arg(long, value_name = "TIMES", default_value_t = 5,
+          value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeat: u32,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub picture: Picture,
+    /// Print Markdown
+    #[arg(long)]
+    pub markdown: bool,
+    /// Write every number and the machine they come from to this file
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Draw charts into this folder, as SVG and PNG; it is made if it is missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+}
+
 /// Which methods compete, and how often.
 #[derive(Debug, Clone, Args)]
 pub struct Race {
@@ -206,6 +296,9 @@ pub struct Race {
     #[arg(long, value_name = "TIMES", default_value_t = 3,
           value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub builders: Builders,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub tuning: Tuning,
@@ -221,6 +314,14 @@ impl Race {
         let methods = if self.methods.is_empty() { Method::ALL } else { &self.methods };
         methods.iter().map(|&method| self.tuning.config(method)).collect()
     }
+}
+
+/// Who builds.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Builders {
+    /// Threads that build, for `brick`; the other methods, and all rays, have one
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = thread_parser())]
+    pub threads: u32,
 }
 
 /// Parameters of single methods; the others ignore them.
@@ -286,6 +387,11 @@ pub enum Shading {
     Heat,
 }
 
+/// As many threads as a build can use.
+fn thread_parser() -> impl TypedValueParser<Value = u32> {
+    clap::value_parser!(u32).range(1..=i64::from(Parallel::MAX_TASKS))
+}
+
 /// A method by its name.
 fn method_parser() -> impl TypedValueParser<Value = Method> {
     let names = Method::ALL.iter().copied().map(Method::name);
@@ -322,6 +428,11 @@ mod tests {
             "table",
             "table a.ply --methods fixed,bvh",
             "table a.ply --json --markdown",
+            "compare",
+            "compare a.ply --peers optix",
+            "animate --frames 0",
+            "animate --threads 65",
+            "render --threads 0",
         ] {
             let words = ["hgrid"].into_iter().chain(words.split(' '));
             assert!(Cli::try_parse_from(words.clone()).is_err(), "{:?}", words.collect::<Vec<_>>());

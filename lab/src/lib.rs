@@ -7,10 +7,16 @@
 //! scene -> measure (hgrid_core::Grid, camera, shade) -> render: a picture and a report
 //!                                                    |-> table: the paper's Table 1
 //!                                                    '-> figures: its charts, by plot
+//!       -> animate: the mesh deformed, built and rendered frame after frame
+//!       -> compare: hgrid and other structures, over the same rays
 //! ```
 
+#![deny(unsafe_code)]
+
+pub mod animate;
 pub mod camera;
 pub mod cli;
+pub mod compare;
 pub mod figures;
 pub mod heat;
 pub mod image;
@@ -24,4 +30,5 @@ pub mod resident;
 pub mod scene;
 pub mod shade;
 pub mod table;
+pub mod threads;
 mod vector;

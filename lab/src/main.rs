@@ -5,13 +5,15 @@ use std::process::ExitCode;
 
 use clap::Parser as _;
 use hgrid_lab::cli::{Cli, Command, RenderArgs};
-use hgrid_lab::{figures, render, table};
+use hgrid_lab::{animate, compare, figures, render, table};
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Table(args)) => table::run(&args),
         Some(Command::Figures(args)) => figures::run(&args),
+        Some(Command::Animate(args)) => animate::run(&args),
+        Some(Command::Compare(args)) => compare::run(&args),
         None => render::run(&RenderArgs::parse_from(["hgrid"])).and_then(|()| {
             let next = "next: hgrid render YOUR.ply, or hgrid render --help";
             Ok(writeln!(std::io::stdout(), "{next}")?)

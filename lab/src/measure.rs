@@ -19,7 +19,9 @@
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{Config, Counters, Grid, Hit, Method, Ray, TriangleMesh, sizes};
+use hgrid_core::{
+    Config, Counters, Grid, Hit, Method, Parallel, Ray, Sizes, TriangleMesh, sizes_parallel,
+};
 use memmap2::{MmapMut, MmapOptions};
 use serde::Serialize;
 
@@ -28,6 +30,7 @@ use crate::progress::Progress;
 use crate::resident::resident_bytes;
 use crate::scene::Scene;
 use crate::shade::{Rgb, Shader};
+use crate::threads::Threads;
 
 /// A scene as the paper's Table 1 describes it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -116,6 +119,8 @@ pub struct Subject<'a> {
     pub camera: Camera,
     /// Pixels on each side of the picture.
     pub size: u16,
+    /// Who builds.
+    pub threads: &'a Threads,
 }
 
 /// What a race gave.
@@ -149,7 +154,7 @@ pub fn measure(
     cost: impl Fn(&Counters) -> u64,
     progress: &mut Progress,
 ) -> Result<Outcome> {
-    let Subject { mesh, camera, size } = *subject;
+    let Subject { mesh, camera, size, threads } = *subject;
     let shader = Shader::new(mesh, &camera);
     let mut samples = vec![(Vec::new(), Vec::new()); configs.len()];
     let mut outcome = Outcome { measurements: Vec::new(), pixels: Vec::new(), costs: Vec::new() };
@@ -159,8 +164,9 @@ pub fn measure(
             let turn = format!("{name}, {repetition} of {repeat}:");
             progress.set_message(&format!("{turn} building"));
             let start = Instant::now();
-            let built =
-                build(mesh, config).with_context(|| format!("cannot build the {name} grid"))?;
+            let built = threads
+                .parallel(|parallel| build_parallel(mesh, config, parallel))
+                .with_context(|| format!("cannot build the {name} grid"))?;
             builds.push(start.elapsed().as_secs_f64());
             let Built { index, scratch } = built;
             let memory = Memory::of(&index, &scratch, repetition == repeat);
@@ -190,21 +196,35 @@ pub fn measure(
 }
 
 /// A grid's memory.
-struct Built {
-    index: MmapMut,
-    scratch: MmapMut,
+pub(crate) struct Built {
+    pub(crate) index: MmapMut,
+    pub(crate) scratch: MmapMut,
 }
 
 /// Builds as a user does who has nothing but the mesh: ask for sizes, get memory, build.
-fn build(mesh: TriangleMesh<'_>, config: &Config) -> Result<Built> {
-    let sizes = sizes(&mesh, config, &mut [])?;
+pub(crate) fn build(mesh: TriangleMesh<'_>, config: &Config) -> Result<Built> {
+    Threads::new(1)?.parallel(|parallel| build_parallel(mesh, config, parallel))
+}
+
+/// The same on threads.
+fn build_parallel(
+    mesh: TriangleMesh<'_>,
+    config: &Config,
+    parallel: &Parallel<'_>,
+) -> Result<Built> {
+    // A brick grid's bound follows from the number of triangles, and what is not written costs nothing.
+    let sizes = match config.method {
+        Method::Brick => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
+        _ => Some(sizes_parallel(&mesh, config, &mut [], parallel)?),
+    };
+    let sizes = sizes.context("the grid does not fit the address space")?;
     let (mut index, mut scratch) = (memory(sizes.index_bytes)?, memory(sizes.scratch_bytes)?);
-    Grid::build(mesh, config, &mut index, &mut scratch)?;
+    Grid::build_parallel(mesh, config, &mut index, &mut scratch, parallel)?;
     Ok(Built { index, scratch })
 }
 
 /// Pages that the system provides when they are first written.
-fn memory(bytes: usize) -> Result<MmapMut> {
+pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
     let mut options = MmapOptions::new();
     options
         .len(bytes.max(1))
@@ -329,7 +349,7 @@ pub fn ratio(a: u64, b: u64) -> f64 {
 }
 
 /// The middle value, the upper one of two.
-fn median(values: &[f64]) -> f64 {
+pub(crate) fn median(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
@@ -346,7 +366,8 @@ mod tests {
         let scene = Scene::load("procedural:knot:2000").unwrap();
         let mesh = TriangleMesh::new(&scene.positions, &scene.indices).unwrap();
         let camera = Camera::framing(scene.framed_bounds(), View::ThreeQuarter, Up::Y);
-        let subject = Subject { mesh, camera, size: 40 };
+        let threads = Threads::new(2).unwrap();
+        let subject = Subject { mesh, camera, size: 40, threads: &threads };
         let cost = |work: &Counters| work.primitive_tests + work.cell_steps + work.grid_steps;
         let mut progress = Progress::new("", 0);
         let is_hit = |_: &Shader<'_>, _: &Ray, hit: Option<Hit>| [u8::from(hit.is_some()); 3];

@@ -14,6 +14,7 @@ use crate::progress::Progress;
 use crate::report::Report;
 use crate::scene::Scene;
 use crate::shade::Shader;
+use crate::threads::Threads;
 
 /// Renders, writes the picture and prints the numbers.
 ///
@@ -31,7 +32,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 
     let size = args.picture.size;
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
-    let subject = Subject { mesh, camera: args.camera(&scene), size };
+    let threads = Threads::new(args.builders.threads)?;
+    let subject = Subject { mesh, camera: args.camera(&scene), size, threads: &threads };
     let shade = |shader: &Shader<'_>, ray: &Ray, hit: Option<Hit>| match args.shading {
         Shading::Normals => shader.normals(ray, hit),
         Shading::Diffuse | Shading::Heat => shader.diffuse(ray, hit),

@@ -78,7 +78,7 @@ impl<'a> Shader<'a> {
 }
 
 /// The unit normal of a triangle, unless it has no area.
-fn normal_of(triangle: &Triangle) -> Option<Vector> {
+pub(crate) fn normal_of(triangle: &Triangle) -> Option<Vector> {
     let [a, b, c] = triangle.map(|corner| corner.map(f64::from));
     unit(cross(offset(b, -1.0, a), offset(c, -1.0, a)))
 }

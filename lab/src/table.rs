@@ -16,6 +16,7 @@ use crate::measure::{Measurement, SceneFacts, Subject, measure, ratio, rows};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::shade::Shader;
+use crate::threads::Threads;
 
 /// Measures and prints.
 ///
@@ -43,6 +44,8 @@ pub struct Results {
     pub size: u16,
     /// Builds and renderings that times are medians of.
     pub repeats: u32,
+    /// Threads that built, where the method can use them.
+    pub threads: u32,
     /// In the order of the command line.
     pub scenes: Vec<SceneResults>,
 }
@@ -77,7 +80,8 @@ impl Results {
             Ok(SceneResults { facts, methods })
         });
         let scenes = scenes.collect::<Result<_>>()?;
-        Ok(Self { machine: Machine::here(), size, repeats: race.repeat, scenes })
+        let (repeats, threads) = (race.repeat, race.builders.threads);
+        Ok(Self { machine: Machine::here(), size, repeats, threads, scenes })
     }
 
     /// The table as aligned text, then what its numbers mean and where they come from.
@@ -93,14 +97,8 @@ impl Results {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut table = self.table(|title| format!("**{title}**"), "");
-        table.load_style(presets::ASCII_MARKDOWN);
-        let mut lines: Vec<_> = table.trim_fmt().lines().map(str::to_owned).collect();
-        if let Some(rule) = lines.get_mut(1) {
-            // Markdown aligns a column to the right where its rule ends in a colon.
-            *rule = rule.replace("-|", ":|").replacen(":|", "-|", 1);
-        }
         let source = format!("{}. Command: `{}`.", self.machine.summary(), self.machine.command);
-        [lines.join("\n"), self.notes().join(" "), source].join("\n\n")
+        [markdown(&mut table, 1), self.notes().join(" "), source].join("\n\n")
     }
 
     /// The rows; `titled` makes a heading of the title of a group, and the others are indented.
@@ -150,6 +148,9 @@ impl Results {
             "Peak is what the build wrote: index and scratch. 1 MiB is 2^20 bytes, the paper's MB."
                 .to_owned(),
         ];
+        if self.threads > 1 {
+            notes.push(format!("Brick grids were built by {} threads.", self.threads));
+        }
         for scene in &self.scenes {
             let name = display_name(&scene.facts.scene);
             let is_thinner = |m: &&Measurement| m.density < m.configured_density;
@@ -169,10 +170,23 @@ pub(crate) fn measure_diffuse(
     progress: &mut Progress,
 ) -> Result<Vec<Measurement>> {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
-    let subject = Subject { mesh, camera: race.picture.camera(scene), size: race.picture.size };
+    let threads = Threads::new(race.builders.threads)?;
+    let (camera, size) = (race.picture.camera(scene), race.picture.size);
+    let subject = Subject { mesh, camera, size, threads: &threads };
     let shade = |shader: &Shader<'_>, ray: &Ray, hit| shader.diffuse(ray, hit);
     let cost = |_: &Counters| 0;
     Ok(measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements)
+}
+
+/// A table as Markdown, its first columns of so many words aligned to the left.
+pub(crate) fn markdown(table: &mut Table, words: usize) -> String {
+    table.load_style(presets::ASCII_MARKDOWN);
+    let mut lines: Vec<_> = table.trim_fmt().lines().map(str::to_owned).collect();
+    if let Some(rule) = lines.get_mut(1) {
+        // Markdown aligns a column to the right where its rule ends in a colon.
+        *rule = rule.replace("-|", ":|").replacen(":|", "-|", words);
+    }
+    lines.join("\n")
 }
 
 /// What times are, as part of a sentence.
@@ -192,7 +206,7 @@ pub(crate) fn display_name(name: &str) -> String {
 }
 
 /// A count as the paper writes it: 69.45K, 1.09M.
-fn count(count: usize) -> String {
+pub(crate) fn count(count: usize) -> String {
     let count = count as u64;
     match count {
         0..1000 => count.to_string(),
@@ -207,7 +221,7 @@ pub(crate) fn mebibytes(bytes: usize) -> f64 {
 }
 
 /// A time in seconds with three digits that count, but no more than milliseconds have.
-fn seconds(seconds: f64) -> String {
+pub(crate) fn seconds(seconds: f64) -> String {
     match seconds {
         s if s >= 100.0 => format!("{s:.0}"),
         s if s >= 10.0 => format!("{s:.1}"),
@@ -244,7 +258,9 @@ mod tests {
 
     #[test]
     fn markdown_is_a_table() {
-        let results = results("procedural:knot:500 --size 16 --repeat 1 --methods fixed").unwrap();
+        let words = "procedural:knot:500 --size 16 --repeat 1 --methods fixed --threads 2";
+        let results = results(words).unwrap();
+        assert!(results.text().contains("built by 2 threads"));
         let markdown = results.markdown();
         let table: Vec<_> = markdown.lines().take_while(|line| !line.is_empty()).collect();
         assert!(table.iter().all(|line| line.matches('|').count() == 3), "{markdown}");

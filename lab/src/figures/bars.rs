@@ -86,14 +86,18 @@ impl Drawing for Figure<'_> {
     }
 
     fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B> {
-        let Results { machine, size, repeats, scenes } = self.0;
+        let Results { machine, size, repeats, threads, scenes } = self.0;
         let methods = scenes.first().map(|scene| &*scene.methods).unwrap_or_default();
         let legend = methods.iter().map(|m| {
             (format!("{}, density {}", m.method, m.configured_density), color_of(m.method))
         });
         let legend: Vec<_> = legend.chain([("mesh".to_owned(), MUTED)]).collect();
         let title = format!("Memory and times, {size} x {size} rays");
-        let source = format!("{}; {}", machine.summary(), times(*repeats));
+        let built = match threads {
+            0 | 1 => String::new(),
+            threads => format!("; brick grids built by {threads} threads"),
+        };
+        let source = format!("{}; {}{built}", machine.summary(), times(*repeats));
         heading(area, pen, [&title, &source], &legend)?;
 
         let (_, below) = area.split_vertically(pen.px(HEADING));

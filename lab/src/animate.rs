@@ -1,0 +1,420 @@
+//! A moving mesh, built anew for every frame: the `animate` command.
+//!
+//! Every vertex swings along its normal, as far as a wave says that travels through the mesh and is
+//! back where it was after the last frame. Each frame is what a game does: move the vertices, build
+//! into the same memory, trace all rays in tiles. What a frame of the mesh needs is asked once, before
+//! the first one, and once more only if a later frame needs more.
+
+use core::f64::consts::TAU;
+use core::fmt;
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::Path;
+use std::sync::Mutex;
+use std::time::Instant;
+
+use anyhow::{Context as _, Result};
+use hgrid_core::{
+    Coherence, Config, Error, Grid, Hit, Ray, Region, Strided, StridedMut, TriangleMesh,
+    sizes_parallel,
+};
+use memmap2::MmapMut;
+use serde::Serialize;
+
+use crate::camera::Camera;
+use crate::cli::AnimateArgs;
+use crate::image;
+use crate::measure::{median, memory};
+use crate::progress::Progress;
+use crate::scene::{Bounds, Scene};
+use crate::shade::{Rgb, Shader, normal_of};
+use crate::threads::Threads;
+use crate::vector::{Vector, offset, round, unit};
+
+/// How far a vertex swings to either side, and how far it is from one crest of the wave to the next,
+/// as parts of the largest extent of the scene.
+const AMPLITUDE: f64 = 0.01;
+const WAVELENGTH: f64 = 0.3;
+
+/// Pixels on each side of a tile: its rays are traced together.
+const TILE: usize = 8;
+
+/// Animates and prints.
+///
+/// # Errors
+/// If the scene cannot be loaded or built, or a picture cannot be written.
+pub fn run(args: &AnimateArgs) -> Result<()> {
+    if let Some(folder) = &args.output {
+        fs::create_dir_all(folder)
+            .with_context(|| format!("cannot write into `{}`", folder.display()))?;
+    }
+    let scene = Scene::load(&args.scene)?;
+    let camera = args.picture.camera(&scene);
+    let config = args.tuning.config(args.method);
+    let threads = Threads::new(args.threads)?;
+    let mut progress = Progress::new("frames", args.frames.into());
+    let write = |frame: u32, pixels: &[Rgb]| match &args.output {
+        Some(folder) => write_frame(folder, frame, args.picture.size, pixels),
+        None => Ok(()),
+    };
+    let size = args.picture.size;
+    let plan = Plan { frames: args.frames, config, camera, size, threads: &threads };
+    let report = animate(&scene, &plan, write, &mut progress)
+        .with_context(|| format!("cannot animate `{}`", args.scene))?;
+    drop(progress);
+
+    let mut out = io::stdout();
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?;
+    } else {
+        writeln!(out, "{report}")?;
+    }
+    if let Some(folder) = &args.output {
+        writeln!(io::stderr(), "wrote {} pictures into {}", args.frames, folder.display())?;
+    }
+    Ok(())
+}
+
+fn write_frame(folder: &Path, frame: u32, size: u16, pixels: &[Rgb]) -> Result<()> {
+    let path = folder.join(format!("frame-{frame:05}.png"));
+    image::write_png(&path, (size.into(), size.into()), pixels)
+}
+
+/// What to animate a scene with.
+struct Plan<'a> {
+    frames: u32,
+    config: Config,
+    camera: Camera,
+    size: u16,
+    threads: &'a Threads,
+}
+
+/// The times of a frame in milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Frame {
+    /// Building, in memory that is there.
+    pub build_ms: f64,
+    /// Tracing and shading every pixel.
+    pub render_ms: f64,
+    /// Moving the vertices, building and rendering.
+    pub frame_ms: f64,
+}
+
+/// The times of all frames.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// The scene's name.
+    pub scene: String,
+    /// Its triangles.
+    pub triangles: usize,
+    /// The method's name.
+    pub method: &'static str,
+    /// Threads that build, if the method is built in parallel, and render.
+    pub threads: u32,
+    /// Pixels on each side.
+    pub size: u16,
+    /// How often the memory did not do for a frame and had to grow.
+    pub grown: u32,
+    /// Bytes of the largest grid.
+    pub index_bytes: usize,
+    /// The middle values of all frames.
+    pub median: Frame,
+    /// One for each frame. The first is the slowest: the system gives its pages as they are written.
+    pub frames: Vec<Frame>,
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scene, triangles, method, threads, size, .. } = self;
+        writeln!(
+            f,
+            "{scene}: {triangles} triangles, {method}, {size} x {size} pixels, {threads} thread{}\n",
+            if *threads == 1 { "" } else { "s" }
+        )?;
+        writeln!(
+            f,
+            "{:>6}  {:>10}  {:>11}  {:>10}",
+            "frame", "build (ms)", "render (ms)", "all (ms)"
+        )?;
+        let mut row = |name: &str, frame: &Frame| {
+            let Frame { build_ms, render_ms, frame_ms } = frame;
+            writeln!(f, "{name:>6}  {build_ms:>10.2}  {render_ms:>11.2}  {frame_ms:>10.2}")
+        };
+        for (number, frame) in self.frames.iter().enumerate() {
+            row(&number.to_string(), frame)?;
+        }
+        row("median", &self.median)?;
+        let mebibytes = crate::measure::ratio(self.index_bytes as u64, 1 << 20);
+        write!(f, "\nThe grid took up to {mebibytes:.1} MiB")?;
+        match self.grown {
+            0 => f.write_str(" of memory that was there from the first frame on."),
+            grown => write!(f, "; its memory grew {grown} times."),
+        }
+    }
+}
+
+/// Runs all frames and shows each picture.
+fn animate(
+    scene: &Scene,
+    plan: &Plan<'_>,
+    mut show: impl FnMut(u32, &[Rgb]) -> Result<()>,
+    progress: &mut Progress,
+) -> Result<Report> {
+    let wave = Wave::new(scene);
+    let mut positions = scene.positions.clone();
+    let mut pixels = vec![[0; 3]; usize::from(plan.size) * usize::from(plan.size)];
+    let mut arena = None;
+    let (mut frames, mut index_bytes, mut grown) = (Vec::new(), 0, 0);
+    for number in 0..plan.frames {
+        let start = Instant::now();
+        wave.at(scene, f64::from(number) / f64::from(plan.frames), &mut positions);
+        let mesh = TriangleMesh::new(&positions, &scene.indices)?;
+        let mut memory = match arena.take() {
+            Some(memory) => memory,
+            None => Memory::of(&mesh, plan)?,
+        };
+
+        let building = Instant::now();
+        grown += memory.build(mesh, plan)?;
+        let build_ms = milliseconds(building);
+
+        let grid = Grid::open(&memory.index, mesh)?;
+        index_bytes = index_bytes.max(grid.blob_bytes());
+        let rendering = Instant::now();
+        render(&grid, plan, &mut pixels);
+        frames.push(Frame {
+            build_ms,
+            render_ms: milliseconds(rendering),
+            frame_ms: milliseconds(start),
+        });
+        show(number, &pixels)?;
+        arena = Some(memory);
+        progress.advance(1);
+    }
+    let middle = |time: fn(&Frame) -> f64| median(&frames.iter().map(time).collect::<Vec<_>>());
+    Ok(Report {
+        scene: scene.name.clone(),
+        triangles: scene.indices.len(),
+        method: plan.config.method.name(),
+        threads: plan.threads.count(),
+        size: plan.size,
+        grown,
+        index_bytes,
+        median: Frame {
+            build_ms: middle(|frame| frame.build_ms),
+            render_ms: middle(|frame| frame.render_ms),
+            frame_ms: middle(|frame| frame.frame_ms),
+        },
+        frames,
+    })
+}
+
+fn milliseconds(start: Instant) -> f64 {
+    1000.0 * start.elapsed().as_secs_f64()
+}
+
+/// The memory of all frames.
+struct Memory {
+    index: MmapMut,
+    scratch: MmapMut,
+}
+
+impl Memory {
+    /// Enough for a mesh as it is now.
+    fn of(mesh: &TriangleMesh<'_>, plan: &Plan<'_>) -> Result<Self> {
+        let sizes =
+            plan.threads.parallel(|all| sizes_parallel(mesh, &plan.config, &mut [], all))?;
+        Ok(Self { index: memory(sizes.index_bytes)?, scratch: memory(sizes.scratch_bytes)? })
+    }
+
+    /// Builds, in larger memory if a frame needs it; how often that was so.
+    fn build(&mut self, mesh: TriangleMesh<'_>, plan: &Plan<'_>) -> Result<u32> {
+        let mut grown = 0;
+        loop {
+            let Self { index, scratch } = self;
+            let built = plan.threads.parallel(|all| {
+                Grid::build_parallel(mesh, &plan.config, index, scratch, all).map(drop)
+            });
+            match built {
+                Ok(()) => return Ok(grown),
+                Err(Error::OutOfMemory { region, needed_bytes, .. }) => {
+                    let larger = memory(usize::try_from(needed_bytes)?)?;
+                    *(if region == Region::Index { index } else { scratch }) = larger;
+                    grown += 1;
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+}
+
+/// Traces and shades all pixels, a row of tiles at a time.
+#[expect(clippy::cast_possible_truncation, reason = "no more rows than pixels of a side")]
+fn render(grid: &Grid<'_>, plan: &Plan<'_>, pixels: &mut [Rgb]) {
+    let shader = Shader::new(*grid.mesh(), &plan.camera);
+    let width = usize::from(plan.size);
+    let rows: Vec<_> = pixels.chunks_mut(width * TILE).map(Mutex::new).collect();
+    plan.threads.each(rows.len() as u32, |at| {
+        let Some(Ok(mut row)) = rows.get(at as usize).map(|row| row.lock()) else { return };
+        render_row(grid, plan, &shader, at as usize * TILE, &mut row);
+    });
+}
+
+/// Traces and shades a row of tiles.
+#[expect(clippy::cast_possible_truncation, reason = "pixels of a picture")]
+fn render_row(grid: &Grid<'_>, plan: &Plan<'_>, shader: &Shader<'_>, top: usize, rows: &mut [Rgb]) {
+    let width = usize::from(plan.size);
+    let height = rows.len() / width;
+    let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE * TILE];
+    let mut hits = [Hit::MISS; TILE * TILE];
+    for left in (0..width).step_by(TILE) {
+        let columns = TILE.min(width - left);
+        let places =
+            || (0..height).flat_map(|row| (0..columns).map(move |column| (left + column, row)));
+        for (ray, (column, row)) in rays.iter_mut().zip(places()) {
+            *ray = plan.camera.ray(column as u16, (top + row) as u16, plan.size);
+        }
+        let count = height * columns;
+        let (rays, hits) = (&rays[..count], &mut hits[..count]);
+        let answers = &mut StridedMut::new(hits);
+        if grid.intersect_n(&Strided::new(rays), answers, Coherence::Coherent).is_err() {
+            continue;
+        }
+        for ((ray, hit), (column, row)) in rays.iter().zip(&*hits).zip(places()) {
+            let hit = (hit.primitive != hgrid_core::INVALID_ID).then_some(*hit);
+            rows[row * width + column] = shader.diffuse(ray, hit);
+        }
+    }
+}
+
+/// How the vertices of a scene swing.
+struct Wave {
+    /// The unit normal of each vertex, 0 where it has none.
+    normals: Vec<[f32; 3]>,
+    /// How far a vertex swings.
+    amplitude: f64,
+    /// Crests in a unit of length, along x, y and z.
+    frequency: Vector,
+}
+
+impl Wave {
+    fn new(scene: &Scene) -> Self {
+        let mut sums = vec![[0.0; 3]; scene.positions.len()];
+        for triangle in &scene.indices {
+            let corners = triangle.map(|vertex| scene.positions.get(vertex as usize).copied());
+            let [Some(a), Some(b), Some(c)] = corners else { continue };
+            let Some(normal) = normal_of(&[a, b, c]) else { continue };
+            for &vertex in triangle {
+                if let Some(sum) = sums.get_mut(vertex as usize) {
+                    *sum = offset(*sum, 1.0, normal);
+                }
+            }
+        }
+        let normals = sums.into_iter().map(|sum| round(unit(sum).unwrap_or_default())).collect();
+        let extent = largest_extent(scene.framed_bounds());
+        let crests = if extent > 0.0 { 1.0 / (WAVELENGTH * extent) } else { 0.0 };
+        Self {
+            normals,
+            amplitude: AMPLITUDE * extent,
+            frequency: [0.6 * crests, 0.8 * crests, 0.0],
+        }
+    }
+
+    /// Moves the vertices to where they are at a time between 0 and 1.
+    fn at(&self, scene: &Scene, time: f64, positions: &mut [[f32; 3]]) {
+        for ((to, from), normal) in positions.iter_mut().zip(&scene.positions).zip(&self.normals) {
+            let place = from.map(f64::from);
+            let phase = crate::vector::dot(place, self.frequency) - time;
+            let swing = self.amplitude * (TAU * phase).sin();
+            *to = round(offset(place, swing, normal.map(f64::from)));
+        }
+    }
+}
+
+fn largest_extent((min, max): Bounds) -> f64 {
+    (0..3).map(|axis| f64::from(max[axis]) - f64::from(min[axis])).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+    use hgrid_core::Method;
+
+    use super::*;
+    use crate::camera::{Up, View};
+
+    fn film(method: Method, threads: u32, frames: u32) -> (Report, Vec<Vec<Rgb>>) {
+        let scene = Scene::load("procedural:knot:3000").unwrap();
+        let camera = Camera::framing(scene.framed_bounds(), View::Front, Up::Y);
+        let threads = Threads::new(threads).unwrap();
+        let config = Config::new(method);
+        let plan = Plan { frames, config, camera, size: 37, threads: &threads };
+        let mut pictures = Vec::new();
+        let show = |number: u32, pixels: &[Rgb]| {
+            assert_eq!(number as usize, pictures.len());
+            pictures.push(pixels.to_vec());
+            Ok(())
+        };
+        let report = animate(&scene, &plan, show, &mut Progress::new("", 0)).unwrap();
+        (report, pictures)
+    }
+
+    #[test]
+    fn a_film_does_not_depend_on_the_method_nor_on_the_threads() {
+        let (report, expected) = film(Method::Brick, 1, 4);
+        assert_eq!((report.frames.len(), report.grown), (4, 0));
+        for (method, threads) in [(Method::Brick, 3), (Method::OneLevel, 1), (Method::Fixed, 2)] {
+            assert!(film(method, threads, 4).1 == expected, "{method:?}, {threads} threads");
+        }
+    }
+
+    #[test]
+    fn it_moves_and_comes_back() {
+        let (_, pictures) = film(Method::Brick, 1, 4);
+        assert!(pictures.windows(2).all(|pair| pair[0] != pair[1]));
+        let scene = Scene::load("procedural:knot:3000").unwrap();
+        let wave = Wave::new(&scene);
+        let (mut first, mut last) = (scene.positions.clone(), scene.positions.clone());
+        wave.at(&scene, 0.0, &mut first);
+        wave.at(&scene, 1.0, &mut last);
+        let far = largest_extent(scene.framed_bounds());
+        for (a, b) in first.iter().zip(&last) {
+            assert!((0..3).all(|axis| f64::from((a[axis] - b[axis]).abs()) < 1e-6 * far));
+        }
+        assert!(first != scene.positions);
+    }
+
+    #[test]
+    fn a_report_has_a_row_for_each_frame_and_the_medians() {
+        let (report, _) = film(Method::Brick, 2, 3);
+        let text = report.to_string();
+        assert!(text.contains("2 threads") && text.contains("median"), "{text}");
+        assert_eq!(text.lines().filter(|line| line.contains('.')).count(), 5, "{text}");
+        for frame in &report.frames {
+            assert!(frame.frame_ms >= frame.build_ms + frame.render_ms);
+        }
+        let json = serde_json::to_value(&report).unwrap();
+        assert_eq!(json["frames"].as_array().unwrap().len(), 3);
+    }
+
+    #[test]
+    fn frames_are_written() {
+        let folder = std::env::temp_dir().join(format!("hgrid-animate-{}", std::process::id()));
+        let words = "hgrid procedural:knot:500 --frames 2 --size 9 --threads 2 --json -o";
+        let words = words.split(' ').map(Into::into).chain([folder.clone().into_os_string()]);
+        run(&AnimateArgs::parse_from(words)).unwrap();
+        assert!(folder.join("frame-00000.png").exists() && folder.join("frame-00001.png").exists());
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_scene_of_nothing_is_animated() {
+        let scene = Scene::default();
+        let camera = Camera::framing(scene.framed_bounds(), View::Front, Up::Y);
+        let threads = Threads::new(1).unwrap();
+        let config = Config::new(Method::Brick);
+        let plan = Plan { frames: 2, config, camera, size: 3, threads: &threads };
+        let report = animate(&scene, &plan, |_, _| Ok(()), &mut Progress::new("", 0)).unwrap();
+        assert_eq!(report.frames.len(), 2);
+    }
+}

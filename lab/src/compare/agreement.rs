@@ -1,0 +1,67 @@
+//! Whether two systems give the same answers.
+
+use hgrid_core::Hit;
+
+use super::system::is_hit;
+
+/// How far apart two hits may be and still be the same, as a part of the scene's diagonal.
+const TOLERANCE: f64 = 1e-4;
+
+/// How many rays of a thousand may differ before a system is marked.
+const MARKED_ABOVE: u64 = 1;
+
+/// Rays whose answers differ: one hits and the other does not, or they hit at different places.
+///
+/// Directions are about one long, so `t` is a length.
+#[must_use]
+pub fn differing_hits(expected: &[Hit], found: &[Hit], diagonal: f64) -> u64 {
+    let is_same = |a: &Hit, b: &Hit| match (is_hit(a), is_hit(b)) {
+        (true, true) => (f64::from(a.t) - f64::from(b.t)).abs() <= TOLERANCE * diagonal,
+        (a, b) => a == b,
+    };
+    count(expected.iter().zip(found), |(a, b)| !is_same(a, b))
+}
+
+/// Answers that are not the same to the last bit.
+#[must_use]
+pub fn unequal<T: PartialEq>(expected: &[T], found: &[T]) -> u64 {
+    count(expected.iter().zip(found), |(a, b)| a != b)
+}
+
+/// Rays that hit.
+#[must_use]
+pub fn hits(hits: &[Hit]) -> u64 {
+    count(hits.iter(), is_hit)
+}
+
+/// Whether so many differing rays are too many.
+#[must_use]
+pub const fn is_off(differing: u64, rays: u64) -> bool {
+    differing * 1000 > rays * MARKED_ABOVE
+}
+
+fn count<T>(items: impl Iterator<Item = T>, is_counted: impl Fn(T) -> bool) -> u64 {
+    items.map(|item| u64::from(is_counted(item))).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::system::MISS;
+    use super::*;
+
+    #[test]
+    fn misses_and_other_places_differ() {
+        let hit = |t| Hit { t, u: 0.1, v: 0.1, primitive: 3 };
+        let expected = [hit(1.0), hit(1.0), hit(1.0), MISS, MISS];
+        let found = [hit(1.000_01), hit(1.1), MISS, hit(1.0), MISS];
+        assert_eq!(differing_hits(&expected, &found, 1.0), 3);
+        assert_eq!(differing_hits(&expected, &found, 2000.0), 2);
+        assert_eq!(hits(&expected), 3);
+        assert_eq!((unequal(&expected, &found), unequal(&found, &found)), (4, 0));
+    }
+
+    #[test]
+    fn one_in_a_thousand_is_allowed() {
+        assert!(!is_off(1, 1000) && is_off(2, 1000) && is_off(1, 999) && !is_off(0, 0));
+    }
+}

@@ -1,0 +1,98 @@
+//! hgrid itself.
+
+use anyhow::Result;
+use hgrid_core::{Coherence, Config, Grid, Hit, Method, Ray, Strided, StridedMut};
+
+use super::input::Input;
+use super::system::{Bytes, MISS, Mode, System, Tracer, Use, each};
+use super::workloads::Workload;
+use crate::measure::{self, Built};
+use crate::resident::resident_bytes;
+
+/// One method.
+pub(super) struct GridSystem {
+    config: Config,
+}
+
+impl GridSystem {
+    pub(super) const fn new(config: Config) -> Self {
+        Self { config }
+    }
+}
+
+impl System for GridSystem {
+    fn name(&self) -> String {
+        self.config.method.name().to_owned()
+    }
+
+    fn is_peer(&self) -> bool {
+        false
+    }
+
+    fn modes(&self, workload: Workload) -> &'static [Mode] {
+        // The other methods trace a batch ray by ray.
+        match workload {
+            Workload::Primary | Workload::Ao if self.config.method == Method::Brick => {
+                &[Mode::Single, Mode::Coherent]
+            }
+            _ => &[Mode::Single],
+        }
+    }
+
+    fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
+        let mesh = input.mesh()?;
+        let memory = measure::build(mesh, &self.config)?;
+        then(&GridTracer { grid: Grid::open(&memory.index, mesh)?, memory: &memory })
+    }
+}
+
+/// Rays in a call: a tile.
+const CHUNK: usize = 64;
+
+/// What a batch is told; `None` for rays that come one by one.
+const fn coherence(mode: Mode) -> Option<Coherence> {
+    match mode {
+        Mode::Single => None,
+        Mode::Coherent => Some(Coherence::Coherent),
+        Mode::Incoherent => Some(Coherence::Incoherent),
+    }
+}
+
+struct GridTracer<'a> {
+    grid: Grid<'a>,
+    memory: &'a Built,
+}
+
+impl Tracer for GridTracer<'_> {
+    fn intersect(&self, mode: Mode, rays: &[Ray], hits: &mut [Hit]) {
+        if let Some(coherence) = coherence(mode) {
+            let answers = &mut StridedMut::new(&mut *hits);
+            if self.grid.intersect_n(&Strided::new(rays), answers, coherence).is_ok() {
+                return;
+            }
+        }
+        each(rays, hits, |ray| self.grid.intersect(ray).unwrap_or(MISS));
+    }
+
+    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [bool]) {
+        let Some(coherence) = coherence(mode) else {
+            return each(rays, occluded, |ray| self.grid.occluded(ray));
+        };
+        let mut bytes = [0_u8; CHUNK];
+        for (rays, occluded) in rays.chunks(CHUNK).zip(occluded.chunks_mut(CHUNK)) {
+            let answers = &mut StridedMut::new(&mut bytes[..rays.len()]);
+            match self.grid.occluded_n(&Strided::new(rays), answers, coherence) {
+                Ok(()) => occluded.iter_mut().zip(&bytes).for_each(|(to, &byte)| *to = byte != 0),
+                Err(_) => each(rays, occluded, |ray| self.grid.occluded(ray)),
+            }
+        }
+    }
+
+    fn bytes(&self) -> Option<Bytes> {
+        let Built { index: asked, scratch } = self.memory;
+        let index = self.grid.blob_bytes();
+        let written = resident_bytes(asked).zip(resident_bytes(scratch));
+        let peak = written.map_or(index + scratch.len(), |(index, scratch)| index + scratch);
+        Some(Bytes { index, peak })
+    }
+}

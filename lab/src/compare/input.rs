@@ -1,0 +1,52 @@
+//! The mesh as every system gets it.
+
+use anyhow::Result;
+use hgrid_core::TriangleMesh;
+
+use crate::scene::Scene;
+
+/// A triangle mesh in two plain arrays, with one more position behind the last one.
+///
+/// Embree loads sixteen bytes of a twelve-byte position, so the memory after the last one must be
+/// there. Everybody else sees the positions alone.
+#[derive(Debug)]
+pub struct Input {
+    padded: Vec<[f32; 3]>,
+    indices: Vec<[u32; 3]>,
+}
+
+impl Input {
+    /// Takes the arrays of a scene.
+    #[must_use]
+    pub fn new(scene: Scene) -> Self {
+        let Scene { positions: mut padded, indices, .. } = scene;
+        padded.push([0.0; 3]);
+        Self { padded, indices }
+    }
+
+    /// The vertices. Four bytes behind the last one may be read.
+    #[must_use]
+    pub fn positions(&self) -> &[[f32; 3]] {
+        self.padded.split_last().map_or(&[], |(_, positions)| positions)
+    }
+
+    /// Three vertices for each triangle.
+    #[must_use]
+    pub fn indices(&self) -> &[[u32; 3]] {
+        &self.indices
+    }
+
+    /// The same for hgrid.
+    ///
+    /// # Errors
+    /// If an index is out of range or there are too many triangles.
+    pub fn mesh(&self) -> Result<TriangleMesh<'_>> {
+        Ok(TriangleMesh::new(self.positions(), &self.indices)?)
+    }
+
+    /// The corners of every triangle, for systems that take no indices.
+    #[must_use]
+    pub fn triangles(&self) -> impl ExactSizeIterator<Item = [[f32; 3]; 3]> + '_ {
+        self.indices.iter().map(|&triangle| triangle.map(|at| self.padded[at as usize]))
+    }
+}

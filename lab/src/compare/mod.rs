@@ -1,0 +1,162 @@
+//! hgrid and other ray tracers, its peers, over the same rays: the `compare` command.
+//!
+//! ```text
+//! workloads: the rays, and the answers of one grid to them
+//!     |
+//! system: builds, then traces slices of rays in one mode or more
+//!     |-- grid: a system for each method          '-- peers: a system for each other library
+//!     |
+//! race: all systems in turn --> numbers --> tables, ratios, charts
+//! ```
+//!
+//! Everything but the peers is compiled always; the peers are behind the feature of that name,
+//! because they need libraries of the system. lab/COMPARE.md says how each is set up and measured.
+
+pub mod agreement;
+mod charts;
+mod grid;
+#[cfg(feature = "peers")]
+mod heap;
+pub mod input;
+pub mod numbers;
+pub mod peers;
+pub mod process;
+pub mod race;
+pub mod ratios;
+pub mod system;
+mod tables;
+pub mod workloads;
+
+use std::fs;
+use std::io::{self, Write as _};
+
+use anyhow::{Context as _, Result};
+use hgrid_core::{Config, Method};
+
+use crate::cli::CompareArgs;
+use grid::GridSystem;
+use numbers::Comparison;
+use race::Plan;
+use system::System;
+
+/// Measures, prints, writes and draws.
+///
+/// # Errors
+/// If this program was built without the peers, a scene cannot be loaded, a structure cannot be
+/// built, two methods of hgrid disagree, or a file cannot be written.
+pub fn run(args: &CompareArgs) -> Result<()> {
+    let mut systems = methods(&args.methods);
+    systems.extend(peers::systems(&args.peers)?);
+    if let Some(folder) = &args.output {
+        fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder `{}`", folder.display()))?;
+    }
+    process::pin_to_one_core()?;
+
+    let plan = Plan::new(args.repeat);
+    let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, plan)?;
+    let text = if args.markdown { comparison.markdown() } else { comparison.text() };
+    writeln!(io::stdout(), "{text}")?;
+    if let Some(path) = &args.json {
+        let json = serde_json::to_string_pretty(&comparison)? + "\n";
+        fs::write(path, json).with_context(|| format!("cannot write `{}`", path.display()))?;
+    }
+    if let Some(folder) = &args.output {
+        comparison.draw(folder)?;
+    }
+    Ok(())
+}
+
+/// A system for each method, at the density that it has by itself; for all if none is named.
+#[must_use]
+pub fn methods(methods: &[Method]) -> Vec<Box<dyn System>> {
+    let methods = if methods.is_empty() { Method::ALL } else { methods };
+    let system = |&method| Box::new(GridSystem::new(Config::new(method))) as Box<dyn System>;
+    methods.iter().map(system).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+
+    /// A comparison of all that there is on small scenes.
+    fn compare(systems: &[Box<dyn System>]) -> Comparison {
+        let words = ["hgrid", "procedural:knot:2000", "procedural:soup:500", "--size", "48"];
+        let args = CompareArgs::parse_from(words);
+        let plan = Plan { repeat: 2, random_rays: 2000 };
+        Comparison::measure(&args.scenes, systems, &args.picture, plan).unwrap()
+    }
+
+    #[test]
+    fn every_method_has_its_rows_and_every_file_its_names() {
+        let comparison = compare(&methods(&[]));
+        let (text, markdown) = (comparison.text(), comparison.markdown());
+        for method in Method::ALL {
+            assert!(text.matches(method.name()).count() >= 4, "{text}");
+            assert!(markdown.contains(&format!("| {}", method.name())), "{markdown}");
+        }
+        assert!(text.contains("knot:2000: 2.00K triangles") && text.contains("rays hit"), "{text}");
+        assert!(markdown.contains("### soup:500"), "{markdown}");
+        assert!(!text.contains("hgrid / peer"), "{text}");
+        for table in markdown.split("\n\n").filter(|part| part.starts_with('|')) {
+            let columns = |line: &str| line.matches('|').count();
+            let first = table.lines().next().map_or(0, columns);
+            assert!(table.lines().all(|line| columns(line) == first), "{table}");
+        }
+
+        let folder = std::env::temp_dir().join(format!("hgrid-compare-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        comparison.draw(&folder).unwrap();
+        for name in ["compare_times", "compare_bytes"] {
+            let svg = fs::read_to_string(folder.join(name).with_extension("svg")).unwrap();
+            assert!(svg.contains("knot:2000") && svg.contains("one"), "{svg}");
+            assert!(folder.join(name).with_extension("png").exists());
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn json_has_every_sample() {
+        let json = serde_json::to_value(compare(&methods(&[Method::Fixed]))).unwrap();
+        let system = &json["scenes"][0]["systems"][0];
+        assert_eq!(system["system"], "fixed");
+        assert_eq!(system["build_samples"].as_array().unwrap().len(), 2);
+        assert_eq!(system["runs"][1]["workload"], "ao");
+        assert!(json["machine"]["rustc"].is_string() && json["target"].is_string());
+    }
+
+    #[cfg(not(feature = "peers"))]
+    #[test]
+    fn without_the_peers_nothing_is_measured() {
+        let args = CompareArgs::parse_from(["hgrid", "no/such.ply"]);
+        let error = format!("{:#}", run(&args).unwrap_err());
+        assert!(error.contains("--features peers") && !error.contains("such.ply"), "{error}");
+    }
+
+    #[cfg(feature = "peers")]
+    #[test]
+    fn all_peers_agree_with_hgrid() {
+        let mut systems = methods(&[]);
+        systems.extend(peers::systems(&[]).unwrap());
+        let comparison = compare(&systems);
+        for scene in &comparison.scenes {
+            assert_eq!(scene.systems.len(), systems.len());
+            for system in &scene.systems {
+                let name = &system.system;
+                // The heap is that of the whole program, other tests included.
+                if !system.is_peer || name.starts_with("embree") {
+                    assert!(system.index_bytes > 0, "{name}");
+                    assert!(system.peak_bytes >= system.index_bytes, "{name}");
+                }
+                for run in &system.runs {
+                    assert!(run.hits > 0 && !run.is_off(), "{name}: {run:?}");
+                    assert_eq!(run.samples.len(), 2);
+                }
+            }
+            assert_eq!(scene.ratios.len(), 6);
+        }
+        assert!(comparison.text().contains("time to image / best peer"));
+    }
+}

@@ -1,0 +1,199 @@
+//! Every number of a comparison, and where they come from.
+
+use std::path::Path;
+
+use anyhow::{Context as _, Result, ensure};
+use serde::Serialize;
+
+use super::agreement::is_off;
+use super::input::Input;
+use super::process::target;
+use super::race::{Plan, race};
+use super::ratios::Ratio;
+use super::system::{Mode, System};
+use super::workloads::{self, Rays, Workload};
+use super::{charts, tables};
+use crate::cli::Picture;
+use crate::machine::Machine;
+use crate::measure::{SceneFacts, ratio};
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::table::display_name;
+
+/// All systems on all scenes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Where the numbers come from.
+    pub machine: Machine,
+    /// What the program was compiled for.
+    pub target: String,
+    /// Pixels on each side of the pictures.
+    pub size: u16,
+    /// Builds and runs that times are medians of.
+    pub repeats: u32,
+    /// In the order of the command line.
+    pub scenes: Vec<SceneNumbers>,
+}
+
+/// All systems on one scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SceneNumbers {
+    /// The scene.
+    #[serde(flatten)]
+    pub facts: SceneFacts,
+    /// The methods of hgrid, then the peers.
+    pub systems: Vec<SystemNumbers>,
+    /// hgrid divided by a peer.
+    pub ratios: Vec<Ratio>,
+}
+
+/// One system on one scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SystemNumbers {
+    /// Its name.
+    pub system: String,
+    /// Whether it is not hgrid.
+    pub is_peer: bool,
+    /// From the mesh to a structure that answers.
+    pub build_seconds: f64,
+    /// The builds that the time is the median of, in the order of time.
+    pub build_samples: Vec<f64>,
+    /// Pages that were first touched meanwhile: the median.
+    pub build_page_faults: Option<u64>,
+    /// Triangles of the scene.
+    pub triangles: u64,
+    /// Bytes that are kept for queries, without the mesh.
+    pub index_bytes: u64,
+    /// The most bytes that there were during the build.
+    pub peak_bytes: u64,
+    /// Every workload in every mode that makes sense.
+    pub runs: Vec<Run>,
+}
+
+/// One way to trace one workload.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Run {
+    /// The rays.
+    pub workload: Workload,
+    /// The way.
+    pub mode: Mode,
+    /// The median.
+    pub seconds: f64,
+    /// What it is the median of, in the order of time.
+    pub samples: Vec<f64>,
+    /// Pages that were first touched meanwhile: the median.
+    pub page_faults: Option<u64>,
+    /// Rays that were traced.
+    pub rays: u64,
+    /// Rays that hit something.
+    pub hits: u64,
+    /// Rays whose answer is not that of hgrid.
+    pub differing: u64,
+}
+
+impl Run {
+    /// Whether so many answers differ that the time means little.
+    #[must_use]
+    pub const fn is_off(&self) -> bool {
+        is_off(self.differing, self.rays)
+    }
+}
+
+impl SystemNumbers {
+    /// The run of a workload in a mode.
+    #[must_use]
+    pub fn run(&self, workload: Workload, mode: Mode) -> Option<&Run> {
+        self.runs.iter().find(|run| run.workload == workload && run.mode == mode)
+    }
+
+    /// The fastest run of a workload whose answers are right.
+    #[must_use]
+    pub fn best(&self, workload: Workload) -> Option<&Run> {
+        let runs = self.runs.iter().filter(|run| run.workload == workload && !run.is_off());
+        runs.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+    }
+
+    /// Build and primary rays: from a mesh in memory to a picture.
+    #[must_use]
+    pub fn time_to_image(&self) -> Option<f64> {
+        self.best(Workload::Primary).map(|run| self.build_seconds + run.seconds)
+    }
+
+    /// Bytes kept for each triangle.
+    #[must_use]
+    pub fn index_bytes_per_triangle(&self) -> f64 {
+        ratio(self.index_bytes, self.triangles)
+    }
+
+    /// The most bytes during the build, for each triangle.
+    #[must_use]
+    pub fn peak_bytes_per_triangle(&self) -> f64 {
+        ratio(self.peak_bytes, self.triangles)
+    }
+}
+
+impl Comparison {
+    /// Runs the race on one scene after the other.
+    ///
+    /// # Errors
+    /// If a scene cannot be loaded, and those of [`race`].
+    pub fn measure(
+        scenes: &[String],
+        systems: &[Box<dyn System>],
+        picture: &Picture,
+        plan: Plan,
+    ) -> Result<Self> {
+        let turns = scenes.len() as u64 * systems.len() as u64 * u64::from(plan.repeat);
+        let mut progress = Progress::new("starting", turns);
+        let scenes = scenes.iter().map(|spec| {
+            progress.set_scope(&display_name(spec));
+            progress.set_message("preparing");
+            SceneNumbers::measure(spec, systems, picture, plan, &mut progress)
+                .with_context(|| format!("cannot compare on `{spec}`"))
+        });
+        let scenes = scenes.collect::<Result<_>>()?;
+        let (size, repeats) = (picture.size, plan.repeat);
+        Ok(Self { machine: Machine::here(), target: target(), size, repeats, scenes })
+    }
+
+    /// Aligned tables, then what their numbers mean and where they come from.
+    #[must_use]
+    pub fn text(&self) -> String {
+        tables::text(self)
+    }
+
+    /// The same as Markdown.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        tables::markdown(self)
+    }
+
+    /// Draws the charts into a folder.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn draw(&self, folder: &Path) -> Result<()> {
+        charts::draw(self, folder)
+    }
+}
+
+impl SceneNumbers {
+    fn measure(
+        spec: &str,
+        systems: &[Box<dyn System>],
+        picture: &Picture,
+        plan: Plan,
+        progress: &mut Progress,
+    ) -> Result<Self> {
+        let scene = Scene::load(spec)?;
+        ensure!(!scene.indices.is_empty(), "no triangles: nothing to measure");
+        let bounds = scene.bounds().context("no vertex with finite coordinates")?;
+        let facts = SceneFacts::of(&scene);
+        let picture = workloads::Picture { camera: picture.camera(&scene), size: picture.size };
+        let input = Input::new(scene);
+        let rays = Rays::new(&input, bounds, picture, plan.random_rays)?;
+        let systems = race(&input, &rays, systems, plan.repeat, progress)?;
+        let ratios = Ratio::all(&systems);
+        Ok(Self { facts, systems, ratios })
+    }
+}

@@ -1,0 +1,141 @@
+//! The other libraries: one adapter each, all behind the feature `peers`.
+//!
+//! An adapter turns the rays of hgrid into those of its library and the answers back, inside the
+//! time that is measured: who uses the library does the same.
+
+#[cfg(feature = "peers")]
+mod bvh;
+#[cfg(feature = "peers")]
+mod embree;
+#[cfg(feature = "peers")]
+mod obvhs;
+#[cfg(feature = "peers")]
+mod parry;
+#[cfg(feature = "peers")]
+mod tinybvh;
+
+use anyhow::Result;
+use clap::ValueEnum;
+
+use super::system::System;
+
+/// A library and how it builds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Peer {
+    /// Embree, build quality LOW (Morton codes)
+    EmbreeLow,
+    /// Embree, build quality MEDIUM (binned SAH)
+    EmbreeMedium,
+    /// tinybvh, binned SAH, two-wide
+    Tinybvh2,
+    /// tinybvh, binned SAH, eight-wide
+    Tinybvh8,
+    /// tinybvh, SAH with spatial splits, eight-wide
+    Tinybvh8Hq,
+    /// obvhs, its preset for very fast builds, eight-wide
+    ObvhsFast,
+    /// obvhs, its preset for very slow builds, eight-wide
+    ObvhsSlow,
+    /// bvh, its only builder
+    Bvh,
+    /// parry3d, binned
+    ParryBinned,
+    /// parry3d, PLOC
+    ParryPloc,
+}
+
+impl Peer {
+    /// The name in commands and tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::EmbreeLow => "embree-low",
+            Self::EmbreeMedium => "embree-medium",
+            Self::Tinybvh2 => "tinybvh2",
+            Self::Tinybvh8 => "tinybvh8",
+            Self::Tinybvh8Hq => "tinybvh8-hq",
+            Self::ObvhsFast => "obvhs-fast",
+            Self::ObvhsSlow => "obvhs-slow",
+            Self::Bvh => "bvh",
+            Self::ParryBinned => "parry-binned",
+            Self::ParryPloc => "parry-ploc",
+        }
+    }
+
+    /// Whether this program has it: tinybvh-rs leaves out a layout that the compiler may not use.
+    #[cfg(feature = "peers")]
+    const fn is_built(self) -> bool {
+        !matches!(self, Self::Tinybvh8 | Self::Tinybvh8Hq) || cfg!(target_feature = "avx2")
+    }
+
+    #[cfg(feature = "peers")]
+    fn system(self) -> Result<Box<dyn System>> {
+        anyhow::ensure!(
+            self.is_built(),
+            "{} needs a program that may use AVX2: build it with RUSTFLAGS='-C target-cpu=native'",
+            self.name()
+        );
+        Ok(match self {
+            Self::EmbreeLow => Box::new(embree::Embree::new(self, embree::Quality::Low)?),
+            Self::EmbreeMedium => Box::new(embree::Embree::new(self, embree::Quality::Medium)?),
+            Self::Tinybvh2 => Box::new(tinybvh::Tinybvh2(self)),
+            #[cfg(target_feature = "avx2")]
+            Self::Tinybvh8 => Box::new(tinybvh::Tinybvh8 { peer: self, is_hq: false }),
+            #[cfg(target_feature = "avx2")]
+            Self::Tinybvh8Hq => Box::new(tinybvh::Tinybvh8 { peer: self, is_hq: true }),
+            #[cfg(not(target_feature = "avx2"))]
+            Self::Tinybvh8 | Self::Tinybvh8Hq => anyhow::bail!("not in this program"),
+            Self::ObvhsFast => Box::new(obvhs::Obvhs::fast(self)),
+            Self::ObvhsSlow => Box::new(obvhs::Obvhs::slow(self)),
+            Self::Bvh => Box::new(bvh::BvhSystem(self)),
+            Self::ParryBinned => Box::new(parry::Parry::binned(self)),
+            Self::ParryPloc => Box::new(parry::Parry::ploc(self)),
+        })
+    }
+}
+
+/// A system for each peer; for all that this program has if none is named.
+///
+/// # Errors
+/// If this program has no peers or not this one, or a library does not start.
+#[cfg(feature = "peers")]
+pub fn systems(peers: &[Peer]) -> Result<Vec<Box<dyn System>>> {
+    let all = Peer::value_variants().iter().copied().filter(|peer| peer.is_built());
+    let peers = if peers.is_empty() { all.collect() } else { peers.to_vec() };
+    peers.into_iter().map(Peer::system).collect()
+}
+
+/// A system for each peer: without the feature there is none.
+///
+/// # Errors
+/// Always; the message says how to build a program that has them.
+#[cfg(not(feature = "peers"))]
+pub fn systems(_: &[Peer]) -> Result<Vec<Box<dyn System>>> {
+    anyhow::bail!(
+        "this program was built without the other ray tracers. On Debian: \
+         apt-get install libembree-dev g++, then \
+         cargo run --release -p hgrid-lab --features peers -- compare ..."
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_the_command_line() {
+        for peer in Peer::value_variants() {
+            assert_eq!(peer.to_possible_value().unwrap().get_name(), peer.name());
+        }
+    }
+
+    #[cfg(not(feature = "peers"))]
+    #[test]
+    fn without_the_peers_the_error_says_how_to_get_them() {
+        let error = systems(&[]).map(|_| ()).unwrap_err().to_string();
+        for words in ["--features peers", "libembree-dev", "cargo run --release -p hgrid-lab"] {
+            assert!(error.contains(words), "{error}");
+        }
+        assert_eq!(error.lines().count(), 1);
+    }
+}

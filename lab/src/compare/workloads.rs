@@ -1,0 +1,305 @@
+//! The rays that every system traces.
+//!
+//! Primary rays are made tile by tile while they are traced, as a renderer does. The others are
+//! made once, beforehand: they are the same for all systems and in none of the times. Nothing here
+//! depends on a clock or on the machine.
+
+use anyhow::{Context as _, Result};
+use clap::ValueEnum;
+use hgrid_core::{Config, Grid, Hit, Ray, TriangleMesh};
+use serde::Serialize;
+
+use super::input::Input;
+use super::system::{MISS, Mode, Tracer, is_hit};
+use crate::camera::Camera;
+use crate::measure;
+use crate::scene::Bounds;
+use crate::shade::normal_of;
+use crate::vector::{Vector, cross, dot, offset, round, unit};
+
+/// The length of an ambient occlusion ray, as a part of the diagonal of the scene's box.
+pub const AO_REACH: f64 = 0.1;
+
+/// How far from its surface such a ray starts, likewise: far above rounding, far below triangles.
+const AO_START: f64 = 1e-5;
+
+/// Pixels on each side of a tile.
+const TILE: u16 = 8;
+
+/// Rays in a tile.
+const TILE_RAYS: usize = TILE as usize * TILE as usize;
+
+/// What is asked of a system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Workload {
+    /// One ray through every pixel, closest hit, shaded.
+    Primary,
+    /// Ambient occlusion: one short ray from every primary hit, any hit.
+    Ao,
+    /// Rays from one random point of the scene's box toward another, closest hit.
+    Random,
+}
+
+impl Workload {
+    /// In the order in which they are measured.
+    pub const ALL: [Self; 3] = [Self::Primary, Self::Ao, Self::Random];
+
+    /// The word that tables use.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Primary => "primary",
+            Self::Ao => "ao",
+            Self::Random => "random",
+        }
+    }
+}
+
+/// The rays of a scene, and the answers that hgrid gives.
+#[derive(Debug)]
+pub struct Rays {
+    /// The primary rays.
+    pub picture: Picture,
+    /// One from every primary hit.
+    pub ao: Vec<Ray>,
+    /// From points toward points.
+    pub random: Vec<Ray>,
+    /// The answers to the primary rays, row by row.
+    pub primary_hits: Vec<Hit>,
+    /// The answers to the others, in their order.
+    pub ao_occluded: Vec<bool>,
+    /// The answers to the others, in their order.
+    pub random_hits: Vec<Hit>,
+    /// From the smallest to the largest coordinates of the scene.
+    pub diagonal: f64,
+}
+
+impl Rays {
+    /// Makes the rays with the help of a grid.
+    ///
+    /// # Errors
+    /// If the grid cannot be built, or the scene has no finite vertex.
+    pub fn new(input: &Input, bounds: Bounds, picture: Picture, count: usize) -> Result<Self> {
+        let mesh = input.mesh()?;
+        let memory = measure::build(mesh, &Config::default()).context("no grid for the rays")?;
+        let grid = Grid::open(&memory.index, mesh)?;
+        let closest = |ray: &Ray| grid.intersect(ray).unwrap_or(MISS);
+
+        let (min, max) = bounds;
+        let extent = [0, 1, 2].map(|axis| f64::from(max[axis]) - f64::from(min[axis]));
+        let diagonal = dot(extent, extent).sqrt();
+        let size = usize::from(picture.size);
+        let mut primary_hits = vec![MISS; size * size];
+        let mut ao = Vec::new();
+        picture.for_each_tile(|rays, pixels| {
+            for (ray, &pixel) in rays.iter().zip(pixels) {
+                let hit = closest(ray);
+                primary_hits[pixel] = hit;
+                ao.extend(is_hit(&hit).then(|| ao_ray(mesh, ray, &hit, pixel, diagonal)).flatten());
+            }
+        });
+        let random = random_rays(bounds, count);
+        let ao_occluded = ao.iter().map(|ray| grid.occluded(ray)).collect();
+        let random_hits = random.iter().map(closest).collect();
+        Ok(Self { picture, ao, random, primary_hits, ao_occluded, random_hits, diagonal })
+    }
+
+    /// How many rays a workload has.
+    #[must_use]
+    pub fn count(&self, workload: Workload) -> usize {
+        match workload {
+            Workload::Primary => self.primary_hits.len(),
+            Workload::Ao => self.ao.len(),
+            Workload::Random => self.random.len(),
+        }
+    }
+}
+
+/// A picture in tiles.
+#[derive(Debug, Clone, Copy)]
+pub struct Picture {
+    /// From where it is seen.
+    pub camera: Camera,
+    /// Pixels on each side.
+    pub size: u16,
+}
+
+impl Picture {
+    /// Traces every ray and gives it, with its answer, to the pixel that it belongs to.
+    pub fn trace(&self, tracer: &dyn Tracer, mode: Mode, mut pixel: impl FnMut(usize, &Ray, &Hit)) {
+        let mut hits = [MISS; TILE_RAYS];
+        self.for_each_tile(|rays, pixels| {
+            let hits = &mut hits[..rays.len()];
+            tracer.intersect(mode, rays, hits);
+            for ((ray, hit), &place) in rays.iter().zip(&*hits).zip(pixels) {
+                pixel(place, ray, hit);
+            }
+        });
+    }
+
+    /// Calls `tile` with the rays of one tile after the other and the places of their pixels.
+    ///
+    /// Tiles come row by row; rays of a tile in Morton order, so that any sixteen in a row are a
+    /// square of four by four pixels.
+    fn for_each_tile(&self, mut tile: impl FnMut(&[Ray], &[usize])) {
+        let Self { camera, size } = *self;
+        let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE_RAYS];
+        let mut pixels = [0; TILE_RAYS];
+        for top in (0..size).step_by(TILE.into()) {
+            for left in (0..size).step_by(TILE.into()) {
+                let mut count = 0;
+                for at in 0..TILE * TILE {
+                    let (column, row) = (left + even_bits(at), top + even_bits(at >> 1));
+                    if column < size && row < size {
+                        rays[count] = camera.ray(column, row, size);
+                        pixels[count] = usize::from(row) * usize::from(size) + usize::from(column);
+                        count += 1;
+                    }
+                }
+                tile(&rays[..count], &pixels[..count]);
+            }
+        }
+    }
+}
+
+/// The three lowest bits in even places, side by side.
+const fn even_bits(at: u16) -> u16 {
+    at & 1 | at >> 1 & 2 | at >> 2 & 4
+}
+
+/// A ray from a hit into the half space above its surface, by the cosine of the angle.
+fn ao_ray(
+    mesh: TriangleMesh<'_>,
+    ray: &Ray,
+    hit: &Hit,
+    pixel: usize,
+    diagonal: f64,
+) -> Option<Ray> {
+    let direction = ray.direction.map(f64::from);
+    let normal = normal_of(&mesh.triangle(hit.primitive)?)?;
+    let normal = if dot(normal, direction) > 0.0 { normal.map(|c| -c) } else { normal };
+
+    // A point of the unit disk, lifted onto the hemisphere.
+    let mut random = Random(pixel as u64);
+    let (radius, angle) = (random.next().sqrt(), core::f64::consts::TAU * random.next());
+    let height = (1.0 - radius * radius).max(0.0).sqrt();
+    let side = if normal[0].abs() < 0.5 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let side = unit(cross(normal, side))?;
+    let other = cross(normal, side);
+    let direction = offset(normal.map(|c| c * height), radius * angle.cos(), side);
+    let direction = offset(direction, radius * angle.sin(), other);
+
+    let point = offset(ray.origin.map(f64::from), f64::from(hit.t), ray.direction.map(f64::from));
+    let origin = offset(point, AO_START * diagonal, normal);
+    Some(Ray { t_max: narrow(AO_REACH * diagonal), ..Ray::new(round(origin), round(direction)) })
+}
+
+/// Rays of unit direction from one point of the box toward another, without an end.
+fn random_rays((min, max): Bounds, count: usize) -> Vec<Ray> {
+    let mut random = Random(0);
+    let mut point = || -> Vector {
+        [0, 1, 2].map(|axis| {
+            let (min, max) = (f64::from(min[axis]), f64::from(max[axis]));
+            min + (max - min) * random.next()
+        })
+    };
+    let rays = (0..count).map(|_| {
+        let (from, to) = (point(), point());
+        // Two points are the same only in a box without a size; any direction does there.
+        let direction = unit(offset(to, -1.0, from)).unwrap_or([0.0, 0.0, 1.0]);
+        Ray::new(round(from), round(direction))
+    });
+    rays.collect()
+}
+
+/// Numbers from 0 to 1, always the same ones for the same start (`SplitMix64`).
+struct Random(u64);
+
+impl Random {
+    #[expect(clippy::cast_precision_loss, reason = "53 bits are what an f64 has")]
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ mixed >> 31) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// The nearest length that a ray can have.
+#[expect(clippy::cast_possible_truncation, reason = "the rounding that is wanted")]
+fn narrow(length: f64) -> f32 {
+    length as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Up, View};
+    use crate::scene::Scene;
+
+    fn rays(size: u16, count: usize) -> (Rays, Bounds) {
+        let scene = Scene::load("procedural:knot:2000").unwrap();
+        let bounds = scene.bounds().unwrap();
+        let picture = Picture { camera: Camera::framing(bounds, View::ThreeQuarter, Up::Y), size };
+        (Rays::new(&Input::new(scene), bounds, picture, count).unwrap(), bounds)
+    }
+
+    #[test]
+    fn rays_are_the_same_every_time() {
+        let [(a, _), (b, _)] = [rays(40, 100), rays(40, 100)];
+        assert_eq!((a.ao, a.random), (b.ao, b.random));
+        assert_eq!(a.primary_hits, b.primary_hits);
+        assert_eq!((a.ao_occluded, a.random_hits), (b.ao_occluded, b.random_hits));
+    }
+
+    #[test]
+    fn counts_are_those_of_pixels_hits_and_points() {
+        let (rays, _) = rays(43, 100);
+        let hits = rays.primary_hits.iter().filter(|hit| is_hit(hit)).count();
+        assert!((300..900).contains(&hits), "{hits}");
+        let counts = Workload::ALL.map(|workload| rays.count(workload));
+        assert_eq!(counts, [43 * 43, hits, 100]);
+        assert_eq!((rays.ao_occluded.len(), rays.random_hits.len()), (hits, 100));
+        let occluded = rays.ao_occluded.iter().filter(|&&is| is).count();
+        assert!((hits / 50..hits).contains(&occluded), "{occluded} of {hits}");
+    }
+
+    #[test]
+    fn every_pixel_has_its_own_ray_once() {
+        let camera = Camera::framing(([0.0; 3], [1.0; 3]), View::Front, Up::Y);
+        for size in [1, 7, 8, 20] {
+            let mut seen = vec![0; usize::from(size) * usize::from(size)];
+            Picture { camera, size }.for_each_tile(|rays, pixels| {
+                for (ray, &pixel) in rays.iter().zip(pixels) {
+                    let at = |place: usize| u16::try_from(place).unwrap();
+                    let (column, row) = (pixel % usize::from(size), pixel / usize::from(size));
+                    assert_eq!(*ray, camera.ray(at(column), at(row), size));
+                    seen[pixel] += 1;
+                }
+            });
+            assert!(seen.iter().all(|&count| count == 1), "{size}");
+        }
+    }
+
+    #[test]
+    fn sixteen_rays_in_a_row_are_a_square() {
+        let places: Vec<_> = (0..16).map(|at| (even_bits(at), even_bits(at >> 1))).collect();
+        assert!(places.iter().all(|&(column, row)| column < 4 && row < 4));
+        assert_eq!((even_bits(63), even_bits(63 >> 1)), (7, 7));
+    }
+
+    #[test]
+    fn rays_stay_where_they_belong() {
+        let (rays, (min, max)) = rays(24, 500);
+        for ray in &rays.random {
+            assert!((0..3).all(|axis| (min[axis]..=max[axis]).contains(&ray.origin[axis])));
+        }
+        for ray in rays.ao.iter().chain(&rays.random) {
+            let direction = ray.direction.map(f64::from);
+            assert!((dot(direction, direction) - 1.0).abs() < 1e-5);
+        }
+        let reach = AO_REACH * rays.diagonal;
+        assert!(rays.ao.iter().all(|ray| (f64::from(ray.t_max) / reach - 1.0).abs() < 1e-6));
+    }
+}
