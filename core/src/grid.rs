@@ -14,7 +14,7 @@ use crate::mesh::{Strided, TriangleMesh};
 use crate::one_level::{self, OneLevel};
 use crate::ray::{Hit, Ray};
 use crate::recursive::{self, Recursive};
-use crate::simd::{SimdLevel, dispatch};
+use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
 use crate::tasks::Parallel;
 use crate::triangle::TriangleTest;
 use crate::variable::{self, Variable};
@@ -245,6 +245,9 @@ impl<'a> Grid<'a> {
         rays: &Strided<'_>,
         answer: impl FnMut(usize, Option<Hit>),
     ) -> bool {
+        if !HAS_VECTORS {
+            return false;
+        }
         let Structure::Brick(brick) = &self.structure else { return false };
         let (lattice, mesh) = (&self.lattice, &self.mesh);
         dispatch(self.simd, Tiles::<_, ANY> { brick, lattice, mesh, rays, answer });

@@ -85,6 +85,18 @@ impl SimdLevel {
     }
 }
 
+/// Whether the target has vectors at all. Without them sixteen lanes one after the other are no gain,
+/// much code, and minutes of compilation.
+pub(crate) const HAS_VECTORS: bool = cfg!(any(
+    all(
+        any(target_arch = "x86", target_arch = "x86_64"),
+        target_feature = "sse2",
+        target_feature = "fxsr"
+    ),
+    all(target_arch = "aarch64", target_feature = "neon"),
+    all(target_arch = "wasm32", target_feature = "simd128")
+));
+
 /// Code for any vector instructions.
 ///
 /// What `run` calls on vectors must be `#[inline(always)]` down to the last function: only what ends
