@@ -2,8 +2,8 @@
 //!
 //! A batch answers each ray as [`Grid::intersect`] or [`Grid::occluded`] would, bit for bit. What the
 //! caller knows about the rays says how: neighbours, as those of a tile of pixels, share their way
-//! through the grid; rays without order are several at a time in flight, so that one waits for memory
-//! while another computes.
+//! through the grid; rays without order go one after the other (several at a time in flight were
+//! slower: core/DESIGN.md).
 
 use bytemuck::{Pod, bytes_of, pod_read_unaligned};
 
@@ -16,7 +16,7 @@ use crate::ray::{Hit, INVALID_ID, Ray};
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Coherence {
-    /// Nothing: rays after a bounce, random rays.
+    /// Nothing: rays after a bounce, random rays. Each is traced alone.
     #[default]
     Incoherent = 0,
     /// Rays that follow one another are neighbours: best are runs of 64 from a tile of 8 x 8 pixels.

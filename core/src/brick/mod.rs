@@ -19,11 +19,16 @@
 
 mod build;
 mod bundle;
+mod divide;
+mod frame;
+mod groups;
+mod hits;
 mod layout;
 mod pass;
 mod pool;
 mod size;
 mod sort;
+#[cfg(test)]
 mod tests;
 mod tile;
 mod validate;

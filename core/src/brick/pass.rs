@@ -14,8 +14,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16, u32x8};
 use glam::{Vec3A, Vec4};
 
+use super::frame::{classify, lists};
 use super::layout::{Class, Entry, GROUP};
-use super::sort::{classify, lists};
 use crate::aabb::{Aabb, MAX_COORDINATE};
 use crate::cell::{CellRange, Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::config::BuildFlags;

@@ -10,8 +10,8 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "words of a region")]
 
+use super::groups::Groups;
 use super::layout::{Block, ENTRY_WORDS, Entry};
-use super::sort::{Groups, Sink};
 
 /// A task's share of the pool. Places are words of the pool.
 #[derive(Debug, Clone, Copy, Default)]
@@ -59,8 +59,18 @@ pub(super) struct Pool<'a> {
     filled: Filled,
 }
 
-impl Sink for Pool<'_> {
-    fn take(&mut self, count: usize) -> Option<&mut [u32]> {
+impl<'a> Pool<'a> {
+    /// The words of a part whose bins are full.
+    pub(super) fn new(part: &Part, words: &'a mut [u32]) -> Self {
+        let Part { taken, start, bins, .. } = *part;
+        let unread = part.bin_words();
+        let filled = Filled { taken, most: taken + unread, is_exhausted: false };
+        let (bins, unread) = ((bins - start) as usize, unread as usize);
+        Self { words, start: taken, bins, unread, filled }
+    }
+
+    /// The next `count` words, or `None` if they are only counted.
+    pub(super) fn take(&mut self, count: usize) -> Option<&mut [u32]> {
         let start = self.filled.taken;
         let taken = start + count as u64;
         self.filled.taken = taken;
@@ -73,7 +83,8 @@ impl Sink for Pool<'_> {
         self.words.get_mut(usize::try_from(start).ok()?..end?)
     }
 
-    fn set(&mut self, at: u32, words: &[u32]) {
+    /// Writes words of the block that were taken before.
+    pub(super) fn set(&mut self, at: u32, words: &[u32]) {
         let at = usize::try_from(self.start + u64::from(at)).unwrap_or(usize::MAX);
         let slots = self.words.get_mut(at..).filter(|_| !self.filled.is_exhausted);
         for (slot, &word) in slots.into_iter().flatten().zip(words) {
@@ -81,19 +92,9 @@ impl Sink for Pool<'_> {
         }
     }
 
-    fn position(&self) -> u32 {
+    /// Where the next word goes, behind the start of the block.
+    pub(super) fn position(&self) -> u32 {
         u32::try_from(self.filled.taken - self.start).unwrap_or(u32::MAX)
-    }
-}
-
-impl<'a> Pool<'a> {
-    /// The words of a part whose bins are full.
-    pub(super) fn new(part: &Part, words: &'a mut [u32]) -> Self {
-        let Part { taken, start, bins, .. } = *part;
-        let unread = part.bin_words();
-        let filled = Filled { taken, most: taken + unread, is_exhausted: false };
-        let (bins, unread) = ((bins - start) as usize, unread as usize);
-        Self { words, start: taken, bins, unread, filled }
     }
 
     /// Whether chunks may go up to `end`; the unread bins are moved to the end of the part if they

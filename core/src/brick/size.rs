@@ -19,9 +19,9 @@ use core::ops::Range;
 
 use glam::Vec3A;
 
+use super::frame::MOST_BLOCKS;
 use super::layout::Layout;
 use super::pass::{Census, Count, Ground};
-use super::sort::MOST_BLOCKS;
 use crate::aabb::Aabb;
 use crate::cell::{Lattice, MAX_RESOLUTION};
 use crate::config::{BuildFlags, Config};
@@ -92,12 +92,8 @@ impl<const N: usize> Shares<N> {
 }
 
 /// [`settle_in`] without scratch.
-pub(super) fn settle(
-    mesh: &TriangleMesh<'_>,
-    config: &Config,
-    scratch: &mut [u8],
-) -> Result<Settled, Error> {
-    Ok(settle_in::<1>(mesh, config, scratch, &Parallel::SERIAL)?.0)
+pub(super) fn settle(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Settled, Error> {
+    Ok(settle_in::<1>(mesh, config, &mut [], &Parallel::SERIAL)?.0)
 }
 
 /// Chooses the cells of a mesh and counts what they will hold. The heads of each task get the entries

@@ -18,124 +18,34 @@
 )]
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, mask32x8, u32x8};
-use glam::Vec3A;
+use fearless_simd::{Simd, u32x8};
 
+use super::divide::{count_of_cell, plan};
+use super::frame::{Frame, Scene};
+use super::groups::Groups;
 use super::layout::{
-    AXES, BLOCK, BLOCK_CELLS, Bench, Block, CHILD_WORDS, CROWDED, Class, ENTRY_WORDS, Entry,
-    MASK_BITS, OTHERS, RECORD_WORDS, number, place,
+    BLOCK_CELLS, Bench, Block, CHILD_WORDS, CROWDED, Class, Entry, MASK_BITS, RECORD_WORDS, number,
+    place,
 };
-use crate::aabb::Aabb;
+use super::pool::Pool;
 use crate::bits::halves;
 use crate::bump::GRID;
-use crate::cell::Lattice;
-use crate::mesh::TriangleMesh;
-
-/// Where chunks go: words in order, up to a limit that may rise.
-pub(super) trait Sink {
-    /// The next `count` words, or `None` if they are only counted.
-    fn take(&mut self, count: usize) -> Option<&mut [u32]>;
-
-    /// Writes one word of the block's that was taken before.
-    fn set(&mut self, at: u32, words: &[u32]);
-
-    /// Where the next word goes, behind the start of the block.
-    fn position(&self) -> u32;
-}
-
-/// The mesh in its lattice.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Scene<'m> {
-    pub(super) mesh: &'m TriangleMesh<'m>,
-    pub(super) lattice: &'m Lattice,
-}
-
-impl Scene<'_> {
-    /// The box of a triangle in cells of the lattice, grown by the margin.
-    #[inline(always)]
-    fn reach(&self, id: u32) -> Option<Aabb> {
-        let bounds = self.mesh.corners(id, Vec3A::new).and_then(Aabb::of)?;
-        Some(self.lattice.reach(&bounds))
-    }
-}
-
-/// The cells that a block, or a divided cell, is cut into, measured in cells of the lattice.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
-    /// The first corner.
-    pub(super) origin: Vec3A,
-    /// Cells of the frame in one of the lattice.
-    pub(super) scale: f32,
-    /// Cells per axis.
-    pub(super) cells: u32,
-}
-
-impl Frame {
-    /// The frame of a block.
-    pub(super) fn of_block(block: [u32; 3]) -> Self {
-        let origin = Vec3A::from_array(block.map(|at| crate::cell::as_f32(at * BLOCK)));
-        Self { origin, scale: 1.0, cells: BLOCK }
-    }
-
-    /// The frame of one of its cells, cut into so many again.
-    pub(super) fn child(&self, cell: [u32; 3], cells: u32) -> Self {
-        let corner = Vec3A::from_array(cell.map(crate::cell::as_f32));
-        Self {
-            origin: self.origin + corner / self.scale,
-            scale: self.scale * crate::cell::as_f32(cells),
-            cells,
-        }
-    }
-
-    /// The cells of the frame that a box in cells of the lattice overlaps.
-    pub(super) fn range(&self, reach: &Aabb) -> crate::cell::CellRange {
-        let zoom = |point: Vec3A| (point - self.origin) * self.scale;
-        let reach = Aabb { min: zoom(reach.min), max: zoom(reach.max) };
-        crate::cell::cells_between(reach, [self.cells; 3])
-    }
-}
-
-/// How many cells hold a triangle with these first and last cells, or with a shift of 2 bricks, of 4
-/// blocks.
-#[inline(always)]
-pub(super) fn lists(min: [u32; 3], max: [u32; 3], shift: u32) -> u64 {
-    let along = |axis: usize| u64::from((max[axis] >> shift) - (min[axis] >> shift)) + 1;
-    along(0) * along(1) * along(2)
-}
-
-/// Which lists take a triangle with these cells; `None` if it would be in too many blocks.
-#[inline(always)]
-pub(super) fn classify(min: [u32; 3], max: [u32; 3], most_blocks: u64) -> Option<Class> {
-    let [x, y, z] = core::array::from_fn(|axis| max[axis].wrapping_sub(min[axis]));
-    if x | y | z <= 1 || lists(min, max, 0) <= MOST_LISTS {
-        Some(Class::Cells)
-    } else if lists(min, max, 2) <= MOST_LISTS {
-        Some(Class::Bricks)
-    } else {
-        (lists(min, max, 4) <= most_blocks).then_some(Class::Blocks)
-    }
-}
-
-/// The most cells, or bricks, that list a triangle.
-pub(super) const MOST_LISTS: u64 = 32;
-/// The most blocks.
-pub(super) const MOST_BLOCKS: u64 = 512;
 
 /// How many words a chunk takes, and what for.
 #[derive(Debug, Clone, Copy, Default)]
-struct Measure {
+pub(super) struct Measure {
     bricks: u32,
     cells: u32,
     /// Words of the cells' lists and records.
     lists: u32,
     /// Words of the lists of bricks and of the block, their lengths included.
-    large: u32,
+    pub(super) large: u32,
     /// Triangles for the whole block.
     block: u32,
     /// References in cells, divided or not.
-    references: u32,
+    pub(super) references: u32,
     /// The longest list of a cell.
-    longest: u32,
+    pub(super) longest: u32,
     mask: u64,
 }
 
@@ -158,11 +68,11 @@ pub(super) fn sort<S: Simd>(
     frame: &Frame,
     benches: &mut [Bench<'_>],
     groups: &Groups,
-    sink: &mut impl Sink,
+    pool: &mut Pool<'_>,
 ) -> Option<Block> {
     simd.vectorize(
         #[inline(always)]
-        || chunk(simd, scene, frame, benches, groups, sink),
+        || chunk(simd, scene, frame, benches, groups, pool),
     )
 }
 
@@ -173,7 +83,7 @@ fn chunk<S: Simd>(
     frame: &Frame,
     benches: &mut [Bench<'_>],
     groups: &Groups,
-    sink: &mut impl Sink,
+    pool: &mut Pool<'_>,
 ) -> Option<Block> {
     let (bench, deeper) = benches.split_first_mut()?;
     let entries = bench.entries.get(..groups.count())?;
@@ -204,8 +114,8 @@ fn chunk<S: Simd>(
     }
     let divided: &[u64] = if is_crowded { bench.divided } else { &[] };
 
-    let base = sink.position();
-    if let Some(words) = sink.take(measure.words()) {
+    let base = pool.position();
+    if let Some(words) = pool.take(measure.words()) {
         write(simd, words, base, &measure, groups, entries, cells, bench.bricks, divided);
     }
     // The records of divided cells lie where the tally left the cursors of their cells.
@@ -221,9 +131,9 @@ fn chunk<S: Simd>(
             else {
                 continue;
             };
-            let block = sort(simd, scene, &frame, deeper, &groups, sink)?;
+            let block = sort(simd, scene, &frame, deeper, &groups, pool)?;
             let [low, high] = block.mask;
-            sink.set(at, &[low, high, block.base, block.list, frame.cells]);
+            pool.set(at, &[low, high, block.base, block.list, frame.cells]);
         }
     }
     let mask = halves(measure.mask);
@@ -237,250 +147,9 @@ fn crowded<S: Simd>(simd: S, cells: [u32; 8]) -> u64 {
     u32x8::simd_from(simd, cells).simd_gt(u32x8::splat(simd, CROWDED)).to_bitmask()
 }
 
-/// Shows the entries that a cell lists.
-///
-/// Every crowded cell looks at all entries of its block, so it looks at eight at once.
-#[inline(always)]
-fn each_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize, mut visit: impl FnMut(u32)) {
-    let (eights, rest) = entries.as_chunks::<8>();
-    for eight in eights {
-        let mut listed = listed_of_eight(simd, eight, cell as u32);
-        while listed != 0 {
-            let bit = listed.trailing_zeros() as usize;
-            listed &= listed - 1;
-            if let Some(entry) = eight.get(bit) {
-                visit(entry.id);
-            }
-        }
-    }
-    of_cell(rest, cell).for_each(visit);
-}
-
-/// The entries that a cell lists, one by one.
-fn of_cell(entries: &[Entry], cell: usize) -> impl Iterator<Item = u32> + '_ {
-    let cell = place(cell as u32);
-    entries.iter().filter_map(move |entry| {
-        let (min, max) = (place(entry.min()), place(entry.max()));
-        let holds = (0..3).all(|axis| (min[axis]..=max[axis]).contains(&cell[axis]));
-        (holds && entry.class() == Class::Cells).then_some(entry.id)
-    })
-}
-
-/// Which of eight entries a cell lists.
-#[inline(always)]
-fn listed_of_eight<S: Simd>(simd: S, entries: &[Entry; 8], cell: u32) -> u64 {
-    let words: &[[u32; 8]; ENTRY_WORDS] = bytemuck::cast_ref(entries);
-    let cells = u32x8::simd_from(simd, words[0]).unzip_high(u32x8::simd_from(simd, words[1]));
-    // An axis' bits are in order, though not side by side.
-    let (min, max) = (cells, cells >> 12);
-    let x = is_between(simd, min, max, cell, AXES[0]);
-    let y = is_between(simd, min, max, cell, AXES[1]);
-    let z = is_between(simd, min, max, cell, AXES[2]);
-    let is_in_cells = (cells & Entry::CLASS).simd_eq(u32x8::splat(simd, 0));
-    (x & y & z & is_in_cells).to_bitmask()
-}
-
-/// Whether a cell is between others on an axis.
-#[inline(always)]
-fn is_between<S: Simd>(simd: S, min: u32x8<S>, max: u32x8<S>, cell: u32, axis: u32) -> mask32x8<S> {
-    let cell = u32x8::splat(simd, cell & axis);
-    (min & axis).simd_le(cell) & cell.simd_le(max & axis)
-}
-
-/// How many entries a cell lists.
-fn count_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize) -> u32 {
-    simd.vectorize(
-        #[inline(always)]
-        || {
-            let mut count = 0;
-            each_of_cell(simd, entries, cell, |_| count += 1);
-            count
-        },
-    )
-}
-
-/// Puts the triangles of a cell on the next bench, if to divide the cell gains something: the
-/// triangles are smaller than it, and its parts list fewer of them.
-fn plan<S: Simd>(
-    simd: S,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    entries: &[Entry],
-    cell: usize,
-    listed: u32,
-    benches: &mut [Bench<'_>],
-) -> Option<(Frame, Groups)> {
-    simd.vectorize(
-        #[inline(always)]
-        || {
-            let bench = benches.first_mut()?;
-            let (frame, groups) = collect(simd, scene, frame, entries, cell, listed, bench)?;
-            let Bench { cells, bricks, entries: inner, .. } = bench;
-            let (inner, cells) = (inner.get(..groups.count())?, cells.first_chunk_mut()?);
-            let block = tally(&groups, inner, cells, bricks);
-            let measure = measure(simd, cells, bricks, block);
-            let gains = u64::from(measure.references) <= 4 * u64::from(listed)
-                && 10 * u64::from(measure.longest.max(block)) <= 9 * u64::from(listed);
-            gains.then_some((frame, groups))
-        },
-    )
-}
-
-/// The whole part of a number; 0 if it is none.
-#[expect(clippy::cast_sign_loss, reason = "saturates")]
-const fn wholes(number: f64) -> u32 {
-    number as u32
-}
-
-/// Puts the triangles of a cell on a bench, if they are small enough to divide it.
-#[inline(always)]
-fn collect<S: Simd>(
-    simd: S,
-    scene: &Scene<'_>,
-    frame: &Frame,
-    entries: &[Entry],
-    cell: usize,
-    listed: u32,
-    bench: &mut Bench<'_>,
-) -> Option<(Frame, Groups)> {
-    // The ids, and soon the entries, wait where cells will be counted, if there is room.
-    let waiting: &mut [Entry] = bytemuck::try_cast_slice_mut(bench.cells).ok()?;
-    let waiting = waiting.get_mut(..listed as usize).unwrap_or_default();
-    let mut slots = waiting.iter_mut();
-    each_of_cell(simd, entries, cell, |id| {
-        if let Some(slot) = slots.next() {
-            slot.id = id;
-        }
-    });
-
-    // As many cells as two of its mean triangles are wide, but none so small that the margin counts.
-    let mut sum = 0.0;
-    let mut add = |id: u32| {
-        if let Some(reach) = scene.reach(id) {
-            sum += f64::from(reach.size().max_element());
-        }
-    };
-    if waiting.is_empty() {
-        of_cell(entries, cell).for_each(&mut add);
-    } else {
-        for entry in waiting.iter() {
-            add(entry.id);
-        }
-    }
-    let mean = sum / f64::from(listed);
-    let width = (2.0 * mean).max(4.0 * f64::from(scene.lattice.margin().max_element()));
-    let count = wholes(1.0 / (width * f64::from(frame.scale)));
-    let frame = frame.child(place(cell as u32), count.min(16));
-    if count < 2 {
-        return None;
-    }
-
-    let entry = |id: u32| {
-        let range = frame.range(&scene.reach(id)?);
-        // No list of the lattice's blocks takes it: at most it is in the list of all of the cell.
-        let class = classify(range.min, range.max, 1).unwrap_or(Class::Blocks);
-        Some(Entry::new(id, range.min, range.max, class))
-    };
-    for slot in waiting.iter_mut() {
-        *slot = entry(slot.id)?;
-    }
-    let groups = if waiting.is_empty() {
-        Groups::collect(|| of_cell(entries, cell).filter_map(entry), bench.entries)
-    } else {
-        Groups::collect(|| waiting.iter().copied(), bench.entries)
-    };
-    Some((frame, groups?))
-}
-
-/// Entries of a block, together those that have two cells on the same axes.
-///
-/// How many cells an entry has is as good as random, and a loop over them, or a choice between eight
-/// ways, costs a mispredicted branch or two: more than all else together. Among equals there is
-/// nothing to predict, a third of the time with the grouping in it.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Groups {
-    /// Where each group starts, and the end.
-    starts: [u32; Self::COUNT + 1],
-}
-
-impl Groups {
-    /// One for every set of axes, and one for entries that are in three cells on an axis or in none.
-    const COUNT: usize = 1 + Self::OTHERS;
-    const OTHERS: usize = OTHERS as usize;
-
-    /// Puts entries that can be gone through twice where they are sorted.
-    #[inline(always)]
-    pub(super) fn collect<I: Iterator<Item = Entry>>(
-        source: impl Fn() -> I,
-        entries: &mut [Entry],
-    ) -> Option<Self> {
-        let mut counts = [0; Self::COUNT];
-        for entry in source() {
-            *counts.get_mut(entry.group() as usize)? += 1;
-        }
-        let mut starts = [0; Self::COUNT + 1];
-        let mut start = 0;
-        for (slot, count) in starts.iter_mut().zip(&mut counts) {
-            *slot = start;
-            start += core::mem::replace(count, start);
-        }
-        starts[Self::COUNT] = start;
-        let mut cursors = counts;
-        for entry in source() {
-            let cursor = cursors.get_mut(entry.group() as usize)?;
-            *entries.get_mut(*cursor as usize)? = entry;
-            *cursor += 1;
-        }
-        Some(Self { starts })
-    }
-
-    /// Number of entries.
-    pub(super) const fn count(&self) -> usize {
-        self.starts[Self::COUNT] as usize
-    }
-
-    fn group<'e>(&self, group: usize, entries: &'e [Entry]) -> &'e [Entry] {
-        let ends = self.starts.get(group).zip(self.starts.get(group + 1));
-        let range = ends.map(|(&start, &end)| start as usize..end as usize);
-        range.and_then(|range| entries.get(range)).unwrap_or_default()
-    }
-
-    /// Shows every cell of the small entries.
-    #[inline(always)]
-    fn each_small(&self, entries: &[Entry], mut visit: impl FnMut(usize, u32)) {
-        let mut visit = |cell: u32, id: u32| visit(cell as usize, id);
-        for entry in self.group(0, entries) {
-            visit(entry.min(), entry.id);
-        }
-        for axis in [1, 2, 4] {
-            for entry in self.group(axis, entries) {
-                visit(entry.min(), entry.id);
-                visit(entry.max(), entry.id);
-            }
-        }
-        // Four cells: one of the two axes is x, or it is z.
-        for (axes, axis) in [(3, AXES[0]), (5, AXES[2]), (6, AXES[2])] {
-            for entry in self.group(axes, entries) {
-                let (min, max) = (entry.min(), entry.max());
-                let step = (min ^ max) & axis;
-                for cell in [min, min ^ step, max ^ step, max] {
-                    visit(cell, entry.id);
-                }
-            }
-        }
-        for entry in self.group(7, entries) {
-            let (min, max) = (entry.min(), entry.max());
-            let [x, y, z] = AXES.map(|axis| (min ^ max) & axis);
-            for cell in [min, min ^ x, min ^ y, max ^ z, min ^ z, max ^ y, max ^ x, max] {
-                visit(cell, entry.id);
-            }
-        }
-    }
-}
-
 /// Counts how many triangles each cell and brick lists, and the block itself.
 #[inline(always)]
-fn tally(
+pub(super) fn tally(
     groups: &Groups,
     entries: &[Entry],
     cells: &mut [u32; BLOCK_CELLS],
@@ -549,7 +218,7 @@ fn occupancy<S: Simd>(simd: S, cells: &[u32]) -> u64 {
 
 /// How many words the lists take that a tally counted.
 #[inline(always)]
-fn measure<S: Simd>(simd: S, cells: &[u32], bricks: &[u32], block: u32) -> Measure {
+pub(super) fn measure<S: Simd>(simd: S, cells: &[u32], bricks: &[u32], block: u32) -> Measure {
     let mut measure = Measure { block, large: block + u32::from(block > 0), ..Measure::default() };
     let (mut sum, mut longest) = (u32x8::splat(simd, 0), u32x8::splat(simd, 0));
     for (brick, (cells, &listed)) in cells.chunks_exact(MASK_BITS).zip(bricks).enumerate() {

@@ -1,362 +1,220 @@
-//! Many rays against triangles: rays side by side where a triangle is large, triangles side by side
-//! where it is small.
-//!
-//! Both do for every ray and triangle what [`TriangleTest`] does, so hits have the same bits.
+//! Parallel builds: the same bits, memory to the byte, and loops that do not do what they should.
 
-use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16};
+extern crate std;
 
-use super::bundle::{Bundle, PerRay, RAYS, rays_where};
-use crate::eight::{Eight, LANES};
-use crate::mesh::{Triangle, TriangleMesh};
-use crate::ray::{Hit, INVALID_ID, round};
-use crate::triangle::{Axis, TriangleTest};
+use alloc::vec;
+use alloc::vec::Vec;
 
-/// From so many rays on they are tested side by side. A choice by the number of rows and triangles
-/// was no better.
-const MANY: u32 = 12;
+use crate::arena::Block as Memory;
+use crate::config::{BuildFlags, Config, Method};
+use crate::error::{Error, Region};
+use crate::grid::Grid;
+use crate::mesh::TriangleMesh;
+use crate::sizes::{Sizes, sizes_parallel};
+use crate::tasks::Parallel;
 
-/// Rays tested at once, and resolved at once.
-const WIDTH: usize = 16;
-const HALF: usize = WIDTH / 2;
+type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+type Loop = dyn Fn(u32, &(dyn Fn(u32) + Sync));
 
-/// The rest of a [`TriangleTest`] for each ray, and what it has hit.
-#[derive(Debug)]
-pub(super) struct Tests {
-    /// The rays whose longest axis is x, y, z.
-    axes: [u64; 3],
-    shear: [PerRay; 2],
-    /// Whether the above is that of the bundle: one that meets nothing needs none.
-    is_ready: bool,
-    /// The closest hit of each ray.
-    t: PerRay,
-    u: PerRay,
-    v: PerRay,
-    primitive: [u32; RAYS],
-    eight: Eight,
-}
-
-impl Tests {
-    /// Of no rays.
-    pub(super) const EMPTY: Self = Self {
-        axes: [0; 3],
-        shear: [[0.0; RAYS]; 2],
-        is_ready: false,
-        t: [f32::INFINITY; RAYS],
-        u: [0.0; RAYS],
-        v: [0.0; RAYS],
-        primitive: [INVALID_ID; RAYS],
-        eight: Eight::EMPTY,
+/// Triangles all over a cube, small and large, and a crowd of them in a corner.
+fn soup(triangles: u32) -> Mesh {
+    let mut state = 1_u64;
+    #[expect(clippy::cast_precision_loss, reason = "24 bits")]
+    let mut random = || {
+        state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+        (state >> 40) as f32 / 16_777_216.0
     };
-
-    /// Forgets the rays and what they hit.
-    pub(super) const fn clear(&mut self) {
-        self.is_ready = false;
-        self.t = Self::EMPTY.t;
-        self.u = Self::EMPTY.u;
-        self.v = Self::EMPTY.v;
-        self.primitive = Self::EMPTY.primitive;
+    let mut positions = Vec::new();
+    for number in 0..triangles {
+        let crowd = if number % 3 == 0 { 0.05 } else { 1.0 };
+        let size = if number % 97 == 0 { 0.4 } else { 0.02 * crowd };
+        let at = [0; 3].map(|_| crowd * random());
+        positions.extend([0; 3].map(|_| at.map(|at| at + size * random())));
     }
+    let indices = (0..triangles).map(|number| [3 * number, 3 * number + 1, 3 * number + 2]);
+    (positions, indices.collect())
+}
 
-    /// The closest hit of a ray, or [`Hit::MISS`].
-    #[inline(always)]
-    pub(super) fn hit(&self, lane: usize) -> Hit {
-        let lane = lane % RAYS;
-        Hit { t: self.t[lane], u: self.u[lane], v: self.v[lane], primitive: self.primitive[lane] }
-    }
+fn forward(count: u32, task: &(dyn Fn(u32) + Sync)) {
+    (0..count).for_each(task);
+}
 
-    /// Prepares the rays of a bundle.
-    #[inline(always)]
-    fn prepare<S: Simd>(&mut self, simd: S, bundle: &Bundle) {
-        self.is_ready = true;
-        let [dx, dy, dz] = &bundle.direction;
-        let mut axes = [0.0; RAYS];
-        for lane in 0..RAYS {
-            let (x, y, z) = (dx[lane], dy[lane], dz[lane]);
-            let is_x = (x.abs() > y.abs()) & (x.abs() > z.abs());
-            let is_y = (x.abs() <= y.abs()) & (y.abs() > z.abs());
-            let along = if is_x {
-                x
-            } else if is_y {
-                y
-            } else {
-                z
-            };
-            self.shear[0][lane] = if is_x {
-                y
-            } else if is_y {
-                z
-            } else {
-                x
-            } / along;
-            self.shear[1][lane] = if is_x {
-                z
-            } else if is_y {
-                x
-            } else {
-                y
-            } / along;
-            axes[lane] = if is_x {
-                0.0
-            } else if is_y {
-                1.0
-            } else {
-                2.0
-            };
-        }
-        for (axis, rays) in [0.0, 1.0, 2.0].into_iter().zip(&mut self.axes) {
-            let axis = f32x16::splat(simd, axis);
-            *rays = rays_where(
-                simd,
-                [&axes, &axes],
-                #[inline(always)]
-                |axes, _| axes.simd_eq(axis),
-            );
-        }
-    }
+fn backward(count: u32, task: &(dyn Fn(u32) + Sync)) {
+    (0..count).rev().for_each(task);
+}
 
-    /// Tests rays of a bundle against the triangles of a list.
-    #[inline(always)]
-    pub(super) fn test<S: Simd, const ANY: bool>(
-        &mut self,
-        simd: S,
-        bundle: &mut Bundle,
-        mesh: &TriangleMesh<'_>,
-        ids: &[u32],
-        rays: u64,
-    ) {
-        if !self.is_ready {
-            self.prepare(simd, bundle);
+fn odd_ones_first(count: u32, task: &(dyn Fn(u32) + Sync)) {
+    (0..count).filter(|index| index % 2 == 1).for_each(task);
+    (0..count).filter(|index| index % 2 == 0).for_each(task);
+}
+
+fn threads(count: u32, task: &(dyn Fn(u32) + Sync)) {
+    std::thread::scope(|scope| {
+        for index in 0..count {
+            scope.spawn(move || task(index));
         }
-        if rays.count_ones() >= MANY {
-            for &id in ids {
-                let Some(triangle) = mesh.triangle(id) else { continue };
-                let rays = if ANY { rays & bundle.members } else { rays };
-                for axis in 0..3 {
-                    let rays = rays & self.axes[axis];
-                    if rays != 0 {
-                        match axis {
-                            0 => self.side_by_side::<S, 0, ANY>(simd, bundle, &triangle, id, rays),
-                            1 => self.side_by_side::<S, 1, ANY>(simd, bundle, &triangle, id, rays),
-                            _ => self.side_by_side::<S, 2, ANY>(simd, bundle, &triangle, id, rays),
-                        }
-                    }
-                }
-            }
-            return;
-        }
-        for ids in ids.chunks(LANES) {
-            self.eight.gather(mesh, ids);
-            let lanes = self.eight.lanes(simd);
-            let mut rest = if ANY { rays & bundle.members } else { rays };
-            while rest != 0 {
-                let lane = rest.trailing_zeros() as usize % RAYS;
-                rest &= rest - 1;
-                let test = self.one(bundle, lane);
-                let mut survivors = test.survivors_of(simd, &lanes) & self.eight.used();
-                while survivors != 0 {
-                    let place = survivors.trailing_zeros() as usize;
-                    survivors &= survivors - 1;
-                    let Some(&id) = ids.get(place) else { break };
-                    let Some(hit) = test.resolve_lane(&self.eight, place) else { continue };
-                    let hit = hit.on(id);
-                    if hit.is_closer(&self.hit(lane)) {
-                        self.t[lane] = hit.t;
-                        self.u[lane] = hit.u;
-                        self.v[lane] = hit.v;
-                        self.primitive[lane] = id;
-                        bundle.to[lane] =
-                            bundle.zero[lane] + bundle.speed[lane] * hit.t + bundle.margin;
-                        if ANY {
-                            bundle.members &= !(1 << lane);
-                            break;
-                        }
-                    }
-                }
+    });
+}
+
+fn config() -> Config {
+    Config::new(Method::Brick)
+}
+
+fn regions(index_bytes: usize, scratch_bytes: usize) -> [Vec<Memory>; 2] {
+    [index_bytes, scratch_bytes].map(|bytes| vec![Memory::ZERO; Memory::count_for(bytes)])
+}
+
+/// The blob of a mesh, built in so many bytes.
+fn blob(
+    (positions, indices): &Mesh,
+    parallel: &Parallel<'_>,
+    bytes: (usize, usize),
+) -> Result<Vec<u8>, Error> {
+    let mesh = TriangleMesh::new(positions, indices)?;
+    let [mut index, mut scratch] = regions(bytes.0, bytes.1);
+    let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
+    let grid = Grid::build_parallel(mesh, &config(), index, scratch, parallel)?;
+    Ok(grid.blob().to_vec())
+}
+
+/// What a build is told to bring, and with that much scratch what it will take.
+fn both_sizes(mesh: &Mesh, parallel: &Parallel<'_>) -> [Sizes; 2] {
+    let mesh = TriangleMesh::new(&mesh.0, &mesh.1).unwrap();
+    let enough = sizes_parallel(&mesh, &config(), &mut [], parallel).unwrap();
+    let entries = 64 * (1 + mesh.triangle_count() as usize);
+    let [_, mut scratch] = regions(0, enough.scratch_bytes + entries);
+    let scratch = Memory::bytes_mut(&mut scratch);
+    let exact = sizes_parallel(&mesh, &config(), scratch, parallel).unwrap();
+    assert!(exact.is_exact && !enough.is_exact);
+    assert!(exact.index_bytes <= enough.index_bytes);
+    [enough, exact]
+}
+
+#[test]
+fn bits_do_not_depend_on_the_tasks_nor_on_their_order() {
+    for mesh in [soup(5000), soup(600), soup(1), soup(0)] {
+        let [enough, _] = both_sizes(&mesh, &Parallel { tasks: 64, run: &forward });
+        let bytes = (enough.index_bytes, enough.scratch_bytes);
+        let serial = blob(&mesh, &Parallel::SERIAL, bytes).unwrap();
+        for tasks in (0..=9).chain([19, 64, 1000, u32::MAX]) {
+            let loops: [&Loop; 4] = [&forward, &backward, &odd_ones_first, &threads];
+            for run in loops {
+                let built = blob(&mesh, &Parallel { tasks, run }, bytes).unwrap();
+                assert!(built == serial, "{tasks} tasks, {} triangles", mesh.1.len());
             }
         }
     }
+}
 
-    /// The test of one ray.
-    #[inline(always)]
-    fn one(&self, bundle: &Bundle, lane: usize) -> TriangleTest {
-        let lane = lane % RAYS;
-        let (axis, [x, y, z]) = if self.axes[0] >> lane & 1 == 1 {
-            (Axis::X, [1, 2, 0])
-        } else if self.axes[1] >> lane & 1 == 1 {
-            (Axis::Y, [2, 0, 1])
-        } else {
-            (Axis::Z, [0, 1, 2])
+#[test]
+fn one_block_is_enough_for_many_tasks() {
+    let (mut positions, indices) = soup(4000);
+    for position in &mut positions {
+        *position = position.map(f32::round);
+    }
+    let mesh = (positions, indices);
+    let [enough, _] = both_sizes(&mesh, &Parallel { tasks: 9, run: &forward });
+    let bytes = (enough.index_bytes, enough.scratch_bytes);
+    let serial = blob(&mesh, &Parallel::SERIAL, bytes).unwrap();
+    assert!(blob(&mesh, &Parallel { tasks: 9, run: &threads }, bytes).unwrap() == serial);
+}
+
+#[test]
+fn sizes_hold_to_the_byte_with_any_number_of_tasks() {
+    let mesh = soup(5000);
+    let [_, alone] = both_sizes(&mesh, &Parallel::SERIAL);
+    let bytes = (alone.index_bytes, alone.scratch_bytes);
+    let serial = blob(&mesh, &Parallel::SERIAL, bytes).unwrap();
+    for tasks in 1..=9 {
+        let parallel = Parallel { tasks, run: &backward };
+        let [_, exact] = both_sizes(&mesh, &parallel);
+        assert_eq!(exact.scratch_bytes, tasks as usize * alone.scratch_bytes);
+        let bytes = (exact.index_bytes, exact.scratch_bytes);
+        assert!(blob(&mesh, &parallel, bytes).unwrap() == serial);
+        // With less there are fewer tasks, down to one.
+        let less = (alone.index_bytes, exact.scratch_bytes - 64);
+        if tasks > 1 {
+            assert!(blob(&mesh, &parallel, less).unwrap() == serial);
+        }
+        let too_small = |bytes, region, needed: usize| {
+            let (needed_bytes, available_bytes) = (needed as u64, needed as u64 - 64);
+            let error = Error::OutOfMemory { region, needed_bytes, available_bytes };
+            assert_eq!(blob(&mesh, &parallel, bytes), Err(error));
         };
-        TriangleTest {
-            axis,
-            anchor: [bundle.origin[x][lane], bundle.origin[y][lane], bundle.origin[z][lane]],
-            shear: [self.shear[0][lane], self.shear[1][lane]],
-            origin_z: f64::from(bundle.origin[z][lane]),
-            direction_z: f64::from(bundle.direction[z][lane]),
-            t_min: bundle.t_min[lane],
-            t_max: bundle.t_max[lane],
-        }
-    }
-
-    /// Tests rays with the same longest axis against one triangle.
-    #[inline(always)]
-    fn side_by_side<S: Simd, const AXIS: usize, const ANY: bool>(
-        &mut self,
-        simd: S,
-        bundle: &mut Bundle,
-        triangle: &Triangle,
-        id: u32,
-        rays: u64,
-    ) {
-        let [x, y, z] = [(AXIS + 1) % 3, (AXIS + 2) % 3, AXIS];
-        for row in 0..RAYS / WIDTH {
-            let here = rays >> (row * WIDTH) & 0xffff;
-            if here == 0 {
-                continue;
-            }
-            let first = row * WIDTH;
-
-            let (ox, oy, oz) = (
-                row_of(simd, &bundle.origin[x], first),
-                row_of(simd, &bundle.origin[y], first),
-                row_of(simd, &bundle.origin[z], first),
-            );
-            let (shear_x, shear_y) =
-                (row_of(simd, &self.shear[0], first), row_of(simd, &self.shear[1], first));
-
-            // Shear the corners, and drop the triangle where two edge functions have opposite signs.
-            let (origin, shear) = ([ox, oy, oz], [shear_x, shear_y]);
-            let [a, b, c] = triangle;
-            let a = sheared::<S, AXIS>(simd, a, origin, shear);
-            let b = sheared::<S, AXIS>(simd, b, origin, shear);
-            let c = sheared::<S, AXIS>(simd, c, origin, shear);
-            let u = c[0] * b[1] - c[1] * b[0];
-            let v = a[0] * c[1] - a[1] * c[0];
-            let w = b[0] * a[1] - b[1] * a[0];
-            let zero = f32x16::splat(simd, 0.0);
-            let any_negative = u.simd_lt(zero) | v.simd_lt(zero) | w.simd_lt(zero);
-            let any_positive = u.simd_gt(zero) | v.simd_gt(zero) | w.simd_gt(zero);
-            let survivors = !(any_negative & any_positive).to_bitmask() & here;
-            if survivors == 0 {
-                continue;
-            }
-            let corners: [[f32; WIDTH]; 6] =
-                [a[0].into(), a[1].into(), b[0].into(), b[1].into(), c[0].into(), c[1].into()];
-            let depths = [triangle[0][z], triangle[1][z], triangle[2][z]];
-            for half in 0..2 {
-                let survivors = (survivors >> (half * HALF) & 0xff) as u32;
-                if survivors != 0 {
-                    let first = first + half * HALF;
-                    let mut sheared = [[0.0; HALF]; 6];
-                    for (to, from) in sheared.iter_mut().zip(&corners) {
-                        to.copy_from_slice(&from[half * HALF..][..HALF]);
-                    }
-                    let taken = self.resolve(bundle, &sheared, &depths, z, id, first, survivors);
-                    if ANY {
-                        bundle.members &= !(taken << first);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Does what [`TriangleTest::resolve`] does, for eight rays from `first` on; tells which of them now
-    /// have this hit.
-    #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "once, for three axes")]
-    fn resolve(
-        &mut self,
-        bundle: &mut Bundle,
-        [ax, ay, bx, by, cx, cy]: &[[f32; HALF]; 6],
-        depths: &[f32; 3],
-        z: usize,
-        id: u32,
-        first: usize,
-        survivors: u32,
-    ) -> u64 {
-        let origin = eight_of(&bundle.origin[z], first);
-        let direction = eight_of(&bundle.direction[z], first);
-        let (t_min, t_max) = (eight_of(&bundle.t_min, first), eight_of(&bundle.t_max, first));
-        let (best_t, best_u) = (eight_of(&self.t, first), eight_of(&self.u, first));
-        let (best_v, to) = (eight_of(&self.v, first), eight_of(&bundle.to, first));
-        let (zero, speed) = (eight_of(&bundle.zero, first), eight_of(&bundle.speed, first));
-        let best_id = eight_of(&self.primitive, first);
-        let depths = [f64::from(depths[0]), f64::from(depths[1]), f64::from(depths[2])];
-        let margin = bundle.margin;
-        let (mut new_t, mut new_u, mut new_v) = (best_t, best_u, best_v);
-        let (mut new_to, mut new_id, mut is_new) = (to, best_id, [0_u32; HALF]);
-        #[expect(clippy::needless_bitwise_bool, reason = "no branch: lanes side by side")]
-        for lane in 0..HALF {
-            let (ax, ay) = (f64::from(ax[lane]), f64::from(ay[lane]));
-            let (bx, by) = (f64::from(bx[lane]), f64::from(by[lane]));
-            let (cx, cy) = (f64::from(cx[lane]), f64::from(cy[lane]));
-            let u = cx * by - cy * bx;
-            let v = ax * cy - ay * cx;
-            let w = bx * ay - by * ax;
-            let any_negative = (u < 0.0) | (v < 0.0) | (w < 0.0);
-            let any_positive = (u > 0.0) | (v > 0.0) | (w > 0.0);
-            let area = u + v + w;
-            let is_area = (area.abs() > 0.0) & (area.abs() < f64::INFINITY);
-            let share = 1.0 / area;
-            let (u, v, w) = (u * share + 0.0, v * share + 0.0, w * share + 0.0);
-            let origin = f64::from(origin[lane]);
-            let depth =
-                u * (depths[0] - origin) + v * (depths[1] - origin) + w * (depths[2] - origin);
-            let t = round(depth / f64::from(direction[lane]));
-            let is_hit = !(any_negative & any_positive)
-                & is_area
-                & (t >= t_min[lane])
-                & (t <= t_max[lane])
-                & (t.abs() < f32::INFINITY)
-                & (survivors >> lane & 1 == 1);
-            let is_closer = (t < best_t[lane]) | ((t <= best_t[lane]) & (id < best_id[lane]));
-            let is_taken = is_hit & is_closer;
-            new_t[lane] = if is_taken { t } else { best_t[lane] };
-            new_u[lane] = if is_taken { round(v) } else { best_u[lane] };
-            new_v[lane] = if is_taken { round(w) } else { best_v[lane] };
-            new_id[lane] = if is_taken { id } else { best_id[lane] };
-            let end = zero[lane] + speed[lane] * t + margin;
-            new_to[lane] = if is_taken { end } else { to[lane] };
-            is_new[lane] = u32::from(is_taken) << lane;
-        }
-        *eight_mut(&mut self.t, first) = new_t;
-        *eight_mut(&mut self.u, first) = new_u;
-        *eight_mut(&mut self.v, first) = new_v;
-        *eight_mut(&mut self.primitive, first) = new_id;
-        *eight_mut(&mut bundle.to, first) = new_to;
-        u64::from(is_new.iter().fold(0, |all, ray| all | ray))
+        let index = (alone.index_bytes - 64, exact.scratch_bytes);
+        too_small(index, Region::Index, alone.index_bytes);
+        let scratch = (exact.index_bytes, alone.scratch_bytes - 64);
+        too_small(scratch, Region::Scratch, alone.scratch_bytes);
     }
 }
 
-/// Eight numbers from `first` on.
-#[inline(always)]
-fn eight_of<T: Copy>(array: &[T; RAYS], first: usize) -> [T; HALF] {
-    array.as_chunks().0[first / HALF % (RAYS / HALF)]
+#[test]
+fn a_bound_is_enough_for_all_tasks() {
+    let mesh = soup(3000);
+    for tasks in [1, 2, 7, 64] {
+        let parallel = Parallel { tasks, run: &forward };
+        let bound = Sizes::bound_parallel(3000, &config(), tasks).unwrap();
+        for sizes in both_sizes(&mesh, &parallel) {
+            assert!(sizes.index_bytes <= bound.index_bytes);
+            assert!(sizes.scratch_bytes <= bound.scratch_bytes);
+        }
+    }
+    assert_eq!(Sizes::bound(3000, &config()), Sizes::bound_parallel(3000, &config(), 0));
 }
 
-#[inline(always)]
-fn eight_mut<T: Copy>(array: &mut [T; RAYS], first: usize) -> &mut [T; HALF] {
-    &mut array.as_chunks_mut().0[first / HALF % (RAYS / HALF)]
+#[test]
+fn a_loop_that_does_not_run_every_task_once_is_an_error_and_leaves_no_grid() {
+    let (positions, indices) = soup(5000);
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    let good = Parallel { tasks: 4, run: &forward };
+    let [enough, _] = both_sizes(&(positions.clone(), indices.clone()), &good);
+    let [mut index, mut scratch] = regions(enough.index_bytes, enough.scratch_bytes);
+    let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
+    let serial = Grid::build(mesh, &config(), index, scratch).unwrap().blob().to_vec();
+
+    let calls = core::cell::Cell::new(0);
+    for broken_call in 0..3 {
+        let loops: [&Loop; 7] = [
+            &|_, _| {},
+            &|count, task| (1..count).for_each(task),
+            &|count, task| (0..count - 1).for_each(task),
+            &|count, task| (0..=count).for_each(task),
+            &|count, task| (0..count).chain([0]).for_each(task),
+            &|count, task| (0..count).for_each(|_| task(0)),
+            &|_, task| task(u32::MAX),
+        ];
+        for broken in loops {
+            calls.set(0);
+            let run = |count: u32, task: &(dyn Fn(u32) + Sync)| {
+                let call = calls.replace(calls.get() + 1);
+                if call == broken_call { broken(count, task) } else { forward(count, task) }
+            };
+            let parallel = Parallel { tasks: 4, run: &run };
+            let built = Grid::build_parallel(mesh, &config(), index, scratch, &parallel);
+            assert_eq!(built.err(), Some(Error::InvalidParallelFor));
+            assert_eq!(calls.get(), broken_call + 1);
+            assert!(broken_call == 0 || Grid::open(index, mesh).is_err());
+            let again = Grid::build_parallel(mesh, &config(), index, scratch, &good).unwrap();
+            assert!(again.blob() == serial);
+        }
+    }
 }
 
-/// A corner relative to sixteen rays, sheared so that each of them is the z axis.
-#[inline(always)]
-fn sheared<S: Simd, const AXIS: usize>(
-    simd: S,
-    corner: &[f32; 3],
-    [ox, oy, oz]: [f32x16<S>; 3],
-    [shear_x, shear_y]: [f32x16<S>; 2],
-) -> [f32x16<S>; 2] {
-    let x = f32x16::splat(simd, corner[(AXIS + 1) % 3]) - ox;
-    let y = f32x16::splat(simd, corner[(AXIS + 2) % 3]) - oy;
-    let z = f32x16::splat(simd, corner[AXIS]) - oz;
-    [x - shear_x * z, y - shear_y * z]
-}
-
-/// Sixteen numbers from `first` on.
-#[inline(always)]
-fn row_of<S: Simd>(simd: S, array: &PerRay, first: usize) -> f32x16<S> {
-    let rows = array.as_chunks::<WIDTH>().0;
-    f32x16::simd_from(simd, rows[first / WIDTH % (RAYS / WIDTH)])
+#[test]
+fn the_first_bad_triangle_is_named_whatever_the_tasks() {
+    let (mut positions, mut indices) = soup(4000);
+    positions[3 * 1700] = [f32::NAN; 3];
+    positions[3 * 3200] = [f32::INFINITY; 3];
+    let strict = Config { flags: BuildFlags::STRICT, ..config() };
+    for tasks in [1, 3, 8] {
+        let parallel = Parallel { tasks, run: &backward };
+        let error = |indices: &[[u32; 3]]| {
+            let mesh = TriangleMesh::new(&positions, indices).unwrap();
+            sizes_parallel(&mesh, &strict, &mut [], &parallel).err()
+        };
+        assert_eq!(error(&indices), Some(Error::NonFiniteTriangle { triangle: 1700 }));
+        let vertex = core::mem::replace(&mut indices[900][1], u32::MAX);
+        assert_eq!(error(&indices), Some(Error::IndexOutOfRange { triangle: 900 }));
+        indices[900][1] = vertex;
+    }
 }

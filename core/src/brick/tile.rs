@@ -21,8 +21,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u8x64};
 
 use super::bundle::{Bounds, Bundle, PerRay, RAYS, below_three};
+use super::hits::Hits;
 use super::layout::{BLOCK, mask as mask_of, place};
-use super::tests::Tests;
 use super::{Brick, Chunk, Content, list};
 use crate::cell::{Lattice, as_f32, whole};
 use crate::mesh::{Strided, TriangleMesh};
@@ -49,7 +49,7 @@ pub(super) struct Tile<'a, const ANY: bool> {
     lattice: &'a Lattice,
     mesh: &'a TriangleMesh<'a>,
     bundle: Bundle,
-    tests: Tests,
+    hits: Hits,
     /// Primitives that may still be shown, over all rays: damaged bytes may list everything in every
     /// cell.
     unread: u64,
@@ -226,7 +226,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         lattice: &'a Lattice,
         mesh: &'a TriangleMesh<'a>,
     ) -> Self {
-        Self { brick, lattice, mesh, bundle: Bundle::EMPTY, tests: Tests::EMPTY, unread: 0 }
+        Self { brick, lattice, mesh, bundle: Bundle::EMPTY, hits: Hits::EMPTY, unread: 0 }
     }
 
     /// Traces up to 64 rays, and tells which of them: the others need a way of their own.
@@ -239,7 +239,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         count: usize,
     ) -> u64 {
         self.bundle.load(simd, self.brick, self.lattice, rays, first, count);
-        self.tests.clear();
+        self.hits.clear();
         self.unread = self.brick.list_words() as u64 * RAYS as u64;
         let members = self.bundle.members;
         if members != 0 && self.go(simd) { members } else { 0 }
@@ -248,7 +248,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
     /// The hit of a ray that was traced, or [`Hit::MISS`].
     #[inline(always)]
     pub(super) fn hit(&self, lane: usize) -> Hit {
-        self.tests.hit(lane)
+        self.hits.hit(lane)
     }
 
     /// Goes through the grid; `false` if the tile is too wide for it.
@@ -422,7 +422,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         let rays = rays & self.bundle.members;
         self.spend(ids.len().max(1) as u64 * u64::from(rays.count_ones()));
         let rays = rays & self.bundle.members;
-        self.tests.test::<S, ANY>(simd, &mut self.bundle, self.mesh, ids, rays);
+        self.hits.test::<S, ANY>(simd, &mut self.bundle, self.mesh, ids, rays);
     }
 }
 

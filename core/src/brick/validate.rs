@@ -11,11 +11,11 @@
 use glam::Vec3A;
 
 use super::build::home;
+use super::frame::{Frame, classify, lists};
 use super::layout::{
     BLOCK, Block, CHILD_WORDS, Class, Layout, MAX_CHILDREN, RECORD_WORDS, mask, number, place,
 };
 use super::size::{Settled, settle};
-use super::sort::{Frame, classify, lists};
 use super::{Brick, Chunk, Content, list};
 use crate::aabb::Aabb;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
@@ -39,7 +39,7 @@ impl Brick<'_> {
         if config.check().is_err() {
             return Err(corrupt(core::mem::offset_of!(Header, cell_size)));
         }
-        let settled = settle(mesh, &config, &mut [])?;
+        let settled = settle(mesh, &config)?;
         if header.skipped_count != settled.census.skipped {
             return Err(corrupt(core::mem::offset_of!(Header, skipped_count)));
         }

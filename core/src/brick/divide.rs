@@ -1,0 +1,170 @@
+//! Whether a crowded cell is divided, and the entries that it then has.
+//!
+//! It is if its triangles are smaller than it, and its parts list fewer of them.
+
+#![expect(clippy::cast_possible_truncation, reason = "numbers of cells")]
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, mask32x8, u32x8};
+
+use super::frame::{Frame, Scene, classify};
+use super::groups::Groups;
+use super::layout::{AXES, Bench, Class, ENTRY_WORDS, Entry, place};
+use super::sort::{measure, tally};
+
+/// Shows the entries that a cell lists.
+///
+/// Every crowded cell looks at all entries of its block, so it looks at eight at once.
+#[inline(always)]
+fn each_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize, mut visit: impl FnMut(u32)) {
+    let (eights, rest) = entries.as_chunks::<8>();
+    for eight in eights {
+        let mut listed = listed_of_eight(simd, eight, cell as u32);
+        while listed != 0 {
+            let bit = listed.trailing_zeros() as usize;
+            listed &= listed - 1;
+            if let Some(entry) = eight.get(bit) {
+                visit(entry.id);
+            }
+        }
+    }
+    of_cell(rest, cell).for_each(visit);
+}
+
+/// The entries that a cell lists, one by one.
+fn of_cell(entries: &[Entry], cell: usize) -> impl Iterator<Item = u32> + '_ {
+    let cell = place(cell as u32);
+    entries.iter().filter_map(move |entry| {
+        let (min, max) = (place(entry.min()), place(entry.max()));
+        let holds = (0..3).all(|axis| (min[axis]..=max[axis]).contains(&cell[axis]));
+        (holds && entry.class() == Class::Cells).then_some(entry.id)
+    })
+}
+
+/// Which of eight entries a cell lists.
+#[inline(always)]
+fn listed_of_eight<S: Simd>(simd: S, entries: &[Entry; 8], cell: u32) -> u64 {
+    let words: &[[u32; 8]; ENTRY_WORDS] = bytemuck::cast_ref(entries);
+    let cells = u32x8::simd_from(simd, words[0]).unzip_high(u32x8::simd_from(simd, words[1]));
+    // An axis' bits are in order, though not side by side.
+    let (min, max) = (cells, cells >> 12);
+    let x = is_between(simd, min, max, cell, AXES[0]);
+    let y = is_between(simd, min, max, cell, AXES[1]);
+    let z = is_between(simd, min, max, cell, AXES[2]);
+    let is_in_cells = (cells & Entry::CLASS).simd_eq(u32x8::splat(simd, 0));
+    (x & y & z & is_in_cells).to_bitmask()
+}
+
+/// Whether a cell is between others on an axis.
+#[inline(always)]
+fn is_between<S: Simd>(simd: S, min: u32x8<S>, max: u32x8<S>, cell: u32, axis: u32) -> mask32x8<S> {
+    let cell = u32x8::splat(simd, cell & axis);
+    (min & axis).simd_le(cell) & cell.simd_le(max & axis)
+}
+
+/// How many entries a cell lists.
+pub(super) fn count_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize) -> u32 {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut count = 0;
+            each_of_cell(simd, entries, cell, |_| count += 1);
+            count
+        },
+    )
+}
+
+/// Puts the triangles of a cell on the next bench, if to divide the cell gains something: the
+/// triangles are smaller than it, and its parts list fewer of them.
+pub(super) fn plan<S: Simd>(
+    simd: S,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    entries: &[Entry],
+    cell: usize,
+    listed: u32,
+    benches: &mut [Bench<'_>],
+) -> Option<(Frame, Groups)> {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let bench = benches.first_mut()?;
+            let (frame, groups) = collect(simd, scene, frame, entries, cell, listed, bench)?;
+            let Bench { cells, bricks, entries: inner, .. } = bench;
+            let (inner, cells) = (inner.get(..groups.count())?, cells.first_chunk_mut()?);
+            let block = tally(&groups, inner, cells, bricks);
+            let measure = measure(simd, cells, bricks, block);
+            // Whatever lists a triangle counts: this is what bounds the words of a mesh.
+            let references = u64::from(measure.references) + u64::from(measure.large);
+            let gains = references <= 4 * u64::from(listed)
+                && 10 * u64::from(measure.longest.max(block)) <= 9 * u64::from(listed);
+            gains.then_some((frame, groups))
+        },
+    )
+}
+
+/// The whole part of a number; 0 if it is none.
+#[expect(clippy::cast_sign_loss, reason = "saturates")]
+const fn wholes(number: f64) -> u32 {
+    number as u32
+}
+
+/// Puts the triangles of a cell on a bench, if they are small enough to divide it.
+#[inline(always)]
+fn collect<S: Simd>(
+    simd: S,
+    scene: &Scene<'_>,
+    frame: &Frame,
+    entries: &[Entry],
+    cell: usize,
+    listed: u32,
+    bench: &mut Bench<'_>,
+) -> Option<(Frame, Groups)> {
+    // The ids, and soon the entries, wait where cells will be counted, if there is room.
+    let waiting: &mut [Entry] = bytemuck::try_cast_slice_mut(bench.cells).ok()?;
+    let waiting = waiting.get_mut(..listed as usize).unwrap_or_default();
+    let mut slots = waiting.iter_mut();
+    each_of_cell(simd, entries, cell, |id| {
+        if let Some(slot) = slots.next() {
+            slot.id = id;
+        }
+    });
+
+    // As many cells as two of its mean triangles are wide, but none so small that the margin counts.
+    let mut sum = 0.0;
+    let mut add = |id: u32| {
+        if let Some(reach) = scene.reach(id) {
+            sum += f64::from(reach.size().max_element());
+        }
+    };
+    if waiting.is_empty() {
+        of_cell(entries, cell).for_each(&mut add);
+    } else {
+        for entry in waiting.iter() {
+            add(entry.id);
+        }
+    }
+    let mean = sum / f64::from(listed);
+    let width = (2.0 * mean).max(4.0 * f64::from(scene.lattice.margin().max_element()));
+    let count = wholes(1.0 / (width * f64::from(frame.scale)));
+    let frame = frame.child(place(cell as u32), count.min(16));
+    if count < 2 {
+        return None;
+    }
+
+    let entry = |id: u32| {
+        let range = frame.range(&scene.reach(id)?);
+        // No list of the lattice's blocks takes it: at most it is in the list of all of the cell.
+        let class = classify(range.min, range.max, 1).unwrap_or(Class::Blocks);
+        Some(Entry::new(id, range.min, range.max, class))
+    };
+    for slot in waiting.iter_mut() {
+        *slot = entry(slot.id)?;
+    }
+    let groups = if waiting.is_empty() {
+        Groups::collect(|| of_cell(entries, cell).filter_map(entry), bench.entries)
+    } else {
+        Groups::collect(|| waiting.iter().copied(), bench.entries)
+    };
+    Some((frame, groups?))
+}
