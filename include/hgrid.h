@@ -75,7 +75,7 @@
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
  *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
  *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
- *   HGRID_METHOD_BRICK       cells as large as triangles, a bit for each: the fastest rays
+ *   HGRID_METHOD_BRICK       cells as large as triangles, a bit for each: the fastest build
  *
  *   hgrid_config config = HGRID_CONFIG_INIT_VARIABLE;
  *

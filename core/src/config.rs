@@ -70,7 +70,8 @@ impl Method {
     }
 
     /// Whether [`Config::density`] means something to it.
-    pub(crate) const fn has_density(self) -> bool {
+    #[must_use]
+    pub const fn has_density(self) -> bool {
         !self.has_cell_size()
     }
 
@@ -136,7 +137,7 @@ impl Config {
 
     /// Refuses values that no build can use.
     pub(crate) const fn check(&self) -> Result<(), Error> {
-        if !self.density_is_valid() {
+        if self.method.has_density() && !self.density_is_valid() {
             return Err(Error::InvalidConfig(ConfigField::Density));
         }
         if self.method.has_macrocells() && self.macrocell_factor < 2 {

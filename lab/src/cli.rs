@@ -336,6 +336,9 @@ pub struct Tuning {
     /// For `recursive`: levels of grids [default: the paper's, 3]
     #[arg(long, value_name = "LEVELS")]
     pub depth: Option<u32>,
+    /// For `brick`: the width of a cell in multiples of the one that suits the triangles [default: 1]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    pub cell_size: Option<f32>,
 }
 
 impl Tuning {
@@ -347,6 +350,7 @@ impl Tuning {
             macrocell_factor: self.macrocell_factor.unwrap_or(default.macrocell_factor),
             subdivide_above: self.subdivide_above.unwrap_or(default.subdivide_above),
             depth: self.depth.unwrap_or(default.depth),
+            cell_size: self.cell_size.unwrap_or(default.cell_size),
             ..default
         }
     }

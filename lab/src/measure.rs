@@ -63,10 +63,12 @@ impl SceneFacts {
 pub struct Measurement {
     /// The structure.
     pub method: &'static str,
-    /// Cells per triangle that were asked for.
-    pub configured_density: f32,
+    /// Cells per triangle that were asked for, where the method has such a number.
+    pub configured_density: Option<f32>,
     /// Cells per triangle that the grid was built for: fewer where it would hold too many ids.
-    pub density: f32,
+    pub density: Option<f32>,
+    /// The width of a brick grid's cells, in multiples of the one that suits the triangles.
+    pub cell_size: Option<f32>,
     /// Cells per axis.
     pub resolution: [u32; 3],
     /// Triangle ids in all cells together, for the methods that count them.
@@ -108,6 +110,28 @@ pub struct Measurement {
     pub build_samples: Vec<f64>,
     /// The renderings, likewise.
     pub render_samples: Vec<f64>,
+}
+
+impl Measurement {
+    /// The method and what was asked for: its density, or the size of its cells.
+    #[must_use]
+    pub fn title(&self) -> String {
+        self.titled(self.configured_density)
+    }
+
+    /// The method and what was built.
+    #[must_use]
+    pub fn built_title(&self) -> String {
+        self.titled(self.density)
+    }
+
+    fn titled(&self, density: Option<f32>) -> String {
+        match (density, self.cell_size) {
+            (Some(density), _) => format!("{}, density {density}", self.method),
+            (None, Some(size)) => format!("{}, cell size {size}", self.method),
+            (None, None) => self.method.to_owned(),
+        }
+    }
 }
 
 /// A mesh and the picture to take of it.
@@ -213,11 +237,14 @@ fn build_parallel(
     parallel: &Parallel<'_>,
 ) -> Result<Built> {
     // A brick grid's bound follows from the number of triangles, and what is not written costs nothing.
-    let sizes = match config.method {
+    let bound = match config.method {
         Method::Brick => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
-        _ => Some(sizes_parallel(&mesh, config, &mut [], parallel)?),
+        _ => None,
     };
-    let sizes = sizes.context("the grid does not fit the address space")?;
+    let sizes = match bound {
+        Some(bound) => bound,
+        None => sizes_parallel(&mesh, config, &mut [], parallel)?,
+    };
     let (mut index, mut scratch) = (memory(sizes.index_bytes)?, memory(sizes.scratch_bytes)?);
     Grid::build_parallel(mesh, config, &mut index, &mut scratch, parallel)?;
     Ok(Built { index, scratch })
@@ -313,11 +340,13 @@ fn numbers(
 ) -> Measurement {
     let rays = u64::from(size) * u64::from(size);
     let index_bytes = grid.blob_bytes();
+    let has_density = config.method.has_density();
     let (build_seconds, render_seconds) = (median(builds), median(renders));
     Measurement {
         method: grid.method().name(),
-        configured_density: config.density,
-        density: grid.density(),
+        configured_density: has_density.then_some(config.density),
+        density: has_density.then(|| grid.density()),
+        cell_size: (!has_density).then_some(config.cell_size),
         resolution: grid.resolution(),
         references: has_references(grid.method()).then(|| grid.reference_count()),
         skipped_triangles: grid.skipped_count(),

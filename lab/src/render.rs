@@ -3,7 +3,7 @@
 use std::io::{self, Write as _};
 use std::time::Instant;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{Counters, Hit, Ray, TriangleMesh};
 
 use crate::cli::{RenderArgs, Shading};
@@ -41,6 +41,11 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let counter = args.counter.unwrap_or(Counter::Cost);
     let cost = |work: &Counters| counter.of(work);
     let mut progress = Progress::new(String::new(), rows(size, 1, args.repeat));
+    ensure!(
+        args.density.is_none() || args.method.has_density(),
+        "a {} grid has no density: --cell-size makes its cells larger or smaller",
+        args.method.name()
+    );
     let configs = [args.config()];
     let outcome = measure(&subject, &configs, args.repeat, shade, cost, &mut progress)
         .with_context(|| format!("no picture of `{}`", args.scene))?;

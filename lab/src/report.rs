@@ -41,7 +41,7 @@ impl fmt::Display for Report {
             ("scene", scene.scene.clone()),
             ("triangles", format!("{}{skipped}", HumanCount(scene.triangles as u64))),
             ("vertices", HumanCount(scene.vertices as u64).to_string()),
-            ("method", format!("{}, density {}", m.method, m.density)),
+            ("method", m.built_title()),
             ("resolution", format!("{x} x {y} x {z}")),
             ("references", m.references.map_or("-".into(), |r| HumanCount(r.into()).to_string())),
             ("index", format!("{index} bytes, {:.1} per triangle", m.index_bytes_per_triangle)),

@@ -120,8 +120,8 @@ impl Results {
             format!("{:.1}", mebibytes(scene.facts.scene_bytes))
         });
         let methods = self.scenes.first().map(|scene| &*scene.methods).unwrap_or_default();
-        for (index, Measurement { method, configured_density, .. }) in methods.iter().enumerate() {
-            row(&titled(&format!("{method}, density {configured_density}")), &|_| String::new());
+        for (index, measurement) in methods.iter().enumerate() {
+            row(&titled(&measurement.title()), &|_| String::new());
             let mut row = |name: &str, cell: &dyn Fn(&Measurement) -> String| {
                 row(&indented(name), &|scene| {
                     scene.methods.get(index).map(cell).unwrap_or_default()
@@ -155,6 +155,7 @@ impl Results {
             let name = display_name(&scene.facts.scene);
             let is_thinner = |m: &&Measurement| m.density < m.configured_density;
             for Measurement { method, density, .. } in scene.methods.iter().filter(is_thinner) {
+                let density = density.unwrap_or_default();
                 notes.push(format!("{name}: {method} at density {density}, for its references."));
             }
         }
@@ -250,7 +251,8 @@ mod tests {
         let text = results.text();
         assert!(text.contains("knot:"), "{text}");
         for method in Method::ALL {
-            assert!(text.contains(&format!("{}, density", method.name())), "{text}");
+            let parameter = if method.has_density() { "density" } else { "cell size" };
+            assert!(text.contains(&format!("{}, {parameter}", method.name())), "{text}");
         }
         assert_eq!(text.matches("time to image").count(), Method::ALL.len());
         assert!(text.contains("medians of 2 runs"));

@@ -88,9 +88,7 @@ impl Drawing for Figure<'_> {
     fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B> {
         let Results { machine, size, repeats, threads, scenes } = self.0;
         let methods = scenes.first().map(|scene| &*scene.methods).unwrap_or_default();
-        let legend = methods.iter().map(|m| {
-            (format!("{}, density {}", m.method, m.configured_density), color_of(m.method))
-        });
+        let legend = methods.iter().map(|m| (m.title(), color_of(m.method)));
         let legend: Vec<_> = legend.chain([("mesh".to_owned(), MUTED)]).collect();
         let title = format!("Memory and times, {size} x {size} rays");
         let built = match threads {

@@ -49,7 +49,8 @@ impl Curves {
         let facts = SceneFacts::of(&scene);
 
         let race = &args.race;
-        let methods = race.configs();
+        let methods: Vec<_> =
+            race.configs().into_iter().filter(|config| config.method.has_density()).collect();
         let at_densities = |config: &Config| {
             let config = *config;
             args.densities.iter().map(move |&density| Config { density, ..config })
@@ -125,7 +126,7 @@ impl Figure<'_> {
         let seconds = points().flat_map(|point| TIMES.map(|(_, _, time)| time(point)));
         let densities = curves.iter().flat_map(|curve| &curve.points);
         let mut names: Vec<_> = densities
-            .map(|point| f64::from(point.configured_density))
+            .filter_map(|point| point.configured_density.map(f64::from))
             .map(|density| (density.log2(), number(density)))
             .collect();
         names.sort_by(|(a, _), (b, _)| a.total_cmp(b));
@@ -188,8 +189,9 @@ impl Curve {
         }
 
         for (_, color, time) in TIMES {
-            let points = self.points().map(|m| (f64::from(m.configured_density).log2(), time(m)));
-            let points: Vec<_> = points.collect();
+            let points = self.points();
+            let place = |m: &Measurement| Some((f64::from(m.configured_density?).log2(), time(m)));
+            let points: Vec<_> = points.filter_map(place).collect();
             let dot = |&point: &(f64, f64)| Circle::new(point, pen.px(4), color.filled());
             chart.draw_series([PathElement::new(points.clone(), pen.line(color, 2))])?;
             chart.draw_series(points.iter().map(dot))?;
