@@ -21,7 +21,7 @@ mod version;
 use core::ffi::{c_char, c_void};
 use core::ptr::{NonNull, null, null_mut};
 
-use hgrid_core::{Grid, Hit, Ray, Strided, StridedMut};
+use hgrid_core::{Grid, Hit, QueryOptions, Ray, Strided, StridedMut};
 
 pub use crate::status::*;
 pub use crate::types::*;
@@ -344,7 +344,7 @@ pub unsafe extern "C" fn hgrid_intersect(
     let Some(to) = NonNull::new(hit) else { return false };
     let ask = |grid: &Grid<'_>, ray: &_, counters: Option<&mut _>| match counters {
         None => grid.intersect(ray),
-        Some(counters) => grid.intersect_counted(ray, counters),
+        Some(counters) => grid.intersect_with(ray, &mut QueryOptions::counting(counters)),
     };
     // SAFETY: the caller's promise.
     let Some(found) = unsafe { raw::query(grid, ray, options, ask) }.flatten() else {
@@ -375,7 +375,7 @@ pub unsafe extern "C" fn hgrid_occluded(
 ) -> bool {
     let ask = |grid: &Grid<'_>, ray: &_, counters: Option<&mut _>| match counters {
         None => grid.occluded(ray),
-        Some(counters) => grid.occluded_counted(ray, counters),
+        Some(counters) => grid.occluded_with(ray, &mut QueryOptions::counting(counters)),
     };
     // SAFETY: the caller's promise.
     unsafe { raw::query(grid, ray, options, ask) }.unwrap_or(false)
@@ -446,7 +446,8 @@ pub unsafe extern "C" fn hgrid_intersect_n(
             grid.intersect_n(&Strided::new::<Ray>(rays), &mut StridedMut::new(hits), coherence)
         };
         let one = |grid: &Grid<'_>, ray: &_, counters: &mut _| {
-            grid.intersect_counted(ray, counters).unwrap_or(Hit::MISS)
+            let options = &mut QueryOptions::counting(counters);
+            grid.intersect_with(ray, options).unwrap_or(Hit::MISS)
         };
         // SAFETY: the caller's promise.
         unsafe { raw::batch(grid, &batch, options, Hit::MISS, many, one) }
@@ -502,7 +503,7 @@ pub unsafe extern "C" fn hgrid_occluded_n(
             grid.occluded_n(&Strided::new::<Ray>(rays), &mut StridedMut::new(occluded), coherence)
         };
         let one = |grid: &Grid<'_>, ray: &_, counters: &mut _| {
-            u8::from(grid.occluded_counted(ray, counters))
+            u8::from(grid.occluded_with(ray, &mut QueryOptions::counting(counters)))
         };
         // SAFETY: the caller's promise.
         unsafe { raw::batch(grid, &batch, options, 0, many, one) }

@@ -20,6 +20,9 @@ pub enum MeshField {
     Positions,
     /// The indices: their bytes end before the last triangle, or the stride is below three indices.
     Indices,
+    /// The masks: there are not as many as triangles, their bytes end before the last, or the stride is
+    /// below four bytes.
+    Masks,
 }
 
 /// An array of a batch of rays.
@@ -137,6 +140,10 @@ impl fmt::Display for Error {
             }
             Self::InvalidMesh(MeshField::Indices) => f.write_str(
                 "the index bytes end before the last triangle, or the stride is below three indices",
+            ),
+            Self::InvalidMesh(MeshField::Masks) => f.write_str(
+                "there are not as many masks as triangles, their bytes end before the last, or the stride \
+                 is below 4",
             ),
             Self::TooManyTriangles => {
                 write!(f, "a grid takes at most {} triangles", crate::MAX_TRIANGLES)

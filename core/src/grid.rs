@@ -6,14 +6,16 @@ use crate::blob::{Header, corrupt};
 use crate::brick::{self, Brick, OneRay, Tiles};
 use crate::cell::Lattice;
 use crate::config::{Config, Method};
-use crate::counters::{Counters, Tally};
+use crate::counters::Tally;
 use crate::dda::Line;
 use crate::error::{Error, Region};
 use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::{Strided, TriangleMesh};
 use crate::one_level::{self, OneLevel};
+use crate::options::Cull;
 use crate::ray::{Hit, Ray};
 use crate::recursive::{self, Recursive};
+use crate::search::{Any, Closest, Outcome, Search};
 use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
 use crate::tasks::Parallel;
 use crate::triangle::TriangleTest;
@@ -170,43 +172,40 @@ impl<'a> Grid<'a> {
     }
 
     /// The closest hit of a ray. Where several triangles are hit at the same `t`, the one with the
-    /// lowest id.
+    /// lowest id. [`intersect_with`](Self::intersect_with) takes options.
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.query::<false, _>(ray, &mut ())
-    }
-
-    /// The closest hit of a ray; adds the work done to `counters`.
-    #[must_use]
-    pub fn intersect_counted(&self, ray: &Ray, counters: &mut Counters) -> Option<Hit> {
-        self.query::<false, _>(ray, counters)
+        let mut closest = Closest(None);
+        self.search(ray, Cull::None, &mut closest, &mut ());
+        closest.0
     }
 
     /// Whether anything is hit: what [`intersect`](Self::intersect) would find, found sooner.
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.query::<true, _>(ray, &mut ()).is_some()
+        let mut any = Any(false);
+        self.search(ray, Cull::None, &mut any, &mut ());
+        any.0
     }
 
-    /// Whether anything is hit; adds the work done to `counters`.
-    #[must_use]
-    pub fn occluded_counted(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.query::<true, _>(ray, counters).is_some()
-    }
-
-    /// The closest hit, or with `ANY` the first one found.
+    /// Walks a ray and shows a search what it hits.
     #[inline(always)]
-    fn query<const ANY: bool, T: Tally>(&self, ray: &Ray, tally: &mut T) -> Option<Hit> {
-        let approach = Approach::new(ray, &self.lattice.bounds())?;
-        let line = Line::new(&self.lattice, ray, &approach)?;
-        let test = TriangleTest::from(ray, &approach);
+    pub(crate) fn search<F: Search, T: Tally>(
+        &self,
+        ray: &Ray,
+        cull: Cull,
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
+        let Some(line) = Line::new(&self.lattice, ray, &approach) else { return };
+        let test = TriangleTest::from(ray, &approach).culling(cull);
         if let Structure::Brick(brick) = &self.structure {
             let mesh = &self.mesh;
-            let ray = OneRay::<T, ANY> { brick, mesh, line: &line, test: &test, tally };
+            let ray = OneRay { brick, mesh, line: &line, test: &test, search, tally };
             return dispatch(self.simd, ray);
         }
 
-        let mut best = None;
         let mut limit = line.end;
         // A ray meets every list at most once; damaged bytes may list everything in every cell.
         let mut unread = self.list_words();
@@ -217,13 +216,10 @@ impl<'a> Grid<'a> {
                 tally.primitive_test();
                 let Some(triangle) = self.mesh.triangle(id) else { continue };
                 let Some(hit) = test.test(&triangle) else { continue };
-                if ANY {
-                    best = Some(hit.on(id));
-                    return f32::NEG_INFINITY;
-                }
-                if best.is_none_or(|best| hit.on(id).is_closer(&best)) {
-                    best = Some(hit.on(id));
-                    limit = line.distance(hit.t);
+                match search.show(hit.on(id)) {
+                    Outcome::Unchanged => {}
+                    Outcome::EndsAt(t) => limit = line.distance(t),
+                    Outcome::Done => return f32::NEG_INFINITY,
                 }
             }
             limit
@@ -235,7 +231,6 @@ impl<'a> Grid<'a> {
             Structure::Recursive(grid) => grid.traverse(&line, tally, leaf),
             Structure::Brick(_) => {}
         }
-        best
     }
 
     /// Traces neighbouring rays together where the structure can; tells whether it does. `answer` gets

@@ -64,8 +64,10 @@ mod fixed;
 mod grid;
 mod mesh;
 mod one_level;
+mod options;
 mod ray;
 mod recursive;
+mod search;
 #[allow(dead_code, reason = "until a structure uses it")]
 mod simd;
 mod sizes;
@@ -84,6 +86,7 @@ pub use counters::Counters;
 pub use error::{BatchField, ConfigField, Error, MeshField, Region};
 pub use grid::Grid;
 pub use mesh::{IndexType, MAX_TRIANGLES, Strided, Triangle, TriangleMesh};
+pub use options::{Cull, QueryOptions, Verdict};
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use recursive::MAX_DEPTH;
 pub use simd::SimdLevel;

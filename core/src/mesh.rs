@@ -76,6 +76,8 @@ pub struct TriangleMesh<'a> {
     positions: Strided<'a>,
     indices: Strided<'a>,
     index_type: IndexType,
+    /// No elements: every triangle has all bits.
+    masks: Strided<'a>,
 }
 
 impl<'a> TriangleMesh<'a> {
@@ -123,7 +125,34 @@ impl<'a> TriangleMesh<'a> {
         if indices.count > MAX_TRIANGLES {
             return Err(Error::TooManyTriangles);
         }
-        Ok(Self { positions, indices, index_type })
+        let masks = Strided { bytes: &[], stride: 0, count: 0 };
+        Ok(Self { positions, indices, index_type, masks })
+    }
+
+    /// The same mesh with a mask for each triangle, a `u32`, which queries that have one look at
+    /// ([`QueryOptions::mask`](crate::QueryOptions::mask)). Without masks every triangle has all bits.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMesh`] if there are not as many masks as triangles, the stride is below four or
+    /// the bytes end before the last mask.
+    ///
+    /// ```
+    /// use hgrid_core::{Strided, TriangleMesh};
+    /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?.with_masks(Strided::new(&[5_u32]))?;
+    /// assert_eq!(mesh.mask(0), 5);
+    /// # Ok::<(), hgrid_core::Error>(())
+    /// ```
+    pub fn with_masks(self, masks: Strided<'a>) -> Result<Self, Error> {
+        let masks = masks.cut(size_of::<u32>()).filter(|masks| masks.count == self.indices.count);
+        Ok(Self { masks: masks.ok_or(Error::InvalidMesh(MeshField::Masks))?, ..self })
+    }
+
+    /// The mask of a triangle; all bits where there is none.
+    #[inline(always)]
+    #[must_use]
+    pub fn mask(&self, triangle: u32) -> u32 {
+        self.masks.element(triangle as usize).map_or(u32::MAX, |bytes| u32::from_ne_bytes(*bytes))
     }
 
     /// Number of triangles.

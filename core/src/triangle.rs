@@ -21,6 +21,7 @@
 use crate::aabb::Aabb;
 use crate::approach::Approach;
 use crate::mesh::Triangle;
+use crate::options::Cull;
 use crate::ray::{Hit, Ray, round};
 
 /// Where a ray meets a triangle, before anyone asked whether it is the closest.
@@ -56,6 +57,7 @@ pub struct TriangleTest {
     pub(crate) direction_z: f64,
     pub(crate) t_min: f32,
     pub(crate) t_max: f32,
+    pub(crate) cull: Cull,
 }
 
 /// The axis that becomes z; x and y follow cyclically.
@@ -108,7 +110,15 @@ impl TriangleTest {
             direction_z: f64::from(z),
             t_min: ray.t_min,
             t_max: ray.t_max,
+            cull: Cull::None,
         }
+    }
+
+    /// The same test, that some sides of triangles pass.
+    #[inline(always)]
+    #[must_use]
+    pub const fn culling(self, cull: Cull) -> Self {
+        Self { cull, ..self }
     }
 
     /// The hit with this triangle, if its `t` lies in the ray's closed range.
@@ -150,6 +160,13 @@ impl TriangleTest {
         let area = u + v + w;
         if !(area.is_finite() && area.abs() > 0.0) {
             return None;
+        }
+        // Positive if the vertices run clockwise around the z axis, seen from its positive end.
+        let is_front = (area > 0.0) == (self.direction_z > 0.0);
+        match self.cull {
+            Cull::Back if !is_front => return None,
+            Cull::Front if is_front => return None,
+            _ => {}
         }
         // Adding zero makes the negative zero of a vertex a plain one.
         let share = 1.0 / area;
@@ -219,6 +236,27 @@ mod tests {
         assert!(hit(&ray(0.125, 0.125)).is_some());
         assert!(hit(&ray(0.0, below)).is_none() && hit(&ray(above, 1.0)).is_none());
         assert!(hit(&ray(-1.0, 0.125)).is_some() && hit(&ray(0.125, f32::INFINITY)).is_some());
+    }
+
+    /// Whatever axis the ray is nearly parallel to, and whichever way it goes.
+    #[test]
+    fn a_triangle_shows_its_front_where_its_corners_run_counter_clockwise() {
+        for axis in 0..3 {
+            for side in [-2.0, 2.0] {
+                let turn = |[x, y, z]: [f32; 3]| match axis {
+                    0 => [z, x, y],
+                    1 => [y, z, x],
+                    _ => [x, y, z],
+                };
+                let ray = Ray::new(turn([0.25, 0.25, side]), turn([0.0, 0.0, -side]));
+                let test = TriangleTest::new(&ray, ([-1.0; 3], [1.0; 3])).unwrap();
+                let triangle = UNIT.map(turn);
+                let is_hit = |cull| test.culling(cull).test(&triangle).is_some();
+                assert!(is_hit(Cull::None));
+                assert_eq!(is_hit(Cull::Back), side > 0.0, "axis {axis}, from {side}");
+                assert_eq!(is_hit(Cull::Front), side < 0.0, "axis {axis}, from {side}");
+            }
+        }
     }
 
     #[test]

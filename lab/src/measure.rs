@@ -20,7 +20,8 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{
-    Config, Counters, Grid, Hit, Method, Parallel, Ray, Sizes, TriangleMesh, sizes_parallel,
+    Config, Counters, Grid, Hit, Method, Parallel, QueryOptions, Ray, Sizes, TriangleMesh,
+    sizes_parallel,
 };
 use memmap2::{MmapMut, MmapOptions};
 use serde::Serialize;
@@ -319,7 +320,9 @@ fn count(
     let (mut total, mut hits, mut largest) = (Counters::default(), 0, 0);
     let costs = trace(camera, size, progress, |ray| {
         let mut counters = Counters::default();
-        hits += u64::from(grid.intersect_counted(ray, &mut counters).is_some());
+        hits += u64::from(
+            grid.intersect_with(ray, &mut QueryOptions::counting(&mut counters)).is_some(),
+        );
         let Counters { primitive_tests, cell_steps, grid_steps } = counters;
         total.primitive_tests += primitive_tests;
         total.cell_steps += cell_steps;

@@ -1,7 +1,7 @@
 //! Random small meshes whose coordinates are snapped to quarters of a cell, and rays between
 //! snapped points: most rays run along a cell border, an edge or a vertex.
 
-use hgrid_core::{Config, Method, Ray};
+use hgrid_core::{Config, Method, Ray, Strided};
 use hgrid_tests::meshes::Mesh;
 use hgrid_tests::oracle;
 use hgrid_tests::owned::Owned;
@@ -73,7 +73,8 @@ proptest! {
         let mut mesh = Mesh::default();
         triangles.into_iter().for_each(|triangle| mesh.push(triangle));
         let mesh = mesh.scaled(scale);
-        let view = mesh.view();
+        let masks: Vec<u32> = (0..).take(mesh.view().triangle_count() as usize).collect();
+        let view = mesh.view().with_masks(Strided::new(&masks)).unwrap();
         let config = Config {
             density,
             macrocell_factor: factor,

@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use hgrid_core::{Config, Counters, Hit, Method, Ray};
+use hgrid_core::{Config, Counters, Hit, Method, QueryOptions, Ray};
 use hgrid_tests::artefact::static_library;
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::methods::configs;
@@ -58,7 +58,7 @@ fn answer(config: &Config, mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
     bytes.extend(grid.blob());
     let mut counters = Counters::default();
     for ray in rays {
-        let found = grid.intersect_counted(ray, &mut counters);
+        let found = grid.intersect_with(ray, &mut QueryOptions::counting(&mut counters));
         let Hit { t, u, v, primitive } =
             found.unwrap_or(Hit { t: 0.0, u: 0.0, v: 0.0, primitive: 0 });
         bytes.extend([t, u, v].iter().flat_map(|f| f.to_ne_bytes()));

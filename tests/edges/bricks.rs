@@ -2,7 +2,8 @@
 //! triangles, and no ray that is shown most of the mesh.
 
 use hgrid_core::{
-    Config, Counters, Grid, IndexType, MAX_RESOLUTION, Method, Ray, Strided, TriangleMesh,
+    Config, Counters, Grid, IndexType, MAX_RESOLUTION, Method, QueryOptions, Ray, Strided,
+    TriangleMesh,
 };
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::oracle;
@@ -37,7 +38,7 @@ fn agrees(mesh: &Mesh, cost: &Cost) {
             .map(|ray| {
                 oracle::check(&grid, &ray);
                 let mut counters = Counters::default();
-                let _ = grid.intersect_counted(&ray, &mut counters);
+                let _ = grid.intersect_with(&ray, &mut QueryOptions::counting(&mut counters));
                 counters.primitive_tests
             })
             .max();

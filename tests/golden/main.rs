@@ -7,7 +7,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use hgrid_core::{Config, Counters, Method};
+use hgrid_core::{Config, Counters, Method, QueryOptions};
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_lab::scene::Scene;
 use hgrid_tests::meshes::{Mesh, ball, soup};
@@ -26,7 +26,11 @@ fn line(name: &str, mesh: &Mesh, method: Method) -> String {
     let pixels = (0..SIZE).flat_map(|row| (0..SIZE).map(move |column| (column, row)));
     let hits = pixels
         .filter(|&(column, row)| {
-            grid.intersect_counted(&camera.ray(column, row, SIZE), &mut counters).is_some()
+            grid.intersect_with(
+                &camera.ray(column, row, SIZE),
+                &mut QueryOptions::counting(&mut counters),
+            )
+            .is_some()
         })
         .count();
     let Counters { primitive_tests, cell_steps, grid_steps } = counters;

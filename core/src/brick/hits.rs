@@ -9,6 +9,7 @@ use fearless_simd::{Simd, f32x16};
 use super::bundle::{Bundle, PerRay, RAYS, rays_where};
 use crate::eight::{Eight, LANES};
 use crate::mesh::{Triangle, TriangleMesh};
+use crate::options::Cull;
 use crate::ray::{Hit, INVALID_ID, round};
 use crate::triangle::{Axis, TriangleTest};
 
@@ -178,6 +179,7 @@ impl Hits {
             direction_z: f64::from(bundle.direction[z][lane]),
             t_min: bundle.t_min[lane],
             t_max: bundle.t_max[lane],
+            cull: Cull::None,
         }
     }
 

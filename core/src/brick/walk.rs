@@ -10,27 +10,28 @@ use crate::counters::Tally;
 use crate::dda::{Line, Step};
 use crate::eight::{Eight, LANES};
 use crate::mesh::TriangleMesh;
-use crate::ray::Hit;
+use crate::search::{Outcome, Search};
 use crate::simd::Kernel;
 use crate::triangle::TriangleTest;
 
 /// A ray, and what it is traced through.
 #[derive(Debug)]
-pub(crate) struct OneRay<'q, T, const ANY: bool> {
+pub(crate) struct OneRay<'q, F, T> {
     pub(crate) brick: &'q Brick<'q>,
     pub(crate) mesh: &'q TriangleMesh<'q>,
     pub(crate) line: &'q Line,
     pub(crate) test: &'q TriangleTest,
+    pub(crate) search: &'q mut F,
     pub(crate) tally: &'q mut T,
 }
 
-/// What a ray has found.
-struct Search<'q, T, const ANY: bool> {
+/// A ray on its way.
+struct Way<'q, F, T> {
     mesh: &'q TriangleMesh<'q>,
     line: &'q Line,
     test: &'q TriangleTest,
+    search: &'q mut F,
     tally: &'q mut T,
-    best: Option<Hit>,
     /// The distance at which the ray now ends.
     limit: f32,
     /// A ray meets every list at most once; damaged bytes may list everything in every cell.
@@ -51,21 +52,18 @@ struct Part<'a, 'l> {
     depth: u32,
 }
 
-impl<T: Tally, const ANY: bool> Kernel for OneRay<'_, T, ANY> {
-    type Output = Option<Hit>;
+impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
+    type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { brick, mesh, line, test, tally } = self;
+        let Self { brick, mesh, line, test, search, tally } = self;
         let (limit, unread, eight) = (line.end, brick.list_words(), Eight::EMPTY);
-        let mut search: Search<'_, T, ANY> =
-            Search { mesh, line, test, tally, best: None, limit, unread, eight };
-        search.blocks(simd, brick);
-        search.best
+        Way { mesh, line, test, search, tally, limit, unread, eight }.blocks(simd, brick);
     }
 }
 
-impl<T: Tally, const ANY: bool> Search<'_, T, ANY> {
+impl<F: Search, T: Tally> Way<'_, F, T> {
     /// Walks from block to block.
     #[inline(always)]
     fn blocks<S: Simd>(&mut self, simd: S, brick: &Brick<'_>) {
@@ -179,7 +177,7 @@ impl<T: Tally, const ANY: bool> Search<'_, T, ANY> {
         };
         self.unread = rest;
         self.tally.primitive_tests(ids.len());
-        let (best, limit, line) = (&mut self.best, &mut self.limit, self.line);
+        let (search, limit, line) = (&mut *self.search, &mut self.limit, self.line);
         for ids in ids.chunks(LANES) {
             self.eight.gather(self.mesh, ids);
             self.test.test_eight(
@@ -188,13 +186,14 @@ impl<T: Tally, const ANY: bool> Search<'_, T, ANY> {
                 #[inline(always)]
                 |lane, hit| {
                     let Some(hit) = ids.get(lane).map(|&id| hit.on(id)) else { return };
-                    if best.is_none_or(|best| hit.is_closer(&best)) {
-                        *best = Some(hit);
-                        *limit = if ANY { f32::NEG_INFINITY } else { line.distance(hit.t) };
+                    match search.show(hit) {
+                        Outcome::Unchanged => {}
+                        Outcome::EndsAt(t) => *limit = line.distance(t),
+                        Outcome::Done => *limit = f32::NEG_INFINITY,
                     }
                 },
             );
-            if ANY && best.is_some() {
+            if *limit == f32::NEG_INFINITY {
                 return;
             }
         }

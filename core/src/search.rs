@@ -1,0 +1,93 @@
+//! What a query looks for.
+//!
+//! A walk shows a search every hit that it finds: about from near to far, but not quite, and a
+//! triangle that lies in several cells more than once. The search answers where the ray now ends.
+
+use crate::options::Selection;
+use crate::ray::Hit;
+
+/// What became of a hit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Outcome {
+    /// The search goes on as before.
+    Unchanged,
+    /// Nothing behind this `t` matters any more.
+    EndsAt(f32),
+    /// The search is over.
+    Done,
+}
+
+/// What a walk shows its hits to.
+pub(crate) trait Search {
+    fn show(&mut self, hit: Hit) -> Outcome;
+}
+
+/// The closest hit; where several are equally close, the one of the triangle with the lowest id.
+#[derive(Debug)]
+pub(crate) struct Closest(pub(crate) Option<Hit>);
+
+impl Search for Closest {
+    #[inline(always)]
+    fn show(&mut self, hit: Hit) -> Outcome {
+        if self.0.is_some_and(|best| !hit.is_closer(&best)) {
+            return Outcome::Unchanged;
+        }
+        self.0 = Some(hit);
+        Outcome::EndsAt(hit.t)
+    }
+}
+
+/// Any hit.
+#[derive(Debug)]
+pub(crate) struct Any(pub(crate) bool);
+
+impl Search for Any {
+    #[inline(always)]
+    fn show(&mut self, _: Hit) -> Outcome {
+        self.0 = true;
+        Outcome::Done
+    }
+}
+
+/// As many of the nearest hits as there is room for, in order and each triangle once: of those that
+/// a selection has, and that lie behind a hit that was dealt with.
+#[derive(Debug)]
+pub(crate) struct Nearest<'q> {
+    pub(crate) selection: &'q Selection<'q>,
+    pub(crate) after: Option<Hit>,
+    pub(crate) hits: &'q mut [Hit],
+    /// How many of the hits are there.
+    pub(crate) count: usize,
+    /// Whether any hits will do, if only they fill the room.
+    pub(crate) is_any: bool,
+}
+
+impl Search for Nearest<'_> {
+    // Out of line: hits are rare, and the walk keeps its registers.
+    #[inline(never)]
+    fn show(&mut self, hit: Hit) -> Outcome {
+        let is_behind = self.after.is_none_or(|after| after.is_closer(&hit));
+        if !is_behind || !self.selection.has(hit.primitive) {
+            return Outcome::Unchanged;
+        }
+        let found = self.hits.get(..self.count).unwrap_or_default();
+        let place = found.partition_point(|other| other.is_closer(&hit));
+        // The same triangle has the same `t`, to the bit, in whichever cell the ray meets it.
+        if found.get(place).is_some_and(|other| other.primitive == hit.primitive) {
+            return Outcome::Unchanged;
+        }
+        // What is behind it moves on by one; the last falls out if there is no room.
+        self.count = (self.count + 1).min(self.hits.len());
+        let mut moved = hit;
+        for slot in self.hits.iter_mut().take(self.count).skip(place) {
+            core::mem::swap(slot, &mut moved);
+        }
+        if self.count < self.hits.len() {
+            return Outcome::Unchanged;
+        }
+        match self.hits.last() {
+            Some(last) if !self.is_any => Outcome::EndsAt(last.t),
+            _ => Outcome::Done,
+        }
+    }
+}
