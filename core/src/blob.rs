@@ -19,6 +19,7 @@ use crate::arena::{self, ALIGNMENT};
 use crate::bits::halves;
 use crate::cell::{Lattice, MAX_RESOLUTION};
 use crate::config::{BuildFlags, Config, Method};
+use crate::control::Watch;
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
@@ -201,7 +202,7 @@ impl Header {
         mesh: &TriangleMesh<'_>,
         rule: impl FnOnce(Vec3A, u32) -> Option<[u32; 3]>,
     ) -> Result<(), Error> {
-        let survey = Survey::of(mesh, BuildFlags::empty())?;
+        let survey = Survey::of(mesh, BuildFlags::empty(), &Watch::none())?;
         if self.skipped_count != survey.skipped_count {
             return Err(corrupt(core::mem::offset_of!(Self, skipped_count)));
         }

@@ -88,8 +88,10 @@ pub enum Error {
     /// A field of the configuration is outside its range.
     InvalidConfig(ConfigField),
     /// The loop of a parallel build ran a task twice or not at all: see
-    /// [`Parallel::run`](crate::Parallel::run). There is no grid.
+    /// [`Control::run`](crate::Control::run). There is no grid.
     InvalidParallelFor,
+    /// The caller's [`Control::progress`](crate::Control::progress) asked to stop. There is no grid.
+    Cancelled,
     /// An array of a batch of rays cannot be what it should: see the field.
     InvalidBatch(BatchField),
     /// The bytes are not a grid.
@@ -180,6 +182,7 @@ impl fmt::Display for Error {
             Self::InvalidParallelFor => {
                 f.write_str("the parallel_for did not run every task exactly once")
             }
+            Self::Cancelled => f.write_str("the build was cancelled by its progress callback"),
             Self::NotAGrid => f.write_str("the bytes are not a grid"),
             Self::WrongByteOrder => {
                 f.write_str("the grid was built on a machine of the other byte order")

@@ -6,6 +6,7 @@ use crate::blob::{Header, corrupt};
 use crate::brick::{self, Brick, OneRay, Tiles};
 use crate::cell::Lattice;
 use crate::config::{Config, Method};
+use crate::control::{Control, Watch};
 use crate::counters::Tally;
 use crate::dda::Line;
 use crate::error::{Error, Region};
@@ -17,7 +18,6 @@ use crate::ray::{Hit, Ray};
 use crate::recursive::{self, Recursive};
 use crate::search::{Any, Closest, Outcome, Search};
 use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
-use crate::tasks::Parallel;
 use crate::triangle::TriangleTest;
 use crate::variable::{self, Variable};
 
@@ -82,39 +82,43 @@ impl<'a> Grid<'a> {
         index: &'a mut [u8],
         scratch: &mut [u8],
     ) -> Result<Self, Error> {
-        Self::build_parallel(mesh, config, index, scratch, &Parallel::SERIAL)
+        Self::build_with(mesh, config, index, scratch, &Control::SERIAL)
     }
 
     /// Builds a grid on the caller's threads: [`build`](Self::build), and bit by bit the same grid.
     ///
     /// Only [`Method::Brick`] is cut into tasks; the other methods build on the thread that calls.
-    /// [`sizes_parallel`](crate::sizes_parallel) and
+    /// [`sizes_with`](crate::sizes_with) and
     /// [`Sizes::bound_parallel`](crate::Sizes::bound_parallel) tell how much memory so many tasks take;
     /// where there is less, but enough for fewer, there are fewer.
     ///
     /// # Errors
     /// Those of [`build`](Self::build), and [`Error::InvalidParallelFor`] if a task was run twice or
     /// not at all.
-    pub fn build_parallel(
+    pub fn build_with(
         mesh: TriangleMesh<'a>,
         config: &Config,
         index: &'a mut [u8],
         scratch: &mut [u8],
-        parallel: &Parallel<'_>,
+        control: &Control<'_>,
     ) -> Result<Self, Error> {
         config.check()?;
         check_alignment(index, Region::Index)?;
         check_alignment(scratch, Region::Scratch)?;
+        let watch = Watch::new(control);
+        watch.at(0.0)?;
         let blob = match config.method {
-            Method::OneLevel => one_level::build(&mesh, config, &(), index, scratch)?,
+            Method::OneLevel => one_level::build(&mesh, config, &(), index, scratch, &watch)?,
             Method::Fixed => {
-                one_level::build(&mesh, config, &Macrocells::of(config), index, scratch)?
+                one_level::build(&mesh, config, &Macrocells::of(config), index, scratch, &watch)?
             }
-            Method::Variable => variable::build(&mesh, config, index, scratch)?,
-            Method::Recursive => recursive::build(&mesh, config, index, scratch)?,
-            Method::Brick => brick::build(&mesh, config, index, scratch, parallel)?,
+            Method::Variable => variable::build(&mesh, config, index, scratch, &watch)?,
+            Method::Recursive => recursive::build(&mesh, config, index, scratch, &watch)?,
+            Method::Brick => brick::build(&mesh, config, index, scratch, control, &watch)?,
         };
-        Self::open(blob, mesh)
+        let grid = Self::open(blob, mesh)?;
+        watch.end();
+        Ok(grid)
     }
 
     /// Opens a grid that was built earlier or elsewhere, in O(1); bytes behind the grid are ignored.

@@ -25,7 +25,7 @@
 //! ```
 //!
 //! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `approach`, `triangle`,
-//! `simd`, `eight`, `config`, `arena`, `bump`, `bits`, `cell`, `dda`, `counters`, `survey`, `tasks`,
+//! `simd`, `eight`, `config`, `control`, `search`, `arena`, `bump`, `bits`, `cell`, `dda`, `counters`, `survey`, `tasks`,
 //! `blob`), one folder per structure above them (`one_level`; `fixed` and `variable` on top of it;
 //! `recursive`; `brick`), and `grid`: the view that queries run on, `batch` for many rays. core/DESIGN.md
 //! tells how it all works and what was left out.
@@ -55,6 +55,7 @@ mod brick;
 mod bump;
 mod cell;
 mod config;
+mod control;
 mod counters;
 mod dda;
 #[allow(dead_code, reason = "until a structure uses it")]
@@ -82,6 +83,7 @@ pub use batch::{Coherence, StridedMut};
 pub use blob::BLOB_VERSION;
 pub use cell::MAX_RESOLUTION;
 pub use config::{BuildFlags, Config, Method};
+pub use control::Control;
 pub use counters::Counters;
 pub use error::{BatchField, ConfigField, Error, MeshField, Region};
 pub use grid::Grid;
@@ -90,6 +92,6 @@ pub use options::{Cull, QueryOptions, Verdict};
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use recursive::MAX_DEPTH;
 pub use simd::SimdLevel;
-pub use sizes::{Sizes, sizes, sizes_parallel};
-pub use tasks::{Parallel, Task};
+pub use sizes::{Sizes, sizes, sizes_with};
+pub use tasks::Task;
 pub use triangle::{TriangleHit, TriangleTest};

@@ -2,12 +2,12 @@
 
 use crate::brick;
 use crate::config::{Config, Method};
+use crate::control::Control;
 use crate::error::{Error, Region};
 use crate::fixed;
 use crate::mesh::TriangleMesh;
 use crate::one_level;
 use crate::recursive;
-use crate::tasks::Parallel;
 use crate::variable;
 
 /// Bytes of the two regions that a build takes.
@@ -44,7 +44,7 @@ impl Sizes {
     }
 
     /// Enough for any mesh with so many triangles and a build with so many tasks
-    /// ([`Parallel::tasks`]), each of which takes scratch: four bytes for eight triangles and those of
+    /// ([`Control::tasks`]), each of which takes scratch: four bytes for eight triangles and those of
     /// the fullest block.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "compared before")]
@@ -110,7 +110,7 @@ impl Sizes {
 /// # Ok::<(), hgrid_core::Error>(())
 /// ```
 pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Result<Sizes, Error> {
-    sizes_parallel(mesh, config, scratch, &Parallel::SERIAL)
+    sizes_with(mesh, config, scratch, &Control::SERIAL)
 }
 
 /// The memory that a parallel build of this mesh takes: [`sizes`], by the caller's threads.
@@ -120,12 +120,12 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
 /// parallel; for the others this is [`sizes`].
 ///
 /// # Errors
-/// Those of [`Grid::build_parallel`](crate::Grid::build_parallel), but for index memory.
-pub fn sizes_parallel(
+/// Those of [`Grid::build_with`](crate::Grid::build_with), but for index memory.
+pub fn sizes_with(
     mesh: &TriangleMesh<'_>,
     config: &Config,
     scratch: &mut [u8],
-    parallel: &Parallel<'_>,
+    control: &Control<'_>,
 ) -> Result<Sizes, Error> {
     config.check()?;
     crate::arena::check_alignment(scratch, Region::Scratch)?;
@@ -134,6 +134,6 @@ pub fn sizes_parallel(
         Method::Fixed => one_level::sizes(mesh, config, &fixed::Macrocells::of(config), scratch),
         Method::Variable => variable::sizes(mesh, config, scratch),
         Method::Recursive => recursive::sizes(mesh, config, scratch),
-        Method::Brick => brick::sizes(mesh, config, scratch, parallel),
+        Method::Brick => brick::sizes(mesh, config, scratch, control),
     }
 }

@@ -4,8 +4,12 @@ use glam::Vec3A;
 
 use crate::aabb::Aabb;
 use crate::config::BuildFlags;
+use crate::control::Watch;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
+
+/// What part of a build the survey is, about.
+const SHARE: [f32; 2] = [0.0, 0.15];
 
 /// What one pass over the triangles tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,9 +24,15 @@ pub(crate) struct Survey {
 
 impl Survey {
     /// Looks at every triangle once: O(n), no memory.
-    pub(crate) fn of(mesh: &TriangleMesh<'_>, flags: BuildFlags) -> Result<Self, Error> {
+    pub(crate) fn of(
+        mesh: &TriangleMesh<'_>,
+        flags: BuildFlags,
+        watch: &Watch<'_>,
+    ) -> Result<Self, Error> {
         let mut survey = Self { bounds: Aabb::EMPTY, finite_count: 0, skipped_count: 0 };
-        for id in 0..mesh.triangle_count() {
+        let count = mesh.triangle_count();
+        for id in 0..count {
+            watch.step(id, count, SHARE)?;
             let Some(corners) = mesh.corners(id, Vec3A::new) else {
                 return Err(Error::IndexOutOfRange { triangle: id });
             };

@@ -6,73 +6,13 @@
 //!
 //! A processor without atomic operations has one core: there the build runs its tasks itself.
 
-use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use crate::control::Control;
 use crate::error::Error;
 
 /// What a build hands to the caller's loop: does the task with a number.
 pub type Task<'t> = dyn Fn(u32) + Sync + 't;
-
-/// How a build runs its tasks: the caller's loop, over the caller's threads.
-///
-/// The grid does not depend on it, to the bit.
-///
-/// ```
-/// use hgrid_core::{Block, Config, Grid, Method, Parallel, TriangleMesh, sizes_parallel};
-/// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-/// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-/// let config = Config::new(Method::Brick);
-///
-/// let run = |count: u32, task: &(dyn Fn(u32) + Sync)| {
-///     std::thread::scope(|scope| {
-///         for index in 0..count {
-///             scope.spawn(move || task(index));
-///         }
-///     });
-/// };
-/// let parallel = Parallel { tasks: 4, run: &run };
-/// let sizes = sizes_parallel(&mesh, &config, &mut [], &parallel)?;
-/// let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-/// let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-/// let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-/// let grid = Grid::build_parallel(mesh, &config, index, scratch, &parallel)?;
-/// assert_eq!(grid.mesh().triangle_count(), 1);
-/// # Ok::<(), hgrid_core::Error>(())
-/// ```
-#[derive(Clone, Copy)]
-pub struct Parallel<'p> {
-    /// The most tasks that run at once, from 1 to [`MAX_TASKS`](Self::MAX_TASKS): what is outside
-    /// counts as the nearest of both. Each takes scratch of its own.
-    pub tasks: u32,
-    /// Calls the task with every number below the count exactly once, in any order, and returns when
-    /// all calls have returned. It is called several times in a build, with counts up to
-    /// [`tasks`](Self::tasks).
-    ///
-    /// On targets without atomic operations it is never called.
-    pub run: &'p dyn for<'t> Fn(u32, &'t Task<'t>),
-}
-
-impl fmt::Debug for Parallel<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Parallel").field("tasks", &self.tasks).finish_non_exhaustive()
-    }
-}
-
-impl Parallel<'_> {
-    /// The most tasks at once.
-    pub const MAX_TASKS: u32 = 64;
-
-    /// One task after the other.
-    pub(crate) const SERIAL: Parallel<'static> = Parallel {
-        tasks: 1,
-        run: &|count, task| {
-            for index in 0..count {
-                task(index);
-            }
-        },
-    };
-}
 
 /// What is in the slot of a task.
 enum State<T, R> {
@@ -85,7 +25,7 @@ enum State<T, R> {
 /// Runs tasks and returns what each of them returns, in their order. An error if the caller's loop
 /// did not run each of them once.
 pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
-    parallel: &Parallel<'_>,
+    parallel: &Control<'_>,
     tasks: impl Iterator<Item = T>,
     work: impl Fn(T) -> R + Sync,
 ) -> Result<[Option<R>; N], Error> {
@@ -130,7 +70,7 @@ mod with_atomics {
 
     use zerocopy::{FromBytes as _, IntoBytes as _};
 
-    use super::Parallel;
+    use super::Control;
 
     /// What tasks take along and bring back.
     pub(crate) use core::marker::Send as Portable;
@@ -153,7 +93,7 @@ mod with_atomics {
         }
     }
 
-    pub(super) fn each(parallel: &Parallel<'_>, count: u32, step: &(dyn Fn(u32) + Sync)) {
+    pub(super) fn each(parallel: &Control<'_>, count: u32, step: &(dyn Fn(u32) + Sync)) {
         (parallel.run)(count, step);
     }
 
@@ -186,7 +126,7 @@ use with_atomics::{Portable, Slot, each};
 mod without_atomics {
     use core::cell::{Cell, RefCell};
 
-    use super::Parallel;
+    use super::Control;
 
     /// What tasks take along and bring back: on one core anything.
     pub(crate) trait Portable {}
@@ -211,7 +151,7 @@ mod without_atomics {
         }
     }
 
-    pub(super) fn each(_: &Parallel<'_>, count: u32, step: &dyn Fn(u32)) {
+    pub(super) fn each(_: &Control<'_>, count: u32, step: &dyn Fn(u32)) {
         for index in 0..count {
             step(index);
         }

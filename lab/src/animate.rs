@@ -15,8 +15,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result};
 use hgrid_core::{
-    Coherence, Config, Error, Grid, Hit, Ray, Region, Strided, StridedMut, TriangleMesh,
-    sizes_parallel,
+    Coherence, Config, Error, Grid, Hit, Ray, Region, Strided, StridedMut, TriangleMesh, sizes_with,
 };
 use memmap2::MmapMut;
 use serde::Serialize;
@@ -222,8 +221,7 @@ struct Memory {
 impl Memory {
     /// Enough for a mesh as it is now.
     fn of(mesh: &TriangleMesh<'_>, plan: &Plan<'_>) -> Result<Self> {
-        let sizes =
-            plan.threads.parallel(|all| sizes_parallel(mesh, &plan.config, &mut [], all))?;
+        let sizes = plan.threads.parallel(|all| sizes_with(mesh, &plan.config, &mut [], all))?;
         Ok(Self { index: memory(sizes.index_bytes)?, scratch: memory(sizes.scratch_bytes)? })
     }
 
@@ -233,7 +231,7 @@ impl Memory {
         loop {
             let Self { index, scratch } = self;
             let built = plan.threads.parallel(|all| {
-                Grid::build_parallel(mesh, &plan.config, index, scratch, all).map(drop)
+                Grid::build_with(mesh, &plan.config, index, scratch, all).map(drop)
             });
             match built {
                 Ok(()) => return Ok(grown),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use hgrid_core::{Config, Method, Parallel};
+use hgrid_core::{Config, Control, Method};
 
 use crate::camera::{Camera, Point, Up, View};
 use crate::compare::peers::Peer;
@@ -393,7 +393,7 @@ pub enum Shading {
 
 /// As many threads as a build can use.
 fn thread_parser() -> impl TypedValueParser<Value = u32> {
-    clap::value_parser!(u32).range(1..=i64::from(Parallel::MAX_TASKS))
+    clap::value_parser!(u32).range(1..=i64::from(Control::MAX_TASKS))
 }
 
 /// A method by its name.

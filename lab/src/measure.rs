@@ -20,8 +20,8 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{
-    Config, Counters, Grid, Hit, Method, Parallel, QueryOptions, Ray, Sizes, TriangleMesh,
-    sizes_parallel,
+    Config, Control, Counters, Grid, Hit, Method, QueryOptions, Ray, Sizes, TriangleMesh,
+    sizes_with,
 };
 use memmap2::{MmapMut, MmapOptions};
 use serde::Serialize;
@@ -190,7 +190,7 @@ pub fn measure(
             progress.set_message(&format!("{turn} building"));
             let start = Instant::now();
             let built = threads
-                .parallel(|parallel| build_parallel(mesh, config, parallel))
+                .parallel(|parallel| build_with(mesh, config, parallel))
                 .with_context(|| format!("cannot build the {name} grid"))?;
             builds.push(start.elapsed().as_secs_f64());
             let Built { index, scratch } = built;
@@ -228,15 +228,11 @@ pub(crate) struct Built {
 
 /// Builds as a user does who has nothing but the mesh: ask for sizes, get memory, build.
 pub(crate) fn build(mesh: TriangleMesh<'_>, config: &Config) -> Result<Built> {
-    Threads::new(1)?.parallel(|parallel| build_parallel(mesh, config, parallel))
+    Threads::new(1)?.parallel(|parallel| build_with(mesh, config, parallel))
 }
 
 /// The same on threads.
-fn build_parallel(
-    mesh: TriangleMesh<'_>,
-    config: &Config,
-    parallel: &Parallel<'_>,
-) -> Result<Built> {
+fn build_with(mesh: TriangleMesh<'_>, config: &Config, parallel: &Control<'_>) -> Result<Built> {
     // A brick grid's bound follows from the number of triangles, and what is not written costs nothing.
     let bound = match config.method {
         Method::Brick => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
@@ -244,10 +240,10 @@ fn build_parallel(
     };
     let sizes = match bound {
         Some(bound) => bound,
-        None => sizes_parallel(&mesh, config, &mut [], parallel)?,
+        None => sizes_with(&mesh, config, &mut [], parallel)?,
     };
     let (mut index, mut scratch) = (memory(sizes.index_bytes)?, memory(sizes.scratch_bytes)?);
-    Grid::build_parallel(mesh, config, &mut index, &mut scratch, parallel)?;
+    Grid::build_with(mesh, config, &mut index, &mut scratch, parallel)?;
     Ok(Built { index, scratch })
 }
 

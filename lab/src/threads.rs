@@ -1,7 +1,7 @@
 //! Threads for the work that can use them.
 
 use anyhow::{Context as _, Result};
-use hgrid_core::Parallel;
+use hgrid_core::Control;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -35,9 +35,9 @@ impl Threads {
     }
 
     /// Shows them to a build.
-    pub fn parallel<R>(&self, build: impl FnOnce(&Parallel<'_>) -> R) -> R {
+    pub fn parallel<R>(&self, build: impl FnOnce(&Control<'_>) -> R) -> R {
         let run = |count: u32, task: &(dyn Fn(u32) + Sync)| self.each(count, task);
-        build(&Parallel { tasks: self.count, run: &run })
+        build(&Control { tasks: self.count, run: &run, progress: None })
     }
 
     /// Does a task for every number below a count.

@@ -4,5 +4,6 @@ mod blobs;
 mod bricks;
 mod chunks;
 mod inputs;
+mod progress;
 mod rays;
 mod shapes;

@@ -32,11 +32,12 @@ use crate::arena::{ALIGNMENT, section_bytes, split_mut};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::bump::{GRID, finish};
 use crate::config::Config;
+use crate::control::{Control, Watch};
 use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::simd::{Kernel, SimdLevel, dispatch};
 use crate::sizes::Sizes;
-use crate::tasks::{Parallel, Shared, run};
+use crate::tasks::{Shared, run};
 
 /// Words for the list of the whole grid.
 const fn large_words(census: &Census) -> u64 {
@@ -79,8 +80,8 @@ pub(crate) const fn bound(triangles: u32, tasks: u32) -> (u64, u64) {
 
 /// A number of tasks that there can be.
 const fn clamped(tasks: u32) -> u32 {
-    if tasks > Parallel::MAX_TASKS {
-        Parallel::MAX_TASKS
+    if tasks > Control::MAX_TASKS {
+        Control::MAX_TASKS
     } else if tasks == 0 {
         1
     } else {
@@ -97,7 +98,7 @@ pub(crate) const fn scratch_bytes_at_most(resolution: [u32; 3], triangles: u32) 
 macro_rules! for_tasks {
     ($parallel:expr, $function:ident($($argument:expr),*)) => {
         if $parallel.tasks > 1 {
-            $function::<{ Parallel::MAX_TASKS as usize }>($($argument),*, $parallel)
+            $function::<{ Control::MAX_TASKS as usize }>($($argument),*, $parallel)
         } else {
             $function::<1>($($argument),*, $parallel)
         }
@@ -109,7 +110,7 @@ pub(crate) fn sizes(
     mesh: &TriangleMesh<'_>,
     config: &Config,
     scratch: &mut [u8],
-    parallel: &Parallel<'_>,
+    parallel: &Control<'_>,
 ) -> Result<Sizes, Error> {
     for_tasks!(parallel, sizes_in(mesh, config, scratch))
 }
@@ -118,7 +119,7 @@ fn sizes_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
     config: &Config,
     scratch: &mut [u8],
-    parallel: &Parallel<'_>,
+    parallel: &Control<'_>,
 ) -> Result<Sizes, Error> {
     let (settled, shares) = settle_in::<N>(mesh, config, scratch, parallel)?;
     let Settled { layout, census, .. } = &settled;
@@ -135,7 +136,7 @@ fn sizes_in<const N: usize>(
     let words = words_of(rest).and_then(|words| words.get_mut(..usize::try_from(least).ok()?));
     let Some(words) = words else { return bound() };
     work.place(least);
-    work.fill(&mut [], words)?;
+    work.fill(&mut [], words, &Watch::none())?;
     Sizes::new(layout.index_bytes(work.most()), scratch_bytes, true)
 }
 
@@ -145,13 +146,14 @@ pub(crate) fn build<'a>(
     config: &Config,
     index: &'a mut [u8],
     scratch: &mut [u8],
-    parallel: &Parallel<'_>,
+    parallel: &Control<'_>,
+    watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    let header = match for_tasks!(parallel, build_in(mesh, config, index, scratch)) {
+    let header = match for_tasks!(parallel, build_in(mesh, config, index, scratch, watch)) {
         // The heads of many tasks may leave no room for the benches of one.
         Err(Error::OutOfMemory { region: Region::Scratch, .. }) if parallel.tasks > 1 => {
             let tasks = clamped(parallel.tasks) / 2;
-            return build(mesh, config, index, scratch, &Parallel { tasks, ..*parallel });
+            return build(mesh, config, index, scratch, &Control { tasks, ..*parallel }, watch);
         }
         built => built?,
     };
@@ -164,7 +166,8 @@ fn build_in<const N: usize>(
     config: &Config,
     index: &mut [u8],
     scratch: &mut [u8],
-    parallel: &Parallel<'_>,
+    watch: &Watch<'_>,
+    parallel: &Control<'_>,
 ) -> Result<Header, Error> {
     let available_bytes = scratch.len() as u64;
     let (settled, shares) = settle_in::<N>(mesh, config, scratch, parallel)?;
@@ -191,20 +194,21 @@ fn build_in<const N: usize>(
         return Err(too_small(enough_words(census)));
     };
 
+    watch.at(0.4)?;
     // What was here is no grid any more, should the build end with an error.
     header.fill(0);
     let room = words.len() as u64;
     work.place(room);
-    let mut taken = work.fill(blocks, words)?;
+    let mut taken = work.fill(blocks, words, watch)?;
     if taken.is_none() && work.most() <= room {
         // There is room for what each task needs, now that this is known.
         work.place_exactly();
-        taken = work.fill(blocks, words)?;
+        taken = work.fill(blocks, words, watch)?;
     }
     if taken.is_none() && work.part_count > 1 {
         work.cut(1);
         work.place(room);
-        taken = work.fill(blocks, words)?;
+        taken = work.fill(blocks, words, watch)?;
     }
     let Some(taken) = taken else { return Err(too_small(work.most())) };
     let mut header = Header::new(config, mesh, &settled.lattice);
@@ -225,7 +229,7 @@ struct Work<'w, const N: usize> {
     ground: &'w Ground<'w>,
     settled: &'w Settled,
     shares: &'w Shares<N>,
-    parallel: &'w Parallel<'w>,
+    parallel: &'w Control<'w>,
     /// For every task and block how many entries it has.
     heads: [&'w mut [u32]; N],
     benches: [Option<Benches<'w>>; N],
@@ -243,7 +247,7 @@ impl<'w, const N: usize> Work<'w, N> {
         settled: &'w Settled,
         shares: &'w Shares<N>,
         scratch: &'w mut [u8],
-        parallel: &'w Parallel<'w>,
+        parallel: &'w Control<'w>,
     ) -> Option<(Self, &'w mut [u8])> {
         if !settled.is_counted {
             return None;
@@ -318,7 +322,12 @@ impl<'w, const N: usize> Work<'w, N> {
 
     /// Scatters and sorts into the words, and returns how many of them are the pool; `None` if there
     /// were not enough for each part.
-    fn fill(&mut self, blocks: &mut [Block], words: &mut [u32]) -> Result<Option<u32>, Error> {
+    fn fill(
+        &mut self,
+        blocks: &mut [Block],
+        words: &mut [u32],
+        watch: &Watch<'_>,
+    ) -> Result<Option<u32>, Error> {
         // A head is a word's number, and so is the base of a block, but for a bit.
         let too_fine = Error::InvalidConfig(ConfigField::CellSize);
         let end = self.parts.iter().map(|part| part.bins + part.bin_words()).max();
@@ -326,6 +335,7 @@ impl<'w, const N: usize> Work<'w, N> {
             return Err(too_fine);
         }
         self.scatter(words)?;
+        watch.at(0.7)?;
         self.sort(blocks, words)?;
         self.recount();
         if self.filled.iter().any(|filled| filled.is_exhausted) {

@@ -25,10 +25,11 @@ use super::pass::{Census, Count, Ground};
 use crate::aabb::Aabb;
 use crate::cell::{Lattice, MAX_RESOLUTION};
 use crate::config::{BuildFlags, Config};
+use crate::control::{Control, Watch};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
-use crate::tasks::{Parallel, run};
+use crate::tasks::run;
 
 /// The most references of a mesh with so many triangles.
 pub(super) const fn reference_limit(triangles: u32) -> u64 {
@@ -93,7 +94,7 @@ impl<const N: usize> Shares<N> {
 
 /// [`settle_in`] without scratch.
 pub(super) fn settle(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Settled, Error> {
-    Ok(settle_in::<1>(mesh, config, &mut [], &Parallel::SERIAL)?.0)
+    Ok(settle_in::<1>(mesh, config, &mut [], &Control::SERIAL)?.0)
 }
 
 /// Chooses the cells of a mesh and counts what they will hold. The heads of each task get the entries
@@ -102,7 +103,7 @@ pub(super) fn settle_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
     config: &Config,
     scratch: &mut [u8],
-    parallel: &Parallel<'_>,
+    parallel: &Control<'_>,
 ) -> Result<(Settled, Shares<N>), Error> {
     let sample = Sample::of(mesh);
     let bounds = Lattice::pad(&bounds(mesh, &sample, config.flags)?);
@@ -147,7 +148,7 @@ fn census<const N: usize>(
     ground: &Ground<'_>,
     layout: Layout,
     scratch: &mut [u8],
-    parallel: &Parallel<'_>,
+    parallel: &Control<'_>,
 ) -> Result<(Settled, Shares<N>), Error> {
     let triangles = ground.mesh.triangle_count();
     let wanted = task_count::<N>(triangles, parallel);
@@ -174,7 +175,7 @@ fn census<const N: usize>(
 }
 
 /// Into how many tasks the work is cut.
-fn task_count<const N: usize>(triangles: u32, parallel: &Parallel<'_>) -> u32 {
+fn task_count<const N: usize>(triangles: u32, parallel: &Control<'_>) -> u32 {
     /// Fewer would not be worth the caller's thread.
     const LEAST_TRIANGLES: u32 = 256;
     parallel.tasks.min(triangles / LEAST_TRIANGLES).clamp(1, N as u32)
@@ -182,7 +183,7 @@ fn task_count<const N: usize>(triangles: u32, parallel: &Parallel<'_>) -> u32 {
 
 /// The entries of the fullest block.
 fn fullest(layout: &Layout, tasks: u32, scratch: &mut [u8]) -> u32 {
-    let heads = layout.heads::<{ Parallel::MAX_TASKS as usize }>(scratch, tasks);
+    let heads = layout.heads::<{ Control::MAX_TASKS as usize }>(scratch, tasks);
     let Some((heads, _)) = heads else { return 0 };
     let sums = (0..layout.block_count() as usize)
         .map(|block| heads.iter().filter_map(|heads| heads.get(block)).sum());
@@ -204,7 +205,11 @@ fn bounds(mesh: &TriangleMesh<'_>, sample: &Sample, flags: BuildFlags) -> Result
     const SUSPICIOUS: f32 = 2.0;
     let all = mesh.vertex_bounds();
     let (size, sampled) = (all.size().max_element(), sample.bounds.size().max_element());
-    if size <= SUSPICIOUS * sampled { Ok(all) } else { Ok(Survey::of(mesh, flags)?.bounds) }
+    if size <= SUSPICIOUS * sampled {
+        Ok(all)
+    } else {
+        Ok(Survey::of(mesh, flags, &Watch::none())?.bounds)
+    }
 }
 
 /// Cells in which a triangle lies on average.

@@ -1,4 +1,4 @@
-//! Parallel builds: the same bits, memory to the byte, and loops that do not do what they should.
+//! Control builds: the same bits, memory to the byte, and loops that do not do what they should.
 
 extern crate std;
 
@@ -7,11 +7,11 @@ use alloc::vec::Vec;
 
 use crate::arena::Block as Memory;
 use crate::config::{BuildFlags, Config, Method};
+use crate::control::Control;
 use crate::error::{Error, Region};
 use crate::grid::Grid;
 use crate::mesh::TriangleMesh;
-use crate::sizes::{Sizes, sizes_parallel};
-use crate::tasks::Parallel;
+use crate::sizes::{Sizes, sizes_with};
 
 type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 type Loop = dyn Fn(u32, &(dyn Fn(u32) + Sync));
@@ -67,24 +67,24 @@ fn regions(index_bytes: usize, scratch_bytes: usize) -> [Vec<Memory>; 2] {
 /// The blob of a mesh, built in so many bytes.
 fn blob(
     (positions, indices): &Mesh,
-    parallel: &Parallel<'_>,
+    parallel: &Control<'_>,
     bytes: (usize, usize),
 ) -> Result<Vec<u8>, Error> {
     let mesh = TriangleMesh::new(positions, indices)?;
     let [mut index, mut scratch] = regions(bytes.0, bytes.1);
     let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
-    let grid = Grid::build_parallel(mesh, &config(), index, scratch, parallel)?;
+    let grid = Grid::build_with(mesh, &config(), index, scratch, parallel)?;
     Ok(grid.blob().to_vec())
 }
 
 /// What a build is told to bring, and with that much scratch what it will take.
-fn both_sizes(mesh: &Mesh, parallel: &Parallel<'_>) -> [Sizes; 2] {
+fn both_sizes(mesh: &Mesh, parallel: &Control<'_>) -> [Sizes; 2] {
     let mesh = TriangleMesh::new(&mesh.0, &mesh.1).unwrap();
-    let enough = sizes_parallel(&mesh, &config(), &mut [], parallel).unwrap();
+    let enough = sizes_with(&mesh, &config(), &mut [], parallel).unwrap();
     let entries = 64 * (1 + mesh.triangle_count() as usize);
     let [_, mut scratch] = regions(0, enough.scratch_bytes + entries);
     let scratch = Memory::bytes_mut(&mut scratch);
-    let exact = sizes_parallel(&mesh, &config(), scratch, parallel).unwrap();
+    let exact = sizes_with(&mesh, &config(), scratch, parallel).unwrap();
     assert!(exact.is_exact && !enough.is_exact);
     assert!(exact.index_bytes <= enough.index_bytes);
     [enough, exact]
@@ -93,13 +93,13 @@ fn both_sizes(mesh: &Mesh, parallel: &Parallel<'_>) -> [Sizes; 2] {
 #[test]
 fn bits_do_not_depend_on_the_tasks_nor_on_their_order() {
     for mesh in [soup(5000), soup(600), soup(1), soup(0)] {
-        let [enough, _] = both_sizes(&mesh, &Parallel { tasks: 64, run: &forward });
+        let [enough, _] = both_sizes(&mesh, &Control { tasks: 64, run: &forward, progress: None });
         let bytes = (enough.index_bytes, enough.scratch_bytes);
-        let serial = blob(&mesh, &Parallel::SERIAL, bytes).unwrap();
+        let serial = blob(&mesh, &Control::SERIAL, bytes).unwrap();
         for tasks in (0..=9).chain([19, 64, 1000, u32::MAX]) {
             let loops: [&Loop; 4] = [&forward, &backward, &odd_ones_first, &threads];
             for run in loops {
-                let built = blob(&mesh, &Parallel { tasks, run }, bytes).unwrap();
+                let built = blob(&mesh, &Control { tasks, run, progress: None }, bytes).unwrap();
                 assert!(built == serial, "{tasks} tasks, {} triangles", mesh.1.len());
             }
         }
@@ -113,20 +113,22 @@ fn one_block_is_enough_for_many_tasks() {
         *position = position.map(f32::round);
     }
     let mesh = (positions, indices);
-    let [enough, _] = both_sizes(&mesh, &Parallel { tasks: 9, run: &forward });
+    let [enough, _] = both_sizes(&mesh, &Control { tasks: 9, run: &forward, progress: None });
     let bytes = (enough.index_bytes, enough.scratch_bytes);
-    let serial = blob(&mesh, &Parallel::SERIAL, bytes).unwrap();
-    assert!(blob(&mesh, &Parallel { tasks: 9, run: &threads }, bytes).unwrap() == serial);
+    let serial = blob(&mesh, &Control::SERIAL, bytes).unwrap();
+    assert!(
+        blob(&mesh, &Control { tasks: 9, run: &threads, progress: None }, bytes).unwrap() == serial
+    );
 }
 
 #[test]
 fn sizes_hold_to_the_byte_with_any_number_of_tasks() {
     let mesh = soup(5000);
-    let [_, alone] = both_sizes(&mesh, &Parallel::SERIAL);
+    let [_, alone] = both_sizes(&mesh, &Control::SERIAL);
     let bytes = (alone.index_bytes, alone.scratch_bytes);
-    let serial = blob(&mesh, &Parallel::SERIAL, bytes).unwrap();
+    let serial = blob(&mesh, &Control::SERIAL, bytes).unwrap();
     for tasks in 1..=9 {
-        let parallel = Parallel { tasks, run: &backward };
+        let parallel = Control { tasks, run: &backward, progress: None };
         let [_, exact] = both_sizes(&mesh, &parallel);
         assert_eq!(exact.scratch_bytes, tasks as usize * alone.scratch_bytes);
         let bytes = (exact.index_bytes, exact.scratch_bytes);
@@ -152,7 +154,7 @@ fn sizes_hold_to_the_byte_with_any_number_of_tasks() {
 fn a_bound_is_enough_for_all_tasks() {
     let mesh = soup(3000);
     for tasks in [1, 2, 7, 64] {
-        let parallel = Parallel { tasks, run: &forward };
+        let parallel = Control { tasks, run: &forward, progress: None };
         let bound = Sizes::bound_parallel(3000, &config(), tasks).unwrap();
         for sizes in both_sizes(&mesh, &parallel) {
             assert!(sizes.index_bytes <= bound.index_bytes);
@@ -166,7 +168,7 @@ fn a_bound_is_enough_for_all_tasks() {
 fn a_loop_that_does_not_run_every_task_once_is_an_error_and_leaves_no_grid() {
     let (positions, indices) = soup(5000);
     let mesh = TriangleMesh::new(&positions, &indices).unwrap();
-    let good = Parallel { tasks: 4, run: &forward };
+    let good = Control { tasks: 4, run: &forward, progress: None };
     let [enough, _] = both_sizes(&(positions.clone(), indices.clone()), &good);
     let [mut index, mut scratch] = regions(enough.index_bytes, enough.scratch_bytes);
     let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
@@ -189,12 +191,12 @@ fn a_loop_that_does_not_run_every_task_once_is_an_error_and_leaves_no_grid() {
                 let call = calls.replace(calls.get() + 1);
                 if call == broken_call { broken(count, task) } else { forward(count, task) }
             };
-            let parallel = Parallel { tasks: 4, run: &run };
-            let built = Grid::build_parallel(mesh, &config(), index, scratch, &parallel);
+            let parallel = Control { tasks: 4, run: &run, progress: None };
+            let built = Grid::build_with(mesh, &config(), index, scratch, &parallel);
             assert_eq!(built.err(), Some(Error::InvalidParallelFor));
             assert_eq!(calls.get(), broken_call + 1);
             assert!(broken_call == 0 || Grid::open(index, mesh).is_err());
-            let again = Grid::build_parallel(mesh, &config(), index, scratch, &good).unwrap();
+            let again = Grid::build_with(mesh, &config(), index, scratch, &good).unwrap();
             assert!(again.blob() == serial);
         }
     }
@@ -207,10 +209,10 @@ fn the_first_bad_triangle_is_named_whatever_the_tasks() {
     positions[3 * 3200] = [f32::INFINITY; 3];
     let strict = Config { flags: BuildFlags::STRICT, ..config() };
     for tasks in [1, 3, 8] {
-        let parallel = Parallel { tasks, run: &backward };
+        let parallel = Control { tasks, run: &backward, progress: None };
         let error = |indices: &[[u32; 3]]| {
             let mesh = TriangleMesh::new(&positions, indices).unwrap();
-            sizes_parallel(&mesh, &strict, &mut [], &parallel).err()
+            sizes_with(&mesh, &strict, &mut [], &parallel).err()
         };
         assert_eq!(error(&indices), Some(Error::NonFiniteTriangle { triangle: 1700 }));
         let vertex = core::mem::replace(&mut indices[900][1], u32::MAX);

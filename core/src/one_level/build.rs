@@ -25,6 +25,7 @@ use crate::aabb::Aabb;
 use crate::blob::Header;
 use crate::cell::{CellRange, Lattice, woo};
 use crate::config::Config;
+use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
@@ -106,8 +107,9 @@ impl<'s> Plan<'s> {
         config: &Config,
         overlay: &impl Overlay,
         scratch: &'s mut [u8],
+        watch: &Watch<'_>,
     ) -> Result<Self, Error> {
-        let survey = Survey::of(mesh, config.flags)?;
+        let survey = Survey::of(mesh, config.flags, watch)?;
         let bounds = Lattice::pad(&survey.bounds);
         let limit = reference_limit(mesh.triangle_count());
 
@@ -119,8 +121,8 @@ impl<'s> Plan<'s> {
             let lattice = Lattice::new(bounds, resolution);
             let spread = MeshSpread { mesh, lattice: &lattice };
             let count = match Layout::new(resolution, 0, 0, 0).scratch(scratch) {
-                Some(Scratch { domain_bits, .. }) => mark(&spread, domain_bits, limit),
-                None => count_references(&spread, limit, |_| {}),
+                Some(Scratch { domain_bits, .. }) => mark(&spread, domain_bits, limit, watch)?,
+                None => count_references(&spread, limit, watch, |_| {})?,
             };
             match count {
                 Some(count) => break (lattice, count),
@@ -128,6 +130,7 @@ impl<'s> Plan<'s> {
             }
         };
 
+        watch.at(0.4)?;
         // Displace the rows: the one number that no pass over the triangles can tell.
         let overlay_words = overlay.words(lattice.resolution);
         let mut layout = Layout::new(lattice.resolution, 0, reference_count, overlay_words);
@@ -170,9 +173,10 @@ pub(crate) fn build<'a>(
     overlay: &impl Overlay,
     index: &'a mut [u8],
     scratch: &mut [u8],
+    watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
     let scratch_bytes = scratch.len() as u64;
-    let plan = Plan::new(mesh, config, overlay, scratch)?;
+    let plan = Plan::new(mesh, config, overlay, scratch, watch)?;
     let Some(rows) = &plan.rows else {
         return Err(Error::OutOfMemory {
             region: Region::Scratch,
@@ -191,7 +195,7 @@ pub(crate) fn build<'a>(
     copy(rows.offsets, sections.row_offsets);
     copy(rows.domain_bits, sections.domain_bits);
     let spread = MeshSpread { mesh, lattice: &plan.lattice };
-    fill(&spread, sections.row_offsets, sections.hash, sections.references);
+    fill(&spread, sections.row_offsets, sections.hash, sections.references, watch)?;
     overlay.fill(plan.lattice.resolution, sections.domain_bits, sections.overlay);
     Ok(blob)
 }

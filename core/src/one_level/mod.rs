@@ -24,6 +24,7 @@ use crate::bits::is_set;
 use crate::blob::{Header, corrupt};
 use crate::cell::Lattice;
 use crate::config::Config;
+use crate::control::Watch;
 use crate::counters::Tally;
 use crate::dda::{Line, Step};
 use crate::error::Error;
@@ -74,7 +75,7 @@ pub(crate) fn sizes(
     overlay: &impl Overlay,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    let plan = Plan::new(mesh, config, overlay, scratch)?;
+    let plan = Plan::new(mesh, config, overlay, scratch, &Watch::none())?;
     Sizes::new(plan.layout.index_bytes(), plan.layout.scratch_bytes(), plan.is_exact())
 }
 

@@ -7,6 +7,8 @@
 use super::{row, slot};
 use crate::bits::set_range;
 use crate::cell::CellRange;
+use crate::control::Watch;
+use crate::error::Error;
 
 /// Primitives with the cells that each belongs into.
 pub(crate) trait Spread {
@@ -21,10 +23,15 @@ pub(crate) trait Spread {
 }
 
 /// Marks the cells that primitives overlap and counts the references, up to a limit.
-pub(crate) fn mark(spread: &impl Spread, domain_bits: &mut [u64], limit: u32) -> Option<u32> {
+pub(crate) fn mark(
+    spread: &impl Spread,
+    domain_bits: &mut [u64],
+    limit: u32,
+    watch: &Watch<'_>,
+) -> Result<Option<u32>, Error> {
     domain_bits.fill(0);
     let [width, height, _] = spread.resolution();
-    count_references(spread, limit, |range| {
+    count_references(spread, limit, watch, |range| {
         let [from, to] = [range.min[0] as usize, range.max[0] as usize];
         for_each_row(height, range, |row| {
             set_range(domain_bits, row * width as usize + from, to - from);
@@ -38,18 +45,20 @@ pub(crate) fn mark(spread: &impl Spread, domain_bits: &mut [u64], limit: u32) ->
 pub(crate) fn count_references(
     spread: &impl Spread,
     limit: u32,
+    watch: &Watch<'_>,
     mut visit: impl FnMut(&CellRange),
-) -> Option<u32> {
+) -> Result<Option<u32>, Error> {
     let mut count = 0;
     for place in 0..spread.count() {
+        watch.step(place, spread.count(), [0.15, 0.4])?;
         let Some((_, range)) = spread.at(place) else { continue };
         count += range.count();
         if count > u64::from(limit) {
-            return None;
+            return Ok(None);
         }
         visit(&range);
     }
-    u32::try_from(count).ok()
+    Ok(u32::try_from(count).ok())
 }
 
 /// Sorts the primitives into the cells' lists: count, sum up, fill in reverse.
@@ -58,12 +67,14 @@ pub(crate) fn fill(
     row_offsets: &[i32],
     hash: &mut [u32],
     references: &mut [u32],
-) {
+    watch: &Watch<'_>,
+) -> Result<(), Error> {
     let [_, height, _] = spread.resolution();
 
     // Count the references of each slot.
     hash.fill(0);
     for place in 0..spread.count() {
+        watch.step(place, spread.count(), [0.5, 0.7])?;
         let Some((_, range)) = spread.at(place) else { continue };
         for_each_slot(height, &range, row_offsets, hash, |count| *count += 1);
     }
@@ -77,6 +88,7 @@ pub(crate) fn fill(
 
     // Put every primitive before the end of its lists, the last one first: lists ascend by id.
     for place in (0..spread.count()).rev() {
+        watch.step(spread.count() - place, spread.count(), [0.7, 1.0])?;
         let Some((id, range)) = spread.at(place) else { continue };
         for_each_slot(height, &range, row_offsets, hash, |end| {
             *end = end.wrapping_sub(1);
@@ -85,6 +97,7 @@ pub(crate) fn fill(
             }
         });
     }
+    Ok(())
 }
 
 /// Shows `visit` the rows that a range of cells touches.

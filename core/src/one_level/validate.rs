@@ -19,6 +19,7 @@ use crate::aabb::Aabb;
 use crate::bits::{WORD_BITS, each_one, extent};
 use crate::blob::{Header, corrupt};
 use crate::cell::{Lattice, woo};
+use crate::control::Watch;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 
@@ -44,8 +45,12 @@ impl OneLevel<'_> {
         let sections = &self.sections;
 
         check_header(header, lattice, mesh)?;
-        let expected =
-            count_references(&MeshSpread { mesh, lattice }, header.reference_count, |_| {});
+        let expected = count_references(
+            &MeshSpread { mesh, lattice },
+            header.reference_count,
+            &Watch::none(),
+            |_| {},
+        )?;
         if expected != Some(header.reference_count) {
             return Err(corrupt(core::mem::offset_of!(Header, reference_count)));
         }

@@ -23,6 +23,7 @@ use crate::blob::{HEADER_BYTES, Header};
 use crate::bump::{Bump, GRID, finish};
 use crate::cell::{CellRange, Lattice, as_f32, cells_between, whole};
 use crate::config::Config;
+use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{copy, reference_limit, row};
@@ -74,10 +75,10 @@ pub(crate) fn sizes(
 ) -> Result<Sizes, Error> {
     let (index_bytes, scratch_bytes) = bound(mesh.triangle_count(), config);
     if (scratch.len() as u64) < scratch_bytes {
-        Root::of(mesh, config)?;
+        Root::of(mesh, config, &Watch::none())?;
         return Sizes::new(index_bytes, scratch_bytes, false);
     }
-    Sizes::new(run(mesh, config, &mut [], scratch)?.blob_bytes, scratch_bytes, true)
+    Sizes::new(run(mesh, config, &mut [], scratch, &Watch::none())?.blob_bytes, scratch_bytes, true)
 }
 
 /// Builds into `index` and returns the part of it that is the blob.
@@ -86,8 +87,9 @@ pub(crate) fn build<'a>(
     config: &Config,
     index: &'a mut [u8],
     scratch: &mut [u8],
+    watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    let header = run(mesh, config, index, scratch)?;
+    let header = run(mesh, config, index, scratch, watch)?;
     finish(index, header)
 }
 
@@ -101,8 +103,8 @@ struct Root {
 }
 
 impl Root {
-    fn of(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Self, Error> {
-        let survey = Survey::of(mesh, config.flags)?;
+    fn of(mesh: &TriangleMesh<'_>, config: &Config, watch: &Watch<'_>) -> Result<Self, Error> {
+        let survey = Survey::of(mesh, config.flags, watch)?;
         let bounds = Lattice::pad(&survey.bounds);
         let size = bounds.size().to_array().map(f64::from);
         let limit = u64::from(reference_limit(mesh.triangle_count()));
@@ -141,8 +143,9 @@ fn run(
     config: &Config,
     index: &mut [u8],
     scratch: &mut [u8],
+    watch: &Watch<'_>,
 ) -> Result<Header, Error> {
-    let Root { survey, lattice, density, rule } = Root::of(mesh, config)?;
+    let Root { survey, lattice, density, rule } = Root::of(mesh, config, watch)?;
     let available_bytes = scratch.len() as u64;
     let needed_bytes = scratch_bytes(mesh.triangle_count(), config);
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
@@ -152,7 +155,7 @@ fn run(
     let (scratch, _) = split_mut::<u32>(scratch, needed_bytes / 4).ok_or(too_small)?;
 
     let pool = index.get_mut(HEADER_BYTES..).unwrap_or_default();
-    let mut builder = Builder { mesh, lattice: &lattice, rule, pool: Bump::over(pool) };
+    let mut builder = Builder { mesh, lattice: &lattice, rule, pool: Bump::over(pool), watch };
 
     let finite = usize::try_from(survey.finite_count).unwrap_or(usize::MAX);
     let (ids, scratch) = scratch.split_at_mut_checked(finite).ok_or(too_small)?;
@@ -285,6 +288,7 @@ struct Builder<'m, 'p> {
     lattice: &'m Lattice,
     rule: Rule,
     pool: Bump<'p>,
+    watch: &'m Watch<'m>,
 }
 
 impl Builder<'_, '_> {
@@ -380,7 +384,11 @@ impl Builder<'_, '_> {
             }
         };
         let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
+        let cells = u32::try_from(node.cells()).unwrap_or(u32::MAX);
         for (number, cell) in all.cells().enumerate() {
+            if depth == 0 {
+                self.watch.between(u32::try_from(number).unwrap_or(cells), cells, [0.2, 1.0])?;
+            }
             let ends = starts.get(number..).and_then(|ends| ends.first_chunk::<2>());
             let list = ends.and_then(|ends| lists.get(ends[0] as usize..ends[1] as usize));
             let list = list.unwrap_or_default();

@@ -20,6 +20,7 @@ use crate::blob::Header;
 use crate::bump::{Bump, GRID, finish};
 use crate::cell::{CellRange, Lattice};
 use crate::config::Config;
+use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{
@@ -133,9 +134,9 @@ pub(crate) fn sizes(
     config: &Config,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    let plan = TopPlan::new(mesh, config, scratch)?;
+    let plan = TopPlan::new(mesh, config, scratch, &Watch::none())?;
     let (top, scratch_bytes) = (plan.top.layout, plan.scratch_bytes);
-    match run(mesh, config, plan, &mut []) {
+    match run(mesh, config, plan, &mut [], &Watch::none()) {
         Ok(header) => Sizes::new(header.blob_bytes, scratch_bytes, true),
         Err(Error::OutOfMemory { region: Region::Scratch, .. }) => {
             let pool_words = pool_words(top.reference_count, config);
@@ -152,9 +153,10 @@ pub(crate) fn build<'a>(
     config: &Config,
     index: &'a mut [u8],
     scratch: &mut [u8],
+    watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    let plan = TopPlan::new(mesh, config, scratch)?;
-    let header = run(mesh, config, plan, index)?;
+    let plan = TopPlan::new(mesh, config, scratch, watch)?;
+    let header = run(mesh, config, plan, index, watch)?;
     finish(index, header)
 }
 
@@ -167,9 +169,14 @@ struct TopPlan<'s> {
 }
 
 impl<'s> TopPlan<'s> {
-    fn new(mesh: &TriangleMesh<'_>, config: &Config, scratch: &'s mut [u8]) -> Result<Self, Error> {
+    fn new(
+        mesh: &TriangleMesh<'_>,
+        config: &Config,
+        scratch: &'s mut [u8],
+        watch: &Watch<'_>,
+    ) -> Result<Self, Error> {
         let available_bytes = scratch.len() as u64;
-        let top = Plan::new(mesh, config, &(), scratch)?;
+        let top = Plan::new(mesh, config, &(), scratch, watch)?;
         // Slots note their cell's number in a word.
         if top.layout.cells >= u64::from(NOBODY) {
             return Err(Error::InvalidConfig(ConfigField::Density));
@@ -185,6 +192,7 @@ fn run(
     config: &Config,
     plan: TopPlan<'_>,
     index: &mut [u8],
+    watch: &Watch<'_>,
 ) -> Result<Header, Error> {
     let TopPlan { top: mut plan, scratch_bytes: needed_bytes, available_bytes } = plan;
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
@@ -193,7 +201,8 @@ fn run(
     // Sort the triangles into the lists of the top, and find the longest.
     let lists = Lists::new(&plan.layout, rest).ok_or(too_small)?;
     let Lists { hash, references, owners, rest } = lists;
-    fill(&MeshSpread { mesh, lattice: &plan.lattice }, offsets, hash, references);
+    fill(&MeshSpread { mesh, lattice: &plan.lattice }, offsets, hash, references, &Watch::none())?;
+    watch.at(0.5)?;
     let longest = hash.windows(2).map(|ends| ends[1].wrapping_sub(ends[0])).max().unwrap_or(0);
     let bench = Layout::bound(longest, plan.density, 0).scratch(rest).ok_or(too_small)?;
     let mut bench = Bench {
@@ -227,7 +236,9 @@ fn run(
         &[start, end] => references.get(start as usize..end as usize).unwrap_or_default(),
         _ => &[],
     });
+    let slot_count = plan.layout.hash_count;
     for (slot, (ids, &owner)) in lists.zip(&*owners).enumerate() {
+        watch.step(u32::try_from(slot).unwrap_or(u32::MAX), slot_count, [0.5, 1.0])?;
         let start = pool.offset()?;
         let cell = cell_of(owner, plan.lattice.resolution);
         let spread = CellSpread { mesh, lattice: &plan.lattice, cell, ids, frame: Frame::WHOLE };
@@ -291,8 +302,7 @@ impl CellSpread<'_> {
         for (to, from) in sections.domain_bits.iter_mut().zip(halves) {
             *to = from;
         }
-        fill(&self, rows, sections.hash, sections.references);
-        true
+        fill(&self, rows, sections.hash, sections.references, &Watch::none()).is_ok()
     }
 
     /// Plans a subgrid: its frame, and its rows on the bench.
@@ -312,7 +322,8 @@ impl CellSpread<'_> {
             }
             let cells = self.frame.cells();
             let domain_bits = bench.domain_bits.get_mut(..cells.div_ceil(WORD_BITS))?;
-            if let Some(references) = mark(self, domain_bits, reference_limit(count)) {
+            let references = mark(self, domain_bits, reference_limit(count), &Watch::none());
+            if let Some(references) = references.ok()? {
                 break (cells, references);
             }
         };

@@ -1,0 +1,148 @@
+//! What a build asks of its caller on the way: threads, and whether to go on.
+
+use core::cell::Cell;
+use core::fmt;
+
+use crate::error::Error;
+use crate::tasks::Task;
+
+/// How a build is run: by the caller's threads, under the caller's eyes. `Control::default()` is one
+/// task after the other, and silence.
+///
+/// The grid does not depend on it, to the bit.
+///
+/// ```
+/// use hgrid_core::{Block, Config, Control, Grid, Method, TriangleMesh, sizes_with};
+/// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+/// let config = Config::new(Method::Brick);
+///
+/// let run = |count: u32, task: &(dyn Fn(u32) + Sync)| {
+///     std::thread::scope(|scope| {
+///         for index in 0..count {
+///             scope.spawn(move || task(index));
+///         }
+///     });
+/// };
+/// let progress = |done: f32| {
+///     eprint!("\r{:3.0} %", 100.0 * done);
+///     true
+/// };
+/// let control = Control { tasks: 4, run: &run, progress: Some(&progress) };
+/// let sizes = sizes_with(&mesh, &config, &mut [], &control)?;
+/// let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+/// let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+/// let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+/// let grid = Grid::build_with(mesh, &config, index, scratch, &control)?;
+/// assert_eq!(grid.mesh().triangle_count(), 1);
+/// # Ok::<(), hgrid_core::Error>(())
+/// ```
+#[derive(Clone, Copy)]
+pub struct Control<'c> {
+    /// The most tasks that run at once, from 1 to [`MAX_TASKS`](Self::MAX_TASKS): what is outside
+    /// counts as the nearest of both. Each takes scratch of its own.
+    pub tasks: u32,
+    /// Calls the task with every number below the count exactly once, in any order, and returns when
+    /// all calls have returned. It is called several times in a build, with counts up to
+    /// [`tasks`](Self::tasks).
+    ///
+    /// On targets without atomic operations it is never called.
+    pub run: &'c dyn for<'t> Fn(u32, &'t Task<'t>),
+    /// Told how much of a build is done, from 0 to 1, and answers whether to go on. It is called on the
+    /// thread that builds; what is done grows from call to call, and with the last call of a build
+    /// that succeeds it is exactly 1, whatever the answer to that. After the answer `false` the build
+    /// ends with [`Error::Cancelled`], at the latest when a pass over the mesh is over.
+    ///
+    /// Questions for sizes do not call it.
+    pub progress: Option<&'c dyn Fn(f32) -> bool>,
+}
+
+impl fmt::Debug for Control<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Control")
+            .field("tasks", &self.tasks)
+            .field("progress", &self.progress.is_some())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Default for Control<'_> {
+    fn default() -> Self {
+        Self::SERIAL
+    }
+}
+
+impl Control<'_> {
+    /// The most tasks at once.
+    pub const MAX_TASKS: u32 = 64;
+
+    /// One task after the other, and silence.
+    pub(crate) const SERIAL: Control<'static> = Control {
+        tasks: 1,
+        run: &|count, task| {
+            for index in 0..count {
+                task(index);
+            }
+        },
+        progress: None,
+    };
+}
+
+/// Of so little nobody is told.
+const LEAST: f32 = 1.0 / 256.0;
+
+/// How far a build is, and who wants to know.
+pub(crate) struct Watch<'c> {
+    progress: Option<&'c dyn Fn(f32) -> bool>,
+    done: Cell<f32>,
+}
+
+impl<'c> Watch<'c> {
+    /// Nobody wants to know.
+    pub(crate) const fn none() -> Self {
+        Self { progress: None, done: Cell::new(f32::NEG_INFINITY) }
+    }
+
+    pub(crate) const fn new(control: &Control<'c>) -> Self {
+        Self { progress: control.progress, done: Cell::new(f32::NEG_INFINITY) }
+    }
+
+    /// Tells that this much is done; an error if the caller does not want the rest.
+    pub(crate) fn at(&self, done: f32) -> Result<(), Error> {
+        let Some(progress) = self.progress else { return Ok(()) };
+        // Not for nothing; and where a build starts anew, with coarser cells say, it does not go back.
+        if done >= self.done.get() + LEAST {
+            self.done.set(done);
+            if !progress(done) {
+                return Err(Error::Cancelled);
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells now and then how much of a part of the build is done, given the place in a loop.
+    #[inline(always)]
+    pub(crate) fn step(&self, place: u32, count: u32, [from, to]: [f32; 2]) -> Result<(), Error> {
+        /// A millisecond or two.
+        const OFTEN: u32 = 1 << 16;
+        if place.is_multiple_of(OFTEN) { self.between(place, count, [from, to]) } else { Ok(()) }
+    }
+
+    /// Tells how much of a part of the build is done.
+    #[expect(clippy::cast_precision_loss, reason = "a share")]
+    pub(crate) fn between(
+        &self,
+        place: u32,
+        count: u32,
+        [from, to]: [f32; 2],
+    ) -> Result<(), Error> {
+        self.at(from + (to - from) * (place as f32 / count.max(1) as f32))
+    }
+
+    /// Tells that all is done.
+    pub(crate) fn end(&self) {
+        if let Some(progress) = self.progress {
+            progress(1.0);
+        }
+    }
+}

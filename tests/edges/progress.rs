@@ -1,0 +1,67 @@
+//! Builds that are watched: what is done grows to exactly 1, and whoever has enough may say so.
+
+use std::cell::{Cell, RefCell};
+
+use hgrid_core::{Block, Config, Control, Error, Grid, Sizes, sizes};
+use hgrid_tests::meshes::{Mesh, ball, one_triangle};
+use hgrid_tests::methods::configs;
+
+/// Memory for a grid, at a multiple of 64.
+fn region(bytes: usize) -> Vec<Block> {
+    vec![Block::ZERO; Block::count_for(bytes)]
+}
+
+/// Calls `visit` with memory for each method.
+fn each(mesh: &Mesh, mut visit: impl FnMut(&Config, &mut [Block], &mut [Block])) {
+    for config in configs() {
+        let Sizes { index_bytes, scratch_bytes, .. } =
+            sizes(&mesh.view(), &config, &mut []).unwrap();
+        visit(&config, &mut region(index_bytes), &mut region(scratch_bytes));
+    }
+}
+
+#[test]
+fn what_is_done_grows_to_exactly_one() {
+    for mesh in [Mesh::default(), one_triangle(), ball(40, 1.0)] {
+        each(&mesh, |config, index, scratch| {
+            let seen = RefCell::new(Vec::new());
+            let progress = |done: f32| {
+                seen.borrow_mut().push(done);
+                true
+            };
+            let control = Control { progress: Some(&progress), ..Control::default() };
+            let (index, scratch) = (Block::bytes_mut(index), Block::bytes_mut(scratch));
+            Grid::build_with(mesh.view(), config, index, scratch, &control).unwrap();
+            let seen = seen.into_inner();
+            assert_eq!((seen[0], seen[seen.len() - 1]), (0.0, 1.0), "{config:?}");
+            assert!(seen.windows(2).all(|pair| pair[0] < pair[1] || pair == [1.0; 2]), "{seen:?}");
+        });
+    }
+}
+
+#[test]
+fn a_build_can_be_cancelled_at_any_call_and_begun_again() {
+    let mesh = ball(20, 1.0);
+    each(&mesh, |config, index, scratch| {
+        let build = |index: &mut [_], scratch: &mut [_], enough: u32| {
+            let calls = Cell::new(0);
+            let progress = |done: f32| {
+                assert!(calls.get() <= enough, "called again after it had enough");
+                calls.set(calls.get() + 1);
+                // The answer to the last call means nothing.
+                calls.get() <= enough && done < 1.0
+            };
+            let control = Control { progress: Some(&progress), ..Control::default() };
+            let (index, scratch) = (Block::bytes_mut(index), Block::bytes_mut(scratch));
+            let built = Grid::build_with(mesh.view(), config, index, scratch, &control);
+            (built.map(|grid| grid.blob().to_vec()), calls.get())
+        };
+        let (expected, calls) = build(index, scratch, u32::MAX);
+        let expected = expected.unwrap();
+        assert!(calls > 3, "{config:?}: {calls} calls");
+        for enough in (0..calls - 1).step_by((calls / 8).max(1) as usize) {
+            assert_eq!(build(index, scratch, enough).0, Err(Error::Cancelled), "{config:?}");
+        }
+        assert_eq!(build(index, scratch, u32::MAX).0.unwrap(), expected, "{config:?}");
+    });
+}
