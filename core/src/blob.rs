@@ -21,6 +21,7 @@ use crate::cell::{Lattice, MAX_RESOLUTION};
 use crate::config::{BuildFlags, Config, Method};
 use crate::control::Watch;
 use crate::error::{Error, Region};
+use crate::hash::Hash;
 use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
 
@@ -69,9 +70,22 @@ pub(crate) struct Header {
     pub(crate) depth: u32,
     /// The width of a cell in triangles; 0 for a method that has a density instead.
     pub(crate) cell_size: f32,
-    reserved: [u32; 4],
+    /// Whether the mesh lies behind the grid: see [`HasMesh`].
+    mesh: u32,
+    reserved: [u32; 3],
     /// Over all bytes before it: a header is what a build wrote, or `open` refuses it.
     checksum: u32,
+}
+
+/// What lies behind a grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum HasMesh {
+    /// Nothing: the caller has the mesh.
+    No = 0,
+    /// Its mesh.
+    Yes = 1,
+    /// Its mesh and the masks of the triangles.
+    WithMasks = 2,
 }
 
 const _: () = assert!(HEADER_BYTES == 128 && HEADER_BYTES.is_multiple_of(ALIGNMENT));
@@ -107,13 +121,15 @@ impl Header {
         bytemuck::cast(self)
     }
 
-    /// FNV-1a over the words before the checksum, and a finisher so that every bit counts.
+    /// A hash of the words before the checksum.
     fn sum(&self) -> u32 {
         let words: [u32; HEADER_BYTES / size_of::<u32>()] = bytemuck::cast(*self);
         let (_, words) = words.split_last().unwrap_or((&0, &[]));
-        let step = |sum: u64, &word: &u32| (sum ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
-        let sum = words.iter().fold(0xcbf2_9ce4_8422_2325, step);
-        let [low, high] = halves(sum ^ (sum >> 29));
+        let mut sum = Hash::new();
+        for &word in words {
+            sum.add(word);
+        }
+        let [low, high] = halves(sum.finish());
         low ^ high
     }
 
@@ -121,6 +137,23 @@ impl Header {
     /// for a mesh of this size, and it is all there.
     pub(crate) fn read(bytes: &[u8], mesh: &TriangleMesh<'_>) -> Result<Self, Error> {
         arena::check_alignment(bytes, Region::Index)?;
+        let header = Self::peek(bytes)?;
+        if header.blob_bytes > bytes.len() as u64 {
+            return Err(Error::Truncated {
+                needed_bytes: header.blob_bytes,
+                available_bytes: bytes.len() as u64,
+            });
+        }
+        if header.triangle_count != mesh.triangle_count()
+            || header.vertex_count != mesh.vertex_count() as u64
+        {
+            return Err(Error::MeshMismatch);
+        }
+        Ok(header)
+    }
+
+    /// Reads the header of foreign bytes, of which there may be no more.
+    pub(crate) fn peek(bytes: &[u8]) -> Result<Self, Error> {
         let Some(head) = bytes.get(..HEADER_BYTES) else {
             return Err(if bytes.starts_with(&MAGIC) {
                 Error::Truncated {
@@ -147,18 +180,22 @@ impl Header {
         if header.checksum != header.sum() {
             return Err(corrupt(core::mem::offset_of!(Self, checksum)));
         }
-        if header.blob_bytes > bytes.len() as u64 {
-            return Err(Error::Truncated {
-                needed_bytes: header.blob_bytes,
-                available_bytes: bytes.len() as u64,
-            });
-        }
-        if header.triangle_count != mesh.triangle_count()
-            || header.vertex_count != mesh.vertex_count() as u64
-        {
-            return Err(Error::MeshMismatch);
-        }
         Ok(header)
+    }
+
+    /// Whether the mesh lies behind the grid.
+    pub(crate) fn has_mesh(&self) -> Result<HasMesh, Error> {
+        match self.mesh {
+            0 => Ok(HasMesh::No),
+            1 => Ok(HasMesh::Yes),
+            2 => Ok(HasMesh::WithMasks),
+            _ => Err(corrupt(core::mem::offset_of!(Self, mesh))),
+        }
+    }
+
+    /// The same header for a blob with a mesh.
+    pub(crate) const fn packed(self, mesh: HasMesh) -> Self {
+        Self { mesh: mesh as u32, ..self }
     }
 
     /// The lattice, if box and resolution can be one.
@@ -225,7 +262,7 @@ impl Header {
             && (method.has_depth() || self.depth == 0)
             && (method.has_cell_size() || self.cell_size.to_bits() == 0)
             && (method.has_density() || self.density.to_bits() == 0)
-            && self.reserved == [0; 4]
+            && self.reserved == [0; 3]
     }
 }
 

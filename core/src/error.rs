@@ -110,6 +110,8 @@ pub enum Error {
         /// Bytes that the caller brought.
         available_bytes: u64,
     },
+    /// The blob holds a grid and no mesh: bring the mesh it was built for.
+    NoMesh,
     /// The grid was built for a mesh with other triangle or vertex counts.
     MeshMismatch,
     /// The grid contradicts itself or its mesh.
@@ -193,6 +195,7 @@ impl fmt::Display for Error {
             Self::Truncated { needed_bytes, available_bytes } => {
                 write!(f, "the grid has {needed_bytes} bytes, of which {available_bytes} are here")
             }
+            Self::NoMesh => f.write_str("the blob holds a grid and no mesh: bring its mesh"),
             Self::MeshMismatch => f.write_str("the grid was built for another mesh"),
             Self::Corrupt { offset } => write!(f, "the grid is damaged at byte {offset}"),
         }

@@ -1,5 +1,8 @@
 //! The view that queries run on: a blob bound to its mesh, whichever method built it.
 
+use glam::Vec3A;
+
+use crate::aabb::Aabb;
 use crate::approach::Approach;
 use crate::arena::check_alignment;
 use crate::blob::{Header, corrupt};
@@ -20,6 +23,7 @@ use crate::search::{Any, Closest, Outcome, Search};
 use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
 use crate::triangle::TriangleTest;
 use crate::variable::{self, Variable};
+use crate::visit::Visitor;
 
 /// A built grid and the mesh it was built for, ready for queries.
 ///
@@ -235,6 +239,25 @@ impl<'a> Grid<'a> {
             Structure::Recursive(grid) => grid.traverse(&line, tally, leaf),
             Structure::Brick(_) => {}
         }
+    }
+
+    /// Shows the lists of all cells that a box meets, and perhaps some others.
+    pub(crate) fn visit(&self, bounds: &Aabb, leaf: &mut dyn FnMut(&[u32])) {
+        // What lies outside belongs to the cells at the border.
+        let reach = self.lattice.reach(bounds);
+        let visitor = &mut Visitor::new(self.list_words(), leaf);
+        match &self.structure {
+            Structure::OneLevel(grid) => grid.visit(&reach, visitor),
+            Structure::Fixed(grid) => grid.visit(&reach, visitor),
+            Structure::Variable(grid) => grid.visit(&reach, visitor),
+            Structure::Recursive(grid) => grid.visit(&reach, visitor),
+            Structure::Brick(grid) => grid.visit(&reach, visitor),
+        };
+    }
+
+    /// The extent of a cell on each axis.
+    pub(crate) fn cell_size(&self) -> Vec3A {
+        self.lattice.cell_size()
     }
 
     /// Traces neighbouring rays together where the structure can; tells whether it does. `answer` gets

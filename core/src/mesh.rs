@@ -175,6 +175,22 @@ impl<'a> TriangleMesh<'a> {
         self.corners(triangle, |x, y, z| [x, y, z])
     }
 
+    /// Whether triangles have masks of their own.
+    pub(crate) const fn has_masks(&self) -> bool {
+        self.masks.count > 0
+    }
+
+    /// The bytes of every vertex.
+    pub(crate) fn each_vertex(&self, mut visit: impl FnMut(&[u8; 12])) {
+        (0..self.positions.count).filter_map(|at| self.positions.element(at)).for_each(&mut visit);
+    }
+
+    /// The vertices of a triangle.
+    #[expect(clippy::cast_possible_truncation, reason = "they were 32 bits or less")]
+    pub(crate) fn indices(&self, triangle: u32) -> Option<[u32; 3]> {
+        Some(self.vertices_of(triangle)?.map(|vertex| vertex as u32))
+    }
+
     /// The corners of a triangle as any type: an array that becomes a vector costs a detour
     /// through memory.
     #[inline(always)]

@@ -137,3 +137,44 @@ pub fn sizes_with(
         Method::Brick => brick::sizes(mesh, config, scratch, control),
     }
 }
+
+/// The finest grid of a method that fits into so many bytes of index: a configuration that is the given
+/// one, or has a lower density (larger cells for [`Method::Brick`]), by no more than a step too much.
+///
+/// A step is a factor of the square root of 2 in the number of cells. The time is that of
+/// [`sizes`] for each step. `scratch` is for [`sizes`], too: without, a configuration must fit by its bound,
+/// so that the grid gets coarser than it had to be.
+///
+/// # Errors
+/// [`Error::OutOfMemory`] with the bytes that the coarsest grid needs; those of [`sizes`].
+///
+/// ```
+/// use hgrid_core::{Config, TriangleMesh, fit};
+/// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+/// let config = fit(&mesh, &Config::default(), 10_000, &mut [])?;
+/// assert_eq!(config, Config::default());
+/// # Ok::<(), hgrid_core::Error>(())
+/// ```
+pub fn fit(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index_bytes: usize,
+    scratch: &mut [u8],
+) -> Result<Config, Error> {
+    /// From many cells for each triangle to one cell for all of them.
+    const STEPS: u32 = 80;
+    let mut config = *config;
+    let mut least = usize::MAX;
+    for _ in 0..STEPS {
+        let needed_bytes = sizes(mesh, &config, scratch)?.index_bytes;
+        if needed_bytes <= index_bytes {
+            return Ok(config);
+        }
+        least = least.min(needed_bytes);
+        config.density *= core::f32::consts::FRAC_1_SQRT_2;
+        config.cell_size *= 1.122_462; // 2^(1/6)
+    }
+    let (needed_bytes, available_bytes) = (least as u64, index_bytes as u64);
+    Err(Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes })
+}

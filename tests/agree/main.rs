@@ -1,6 +1,7 @@
 //! Does every query agree with brute force, at the boundaries above all?
 
 mod batches;
+mod closest;
 mod exact;
 mod forms;
 mod scans;

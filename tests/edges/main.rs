@@ -4,6 +4,7 @@ mod blobs;
 mod bricks;
 mod chunks;
 mod inputs;
+mod packed;
 mod progress;
 mod rays;
 mod shapes;

@@ -7,7 +7,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use hgrid_core::{Config, Counters, Method, QueryOptions};
+use hgrid_core::{Config, Counters, Method, QueryOptions, Statistics};
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_lab::scene::Scene;
 use hgrid_tests::meshes::{Mesh, ball, soup};
@@ -34,10 +34,11 @@ fn line(name: &str, mesh: &Mesh, method: Method) -> String {
         })
         .count();
     let Counters { primitive_tests, cell_steps, grid_steps } = counters;
+    let Statistics { longest_list, content_hash, .. } = grid.inspect();
     let [x, y, z] = grid.resolution();
     let resolution = format!("{x}x{y}x{z}");
     format!(
-        "{name:8} {:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6}",
+        "{name:8} {:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6} {longest_list:>7} {content_hash:016x}",
         method.name(),
         grid.blob_bytes(),
     )
@@ -51,8 +52,9 @@ fn work_is_what_it_was() {
         ("ball", ball(16, 1.0)),
         ("soup", soup(3000, 0.05, 1)),
     ];
-    let mut table =
-        String::from("scene    method     resolution    bytes  hits   tests   steps  grids\n");
+    let mut table = String::from(
+        "scene    method     resolution    bytes  hits   tests   steps  grids longest content\n",
+    );
     for (name, mesh) in &scenes {
         for &method in Method::ALL {
             writeln!(table, "{}", line(name, mesh, method)).unwrap();

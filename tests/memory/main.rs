@@ -1,6 +1,8 @@
 //! Is the memory exactly what was said: enough at the answer, refused with the need below it, and
 //! nothing touched beside it?
 
+mod budget;
+
 use hgrid_core::{Block, Config, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::methods;

@@ -35,14 +35,17 @@ mod validate;
 mod walk;
 
 use fearless_simd::Simd;
+use glam::Vec3A;
 
+use crate::aabb::Aabb;
 use crate::arena::split;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
-use crate::cell::Lattice;
+use crate::cell::{CellRange, Lattice, as_f32, cells_between};
 use crate::error::Error;
 use crate::mesh::{Strided, TriangleMesh};
 use crate::ray::Hit;
 use crate::simd::Kernel;
+use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
 use bundle::RAYS;
 use layout::{Block, Layout};
@@ -85,6 +88,26 @@ impl<'a> Brick<'a> {
         let block = *self.blocks.get((x + self.width[0] * (y + self.width[1] * z)) as usize)?;
         let words = self.pool.get(block.base as usize..)?;
         Some(Chunk { words, bricks: 0, mask: layout::mask(block.mask), list: block.list })
+    }
+
+    /// Shows the lists of all cells that a box meets, and of the bricks and blocks around them, given
+    /// in cells; `false` if that was enough.
+    pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
+        let range = cells_between(*reach, self.last.map(|last| last + 1));
+        let blocks = CellRange {
+            min: range.min.map(|cell| cell / layout::BLOCK),
+            max: range.max.map(|cell| cell / layout::BLOCK),
+        };
+        visitor.list(self.large())
+            && blocks.cells().all(|block| {
+                let Some(chunk) = self.block(block) else { return true };
+                let corner = block.map(|at| as_f32(at * layout::BLOCK));
+                let reach = Aabb {
+                    min: reach.min - Vec3A::from_array(corner),
+                    max: reach.max - Vec3A::from_array(corner),
+                };
+                chunk.visit(&reach, layout::BLOCK, 2, visitor)
+            })
     }
 
     /// The primitives that are in no block.
@@ -156,6 +179,59 @@ impl<'a> Chunk<'a> {
     #[inline(always)]
     fn list(&self) -> Option<&'a [u32]> {
         list(self.words, self.list)
+    }
+
+    /// Shows the lists of all cells that a box meets, given in cells of the chunk, of which it has some
+    /// on each axis and which may be divided so often.
+    fn visit(&self, reach: &Aabb, cells: u32, depth: u32, visitor: &mut Visitor<'_>) -> bool {
+        let range = cells_between(*reach, [cells; 3]);
+        let bricks = CellRange {
+            min: range.min.map(|cell| cell >> 2),
+            max: range.max.map(|cell| cell >> 2),
+        };
+        self.list().is_none_or(|ids| visitor.list(ids))
+            && bricks.cells().all(|at| {
+                let corner = at.map(|at| at << 2);
+                let bit = layout::number(corner) >> 6;
+                if self.mask >> bit & 1 == 0 {
+                    return true;
+                }
+                let Some(brick) = self.brick(bit) else { return true };
+                let inside = CellRange {
+                    min: core::array::from_fn(|axis| range.min[axis].max(corner[axis])),
+                    max: core::array::from_fn(|axis| range.max[axis].min(corner[axis] + 3)),
+                };
+                visitor.spend(1)
+                    && list(self.words, brick.list).is_none_or(|ids| visitor.list(ids))
+                    && inside
+                        .cells()
+                        .all(|cell| self.visit_cell(&brick, cell, reach, depth, visitor))
+            })
+    }
+
+    /// Shows what lists a cell has.
+    fn visit_cell(
+        &self,
+        brick: &layout::Brick,
+        cell: [u32; 3],
+        reach: &Aabb,
+        depth: u32,
+        visitor: &mut Visitor<'_>,
+    ) -> bool {
+        let bit = layout::number(cell.map(|cell| cell & 3));
+        if layout::mask(brick.mask) >> bit & 1 == 0 {
+            return true;
+        }
+        match self.content(brick, bit) {
+            Some(Content::List(ids)) => visitor.list(ids),
+            Some(Content::Chunk(chunk, cells)) if depth > 0 && visitor.spend(1) => {
+                let corner = Vec3A::from_array(cell.map(as_f32));
+                let within = |position: Vec3A| (position - corner) * as_f32(cells);
+                let reach = Aabb { min: within(reach.min), max: within(reach.max) };
+                chunk.visit(&reach, cells, depth - 1, visitor)
+            }
+            _ => true,
+        }
     }
 
     /// A brick that the mask has.

@@ -14,6 +14,7 @@
 mod levels;
 mod validate;
 
+use crate::aabb::Aabb;
 use crate::blob::{Header, corrupt};
 use crate::cell::{Lattice, as_f32};
 use crate::config::Config;
@@ -21,6 +22,7 @@ use crate::counters::Tally;
 use crate::dda::{Line, Step};
 use crate::error::Error;
 use crate::one_level::{self, OneLevel, Overlay};
+use crate::visit::Visitor;
 use levels::{Levels, MAX_LEVELS};
 
 /// The macrocell levels as the overlay of a one-level grid.
@@ -80,6 +82,11 @@ impl<'a> Fixed<'a> {
     /// No ray is shown more primitives than this.
     pub(crate) const fn list_words(&self) -> usize {
         self.cells.lists().len()
+    }
+
+    /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.
+    pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
+        self.cells.visit(reach, visitor)
     }
 
     /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any; see

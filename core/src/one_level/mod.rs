@@ -20,9 +20,10 @@ mod layout;
 mod spread;
 mod validate;
 
-use crate::bits::is_set;
+use crate::aabb::Aabb;
+use crate::bits::{each_one, is_set};
 use crate::blob::{Header, corrupt};
-use crate::cell::Lattice;
+use crate::cell::{Lattice, cells_between};
 use crate::config::Config;
 use crate::control::Watch;
 use crate::counters::Tally;
@@ -30,6 +31,7 @@ use crate::dda::{Line, Step};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::sizes::Sizes;
+use crate::visit::Visitor;
 pub(crate) use build::{MeshSpread, Overlay, Plan, Rows, build, copy, reference_limit};
 pub(crate) use displacement::displace;
 use layout::Sections;
@@ -142,6 +144,38 @@ impl<'a> OneLevel<'a> {
         let row = row(self.last[1] + 1, y, z);
         let slot = slot(*self.sections.row_offsets.get(row)?, x)?;
         self.sections.hash.get(slot..)?.first_chunk().copied()
+    }
+
+    /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.
+    pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
+        self.each_marked(reach, |cell| self.references(cell).is_none_or(|ids| visitor.list(ids)))
+    }
+
+    /// Shows the cells with primitives that a box meets, given in cells, until that is enough.
+    pub(crate) fn each_marked(
+        &self,
+        reach: &Aabb,
+        mut visit: impl FnMut([u32; 3]) -> bool,
+    ) -> bool {
+        let [width, height, _] = self.last.map(|last| last + 1);
+        let range = cells_between(*reach, self.last.map(|last| last + 1));
+        let [first, last] = [range.min[0], range.max[0]];
+        for z in range.min[2]..=range.max[2] {
+            for y in range.min[1]..=range.max[1] {
+                let bit = row(height, y, z) * width as usize + first as usize;
+                let count = (last - first) as usize + 1;
+                let mut goes_on = true;
+                each_one(self.sections.domain_bits, bit, count, |x| {
+                    let x = first + u32::try_from(x).unwrap_or(0);
+                    goes_on = visit([x, y, z]);
+                    goes_on
+                });
+                if !goes_on {
+                    return false;
+                }
+            }
+        }
+        true
     }
 
     /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any.

@@ -21,7 +21,7 @@ use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split_mut};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::bump::{Bump, GRID, finish};
-use crate::cell::{CellRange, Lattice, as_f32, cells_between, whole};
+use crate::cell::{CellRange, Lattice, as_f32, whole};
 use crate::config::Config;
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
@@ -262,9 +262,7 @@ impl Placed {
         let (origin, scale) = (Vec3A::from_array(node.origin), Vec3A::from_array(node.scale));
         let [width, height, _] = node.resolution;
         let number = |[x, y, z]: [u32; 3]| row(height, y, z) * width as usize + x as usize;
-        let within = |position: Vec3A| (position - origin) * scale;
-        let reach = Aabb { min: within(self.reach.min), max: within(self.reach.max) };
-        let range = cells_between(reach, node.resolution);
+        let range = node.range(&self.reach);
         if range.count() == 1 {
             return visit(number(range.min), range.min);
         }

@@ -22,11 +22,13 @@ mod node;
 mod overlap;
 mod validate;
 
+use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::counters::Tally;
 use crate::dda::{Line, Step};
 use crate::error::Error;
+use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes, sizes};
 use node::{Content, Node};
 
@@ -56,6 +58,25 @@ impl<'a> Recursive<'a> {
     /// No ray is shown more primitives than this.
     pub(crate) const fn list_words(&self) -> usize {
         self.pool.len()
+    }
+
+    /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.
+    pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
+        Node::open(self.pool, 0)
+            .is_none_or(|root| self.visit_node(&root, reach, MAX_DEPTH, visitor))
+    }
+
+    fn visit_node(&self, node: &Node, reach: &Aabb, depth: u32, visitor: &mut Visitor<'_>) -> bool {
+        node.range(reach).cells().all(|cell| {
+            visitor.spend(1)
+                && match node.content(self.pool, cell) {
+                    None => true,
+                    Some(Content::List(ids)) => visitor.list(ids),
+                    Some(Content::Grid(at)) => Node::open(self.pool, at)
+                        .filter(|_| depth > 0)
+                        .is_none_or(|inner| self.visit_node(&inner, reach, depth - 1, visitor)),
+                }
+        })
     }
 
     /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any; see

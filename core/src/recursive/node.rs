@@ -4,7 +4,7 @@ use glam::Vec3A;
 
 use crate::aabb::Aabb;
 use crate::bump::GRID;
-use crate::cell::as_f32;
+use crate::cell::{CellRange, as_f32, cells_between};
 use crate::dda::{Line, Walk};
 use crate::one_level::row;
 
@@ -107,6 +107,13 @@ impl Node {
     #[inline]
     pub(super) fn walk(&self, line: &Line, entered: f32) -> Option<Walk> {
         line.zoom(self.origin, self.scale).walk_in(entered, self.resolution)
+    }
+
+    /// The cells that a box meets, given in cells of the root.
+    pub(super) fn range(&self, reach: &Aabb) -> CellRange {
+        let (origin, scale) = (Vec3A::from_array(self.origin), Vec3A::from_array(self.scale));
+        let within = |position: Vec3A| (position - origin) * scale;
+        cells_between(Aabb { min: within(reach.min), max: within(reach.max) }, self.resolution)
     }
 
     /// What a cell holds; `None` if it is empty.

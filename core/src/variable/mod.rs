@@ -20,6 +20,7 @@ mod build;
 mod subgrid;
 mod validate;
 
+use crate::aabb::Aabb;
 use crate::blob::Header;
 use crate::bump::GRID;
 use crate::cell::Lattice;
@@ -27,6 +28,7 @@ use crate::counters::Tally;
 use crate::dda::{Line, Step};
 use crate::error::Error;
 use crate::one_level::OneLevel;
+use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
 use subgrid::Subgrid;
 
@@ -63,6 +65,17 @@ impl<'a> Variable<'a> {
         let part = (start & !GRID) as usize..(end & !GRID) as usize;
         let words = self.top.lists().get(part)?;
         Some(if start & GRID == 0 { Content::List(words) } else { Content::Subgrid(words) })
+    }
+
+    /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.
+    pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
+        self.top.each_marked(reach, |cell| match self.content(cell) {
+            Some(Content::List(ids)) => visitor.list(ids),
+            Some(Content::Subgrid(words)) => {
+                Subgrid::open(words).is_none_or(|grid| grid.visit(cell, reach, visitor))
+            }
+            None => true,
+        })
     }
 
     /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any; see

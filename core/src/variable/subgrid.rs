@@ -15,6 +15,7 @@ use crate::aabb::Aabb;
 use crate::cell::{CellRange, as_f32, cells_between, woo};
 use crate::dda::{Line, Walk};
 use crate::one_level::{row, slot};
+use crate::visit::Visitor;
 
 /// The most cells of a subgrid on an axis.
 const MAX_RESOLUTION: u32 = 255;
@@ -180,6 +181,16 @@ impl<'a> Subgrid<'a> {
         let (origin, scale) = self.frame.zoom(around.cell);
         let zoomed = line.zoom(origin.to_array(), scale.to_array());
         zoomed.walk_in(around.entered, self.frame.resolution)
+    }
+
+    /// Shows the lists of all cells that a box meets, given in cells of the top.
+    pub(super) fn visit(&self, around: [u32; 3], reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
+        let range = self.frame.range(around, reach);
+        range.cells().all(|cell| {
+            // A cell has a bit, not a word, but damaged bytes may have this subgrid in many cells.
+            let is_paid = cell[0] != range.min[0] || visitor.spend(1);
+            is_paid && self.references(cell).is_none_or(|ids| visitor.list(ids))
+        })
     }
 
     /// The primitive ids in a cell, ascending; `None` if it is empty.

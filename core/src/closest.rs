@@ -1,0 +1,184 @@
+//! The point of a mesh that is closest to a point.
+//!
+//! A box around the point grows until it is sure that nothing outside is closer: from the cells next to
+//! the point on, twice as wide each time, and when something was found as wide as that is far.
+//!
+//! ```text
+//! +-----------------------+
+//! |       +-------+       |     found a in the second box, but b could be closer: the last box
+//! |    a  |   x   |       |     reaches as far as a, all around
+//! |       +-------+       |
+//! +-----------------------+ b
+//! ```
+
+use glam::{DVec3, Vec3A};
+
+use crate::aabb::Aabb;
+use crate::counters::Counters;
+use crate::grid::Grid;
+use crate::mesh::Triangle;
+use crate::options::{QueryOptions, Selection};
+use crate::ray::{INVALID_ID, round};
+
+/// The point of a mesh that is closest to a point: 28 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClosestPoint {
+    /// The point, in scene units.
+    pub position: [f32; 3],
+    /// How far it is.
+    pub distance: f32,
+    /// Weight of the triangle's second vertex, 0 to 1.
+    pub u: f32,
+    /// Weight of the triangle's third vertex, 0 to 1.
+    pub v: f32,
+    /// Id of the triangle.
+    pub primitive: u32,
+}
+
+impl ClosestPoint {
+    /// The point of one triangle that is closest to a point: what a loop over all triangles compares.
+    ///
+    /// `None` if a coordinate is not finite. A triangle without area has points, too.
+    #[must_use]
+    pub fn on_triangle(triangle: &Triangle, primitive: u32, point: [f32; 3]) -> Option<Self> {
+        Aabb::of(triangle.map(Vec3A::from_array))?;
+        let [a, b, c] = triangle.map(|corner| DVec3::from_array(corner.map(f64::from)));
+        let p = DVec3::from_array(point.map(f64::from));
+        let [v, w] = weights(a, b - a, c - a, p);
+        let closest = a + (b - a) * v + (c - a) * w;
+        let distance = round((closest - p).length());
+        let position = closest.to_array().map(round);
+        let (u, v) = (round(v), round(w));
+        distance.is_finite().then_some(Self { position, distance, u, v, primitive })
+    }
+
+    /// Whether this point is reported rather than the other: closer, then of a lower id.
+    fn is_closer(&self, other: &Self) -> bool {
+        self.distance < other.distance
+            || (self.distance <= other.distance && self.primitive < other.primitive)
+    }
+}
+
+/// The weights of b and c in the point of a triangle that is closest to p: straight below p if that is
+/// inside (Ericson 2005, 5.1.5), or else on the closest of the edges. A triangle without area has only
+/// edges.
+fn weights(a: DVec3, ab: DVec3, ac: DVec3, p: DVec3) -> [f64; 2] {
+    let ap = p - a;
+    let (bp, cp) = (ap - ab, ap - ac);
+    let (ab_a, ac_a) = (ab.dot(ap), ac.dot(ap));
+    let (ab_b, ac_b) = (ab.dot(bp), ac.dot(bp));
+    let (ab_c, ac_c) = (ab.dot(cp), ac.dot(cp));
+    let of_a = ab_b * ac_c - ab_c * ac_b;
+    let of_b = ab_c * ac_a - ab_a * ac_c;
+    let of_c = ab_a * ac_b - ab_b * ac_a;
+    if of_a > 0.0 && of_b > 0.0 && of_c > 0.0 {
+        let all = of_a + of_b + of_c;
+        return [of_b / all, of_c / all];
+    }
+    let along_bc = share(ac_b - ab_b, ab_c - ac_c);
+    let edges = [[share(ab_a, -ab_b), 0.0], [0.0, share(ac_a, -ac_c)], [1.0 - along_bc, along_bc]];
+    let distance = |[v, w]: [f64; 2]| (ap - ab * v - ac * w).length_squared();
+    let [first, second, third] = edges;
+    let closer = |a, b| if distance(b) < distance(a) { b } else { a };
+    closer(closer(first, second), third)
+}
+
+/// Where on an edge a point lies, from 0 to 1, that is this far behind its start and before its end.
+fn share(behind: f64, before: f64) -> f64 {
+    if behind <= 0.0 {
+        0.0
+    } else if before <= 0.0 {
+        1.0
+    } else {
+        behind / (behind + before)
+    }
+}
+
+impl Grid<'_> {
+    /// The point of the mesh that is closest to a point, and no farther than `max_distance`; where
+    /// several triangles are equally close, that of the lowest id.
+    ///
+    /// Of the options, mask, the triangle to skip and counters mean something here: a cell step is a list that
+    /// was looked at. A point or a distance that is NaN, an infinite point and a negative distance find
+    /// nothing.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let closest = grid.closest_point([0.5, 0.25, 3.0], 10.0, &mut QueryOptions::default());
+    /// let closest = closest.expect("3 away");
+    /// assert_eq!((closest.distance, closest.position), (3.0, [0.5, 0.25, 0.0]));
+    /// # Ok::<(), Error>(())
+    /// ```
+    #[must_use]
+    pub fn closest_point(
+        &self,
+        point: [f32; 3],
+        max_distance: f32,
+        options: &mut QueryOptions<'_>,
+    ) -> Option<ClosestPoint> {
+        let is_question = point.iter().all(|c| c.is_finite()) && max_distance >= 0.0;
+        if !is_question {
+            return None;
+        }
+        let selection = Selection::new(self.mesh(), options);
+        let mut work = Counters::default();
+        let farthest =
+            ClosestPoint { distance: max_distance, primitive: INVALID_ID, ..ClosestPoint::NONE };
+        let mut best = farthest;
+
+        // Begin with the cells next to where the point is, or would come in.
+        let center = DVec3::from_array(point.map(f64::from));
+        let (min, max) = self.bounds();
+        let [min, max] = [min, max].map(|corner| DVec3::from_array(corner.map(f64::from)));
+        let outside = (min - center).max(center - max).max(DVec3::ZERO).max_element();
+        let mut inside = f64::from(self.cell_size().max_element());
+        let mut reach = outside + inside;
+        loop {
+            self.visit(&around(center, reach), &mut |ids| {
+                work.cell_steps += 1;
+                work.primitive_tests += ids.len() as u64;
+                for &id in ids.iter().filter(|&&id| selection.has(id)) {
+                    let triangle = self.mesh().triangle(id);
+                    let found = triangle.and_then(|t| ClosestPoint::on_triangle(&t, id, point));
+                    if let Some(found) = found.filter(|found| found.is_closer(&best)) {
+                        best = found;
+                    }
+                }
+            });
+            let is_all = (center - reach).cmple(min).all() && (center + reach).cmpge(max).all();
+            // Until something is found, `best` is as far as anything may be.
+            // As far as what rounds to the same distance may be.
+            let needed = f64::from(best.distance.next_up());
+            if needed <= reach || is_all {
+                break;
+            }
+            inside *= 2.0;
+            reach =
+                if best.primitive == INVALID_ID { (outside + inside).min(needed) } else { needed };
+        }
+        if let Some(counters) = &mut options.counters {
+            counters.add(&work);
+        }
+        (best.primitive != INVALID_ID).then_some(best)
+    }
+}
+
+impl ClosestPoint {
+    const NONE: Self =
+        Self { position: [0.0; 3], distance: 0.0, u: 0.0, v: 0.0, primitive: INVALID_ID };
+}
+
+/// A cube around a point, rounded outwards.
+fn around(center: DVec3, reach: f64) -> Aabb {
+    let low = (center - reach).to_array().map(|c| round(c).next_down());
+    let high = (center + reach).to_array().map(|c| round(c).next_up());
+    Aabb { min: low.into(), max: high.into() }
+}

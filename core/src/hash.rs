@@ -1,0 +1,19 @@
+//! A hash of words, the same in either byte order: against accidents, not against forgery.
+
+/// FNV-1a over words instead of bytes.
+pub(crate) struct Hash(u64);
+
+impl Hash {
+    pub(crate) const fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    pub(crate) fn add(&mut self, word: u32) {
+        self.0 = (self.0 ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
+    }
+
+    /// The hash, mixed so that every bit of the last words counts everywhere.
+    pub(crate) const fn finish(self) -> u64 {
+        self.0 ^ (self.0 >> 29)
+    }
+}

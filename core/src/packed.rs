@@ -1,0 +1,221 @@
+//! Grid and mesh in one blob, for those who have nothing else.
+//!
+//! ```text
+//! 0                 blob_bytes                                     total_bytes
+//! | header | grid   | positions    | indices     | masks           |
+//!   says so           12 a vertex    12 a triangle  4 a triangle, if the mesh has any
+//! ```
+//!
+//! Every section starts at a multiple of 64, as in the grid, which is the one that was built but for its
+//! header. The mesh is tight and its indices have 32 bits, whatever the caller's had. Opening reads it
+//! where it lies, so there is still no copy and no allocation.
+
+use core::mem::offset_of;
+
+use crate::arena::{ALIGNMENT, align_up, check_alignment, section_bytes};
+use crate::blob::{BLOB_VERSION, HEADER_BYTES, HasMesh, Header, corrupt};
+use crate::config::Method;
+use crate::error::{Error, Region};
+use crate::grid::Grid;
+use crate::mesh::{IndexType, MAX_TRIANGLES, Strided, TriangleMesh};
+
+/// What the header of a blob says, whether or not the rest of it is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BlobInfo {
+    /// The version of the format.
+    pub version: u32,
+    /// What built it.
+    pub method: Method,
+    /// Whether it is packed: the mesh is in it.
+    pub has_mesh: bool,
+    /// Vertices of its mesh.
+    pub vertex_count: u64,
+    /// Triangles of its mesh.
+    pub triangle_count: u32,
+    /// Bytes of the grid.
+    pub grid_bytes: u64,
+    /// Bytes of all of it: of the grid, and of the mesh if that is in it.
+    pub total_bytes: u64,
+}
+
+impl BlobInfo {
+    /// Reads the first 128 bytes of a blob, which may lie anywhere: in a buffer that is filled from a
+    /// file, before there is room for the rest.
+    ///
+    /// # Errors
+    /// [`Error::NotAGrid`], [`Error::WrongByteOrder`], [`Error::UnsupportedVersion`],
+    /// [`Error::Truncated`] if there are fewer bytes, [`Error::Corrupt`].
+    pub fn peek(bytes: &[u8]) -> Result<Self, Error> {
+        let header = Header::peek(bytes)?;
+        let method = Method::from_u32(header.method).ok_or(corrupt(offset_of!(Header, method)))?;
+        let has_mesh = header.has_mesh()? != HasMesh::No;
+        let total_bytes = Sections::of(&header)?.end;
+        let Header { vertex_count, triangle_count, blob_bytes: grid_bytes, .. } = header;
+        Ok(Self {
+            version: BLOB_VERSION,
+            method,
+            has_mesh,
+            vertex_count,
+            triangle_count,
+            grid_bytes,
+            total_bytes,
+        })
+    }
+}
+
+/// Where the mesh lies behind a grid.
+struct Sections {
+    positions: u64,
+    indices: u64,
+    masks: u64,
+    end: u64,
+}
+
+impl Sections {
+    fn of(header: &Header) -> Result<Self, Error> {
+        let has_mesh = header.has_mesh()?;
+        let triangles = u64::from(header.triangle_count);
+        let positions = align_up(header.blob_bytes);
+        if has_mesh == HasMesh::No {
+            let end = header.blob_bytes;
+            return Ok(Self { positions, indices: positions, masks: positions, end });
+        }
+        let indices = positions.saturating_add(section_bytes::<[f32; 3]>(header.vertex_count));
+        let masks = indices.saturating_add(section_bytes::<[u32; 3]>(triangles));
+        let mask_bytes =
+            if has_mesh == HasMesh::WithMasks { section_bytes::<u32>(triangles) } else { 0 };
+        Ok(Self { positions, indices, masks, end: masks.saturating_add(mask_bytes) })
+    }
+}
+
+impl<'a> Grid<'a> {
+    /// Bytes that [`pack`](Self::pack) writes.
+    #[must_use]
+    pub fn packed_bytes(&self) -> u64 {
+        let packed = self.packed_header().and_then(|header| Sections::of(&header));
+        packed.map_or(0, |sections| sections.end)
+    }
+
+    /// Writes grid and mesh as one blob, which [`open_packed`](Self::open_packed) needs nothing else
+    /// for, and returns the part of `to` that it takes.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is no multiple of
+    /// [`ALIGNMENT`], [`Error::IndexOutOfRange`] a triangle without vertices. Nothing is written then.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let mut memory = vec![Block::ZERO; Block::count_for(grid.packed_bytes() as usize)];
+    /// let packed = grid.pack(Block::bytes_mut(&mut memory))?;
+    ///
+    /// // Store it, map it in another process, and there:
+    /// let grid = Grid::open_packed(packed)?;
+    /// assert!(grid.occluded(&Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0])));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn pack<'t>(&self, to: &'t mut [u8]) -> Result<&'t mut [u8], Error> {
+        check_alignment(to, Region::Index)?;
+        let header = self.packed_header()?;
+        let sections = Sections::of(&header)?;
+        let mesh = self.mesh();
+        if let Some(triangle) = (0..mesh.triangle_count()).find(|&id| mesh.triangle(id).is_none()) {
+            return Err(Error::IndexOutOfRange { triangle });
+        }
+        let available_bytes = to.len() as u64;
+        let needed_bytes = sections.end;
+        let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
+        let end = usize::try_from(needed_bytes).map_err(|_| too_small)?;
+        let to = to.get_mut(..end).ok_or(too_small)?;
+
+        // Copy the grid, tell in its header what follows, and clear what the sections leave over.
+        let mut out = Out { bytes: &mut *to };
+        out.put(&header.to_bytes());
+        out.put(self.blob().get(HEADER_BYTES..).unwrap_or_default());
+        out.pad();
+        mesh.each_vertex(|vertex| out.put(vertex));
+        out.pad();
+        for id in 0..mesh.triangle_count() {
+            out.put(bytemuck::bytes_of(&mesh.indices(id).unwrap_or_default()));
+        }
+        out.pad();
+        if mesh.has_masks() {
+            (0..mesh.triangle_count()).for_each(|id| out.put(&mesh.mask(id).to_ne_bytes()));
+            out.pad();
+        }
+        Ok(to)
+    }
+
+    /// Opens a blob that [`pack`](Self::pack) wrote, in O(1): the mesh is its own.
+    ///
+    /// What [`open`](Self::open) says of damaged bytes holds here, too; [`validate`](Self::validate)
+    /// proves that the grid is one of the mesh behind it, whatever mesh that is.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open), and [`Error::NoMesh`].
+    pub fn open_packed(blob: &'a [u8]) -> Result<Self, Error> {
+        check_alignment(blob, Region::Index)?;
+        let header = Header::peek(blob)?;
+        let has_mesh = header.has_mesh()?;
+        if has_mesh == HasMesh::No {
+            return Err(Error::NoMesh);
+        }
+        let Sections { positions, indices, masks, end } = Sections::of(&header)?;
+        let (needed_bytes, available_bytes) = (end, blob.len() as u64);
+        let truncated = Error::Truncated { needed_bytes, available_bytes };
+        let damaged = corrupt(offset_of!(Header, triangle_count));
+        let section = |start: u64, count: u64, stride: usize| {
+            let start = usize::try_from(start).ok()?;
+            let count = usize::try_from(count).ok()?;
+            let bytes = blob.get(start..)?.get(..count.checked_mul(stride)?)?;
+            Some(Strided { bytes, stride, count })
+        };
+        if needed_bytes > available_bytes {
+            return Err(truncated);
+        }
+        let triangles = u64::from(header.triangle_count);
+        let positions = section(positions, header.vertex_count, 12).ok_or(damaged)?;
+        let indices = section(indices, triangles, 12).ok_or(damaged)?;
+        if indices.count > MAX_TRIANGLES {
+            return Err(damaged);
+        }
+        let mut mesh = TriangleMesh::strided(positions, indices, IndexType::U32)?;
+        if has_mesh == HasMesh::WithMasks {
+            mesh = mesh.with_masks(section(masks, triangles, 4).ok_or(damaged)?)?;
+        }
+        Self::open(blob, mesh)
+    }
+
+    /// The grid's header, as it is in a blob with the mesh.
+    fn packed_header(&self) -> Result<Header, Error> {
+        let has_mesh = if self.mesh().has_masks() { HasMesh::WithMasks } else { HasMesh::Yes };
+        Ok(Header::read(self.blob(), self.mesh())?.packed(has_mesh))
+    }
+}
+
+/// Bytes to be written, from the front to the back.
+struct Out<'t> {
+    bytes: &'t mut [u8],
+}
+
+impl Out<'_> {
+    fn put(&mut self, bytes: &[u8]) {
+        let rest = core::mem::take(&mut self.bytes);
+        if let Some((to, rest)) = rest.split_at_mut_checked(bytes.len()) {
+            to.copy_from_slice(bytes);
+            self.bytes = rest;
+        }
+    }
+
+    /// Writes zeros up to the next section: the end is a multiple of [`ALIGNMENT`].
+    fn pad(&mut self) {
+        let padding = self.bytes.len() % ALIGNMENT;
+        self.put([0; ALIGNMENT].get(..padding).unwrap_or_default());
+    }
+}

@@ -1,0 +1,52 @@
+//! Grids for a budget: as fine as fits.
+
+use hgrid_core::{Block, Error, Grid, Region, fit, sizes};
+use hgrid_tests::meshes::{Mesh, ball};
+use hgrid_tests::methods::configs;
+
+#[test]
+fn the_finest_grid_that_fits_is_built_in_its_budget() {
+    let mesh = ball(40, 1.0);
+    let view = mesh.view();
+    for config in configs() {
+        let enough = sizes(&view, &config, &mut []).unwrap();
+        let mut scratch = vec![Block::ZERO; Block::count_for(enough.scratch_bytes)];
+        let scratch = Block::bytes_mut(&mut scratch);
+        let whole = sizes(&view, &config, scratch).unwrap().index_bytes;
+        assert_eq!(fit(&view, &config, whole, scratch), Ok(config));
+        assert_eq!(fit(&view, &config, usize::MAX, scratch), Ok(config));
+
+        let mut last = whole;
+        for budget in [whole - 1, whole * 9 / 10, whole * 3 / 4] {
+            let fitted = match fit(&view, &config, budget, scratch) {
+                Ok(fitted) => fitted,
+                Err(error) => {
+                    let Error::OutOfMemory { region: Region::Index, needed_bytes, .. } = error
+                    else {
+                        panic!("{error}");
+                    };
+                    // What it asks for helps.
+                    fit(&view, &config, needed_bytes as usize, scratch).unwrap()
+                }
+            };
+            let needed = sizes(&view, &fitted, scratch).unwrap();
+            assert!(needed.index_bytes <= last, "{config:?}: {budget}");
+            last = needed.index_bytes;
+            let mut index = vec![Block::ZERO; Block::count_for(needed.index_bytes)];
+            let index = Block::bytes_mut(&mut index);
+            Grid::build(view, &fitted, &mut index[..needed.index_bytes], scratch).unwrap();
+        }
+        // No grid has less than a header.
+        let error = fit(&view, &config, 100, scratch).unwrap_err();
+        let is_told = matches!(
+            error,
+            Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes: 100 }
+                if needed_bytes > 100 && needed_bytes < whole as u64
+        );
+        assert!(is_told, "{config:?}: {error}");
+    }
+    let nothing = Mesh::default();
+    for config in configs() {
+        assert_eq!(fit(&nothing.view(), &config, 1 << 24, &mut []), Ok(config));
+    }
+}
