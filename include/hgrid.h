@@ -52,7 +52,9 @@
  * You bring two regions. The index keeps the grid; the scratch is free again after the build. Both
  * start at a multiple of HGRID_ALIGNMENT (64) bytes and overlap nothing else that the call uses.
  * They may hold anything before. The library allocates nothing, keeps nothing, touches nothing
- * outside the regions, and there is nothing to free.
+ * outside the regions, and there is nothing to free. Programs that would rather not think of memory
+ * link a library with the feature std, define HGRID_STD before they include this file, and have
+ * hgrid_create and hgrid_destroy as well.
  *
  * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are enough for every mesh with so many
  * triangles, with the default configuration, and fit into an array declaration; hgrid_sizes knows
@@ -609,6 +611,42 @@ typedef struct hgrid_hit {
  */
 typedef uint32_t hgrid_coherence;
 
+#if defined(HGRID_STD)
+/**
+ * Where `hgrid_create` gets its memory from. Initialise it with `HGRID_ALLOCATOR_INIT` and set both
+ * functions.
+ *
+ * The struct itself is only read during the call, but `hgrid_destroy` calls `release` with the same
+ * `context`, so both must last as long as the grid. Neither function may be left by `longjmp` or by
+ * a C++ exception.
+ */
+typedef struct hgrid_allocator {
+    /**
+     * `sizeof(hgrid_allocator)`.
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+    /**
+     * Yours: passed on to both functions.
+     */
+    void *context;
+    /**
+     * Gives `bytes` bytes, never 0 of them, that start at a multiple of `alignment`, a power of two,
+     * and that nothing else uses until they are released. They may hold anything. NULL if there are
+     * no more. Called on the thread that calls `hgrid_create`. May not be NULL.
+     */
+    void *(*allocate)(void *context, size_t bytes, size_t alignment);
+    /**
+     * Takes back what `allocate` gave, with the `bytes` and the `alignment` that it was asked for.
+     * Called on the thread that calls `hgrid_create` or `hgrid_destroy`. May not be NULL.
+     */
+    void (*release)(void *context, void *memory, size_t bytes, size_t alignment);
+} hgrid_allocator;
+#endif
+
 /**
  * Success.
  */
@@ -648,6 +686,11 @@ typedef uint32_t hgrid_coherence;
  * The scratch is too small. The report says how many bytes it needs.
  */
 #define HGRID_ERROR_SCRATCH_TOO_SMALL -11
+
+/**
+ * The allocator has no more memory. The report says how many bytes index and scratch need.
+ */
+#define HGRID_ERROR_OUT_OF_MEMORY -12
 
 /**
  * The position stride is below 12 bytes, or the vertices do not fit into memory.
@@ -1155,6 +1198,73 @@ uint32_t hgrid_version(void);
  */
 const char *hgrid_version_string(void);
 
+#if defined(HGRID_STD)
+/**
+ * Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and with, and
+ * `hgrid_build`, in one call.
+ *
+ * Only in libraries that were built with the feature `std`, and declared only where `HGRID_STD` is
+ * defined. It takes as long as those three calls: who builds again for every frame brings the memory
+ * and calls `hgrid_build`.
+ *
+ * ```c
+ * static size_t count_hits(const hgrid_mesh *mesh, const hgrid_ray *rays, size_t count)
+ * {
+ *     hgrid_grid *grid;
+ *     if (hgrid_create(mesh, NULL, NULL, &grid, NULL) != HGRID_OK)
+ *         return 0;
+ *     hgrid_hit hit;
+ *     size_t found = 0;
+ *     for (size_t i = 0; i < count; i++)
+ *         found += hgrid_intersect(grid, &rays[i], NULL, &hit);
+ *     hgrid_destroy(grid);
+ *     return found;
+ * }
+ * ```
+ *
+ * `allocator` says where memory comes from; NULL means the C library, as with `malloc`. It is asked
+ * twice: for the scratch, which is given back before the call returns, and for the grid, which takes
+ * what `hgrid_sizes` tells, to the byte, and less than 1 KiB for the view. The mesh stays yours and
+ * where it is, as after `hgrid_build`.
+ *
+ * `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `allocator` may be NULL.
+ * `report` may be NULL.
+ *
+ * Returns `HGRID_OK` and writes the address of the view to `grid`; or returns the reason, has given
+ * back all memory, and leaves `grid` as it was. `HGRID_ERROR_OUT_OF_MEMORY` says that the allocator
+ * had no more, and the report how much was needed; `HGRID_ERROR_MISALIGNED` that what it gave does
+ * not start at a multiple of the alignment. All else is what `hgrid_build` returns. The report is
+ * that of `hgrid_build`.
+ *
+ * Threads: any number of calls at once, if the allocator's functions allow it.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_create(const struct hgrid_mesh *mesh,
+                          const struct hgrid_config *config,
+                          const struct hgrid_allocator *allocator,
+                          struct hgrid_grid **grid,
+                          struct hgrid_report *report);
+#endif
+
+#if defined(HGRID_STD)
+/**
+ * Gives back all memory of a grid that `hgrid_create` made.
+ *
+ * `grid` may be NULL: nothing happens. It may be nothing else than what `hgrid_create` wrote, once:
+ * not the view of a build or of an open, and no copy of a view. No query runs, and copies of the
+ * view are good for nothing afterwards.
+ *
+ * Threads: any number of calls at once, each for a grid of its own, if the allocator's functions
+ * allow it; on any thread, not only on the one that created the grid.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+void hgrid_destroy(struct hgrid_grid *grid);
+#endif
+
 #ifdef __cplusplus
 }  // extern "C"
 #endif  // __cplusplus
@@ -1211,3 +1321,10 @@ const char *hgrid_version_string(void);
  * recognised and hits nothing. After a failed build or open a view is what it was before.
  */
 #define HGRID_GRID_INIT {{0}}
+
+#if defined(HGRID_STD)
+/**
+ * An allocator without functions: set allocate and release, and context if they need it.
+ */
+#define HGRID_ALLOCATOR_INIT {sizeof(hgrid_allocator), 0, NULL, NULL, NULL}
+#endif

@@ -3,18 +3,25 @@
 //! Every function checks what it was given, calls core, and writes the answer. The docs of all that
 //! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
 //! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
-//! structs and threads that they rely on. `raw` holds every use of a pointer.
+//! structs and threads that they rely on. `raw` holds every use of a caller's pointer.
 //!
 //! There is no allocation, no state and no thread here, and no panic that a caller could reach; a
 //! test looks for the symbols of all but the state in the library. Core remembers in one byte which
 //! vector instructions the processor has.
+//!
+//! That is the library without features. With `std` it also has `create`, which gets memory from the
+//! caller's allocator or the system's and looks after the pointers to it.
 #![no_std]
 
 mod batch;
+#[cfg(feature = "std")]
+mod create;
 mod input;
 mod raw;
 mod span;
 mod status;
+#[cfg(feature = "std")]
+mod system;
 mod types;
 mod version;
 
@@ -23,6 +30,8 @@ use core::ptr::{NonNull, null, null_mut};
 
 use hgrid_core::{Grid, Hit, QueryOptions, Ray, Strided, StridedMut};
 
+#[cfg(feature = "std")]
+pub use crate::create::*;
 pub use crate::status::*;
 pub use crate::types::*;
 pub use crate::version::*;

@@ -36,6 +36,9 @@ pub const HGRID_ERROR_INDEX_TOO_SMALL: hgrid_status = -10;
 /// The scratch is too small. The report says how many bytes it needs.
 pub const HGRID_ERROR_SCRATCH_TOO_SMALL: hgrid_status = -11;
 
+/// The allocator has no more memory. The report says how many bytes index and scratch need.
+pub const HGRID_ERROR_OUT_OF_MEMORY: hgrid_status = -12;
+
 /// The position stride is below 12 bytes, or the vertices do not fit into memory.
 pub const HGRID_ERROR_INVALID_POSITIONS: hgrid_status = -20;
 
@@ -152,6 +155,9 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         }
         HGRID_ERROR_INDEX_TOO_SMALL => c"index too small: bring the report's index_bytes",
         HGRID_ERROR_SCRATCH_TOO_SMALL => c"scratch too small: bring the report's scratch_bytes",
+        HGRID_ERROR_OUT_OF_MEMORY => {
+            c"out of memory: the report says how many bytes index and scratch need"
+        }
         HGRID_ERROR_INVALID_POSITIONS => {
             c"invalid positions: check vertex_count, and position_stride (0, or 12 and more)"
         }

@@ -1,5 +1,6 @@
 /* Prints what the header says as numbers, one "name value" a line, for the test to compare. */
 
+#define HGRID_STD
 #include <hgrid.h>
 
 #include <stdio.h>
@@ -68,6 +69,12 @@ static void layout(void)
     OFFSET(hgrid_report, resolution);
     OFFSET(hgrid_report, reserved);
     SIZE(hgrid_grid);
+    SIZE(hgrid_allocator);
+    OFFSET(hgrid_allocator, struct_size);
+    OFFSET(hgrid_allocator, reserved);
+    OFFSET(hgrid_allocator, context);
+    OFFSET(hgrid_allocator, allocate);
+    OFFSET(hgrid_allocator, release);
 }
 
 static void constants(void)
@@ -94,6 +101,7 @@ static void constants(void)
     NUMBER(HGRID_ERROR_OVERLAP);
     NUMBER(HGRID_ERROR_INDEX_TOO_SMALL);
     NUMBER(HGRID_ERROR_SCRATCH_TOO_SMALL);
+    NUMBER(HGRID_ERROR_OUT_OF_MEMORY);
     NUMBER(HGRID_ERROR_INVALID_POSITIONS);
     NUMBER(HGRID_ERROR_INVALID_INDICES);
     NUMBER(HGRID_ERROR_INVALID_INDEX_TYPE);
@@ -136,10 +144,12 @@ static void defaults(void)
     const hgrid_parallel parallel = HGRID_PARALLEL_INIT;
     const hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
     const hgrid_report report = HGRID_REPORT_INIT;
+    const hgrid_allocator allocator = HGRID_ALLOCATOR_INIT;
     printf("mesh %lu\n", (unsigned long)mesh.struct_size);
     printf("parallel %lu\n", (unsigned long)parallel.struct_size);
     printf("options %lu\n", (unsigned long)options.struct_size);
     printf("report %lu\n", (unsigned long)report.struct_size);
+    printf("allocator %lu\n", (unsigned long)allocator.struct_size);
     for (size_t i = 0; i < sizeof configs / sizeof *configs; i++) {
         const hgrid_config *c = &configs[i];
         printf("config_%lu %lu %g %lu %lu %lu %g %lu\n", (unsigned long)c->method,

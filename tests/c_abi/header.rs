@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use hgrid_core::{Config, Method, Sizes};
-use hgrid_tests::artefact::{compiler, is_installed, root, run, static_library, warnings};
+use hgrid_tests::artefact::{Flavour, compiler, is_installed, root, run, static_library, warnings};
 use tempfile::TempDir;
 
 /// The dialects that renderers are written in.
@@ -17,13 +17,38 @@ pub(crate) fn committed() -> String {
     fs::read_to_string(root().join("include/hgrid.h")).expect("include/hgrid.h")
 }
 
+/// What a program sees of it that is compiled for a flavour: without `HGRID_STD`, the lines that need
+/// it are not there.
+pub(crate) fn seen_by(flavour: Flavour) -> String {
+    let (mut header, mut rest) = (String::new(), committed());
+    while let Some((before, behind)) = rest.split_once("\n#if defined(HGRID_STD)\n") {
+        let (inside, behind) = behind.split_once("\n#endif\n").expect("its end");
+        header.push_str(before);
+        header.push('\n');
+        if flavour == Flavour::Std {
+            header.push_str(inside);
+            header.push('\n');
+        }
+        rest = behind.to_owned();
+    }
+    header + &rest
+}
+
 /// The functions that the header declares.
-pub(crate) fn functions() -> Vec<String> {
-    let header = committed();
+pub(crate) fn functions(flavour: Flavour) -> Vec<String> {
+    let header = seen_by(flavour);
     let is_code = |line: &&str| !line.starts_with([' ', '#', '/']) && !line.starts_with("typedef");
     let calls = header.lines().filter(is_code);
     let names = calls.filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next());
     names.map(str::to_owned).collect()
+}
+
+/// The functions in C between the comments.
+pub(crate) fn examples(header: &str) -> Vec<String> {
+    let blocks = header.split("```").skip(1).step_by(2);
+    let blocks = blocks.filter_map(|block| block.strip_prefix("c\n"));
+    let code = |line: &str| format!("{}\n", line.trim_start_matches(" *").trim_end());
+    blocks.map(|block| block.lines().map(code).collect()).collect()
 }
 
 /// The statuses that the header defines.
@@ -149,7 +174,7 @@ fn versions_are_those_of_the_package() {
 
 #[test]
 fn initialisers_are_the_defaults() {
-    for name in ["mesh", "parallel", "options", "report"] {
+    for name in ["mesh", "parallel", "options", "report", "allocator"] {
         let struct_name = if name == "options" { "query_options" } else { name };
         assert_eq!(fact(name), fact(&format!("hgrid_{struct_name}")), "{name}");
     }
@@ -184,8 +209,11 @@ fn bounds_are_no_less_than_those_of_core() {
 #[test]
 fn every_function_says_what_callers_must_know() {
     let header = committed();
-    for function in functions() {
-        let (before, _) = header.rsplit_once(&format!("{function}(")).expect("its declaration");
+    for function in functions(Flavour::Std) {
+        let is_text =
+            |line: &&str| !line.contains(&format!("{function}(")) || line.starts_with(' ');
+        let before: Vec<_> = header.lines().take_while(is_text).collect();
+        let before = before.join("\n");
         let (_, text) = before.rsplit_once("/**").expect("a comment");
         assert!(text.contains("Threads: "), "{function} says nothing about threads");
         let takes_pointers =
@@ -211,13 +239,9 @@ fn its_example_runs() {
 
 #[test]
 fn its_functions_examples_run() {
-    let header = committed();
-    let blocks = header.split("```").skip(1).step_by(2);
-    let blocks: Vec<_> = blocks.filter_map(|block| block.strip_prefix("c\n")).collect();
-    assert_eq!(blocks.len(), 3);
-    let lines = blocks.iter().flat_map(|block| block.lines());
-    let functions: Vec<_> = lines.map(|line| line.trim_start_matches(" *").trim_end()).collect();
-    let source = include_str!("tile.c").replace("FUNCTIONS", &functions.join("\n"));
+    let examples = examples(&seen_by(Flavour::NoStd));
+    assert_eq!(examples.len(), 3);
+    let source = include_str!("tile.c").replace("FUNCTIONS", &examples.join("\n"));
 
     let dir = TempDir::new().expect("a folder");
     let [path, program] = ["tile.c", "tile"].map(|name| dir.path().join(name));

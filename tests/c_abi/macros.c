@@ -1,5 +1,6 @@
 /* Uses every macro the way a program does, in every dialect, without a warning. */
 
+#define HGRID_STD
 #include <hgrid.h>
 #include <hgrid.h>
 
@@ -22,6 +23,7 @@ int main(void)
     hgrid_parallel parallel = HGRID_PARALLEL_INIT;
     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
     hgrid_report report = HGRID_REPORT_INIT;
+    hgrid_allocator allocator = HGRID_ALLOCATOR_INIT;
     hgrid_grid grid;
     const hgrid_ray ray = {{0, 0, 0}, 0, {0, 0, 1}, 1};
     hgrid_hit hit;
@@ -35,5 +37,5 @@ int main(void)
     return misplaced != 0 || status != HGRID_OK || report.triangle != HGRID_INVALID_ID ||
            hgrid_intersect(&grid, &ray, &options, &hit) || hgrid_occluded(&grid, &ray, NULL) ||
            hgrid_intersect_n(&grid, &ray, 0, &hit, 0, 1, coherence, &options) != HGRID_OK ||
-           hit.primitive != HGRID_INVALID_ID;
+           hit.primitive != HGRID_INVALID_ID || allocator.allocate != NULL;
 }

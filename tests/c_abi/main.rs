@@ -5,6 +5,7 @@
 //! libraries' symbols show that there is nothing else in them.
 
 mod answers;
+mod create;
 mod header;
 mod programs;
 mod symbols;

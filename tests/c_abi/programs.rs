@@ -8,15 +8,24 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use hgrid_tests::artefact::{
-    compiler, is_installed, library_dir, root, run, shared_library, static_library,
+    Flavour, compiler, is_installed, library_dir, root, run, static_library,
 };
 use tempfile::TempDir;
 
 use crate::header::statuses;
 
-/// Programs that check for themselves and tell which statuses they reached.
-const PROGRAMS: [&str; 7] =
-    ["queries", "batches", "memory", "methods", "parallel", "refusals", "blobs"];
+/// Programs that check for themselves and tell which statuses they reached, and the flavour of the
+/// library that they need.
+const PROGRAMS: [(&str, Flavour); 8] = [
+    ("queries", Flavour::NoStd),
+    ("batches", Flavour::NoStd),
+    ("memory", Flavour::NoStd),
+    ("methods", Flavour::NoStd),
+    ("parallel", Flavour::NoStd),
+    ("refusals", Flavour::NoStd),
+    ("blobs", Flavour::NoStd),
+    ("create", Flavour::Std),
+];
 
 const SANITIZERS: [&str; 3] =
     ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"];
@@ -40,28 +49,34 @@ pub(crate) fn compile(
     program
 }
 
-/// Compiles and runs all programs.
-fn run_all(dialect: &str, flags: &[&str], library: &Path) {
+/// Compiles and runs all programs with a library of the flavour that they need.
+fn run_all(dialect: &str, flags: &[&str], library: impl Fn(Flavour) -> PathBuf) {
     let dir = TempDir::new().expect("a folder");
-    for name in PROGRAMS {
-        let program = compile(name, dialect, flags, library, dir.path());
-        run(Command::new(program).env("LD_LIBRARY_PATH", library_dir()));
+    for (name, flavour) in PROGRAMS {
+        let program = compile(name, dialect, flags, &library(flavour), dir.path());
+        run(Command::new(program).env("LD_LIBRARY_PATH", flavour.dir()));
     }
 }
 
 #[test]
 fn they_pass_as_c99_with_sanitizers() {
-    run_all("c99", &SANITIZERS, &static_library());
+    run_all("c99", &SANITIZERS, Flavour::static_library);
 }
 
 #[test]
 fn they_pass_as_cpp_with_sanitizers() {
-    run_all("c++17", &SANITIZERS, &static_library());
+    run_all("c++17", &SANITIZERS, Flavour::static_library);
 }
 
 #[test]
 fn they_pass_with_the_shared_library() {
-    run_all("c11", &[], &shared_library());
+    run_all("c11", &[], Flavour::shared_library);
+}
+
+/// The flavour that can do more does the rest the same.
+#[test]
+fn they_pass_with_the_larger_flavour() {
+    run_all("c11", &["-DHGRID_STD"], |_| Flavour::Std.static_library());
 }
 
 #[test]
@@ -70,8 +85,8 @@ fn they_pass_under_valgrind() {
         return;
     }
     let dir = TempDir::new().expect("a folder");
-    for name in PROGRAMS {
-        let program = compile(name, "c99", &[], &static_library(), dir.path());
+    for (name, flavour) in PROGRAMS {
+        let program = compile(name, "c99", &[], &flavour.static_library(), dir.path());
         run(Command::new("valgrind").args(["--quiet", "--error-exitcode=99"]).arg(program));
     }
 }
@@ -107,8 +122,8 @@ fn the_library_links_by_its_name_alone() {
 fn every_status_is_reached_and_described() {
     let dir = TempDir::new().expect("a folder");
     let [mut reached, mut described] = [BTreeSet::new(), BTreeSet::new()];
-    for name in PROGRAMS {
-        let program = compile(name, "c99", &[], &static_library(), dir.path());
+    for (name, flavour) in PROGRAMS {
+        let program = compile(name, "c99", &[], &flavour.static_library(), dir.path());
         let printed = String::from_utf8(run(&mut Command::new(program)).stdout).expect("text");
         for (word, status) in printed.lines().filter_map(|line| line.split_once(' ')) {
             let set = if word == "reached" { &mut reached } else { &mut described };

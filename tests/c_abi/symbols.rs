@@ -2,10 +2,14 @@
 //! but moving memory.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::path::Path;
 use std::process::Command;
 
-use hgrid_tests::artefact::{compiler, is_installed, root, run, shared_library, static_library};
+use hgrid_tests::artefact::{
+    Flavour, cargo_in, compiler, is_installed, root, run, static_library, target_dir,
+};
+use hgrid_tests::symbols::{extract_ours, symbols, symbols_of_ours};
 use tempfile::TempDir;
 
 use crate::header::functions;
@@ -13,35 +17,30 @@ use crate::header::functions;
 /// What compilers may ask of any C library, or of the compiler's own, behind the program's back.
 const MEMORY: [&str; 5] = ["memcpy", "memmove", "memset", "memcmp", "bcmp"];
 
-/// The symbols that `nm` lists with these flags.
-fn symbols(library: &Path, flags: &[&str]) -> BTreeSet<String> {
-    let output = run(Command::new("nm").args(flags).arg(library));
-    let text = String::from_utf8(output.stdout).expect("text");
-    let lines = text.lines().filter(|line| !line.is_empty() && !line.ends_with(':'));
-    lines.filter_map(|line| Some(line.rsplit(' ').next()?.to_owned())).collect()
+/// What `hgrid_create` asks of the C library.
+const ALLOCATOR: [&str; 2] = ["posix_memalign", "free"];
+
+/// Whether a flavour may need a symbol.
+fn may_need(flavour: Flavour, name: &str) -> bool {
+    MEMORY.contains(&name) || flavour == Flavour::Std && ALLOCATOR.contains(&name)
 }
 
-/// The object in the archive that is ours, put into a folder. The others are the compiler's run-time
-/// library, from which the linker takes what a target lacks.
-fn our_object(dir: &Path) -> PathBuf {
-    let archive = static_library();
-    let members = run(Command::new("ar").arg("t").arg(&archive)).stdout;
-    let members = String::from_utf8(members).expect("text");
-    let ours: Vec<_> = members.lines().filter(|name| name.starts_with("hgrid.")).collect();
-    let [ours] = ours[..] else { panic!("one object after link-time optimisation, not {ours:?}") };
-    run(Command::new("ar").current_dir(dir).arg("x").arg(&archive).arg(ours));
-    dir.join(ours)
-}
-
-fn symbols_of_our_object(flags: &[&str]) -> BTreeSet<String> {
-    let dir = TempDir::new().expect("a folder");
-    symbols(&our_object(dir.path()), flags)
+/// The committed list of what a flavour exports: `symbols.txt`, a name a line, and `std` behind what
+/// only that one has.
+fn exports(flavour: Flavour) -> BTreeSet<String> {
+    let lines = include_str!("symbols.txt").lines();
+    let names = lines.filter_map(|line| match line.split_once(' ') {
+        None => Some(line),
+        Some((name, "std")) => (flavour == Flavour::Std).then_some(name),
+        Some((_, other)) => panic!("no flavour: {other}"),
+    });
+    names.map(str::to_owned).collect()
 }
 
 /// Functions and source lines from which a symbol with one of the words is called.
-fn callers(words: &[&str]) -> String {
+fn callers(archive: &Path, words: &[&str]) -> String {
     let dir = TempDir::new().expect("a folder");
-    let object = our_object(dir.path());
+    let object = extract_ours(archive, dir.path());
     let code =
         run(Command::new("objdump").args(["-drlC", "--no-show-raw-insn"]).arg(object)).stdout;
     let (mut function, mut place, mut found) = ("", "", BTreeSet::new());
@@ -59,39 +58,76 @@ fn callers(words: &[&str]) -> String {
 }
 
 #[test]
-fn the_shared_library_exports_the_headers_functions() {
-    if is_installed("nm") {
-        let exported = symbols(&shared_library(), &["-D", "--defined-only"]);
-        assert_eq!(exported, functions().into_iter().collect());
+fn the_committed_list_is_what_the_header_declares() {
+    let path = root().join("tests/c_abi/symbols.txt");
+    let all = functions(Flavour::Std);
+    let common = functions(Flavour::NoStd);
+    let line = |name: &String| {
+        let flavour = if common.contains(name) { "" } else { " std" };
+        format!("{name}{flavour}\n")
+    };
+    let list: String = all.iter().map(line).collect();
+    if std::env::var_os("HGRID_BLESS").is_some() {
+        fs::write(&path, &list).expect("tests/ can be written");
+    }
+    assert_eq!(fs::read_to_string(path).expect("the list"), list, "HGRID_BLESS=1 writes it anew");
+}
+
+#[test]
+fn both_flavours_export_what_is_listed_and_no_more() {
+    if !is_installed("nm") {
+        return;
+    }
+    for flavour in Flavour::ALL {
+        let shared = symbols(&flavour.shared_library(), &["-D", "--defined-only"]);
+        assert_eq!(shared, exports(flavour), "{flavour:?}");
+        let ours = symbols_of_ours(&flavour.static_library(), &["--defined-only", "--extern-only"]);
+        assert_eq!(ours, exports(flavour), "{flavour:?}");
     }
 }
 
 #[test]
-fn the_static_library_exports_the_headers_functions() {
-    if is_installed("nm") {
-        let exported = symbols_of_our_object(&["--defined-only", "--extern-only"]);
-        assert_eq!(exported, functions().into_iter().collect());
+fn the_static_libraries_need_nothing_but_memory() {
+    if !is_installed("nm") {
+        return;
     }
-}
-
-#[test]
-fn the_static_library_needs_nothing_but_memory_moves() {
-    if is_installed("nm") {
-        let needed = symbols_of_our_object(&["--undefined-only"]);
-        let more: Vec<_> = needed.iter().filter(|name| !MEMORY.contains(&name.as_str())).collect();
-        assert!(more.is_empty(), "{more:?}");
+    for flavour in Flavour::ALL {
+        let needed = symbols_of_ours(&flavour.static_library(), &["--undefined-only"]);
+        let more: Vec<_> = needed.iter().filter(|name| !may_need(flavour, name)).collect();
+        assert!(more.is_empty(), "{flavour:?}: {more:?}");
     }
 }
 
 /// A panic would end the program of a user who never heard of one. No symbol, no panic.
 #[test]
 fn nothing_panics_allocates_or_starts_threads() {
-    if is_installed("nm") {
-        let all = symbols_of_our_object(&[]);
-        let words = ["panic", "_fail", "__rust_", "alloc", "pthread", "unwind"];
+    if !is_installed("nm") {
+        return;
+    }
+    let words = ["panic", "_fail", "__rust_", "alloc", "pthread", "unwind"];
+    for flavour in Flavour::ALL {
+        let archive = flavour.static_library();
+        let all = symbols_of_ours(&archive, &[]);
         let is_bad = |name: &&String| words.iter().any(|word| name.contains(word));
         let bad: Vec<_> = all.iter().filter(is_bad).collect();
-        assert!(bad.is_empty(), "{bad:#?}, called from\n{}", callers(&words));
+        assert!(bad.is_empty(), "{bad:#?}, called from\n{}", callers(&archive, &words));
+    }
+}
+
+/// What rustc would tell a C programmer to add to the link line. It does not depend on the profile, so
+/// a quick one serves.
+#[test]
+fn neither_flavour_asks_for_a_library() {
+    let target = target_dir().join("link_line");
+    for flavour in Flavour::ALL {
+        let mut rustc = cargo_in(&target, "rustc");
+        rustc.args(["-p", "hgrid-capi", "--crate-type", "staticlib"]).args(flavour.features());
+        rustc.args(["--config", "profile.dev.opt-level=0", "--", "--print", "native-static-libs"]);
+        let told = String::from_utf8(run(&mut rustc).stderr).expect("text");
+        let libraries: Vec<_> =
+            told.lines().filter_map(|line| line.split_once("native-static-libs:")).collect();
+        let [(_, libraries)] = libraries[..] else { panic!("{told}") };
+        assert_eq!(libraries.trim(), "", "{flavour:?}");
     }
 }
 
@@ -105,10 +141,10 @@ fn two_copies_in_one_program_do_not_clash() {
     let dir = TempDir::new().expect("a folder");
     let [copy, program] = ["copy.o", "copies"].map(|name| dir.path().join(name));
     let mut objcopy = Command::new("objcopy");
-    for function in functions() {
+    for function in functions(Flavour::NoStd) {
         objcopy.arg("--redefine-sym").arg(format!("{function}=other_{function}"));
     }
-    run(objcopy.arg(our_object(dir.path())).arg(&copy));
+    run(objcopy.arg(extract_ours(&static_library(), dir.path())).arg(&copy));
     let source = root().join("tests/c_abi/copies.c");
     run(compiler("c99")
         .arg("-D_DEFAULT_SOURCE")
@@ -121,16 +157,19 @@ fn two_copies_in_one_program_do_not_clash() {
 }
 
 #[test]
-fn the_shared_library_needs_nothing_but_libc() {
-    if is_installed("nm") {
-        let needed = symbols(&shared_library(), &["-D", "--undefined-only"]);
+fn the_shared_libraries_need_nothing_but_libc() {
+    if !is_installed("nm") {
+        return;
+    }
+    for flavour in Flavour::ALL {
+        let needed = symbols(&flavour.shared_library(), &["-D", "--undefined-only"]);
         let is_known = |name: &&String| {
             let name = name.split('@').next().unwrap_or_default();
             // Hooks that the C start-up code offers every library, weak and unused.
             let hooks = ["__cxa_finalize", "__gmon_start__"];
-            MEMORY.contains(&name) || hooks.contains(&name) || name.starts_with("_ITM_")
+            may_need(flavour, name) || hooks.contains(&name) || name.starts_with("_ITM_")
         };
         let more: Vec<_> = needed.iter().filter(|name| !is_known(name)).collect();
-        assert!(more.is_empty(), "{more:?}");
+        assert!(more.is_empty(), "{flavour:?}: {more:?}");
     }
 }

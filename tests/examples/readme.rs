@@ -1,32 +1,49 @@
 //! The README says what is so: its C program runs, and the files it names are there.
 
 use std::fs;
+use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
-use hgrid_tests::artefact::{root, run};
+use hgrid_tests::artefact::{is_installed, library_dir, root, run};
 use tempfile::TempDir;
-
-use crate::programs::compile;
 
 fn page(name: &str) -> String {
     fs::read_to_string(root().join(name)).expect("a page of the project")
 }
 
+/// The first block of a language behind a place in the README.
+fn block<'a>(readme: &'a str, language: &str) -> (&'a str, &'a str) {
+    let (_, rest) = readme.split_once(&format!("```{language}\n")).expect("a block");
+    rest.split_once("```").expect("the end of the block")
+}
+
+/// The program in C and the commands below it, in a folder that looks like the repository.
 #[test]
 fn its_c_program_prints_the_hit() {
+    if !is_installed("cc") {
+        return;
+    }
     let readme = page("README.md");
-    let (_, rest) = readme.split_once("```c\n").expect("a program in C");
-    let (program, _) = rest.split_once("```").expect("the end of the program");
-    let dir = TempDir::new().expect("a folder");
-    let source = dir.path().join("prog.c");
-    // What the README includes as installed lies beside nothing here but the header's own folder.
-    fs::write(&source, program).expect("a file");
-    let example = dir.path().join("prog");
-    compile(&[source], &[], &example);
-    let printed = run(&mut Command::new(example)).stdout;
-    assert_eq!(String::from_utf8(printed).as_deref(), Ok("hit at t = 1\n"));
+    let (program, behind) = block(&readme, "c");
     assert!(program.lines().count() <= 40);
+    let (commands, _) = block(behind, "sh");
+    let commands: Vec<_> = commands.lines().collect();
+    // The library is there already, and the last line has a test of its own.
+    let ["cargo build --release -p hgrid-capi", compile, start, _] = commands[..] else {
+        panic!("{commands:?}")
+    };
+    assert_eq!(compile, "cc prog.c -Iinclude -Ltarget/release -lhgrid");
+
+    let dir = TempDir::new().expect("a folder");
+    fs::write(dir.path().join("prog.c"), program).expect("a file");
+    fs::create_dir(dir.path().join("target")).expect("a folder");
+    symlink(root().join("include"), dir.path().join("include")).expect("a link");
+    symlink(library_dir(), dir.path().join("target/release")).expect("a link");
+    let [compiled, printed] = [compile, start]
+        .map(|command| run(Command::new("sh").arg("-c").arg(command).current_dir(dir.path())));
+    assert!(compiled.stderr.is_empty(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    assert_eq!(String::from_utf8(printed.stdout).as_deref(), Ok("hit at t = 1\n"));
 }
 
 #[test]

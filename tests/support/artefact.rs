@@ -2,6 +2,7 @@
 //!
 //! The library is built by the same cargo, in the release profile, once for each test program, into
 //! a folder of its own below the target folder: a test program holds the lock of the outer one.
+//! Each flavour has a folder, so that one does not take the place of the other.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -26,36 +27,93 @@ pub fn target_dir() -> PathBuf {
 
 /// A cargo command for this repository that nothing in the environment bends.
 #[must_use]
-pub fn cargo(subcommand: &str) -> Command {
+pub fn bare_cargo(subcommand: &str) -> Command {
     let mut cargo = Command::new(env!("CARGO"));
-    cargo.arg(subcommand).args(["--quiet", "--offline", "--target-dir"]).arg(target_dir());
-    cargo.current_dir(root());
+    cargo.arg(subcommand).arg("--offline").current_dir(root());
     for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET"] {
         cargo.env_remove(name);
     }
     cargo
 }
 
-/// Where `libhgrid.a` and `libhgrid.so` lie, fresh from the compiler.
-pub fn library_dir() -> &'static Path {
-    static DIR: OnceLock<PathBuf> = OnceLock::new();
-    DIR.get_or_init(|| {
-        run(cargo("build").args(["--release", "-p", "hgrid-capi"]));
-        target_dir().join("release")
-    })
+/// The same for one that compiles, into the target folder of the tests.
+#[must_use]
+pub fn cargo(subcommand: &str) -> Command {
+    cargo_in(&target_dir(), subcommand)
 }
 
-/// The static library.
+/// The same with another target folder.
+#[must_use]
+pub fn cargo_in(target_dir: &Path, subcommand: &str) -> Command {
+    let mut cargo = bare_cargo(subcommand);
+    cargo.arg("--quiet").arg("--target-dir").arg(target_dir);
+    cargo
+}
+
+/// What the library is built with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flavour {
+    /// Nothing: what needs no operating system.
+    NoStd,
+    /// The feature `std`: the same, and `hgrid_create`.
+    Std,
+}
+
+impl Flavour {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::NoStd, Self::Std];
+
+    /// What to tell cargo.
+    #[must_use]
+    pub fn features(self) -> &'static [&'static str] {
+        match self {
+            Self::NoStd => &[],
+            Self::Std => &["--features", "std"],
+        }
+    }
+
+    /// Where `libhgrid.a` and `libhgrid.so` lie, fresh from the compiler.
+    pub fn dir(self) -> &'static Path {
+        static DIRS: [OnceLock<PathBuf>; 2] = [const { OnceLock::new() }; 2];
+        DIRS[self as usize].get_or_init(|| {
+            let target = match self {
+                Self::NoStd => target_dir(),
+                Self::Std => target_dir().join("std"),
+            };
+            let mut build = cargo_in(&target, "build");
+            run(build.args(["--release", "-p", "hgrid-capi"]).args(self.features()));
+            target.join("release")
+        })
+    }
+
+    /// The static library.
+    #[must_use]
+    pub fn static_library(self) -> PathBuf {
+        self.dir().join("libhgrid.a")
+    }
+
+    /// The shared library.
+    #[must_use]
+    pub fn shared_library(self) -> PathBuf {
+        self.dir().join(format!("{}hgrid{}", env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX))
+    }
+}
+
+/// Where the libraries of the usual flavour lie.
+pub fn library_dir() -> &'static Path {
+    Flavour::NoStd.dir()
+}
+
+/// The usual static library.
 #[must_use]
 pub fn static_library() -> PathBuf {
-    library_dir().join("libhgrid.a")
+    Flavour::NoStd.static_library()
 }
 
-/// The shared library.
+/// The usual shared library.
 #[must_use]
 pub fn shared_library() -> PathBuf {
-    let name = format!("{}hgrid{}", env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX);
-    library_dir().join(name)
+    Flavour::NoStd.shared_library()
 }
 
 /// A compiler for a dialect like `c99` or `c++17`, with the header on its path and every warning an

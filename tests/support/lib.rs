@@ -7,3 +7,4 @@ pub mod oracle;
 pub mod owned;
 pub mod random;
 pub mod scans;
+pub mod symbols;

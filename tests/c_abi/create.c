@@ -1,0 +1,328 @@
+/* Does hgrid_create build what hgrid_build builds, in memory that it gives back to the byte, whatever
+ * goes wrong? For libraries with the feature std. */
+
+#ifndef HGRID_STD
+#define HGRID_STD
+#endif
+#include "check.h"
+
+static sheet mesh_data;
+static hgrid_mesh mesh;
+static const hgrid_config configs[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
+                                       HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
+                                       HGRID_CONFIG_INIT_BRICK};
+enum { CONFIGS = sizeof configs / sizeof *configs };
+
+/* Takes a note of every block that is out, and runs out of memory on demand. */
+typedef struct {
+    struct {
+        void *start;
+        size_t bytes, alignment;
+    } blocks[8];
+    size_t live, calls, bytes;
+    size_t fail_at;  /* the call, from 1, that gets nothing; 0: none */
+    size_t shift;    /* what is given starts so many bytes too late */
+} arena;
+
+static arena new_arena(void)
+{
+    arena a;
+    memset(&a, 0, sizeof a);
+    return a;
+}
+
+static void *arena_allocate(void *context, size_t bytes, size_t alignment)
+{
+    arena *a = (arena *)context;
+    CHECK(bytes > 0 && alignment > 0 && (alignment & (alignment - 1)) == 0);
+    if (++a->calls == a->fail_at)
+        return NULL;
+    void *start = NULL;
+    CHECK(a->live < sizeof a->blocks / sizeof *a->blocks);
+    CHECK(posix_memalign(&start, alignment, bytes + a->shift) == 0);
+    memset(start, 0xc7, bytes + a->shift);
+    a->blocks[a->live].start = start;
+    a->blocks[a->live].bytes = bytes;
+    a->blocks[a->live].alignment = alignment;
+    a->live++;
+    a->bytes += bytes;
+    return (unsigned char *)start + a->shift;
+}
+
+static void arena_release(void *context, void *memory, size_t bytes, size_t alignment)
+{
+    arena *a = (arena *)context;
+    void *start = (unsigned char *)memory - a->shift;
+    size_t i = 0;
+    while (i < a->live && a->blocks[i].start != start)
+        i++;
+    CHECK(i < a->live && a->blocks[i].bytes == bytes && a->blocks[i].alignment == alignment);
+    a->blocks[i] = a->blocks[--a->live];
+    a->bytes -= bytes;
+    free(start);
+}
+
+static hgrid_allocator allocator_of(arena *a)
+{
+    hgrid_allocator allocator = HGRID_ALLOCATOR_INIT;
+    allocator.context = a;
+    allocator.allocate = arena_allocate;
+    allocator.release = arena_release;
+    return allocator;
+}
+
+/* A view that no call may have touched. */
+static hgrid_grid untouched;
+
+/* A call that is refused: the address of the view is as it was, nothing is out. */
+static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
+                           const hgrid_config *config, arena *a)
+{
+    const hgrid_allocator allocator = allocator_of(a);
+    hgrid_grid *grid = &untouched;
+    hgrid_report report = HGRID_REPORT_INIT;
+    EXPECT(expected, hgrid_create(input, config, &allocator, &grid, &report));
+    CHECK(grid == &untouched && a->live == 0 && a->bytes == 0);
+    CHECK(report.struct_size == sizeof report && report.reserved == 0);
+    return report;
+}
+
+/* A grid that was created answers as one that was built, and tells the same about itself. */
+static void compare_with_a_build(const hgrid_grid *grid, const hgrid_report *report,
+                                 const hgrid_config *config)
+{
+    const hgrid_report need = exact_sizes(&mesh, config);
+    void *index = guarded(need.index_bytes), *scratch = guarded(need.scratch_bytes);
+    hgrid_grid built;
+    hgrid_report told = HGRID_REPORT_INIT;
+    EXPECT(HGRID_OK, hgrid_build(&mesh, config, index, need.index_bytes, scratch,
+                                 need.scratch_bytes, &built, &told));
+    CHECK(memcmp(report, &told, sizeof told) == 0);
+    EXPECT(HGRID_OK, hgrid_validate(grid));
+    const hgrid_grid copy = *grid;
+    for (int i = 0; i < 200; i++) {
+        const hgrid_ray ray = ray_down((float)(i % 19) / 17, (float)(i % 23) / 21);
+        hgrid_hit hits[3];
+        const bool is_hit = hgrid_intersect(&built, &ray, NULL, &hits[0]);
+        CHECK(hgrid_intersect(grid, &ray, NULL, &hits[1]) == is_hit);
+        CHECK(hgrid_intersect(&copy, &ray, NULL, &hits[2]) == is_hit);
+        CHECK(!is_hit || memcmp(&hits[0], &hits[1], sizeof *hits) == 0);
+        CHECK(!is_hit || memcmp(&hits[0], &hits[2], sizeof *hits) == 0);
+    }
+}
+
+static void the_systems_memory_serves(void)
+{
+    for (int i = 0; i < CONFIGS; i++) {
+        hgrid_grid *grid = NULL;
+        hgrid_report report = HGRID_REPORT_INIT;
+        EXPECT(HGRID_OK, hgrid_create(&mesh, &configs[i], NULL, &grid, &report));
+        compare_with_a_build(grid, &report, &configs[i]);
+        hgrid_destroy(grid);
+    }
+}
+
+static void all_memory_is_given_back_as_it_was_asked_for(void)
+{
+    for (int i = 0; i < CONFIGS; i++) {
+        arena a = new_arena();
+        hgrid_grid *grid = NULL;
+        hgrid_report report = HGRID_REPORT_INIT;
+        {
+            /* The struct itself is gone when the grid is destroyed. */
+            hgrid_allocator allocator = allocator_of(&a);
+            EXPECT(HGRID_OK, hgrid_create(&mesh, &configs[i], &allocator, &grid, &report));
+            memset(&allocator, 0xc7, sizeof allocator);
+        }
+        compare_with_a_build(grid, &report, &configs[i]);
+
+        /* The grid is all that is out: the exact index and a little for the view. */
+        const hgrid_report need = exact_sizes(&mesh, &configs[i]);
+        CHECK(a.live == 1 && a.calls == 2);
+        CHECK(a.bytes > need.index_bytes && a.bytes < need.index_bytes + 1024);
+        CHECK(a.blocks[0].start == (void *)grid && a.blocks[0].alignment == HGRID_ALIGNMENT);
+        hgrid_destroy(grid);
+        CHECK(a.live == 0 && a.bytes == 0 && a.calls == 2);
+    }
+}
+
+static void every_allocation_may_fail(void)
+{
+    for (int i = 0; i < CONFIGS; i++) {
+        const hgrid_report need = exact_sizes(&mesh, &configs[i]);
+        size_t fail_at = 1;
+        for (;; fail_at++) {
+            arena a = new_arena();
+            a.fail_at = fail_at;
+            const hgrid_allocator allocator = allocator_of(&a);
+            hgrid_grid *grid = &untouched;
+            if (hgrid_create(&mesh, &configs[i], &allocator, &grid, NULL) == HGRID_OK) {
+                CHECK(a.calls == fail_at - 1);
+                hgrid_destroy(grid);
+                CHECK(a.live == 0);
+                break;
+            }
+            a = new_arena();
+            a.fail_at = fail_at;
+            const hgrid_report report =
+                refuse(HGRID_ERROR_OUT_OF_MEMORY, &mesh, &configs[i], &a);
+            CHECK(report.index_bytes >= need.index_bytes && report.triangle == HGRID_INVALID_ID);
+            CHECK(report.scratch_bytes >= need.scratch_bytes);
+            CHECK(report.is_exact == (fail_at > 1));
+        }
+        CHECK(fail_at == 3);
+    }
+}
+
+static void memory_that_is_not_aligned_is_given_back(void)
+{
+    for (size_t shift = 1; shift < HGRID_ALIGNMENT; shift++) {
+        arena a = new_arena();
+        a.shift = shift;
+        refuse(HGRID_ERROR_MISALIGNED, &mesh, NULL, &a);
+        CHECK(a.calls == 1);
+    }
+}
+
+/* A build that fails when both regions are there gives both back. It takes an allocator that gives the
+ * same memory twice, which is refused as regions that overlap. */
+static HGRID_ALIGNED unsigned char only_region[1 << 17];
+static size_t times_released;
+
+static void *give_the_only_region(void *context, size_t bytes, size_t alignment)
+{
+    CHECK(context == NULL && bytes <= sizeof only_region && alignment <= 64);
+    return only_region;
+}
+
+static void take_the_only_region(void *context, void *memory, size_t bytes, size_t alignment)
+{
+    CHECK(context == NULL && memory == only_region && bytes > 0 && alignment <= 64);
+    times_released++;
+}
+
+static void a_build_that_fails_gives_back_both_regions(void)
+{
+    hgrid_allocator allocator = HGRID_ALLOCATOR_INIT;
+    allocator.allocate = give_the_only_region;
+    allocator.release = take_the_only_region;
+    hgrid_grid *grid = &untouched;
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_create(&mesh, &configs[4], &allocator, &grid, NULL));
+    CHECK(grid == &untouched && times_released == 2);
+}
+
+static void null_is_refused_where_it_is_not_allowed(void)
+{
+    arena a = new_arena();
+    hgrid_allocator allocator = allocator_of(&a);
+    hgrid_report report = HGRID_REPORT_INIT;
+    hgrid_grid *grid = &untouched;
+    refuse(HGRID_ERROR_NULL_ARGUMENT, NULL, NULL, &a);
+    EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_create(&mesh, NULL, &allocator, NULL, &report));
+    EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_create(NULL, NULL, NULL, NULL, NULL));
+    allocator.allocate = NULL;
+    EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_create(&mesh, NULL, &allocator, &grid, &report));
+    allocator = allocator_of(&a);
+    allocator.release = NULL;
+    EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_create(&mesh, NULL, &allocator, &grid, &report));
+    hgrid_mesh input = mesh;
+    input.positions = NULL;
+    refuse(HGRID_ERROR_NULL_ARGUMENT, &input, NULL, &a);
+    input = mesh;
+    input.indices = NULL;
+    refuse(HGRID_ERROR_NULL_ARGUMENT, &input, NULL, &a);
+    CHECK(grid == &untouched && a.calls == 0);
+
+    /* Config, allocator and report may be NULL, and so may what is destroyed. */
+    EXPECT(HGRID_OK, hgrid_create(&mesh, NULL, NULL, &grid, NULL));
+    EXPECT(HGRID_OK, hgrid_validate(grid));
+    hgrid_destroy(grid);
+    hgrid_destroy(NULL);
+}
+
+static void the_allocators_struct_is_checked(void)
+{
+    arena a = new_arena();
+    struct {
+        hgrid_allocator known;
+        unsigned char tail[16];
+    } later = {allocator_of(&a), {0}};
+    const uint32_t sizes[] = {0, sizeof later.known - 1, sizeof later.known, sizeof later,
+                              UINT32_MAX};
+    for (int i = 0; i < 5; i++) {
+        later.known.struct_size = sizes[i];
+        hgrid_grid *grid = &untouched;
+        if (sizes[i] == sizeof later.known || sizes[i] == sizeof later) {
+            EXPECT(HGRID_OK, hgrid_create(&mesh, NULL, &later.known, &grid, NULL));
+            hgrid_destroy(grid);
+        } else {
+            EXPECT(HGRID_ERROR_STRUCT_SIZE, hgrid_create(&mesh, NULL, &later.known, &grid, NULL));
+            CHECK(grid == &untouched);
+        }
+    }
+    hgrid_grid *grid = &untouched;
+    later.tail[15] = 1;
+    later.known.struct_size = sizeof later;
+    EXPECT(HGRID_ERROR_STRUCT_SIZE, hgrid_create(&mesh, NULL, &later.known, &grid, NULL));
+    later.known = allocator_of(&a);
+    later.known.reserved = 1;
+    EXPECT(HGRID_ERROR_STRUCT_SIZE, hgrid_create(&mesh, NULL, &later.known, &grid, NULL));
+    CHECK(grid == &untouched && a.live == 0);
+}
+
+static void what_a_build_refuses_is_refused(void)
+{
+    arena a = new_arena();
+    hgrid_config config = HGRID_CONFIG_INIT;
+    config.method = 99;
+    refuse(HGRID_ERROR_INVALID_METHOD, &mesh, &config, &a);
+    static sheet broken;
+    broken = mesh_data;
+    broken.indices[77][1] = VERTICES;
+    hgrid_mesh input = mesh_of(&broken);
+    CHECK(refuse(HGRID_ERROR_INDEX_OUT_OF_RANGE, &input, NULL, &a).triangle == 77);
+    broken = mesh_data;
+    broken.positions[VERTICES - 1][2] = NAN;
+    config = configs[4];
+    config.flags = HGRID_BUILD_STRICT;
+    CHECK(refuse(HGRID_ERROR_NON_FINITE, &input, &config, &a).triangle == TRIANGLES - 2);
+    CHECK(a.calls == 0);
+    hgrid_report report = HGRID_REPORT_INIT;
+    report.struct_size = 3;
+    hgrid_grid *grid = &untouched;
+    EXPECT(HGRID_ERROR_STRUCT_SIZE, hgrid_create(&mesh, NULL, NULL, &grid, &report));
+    CHECK(grid == &untouched);
+}
+
+static void an_empty_mesh_is_a_grid(void)
+{
+    const hgrid_mesh empty = HGRID_MESH_INIT;
+    for (int i = 0; i < CONFIGS; i++) {
+        arena a = new_arena();
+        const hgrid_allocator allocator = allocator_of(&a);
+        hgrid_grid *grid = NULL;
+        EXPECT(HGRID_OK, hgrid_create(&empty, &configs[i], &allocator, &grid, NULL));
+        const hgrid_ray ray = ray_down(0, 0);
+        CHECK(!hgrid_occluded(grid, &ray, NULL));
+        hgrid_destroy(grid);
+        CHECK(a.live == 0);
+    }
+}
+
+int main(void)
+{
+    make_sheet(&mesh_data);
+    mesh = mesh_of(&mesh_data);
+    memset(&untouched, 0xc7, sizeof untouched);
+    the_systems_memory_serves();
+    all_memory_is_given_back_as_it_was_asked_for();
+    every_allocation_may_fail();
+    memory_that_is_not_aligned_is_given_back();
+    a_build_that_fails_gives_back_both_regions();
+    null_is_refused_where_it_is_not_allowed();
+    the_allocators_struct_is_checked();
+    what_a_build_refuses_is_refused();
+    an_empty_mesh_is_a_grid();
+    CHECK(all_bytes_are(&untouched, sizeof untouched, 0xc7));
+    return 0;
+}

@@ -1,0 +1,41 @@
+//! `hgrid_create`, which only one flavour of the library has: what `programs` does not ask about it.
+
+use std::fs;
+use std::process::Command;
+
+use hgrid_tests::artefact::{Flavour, compiler, is_installed, run, warnings};
+use tempfile::TempDir;
+
+use crate::header::{examples, seen_by};
+use crate::programs::compile;
+
+#[test]
+fn it_leaks_nothing() {
+    if !is_installed("valgrind") {
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    let program = compile("create", "c99", &[], &Flavour::Std.static_library(), dir.path());
+    let mut valgrind = Command::new("valgrind");
+    valgrind.args(["--quiet", "--error-exitcode=99", "--leak-check=full"]);
+    run(valgrind.args(["--show-leak-kinds=all", "--errors-for-leak-kinds=all"]).arg(program));
+}
+
+#[test]
+fn its_example_runs_by_every_compiler() {
+    let all = examples(&seen_by(Flavour::Std));
+    let common = examples(&seen_by(Flavour::NoStd));
+    let [example] = &all.iter().filter(|example| !common.contains(example)).collect::<Vec<_>>()[..]
+    else {
+        panic!("one example")
+    };
+    let dir = TempDir::new().expect("a folder");
+    let [source, program] = ["example.c", "example"].map(|name| dir.path().join(name));
+    fs::write(&source, include_str!("created.c").replace("FUNCTIONS", example)).expect("a file");
+    let clang = is_installed("clang").then(|| warnings(Command::new("clang"), "c99"));
+    for mut compiler in [compiler("c99")].into_iter().chain(clang) {
+        compiler.arg(&source).arg(Flavour::Std.static_library()).arg("-o").arg(&program);
+        run(&mut compiler);
+        run(&mut Command::new(&program));
+    }
+}

@@ -1,0 +1,141 @@
+//! A project that asks CMake: `find_package(hgrid)` and two targets.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use hgrid_tests::artefact::{Flavour, compiler, is_installed, output, root, run};
+use tempfile::TempDir;
+
+use crate::installed::soname;
+use crate::prefix::{HIT, Prefix, VERSION, dynamic, installed, laid_out, output_of, program};
+
+/// A cmake command that nothing in the environment bends.
+fn cmake() -> Command {
+    let mut cmake = Command::new("cmake");
+    for name in ["CMAKE_PREFIX_PATH", "CMAKE_GENERATOR", "CFLAGS", "LDFLAGS", "MAKEFLAGS"] {
+        cmake.env_remove(name);
+    }
+    cmake
+}
+
+/// Asks for a project's build files.
+fn configure(project: &Path, prefix: &Path, build: &Path) -> Output {
+    let mut cmake = cmake();
+    cmake.arg("-S").arg(project).arg("-B").arg(build);
+    cmake.arg(format!("-DCMAKE_PREFIX_PATH={}", prefix.display()));
+    cmake.arg(format!("-DSOURCE={}", root().join("c_examples/minimal.c").display()));
+    output(&mut cmake)
+}
+
+/// Builds the project outside with what lies in a folder, and runs its two programs.
+fn build_and_run(prefix: &Path) -> (TempDir, [PathBuf; 2]) {
+    let dir = TempDir::new().expect("a folder");
+    let project = root().join("tests/packages/outside");
+    let Output { status, stderr, .. } = configure(&project, prefix, dir.path());
+    assert!(status.success(), "{}", String::from_utf8_lossy(&stderr));
+    run(cmake().arg("--build").arg(dir.path()));
+    let programs = ["shared", "static"].map(|name| dir.path().join(name));
+    for path in &programs {
+        let printed = output_of(&mut program(path));
+        assert!(printed.ends_with(HIT), "{printed}");
+    }
+    (dir, programs)
+}
+
+#[test]
+fn a_project_links_what_cargo_c_installs() {
+    if !is_installed("cmake") || !is_installed("readelf") {
+        return;
+    }
+    let Some(Prefix { dir, .. }) = installed(Flavour::NoStd) else { return };
+    let (_dir, [shared, static_]) = build_and_run(dir);
+    assert!(dynamic(&shared, "NEEDED").contains(&soname()));
+    assert!(!dynamic(&static_, "NEEDED").contains(&soname()));
+}
+
+/// Debian has a folder for each architecture, Fedora has lib64, most others lib; and packages are moved
+/// about before they come to rest.
+#[test]
+fn a_project_finds_libraries_wherever_they_lie() {
+    if !is_installed("cmake") {
+        return;
+    }
+    let architecture = output_of(compiler("c99").arg("-print-multiarch"));
+    let mut places = vec!["lib".to_owned(), "lib64".to_owned()];
+    if !architecture.trim().is_empty() {
+        places.push(format!("lib/{}", architecture.trim()));
+    }
+    for place in places {
+        let (temporary, prefix) = laid_out(&place);
+        build_and_run(&prefix.dir);
+        let moved = temporary.path().join("another place");
+        fs::rename(&prefix.dir, &moved).expect("a new place");
+        build_and_run(&moved);
+    }
+}
+
+/// A project that says what it found.
+const PROBE: &str = r#"
+cmake_minimum_required(VERSION 3.19)
+project(probe C)
+foreach(wanted IN LISTS WANTED)
+  unset(hgrid_DIR CACHE)
+  find_package(hgrid ${wanted} QUIET)
+  message("${wanted}: ${hgrid_FOUND}")
+endforeach()
+foreach(target hgrid::hgrid hgrid::static)
+  if(TARGET ${target})
+    message("has ${target}")
+  endif()
+endforeach()
+find_package(hgrid REQUIRED)
+"#;
+
+/// What the probe says, and whether it was content.
+fn probe(prefix: &Path, wanted: &str) -> (String, bool) {
+    let dir = TempDir::new().expect("a folder");
+    let lists = format!("set(WANTED {wanted})\n{PROBE}");
+    fs::write(dir.path().join("CMakeLists.txt"), lists).expect("a file");
+    let Output { status, stderr, .. } = configure(dir.path(), prefix, &dir.path().join("build"));
+    (String::from_utf8(stderr).expect("text"), status.success())
+}
+
+#[test]
+fn a_project_gets_the_versions_that_do_not_break_it() {
+    if !is_installed("cmake") {
+        return;
+    }
+    let (_temporary, prefix) = laid_out("lib");
+    let good = [VERSION, "0.1", "0.1.0", "0.1...<0.2", "0.0.5...1.0", "0.1.0...0.1.0"];
+    let bad = ["0.0", "0.2", "0.1.99", "1", "1.0", "0.2...0.3", "0.0.1...<0.1"];
+    let (said, _) = probe(&prefix.dir, &[&good[..], &bad[..]].concat().join(" "));
+    let says = |line: String| assert!(said.lines().any(|said| said == line), "{line}\n{said}");
+    good.iter().for_each(|wanted| says(format!("{wanted}: 1")));
+    bad.iter().for_each(|wanted| says(format!("{wanted}: 0")));
+}
+
+#[test]
+fn the_cmake_package_has_the_version_of_the_library() {
+    let file = root().join("capi/cmake/hgrid-config-version.cmake");
+    let text = fs::read_to_string(file).expect("the file");
+    assert!(text.contains(&format!("set(PACKAGE_VERSION {VERSION})\n")), "{text}");
+}
+
+#[test]
+fn a_project_is_told_what_is_missing() {
+    if !is_installed("cmake") {
+        return;
+    }
+    let (_temporary, prefix) = laid_out("lib");
+    let remove = |name| fs::remove_file(prefix.lib.join(name)).expect("a library");
+    assert_eq!(probe(&prefix.dir, "0.1").0.matches("has hgrid::").count(), 2);
+    remove("libhgrid.so");
+    let (said, is_content) = probe(&prefix.dir, "0.1");
+    assert!(is_content && said.contains("has hgrid::static"), "{said}");
+    assert!(!said.contains("has hgrid::hgrid"), "{said}");
+    remove("libhgrid.a");
+    let (said, is_content) = probe(&prefix.dir, "0.1");
+    assert!(!is_content && said.contains("0.1: 0\n"), "{said}");
+    assert!(said.contains("there is no hgrid library beneath"), "{said}");
+}

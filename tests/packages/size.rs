@@ -1,0 +1,67 @@
+//! How large is a program with the library in it? The README says so, and a library that grows without
+//! anybody noticing does not stay one that a small machine can carry.
+
+use std::fs;
+use std::path::Path;
+
+use hgrid_tests::artefact::{compiler, root, run, static_library};
+use tempfile::TempDir;
+
+/// What the README says in front of the size of the program, and of the library's part in it.
+const WORDS: [&str; 2] = ["stripped: ", " bytes, of which "];
+
+#[test]
+fn minimal_is_as_small_as_the_readme_says() {
+    if !cfg!(all(target_arch = "x86_64", target_os = "linux")) {
+        println!("skipped: the README has the size for x86-64 Linux");
+        return;
+    }
+    let readme = fs::read_to_string(root().join("README.md")).expect("README.md");
+    let (before, behind) = readme.split_once(WORDS[0]).expect("a size");
+    let (program, behind) = behind.split_once(WORDS[1]).expect("another size");
+    let end = behind.find(' ').expect("an end");
+    let (library, behind) = behind.split_at(end);
+
+    let sizes = measure();
+    if std::env::var_os("HGRID_BLESS").is_some() {
+        let [program, library] = sizes;
+        let [stripped, of_which] = WORDS;
+        let readme = format!("{before}{stripped}{program}{of_which}{library}{behind}");
+        fs::write(root().join("README.md"), readme).expect("README.md can be written");
+        return;
+    }
+    for (said, is) in [program, library].into_iter().zip(sizes) {
+        let said: u64 = said.parse().expect("a number");
+        let slack = said / 10;
+        assert!(
+            is.abs_diff(said) <= slack,
+            "{said} bytes in the README, now {is}: HGRID_BLESS=1 writes it anew"
+        );
+    }
+}
+
+/// The size of the stripped program, and the bytes in it that come from the library.
+fn measure() -> [u64; 2] {
+    let dir = TempDir::new().expect("a folder");
+    let [program, map] = ["minimal", "map"].map(|name| dir.path().join(name));
+    let mut compiler = compiler("c99");
+    compiler.args(["-Os", "-Wl,--gc-sections", "-s"]).arg(root().join("c_examples/minimal.c"));
+    compiler.arg(static_library()).arg("-o").arg(&program);
+    run(compiler.arg(format!("-Wl,-Map,{}", map.display())));
+    [fs::metadata(program).expect("the program").len(), bytes_of_the_library(&map)]
+}
+
+/// What the linker's map says was put into memory out of our archive. Its lines end with an address, a
+/// size and a file; what was thrown away is at address 0.
+fn bytes_of_the_library(map: &Path) -> u64 {
+    let map = fs::read_to_string(map).expect("a map");
+    let number = |word: &str| u64::from_str_radix(word.strip_prefix("0x")?, 16).ok();
+    let size = |line: &str| {
+        let mut words = line.rsplit(' ').filter(|word| !word.is_empty());
+        let (file, size, address) = (words.next()?, words.next()?, words.next()?);
+        (file.contains("libhgrid.a(") && number(address)? > 0).then(|| number(size))?
+    };
+    let sum = map.lines().filter_map(size).sum();
+    assert!(sum > 10_000, "the map has another shape: {sum}");
+    sum
+}

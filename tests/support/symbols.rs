@@ -1,0 +1,65 @@
+//! The names in a library, as the tools of the linker tell them.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::artefact::run;
+
+/// The symbols that `nm` lists with these flags.
+///
+/// # Panics
+/// If it cannot read the library.
+#[must_use]
+pub fn symbols(library: &Path, flags: &[&str]) -> BTreeSet<String> {
+    names(list(library, flags).lines())
+}
+
+/// The same for the object in an archive that is ours. The others are the compiler's run-time
+/// library, from which the linker takes what a target lacks.
+///
+/// # Panics
+/// If it cannot read the archive, or if ours is not one object: then nothing optimised it as a whole.
+#[must_use]
+pub fn symbols_of_ours(archive: &Path, flags: &[&str]) -> BTreeSet<String> {
+    let heading = format!("{}:", ours(archive));
+    let list = list(archive, flags);
+    let behind = list.lines().skip_while(|line| *line != heading).skip(1);
+    names(behind.take_while(|line| !line.is_empty()))
+}
+
+/// Puts that object into a folder.
+///
+/// # Panics
+/// If it is not one.
+#[must_use]
+pub fn extract_ours(archive: &Path, dir: &Path) -> PathBuf {
+    let ours = ours(archive);
+    run(Command::new("ar").current_dir(dir).arg("x").arg(archive).arg(&ours));
+    dir.join(ours)
+}
+
+/// The name of that object.
+fn ours(archive: &Path) -> String {
+    let members = run(Command::new("ar").arg("t").arg(archive)).stdout;
+    let members = String::from_utf8(members).expect("text");
+    let ours: Vec<_> = members.lines().filter(|name| name.starts_with("hgrid.")).collect();
+    let [ours] = ours[..] else { panic!("one object after link-time optimisation, not {ours:?}") };
+    ours.to_owned()
+}
+
+fn list(library: &Path, flags: &[&str]) -> String {
+    let output = run(Command::new("nm").args(flags).arg(library));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// The names in lines like `0000000000000010 T name` and `U name`. There are others: headings, and
+/// what a plug-in of `nm` has to say about objects of newer compilers.
+fn names<'a>(lines: impl Iterator<Item = &'a str>) -> BTreeSet<String> {
+    let name = |line: &str| {
+        let mut words = line.split_whitespace().rev();
+        let (name, kind) = (words.next()?, words.next()?);
+        (kind.len() == 1).then(|| name.to_owned())
+    };
+    lines.filter_map(name).collect()
+}
