@@ -11,9 +11,12 @@
  *   hgrid_build       mesh + memory -> grid
  *   hgrid_intersect   grid + ray -> hit;  hgrid_occluded only says whether there is one
  *
- * Many rays at once, from your structs into your structs: hgrid_intersect_n, hgrid_occluded_n. And
- * for grids that are stored: hgrid_open, hgrid_validate. A large scene is built on threads of yours
- * by hgrid_sizes_parallel and hgrid_build_parallel.
+ * Many rays at once, from your structs into your structs: hgrid_intersect_n, hgrid_occluded_n. Every
+ * triangle along a ray: hgrid_intersect_all. The nearest point: hgrid_closest_point. Masks, culling, a
+ * triangle to skip, filters and counters are options of these. hgrid_bound, hgrid_sizes and hgrid_fit
+ * are about memory: enough for any mesh, for this one, and the best grid for a budget. A build on
+ * threads of yours, with progress, is a matter of hgrid_config. For grids that are stored there are
+ * hgrid_open, hgrid_peek, hgrid_pack and hgrid_validate, and hgrid_inspect looks at all of one.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -117,10 +120,10 @@
  *
  * Threads
  * -------
- * The library waits for no lock and starts no thread (hgrid_build_parallel uses yours), and it has no
- * global state but one byte that remembers which vector instructions the processor has. Any number of threads may query one grid at once, and
- * calls that share no memory they write never disturb each other. Each function says it again for
- * itself.
+ * The library waits for no lock and starts no thread (hgrid_build uses yours if you bring some), and
+ * it has no global state but one byte that remembers which vector instructions the processor has. Any
+ * number of threads may query one grid at once, and calls that share no memory they write never disturb
+ * each other. Each function says it again for itself.
  *
  * Results
  * -------
@@ -284,6 +287,22 @@
 #define HGRID_MAX_TASKS 64
 
 /**
+ * Both sides of a triangle are hit: the default of `hgrid_query_options`.
+ */
+#define HGRID_CULL_NONE 0
+
+/**
+ * A ray passes through triangles that show it their back.
+ */
+#define HGRID_CULL_BACK 1
+
+/**
+ * A ray passes through triangles that show it their front: the side from which the vertices appear
+ * counter-clockwise.
+ */
+#define HGRID_CULL_FRONT 2
+
+/**
  * Raised when programs must change to go on working.
  */
 #define HGRID_VERSION_MAJOR 0
@@ -309,50 +328,16 @@
 typedef int32_t hgrid_status;
 
 /**
- * A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
+ * A part of a build, as `run` of a `hgrid_config` gets it: a function of this library.
  *
- * The arrays are read where they lie, never copied and never changed, and not one byte behind the
- * last element's own bytes. They need no alignment, so both may be fields of the caller's structs.
- * Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
- * struct itself is only read during the call.
+ * It may be called on any thread, on several at once, with the `task_context` that came with it and
+ * an `index` below the `count` that came with it. It starts no thread, waits for none, and never
+ * jumps out.
  */
-typedef struct hgrid_mesh {
-    /**
-     * `sizeof(hgrid_mesh)`.
-     */
-    uint32_t struct_size;
-    /**
-     * `HGRID_INDEX_U32` or `HGRID_INDEX_U16`.
-     */
-    uint32_t index_type;
-    /**
-     * The first vertex: three floats x, y, z, in scene units. NULL only without vertices.
-     */
-    const void *positions;
-    /**
-     * Bytes from one vertex to the next, at least 12; 0 means 12.
-     */
-    size_t position_stride;
-    /**
-     * Number of vertices.
-     */
-    size_t vertex_count;
-    /**
-     * The first triangle: three vertex numbers, from 0. NULL only without triangles.
-     */
-    const void *indices;
-    /**
-     * Bytes from one triangle to the next, at least three indices; 0 means exactly three indices.
-     */
-    size_t index_stride;
-    /**
-     * Number of triangles, at most 4294967294.
-     */
-    size_t triangle_count;
-} hgrid_mesh;
+typedef void (*hgrid_task)(void *task_context, uint32_t index);
 
 /**
- * What a build may be told. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
+ * What a build may be told: which grid, and how to go about it. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
  * or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`,
  * `_BRICK`.
  *
@@ -398,6 +383,43 @@ typedef struct hgrid_config {
      * 0 or `HGRID_BUILD_STRICT`.
      */
     uint32_t flags;
+    /**
+     * For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores; each
+     * takes scratch of its own. With 0 and 1 nothing is parallel, and what is above `HGRID_MAX_TASKS`
+     * counts as that. The other methods build on the thread that calls.
+     */
+    uint32_t tasks;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+    /**
+     * Yours: passed on to `run` and `progress`.
+     */
+    void *context;
+    /**
+     * Calls `task(task_context, index)` once for every `index` below `count`, in any order, on any
+     * threads, and returns when all these calls have returned: after a join, or after any other
+     * synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
+     * library calls it several times, one after the other, on the thread that builds, with counts up
+     * to `tasks`; where the processor has no atomic operations, it never does. NULL only with `tasks`
+     * 0 or 1. `hgrid_build` has an example.
+     *
+     * A task that is called twice, even at the same time, one that is never called, and an index that
+     * is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`. Undefined
+     * behaviour, as nothing can detect it, is a call of `task` that is made or still running after
+     * `run` has returned, or with another `task_context`; a `run` that is left by `longjmp` or by a
+     * C++ exception; and one that changes what the build works on.
+     */
+    void (*run)(void *context, uint32_t count, hgrid_task task, void *task_context);
+    /**
+     * Told how much of a build is `done`, from 0 to 1, and answers whether to go on; or NULL. It is
+     * called on the thread that builds, a few times to a few hundred times; `done` grows from call
+     * to call, and in the last call of a build that succeeds it is exactly 1, whatever the answer.
+     * After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass over the mesh
+     * is over. It may not be left by `longjmp` or by a C++ exception.
+     */
+    bool (*progress)(void *context, float done);
 } hgrid_config;
 
 /**
@@ -422,8 +444,8 @@ typedef struct hgrid_report {
     uint64_t index_bytes;
     /**
      * Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_BRICK` it
-     * is enough, but not exact, and after a build an upper bound of that. After
-     * `hgrid_build_parallel`, whether it succeeds or fails, it is that of a build with one task.
+     * is enough, but not exact, and after a build an upper bound of that. After a build with
+     * several tasks, whether it succeeds or fails, it is that of a build with one.
      */
     uint64_t scratch_bytes;
     /**
@@ -457,49 +479,56 @@ typedef struct hgrid_report {
 } hgrid_report;
 
 /**
- * A part of a build, as `run` of a `hgrid_parallel` gets it: a function of this library.
+ * A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
  *
- * It may be called on any thread, on several at once, with the `task_context` that came with it and
- * an `index` below the `count` that came with it. It starts no thread, waits for none, and never
- * jumps out.
+ * The arrays are read where they lie, never copied and never changed, and not one byte behind the
+ * last element's own bytes. They need no alignment, so both may be fields of the caller's structs.
+ * Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
+ * struct itself is only read during the call.
  */
-typedef void (*hgrid_task)(void *task_context, uint32_t index);
-
-/**
- * How a build runs parts of it, its tasks, at once: by a loop of the caller's, over the caller's
- * threads. Initialise it with `HGRID_PARALLEL_INIT`, which means what NULL means: one task after the
- * other, on the thread that calls. The grid does not depend on it, to the bit.
- */
-typedef struct hgrid_parallel {
+typedef struct hgrid_mesh {
     /**
-     * `sizeof(hgrid_parallel)`.
+     * `sizeof(hgrid_mesh)`.
      */
     uint32_t struct_size;
     /**
-     * The most tasks at once, usually the number of cores; each takes scratch of its own. With 0 and
-     * 1 nothing is parallel, and what is above `HGRID_MAX_TASKS` counts as that.
+     * `HGRID_INDEX_U32` or `HGRID_INDEX_U16`.
      */
-    uint32_t tasks;
+    uint32_t index_type;
     /**
-     * Yours: passed on to `run`.
+     * The first vertex: three floats x, y, z, in scene units. NULL only without vertices.
      */
-    void *context;
+    const void *positions;
     /**
-     * Calls `task(task_context, index)` once for every `index` below `count`, in any order, on any
-     * threads, and returns when all these calls have returned: after a join, or after any other
-     * synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
-     * library calls it several times, one after the other, on the thread that builds, with counts up
-     * to `tasks`; where the processor has no atomic operations, it never does. NULL only with `tasks`
-     * 0 or 1.
-     *
-     * A task that is called twice, even at the same time, one that is never called, and an index that
-     * is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`. Undefined
-     * behaviour, as nothing can detect it, is a call of `task` that is made or still running after
-     * `run` has returned, or with another `task_context`; a `run` that is left by `longjmp` or by a
-     * C++ exception; and one that changes what the build works on.
+     * Bytes from one vertex to the next, at least 12; 0 means 12.
      */
-    void (*run)(void *context, uint32_t count, hgrid_task task, void *task_context);
-} hgrid_parallel;
+    size_t position_stride;
+    /**
+     * Number of vertices.
+     */
+    size_t vertex_count;
+    /**
+     * The first triangle: three vertex numbers, from 0. NULL only without triangles.
+     */
+    const void *indices;
+    /**
+     * Bytes from one triangle to the next, at least three indices; 0 means exactly three indices.
+     */
+    size_t index_stride;
+    /**
+     * Number of triangles, at most 4294967294.
+     */
+    size_t triangle_count;
+    /**
+     * The first triangle's mask, a `uint32_t`, or NULL: queries with a mask of their own see a triangle
+     * if both have a bit in common. NULL means that every triangle has all bits.
+     */
+    const void *masks;
+    /**
+     * Bytes from one mask to the next, at least 4; 0 means 4.
+     */
+    size_t mask_stride;
+} hgrid_mesh;
 
 /**
  * A built grid and its mesh, ready for queries: a view, held by value.
@@ -544,41 +573,10 @@ typedef struct hgrid_ray {
 } hgrid_ray;
 
 /**
- * Work done by queries. A query adds to it, so one struct can sum up a whole picture.
+ * What a filter says of a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`. Anything
+ * else counts as `HGRID_REJECT`.
  */
-typedef struct hgrid_counters {
-    /**
-     * Ray-triangle tests.
-     */
-    uint64_t primitive_tests;
-    /**
-     * Cells and macrocells entered, empty ones included.
-     */
-    uint64_t cell_steps;
-    /**
-     * How often a ray went down a level, into a macrocell, a subgrid, a block or a brick; 0 for a
-     * grid of one level.
-     */
-    uint64_t grid_steps;
-} hgrid_counters;
-
-/**
- * What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
- */
-typedef struct hgrid_query_options {
-    /**
-     * `sizeof(hgrid_query_options)`.
-     */
-    uint32_t struct_size;
-    /**
-     * 0.
-     */
-    uint32_t reserved;
-    /**
-     * Where to add up the work, or NULL. Each thread needs its own.
-     */
-    struct hgrid_counters *counters;
-} hgrid_query_options;
+typedef uint32_t hgrid_verdict;
 
 /**
  * Where a ray meets a triangle: 16 bytes.
@@ -606,10 +604,208 @@ typedef struct hgrid_hit {
 } hgrid_hit;
 
 /**
+ * Work done by queries. A query adds to it, so one struct can sum up a whole picture.
+ */
+typedef struct hgrid_counters {
+    /**
+     * Ray-triangle tests.
+     */
+    uint64_t primitive_tests;
+    /**
+     * Cells and macrocells entered, empty ones included.
+     */
+    uint64_t cell_steps;
+    /**
+     * How often a ray went down a level, into a macrocell, a subgrid, a block or a brick; 0 for a
+     * grid of one level.
+     */
+    uint64_t grid_steps;
+} hgrid_counters;
+
+/**
+ * What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
+ *
+ * A query with options that are not the defaults is somewhat slower than one without, and rays of a
+ * batch are then traced one by one.
+ */
+typedef struct hgrid_query_options {
+    /**
+     * `sizeof(hgrid_query_options)`.
+     */
+    uint32_t struct_size;
+    /**
+     * A triangle is seen if its mask and this have a bit in common; see `masks` of `hgrid_mesh`. With
+     * all bits, the default, every triangle is seen, even one whose mask is 0.
+     */
+    uint32_t mask;
+    /**
+     * Which sides are not hit: one of `HGRID_CULL_...`.
+     */
+    uint32_t cull;
+    /**
+     * A triangle that is not hit, usually the one that the ray leaves, so that it needs no epsilon;
+     * or `HGRID_INVALID_ID`.
+     */
+    uint32_t skip;
+    /**
+     * Yours: passed on to `filter`.
+     */
+    void *context;
+    /**
+     * Says of a `hit` whether it counts; or NULL: all do. `ray` is the place of the ray in its batch,
+     * 0 for a single one.
+     *
+     * Hits are offered from near to far, where `t` is equal by ascending triangle, and each triangle
+     * at most once for each ray. It is called on the thread that asks, may ask the same grid other
+     * questions, and may not be left by `longjmp` or by a C++ exception. Here is glass, which lets
+     * shadow rays pass and weakens them:
+     *
+     * ```c
+     * typedef struct {
+     *     const unsigned char *is_glass;
+     *     float light;
+     * } shadow;
+     *
+     * static hgrid_verdict pass_glass(void *context, size_t ray, const hgrid_hit *hit)
+     * {
+     *     shadow *to = (shadow *)context;
+     *     (void)ray;
+     *     if (!to->is_glass[hit->primitive])
+     *         return HGRID_ACCEPT;
+     *     to->light *= 0.8f;
+     *     return HGRID_REJECT;
+     * }
+     *
+     * static float light_along(const hgrid_grid *grid, const hgrid_ray *ray,
+     *                          const unsigned char *is_glass)
+     * {
+     *     shadow to = {is_glass, 1};
+     *     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+     *     options.filter = pass_glass, options.context = &to;
+     *     return hgrid_occluded(grid, ray, &options) ? 0 : to.light;
+     * }
+     * ```
+     */
+    hgrid_verdict (*filter)(void *context, size_t ray, const struct hgrid_hit *hit);
+    /**
+     * Where to add up the work, or NULL. Each thread needs its own.
+     */
+    struct hgrid_counters *counters;
+} hgrid_query_options;
+
+/**
+ * The point of a mesh that is closest to a point: 28 bytes.
+ */
+typedef struct hgrid_closest {
+    /**
+     * The point, in scene units.
+     */
+    float position[3];
+    /**
+     * How far it is.
+     */
+    float distance;
+    /**
+     * Weight of the triangle's second vertex, 0 to 1.
+     */
+    float u;
+    /**
+     * Weight of the triangle's third vertex, 0 to 1.
+     */
+    float v;
+    /**
+     * The triangle: its position in the index array.
+     */
+    uint32_t primitive;
+} hgrid_closest;
+
+/**
  * What a caller knows about the rays of a batch: one of `HGRID_COHERENCE_...`. It changes how fast
  * the answers come, never the answers.
  */
 typedef uint32_t hgrid_coherence;
+
+/**
+ * What the header of a blob says. Initialise it with `HGRID_BLOB_INFO_INIT`.
+ */
+typedef struct hgrid_blob_info {
+    /**
+     * `sizeof(hgrid_blob_info)`.
+     */
+    uint32_t struct_size;
+    /**
+     * The version of the format.
+     */
+    uint32_t version;
+    /**
+     * What built it: one of `HGRID_METHOD_...`.
+     */
+    uint32_t method;
+    /**
+     * 1 if the mesh is in it, as `hgrid_pack` writes it; 0 if not.
+     */
+    uint32_t has_mesh;
+    /**
+     * Vertices of its mesh.
+     */
+    uint64_t vertex_count;
+    /**
+     * Triangles of its mesh.
+     */
+    uint64_t triangle_count;
+    /**
+     * Bytes of the grid.
+     */
+    uint64_t grid_bytes;
+    /**
+     * Bytes of all of it: of the grid, and of the mesh if that is in it.
+     */
+    uint64_t total_bytes;
+} hgrid_blob_info;
+
+/**
+ * What a look at all of a grid finds. Initialise it with `HGRID_STATISTICS_INIT`.
+ */
+typedef struct hgrid_statistics {
+    /**
+     * `sizeof(hgrid_statistics)`.
+     */
+    uint32_t struct_size;
+    /**
+     * Triangles left out because a coordinate is not finite.
+     */
+    uint32_t skipped_count;
+    /**
+     * Triangles of which two corners are the same point. They are in the grid, and no ray hits them.
+     */
+    uint32_t degenerate_count;
+    /**
+     * The first triangle that is one or the other, or `HGRID_INVALID_ID`.
+     */
+    uint32_t first_bad;
+    /**
+     * Lists of triangles: one for each cell that has any, and for each brick or block that has some of
+     * its own.
+     */
+    uint64_t list_count;
+    /**
+     * Triangle ids in all lists together.
+     */
+    uint64_t reference_count;
+    /**
+     * Ids in the longest list.
+     */
+    uint32_t longest_list;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+    /**
+     * A hash of the grid's box, resolution and lists: the same for the same grid on every platform,
+     * whatever its byte order. It tells grids apart; it is no defence against forgery.
+     */
+    uint64_t content_hash;
+} hgrid_statistics;
 
 #if defined(HGRID_STD)
 /**
@@ -646,6 +842,32 @@ typedef struct hgrid_allocator {
     void (*release)(void *context, void *memory, size_t bytes, size_t alignment);
 } hgrid_allocator;
 #endif
+
+/**
+ * Nothing is known: random rays, rays after a bounce.
+ */
+#define HGRID_COHERENCE_INCOHERENT 0
+
+/**
+ * Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 64
+ * rays, a tile of 8 x 8 pixels after the other.
+ */
+#define HGRID_COHERENCE_COHERENT 1
+
+/**
+ * The ray goes on as if the triangle were not there.
+ */
+#define HGRID_REJECT 0
+
+/**
+ * The hit counts.
+ */
+#define HGRID_ACCEPT 1
+
+/**
+ * The hit counts, and it is the last one: the same as `HGRID_ACCEPT`, but for `hgrid_intersect_all`.
+ */
+#define HGRID_ACCEPT_AND_STOP 2
 
 /**
  * Success.
@@ -724,6 +946,11 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_NON_FINITE -25
 
 /**
+ * The mask stride is below 4 bytes, or the masks do not fit into memory.
+ */
+#define HGRID_ERROR_INVALID_MASKS -26
+
+/**
  * The configuration's `method` is none that this version knows.
  */
 #define HGRID_ERROR_INVALID_METHOD -30
@@ -757,9 +984,14 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_CELL_SIZE -35
 
 /**
- * The `run` of a `hgrid_parallel` did not run every task exactly once before it returned.
+ * The configuration's `run` did not run every task exactly once before it returned.
  */
 #define HGRID_ERROR_PARALLEL_FOR -36
+
+/**
+ * The configuration's `progress` answered false. There is no grid.
+ */
+#define HGRID_ERROR_CANCELLED -37
 
 /**
  * The bytes, or the view, are not a grid.
@@ -792,6 +1024,11 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_CORRUPT -45
 
 /**
+ * The blob holds a grid and no mesh, and none was brought.
+ */
+#define HGRID_ERROR_NO_MESH -46
+
+/**
  * The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
  */
 #define HGRID_ERROR_INVALID_RAYS -50
@@ -807,19 +1044,34 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_COHERENCE -52
 
 /**
- * Nothing is known: random rays, rays after a bounce.
+ * The options' `cull` is none that this version knows.
  */
-#define HGRID_COHERENCE_INCOHERENT 0
-
-/**
- * Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 64
- * rays, a tile of 8 x 8 pixels after the other.
- */
-#define HGRID_COHERENCE_COHERENT 1
+#define HGRID_ERROR_INVALID_CULL -53
 
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
+ * is looked at.
+ *
+ * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration, for array
+ * declarations. How much more than enough it is depends on the method: a scan takes a sixth of it or
+ * less with one level; with recursive and brick it is generous beyond use.
+ *
+ * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
+ * `index_bytes` and `scratch_bytes`; or what is wrong with the configuration; or
+ * `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space.
+ *
+ * Threads: any number of calls at once, each with a report of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_bound(size_t triangle_count,
+                         const struct hgrid_config *config,
+                         struct hgrid_report *report);
 
 /**
  * Tells how much memory a build of this mesh takes.
@@ -833,11 +1085,16 @@ extern "C" {
  * is 1. That takes about half the time of a build; with recursive and brick, which have to build
  * the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
  *
+ * With `tasks` in the configuration the answer is for a build with so many at once: each takes scratch,
+ * the index is filled by all of them and may be a little larger. `run` is called for the answer, too;
+ * `progress` is not.
+ *
  * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. Returns `HGRID_OK` or
  * the reason, with the triangle that is to blame in the report; scratch that is too small is no
  * error, and counts as none.
  *
- * Threads: any number of calls at once, as long as each has a scratch and a report of its own.
+ * Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
+ * call starts no thread; tasks are called on those that `run` chooses.
  *
  * # Safety
  * Pointers are as the head of this file says.
@@ -849,29 +1106,34 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
                          struct hgrid_report *report);
 
 /**
- * Tells how much memory a build of this mesh takes that runs so many tasks at once: `hgrid_sizes`
- * for `hgrid_build_parallel`.
+ * Looks for the finest grid that fits into a budget.
  *
- * Each task takes scratch, for `HGRID_METHOD_BRICK`. The index is filled by all of them, and the one
- * that a build takes may be a little larger than with another number. With the other methods, and
- * with `parallel` NULL or `tasks` 0 or 1, the answer is that of `hgrid_sizes`. `run` is called for
- * the answer, too.
+ * `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
+ * (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no more than a
+ * step too much: a step is a factor of 1.41 in the number of cells, and takes as long as `hgrid_sizes`.
+ * Bring scratch, as for `hgrid_sizes`; without, a grid must fit by its bound, and gets coarser than it
+ * had to be. The scratch holds nothing of use afterwards.
  *
- * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `parallel` may be NULL:
- * one task. Returns what `hgrid_sizes` returns, or `HGRID_ERROR_PARALLEL_FOR`.
+ * `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be the same as
+ * `fitted`. `report` may be NULL.
  *
- * Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
- * call starts no thread; its tasks are called on those that `run` chooses.
+ * Returns `HGRID_OK`, and the report says what the fitted grid takes; or
+ * `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or what
+ * `hgrid_sizes` returns. Neither `tasks` nor `progress` matters here; both are copied.
+ *
+ * Threads: any number of calls at once, as long as each has a scratch, a configuration to write and a
+ * report of its own.
  *
  * # Safety
  * Pointers are as the head of this file says.
  */
-hgrid_status hgrid_sizes_parallel(const struct hgrid_mesh *mesh,
-                                  const struct hgrid_config *config,
-                                  const struct hgrid_parallel *parallel,
-                                  void *scratch,
-                                  size_t scratch_bytes,
-                                  struct hgrid_report *report);
+hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
+                       const struct hgrid_config *config,
+                       size_t index_bytes,
+                       void *scratch,
+                       size_t scratch_bytes,
+                       struct hgrid_config *fitted,
+                       struct hgrid_report *report);
 
 /**
  * Builds a grid in memory that the caller brings.
@@ -890,34 +1152,20 @@ hgrid_status hgrid_sizes_parallel(const struct hgrid_mesh *mesh,
  * was. The report is written in both cases: what was built; or, if a region is too small, what
  * both need; or the triangle that is to blame.
  *
- * After an error `index` is as it was, with these exceptions: after `HGRID_ERROR_INDEX_TOO_SMALL`,
- * `HGRID_ERROR_INVALID_DENSITY` and `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_METHOD_VARIABLE`,
+ * After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
+ * anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
+ * `HGRID_ERROR_INVALID_CELL_SIZE` and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`,
  * `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BRICK` may have left anything in it, so a grid that
  * lay there before is gone. They write as far as the index reaches and then go on counting: the
  * report's `index_bytes` is exact (with brick maybe only enough), and with so many the same call
  * succeeds.
  *
- * Threads: any number of calls at once, as long as each has regions, a view and a report of its
- * own. The call starts no thread.
+ * # A build on threads
  *
- * # Safety
- * Pointers are as the head of this file says.
- */
-hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
-                         const struct hgrid_config *config,
-                         void *index,
-                         size_t index_bytes,
-                         void *scratch,
-                         size_t scratch_bytes,
-                         struct hgrid_grid *grid,
-                         struct hgrid_report *report);
-
-/**
- * Builds a grid on threads that the caller brings: `hgrid_build`, and byte by byte the same blob.
- *
- * `parallel` says how many tasks the build is cut into and how they are run. The library knows no
- * threads: it calls `run`, on the thread that calls this function, and `run` calls the tasks, on the
- * threads of a pool or on new ones. With POSIX threads, one for each task:
+ * The library knows no threads. With `tasks` and `run` in the configuration, `HGRID_METHOD_BRICK` is cut
+ * into tasks: the library calls `run`, on the thread that calls this function, and `run` calls the
+ * tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte. With POSIX
+ * threads, one for each task:
  *
  * ```c
  * typedef struct {
@@ -953,24 +1201,16 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * static hgrid_status build_on_threads(const hgrid_mesh *mesh, void *index, size_t index_bytes,
  *                                      void *scratch, size_t scratch_bytes, hgrid_grid *grid)
  * {
- *     const hgrid_config config = HGRID_CONFIG_INIT_BRICK;
- *     hgrid_parallel parallel = HGRID_PARALLEL_INIT;
- *     parallel.tasks = 8, parallel.run = run_on_threads;
- *     return hgrid_build_parallel(mesh, &config, &parallel, index, index_bytes, scratch,
- *                                 scratch_bytes, grid, NULL);
+ *     hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+ *     config.tasks = 8, config.run = run_on_threads;
+ *     return hgrid_build(mesh, &config, index, index_bytes, scratch, scratch_bytes, grid, NULL);
  * }
  * ```
  *
- * Only `HGRID_METHOD_BRICK` is cut into tasks; the other methods never call `run`.
- * `hgrid_sizes_parallel` tells how much memory so many tasks take. Where there is less scratch, but
- * enough for fewer tasks, there are fewer; enough for one is what `hgrid_sizes` tells.
- *
- * `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `parallel` may be NULL: one
- * task, as with `tasks` 0 or 1; with more, its `run` may not be NULL. `index` and `scratch` may be
- * NULL if their size is 0. `report` may be NULL.
- *
- * Returns what `hgrid_build` returns, or `HGRID_ERROR_PARALLEL_FOR` if `run` ran a task twice or not
- * at all; then the index may hold anything, and both regions can be used again.
+ * `hgrid_sizes` with the same configuration tells how much memory so many tasks take. Where there is
+ * less scratch, but enough for fewer tasks, there are fewer. `HGRID_ERROR_PARALLEL_FOR` says that `run`
+ * ran a task twice or not at all; then the index may hold anything, and both regions can be used
+ * again, as after `HGRID_ERROR_CANCELLED`.
  *
  * Threads: any number of calls at once, as long as each has regions, a view and a report of its
  * own. The call starts no thread; its tasks are called on those that `run` chooses.
@@ -978,59 +1218,14 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * # Safety
  * Pointers are as the head of this file says.
  */
-hgrid_status hgrid_build_parallel(const struct hgrid_mesh *mesh,
-                                  const struct hgrid_config *config,
-                                  const struct hgrid_parallel *parallel,
-                                  void *index,
-                                  size_t index_bytes,
-                                  void *scratch,
-                                  size_t scratch_bytes,
-                                  struct hgrid_grid *grid,
-                                  struct hgrid_report *report);
-
-/**
- * Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
- *
- * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
- * in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
- * ignored. It says itself which method built it and how. The mesh is the one it was built for,
- * of which only the counts are compared.
- *
- * What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
- * nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
- * not change while the grid is in use: a file that others may write is not for mapping, read it into
- * memory of your own.
- *
- * No argument may be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
- * and leaves `grid` as it was.
- *
- * Threads: any number of calls at once, also on the same blob, each with a view of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
- */
-hgrid_status hgrid_open(const void *blob,
-                        size_t blob_bytes,
-                        const struct hgrid_mesh *mesh,
-                        struct hgrid_grid *grid);
-
-/**
- * Proves that a blob is the grid of its mesh, and so that every answer will be right.
- *
- * Takes no memory and at most about the time of a build; with recursive several times as long, on
- * damaged bytes much longer. A grid that was just built needs no proof; a blob from a file, a
- * network or another process may.
- *
- * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
- * that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
- * `HGRID_ERROR_NULL_ARGUMENT`.
- *
- * Threads: any number of calls and queries on the same grid at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
- */
-hgrid_status hgrid_validate(const struct hgrid_grid *grid);
+hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
+                         const struct hgrid_config *config,
+                         void *index,
+                         size_t index_bytes,
+                         void *scratch,
+                         size_t scratch_bytes,
+                         struct hgrid_grid *grid,
+                         struct hgrid_report *report);
 
 /**
  * Finds the closest triangle that a ray hits.
@@ -1075,6 +1270,73 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
                     const struct hgrid_query_options *options);
 
 /**
+ * Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
+ *
+ * Writes as many hits as there is room for, the nearest, and to `count` how many there are, which may
+ * be more. With room for all, the ray is walked once; otherwise, and with a filter, once more for each
+ * sixteen hits, from where it got to: so nothing is allocated, whatever their number. Options as
+ * with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what it accepts is
+ * written and counted.
+ *
+ * ```c
+ * static double thickness_along(const hgrid_grid *grid, const hgrid_ray *ray)
+ * {
+ *     hgrid_hit hits[64];
+ *     size_t count;
+ *     double inside = 0;
+ *     if (hgrid_intersect_all(grid, ray, NULL, hits, 64, &count) != HGRID_OK)
+ *         return -1;
+ *     for (size_t i = 0; i + 1 < count && i + 1 < 64; i += 2)
+ *         inside += hits[i + 1].t - hits[i].t;
+ *     return inside;
+ * }
+ * ```
+ *
+ * `hits` may be NULL if `capacity` is 0. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
+ * returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
+ * `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_ANSWERS`
+ * (a capacity that is impossible). A ray that is none hits nothing: the count is 0.
+ *
+ * Threads: any number of queries on the same grid at once; each thread with hits and counters of
+ * its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
+                                 const struct hgrid_ray *ray,
+                                 const struct hgrid_query_options *options,
+                                 struct hgrid_hit *hits,
+                                 size_t capacity,
+                                 size_t *count);
+
+/**
+ * Finds the point of the mesh that is closest to a point, `max_distance` away at most.
+ *
+ * Returns true and writes `closest`; or returns false and writes nothing. Where several triangles are
+ * equally close, the one with the lowest number is reported. `max_distance` may be `INFINITY`. `point`
+ * is three floats; it and `closest` may not be NULL.
+ *
+ * Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts the lists that
+ * were looked at, `primitive_tests` the triangles in them. `options` may be NULL: the defaults. With
+ * anything that is not as it should be (another NULL, a view of zeros, options that break the rules, a point that
+ * is not finite, a distance that is NaN or negative) the answer is false.
+ *
+ * The call allocates nothing and always ends. How long it takes grows with the number of cells that
+ * are as close as the answer: far from the mesh and in the middle of nothing, limit the distance.
+ *
+ * Threads: any number of queries on the same grid at once; each thread with counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_closest_point(const struct hgrid_grid *grid,
+                         const float *point,
+                         float max_distance,
+                         const struct hgrid_query_options *options,
+                         struct hgrid_closest *closest);
+
+/**
  * Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
  * each, bit for bit, but sooner.
  *
@@ -1106,12 +1368,12 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
  * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
  * the hits. With `count` 0 nothing is done. Up to 64 rays are read before the first hit is written.
  *
- * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With counters
- * the work of all rays is added up, one ray after the other, which is slower.
+ * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With others the
+ * rays are traced one after the other, which is slower.
  *
  * Returns `HGRID_OK` and has written all hits, or returns the reason and has written none:
- * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` (the options),
- * `HGRID_ERROR_INVALID_RAYS` and `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is
+ * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and
+ * `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is
  * impossible), `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no
  * error: it misses.
  *
@@ -1174,29 +1436,107 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
                               const struct hgrid_query_options *options);
 
 /**
- * Says in words what a status means and what to do.
+ * Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
  *
- * Never NULL: a number that is no status gives "unknown status". The text is static, in English,
- * without a full stop; programs compare numbers, not texts.
+ * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
+ * in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
+ * ignored. It says itself which method built it and how. The mesh is the one it was built for,
+ * of which only the counts are compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh`
+ * may be NULL.
  *
- * Threads: any number of calls at once.
+ * What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
+ * nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
+ * not change while the grid is in use: a file that others may write is not for mapping, read it into
+ * memory of your own.
+ *
+ * `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
+ * and leaves `grid` as it was.
+ *
+ * Threads: any number of calls at once, also on the same blob, each with a view of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
  */
-const char *hgrid_status_string(hgrid_status status);
+hgrid_status hgrid_open(const void *blob,
+                        size_t blob_bytes,
+                        const struct hgrid_mesh *mesh,
+                        struct hgrid_grid *grid);
 
 /**
- * The version of the library that is linked, to be compared with the `HGRID_VERSION` of the header
- * that was compiled against.
+ * Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
  *
- * Threads: any number of calls at once.
+ * The bytes may lie at any address. Neither argument may be NULL, unless `blob_bytes` is 0. Returns
+ * `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was: `HGRID_ERROR_NOT_A_GRID`,
+ * `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`,
+ * `HGRID_ERROR_CORRUPT`.
+ *
+ * Threads: any number of calls at once, each with an info of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
  */
-uint32_t hgrid_version(void);
+hgrid_status hgrid_peek(const void *blob,
+                        size_t blob_bytes,
+                        struct hgrid_blob_info *info);
 
 /**
- * The version of the library that is linked, as text: never NULL, static.
+ * Writes a grid and its mesh as one blob, for which `hgrid_open` needs no mesh: to be stored where the
+ * mesh is not, or mapped by several processes.
  *
- * Threads: any number of calls at once.
+ * It holds the grid, then positions, indices (of 32 bits) and masks if there are any, tight, each at a
+ * multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid. Nothing is
+ * copied when it is opened.
+ *
+ * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh. It may be NULL if
+ * `capacity` is 0: to ask for the size. `grid` and `bytes` may not be NULL.
+ *
+ * Returns `HGRID_OK` and has written the blob; or the reason, and has written nothing:
+ * `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+ * `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged, `HGRID_ERROR_NOT_A_GRID`. In the first two
+ * cases of all these `bytes` becomes the size of the packed blob.
+ *
+ * Threads: any number of calls and queries on the same grid at once, each with memory of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
  */
-const char *hgrid_version_string(void);
+hgrid_status hgrid_pack(const struct hgrid_grid *grid,
+                        void *to,
+                        size_t capacity,
+                        uint64_t *bytes);
+
+/**
+ * Proves that a blob is the grid of its mesh, and so that every answer will be right.
+ *
+ * Takes no memory and at most about the time of a build; with recursive several times as long, on
+ * damaged bytes much longer. A grid that was just built needs no proof; a blob from a file, a
+ * network or another process may.
+ *
+ * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
+ * that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
+ * `HGRID_ERROR_NULL_ARGUMENT`.
+ *
+ * Threads: any number of calls and queries on the same grid at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_validate(const struct hgrid_grid *grid);
+
+/**
+ * Looks at all of a grid and its mesh: O(cells + ids + triangles), no memory.
+ *
+ * Neither argument may be NULL. Returns `HGRID_OK` and fills `statistics`; or
+ * `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves it as it
+ * was. On damaged bytes it counts what is there.
+ *
+ * Threads: any number of calls and queries on the same grid at once, each with statistics of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_inspect(const struct hgrid_grid *grid,
+                           struct hgrid_statistics *statistics);
 
 #if defined(HGRID_STD)
 /**
@@ -1265,6 +1605,31 @@ hgrid_status hgrid_create(const struct hgrid_mesh *mesh,
 void hgrid_destroy(struct hgrid_grid *grid);
 #endif
 
+/**
+ * Says in words what a status means and what to do.
+ *
+ * Never NULL: a number that is no status gives "unknown status". The text is static, in English,
+ * without a full stop; programs compare numbers, not texts.
+ *
+ * Threads: any number of calls at once.
+ */
+const char *hgrid_status_string(hgrid_status status);
+
+/**
+ * The version of the library that is linked, to be compared with the `HGRID_VERSION` of the header
+ * that was compiled against.
+ *
+ * Threads: any number of calls at once.
+ */
+uint32_t hgrid_version(void);
+
+/**
+ * The version of the library that is linked, as text: never NULL, static.
+ *
+ * Threads: any number of calls at once.
+ */
+const char *hgrid_version_string(void);
+
 #ifdef __cplusplus
 }  // extern "C"
 #endif  // __cplusplus
@@ -1274,47 +1639,58 @@ void hgrid_destroy(struct hgrid_grid *grid);
 /**
  * An empty mesh of tight arrays: set positions, vertex_count, indices and triangle_count.
  */
-#define HGRID_MESH_INIT {sizeof(hgrid_mesh), HGRID_INDEX_U32, NULL, 0, 0, NULL, 0, 0}
+#define HGRID_MESH_INIT {sizeof(hgrid_mesh), HGRID_INDEX_U32, NULL, 0, 0, NULL, 0, 0, NULL, 0}
 
 /**
  * The default configuration: one level.
  */
-#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 6, 16, 3, 1.0f, 0}
+#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 6, 16, 3, 1.0f, 0, \
+                           1, 0, NULL, NULL, NULL}
 
 /**
  * The usual configuration of a fixed grid.
  */
-#define HGRID_CONFIG_INIT_FIXED {sizeof(hgrid_config), HGRID_METHOD_FIXED, 32.0f, 6, 16, 3, 1.0f, 0}
+#define HGRID_CONFIG_INIT_FIXED {sizeof(hgrid_config), HGRID_METHOD_FIXED, 32.0f, 6, 16, 3, 1.0f, 0, \
+                           1, 0, NULL, NULL, NULL}
 
 /**
  * The usual configuration of a variable grid.
  */
-#define HGRID_CONFIG_INIT_VARIABLE {sizeof(hgrid_config), HGRID_METHOD_VARIABLE, 4.0f, 6, 16, 3, 1.0f, 0}
+#define HGRID_CONFIG_INIT_VARIABLE {sizeof(hgrid_config), HGRID_METHOD_VARIABLE, 4.0f, 6, 16, 3, 1.0f, 0, \
+                           1, 0, NULL, NULL, NULL}
 
 /**
  * The usual configuration of a recursive grid.
  */
-#define HGRID_CONFIG_INIT_RECURSIVE {sizeof(hgrid_config), HGRID_METHOD_RECURSIVE, 8.0f, 6, 16, 3, 1.0f, 0}
+#define HGRID_CONFIG_INIT_RECURSIVE {sizeof(hgrid_config), HGRID_METHOD_RECURSIVE, 8.0f, 6, 16, 3, 1.0f, 0, \
+                           1, 0, NULL, NULL, NULL}
 
 /**
  * The usual configuration of a brick grid.
  */
-#define HGRID_CONFIG_INIT_BRICK {sizeof(hgrid_config), HGRID_METHOD_BRICK, 4.0f, 6, 16, 3, 1.0f, 0}
-
-/**
- * One task: set tasks and run, and context if run needs it.
- */
-#define HGRID_PARALLEL_INIT {sizeof(hgrid_parallel), 1, NULL, NULL}
+#define HGRID_CONFIG_INIT_BRICK {sizeof(hgrid_config), HGRID_METHOD_BRICK, 4.0f, 6, 16, 3, 1.0f, 0, \
+                           1, 0, NULL, NULL, NULL}
 
 /**
  * The default options of a query.
  */
-#define HGRID_QUERY_OPTIONS_INIT {sizeof(hgrid_query_options), 0, NULL}
+#define HGRID_QUERY_OPTIONS_INIT {sizeof(hgrid_query_options), 0xffffffffu, HGRID_CULL_NONE, \
+                                  HGRID_INVALID_ID, NULL, NULL, NULL}
 
 /**
  * A report before its call.
  */
 #define HGRID_REPORT_INIT {sizeof(hgrid_report), 0, 0, 0, HGRID_INVALID_ID, 0, 0, 0.0f, {0, 0, 0}, 0}
+
+/**
+ * The header of a blob before it is read.
+ */
+#define HGRID_BLOB_INFO_INIT {sizeof(hgrid_blob_info), 0, 0, 0, 0, 0, 0, 0}
+
+/**
+ * Statistics before their call.
+ */
+#define HGRID_STATISTICS_INIT {sizeof(hgrid_statistics), 0, 0, HGRID_INVALID_ID, 0, 0, 0, 0, 0}
 
 /**
  * Initialises a `hgrid_grid` with zeros: a view that no build or open has written, which is

@@ -8,12 +8,13 @@
 
 use core::ffi::c_void;
 
+use crate::questions::hgrid_ray;
 use crate::span::Span;
 use crate::status::{
     HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_INVALID_RAYS, HGRID_ERROR_NULL_ARGUMENT,
     HGRID_ERROR_OVERLAP, hgrid_status,
 };
-use crate::types::{Elements, hgrid_ray};
+use crate::types::Elements;
 
 /// An array of the caller's, as it is passed: where it starts, and its stride.
 pub(crate) type Array<T> = (T, usize);

@@ -16,7 +16,7 @@
 //! [`hgrid_build`]: crate::hgrid_build
 
 use core::ffi::c_void;
-use core::ptr::{NonNull, null, null_mut};
+use core::ptr::{NonNull, null_mut};
 
 use crate::raw;
 use crate::span::Region;
@@ -165,15 +165,15 @@ unsafe fn create(
     let none = Region { start: null_mut(), bytes: 0 };
     // How much scratch is enough, and with it how much index the grid takes, to the byte.
     // SAFETY: the caller's promise.
-    unsafe { raw::input(mesh, config, null(), [none, none]) }?.measure(report)?;
+    unsafe { raw::input(mesh, config, [none, none]) }?.measure(report)?;
     let scratch = Memory::new(allocator, 0, report.scratch_bytes)?;
     // SAFETY: the caller's promise.
-    unsafe { raw::input(mesh, config, null(), [none, scratch.behind(0)]) }?.measure(report)?;
+    unsafe { raw::input(mesh, config, [none, scratch.behind(0)]) }?.measure(report)?;
 
     let memory = Memory::new(allocator, size_of::<Owned>(), report.index_bytes)?;
     let regions = [memory.behind(size_of::<Owned>()), scratch.behind(0)];
     // SAFETY: the caller's promise.
-    let built = unsafe { raw::input(mesh, config, null(), regions) }?.build(report)?;
+    let built = unsafe { raw::input(mesh, config, regions) }?.build(report)?;
 
     let owned = memory.start.cast::<Owned>();
     // SAFETY: `memory` has room for an `Owned`, aligned, and the index lies behind it.

@@ -1,10 +1,10 @@
 //! What a build or a question for sizes works on, once every pointer is checked.
 
 use hgrid_core::{
-    Config, Error, Grid, Method, Parallel, Region, Task, TriangleMesh, sizes_parallel,
+    Config, Control, Error, Grid, Method, Region, Task, TriangleMesh, fit, sizes_with,
 };
 
-use crate::raw::Threads;
+use crate::raw::Caller;
 use crate::status::hgrid_status;
 use crate::types::hgrid_report;
 
@@ -13,8 +13,7 @@ use crate::types::hgrid_report;
 pub(crate) struct Input {
     pub(crate) mesh: TriangleMesh<'static>,
     pub(crate) config: Config,
-    /// `None` for one task after the other.
-    pub(crate) threads: Option<Threads>,
+    pub(crate) caller: Caller,
     pub(crate) index: &'static mut [u8],
     pub(crate) scratch: &'static mut [u8],
 }
@@ -22,20 +21,31 @@ pub(crate) struct Input {
 impl Input {
     /// Asks how much memory a build takes and notes the answer.
     pub(crate) fn measure(self, report: &mut hgrid_report) -> Result<(), hgrid_status> {
-        let Self { mesh, config, threads, scratch, .. } = self;
-        let answer =
-            in_parallel(threads, |parallel| sizes_parallel(&mesh, &config, scratch, parallel));
+        let Self { mesh, config, caller, scratch, .. } = self;
+        let answer = controlled(caller, |control| sizes_with(&mesh, &config, scratch, control));
         let answer = answer.map_err(|error| report.note_error(error))?;
         report.note_sizes(&answer);
         Ok(())
     }
 
+    /// Looks for the finest grid that fits, and notes what it takes or what the coarsest one would.
+    pub(crate) fn fit(
+        self,
+        index_bytes: usize,
+        report: &mut hgrid_report,
+    ) -> Result<Config, hgrid_status> {
+        let Self { mesh, config, scratch, .. } = self;
+        let fitted = fit(&mesh, &config, index_bytes, scratch);
+        let (config, sizes) = fitted.map_err(|error| report.note_error(error))?;
+        report.note_sizes(&sizes);
+        Ok(config)
+    }
+
     /// Builds, and notes what was built or what was missing.
     pub(crate) fn build(self, report: &mut hgrid_report) -> Result<Grid<'static>, hgrid_status> {
-        let Self { mesh, config, threads, index, scratch } = self;
-        let built = in_parallel(threads, |parallel| {
-            Grid::build_parallel(mesh, &config, index, scratch, parallel)
-        });
+        let Self { mesh, config, caller, index, scratch } = self;
+        let built =
+            controlled(caller, |control| Grid::build_with(mesh, &config, index, scratch, control));
         match built {
             Ok(grid) => {
                 report.note_grid(&grid);
@@ -44,8 +54,8 @@ impl Input {
             Err(error) => {
                 // The error knows one region's need; the caller wants to bring both at once.
                 if let Error::OutOfMemory { region, .. } = error {
-                    let enough = in_parallel(None, |parallel| {
-                        sizes_parallel(&mesh, &config, &mut [], parallel)
+                    let enough = controlled(Caller::NOBODY, |control| {
+                        sizes_with(&mesh, &config, &mut [], control)
                     });
                     if let Ok(enough) = enough {
                         report.note_sizes(&enough);
@@ -60,12 +70,11 @@ impl Input {
     }
 }
 
-/// Shows `visit` how tasks are run.
-fn in_parallel<T>(threads: Option<Threads>, visit: impl FnOnce(&Parallel<'_>) -> T) -> T {
-    let tasks = threads.map_or(1, |threads| threads.tasks);
-    let run = |count: u32, task: &Task<'_>| match threads {
-        Some(threads) => threads.run(count, task),
-        None => (0..count).for_each(task),
-    };
-    visit(&Parallel { tasks, run: &run })
+/// Shows `visit` how a build is run.
+fn controlled<T>(caller: Caller, visit: impl FnOnce(&Control<'_>) -> T) -> T {
+    let run = |count: u32, task: &Task<'_>| caller.run(count, task);
+    let progress = |done: f32| caller.progress(done);
+    let progress: Option<&dyn Fn(f32) -> bool> =
+        if caller.is_watching() { Some(&progress) } else { None };
+    visit(&Control { tasks: caller.tasks, run: &run, progress })
 }

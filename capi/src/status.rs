@@ -2,7 +2,7 @@
 //!
 //! The numbers are ABI. They have gaps between the groups and are never used for anything else.
 
-use core::ffi::CStr;
+use core::ffi::{CStr, c_char};
 
 use hgrid_core::{BatchField, ConfigField, Error, MeshField, Region};
 
@@ -58,6 +58,9 @@ pub const HGRID_ERROR_INDEX_OUT_OF_RANGE: hgrid_status = -24;
 /// set. The report says which triangle.
 pub const HGRID_ERROR_NON_FINITE: hgrid_status = -25;
 
+/// The mask stride is below 4 bytes, or the masks do not fit into memory.
+pub const HGRID_ERROR_INVALID_MASKS: hgrid_status = -26;
+
 /// The configuration's `method` is none that this version knows.
 pub const HGRID_ERROR_INVALID_METHOD: hgrid_status = -30;
 
@@ -79,8 +82,11 @@ pub const HGRID_ERROR_INVALID_DEPTH: hgrid_status = -34;
 /// take more than 8 GiB, and the method is `HGRID_METHOD_BRICK`.
 pub const HGRID_ERROR_INVALID_CELL_SIZE: hgrid_status = -35;
 
-/// The `run` of a `hgrid_parallel` did not run every task exactly once before it returned.
+/// The configuration's `run` did not run every task exactly once before it returned.
 pub const HGRID_ERROR_PARALLEL_FOR: hgrid_status = -36;
+
+/// The configuration's `progress` answered false. There is no grid.
+pub const HGRID_ERROR_CANCELLED: hgrid_status = -37;
 
 /// The bytes, or the view, are not a grid.
 pub const HGRID_ERROR_NOT_A_GRID: hgrid_status = -40;
@@ -100,6 +106,9 @@ pub const HGRID_ERROR_MESH_MISMATCH: hgrid_status = -44;
 /// The blob contradicts itself or its mesh.
 pub const HGRID_ERROR_CORRUPT: hgrid_status = -45;
 
+/// The blob holds a grid and no mesh, and none was brought.
+pub const HGRID_ERROR_NO_MESH: hgrid_status = -46;
+
 /// The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
 pub const HGRID_ERROR_INVALID_RAYS: hgrid_status = -50;
 
@@ -109,6 +118,9 @@ pub const HGRID_ERROR_INVALID_ANSWERS: hgrid_status = -51;
 /// The coherence is none that this version knows.
 pub const HGRID_ERROR_INVALID_COHERENCE: hgrid_status = -52;
 
+/// The options' `cull` is none that this version knows.
+pub const HGRID_ERROR_INVALID_CULL: hgrid_status = -53;
+
 /// The status that stands for an error of core.
 pub(crate) const fn status_of(error: Error) -> hgrid_status {
     match error {
@@ -117,6 +129,7 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
         Error::Misaligned { .. } => HGRID_ERROR_MISALIGNED,
         Error::InvalidMesh(MeshField::Positions) => HGRID_ERROR_INVALID_POSITIONS,
         Error::InvalidMesh(MeshField::Indices) => HGRID_ERROR_INVALID_INDICES,
+        Error::InvalidMesh(MeshField::Masks) => HGRID_ERROR_INVALID_MASKS,
         Error::TooManyTriangles => HGRID_ERROR_TOO_MANY_TRIANGLES,
         Error::IndexOutOfRange { .. } => HGRID_ERROR_INDEX_OUT_OF_RANGE,
         Error::NonFiniteTriangle { .. } => HGRID_ERROR_NON_FINITE,
@@ -127,6 +140,8 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
         Error::InvalidConfig(ConfigField::Flags) => HGRID_ERROR_INVALID_FLAGS,
         Error::InvalidConfig(ConfigField::CellSize) => HGRID_ERROR_INVALID_CELL_SIZE,
         Error::InvalidParallelFor => HGRID_ERROR_PARALLEL_FOR,
+        Error::Cancelled => HGRID_ERROR_CANCELLED,
+        Error::NoMesh => HGRID_ERROR_NO_MESH,
         Error::InvalidBatch(BatchField::Rays) => HGRID_ERROR_INVALID_RAYS,
         Error::InvalidBatch(BatchField::Answers) => HGRID_ERROR_INVALID_ANSWERS,
         Error::NotAGrid => HGRID_ERROR_NOT_A_GRID,
@@ -175,6 +190,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
             c"a coordinate is not finite: repair the report's triangle, or build without \
               HGRID_BUILD_STRICT to leave it out"
         }
+        HGRID_ERROR_INVALID_MASKS => c"invalid masks: check mask_stride (0, or 4 and more)",
         HGRID_ERROR_INVALID_METHOD => c"unknown method: use one of HGRID_METHOD_...",
         HGRID_ERROR_INVALID_DENSITY => {
             c"invalid density: above 0, and lower if the grid would become too fine or too large"
@@ -188,6 +204,11 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_PARALLEL_FOR => {
             c"tasks run twice or not at all: let run call each one once and wait for all of them"
         }
+        HGRID_ERROR_CANCELLED => c"cancelled by the progress callback: there is no grid",
+        HGRID_ERROR_NO_MESH => {
+            c"a blob without its mesh: bring the mesh it was built for, or pack both with hgrid_pack"
+        }
+        HGRID_ERROR_INVALID_CULL => c"unknown cull: use one of HGRID_CULL_...",
         HGRID_ERROR_NOT_A_GRID => c"not a grid: build or open one first",
         HGRID_ERROR_WRONG_BYTE_ORDER => {
             c"a blob of the other byte order: build it again on this machine"
@@ -205,4 +226,15 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_INVALID_COHERENCE => c"unknown coherence: use one of HGRID_COHERENCE_...",
         _ => c"unknown status",
     }
+}
+
+/// Says in words what a status means and what to do.
+///
+/// Never NULL: a number that is no status gives "unknown status". The text is static, in English,
+/// without a full stop; programs compare numbers, not texts.
+///
+/// Threads: any number of calls at once.
+#[unsafe(no_mangle)]
+pub const extern "C" fn hgrid_status_string(status: hgrid_status) -> *const c_char {
+    text(status).as_ptr()
 }

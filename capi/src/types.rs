@@ -1,18 +1,20 @@
-//! The structs that cross the boundary, as C sees them, and what they mean to core.
+//! What builds work on and what they make: the structs that cross the boundary, as C sees them, and
+//! what they mean to core.
 //!
 //! The docs here are the text of `hgrid.h`: they are written for C readers.
 
 use core::ffi::c_void;
+use core::ptr::null_mut;
 
 use hgrid_core::{
-    BuildFlags, Coherence, Config, Counters, Error, Grid, Hit, INVALID_ID, IndexType,
-    MAX_TRIANGLES, Method, Parallel, Ray, Region, Sizes,
+    BuildFlags, Config, Control, Error, Grid, INVALID_ID, IndexType, MAX_TRIANGLES, Method, Region,
+    Sizes, TriangleMesh, sizes,
 };
 
 use crate::status::{
-    HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_FLAGS, HGRID_ERROR_INVALID_INDEX_TYPE,
-    HGRID_ERROR_INVALID_INDICES, HGRID_ERROR_INVALID_METHOD, HGRID_ERROR_INVALID_POSITIONS,
-    HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
+    HGRID_ERROR_INVALID_FLAGS, HGRID_ERROR_INVALID_INDEX_TYPE, HGRID_ERROR_INVALID_INDICES,
+    HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_METHOD, HGRID_ERROR_INVALID_POSITIONS,
+    HGRID_ERROR_STRUCT_SIZE, HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
 };
 
 /// Every memory region starts at a multiple of this many bytes: index, scratch and blob.
@@ -92,18 +94,6 @@ pub const HGRID_BUILD_STRICT: u32 = 1;
 /// The most tasks that a parallel build runs at once.
 pub const HGRID_MAX_TASKS: u32 = 64;
 
-/// What a caller knows about the rays of a batch: one of `HGRID_COHERENCE_...`. It changes how fast
-/// the answers come, never the answers.
-#[allow(non_camel_case_types, reason = "the C name")]
-pub type hgrid_coherence = u32;
-
-/// Nothing is known: random rays, rays after a bounce.
-pub const HGRID_COHERENCE_INCOHERENT: hgrid_coherence = 0;
-
-/// Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 64
-/// rays, a tile of 8 x 8 pixels after the other.
-pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
-
 const _: () = assert!(HGRID_ALIGNMENT == hgrid_core::ALIGNMENT);
 const _: () = assert!(HGRID_BLOB_VERSION == hgrid_core::BLOB_VERSION);
 const _: () = assert!(HGRID_METHOD_ONE_LEVEL == Method::OneLevel as u32);
@@ -111,60 +101,9 @@ const _: () = assert!(HGRID_METHOD_FIXED == Method::Fixed as u32);
 const _: () = assert!(HGRID_METHOD_VARIABLE == Method::Variable as u32);
 const _: () = assert!(HGRID_METHOD_RECURSIVE == Method::Recursive as u32);
 const _: () = assert!(HGRID_METHOD_BRICK == Method::Brick as u32);
-const _: () = assert!(HGRID_COHERENCE_INCOHERENT == Coherence::Incoherent as u32);
-const _: () = assert!(HGRID_COHERENCE_COHERENT == Coherence::Coherent as u32);
 const _: () = assert!(HGRID_MAX_DEPTH == hgrid_core::MAX_DEPTH);
-const _: () = assert!(HGRID_MAX_TASKS == Parallel::MAX_TASKS);
+const _: () = assert!(HGRID_MAX_TASKS == Control::MAX_TASKS);
 const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
-
-/// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.
-///
-/// A point of the ray is `origin + t * direction`. The direction has any length but zero, and every
-/// `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`, both ends included. A ray
-/// with a NaN anywhere, with an infinite origin or direction, with a zero direction or with
-/// `t_min > t_max` hits nothing.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct hgrid_ray {
-    /// Where `t` is 0, in scene units.
-    pub origin: [f32; 3],
-    /// The smallest `t` that is accepted, usually 0; negative reaches behind the origin.
-    pub t_min: f32,
-    /// The direction, any length but zero.
-    pub direction: [f32; 3],
-    /// The largest `t` that is accepted; `INFINITY` and `FLT_MAX` are both fine.
-    pub t_max: f32,
-}
-
-/// Where a ray meets a triangle: 16 bytes.
-///
-/// The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
-/// triangle's vertices `a`, `b`, `c`, up to rounding.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct hgrid_hit {
-    /// Distance in multiples of the ray's direction.
-    pub t: f32,
-    /// Weight of the triangle's second vertex, 0 to 1.
-    pub u: f32,
-    /// Weight of the triangle's third vertex, 0 to 1.
-    pub v: f32,
-    /// The triangle: its position in the index array.
-    pub primitive: u32,
-}
-
-/// Work done by queries. A query adds to it, so one struct can sum up a whole picture.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct hgrid_counters {
-    /// Ray-triangle tests.
-    pub primitive_tests: u64,
-    /// Cells and macrocells entered, empty ones included.
-    pub cell_steps: u64,
-    /// How often a ray went down a level, into a macrocell, a subgrid, a block or a brick; 0 for a
-    /// grid of one level.
-    pub grid_steps: u64,
-}
 
 /// A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
 ///
@@ -191,9 +130,14 @@ pub struct hgrid_mesh {
     pub index_stride: usize,
     /// Number of triangles, at most 4294967294.
     pub triangle_count: usize,
+    /// The first triangle's mask, a `uint32_t`, or NULL: queries with a mask of their own see a triangle
+    /// if both have a bit in common. NULL means that every triangle has all bits.
+    pub masks: *const c_void,
+    /// Bytes from one mask to the next, at least 4; 0 means 4.
+    pub mask_stride: usize,
 }
 
-/// What a build may be told. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
+/// What a build may be told: which grid, and how to go about it. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
 /// or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`,
 /// `_BRICK`.
 ///
@@ -224,35 +168,20 @@ pub struct hgrid_config {
     pub cell_size: f32,
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
-}
-
-/// A part of a build, as `run` of a `hgrid_parallel` gets it: a function of this library.
-///
-/// It may be called on any thread, on several at once, with the `task_context` that came with it and
-/// an `index` below the `count` that came with it. It starts no thread, waits for none, and never
-/// jumps out.
-#[allow(non_camel_case_types, reason = "the C name")]
-pub type hgrid_task = unsafe extern "C" fn(task_context: *mut c_void, index: u32);
-
-/// How a build runs parts of it, its tasks, at once: by a loop of the caller's, over the caller's
-/// threads. Initialise it with `HGRID_PARALLEL_INIT`, which means what NULL means: one task after the
-/// other, on the thread that calls. The grid does not depend on it, to the bit.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct hgrid_parallel {
-    /// `sizeof(hgrid_parallel)`.
-    pub struct_size: u32,
-    /// The most tasks at once, usually the number of cores; each takes scratch of its own. With 0 and
-    /// 1 nothing is parallel, and what is above `HGRID_MAX_TASKS` counts as that.
+    /// For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores; each
+    /// takes scratch of its own. With 0 and 1 nothing is parallel, and what is above `HGRID_MAX_TASKS`
+    /// counts as that. The other methods build on the thread that calls.
     pub tasks: u32,
-    /// Yours: passed on to `run`.
+    /// 0.
+    pub reserved: u32,
+    /// Yours: passed on to `run` and `progress`.
     pub context: *mut c_void,
     /// Calls `task(task_context, index)` once for every `index` below `count`, in any order, on any
     /// threads, and returns when all these calls have returned: after a join, or after any other
     /// synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
     /// library calls it several times, one after the other, on the thread that builds, with counts up
     /// to `tasks`; where the processor has no atomic operations, it never does. NULL only with `tasks`
-    /// 0 or 1.
+    /// 0 or 1. `hgrid_build` has an example.
     ///
     /// A task that is called twice, even at the same time, one that is never called, and an index that
     /// is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`. Undefined
@@ -267,19 +196,21 @@ pub struct hgrid_parallel {
             task_context: *mut c_void,
         ),
     >,
+    /// Told how much of a build is `done`, from 0 to 1, and answers whether to go on; or NULL. It is
+    /// called on the thread that builds, a few times to a few hundred times; `done` grows from call
+    /// to call, and in the last call of a build that succeeds it is exactly 1, whatever the answer.
+    /// After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass over the mesh
+    /// is over. It may not be left by `longjmp` or by a C++ exception.
+    pub progress: Option<unsafe extern "C" fn(context: *mut c_void, done: f32) -> bool>,
 }
 
-/// What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct hgrid_query_options {
-    /// `sizeof(hgrid_query_options)`.
-    pub struct_size: u32,
-    /// 0.
-    pub reserved: u32,
-    /// Where to add up the work, or NULL. Each thread needs its own.
-    pub counters: *mut hgrid_counters,
-}
+/// A part of a build, as `run` of a `hgrid_config` gets it: a function of this library.
+///
+/// It may be called on any thread, on several at once, with the `task_context` that came with it and
+/// an `index` below the `count` that came with it. It starts no thread, waits for none, and never
+/// jumps out.
+#[allow(non_camel_case_types, reason = "the C name")]
+pub type hgrid_task = unsafe extern "C" fn(task_context: *mut c_void, index: u32);
 
 /// What a build, or a question for sizes, found out. Initialise it with `HGRID_REPORT_INIT`.
 ///
@@ -296,8 +227,8 @@ pub struct hgrid_report {
     /// `HGRID_METHOD_BRICK` may be smaller than the index had to be.
     pub index_bytes: u64,
     /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_BRICK` it
-    /// is enough, but not exact, and after a build an upper bound of that. After
-    /// `hgrid_build_parallel`, whether it succeeds or fails, it is that of a build with one task.
+    /// is enough, but not exact, and after a build an upper bound of that. After a build with
+    /// several tasks, whether it succeeds or fails, it is that of a build with one.
     pub scratch_bytes: u64,
     /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
     pub triangle: u32,
@@ -330,35 +261,54 @@ pub struct hgrid_grid {
     pub opaque: [u64; 64],
 }
 
-impl From<hgrid_ray> for Ray {
-    fn from(ray: hgrid_ray) -> Self {
-        let hgrid_ray { origin, t_min, direction, t_max } = ray;
-        Self { origin, t_min, direction, t_max }
-    }
-}
-
-impl From<Hit> for hgrid_hit {
-    fn from(hit: Hit) -> Self {
-        let Hit { t, u, v, primitive } = hit;
-        Self { t, u, v, primitive }
-    }
-}
-
-impl hgrid_counters {
-    /// Adds the work of a query.
-    pub(crate) fn add(&mut self, work: &Counters) {
-        self.primitive_tests = self.primitive_tests.wrapping_add(work.primitive_tests);
-        self.cell_steps = self.cell_steps.wrapping_add(work.cell_steps);
-        self.grid_steps = self.grid_steps.wrapping_add(work.grid_steps);
-    }
-}
-
 impl hgrid_config {
+    /// What NULL means.
+    #[expect(clippy::cast_possible_truncation, reason = "64 bytes")]
+    pub(crate) const DEFAULT: Self = {
+        let Config { method, density, macrocell_factor, subdivide_above, depth, cell_size, .. } =
+            Config::new(Method::OneLevel);
+        let (struct_size, method) = (size_of::<Self>() as u32, method as u32);
+        Self {
+            struct_size,
+            method,
+            density,
+            macrocell_factor,
+            subdivide_above,
+            depth,
+            cell_size,
+            flags: 0,
+            tasks: 1,
+            reserved: 0,
+            context: null_mut(),
+            run: None,
+            progress: None,
+        }
+    };
+
+    /// Notes how much memory is enough for so many triangles.
+    pub(crate) fn bound(
+        self,
+        triangle_count: usize,
+        report: &mut hgrid_report,
+    ) -> Result<(), hgrid_status> {
+        let config = self.to_core()?;
+        // Without triangles there is nothing that could be wrong but the configuration.
+        let nothing = TriangleMesh::new(&[], &[]).map_err(status_of)?;
+        sizes(&nothing, &config, &mut []).map_err(status_of)?;
+        let count = u32::try_from(triangle_count).ok().filter(|&c| c as usize <= MAX_TRIANGLES);
+        let bound = count.and_then(|count| Sizes::bound_parallel(count, &config, self.tasks));
+        report.note_sizes(&bound.ok_or(HGRID_ERROR_TOO_MANY_TRIANGLES)?);
+        Ok(())
+    }
+
     /// The configuration as core knows it. The numbers are core's to judge.
     pub(crate) fn to_core(self) -> Result<Config, hgrid_status> {
         let Self { density, macrocell_factor, subdivide_above, depth, cell_size, .. } = self;
         let method = Method::from_u32(self.method).ok_or(HGRID_ERROR_INVALID_METHOD)?;
         let flags = BuildFlags::from_bits(self.flags).ok_or(HGRID_ERROR_INVALID_FLAGS)?;
+        if self.reserved != 0 {
+            return Err(HGRID_ERROR_STRUCT_SIZE);
+        }
         Ok(Config { method, density, macrocell_factor, subdivide_above, depth, cell_size, flags })
     }
 }
@@ -413,15 +363,6 @@ impl hgrid_report {
             _ => {}
         }
         status_of(error)
-    }
-}
-
-/// The coherence as core knows it.
-pub(crate) const fn coherence(coherence: hgrid_coherence) -> Result<Coherence, hgrid_status> {
-    match coherence {
-        HGRID_COHERENCE_INCOHERENT => Ok(Coherence::Incoherent),
-        HGRID_COHERENCE_COHERENT => Ok(Coherence::Coherent),
-        _ => Err(HGRID_ERROR_INVALID_COHERENCE),
     }
 }
 
@@ -482,5 +423,14 @@ impl hgrid_mesh {
         }
         Elements::new(indices, index_stride, triangle_count, size)
             .ok_or(HGRID_ERROR_INVALID_INDICES)
+    }
+
+    /// The masks; none if there are none.
+    pub(crate) fn mask_elements(&self) -> Result<Elements, hgrid_status> {
+        let Self { masks, mask_stride, triangle_count, .. } = *self;
+        let count = if masks.is_null() { 0 } else { triangle_count };
+        Elements::new(masks, mask_stride, count, size_of::<u32>())
+            .filter(|elements| elements.stride >= size_of::<u32>())
+            .ok_or(HGRID_ERROR_INVALID_MASKS)
     }
 }

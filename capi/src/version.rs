@@ -1,6 +1,6 @@
 //! The version, told once in `Cargo.toml` and checked here.
 
-use core::ffi::CStr;
+use core::ffi::{CStr, c_char};
 
 /// Raised when programs must change to go on working.
 pub const HGRID_VERSION_MAJOR: u32 = 0;
@@ -32,3 +32,20 @@ const _: () = {
     assert!(matches!(u32::from_str_radix(package[1], 10), Ok(HGRID_VERSION_MINOR)));
     assert!(matches!(u32::from_str_radix(package[2], 10), Ok(HGRID_VERSION_PATCH)));
 };
+
+/// The version of the library that is linked, to be compared with the `HGRID_VERSION` of the header
+/// that was compiled against.
+///
+/// Threads: any number of calls at once.
+#[unsafe(no_mangle)]
+pub const extern "C" fn hgrid_version() -> u32 {
+    HGRID_VERSION
+}
+
+/// The version of the library that is linked, as text: never NULL, static.
+///
+/// Threads: any number of calls at once.
+#[unsafe(no_mangle)]
+pub const extern "C" fn hgrid_version_string() -> *const c_char {
+    VERSION.as_ptr()
+}

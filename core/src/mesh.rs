@@ -175,6 +175,24 @@ impl<'a> TriangleMesh<'a> {
         self.corners(triangle, |x, y, z| [x, y, z])
     }
 
+    /// The vertices, where the caller has them.
+    #[must_use]
+    pub const fn positions(&self) -> Strided<'a> {
+        self.positions
+    }
+
+    /// The triangles, where the caller has them.
+    #[must_use]
+    pub const fn triangles(&self) -> Strided<'a> {
+        self.indices
+    }
+
+    /// The masks, where the caller has them; none if there are none.
+    #[must_use]
+    pub const fn masks(&self) -> Strided<'a> {
+        self.masks
+    }
+
     /// Whether triangles have masks of their own.
     pub(crate) const fn has_masks(&self) -> bool {
         self.masks.count > 0

@@ -138,8 +138,9 @@ pub fn sizes_with(
     }
 }
 
-/// The finest grid of a method that fits into so many bytes of index: a configuration that is the given
-/// one, or has a lower density (larger cells for [`Method::Brick`]), by no more than a step too much.
+/// The finest grid of a method that fits into so many bytes of index, and what it takes: a configuration
+/// that is the given one, or has a lower density (larger cells for [`Method::Brick`]), by no more than a
+/// step too much.
 ///
 /// A step is a factor of the square root of 2 in the number of cells. The time is that of
 /// [`sizes`] for each step. `scratch` is for [`sizes`], too: without, a configuration must fit by its bound,
@@ -152,8 +153,8 @@ pub fn sizes_with(
 /// use hgrid_core::{Config, TriangleMesh, fit};
 /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 /// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-/// let config = fit(&mesh, &Config::default(), 10_000, &mut [])?;
-/// assert_eq!(config, Config::default());
+/// let (config, sizes) = fit(&mesh, &Config::default(), 10_000, &mut [])?;
+/// assert!(config == Config::default() && sizes.index_bytes <= 10_000);
 /// # Ok::<(), hgrid_core::Error>(())
 /// ```
 pub fn fit(
@@ -161,17 +162,17 @@ pub fn fit(
     config: &Config,
     index_bytes: usize,
     scratch: &mut [u8],
-) -> Result<Config, Error> {
+) -> Result<(Config, Sizes), Error> {
     /// From many cells for each triangle to one cell for all of them.
     const STEPS: u32 = 80;
     let mut config = *config;
     let mut least = usize::MAX;
     for _ in 0..STEPS {
-        let needed_bytes = sizes(mesh, &config, scratch)?.index_bytes;
-        if needed_bytes <= index_bytes {
-            return Ok(config);
+        let needed = sizes(mesh, &config, scratch)?;
+        if needed.index_bytes <= index_bytes {
+            return Ok((config, needed));
         }
-        least = least.min(needed_bytes);
+        least = least.min(needed.index_bytes);
         config.density *= core::f32::consts::FRAC_1_SQRT_2;
         config.cell_size *= 1.122_462; // 2^(1/6)
     }

@@ -1,4 +1,5 @@
-//! The only place where a caller's pointer becomes a reference or a value.
+//! The only place where a caller's pointer becomes a reference or a value: here for builds and blobs, in
+//! `ask` for queries.
 //!
 //! # The contract with C
 //!
@@ -23,23 +24,23 @@
 //! "as long as the caller says": blob and mesh stay unchanged while the view is in use, and between
 //! calls nothing here looks at them.
 
+mod ask;
+
 use core::ffi::c_void;
-use core::ptr::NonNull;
+use core::ptr::{NonNull, null_mut};
 use core::slice;
 
-use hgrid_core::{Config, Counters, Error, Grid, Ray, Strided, Task, TriangleMesh};
+use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
-use crate::batch::Batch;
+pub(crate) use ask::{batch, closest, query, query_all};
+
 use crate::input::Input;
 use crate::span::{Region, Span};
 use crate::status::{
     HGRID_ERROR_NOT_A_GRID, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,
     HGRID_ERROR_STRUCT_SIZE, HGRID_OK, hgrid_status, status_of,
 };
-use crate::types::{
-    Elements, hgrid_config, hgrid_counters, hgrid_grid, hgrid_mesh, hgrid_parallel,
-    hgrid_query_options, hgrid_ray, hgrid_report, hgrid_task,
-};
+use crate::types::{Elements, hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report, hgrid_task};
 
 /// The most bytes that a reference may span.
 const MAX_BYTES: usize = isize::MAX.unsigned_abs();
@@ -148,11 +149,15 @@ unsafe fn bytes_mut(start: *mut c_void, count: usize) -> Result<&'static mut [u8
 /// The caller's promise.
 unsafe fn mesh(mesh: &hgrid_mesh) -> Result<TriangleMesh<'static>, hgrid_status> {
     let [positions, indices] = [mesh.position_elements()?, mesh.index_elements()?];
+    let masks = mesh.mask_elements()?;
     // SAFETY: the caller's promise.
     let positions = unsafe { strided(positions) }?;
     // SAFETY: the caller's promise.
     let indices = unsafe { strided(indices) }?;
-    TriangleMesh::strided(positions, indices, mesh.index_type()?).map_err(status_of)
+    // SAFETY: the caller's promise.
+    let masks = unsafe { strided(masks) }?;
+    let mesh = TriangleMesh::strided(positions, indices, mesh.index_type()?).map_err(status_of)?;
+    if masks.count == 0 { Ok(mesh) } else { mesh.with_masks(masks).map_err(status_of) }
 }
 
 /// One array of a mesh.
@@ -166,65 +171,83 @@ unsafe fn strided(elements: Elements) -> Result<Strided<'static>, hgrid_status> 
     Ok(Strided { bytes, stride, count })
 }
 
-/// The configuration; NULL means the defaults.
+/// What a build may be told, as the caller says it; NULL means the defaults.
 ///
 /// # Safety
 /// The caller's promise.
-unsafe fn config(config: *const hgrid_config) -> Result<Config, hgrid_status> {
+pub(crate) unsafe fn settings(config: *const hgrid_config) -> Result<hgrid_config, hgrid_status> {
     if config.is_null() {
-        return Ok(Config::default());
+        return Ok(hgrid_config::DEFAULT);
     }
     // SAFETY: the caller's promise.
-    unsafe { read_sized(config) }?.to_core()
+    let mut config = unsafe { read_sized(config) }?;
+    // What a later version has behind it is zero and not copied.
+    config.struct_size = hgrid_config::DEFAULT.struct_size;
+    Ok(config)
 }
 
-/// The caller's loop over tasks.
+/// What a build may be told, and whom it asks on the way; NULL means the defaults and nobody.
+///
+/// # Safety
+/// The caller's promise.
+unsafe fn config(config: *const hgrid_config) -> Result<(Config, Caller), hgrid_status> {
+    // SAFETY: the caller's promise.
+    let config = unsafe { settings(config) }?;
+    let hgrid_config { tasks, context, run, progress, .. } = config;
+    if tasks > 1 && run.is_none() {
+        return Err(HGRID_ERROR_NULL_ARGUMENT);
+    }
+    let run = run.filter(|_| tasks > 1);
+    Ok((config.to_core()?, Caller { tasks, context, run, progress }))
+}
+
+/// What a caller has for a build: a loop over tasks, and an eye on how far it is.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Threads {
-    /// 2 or more.
+pub(crate) struct Caller {
+    /// 2 or more if there is a loop.
     pub(crate) tasks: u32,
     context: *mut c_void,
-    run: unsafe extern "C" fn(*mut c_void, u32, hgrid_task, *mut c_void),
+    run: Option<unsafe extern "C" fn(*mut c_void, u32, hgrid_task, *mut c_void)>,
+    progress: Option<unsafe extern "C" fn(*mut c_void, f32) -> bool>,
 }
 
-impl Threads {
-    /// Has the caller's loop call a task with every number below the count.
+impl Caller {
+    /// Neither.
+    pub(crate) const NOBODY: Self =
+        Self { tasks: 1, context: null_mut(), run: None, progress: None };
+
+    /// Has the caller's loop call a task with every number below the count; without one does it.
     pub(crate) fn run(&self, count: u32, task: &Task<'_>) {
+        let Some(run) = self.run else { return (0..count).for_each(task) };
         // SAFETY: a function of this type by the caller's promise, and with `call` all it needs:
         // * `task` lives until this returns, and by the caller's promise no call comes later;
         // * it is `Sync`, so that calls may come at once, from any thread;
         // * core makes sure itself that one too many or too few do no harm.
-        unsafe { (self.run)(self.context, count, call, (&raw const task).cast_mut().cast()) }
+        unsafe { run(self.context, count, call, (&raw const task).cast_mut().cast()) }
+    }
+
+    /// Whether the caller wants to know how far a build is.
+    pub(crate) const fn is_watching(&self) -> bool {
+        self.progress.is_some()
+    }
+
+    /// Tells how far a build is; `false` if the caller does not want the rest.
+    pub(crate) fn progress(&self, done: f32) -> bool {
+        // SAFETY: a function of this type by the caller's promise.
+        self.progress.is_none_or(|progress| unsafe { progress(self.context, done) })
     }
 }
 
 /// What C gets for a task: calls the one whose address is the context.
 ///
 /// # Safety
-/// The context is NULL, or it came with this function and the [`Threads::run`] that passed it on has
+/// The context is NULL, or it came with this function and the [`Caller::run`] that passed it on has
 /// not returned.
 unsafe extern "C" fn call(task_context: *mut c_void, index: u32) {
-    // SAFETY: `Threads::run` made it from the address of such a reference and is still running.
+    // SAFETY: `Caller::run` made it from the address of such a reference and is still running.
     if let Some(task) = unsafe { task_context.cast::<&Task<'_>>().as_ref() } {
         task(index);
     }
-}
-
-/// The caller's loop; `None` where nothing is to be parallel.
-///
-/// # Safety
-/// The caller's promise.
-unsafe fn threads(parallel: *const hgrid_parallel) -> Result<Option<Threads>, hgrid_status> {
-    if parallel.is_null() {
-        return Ok(None);
-    }
-    // SAFETY: the caller's promise.
-    let hgrid_parallel { tasks, context, run, .. } = unsafe { read_sized(parallel) }?;
-    if tasks <= 1 {
-        return Ok(None);
-    }
-    let run = run.ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
-    Ok(Some(Threads { tasks, context, run }))
 }
 
 /// Index and scratch, once it is sure that they lie apart from each other and from the mesh.
@@ -235,7 +258,7 @@ unsafe fn regions(
     mesh: &hgrid_mesh,
     [index, scratch]: [Region; 2],
 ) -> Result<[&'static mut [u8]; 2], hgrid_status> {
-    let inputs = [mesh.position_elements()?, mesh.index_elements()?]
+    let inputs = [mesh.position_elements()?, mesh.index_elements()?, mesh.mask_elements()?]
         .map(|elements| Span::new(elements.start, elements.bytes));
     let [index_span, scratch_span] = [index.span(), scratch.span()];
     let is_shared = |input: &Span| input.overlaps(index_span) || input.overlaps(scratch_span);
@@ -256,7 +279,6 @@ unsafe fn regions(
 pub(crate) unsafe fn input(
     description: *const hgrid_mesh,
     settings: *const hgrid_config,
-    parallel: *const hgrid_parallel,
     memory: [Region; 2],
 ) -> Result<Input, hgrid_status> {
     // SAFETY: the caller's promise.
@@ -264,15 +286,13 @@ pub(crate) unsafe fn input(
     // SAFETY: the caller's promise.
     let mesh = unsafe { mesh(&description) }?;
     // SAFETY: the caller's promise.
-    let config = unsafe { config(settings) }?;
-    // SAFETY: the caller's promise.
-    let threads = unsafe { threads(parallel) }?;
+    let (config, caller) = unsafe { config(settings) }?;
     // SAFETY: the caller's promise.
     let [index, scratch] = unsafe { regions(&description, memory) }?;
-    Ok(Input { mesh, config, threads, index, scratch })
+    Ok(Input { mesh, config, caller, index, scratch })
 }
 
-/// The grid in a blob.
+/// The grid in a blob, and its mesh: the caller's, or NULL for the blob's own.
 ///
 /// # Safety
 /// The caller's promise.
@@ -281,6 +301,11 @@ pub(crate) unsafe fn open(
     blob_bytes: usize,
     description: *const hgrid_mesh,
 ) -> Result<Grid<'static>, hgrid_status> {
+    if description.is_null() {
+        // SAFETY: the caller's promise.
+        let blob = unsafe { bytes(blob, blob_bytes) }?;
+        return Grid::open_packed(blob).map_err(status_of);
+    }
     // SAFETY: the caller's promise.
     let description = unsafe { read_sized(description) }?;
     // SAFETY: the caller's promise.
@@ -288,6 +313,36 @@ pub(crate) unsafe fn open(
     // SAFETY: the caller's promise.
     let blob = unsafe { bytes(blob, blob_bytes) }?;
     Grid::open(blob, mesh).map_err(status_of)
+}
+
+/// What the header of a blob says.
+///
+/// # Safety
+/// The caller's promise.
+pub(crate) unsafe fn peek(
+    blob: *const c_void,
+    blob_bytes: usize,
+) -> Result<BlobInfo, hgrid_status> {
+    // SAFETY: the caller's promise.
+    BlobInfo::peek(unsafe { bytes(blob, blob_bytes) }?).map_err(status_of)
+}
+
+/// Writes a grid with its mesh, once it is sure that they lie elsewhere.
+///
+/// # Safety
+/// That of [`grid`].
+pub(crate) unsafe fn pack(grid: &Grid<'_>, to: Region) -> Result<(), hgrid_status> {
+    let mesh = grid.mesh();
+    let [positions, triangles, masks] =
+        [mesh.positions(), mesh.triangles(), mesh.masks()].map(|array| array.bytes);
+    let is_shared =
+        |bytes: &[u8]| Span::new(bytes.as_ptr().cast(), bytes.len()).overlaps(to.span());
+    if [grid.blob(), positions, triangles, masks].into_iter().any(is_shared) {
+        return Err(HGRID_ERROR_OVERLAP);
+    }
+    // SAFETY: the caller's promise; nothing else that this call reads lies there.
+    let to = unsafe { bytes_mut(to.start, to.bytes) }?;
+    grid.pack(to).map(|_| ()).map_err(status_of)
 }
 
 /// The grid of a view.
@@ -338,111 +393,23 @@ pub(crate) unsafe fn reporting(
     result.err().unwrap_or(HGRID_OK)
 }
 
-/// Runs a query, counting if the options say so. `None` if there is nothing to ask.
-///
-/// # Safety
-/// That of [`grid`].
-#[inline(always)]
-pub(crate) unsafe fn query<T>(
-    view: *const hgrid_grid,
-    ray: *const hgrid_ray,
-    options: *const hgrid_query_options,
-    ask: impl FnOnce(&Grid<'static>, &Ray, Option<&mut Counters>) -> T,
-) -> Option<T> {
-    // SAFETY: this function's contract.
-    let grid = unsafe { grid(view) }.ok()?;
-    // SAFETY: the caller's promise.
-    let ray = unsafe { read(ray) }.ok()?.into();
-    // SAFETY: the caller's promise.
-    let Some(counters) = unsafe { counters(options) }.ok()? else {
-        return Some(ask(grid, &ray, None));
-    };
-    let mut work = Counters::default();
-    let answer = ask(grid, &ray, Some(&mut work));
-    // SAFETY: the caller's promise.
-    unsafe { add(counters, &work) }.ok()?;
-    Some(answer)
-}
-
-/// How many rays of a batch are read before their answers are written: a tile of 8 x 8. The buffers
-/// are 3 KiB.
-const CHUNK: usize = 64;
-
-/// Runs a batch: `many` answers a chunk of rays, or `one` a single ray if the options say that work
-/// is to be counted. `unanswered` is written nowhere.
-///
-/// # Safety
-/// That of [`grid`]; and the elements of both arrays are the caller's to be read and written.
-pub(crate) unsafe fn batch<A: Copy, T: From<A>>(
-    view: *const hgrid_grid,
-    batch: &Batch<T>,
-    options: *const hgrid_query_options,
-    unanswered: A,
-    many: impl Fn(&Grid<'static>, &[Ray], &mut [A]) -> Result<(), Error>,
-    one: impl Fn(&Grid<'static>, &Ray, &mut Counters) -> A,
-) -> Result<(), hgrid_status> {
-    // SAFETY: this function's contract.
-    let grid = unsafe { grid(view) }?;
-    // SAFETY: the caller's promise.
-    let counters = unsafe { counters(options) }?;
-    let mut work = Counters::default();
-    let mut rays = [Ray::new([0.0; 3], [0.0; 3]); CHUNK];
-    let mut answers = [unanswered; CHUNK];
-    for first in (0..batch.count).step_by(CHUNK) {
-        let count = CHUNK.min(batch.count - first);
-        let rays = rays.get_mut(..count).unwrap_or_default();
-        let answers = answers.get_mut(..count).unwrap_or_default();
-        for (index, ray) in (first..).zip(&mut *rays) {
-            // SAFETY: within the array by its index, readable by this function's contract, and any
-            // bytes are a ray.
-            *ray = unsafe { batch.ray(index).read_unaligned() }.into();
-        }
-        if counters.is_some() {
-            for (ray, answer) in rays.iter().zip(&mut *answers) {
-                *answer = one(grid, ray, &mut work);
-            }
-        } else {
-            many(grid, rays, answers).map_err(status_of)?;
-        }
-        for (index, &answer) in (first..).zip(&*answers) {
-            // SAFETY: within the array by its index, writable by this function's contract.
-            unsafe { batch.answer(index).write_unaligned(answer.into()) };
-        }
-    }
-    let Some(counters) = counters else { return Ok(()) };
-    // SAFETY: the caller's promise.
-    unsafe { add(counters, &work) }
-}
-
-/// Adds the work of queries to the caller's.
+/// Fills a struct that starts with its `struct_size`, if `call` finds out what belongs there.
 ///
 /// # Safety
 /// The caller's promise.
-#[inline(always)]
-unsafe fn add(to: NonNull<hgrid_counters>, work: &Counters) -> Result<(), hgrid_status> {
+pub(crate) unsafe fn filling<T: Copy>(
+    to: *mut T,
+    call: impl FnOnce(&mut T) -> Result<(), hgrid_status>,
+) -> hgrid_status {
     // SAFETY: the caller's promise.
-    let mut sum = unsafe { read(to.as_ptr()) }?;
-    sum.add(work);
-    // SAFETY: the caller's promise.
-    unsafe { write(to, sum) };
-    Ok(())
-}
-
-/// Where the options, which may be NULL, say that work is to be counted.
-///
-/// # Safety
-/// The caller's promise.
-#[inline(always)]
-unsafe fn counters(
-    options: *const hgrid_query_options,
-) -> Result<Option<NonNull<hgrid_counters>>, hgrid_status> {
-    if options.is_null() {
-        return Ok(None);
+    let filled = unsafe { read_sized(to) }.and_then(|mut value| call(&mut value).map(|()| value));
+    match (filled, NonNull::new(to)) {
+        (Ok(value), Some(to)) => {
+            // SAFETY: the caller's promise.
+            unsafe { write(to, value) };
+            HGRID_OK
+        }
+        (Err(status), _) => status,
+        (_, None) => HGRID_ERROR_NULL_ARGUMENT,
     }
-    // SAFETY: the caller's promise.
-    let options = unsafe { read_sized(options) }?;
-    if options.reserved != 0 {
-        return Err(HGRID_ERROR_STRUCT_SIZE);
-    }
-    Ok(NonNull::new(options.counters))
 }

@@ -1,0 +1,240 @@
+//! How much memory, and building.
+
+use core::ffi::c_void;
+use core::ptr::{NonNull, null_mut};
+
+use crate::raw;
+use crate::span::Region;
+use crate::status::{HGRID_ERROR_NULL_ARGUMENT, hgrid_status};
+use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
+
+/// Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
+/// is looked at.
+///
+/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration, for array
+/// declarations. How much more than enough it is depends on the method: a scan takes a sixth of it or
+/// less with one level; with recursive and brick it is generous beyond use.
+///
+/// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
+/// `index_bytes` and `scratch_bytes`; or what is wrong with the configuration; or
+/// `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space.
+///
+/// Threads: any number of calls at once, each with a report of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_bound(
+    triangle_count: usize,
+    config: *const hgrid_config,
+    report: *mut hgrid_report,
+) -> hgrid_status {
+    if report.is_null() {
+        return HGRID_ERROR_NULL_ARGUMENT;
+    }
+    let call = |report: &mut hgrid_report| {
+        // SAFETY: the caller's promise.
+        unsafe { raw::settings(config) }?.bound(triangle_count, report)
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting(report, call) }
+}
+
+/// Tells how much memory a build of this mesh takes.
+///
+/// Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
+/// `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
+/// more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
+/// with variable; with recursive and brick it is a bound that no mesh comes near.
+///
+/// With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
+/// is 1. That takes about half the time of a build; with recursive and brick, which have to build
+/// the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
+///
+/// With `tasks` in the configuration the answer is for a build with so many at once: each takes scratch,
+/// the index is filled by all of them and may be a little larger. `run` is called for the answer, too;
+/// `progress` is not.
+///
+/// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. Returns `HGRID_OK` or
+/// the reason, with the triangle that is to blame in the report; scratch that is too small is no
+/// error, and counts as none.
+///
+/// Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
+/// call starts no thread; tasks are called on those that `run` chooses.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_sizes(
+    mesh: *const hgrid_mesh,
+    config: *const hgrid_config,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+    report: *mut hgrid_report,
+) -> hgrid_status {
+    if report.is_null() {
+        return HGRID_ERROR_NULL_ARGUMENT;
+    }
+    let none = Region { start: null_mut(), bytes: 0 };
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let call = |report: &mut hgrid_report| {
+        // SAFETY: the caller's promise.
+        unsafe { raw::input(mesh, config, [none, scratch]) }?.measure(report)
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting(report, call) }
+}
+
+/// Looks for the finest grid that fits into a budget.
+///
+/// `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
+/// (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no more than a
+/// step too much: a step is a factor of 1.41 in the number of cells, and takes as long as `hgrid_sizes`.
+/// Bring scratch, as for `hgrid_sizes`; without, a grid must fit by its bound, and gets coarser than it
+/// had to be. The scratch holds nothing of use afterwards.
+///
+/// `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be the same as
+/// `fitted`. `report` may be NULL.
+///
+/// Returns `HGRID_OK`, and the report says what the fitted grid takes; or
+/// `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or what
+/// `hgrid_sizes` returns. Neither `tasks` nor `progress` matters here; both are copied.
+///
+/// Threads: any number of calls at once, as long as each has a scratch, a configuration to write and a
+/// report of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_fit(
+    mesh: *const hgrid_mesh,
+    config: *const hgrid_config,
+    index_bytes: usize,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+    fitted: *mut hgrid_config,
+    report: *mut hgrid_report,
+) -> hgrid_status {
+    let none = Region { start: null_mut(), bytes: 0 };
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let call = |report: &mut hgrid_report| {
+        let to = NonNull::new(fitted).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        let found =
+            unsafe { raw::input(mesh, config, [none, scratch]) }?.fit(index_bytes, report)?;
+        // SAFETY: the caller's promise.
+        let mut config = unsafe { raw::settings(config) }?;
+        (config.density, config.cell_size) = (found.density, found.cell_size);
+        // SAFETY: the caller's promise.
+        unsafe { raw::write(to, config) };
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting(report, call) }
+}
+
+/// Builds a grid in memory that the caller brings.
+///
+/// `index` keeps the grid (it is the blob afterwards), `scratch` is free again when the call
+/// returns. Both start at a multiple of `HGRID_ALIGNMENT`, overlap neither each other nor the mesh
+/// nor any struct of this call, and may hold anything before. `hgrid_sizes` tells how large they
+/// must be, `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` how large is always enough with the
+/// default configuration; what is more than needed is not touched. The same mesh and configuration
+/// give the same bytes on every machine of the same byte order.
+///
+/// `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `index` and `scratch` may
+/// be NULL if their size is 0. `report` may be NULL.
+///
+/// Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `grid` as it
+/// was. The report is written in both cases: what was built; or, if a region is too small, what
+/// both need; or the triangle that is to blame.
+///
+/// After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
+/// anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
+/// `HGRID_ERROR_INVALID_CELL_SIZE` and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`,
+/// `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BRICK` may have left anything in it, so a grid that
+/// lay there before is gone. They write as far as the index reaches and then go on counting: the
+/// report's `index_bytes` is exact (with brick maybe only enough), and with so many the same call
+/// succeeds.
+///
+/// # A build on threads
+///
+/// The library knows no threads. With `tasks` and `run` in the configuration, `HGRID_METHOD_BRICK` is cut
+/// into tasks: the library calls `run`, on the thread that calls this function, and `run` calls the
+/// tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte. With POSIX
+/// threads, one for each task:
+///
+/// ```c
+/// typedef struct {
+///     pthread_t thread;
+///     bool has_thread;
+///     hgrid_task task;
+///     void *task_context;
+///     uint32_t index;
+/// } one_task;
+///
+/// static void *run_one(void *argument)
+/// {
+///     const one_task *one = (const one_task *)argument;
+///     one->task(one->task_context, one->index);
+///     return NULL;
+/// }
+///
+/// static void run_on_threads(void *context, uint32_t count, hgrid_task task, void *task_context)
+/// {
+///     one_task all[HGRID_MAX_TASKS];
+///     for (uint32_t i = 0; i < count; i++) {
+///         all[i].task = task, all[i].task_context = task_context, all[i].index = i;
+///         all[i].has_thread = pthread_create(&all[i].thread, NULL, run_one, &all[i]) == 0;
+///         if (!all[i].has_thread)
+///             run_one(&all[i]);
+///     }
+///     for (uint32_t i = 0; i < count; i++)
+///         if (all[i].has_thread)
+///             pthread_join(all[i].thread, NULL);
+///     (void)context;
+/// }
+///
+/// static hgrid_status build_on_threads(const hgrid_mesh *mesh, void *index, size_t index_bytes,
+///                                      void *scratch, size_t scratch_bytes, hgrid_grid *grid)
+/// {
+///     hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+///     config.tasks = 8, config.run = run_on_threads;
+///     return hgrid_build(mesh, &config, index, index_bytes, scratch, scratch_bytes, grid, NULL);
+/// }
+/// ```
+///
+/// `hgrid_sizes` with the same configuration tells how much memory so many tasks take. Where there is
+/// less scratch, but enough for fewer tasks, there are fewer. `HGRID_ERROR_PARALLEL_FOR` says that `run`
+/// ran a task twice or not at all; then the index may hold anything, and both regions can be used
+/// again, as after `HGRID_ERROR_CANCELLED`.
+///
+/// Threads: any number of calls at once, as long as each has regions, a view and a report of its
+/// own. The call starts no thread; its tasks are called on those that `run` chooses.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_build(
+    mesh: *const hgrid_mesh,
+    config: *const hgrid_config,
+    index: *mut c_void,
+    index_bytes: usize,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+    grid: *mut hgrid_grid,
+    report: *mut hgrid_report,
+) -> hgrid_status {
+    let index = Region { start: index, bytes: index_bytes };
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let call = |report: &mut hgrid_report| {
+        let to = NonNull::new(grid).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        let built = unsafe { raw::input(mesh, config, [index, scratch]) }?.build(report)?;
+        // SAFETY: the caller's promise.
+        unsafe { raw::write_grid(to, &built) };
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting(report, call) }
+}

@@ -1,0 +1,138 @@
+//! Questions about many rays, from the caller's structs into the caller's structs.
+
+use hgrid_core::{Grid, Hit, QueryOptions, Ray, Strided, StridedMut};
+
+use crate::batch::Batch;
+use crate::questions::{self, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray};
+use crate::raw;
+use crate::status::{HGRID_OK, hgrid_status};
+use crate::types::hgrid_grid;
+
+/// Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
+/// each, bit for bit, but sooner.
+///
+/// A ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of `hits`.
+/// A miss writes a hit, too: with `primitive` equal to `HGRID_INVALID_ID`, `t` equal to `INFINITY`,
+/// `u` and `v` equal to 0. Here is a tile of 8 x 8 pixels:
+///
+/// ```c
+/// static size_t trace_tile(const hgrid_grid *grid, const hgrid_ray rays[64], float depth[64])
+/// {
+///     hgrid_hit hits[64];
+///     size_t found = 0;
+///     if (hgrid_intersect_n(grid, rays, 0, hits, 0, 64, HGRID_COHERENCE_COHERENT, NULL) != HGRID_OK)
+///         return 0;
+///     for (size_t i = 0; i < 64; i++) {
+///         depth[i] = hits[i].t;
+///         found += hits[i].primitive != HGRID_INVALID_ID;
+///     }
+///     return found;
+/// }
+/// ```
+///
+/// Rays and hits may lie in structs of yours, also in the same ones: with `struct {hgrid_ray ray;
+/// hgrid_hit hit; int pixel;}` both strides are the size of the struct. A stride of 0 means side by
+/// side. Neither array needs any alignment, and not a byte between its elements is read or written.
+/// No hit may overlap a ray, its own or another; where the two arrays reach into each other, their
+/// strides are the same. Nor do hits overlap anything else that the call uses.
+///
+/// `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
+/// the hits. With `count` 0 nothing is done. Up to 64 rays are read before the first hit is written.
+///
+/// `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With others the
+/// rays are traced one after the other, which is slower.
+///
+/// Returns `HGRID_OK` and has written all hits, or returns the reason and has written none:
+/// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and
+/// `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is
+/// impossible), `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no
+/// error: it misses.
+///
+/// The call allocates nothing and needs at most about 16 KiB of stack.
+///
+/// Threads: any number of queries on the same grid at once; each thread with hits and counters of
+/// its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_intersect_n(
+    grid: *const hgrid_grid,
+    rays: *const hgrid_ray,
+    ray_stride: usize,
+    hits: *mut hgrid_hit,
+    hit_stride: usize,
+    count: usize,
+    coherence: hgrid_coherence,
+    options: *const hgrid_query_options,
+) -> hgrid_status {
+    let call = || {
+        let batch = Batch::new((rays, ray_stride), (hits, hit_stride), count)?;
+        let coherence = questions::coherence(coherence)?;
+        let many = |grid: &Grid<'_>, rays: &[_], hits: &mut [_]| {
+            grid.intersect_n(&Strided::new::<Ray>(rays), &mut StridedMut::new(hits), coherence)
+        };
+        let one = |grid: &Grid<'_>, ray: &_, options: &mut QueryOptions<'_>| {
+            grid.intersect_with(ray, options).unwrap_or(Hit::MISS)
+        };
+        // SAFETY: the caller's promise.
+        unsafe { raw::batch(grid, &batch, options, Hit::MISS, many, one) }
+    };
+    call().err().unwrap_or(HGRID_OK)
+}
+
+/// Tells for each of many rays whether it hits anything: what `hgrid_occluded` would say for each,
+/// but sooner.
+///
+/// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
+/// from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that hold a ray and
+/// its byte, what may be NULL, coherence, options, statuses, stack. For the shadow rays of a tile,
+/// towards one light:
+///
+/// ```c
+/// static size_t count_lit(const hgrid_grid *grid, const hgrid_ray *rays, size_t count)
+/// {
+///     unsigned char occluded[64];
+///     size_t lit = 0;
+///     for (size_t first = 0; first < count; first += 64) {
+///         const size_t n = count - first < 64 ? count - first : 64;
+///         if (hgrid_occluded_n(grid, rays + first, 0, occluded, 0, n, HGRID_COHERENCE_COHERENT,
+///                              NULL) != HGRID_OK)
+///             return 0;
+///         for (size_t i = 0; i < n; i++)
+///             lit += !occluded[i];
+///     }
+///     return lit;
+/// }
+/// ```
+///
+/// Threads: any number of queries on the same grid at once; each thread with bytes and counters of
+/// its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluded_n(
+    grid: *const hgrid_grid,
+    rays: *const hgrid_ray,
+    ray_stride: usize,
+    occluded: *mut u8,
+    occluded_stride: usize,
+    count: usize,
+    coherence: hgrid_coherence,
+    options: *const hgrid_query_options,
+) -> hgrid_status {
+    let call = || {
+        let batch = Batch::new((rays, ray_stride), (occluded, occluded_stride), count)?;
+        let coherence = questions::coherence(coherence)?;
+        let many = |grid: &Grid<'_>, rays: &[_], occluded: &mut [u8]| {
+            grid.occluded_n(&Strided::new::<Ray>(rays), &mut StridedMut::new(occluded), coherence)
+        };
+        let one = |grid: &Grid<'_>, ray: &_, options: &mut QueryOptions<'_>| {
+            u8::from(grid.occluded_with(ray, options))
+        };
+        // SAFETY: the caller's promise.
+        unsafe { raw::batch(grid, &batch, options, 0, many, one) }
+    };
+    call().err().unwrap_or(HGRID_OK)
+}

@@ -1,0 +1,161 @@
+//! Questions about one ray or one point.
+
+use core::ptr::NonNull;
+
+use hgrid_core::{Grid, QueryOptions};
+
+use crate::questions::{hgrid_closest, hgrid_hit, hgrid_query_options, hgrid_ray};
+use crate::raw;
+use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};
+use crate::types::hgrid_grid;
+
+/// Finds the closest triangle that a ray hits.
+///
+/// Returns true and writes `hit`; or returns false and writes nothing. Where several triangles are
+/// hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count.
+/// A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
+/// without area, or one that is seen exactly edge-on, is not hit.
+///
+/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
+/// opened, or with options that break the rules for structs, nothing is hit.
+///
+/// A query allocates nothing, needs at most about 4 KiB of stack and always ends: on one level
+/// after no more steps than the three resolutions sum up to.
+///
+/// Threads: any number of queries on the same grid at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_intersect(
+    grid: *const hgrid_grid,
+    ray: *const hgrid_ray,
+    options: *const hgrid_query_options,
+    hit: *mut hgrid_hit,
+) -> bool {
+    let Some(to) = NonNull::new(hit) else { return false };
+    let plain = |grid: &Grid<'_>, ray: &_| grid.intersect(ray);
+    let with = |grid: &Grid<'_>, ray: &_, options: &mut QueryOptions<'_>| {
+        grid.intersect_with(ray, options)
+    };
+    // SAFETY: the caller's promise.
+    let Ok(Some(found)) = (unsafe { raw::query(grid, ray, options, plain, with) }) else {
+        return false;
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::write(to, found.into()) };
+    true
+}
+
+/// Tells whether a ray hits anything: what `hgrid_intersect` would return, but sooner.
+///
+/// This is the query for shadows and visibility. It stops at the first triangle it finds in the
+/// ray's range, which need not be the closest.
+///
+/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
+/// opened, or with options that break the rules for structs, the answer is false.
+///
+/// Threads: any number of queries on the same grid at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluded(
+    grid: *const hgrid_grid,
+    ray: *const hgrid_ray,
+    options: *const hgrid_query_options,
+) -> bool {
+    let plain = |grid: &Grid<'_>, ray: &_| grid.occluded(ray);
+    let with =
+        |grid: &Grid<'_>, ray: &_, options: &mut QueryOptions<'_>| grid.occluded_with(ray, options);
+    // SAFETY: the caller's promise.
+    unsafe { raw::query(grid, ray, options, plain, with) }.unwrap_or(false)
+}
+
+/// Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
+///
+/// Writes as many hits as there is room for, the nearest, and to `count` how many there are, which may
+/// be more. With room for all, the ray is walked once; otherwise, and with a filter, once more for each
+/// sixteen hits, from where it got to: so nothing is allocated, whatever their number. Options as
+/// with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what it accepts is
+/// written and counted.
+///
+/// ```c
+/// static double thickness_along(const hgrid_grid *grid, const hgrid_ray *ray)
+/// {
+///     hgrid_hit hits[64];
+///     size_t count;
+///     double inside = 0;
+///     if (hgrid_intersect_all(grid, ray, NULL, hits, 64, &count) != HGRID_OK)
+///         return -1;
+///     for (size_t i = 0; i + 1 < count && i + 1 < 64; i += 2)
+///         inside += hits[i + 1].t - hits[i].t;
+///     return inside;
+/// }
+/// ```
+///
+/// `hits` may be NULL if `capacity` is 0. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
+/// returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
+/// `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_ANSWERS`
+/// (a capacity that is impossible). A ray that is none hits nothing: the count is 0.
+///
+/// Threads: any number of queries on the same grid at once; each thread with hits and counters of
+/// its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_intersect_all(
+    grid: *const hgrid_grid,
+    ray: *const hgrid_ray,
+    options: *const hgrid_query_options,
+    hits: *mut hgrid_hit,
+    capacity: usize,
+    count: *mut usize,
+) -> hgrid_status {
+    let call = || {
+        let to = NonNull::new(count).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        let found = unsafe { raw::query_all(grid, ray, options, hits, capacity) }?;
+        // SAFETY: the caller's promise.
+        unsafe { raw::write(to, found) };
+        Ok(())
+    };
+    call().err().unwrap_or(HGRID_OK)
+}
+
+/// Finds the point of the mesh that is closest to a point, `max_distance` away at most.
+///
+/// Returns true and writes `closest`; or returns false and writes nothing. Where several triangles are
+/// equally close, the one with the lowest number is reported. `max_distance` may be `INFINITY`. `point`
+/// is three floats; it and `closest` may not be NULL.
+///
+/// Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts the lists that
+/// were looked at, `primitive_tests` the triangles in them. `options` may be NULL: the defaults. With
+/// anything that is not as it should be (another NULL, a view of zeros, options that break the rules, a point that
+/// is not finite, a distance that is NaN or negative) the answer is false.
+///
+/// The call allocates nothing and always ends. How long it takes grows with the number of cells that
+/// are as close as the answer: far from the mesh and in the middle of nothing, limit the distance.
+///
+/// Threads: any number of queries on the same grid at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_closest_point(
+    grid: *const hgrid_grid,
+    point: *const f32,
+    max_distance: f32,
+    options: *const hgrid_query_options,
+    closest: *mut hgrid_closest,
+) -> bool {
+    let Some(to) = NonNull::new(closest) else { return false };
+    // SAFETY: the caller's promise.
+    let Ok(Some(found)) = (unsafe { raw::closest(grid, point, max_distance, options) }) else {
+        return false;
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::write(to, found.into()) };
+    true
+}

@@ -1,0 +1,339 @@
+//! What queries ask and what they answer: the structs that cross the boundary, as C sees them, and what
+//! they mean to core.
+//!
+//! The docs here are the text of `hgrid.h`: they are written for C readers.
+
+use core::ffi::c_void;
+
+use hgrid_core::{
+    BlobInfo, ClosestPoint, Coherence, Counters, Cull, Hit, INVALID_ID, Ray, Statistics, Verdict,
+};
+
+use crate::status::{HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_CULL, hgrid_status};
+
+/// What a caller knows about the rays of a batch: one of `HGRID_COHERENCE_...`. It changes how fast
+/// the answers come, never the answers.
+#[allow(non_camel_case_types, reason = "the C name")]
+pub type hgrid_coherence = u32;
+
+/// Nothing is known: random rays, rays after a bounce.
+pub const HGRID_COHERENCE_INCOHERENT: hgrid_coherence = 0;
+
+/// Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 64
+/// rays, a tile of 8 x 8 pixels after the other.
+pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
+
+/// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.
+///
+/// A point of the ray is `origin + t * direction`. The direction has any length but zero, and every
+/// `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`, both ends included. A ray
+/// with a NaN anywhere, with an infinite origin or direction, with a zero direction or with
+/// `t_min > t_max` hits nothing.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_ray {
+    /// Where `t` is 0, in scene units.
+    pub origin: [f32; 3],
+    /// The smallest `t` that is accepted, usually 0; negative reaches behind the origin.
+    pub t_min: f32,
+    /// The direction, any length but zero.
+    pub direction: [f32; 3],
+    /// The largest `t` that is accepted; `INFINITY` and `FLT_MAX` are both fine.
+    pub t_max: f32,
+}
+
+/// Where a ray meets a triangle: 16 bytes.
+///
+/// The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
+/// triangle's vertices `a`, `b`, `c`, up to rounding.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_hit {
+    /// Distance in multiples of the ray's direction.
+    pub t: f32,
+    /// Weight of the triangle's second vertex, 0 to 1.
+    pub u: f32,
+    /// Weight of the triangle's third vertex, 0 to 1.
+    pub v: f32,
+    /// The triangle: its position in the index array.
+    pub primitive: u32,
+}
+
+/// Work done by queries. A query adds to it, so one struct can sum up a whole picture.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_counters {
+    /// Ray-triangle tests.
+    pub primitive_tests: u64,
+    /// Cells and macrocells entered, empty ones included.
+    pub cell_steps: u64,
+    /// How often a ray went down a level, into a macrocell, a subgrid, a block or a brick; 0 for a
+    /// grid of one level.
+    pub grid_steps: u64,
+}
+
+/// What a filter says of a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`. Anything
+/// else counts as `HGRID_REJECT`.
+#[allow(non_camel_case_types, reason = "the C name")]
+pub type hgrid_verdict = u32;
+
+/// The ray goes on as if the triangle were not there.
+pub const HGRID_REJECT: hgrid_verdict = 0;
+
+/// The hit counts.
+pub const HGRID_ACCEPT: hgrid_verdict = 1;
+
+/// The hit counts, and it is the last one: the same as `HGRID_ACCEPT`, but for `hgrid_intersect_all`.
+pub const HGRID_ACCEPT_AND_STOP: hgrid_verdict = 2;
+
+/// Both sides of a triangle are hit: the default of `hgrid_query_options`.
+pub const HGRID_CULL_NONE: u32 = 0;
+
+/// A ray passes through triangles that show it their back.
+pub const HGRID_CULL_BACK: u32 = 1;
+
+/// A ray passes through triangles that show it their front: the side from which the vertices appear
+/// counter-clockwise.
+pub const HGRID_CULL_FRONT: u32 = 2;
+
+/// What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
+///
+/// A query with options that are not the defaults is somewhat slower than one without, and rays of a
+/// batch are then traced one by one.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_query_options {
+    /// `sizeof(hgrid_query_options)`.
+    pub struct_size: u32,
+    /// A triangle is seen if its mask and this have a bit in common; see `masks` of `hgrid_mesh`. With
+    /// all bits, the default, every triangle is seen, even one whose mask is 0.
+    pub mask: u32,
+    /// Which sides are not hit: one of `HGRID_CULL_...`.
+    pub cull: u32,
+    /// A triangle that is not hit, usually the one that the ray leaves, so that it needs no epsilon;
+    /// or `HGRID_INVALID_ID`.
+    pub skip: u32,
+    /// Yours: passed on to `filter`.
+    pub context: *mut c_void,
+    /// Says of a `hit` whether it counts; or NULL: all do. `ray` is the place of the ray in its batch,
+    /// 0 for a single one.
+    ///
+    /// Hits are offered from near to far, where `t` is equal by ascending triangle, and each triangle
+    /// at most once for each ray. It is called on the thread that asks, may ask the same grid other
+    /// questions, and may not be left by `longjmp` or by a C++ exception. Here is glass, which lets
+    /// shadow rays pass and weakens them:
+    ///
+    /// ```c
+    /// typedef struct {
+    ///     const unsigned char *is_glass;
+    ///     float light;
+    /// } shadow;
+    ///
+    /// static hgrid_verdict pass_glass(void *context, size_t ray, const hgrid_hit *hit)
+    /// {
+    ///     shadow *to = (shadow *)context;
+    ///     (void)ray;
+    ///     if (!to->is_glass[hit->primitive])
+    ///         return HGRID_ACCEPT;
+    ///     to->light *= 0.8f;
+    ///     return HGRID_REJECT;
+    /// }
+    ///
+    /// static float light_along(const hgrid_grid *grid, const hgrid_ray *ray,
+    ///                          const unsigned char *is_glass)
+    /// {
+    ///     shadow to = {is_glass, 1};
+    ///     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+    ///     options.filter = pass_glass, options.context = &to;
+    ///     return hgrid_occluded(grid, ray, &options) ? 0 : to.light;
+    /// }
+    /// ```
+    pub filter: Option<
+        unsafe extern "C" fn(
+            context: *mut c_void,
+            ray: usize,
+            hit: *const hgrid_hit,
+        ) -> hgrid_verdict,
+    >,
+    /// Where to add up the work, or NULL. Each thread needs its own.
+    pub counters: *mut hgrid_counters,
+}
+
+/// The point of a mesh that is closest to a point: 28 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_closest {
+    /// The point, in scene units.
+    pub position: [f32; 3],
+    /// How far it is.
+    pub distance: f32,
+    /// Weight of the triangle's second vertex, 0 to 1.
+    pub u: f32,
+    /// Weight of the triangle's third vertex, 0 to 1.
+    pub v: f32,
+    /// The triangle: its position in the index array.
+    pub primitive: u32,
+}
+
+/// What the header of a blob says. Initialise it with `HGRID_BLOB_INFO_INIT`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_blob_info {
+    /// `sizeof(hgrid_blob_info)`.
+    pub struct_size: u32,
+    /// The version of the format.
+    pub version: u32,
+    /// What built it: one of `HGRID_METHOD_...`.
+    pub method: u32,
+    /// 1 if the mesh is in it, as `hgrid_pack` writes it; 0 if not.
+    pub has_mesh: u32,
+    /// Vertices of its mesh.
+    pub vertex_count: u64,
+    /// Triangles of its mesh.
+    pub triangle_count: u64,
+    /// Bytes of the grid.
+    pub grid_bytes: u64,
+    /// Bytes of all of it: of the grid, and of the mesh if that is in it.
+    pub total_bytes: u64,
+}
+
+/// What a look at all of a grid finds. Initialise it with `HGRID_STATISTICS_INIT`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_statistics {
+    /// `sizeof(hgrid_statistics)`.
+    pub struct_size: u32,
+    /// Triangles left out because a coordinate is not finite.
+    pub skipped_count: u32,
+    /// Triangles of which two corners are the same point. They are in the grid, and no ray hits them.
+    pub degenerate_count: u32,
+    /// The first triangle that is one or the other, or `HGRID_INVALID_ID`.
+    pub first_bad: u32,
+    /// Lists of triangles: one for each cell that has any, and for each brick or block that has some of
+    /// its own.
+    pub list_count: u64,
+    /// Triangle ids in all lists together.
+    pub reference_count: u64,
+    /// Ids in the longest list.
+    pub longest_list: u32,
+    /// 0.
+    pub reserved: u32,
+    /// A hash of the grid's box, resolution and lists: the same for the same grid on every platform,
+    /// whatever its byte order. It tells grids apart; it is no defence against forgery.
+    pub content_hash: u64,
+}
+
+const _: () = assert!(HGRID_COHERENCE_INCOHERENT == Coherence::Incoherent as u32);
+const _: () = assert!(HGRID_COHERENCE_COHERENT == Coherence::Coherent as u32);
+const _: () = assert!(HGRID_REJECT == Verdict::Reject as u32);
+const _: () = assert!(HGRID_ACCEPT == Verdict::Accept as u32);
+const _: () = assert!(HGRID_ACCEPT_AND_STOP == Verdict::AcceptAndStop as u32);
+const _: () = assert!(HGRID_CULL_NONE == Cull::None as u32);
+const _: () = assert!(HGRID_CULL_BACK == Cull::Back as u32);
+const _: () = assert!(HGRID_CULL_FRONT == Cull::Front as u32);
+
+impl From<hgrid_ray> for Ray {
+    fn from(ray: hgrid_ray) -> Self {
+        let hgrid_ray { origin, t_min, direction, t_max } = ray;
+        Self { origin, t_min, direction, t_max }
+    }
+}
+
+impl From<Hit> for hgrid_hit {
+    fn from(hit: Hit) -> Self {
+        let Hit { t, u, v, primitive } = hit;
+        Self { t, u, v, primitive }
+    }
+}
+
+impl hgrid_counters {
+    /// Adds the work of a query.
+    pub(crate) fn add(&mut self, work: &Counters) {
+        self.primitive_tests = self.primitive_tests.wrapping_add(work.primitive_tests);
+        self.cell_steps = self.cell_steps.wrapping_add(work.cell_steps);
+        self.grid_steps = self.grid_steps.wrapping_add(work.grid_steps);
+    }
+}
+
+impl From<ClosestPoint> for hgrid_closest {
+    fn from(closest: ClosestPoint) -> Self {
+        let ClosestPoint { position, distance, u, v, primitive } = closest;
+        Self { position, distance, u, v, primitive }
+    }
+}
+
+impl hgrid_query_options {
+    /// Whether these are the defaults, which need not be looked at.
+    pub(crate) const fn are_default(&self) -> bool {
+        self.mask == u32::MAX
+            && self.cull == HGRID_CULL_NONE
+            && self.skip == INVALID_ID
+            && self.filter.is_none()
+            && self.counters.is_null()
+    }
+
+    /// The sides that are not hit.
+    pub(crate) const fn cull(&self) -> Result<Cull, hgrid_status> {
+        match self.cull {
+            HGRID_CULL_NONE => Ok(Cull::None),
+            HGRID_CULL_BACK => Ok(Cull::Back),
+            HGRID_CULL_FRONT => Ok(Cull::Front),
+            _ => Err(HGRID_ERROR_INVALID_CULL),
+        }
+    }
+}
+
+/// A verdict as core knows it.
+pub(crate) const fn verdict(verdict: hgrid_verdict) -> Verdict {
+    match verdict {
+        HGRID_ACCEPT => Verdict::Accept,
+        HGRID_ACCEPT_AND_STOP => Verdict::AcceptAndStop,
+        _ => Verdict::Reject,
+    }
+}
+
+impl hgrid_blob_info {
+    /// What a blob says.
+    pub(crate) fn note(&mut self, info: &BlobInfo) {
+        let BlobInfo { version, method, has_mesh, vertex_count, triangle_count, .. } = *info;
+        let (has_mesh, triangle_count) = (has_mesh.into(), triangle_count.into());
+        let BlobInfo { grid_bytes, total_bytes, .. } = *info;
+        let (struct_size, method) = (self.struct_size, method as u32);
+        *self = Self {
+            struct_size,
+            version,
+            method,
+            has_mesh,
+            vertex_count,
+            triangle_count,
+            grid_bytes,
+            total_bytes,
+        };
+    }
+}
+
+impl hgrid_statistics {
+    /// What a look found.
+    pub(crate) fn note(&mut self, found: &Statistics) {
+        *self = Self {
+            struct_size: self.struct_size,
+            skipped_count: found.skipped_count,
+            degenerate_count: found.degenerate_count,
+            first_bad: found.first_bad,
+            list_count: found.list_count,
+            reference_count: found.reference_count,
+            longest_list: found.longest_list,
+            reserved: 0,
+            content_hash: found.content_hash,
+        };
+    }
+}
+
+/// The coherence as core knows it.
+pub(crate) const fn coherence(coherence: hgrid_coherence) -> Result<Coherence, hgrid_status> {
+    match coherence {
+        HGRID_COHERENCE_INCOHERENT => Ok(Coherence::Incoherent),
+        HGRID_COHERENCE_COHERENT => Ok(Coherence::Coherent),
+        _ => Err(HGRID_ERROR_INVALID_COHERENCE),
+    }
+}

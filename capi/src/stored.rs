@@ -1,0 +1,167 @@
+//! Grids that are stored: opening, proving, packing, and looking at all of one.
+
+use core::ffi::c_void;
+use core::ptr::NonNull;
+
+use crate::questions::{hgrid_blob_info, hgrid_statistics};
+use crate::raw;
+use crate::span::Region;
+use crate::status::{
+    HGRID_ERROR_INDEX_TOO_SMALL, HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status, status_of,
+};
+use crate::types::{hgrid_grid, hgrid_mesh};
+
+/// Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
+///
+/// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
+/// in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
+/// ignored. It says itself which method built it and how. The mesh is the one it was built for,
+/// of which only the counts are compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh`
+/// may be NULL.
+///
+/// What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
+/// nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
+/// not change while the grid is in use: a file that others may write is not for mapping, read it into
+/// memory of your own.
+///
+/// `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
+/// and leaves `grid` as it was.
+///
+/// Threads: any number of calls at once, also on the same blob, each with a view of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_open(
+    blob: *const c_void,
+    blob_bytes: usize,
+    mesh: *const hgrid_mesh,
+    grid: *mut hgrid_grid,
+) -> hgrid_status {
+    let (false, Some(to)) = (blob.is_null(), NonNull::new(grid)) else {
+        return HGRID_ERROR_NULL_ARGUMENT;
+    };
+    // SAFETY: the caller's promise.
+    match unsafe { raw::open(blob, blob_bytes, mesh) } {
+        Ok(opened) => {
+            // SAFETY: the caller's promise.
+            unsafe { raw::write_grid(to, &opened) };
+            HGRID_OK
+        }
+        Err(status) => status,
+    }
+}
+
+/// Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
+///
+/// The bytes may lie at any address. Neither argument may be NULL, unless `blob_bytes` is 0. Returns
+/// `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was: `HGRID_ERROR_NOT_A_GRID`,
+/// `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`,
+/// `HGRID_ERROR_CORRUPT`.
+///
+/// Threads: any number of calls at once, each with an info of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_peek(
+    blob: *const c_void,
+    blob_bytes: usize,
+    info: *mut hgrid_blob_info,
+) -> hgrid_status {
+    let call = |info: &mut hgrid_blob_info| {
+        // SAFETY: the caller's promise.
+        info.note(&unsafe { raw::peek(blob, blob_bytes) }?);
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::filling(info, call) }
+}
+
+/// Writes a grid and its mesh as one blob, for which `hgrid_open` needs no mesh: to be stored where the
+/// mesh is not, or mapped by several processes.
+///
+/// It holds the grid, then positions, indices (of 32 bits) and masks if there are any, tight, each at a
+/// multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid. Nothing is
+/// copied when it is opened.
+///
+/// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh. It may be NULL if
+/// `capacity` is 0: to ask for the size. `grid` and `bytes` may not be NULL.
+///
+/// Returns `HGRID_OK` and has written the blob; or the reason, and has written nothing:
+/// `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+/// `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged, `HGRID_ERROR_NOT_A_GRID`. In the first two
+/// cases of all these `bytes` becomes the size of the packed blob.
+///
+/// Threads: any number of calls and queries on the same grid at once, each with memory of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_pack(
+    grid: *const hgrid_grid,
+    to: *mut c_void,
+    capacity: usize,
+    bytes: *mut u64,
+) -> hgrid_status {
+    let call = || {
+        let size = NonNull::new(bytes).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        let grid = unsafe { raw::grid(grid) }?;
+        // SAFETY: the caller's promise.
+        let packed = unsafe { raw::pack(grid, Region { start: to, bytes: capacity }) };
+        if matches!(packed, Ok(()) | Err(HGRID_ERROR_INDEX_TOO_SMALL)) {
+            // SAFETY: the caller's promise.
+            unsafe { raw::write(size, grid.packed_bytes()) };
+        }
+        packed
+    };
+    call().err().unwrap_or(HGRID_OK)
+}
+
+/// Proves that a blob is the grid of its mesh, and so that every answer will be right.
+///
+/// Takes no memory and at most about the time of a build; with recursive several times as long, on
+/// damaged bytes much longer. A grid that was just built needs no proof; a blob from a file, a
+/// network or another process may.
+///
+/// Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
+/// that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
+/// `HGRID_ERROR_NULL_ARGUMENT`.
+///
+/// Threads: any number of calls and queries on the same grid at once.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_validate(grid: *const hgrid_grid) -> hgrid_status {
+    // SAFETY: the caller's promise.
+    match unsafe { raw::grid(grid) } {
+        Ok(grid) => grid.validate().map_or_else(status_of, |()| HGRID_OK),
+        Err(status) => status,
+    }
+}
+
+/// Looks at all of a grid and its mesh: O(cells + ids + triangles), no memory.
+///
+/// Neither argument may be NULL. Returns `HGRID_OK` and fills `statistics`; or
+/// `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves it as it
+/// was. On damaged bytes it counts what is there.
+///
+/// Threads: any number of calls and queries on the same grid at once, each with statistics of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_inspect(
+    grid: *const hgrid_grid,
+    statistics: *mut hgrid_statistics,
+) -> hgrid_status {
+    let call = |statistics: &mut hgrid_statistics| {
+        // SAFETY: the caller's promise.
+        statistics.note(&unsafe { raw::grid(grid) }?.inspect());
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::filling(statistics, call) }
+}
