@@ -9,21 +9,27 @@
 //! A [`Line`] is the ray in a lattice; a [`Walk`] goes along it through equal cells, those of the
 //! lattice or larger ones of a macrocell level.
 
+use glam::Vec3A;
+
 use crate::approach::Approach;
-use crate::cell::{Lattice, as_f32, whole};
+use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::ray::{Ray, round};
 
 /// A ray in the cells of a lattice, from where it enters the box.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Line {
     /// Where the line starts, in cells.
-    position: [f32; 3],
+    position: Vec3A,
     /// Cells for each unit of distance; zero on an axis that the ray runs parallel to.
-    rate: [f32; 3],
+    rate: Vec3A,
     /// Distance for each cell, negative where the ray runs downwards; zero if parallel.
-    delta: [f32; 3],
+    delta: Vec3A,
+    /// Distance of the border between no cells and cell 0; infinite if parallel.
+    base: Vec3A,
+    /// What to add to the cell on each axis: 1 or, in wrapping arithmetic, -1; 0 if parallel.
+    step: [u32; 3],
     /// How far off its cells a line may be, in cells.
-    margin: [f32; 3],
+    margin: Vec3A,
     /// Distance at which the ray ends.
     pub(crate) end: f32,
     /// The `t` at which the line starts.
@@ -43,7 +49,7 @@ pub(crate) struct Walk {
     next: [f32; 3],
     /// Distance from one border to the next, negative where the ray runs downwards.
     delta: [f32; 3],
-    /// Distance of the border through which the ray leaves cell 0.
+    /// Distance of the border through which the ray leaves cell 0; infinite if parallel.
     base: [f32; 3],
     /// What to add to the cell on each axis: 1 or, in wrapping arithmetic, -1.
     step: [u32; 3],
@@ -82,10 +88,12 @@ impl Line {
         let inverse_scale = 1.0 / scale;
 
         let mut line = Self {
-            position: [0.0; 3],
-            rate: [0.0; 3],
-            delta: [0.0; 3],
-            margin: lattice.margin().to_array(),
+            position: Vec3A::ZERO,
+            rate: Vec3A::ZERO,
+            delta: Vec3A::ZERO,
+            base: Vec3A::INFINITY,
+            step: [0; 3],
+            margin: lattice.margin(),
             end: round((end - start) * scale),
             start: approach.t + start,
             scale,
@@ -98,6 +106,8 @@ impl Line {
                 line.rate[axis] = round(speed * inverse_scale);
                 let fineness = lattice.finest() / lattice.cells_per_unit(axis);
                 line.delta[axis] = round(longest * approach.inverse[axis] * fineness);
+                line.base[axis] = -line.position[axis] * line.delta[axis];
+                line.step[axis] = if direction > 0.0 { 1 } else { u32::MAX };
             }
         }
         Some(line)
@@ -113,14 +123,18 @@ impl Line {
     /// cells for one of this line's. Distances stay what they are.
     #[inline]
     pub(crate) fn zoom(&self, origin: [f32; 3], scale: [f32; 3]) -> Self {
-        let mut zoomed = *self;
-        for axis in 0..3 {
-            zoomed.position[axis] = (self.position[axis] - origin[axis]) * scale[axis];
-            zoomed.rate[axis] = self.rate[axis] * scale[axis];
-            zoomed.delta[axis] = self.delta[axis] / scale[axis];
-            zoomed.margin[axis] = self.margin[axis] * scale[axis];
+        let (origin, scale) = (Vec3A::from_array(origin), Vec3A::from_array(scale));
+        let position = (self.position - origin) * scale;
+        let delta = self.delta / scale;
+        let is_parallel = self.delta.cmpeq(Vec3A::ZERO);
+        Self {
+            position,
+            rate: self.rate * scale,
+            delta,
+            base: Vec3A::select(is_parallel, Vec3A::INFINITY, -position * delta),
+            margin: self.margin * scale,
+            ..*self
         }
-        zoomed
     }
 
     /// A walk through a box of so many cells, from `entered` or where the line enters the box;
@@ -150,34 +164,25 @@ impl Line {
     /// wide.
     #[inline(always)]
     pub(crate) fn walk(&self, from: f32, size: f32, min: [u32; 3], max: [u32; 3]) -> Walk {
-        let mut walk = Walk {
-            cell: min,
+        // All axes at once: a ray begins many walks, and most are short.
+        let position = (self.position + self.rate * from) / size;
+        let (low, high) = (Vec3A::from_array(min.map(as_f32)), Vec3A::from_array(max.map(as_f32)));
+        let cell = position.max(low).min(high).trunc();
+        let delta = self.delta * size;
+        let base = self.base + self.delta.max(Vec3A::ZERO) * size;
+        let next = base + cell * delta;
+        Walk {
+            cell: (cell + WHOLE_SHIFT).to_array().map(|cell| cell.to_bits() & WHOLE_BITS),
             entered: from,
-            next: [f32::INFINITY; 3],
-            delta: [0.0; 3],
-            base: [f32::INFINITY; 3],
-            step: [0; 3],
-            outside: [u32::MAX; 3],
-        };
-        for axis in 0..3 {
-            let position = (self.position[axis] + from * self.rate[axis]) / size;
-            walk.cell[axis] = whole(position).max(min[axis]).min(max[axis]);
-            let delta = self.delta[axis];
-            if delta > 0.0 {
-                walk.base[axis] = (size - self.position[axis]) * delta;
-                walk.step[axis] = 1;
-                walk.outside[axis] = max[axis].wrapping_add(1);
-            } else if delta < 0.0 {
-                walk.base[axis] = -self.position[axis] * delta;
-                walk.step[axis] = u32::MAX;
-                walk.outside[axis] = min[axis].wrapping_sub(1);
-            } else {
-                continue;
-            }
-            walk.delta[axis] = delta * size;
-            walk.aim(axis);
+            next: next.to_array(),
+            delta: delta.to_array(),
+            base: base.to_array(),
+            step: self.step,
+            outside: core::array::from_fn(|axis| match self.step[axis] {
+                1 => max[axis].wrapping_add(1),
+                _ => min[axis].wrapping_sub(1),
+            }),
         }
-        walk
     }
 }
 
