@@ -148,7 +148,7 @@ impl Grid<'_> {
     #[must_use]
     pub fn intersect_with(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> Option<Hit> {
         let mut closest = None;
-        self.in_order::<false>(ray, options, None, 1, |hit| {
+        self.in_order(ray, options, None, 1, |hit| {
             closest = Some(*hit);
             false
         });
@@ -158,18 +158,11 @@ impl Grid<'_> {
     /// Whether anything is hit that the options let count.
     #[must_use]
     pub fn occluded_with(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> bool {
-        let mut is_hit = false;
-        let mut hit = |_: &Hit| {
-            is_hit = true;
-            false
-        };
-        // A filter is promised an order, and nobody else.
         if options.filter.is_some() {
-            self.in_order::<false>(ray, options, None, 1, &mut hit);
-        } else {
-            self.in_order::<true>(ray, options, None, 1, &mut hit);
+            return self.intersect_with(ray, options).is_some();
         }
-        is_hit
+        // Nobody is promised an order.
+        self.nearest(ray, options, None, &mut [Hit::MISS], true) > 0
     }
 
     /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.
@@ -203,13 +196,13 @@ impl Grid<'_> {
         let mut after = None;
         // Without a filter all that is found counts: collect it where it is wanted.
         if options.filter.is_none() && hits.len() > ROOM {
-            count = self.nearest::<false>(ray, options, None, hits);
+            count = self.nearest(ray, options, None, hits, false);
             match hits.last() {
                 Some(last) if count == hits.len() => after = Some(*last),
                 _ => return count,
             }
         }
-        self.in_order::<false>(ray, options, after, ROOM, |hit| {
+        self.in_order(ray, options, after, ROOM, |hit| {
             if let Some(slot) = hits.get_mut(count) {
                 *slot = *hit;
             }
@@ -220,9 +213,8 @@ impl Grid<'_> {
     }
 
     /// Shows `take` the hits that count and lie behind one, in order, until it answers that it has
-    /// enough. The first walk collects `room` hits. With `ANY` there is no order, no filter, and only
-    /// one hit.
-    fn in_order<const ANY: bool>(
+    /// enough. The first walk collects `room` hits.
+    fn in_order(
         &self,
         ray: &Ray,
         options: &mut QueryOptions<'_>,
@@ -233,7 +225,7 @@ impl Grid<'_> {
         let mut buffer = [Hit::MISS; ROOM];
         loop {
             let space = buffer.get_mut(..room).unwrap_or_default();
-            let found = self.nearest::<ANY>(ray, options, after, space);
+            let found = self.nearest(ray, options, after, space, false);
             for hit in buffer.iter().take(found) {
                 let verdict = match &mut options.filter {
                     Some(filter) => filter(hit),
@@ -261,16 +253,17 @@ impl Grid<'_> {
     }
 
     /// Walks a ray from a hit on, collects as many of the hits behind it as there is room for, and
-    /// returns how many.
-    fn nearest<const ANY: bool>(
+    /// returns how many: the nearest, or any.
+    fn nearest(
         &self,
         ray: &Ray,
         options: &mut QueryOptions<'_>,
         after: Option<Hit>,
         hits: &mut [Hit],
+        is_any: bool,
     ) -> usize {
         let selection = Selection::new(self.mesh(), options);
-        let mut nearest = Nearest { selection: &selection, after, hits, count: 0, is_any: ANY };
+        let mut nearest = Nearest { selection: &selection, after, hits, count: 0, is_any };
         let t_min = after.map_or(ray.t_min, |after| after.t);
         let mut work = Counters::default();
         self.search(&Ray { t_min, ..*ray }, options.cull, &mut nearest, &mut work);

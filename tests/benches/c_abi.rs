@@ -1,0 +1,107 @@
+//! What a call through the C ABI costs over the Rust call: the same grid, the same rays, one process.
+//!
+//! Analysis: the C side checks a tag, three pointers and the ray's bytes, and cannot be inlined; that is
+//! a few nanoseconds on a query of some hundred. The library is `libhgrid.so` as C programs get it.
+
+#![expect(clippy::expect_used, reason = "a bench that cannot start has nobody to answer to")]
+
+use core::ffi::c_void;
+use core::hint::black_box;
+use core::ptr::null;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use hgrid_core::{Config, Hit, Method, Ray};
+use hgrid_lab::camera::{Camera, Up, View};
+use hgrid_lab::scene::Scene;
+use hgrid_tests::artefact::shared_library;
+use hgrid_tests::meshes::Mesh;
+use hgrid_tests::owned::Owned;
+use hgrid_tests::scans;
+use libloading::{Library, Symbol};
+
+/// Rays on a side of the picture.
+const SIZE: u16 = 256;
+
+/// `hgrid_mesh`.
+#[repr(C)]
+struct CMesh {
+    struct_size: u32,
+    index_type: u32,
+    positions: *const c_void,
+    position_stride: usize,
+    vertex_count: usize,
+    indices: *const c_void,
+    index_stride: usize,
+    triangle_count: usize,
+    masks: *const c_void,
+    mask_stride: usize,
+}
+
+/// `hgrid_grid`.
+#[repr(C)]
+struct CGrid([u64; 64]);
+
+type Open = unsafe extern "C" fn(*const u8, usize, *const CMesh, *mut CGrid) -> i32;
+type Intersect = unsafe extern "C" fn(*const CGrid, *const Ray, *const c_void, *mut Hit) -> bool;
+
+fn c_abi(criterion: &mut Criterion) {
+    let mesh = scans::load("bunny").unwrap_or_else(|| {
+        let knot = Scene::load("procedural:knot:70k").expect("a procedural scene");
+        Mesh { positions: knot.positions, indices: knot.indices }
+    });
+    // SAFETY: the library was built by this project, and loading it runs nothing.
+    let library = unsafe { Library::new(shared_library()) }.expect("libhgrid.so");
+    // SAFETY: the function has this type: include/hgrid.h.
+    let open: Symbol<'_, Open> = unsafe { library.get(b"hgrid_open") }.expect("hgrid_open");
+    // SAFETY: the same.
+    let intersect: Symbol<'_, Intersect> =
+        unsafe { library.get(b"hgrid_intersect") }.expect("hgrid_intersect");
+
+    for method in [Method::OneLevel, Method::Brick] {
+        let owned = Owned::build(&mesh.view(), &Config::new(method)).expect("a sound mesh");
+        let view = mesh.view();
+        let grid = owned.open(&view).expect("its mesh");
+        let camera = Camera::framing(grid.bounds(), View::Front, Up::Y);
+        let pixels = (0..SIZE).flat_map(|row| (0..SIZE).map(move |column| (column, row)));
+        let rays: Vec<Ray> = pixels.map(|(column, row)| camera.ray(column, row, SIZE)).collect();
+
+        let c_mesh = CMesh {
+            struct_size: size_of::<CMesh>() as u32,
+            index_type: 0,
+            positions: mesh.positions.as_ptr().cast(),
+            position_stride: 0,
+            vertex_count: mesh.positions.len(),
+            indices: mesh.indices.as_ptr().cast(),
+            index_stride: 0,
+            triangle_count: mesh.indices.len(),
+            masks: null(),
+            mask_stride: 0,
+        };
+        let mut c_grid = CGrid([0; 64]);
+        let (blob, bytes) = (grid.blob().as_ptr(), grid.blob().len());
+        // SAFETY: the blob and the mesh outlive the view, which has room for one.
+        let status = unsafe { open(blob, bytes, &raw const c_mesh, &raw mut c_grid) };
+        assert_eq!(status, 0, "hgrid_open");
+
+        let mut group = criterion.benchmark_group(format!("intersect, {}", method.name()));
+        group.sample_size(60).throughput(Throughput::Elements(rays.len() as u64));
+        group.bench_function("Rust", |b| {
+            b.iter(|| rays.iter().filter(|ray| grid.intersect(black_box(ray)).is_some()).count());
+        });
+        group.bench_function("C", |b| {
+            let mut hit = Hit::MISS;
+            b.iter(|| {
+                let call = |ray: &&Ray| {
+                    let ray: *const Ray = black_box(*ray);
+                    // SAFETY: a view that was opened, a ray, no options, a hit.
+                    unsafe { intersect(&raw const c_grid, ray, null(), &raw mut hit) }
+                };
+                rays.iter().filter(call).count()
+            });
+        });
+        group.finish();
+    }
+}
+
+criterion_group!(benches, c_abi);
+criterion_main!(benches);
