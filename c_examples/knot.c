@@ -5,6 +5,7 @@
  * double, rounded to float once, so both make the same bits; a test compares them.
  */
 
+#include "memory.h"
 #include "scene.h"
 
 #include <math.h>

@@ -5,6 +5,7 @@
  * Every number is read as a double, which holds all of PLY's types exactly: one path for all.
  */
 
+#include "memory.h"
 #include "scene.h"
 
 #include <stdbool.h>

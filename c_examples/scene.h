@@ -18,10 +18,10 @@ scene make_knot(void);
 /* A mesh file (ply.c). Ends the program if it cannot be read. */
 scene load_ply(const char *path);
 
-/* Ends the program with a message (raytracer.c). */
-void fail(const char *format, ...);
-
-/* Memory for so many elements (raytracer.c), or the end of the program. */
-void *allocate(size_t count, size_t size);
+/* The file, or the built-in scene if there is none. */
+static inline scene load_scene(const char *path)
+{
+    return path != NULL ? load_ply(path) : make_knot();
+}
 
 #endif

@@ -2,21 +2,11 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use tempfile::TempDir;
 
 use crate::pictures::{ascii, binary};
-use crate::programs::{attempt, watched_raytracer};
-
-/// What a refused program says.
-fn refusal(program: &mut Command) -> String {
-    let output = attempt(program);
-    let said = String::from_utf8(output.stderr).expect("text");
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.starts_with("raytracer: ") && said.ends_with('\n'), "{said:?}");
-    said
-}
+use crate::programs::{attempt, refusal, watched_raytracer};
 
 /// What it says about a file.
 fn refusal_of(dir: &Path, contents: &[u8]) -> String {
@@ -52,10 +42,20 @@ fn bad_arguments_are_refused() {
         (&["--density", "4cells"], "not `4cells`"),
         (&["--density", "inf"], "invalid density: above 0"),
         (&["--cell-size", "0"], "--cell-size is a number above 0, not `0`"),
-        (&["--cell-size", "1"], "--method one-level has no cell size"),
-        (&["--method", "brick", "--density", "1"], "--method brick has no density"),
+        (&["--cell-size", "1"], "--method one-level has no cell size: leave out --cell-size"),
+        (&["--method", "brick", "--density", "1"], "brick has no density: leave out --density"),
         (&["--cell-size", "inf", "--method", "brick"], "invalid cell_size: above 0"),
-        (&["--fast"], "unknown option --fast: raytracer [FILE.ply]"),
+        (&["--threads"], "--threads needs a value"),
+        (&["--threads", "0"], "--threads is a number from 1 to 256, not `0`"),
+        (&["--threads", "two"], "not `two`"),
+        (&["--threads", ""], "not ``"),
+        (&["--ao"], "--ao needs a value"),
+        (&["--ao", "0"], "--ao is a number from 1 to 4096, not `0`"),
+        (&["--ao", "5000"], "not `5000`"),
+        (&["--heat"], "--heat needs a value"),
+        (&["--heat", "triangles"], "--heat is tests or steps, not `triangles`"),
+        (&["--fast"], "unknown option --fast: raytracer --help names all of them"),
+        (&["-h"], "unknown option -h: raytracer --help names all of them"),
         (&["a.ply", "b.ply"], "one scene at a time: a.ply or b.ply?"),
         (&["no/such/file.ply"], "no/such/file.ply: cannot be opened"),
         (&["--size", "4", "-o", "no/such/folder/a.ppm"], "no/such/folder/a.ppm: cannot be written"),

@@ -16,7 +16,7 @@ fn the_knot_has_the_bits_of_the_labs() {
     let dir = TempDir::new().expect("a folder");
     let program = dir.path().join("knot_bits");
     let driver = root().join("tests/examples/knot_bits.c");
-    compile(&[driver, example("knot.c")], &[], &program);
+    compile(&[driver, example("knot.c"), example("memory.c")], &[], &program);
     let written = run(&mut Command::new(program)).stdout;
 
     let scene = Scene::load(KNOT).expect("a scene");

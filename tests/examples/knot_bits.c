@@ -1,27 +1,12 @@
 /* Writes the arrays of the built-in scene, for the test to compare bit by bit. */
 
+#include "memory.h"
 #include "scene.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-void fail(const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    vfprintf(stderr, format, arguments);
-    va_end(arguments);
-    exit(1);
-}
-
-void *allocate(size_t count, size_t size)
-{
-    void *memory = malloc(count * size);
-    if (memory == NULL)
-        fail("no memory");
-    return memory;
-}
+const char *const program_name = "knot_bits";
 
 int main(void)
 {

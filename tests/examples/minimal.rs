@@ -1,11 +1,12 @@
-//! The smallest example, and the Makefile that builds both.
+//! The smallest example, and the Makefile that builds all of them.
 
-use std::fs;
 use std::process::Command;
 
 use hgrid_tests::artefact::{is_installed, root, run, target_dir};
 use tempfile::TempDir;
 
+use crate::hpp::HELLO;
+use crate::ppm::Picture;
 use crate::programs::{compile, example};
 
 const PRINTED: &str = "built a grid of 384 bytes\n\
@@ -21,7 +22,7 @@ fn minimal_prints_its_hit() {
 }
 
 #[test]
-fn the_makefile_builds_and_runs_both() {
+fn the_makefile_builds_and_runs_all() {
     if !is_installed("make") {
         return;
     }
@@ -38,6 +39,13 @@ fn the_makefile_builds_and_runs_both() {
     let printed = String::from_utf8(run(&mut make).stdout).expect("text");
     assert!(printed.contains(PRINTED), "{printed}");
     assert!(printed.contains("triangles      500000\n"), "{printed}");
-    let picture = fs::read(dir.path().join("raytracer.ppm")).expect("the picture");
-    assert!(picture.starts_with(b"P6\n1024 1024\n255\n"));
+    assert_eq!(printed.contains(HELLO), is_installed("c++"), "{printed}");
+    for (name, size) in
+        [("raytracer", (512, 512)), ("steps", (1024, 1024 + 26 * 4)), ("mapped", (512, 512))]
+    {
+        let picture = Picture::load(&dir.path().join(name).with_extension("ppm"));
+        assert_eq!((picture.width, picture.height), size, "{name}");
+    }
+    assert_eq!(dir.path().join("mpi").exists(), is_installed("mpicc"));
+    assert_eq!(dir.path().join("mpi.ppm").exists(), is_installed("mpicc"));
 }

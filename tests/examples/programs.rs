@@ -4,16 +4,35 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use hgrid_tests::artefact::{compiler, output, root, run, static_library};
+use hgrid_tests::artefact::{compiler, is_installed, output, root, run, static_library, warnings};
 use tempfile::TempDir;
 
-/// What the ray tracer is made of.
-const RAYTRACER: [&str; 3] = ["raytracer.c", "knot.c", "ply.c"];
+/// What draws, in every program that does.
+const DRAWING: [&str; 11] = [
+    "camera.c",
+    "grid.c",
+    "knot.c",
+    "light.c",
+    "memory.c",
+    "options.c",
+    "picture.c",
+    "ply.c",
+    "progress.c",
+    "render.c",
+    "threads.c",
+];
+
+/// Faults that a program would not notice by itself.
+const WATCHED: [&str; 3] = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
 
 /// Compiles sources of `c_examples/` and others into a program.
 pub(crate) fn compile(sources: &[PathBuf], flags: &[&str], program: &Path) {
-    let mut compiler = compiler("c99");
-    compiler.args(["-O2", "-ffp-contract=off"]).args(flags);
+    link(compiler("c99"), sources, flags, program);
+}
+
+/// The same with another compiler.
+pub(crate) fn link(mut compiler: Command, sources: &[PathBuf], flags: &[&str], program: &Path) {
+    compiler.args(["-O2", "-ffp-contract=off", "-pthread"]).args(flags);
     compiler.arg("-I").arg(root().join("c_examples")).args(sources);
     run(compiler.arg(static_library()).arg("-lm").arg("-o").arg(program));
 }
@@ -21,6 +40,11 @@ pub(crate) fn compile(sources: &[PathBuf], flags: &[&str], program: &Path) {
 /// A source of `c_examples/`.
 pub(crate) fn example(name: &str) -> PathBuf {
     root().join("c_examples").join(name)
+}
+
+/// The sources of a program that draws.
+pub(crate) fn drawing(more: &[&str]) -> Vec<PathBuf> {
+    DRAWING.iter().chain(more).map(|name| example(name)).collect()
 }
 
 /// A ray tracer in a folder that lasts as long as the test program, compiled once.
@@ -32,15 +56,24 @@ pub(crate) fn raytracer() -> Command {
 /// The same with sanitizers, for files that nobody trusts.
 pub(crate) fn watched_raytracer() -> Command {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    Command::new(PROGRAM.get_or_init(|| {
-        raytracer_with(&["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"])
-    }))
+    Command::new(PROGRAM.get_or_init(|| raytracer_with(&WATCHED)))
 }
 
-fn raytracer_with(flags: &[&str]) -> PathBuf {
+/// A ray tracer with flags of its own.
+pub(crate) fn raytracer_with(flags: &[&str]) -> PathBuf {
     let program = TempDir::new().expect("a folder").keep().join("raytracer");
-    compile(&RAYTRACER.map(example), flags, &program);
+    compile(&drawing(&["raytracer.c", "heat.c"]), flags, &program);
     program
+}
+
+/// The program of two processes, with sanitizers.
+pub(crate) fn watched_mapped() -> Command {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    Command::new(PROGRAM.get_or_init(|| {
+        let program = TempDir::new().expect("a folder").keep().join("mapped");
+        compile(&drawing(&["mapped.c"]), &WATCHED, &program);
+        program
+    }))
 }
 
 /// Runs a program that may refuse its arguments, but not crash.
@@ -50,4 +83,36 @@ pub(crate) fn attempt(program: &mut Command) -> Output {
     assert!(!stderr.contains("Sanitizer") && !stderr.contains("runtime error"), "{stderr}");
     assert!(output.status.code().is_some_and(|code| code < 2), "{:?}: {stderr}", output.status);
     output
+}
+
+/// What a refused program says.
+pub(crate) fn refusal(program: &mut Command) -> String {
+    let name = Path::new(program.get_program()).file_name().expect("a program has a name");
+    let name = name.to_string_lossy().into_owned();
+    let output = attempt(program);
+    let said = String::from_utf8(output.stderr).expect("text");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.starts_with(&format!("{name}: ")) && said.ends_with('\n'), "{said:?}");
+    said
+}
+
+/// What a program prints that must succeed.
+pub(crate) fn printed(program: &mut Command) -> String {
+    String::from_utf8(run(program).stdout).expect("text")
+}
+
+#[test]
+fn no_compiler_warns_about_them() {
+    let sources = drawing(&["minimal.c", "raytracer.c", "heat.c", "mapped.c"]);
+    let dir = TempDir::new().expect("a folder");
+    for name in ["gcc", "clang"] {
+        if !is_installed(name) {
+            continue;
+        }
+        for dialect in ["c99", "c17"] {
+            let mut compiler = warnings(Command::new(name), dialect);
+            compiler.current_dir(dir.path()).args(["-O2", "-Wconversion", "-c"]);
+            run(compiler.args(&sources));
+        }
+    }
 }

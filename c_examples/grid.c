@@ -1,0 +1,88 @@
+#include "grid.h"
+
+#include "threads.h"
+
+#include <stdbool.h>
+#include <stdlib.h>
+
+const method METHODS[METHOD_COUNT] = {
+    {"one-level", HGRID_CONFIG_INIT},
+    {"fixed", HGRID_CONFIG_INIT_FIXED},
+    {"variable", HGRID_CONFIG_INIT_VARIABLE},
+    {"recursive", HGRID_CONFIG_INIT_RECURSIVE},
+    {"brick", HGRID_CONFIG_INIT_BRICK},
+};
+
+void check(hgrid_status status, const hgrid_report *report)
+{
+    if (status == HGRID_OK)
+        return;
+    if (report != NULL && report->triangle != HGRID_INVALID_ID)
+        fail("triangle %lu: %s", (unsigned long)report->triangle, hgrid_status_string(status));
+    fail("%s", hgrid_status_string(status));
+}
+
+hgrid_mesh mesh_of(const scene *s)
+{
+    hgrid_mesh mesh = HGRID_MESH_INIT;
+    mesh.positions = s->positions;
+    mesh.vertex_count = s->vertex_count;
+    mesh.indices = s->indices;
+    mesh.triangle_count = s->triangle_count;
+    return mesh;
+}
+
+/* Whether a method knows the size of its index before it writes it. */
+static bool is_planned(const hgrid_config *config)
+{
+    return config->method == HGRID_METHOD_ONE_LEVEL || config->method == HGRID_METHOD_FIXED;
+}
+
+/* Asks how much memory the grid takes, and allocates it; returns the scratch.
+ *
+ * The question without scratch says enough for the index, not exactly what it takes: where memory
+ * comes in pages, those that are never touched cost nothing. With the methods that find their size
+ * while they write, enough is far too much, so they are asked again, with scratch, for up to the
+ * time of a build. */
+static region allocate_grid(const hgrid_mesh *mesh, const hgrid_config *config, region *index)
+{
+    hgrid_report report = HGRID_REPORT_INIT;
+    check(hgrid_sizes(mesh, config, NULL, 0, &report), &report);
+    const region scratch = allocate_region(report.scratch_bytes);
+    if (!is_planned(config))
+        check(hgrid_sizes(mesh, config, scratch.start, scratch.bytes, &report), &report);
+    *index = allocate_region(report.index_bytes);
+    return scratch;
+}
+
+/* Told by hgrid how far it is; to return false would end the build. */
+static bool go_on(void *context, float done)
+{
+    show_progress((progress *)context, done);
+    return true;
+}
+
+built_grid build_grid(const hgrid_mesh *mesh, const hgrid_config *config, uint32_t threads,
+                      progress *p)
+{
+    built_grid b;
+    const hgrid_report empty = HGRID_REPORT_INIT;
+    b.report = empty;
+    hgrid_config how = *config;
+    how.tasks = threads, how.run = run_on_threads;
+    how.context = p, how.progress = p != NULL ? go_on : NULL;
+
+    const double start = now();
+    const region scratch = allocate_grid(mesh, &how, &b.index);
+    const double allocated = now();
+    check(hgrid_build(mesh, &how, b.index.start, b.index.bytes, scratch.start, scratch.bytes,
+                      &b.grid, &b.report),
+          &b.report);
+    const double built = now();
+
+    b.scratch_bytes = scratch.bytes;
+    b.sizes_seconds = allocated - start;
+    b.build_seconds = built - allocated;
+    free(scratch.allocation);
+    return b;
+}

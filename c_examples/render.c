@@ -1,0 +1,223 @@
+#include "render.h"
+
+#include "grid.h"
+#include "light.h"
+#include "threads.h"
+
+#include <pthread.h>
+
+/* Rays are traced by tiles of 8 x 8 pixels, all rays of a tile in one call. */
+enum { TILE = 8, TILE_PIXELS = TILE * TILE };
+
+/* Skies that are partly hidden are brighter, so that one can see what is hidden. */
+static const double OPEN_SKY_GAIN = 2.2;
+
+/* How far away something may hide the sky, in parts of the scene's radius. */
+static const double SKY_REACH = 0.5;
+
+/* A pixel on its way: ray and hit lie in one struct, and hgrid_intersect_n finds them there. */
+typedef struct {
+    hgrid_ray ray;
+    hgrid_hit hit;
+    /* Its place in the whole picture and in the job's rows. */
+    uint32_t number;
+    size_t place;
+    surface at;
+    double lit, open;
+} sample;
+
+/* A ray from a hit towards light, and whether something is in the way. */
+typedef struct {
+    hgrid_ray ray;
+    uint8_t is_occluded;
+    sample *of;
+} probe;
+
+/* What the threads share: the number of the next tile, how many are done, and what they found. */
+typedef struct {
+    const picture_job *job;
+    lights lights;
+    size_t columns, tile_count;
+    pthread_mutex_t lock;
+    size_t next, done, hits;
+} shared;
+
+/* --- the steps of a tile --------------------------------------------------------------------- */
+
+/* Finds what the rays of a tile hit, all with one call: neighbours share most of their way. */
+static void trace(const shared *s, sample *tile, size_t count, const hgrid_query_options *options)
+{
+    check(hgrid_intersect_n(s->job->grid, &tile->ray, sizeof *tile, &tile->hit, sizeof *tile, count,
+                            HGRID_COHERENCE_COHERENT, options),
+          NULL);
+}
+
+static bool is_hit(const sample *at)
+{
+    return at->hit.primitive != HGRID_INVALID_ID;
+}
+
+static probe probe_of(sample *of, vector toward, float reach)
+{
+    probe p = {{{0, 0, 0}, 0, {0, 0, 0}, reach}, 0, of};
+    round_to(p.ray.origin, of->at.above);
+    round_to(p.ray.direction, toward);
+    return p;
+}
+
+/* Asks for all probes with one call whether they get through. */
+static void send(const shared *s, probe *probes, size_t count, hgrid_coherence coherence,
+                 const hgrid_query_options *options)
+{
+    if (count == 0)
+        return;
+    check(hgrid_occluded_n(s->job->grid, &probes->ray, sizeof *probes, &probes->is_occluded,
+                           sizeof *probes, count, coherence, options),
+          NULL);
+}
+
+/* Shadow rays, from where the lamp could shine. They are parallel, so they are neighbours, too. */
+static void look_for_lamp(const shared *s, sample *tile, size_t count,
+                          const hgrid_query_options *options)
+{
+    probe probes[TILE_PIXELS];
+    size_t probe_count = 0;
+    for (sample *at = tile; at < tile + count; at++)
+        if (is_hit(at) && lamp_on(&s->lights, at->at.normal) > 0)
+            probes[probe_count++] = probe_of(at, s->lights.toward_lamp, INFINITY);
+    send(s, probes, probe_count, HGRID_COHERENCE_COHERENT, options);
+    for (const probe *p = probes; p < probes + probe_count; p++)
+        p->of->lit = !p->is_occluded;
+}
+
+/* Ambient occlusion: the part of the sky and the ground that a hit sees. */
+static void look_for_sky(const shared *s, sample *tile, size_t count,
+                         const hgrid_query_options *options)
+{
+    const int rays = s->job->sky_rays;
+    const float reach = (float)(SKY_REACH * s->job->camera->scene_radius);
+    for (sample *at = tile; at < tile + count; at++)
+        at->open = 0;
+    for (int i = 0; i < rays; i++) {
+        probe probes[TILE_PIXELS];
+        size_t probe_count = 0;
+        for (sample *at = tile; at < tile + count; at++)
+            if (is_hit(at))
+                probes[probe_count++] =
+                    probe_of(at, scatter(at->at.normal, at->number, i, rays), reach);
+        send(s, probes, probe_count, HGRID_COHERENCE_INCOHERENT, options);
+        for (const probe *p = probes; p < probes + probe_count; p++)
+            p->of->open += p->is_occluded ? 0 : 1.0 / rays;
+    }
+}
+
+/* Paints the pixels of a tile; returns how many rays hit. */
+static size_t paint(const shared *s, const sample *tile, size_t count)
+{
+    size_t hits = 0;
+    for (const sample *at = tile; at < tile + count; at++) {
+        unsigned char *pixel = s->job->pixels + 3 * at->place;
+        if (is_hit(at)) {
+            paint_surface(&s->lights, at->at.normal, at->lit, at->open, pixel);
+            hits++;
+        } else {
+            paint_background(&s->lights, &at->ray, pixel);
+        }
+    }
+    return hits;
+}
+
+/* Draws the pixels of a tile, or some of them; returns how many rays from the camera hit. */
+static size_t draw(const shared *s, sample *tile, size_t count, const hgrid_query_options *options)
+{
+    trace(s, tile, count, options);
+    for (sample *at = tile; at < tile + count; at++)
+        if (is_hit(at))
+            at->at = surface_at(s->job->scene, &s->lights, &at->ray, &at->hit);
+    if (s->job->has_shadows)
+        look_for_lamp(s, tile, count, options);
+    if (s->job->sky_rays > 0)
+        look_for_sky(s, tile, count, options);
+    return paint(s, tile, count);
+}
+
+/* Draws the pixels of a tile one by one, to tell what each of them costs. */
+static size_t draw_and_count(const shared *s, sample *tile, size_t count)
+{
+    const picture_job *job = s->job;
+    size_t hits = 0;
+    for (sample *at = tile; at < tile + count; at++) {
+        hgrid_counters counters = {0, 0, 0};
+        hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+        options.counters = &counters;
+        hits += draw(s, at, 1, &options);
+        if (job->tests != NULL)
+            job->tests[at->place] = (uint32_t)counters.primitive_tests;
+        if (job->steps != NULL)
+            job->steps[at->place] = (uint32_t)counters.cell_steps;
+    }
+    return hits;
+}
+
+/* --- tiles ----------------------------------------------------------------------------------- */
+
+/* The rays of a tile; at the right and lower edge it may be smaller. */
+static size_t aim(const shared *s, size_t number, sample *tile)
+{
+    const picture_job *job = s->job;
+    const int left = (int)(number % s->columns) * TILE, top = (int)(number / s->columns) * TILE;
+    size_t count = 0;
+    for (int row = top; row < top + TILE && row < job->row_count; row++)
+        for (int column = left; column < left + TILE && column < job->size; column++) {
+            sample *at = &tile[count++];
+            at->ray = ray_of(job->camera, column, job->first_row + row, job->size);
+            at->number = (uint32_t)(job->first_row + row) * (uint32_t)job->size + (uint32_t)column;
+            at->place = (size_t)row * (size_t)job->size + (size_t)column;
+            at->lit = at->open = 1;
+        }
+    return count;
+}
+
+/* Hands in what a thread found in a tile, if it had one, and takes the number of the next. */
+static size_t take(shared *s, bool had_tile, size_t hits)
+{
+    pthread_mutex_lock(&s->lock);
+    const size_t number = s->next;
+    s->next += number < s->tile_count;
+    s->done += had_tile;
+    s->hits += hits;
+    if (s->job->progress != NULL)
+        show_progress(s->job->progress, (double)s->done / (double)s->tile_count);
+    pthread_mutex_unlock(&s->lock);
+    return number;
+}
+
+/* A thread: draws tiles until there are none. Each pixel is written by one thread, and what it looks
+ * like depends on nothing but its place, so the picture is the same however the tiles fall. */
+static void draw_tiles(void *context, uint32_t thread)
+{
+    shared *s = (shared *)context;
+    const bool is_counting = s->job->tests != NULL || s->job->steps != NULL;
+    (void)thread;
+    size_t number = take(s, false, 0);
+    while (number < s->tile_count) {
+        sample tile[TILE_PIXELS];
+        const size_t count = aim(s, number, tile);
+        const size_t hits =
+            is_counting ? draw_and_count(s, tile, count) : draw(s, tile, count, NULL);
+        number = take(s, true, hits);
+    }
+}
+
+size_t render(const picture_job *job)
+{
+    const size_t columns = ((size_t)job->size + TILE - 1) / TILE;
+    const size_t rows = ((size_t)job->row_count + TILE - 1) / TILE;
+    if (columns == 0 || rows == 0)
+        return 0;
+    shared s = {job, lights_of(job->camera, job->sky_rays > 0 ? OPEN_SKY_GAIN : 1),
+                columns, columns * rows, PTHREAD_MUTEX_INITIALIZER, 0, 0, 0};
+    run_on_threads(NULL, job->threads, draw_tiles, &s);
+    pthread_mutex_destroy(&s.lock);
+    return s.hits;
+}

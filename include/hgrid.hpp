@@ -1,0 +1,1124 @@
+/*
+ * hgrid for C++17 and later: hgrid.h with types that own, know their size and call lambdas.
+ *
+ * It adds no code of its own to a query: each function here is the C call of the same name, and the
+ * manual is hgrid.h. What it adds is for the programmer:
+ *
+ *   hgrid::grid       a built grid that owns its memory; moves, frees itself
+ *   hgrid::view       a grid in memory of yours: an arena, a mapped file; what hgrid_grid is in C
+ *   hgrid::mesh       where your vertices and indices are, whatever structs they lie in
+ *   hgrid::config     how to build; progress and parallel_for are callables of yours
+ *   hgrid::options    what a query may be told; a filter is any callable, without allocation
+ *   hgrid::result     a value, or the status that says why there is none
+ *   hgrid::strided    rays and hits inside your structs: hgrid::field(pixels, &pixel::ray)
+ *
+ *   #include <hgrid.hpp>
+ *   #include <cstdio>
+ *   #include <vector>
+ *
+ *   struct vertex { float x, y, z, s, t; };
+ *
+ *   int main()
+ *   {
+ *       const std::vector<vertex> vertices = {{0, 0, 0, 0, 0}, {1, 0, 0, 1, 0}, {0, 1, 0, 0, 1}};
+ *       const std::vector<std::uint16_t> indices = {0, 1, 2};
+ *       const auto grid = hgrid::grid::build(hgrid::mesh(vertices, indices));
+ *       if (!grid)
+ *           return std::puts(hgrid::message(grid.error())), 1;
+ *       if (const auto hit = grid->intersect(hgrid::make_ray({0.25f, 0.25f, 1}, {0, 0, -1})))
+ *           std::printf("triangle %u at t = %g\n", hit->primitive, hit->t);
+ *   }
+ *
+ * Exceptions: none are thrown, and none are needed (-fno-exceptions is fine, -fno-rtti, too). Every
+ * function is noexcept. One that leaves a callable of yours ends the program, as it could not pass
+ * through C.
+ *
+ * Lifetimes: meshes, views, options and configurations refer to what they were given: arrays,
+ * counters, callables. Callables must have a name, so that they are still there when they are
+ * called; the compiler refuses others.
+ *
+ * Threads: as in hgrid.h. Any number of threads may query one grid or view.
+ *
+ * SPDX-License-Identifier: MIT OR Apache-2.0
+ */
+
+#ifndef HGRID_HPP
+#define HGRID_HPP
+
+#include "hgrid.h"
+
+#if (defined(_MSVC_LANG) ? _MSVC_LANG : __cplusplus) < 201703L
+#error "hgrid.hpp needs C++17"
+#endif
+
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <new>
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+/// See the head of this file.
+namespace hgrid {
+
+// --- words ----------------------------------------------------------------------------------------
+
+/// A ray, or the part of it from `t_min` to `t_max`. See `hgrid_ray`.
+using ray = ::hgrid_ray;
+/// Where a ray meets a triangle. See `hgrid_hit`.
+using hit = ::hgrid_hit;
+/// The nearest point of a mesh. See `hgrid_closest`.
+using closest = ::hgrid_closest;
+/// Work done by queries. See `hgrid_counters`.
+using counters = ::hgrid_counters;
+/// What a build found out. See `hgrid_report`.
+using report = ::hgrid_report;
+/// What a look at a whole grid found out. See `hgrid_statistics`.
+using statistics = ::hgrid_statistics;
+/// What the first bytes of a blob say. See `hgrid_blob_info`.
+using blob_info = ::hgrid_blob_info;
+/// A point or a direction: x, y, z.
+using point = std::array<float, 3>;
+
+/// The id that no triangle has; in a hit of a batch, a miss.
+inline constexpr std::uint32_t invalid_id = HGRID_INVALID_ID;
+/// Every region and every blob starts at a multiple of this many bytes.
+inline constexpr std::size_t alignment = HGRID_ALIGNMENT;
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wold-style-cast"
+#endif
+/// Bytes of index that are enough for any mesh with so many triangles and the default configuration,
+/// for an array.
+inline constexpr std::size_t index_bound(std::size_t triangles) noexcept
+{
+    return HGRID_INDEX_BOUND(triangles);
+}
+/// Bytes of scratch that are enough for any mesh with so many triangles and the default configuration.
+inline constexpr std::size_t scratch_bound(std::size_t triangles) noexcept
+{
+    return HGRID_SCRATCH_BOUND(triangles);
+}
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
+
+/// What a call answers: `ok`, or why not. The numbers are those of `hgrid_status`, and a later library
+/// may return others than these.
+enum class [[nodiscard]] status : std::int32_t {
+    /// `HGRID_OK`
+    ok = HGRID_OK,
+    /// `HGRID_ERROR_NULL_ARGUMENT`
+    null_argument = HGRID_ERROR_NULL_ARGUMENT,
+    /// `HGRID_ERROR_STRUCT_SIZE`
+    struct_size = HGRID_ERROR_STRUCT_SIZE,
+    /// `HGRID_ERROR_MISALIGNED`
+    misaligned = HGRID_ERROR_MISALIGNED,
+    /// `HGRID_ERROR_OVERLAP`
+    overlap = HGRID_ERROR_OVERLAP,
+    /// `HGRID_ERROR_INDEX_TOO_SMALL`
+    index_too_small = HGRID_ERROR_INDEX_TOO_SMALL,
+    /// `HGRID_ERROR_SCRATCH_TOO_SMALL`
+    scratch_too_small = HGRID_ERROR_SCRATCH_TOO_SMALL,
+    /// `HGRID_ERROR_OUT_OF_MEMORY`
+    out_of_memory = HGRID_ERROR_OUT_OF_MEMORY,
+    /// `HGRID_ERROR_INVALID_POSITIONS`
+    invalid_positions = HGRID_ERROR_INVALID_POSITIONS,
+    /// `HGRID_ERROR_INVALID_INDICES`
+    invalid_indices = HGRID_ERROR_INVALID_INDICES,
+    /// `HGRID_ERROR_INVALID_INDEX_TYPE`
+    invalid_index_type = HGRID_ERROR_INVALID_INDEX_TYPE,
+    /// `HGRID_ERROR_TOO_MANY_TRIANGLES`
+    too_many_triangles = HGRID_ERROR_TOO_MANY_TRIANGLES,
+    /// `HGRID_ERROR_INDEX_OUT_OF_RANGE`
+    index_out_of_range = HGRID_ERROR_INDEX_OUT_OF_RANGE,
+    /// `HGRID_ERROR_NON_FINITE`
+    non_finite = HGRID_ERROR_NON_FINITE,
+    /// `HGRID_ERROR_INVALID_MASKS`
+    invalid_masks = HGRID_ERROR_INVALID_MASKS,
+    /// `HGRID_ERROR_INVALID_METHOD`
+    invalid_method = HGRID_ERROR_INVALID_METHOD,
+    /// `HGRID_ERROR_INVALID_DENSITY`
+    invalid_density = HGRID_ERROR_INVALID_DENSITY,
+    /// `HGRID_ERROR_INVALID_FLAGS`
+    invalid_flags = HGRID_ERROR_INVALID_FLAGS,
+    /// `HGRID_ERROR_INVALID_MACROCELL_FACTOR`
+    invalid_macrocell_factor = HGRID_ERROR_INVALID_MACROCELL_FACTOR,
+    /// `HGRID_ERROR_INVALID_DEPTH`
+    invalid_depth = HGRID_ERROR_INVALID_DEPTH,
+    /// `HGRID_ERROR_INVALID_CELL_SIZE`
+    invalid_cell_size = HGRID_ERROR_INVALID_CELL_SIZE,
+    /// `HGRID_ERROR_PARALLEL_FOR`
+    parallel_for = HGRID_ERROR_PARALLEL_FOR,
+    /// `HGRID_ERROR_CANCELLED`
+    cancelled = HGRID_ERROR_CANCELLED,
+    /// `HGRID_ERROR_NOT_A_GRID`
+    not_a_grid = HGRID_ERROR_NOT_A_GRID,
+    /// `HGRID_ERROR_WRONG_BYTE_ORDER`
+    wrong_byte_order = HGRID_ERROR_WRONG_BYTE_ORDER,
+    /// `HGRID_ERROR_UNSUPPORTED_VERSION`
+    unsupported_version = HGRID_ERROR_UNSUPPORTED_VERSION,
+    /// `HGRID_ERROR_TRUNCATED`
+    truncated = HGRID_ERROR_TRUNCATED,
+    /// `HGRID_ERROR_MESH_MISMATCH`
+    mesh_mismatch = HGRID_ERROR_MESH_MISMATCH,
+    /// `HGRID_ERROR_CORRUPT`
+    corrupt = HGRID_ERROR_CORRUPT,
+    /// `HGRID_ERROR_NO_MESH`
+    no_mesh = HGRID_ERROR_NO_MESH,
+    /// `HGRID_ERROR_INVALID_RAYS`
+    invalid_rays = HGRID_ERROR_INVALID_RAYS,
+    /// `HGRID_ERROR_INVALID_ANSWERS`
+    invalid_answers = HGRID_ERROR_INVALID_ANSWERS,
+    /// `HGRID_ERROR_INVALID_COHERENCE`
+    invalid_coherence = HGRID_ERROR_INVALID_COHERENCE,
+    /// `HGRID_ERROR_INVALID_CULL`
+    invalid_cull = HGRID_ERROR_INVALID_CULL,
+};
+
+/// Says in words what a status means and what to do. Static, never null.
+inline const char *message(status of) noexcept
+{
+    return ::hgrid_status_string(static_cast<::hgrid_status>(of));
+}
+
+/// The structure to build; `hgrid.h` says when to choose which.
+enum class method : std::uint32_t {
+    /// `HGRID_METHOD_ONE_LEVEL`
+    one_level = HGRID_METHOD_ONE_LEVEL,
+    /// `HGRID_METHOD_FIXED`
+    fixed = HGRID_METHOD_FIXED,
+    /// `HGRID_METHOD_VARIABLE`
+    variable = HGRID_METHOD_VARIABLE,
+    /// `HGRID_METHOD_RECURSIVE`
+    recursive = HGRID_METHOD_RECURSIVE,
+    /// `HGRID_METHOD_BRICK`
+    brick = HGRID_METHOD_BRICK,
+};
+
+/// What is known about the rays of a batch. It changes how fast the answers come, never the answers.
+enum class coherence : std::uint32_t {
+    /// Nothing: `HGRID_COHERENCE_INCOHERENT`
+    incoherent = HGRID_COHERENCE_INCOHERENT,
+    /// Neighbours follow one another: `HGRID_COHERENCE_COHERENT`
+    coherent = HGRID_COHERENCE_COHERENT,
+};
+
+/// Triangles that are not hit from one of their sides.
+enum class culling : std::uint32_t {
+    /// Both sides are hit: `HGRID_CULL_NONE`
+    none = HGRID_CULL_NONE,
+    /// Backs are not hit: `HGRID_CULL_BACK`
+    back = HGRID_CULL_BACK,
+    /// Fronts are not hit: `HGRID_CULL_FRONT`
+    front = HGRID_CULL_FRONT,
+};
+
+/// What a filter answers.
+enum class verdict : ::hgrid_verdict {
+    /// As if the triangle were not there: `HGRID_REJECT`
+    reject = HGRID_REJECT,
+    /// This hit counts: `HGRID_ACCEPT`
+    accept = HGRID_ACCEPT,
+    /// This hit counts, and no other one will: `HGRID_ACCEPT_AND_STOP`
+    accept_and_stop = HGRID_ACCEPT_AND_STOP,
+};
+
+/// A ray from a point; `t` counts multiples of the direction, whatever its length.
+inline constexpr ray make_ray(const point &origin, const point &direction, float t_min = 0,
+                              float t_max = std::numeric_limits<float>::infinity()) noexcept
+{
+    return {{origin[0], origin[1], origin[2]},
+            t_min,
+            {direction[0], direction[1], direction[2]},
+            t_max};
+}
+
+/// Whether the library that is linked has the version of this header, but for repairs.
+inline bool is_compatible() noexcept
+{
+    return ::hgrid_version() >> 8 == HGRID_VERSION >> 8;
+}
+
+// --- a value or a status --------------------------------------------------------------------------
+
+/// A value, or the status that says why there is none. Test it before you look at the value:
+/// `if (!result) return result.error();`
+template <class T>
+class [[nodiscard]] result {
+public:
+    /// With a value.
+    constexpr result(T value) noexcept : value_(std::move(value)) {}
+    /// Without one; the status is not `ok`.
+    constexpr result(status error) noexcept : error_(error) { assert(error != status::ok); }
+
+    /// Whether there is a value.
+    constexpr bool has_value() const noexcept { return value_.has_value(); }
+    /// Whether there is a value.
+    constexpr explicit operator bool() const noexcept { return value_.has_value(); }
+    /// Why there is no value, or `ok` if there is one.
+    constexpr status error() const noexcept { return error_; }
+
+    /// The value, which must be there.
+    constexpr T &operator*() & noexcept { return assert(value_), *value_; }
+    /// The value, which must be there.
+    constexpr const T &operator*() const & noexcept { return assert(value_), *value_; }
+    /// The value, which must be there, to move from.
+    constexpr T &&operator*() && noexcept { return assert(value_), *std::move(value_); }
+    /// The value's members; it must be there.
+    constexpr T *operator->() noexcept { return assert(value_), &*value_; }
+    /// The value's members; it must be there.
+    constexpr const T *operator->() const noexcept { return assert(value_), &*value_; }
+
+private:
+    std::optional<T> value_;
+    status error_ = status::ok;
+};
+
+// --- elements in a row ----------------------------------------------------------------------------
+
+namespace detail {
+
+template <class C>
+using element_of = std::remove_pointer_t<decltype(std::data(std::declval<C &>()))>;
+
+// Whether the elements of a container are T, but for const.
+template <class C, class T, class = void>
+struct holds : std::false_type {};
+template <class C, class T>
+struct holds<C, T, std::void_t<element_of<C>, decltype(std::size(std::declval<C &>()))>>
+    : std::is_convertible<element_of<C> (*)[], T (*)[]> {};
+
+} // namespace detail
+
+/// Elements side by side: a pointer and a number. Made from arrays and from everything with `data()`
+/// and `size()`: `std::vector`, `std::array`, C++20's `std::span`.
+template <class T>
+class span {
+public:
+    /// No elements.
+    constexpr span() noexcept = default;
+    /// So many elements from an address on.
+    constexpr span(T *data, std::size_t size) noexcept : data_(data), size_(size) {}
+    /// The elements of a container or an array. What is to be written must not be a temporary.
+    template <class C, std::enable_if_t<detail::holds<std::remove_reference_t<C>, T>::value &&
+                                            (std::is_lvalue_reference_v<C> || std::is_const_v<T> ||
+                                             std::is_trivially_destructible_v<C>),
+                                        int> = 0>
+    constexpr span(C &&container) noexcept : data_(std::data(container)), size_(std::size(container))
+    {
+    }
+
+    /// The first element; may be null if there is none.
+    constexpr T *data() const noexcept { return data_; }
+    /// How many elements there are.
+    constexpr std::size_t size() const noexcept { return size_; }
+    /// Whether there is no element.
+    constexpr bool empty() const noexcept { return size_ == 0; }
+    /// The first element, for loops.
+    constexpr T *begin() const noexcept { return data_; }
+    /// Behind the last element, for loops.
+    constexpr T *end() const noexcept { return data_ + size_; }
+    /// An element; there must be one.
+    constexpr T &operator[](std::size_t i) const noexcept { return assert(i < size_), data_[i]; }
+    /// So many elements from the i-th on; they must be there.
+    constexpr span subspan(std::size_t i, std::size_t count) const noexcept
+    {
+        assert(i <= size_ && count <= size_ - i);
+        return {data_ + i, count};
+    }
+
+private:
+    T *data_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+/// The bytes of elements.
+template <class C>
+span<const std::byte> as_bytes(const C &container) noexcept
+{
+    return {reinterpret_cast<const std::byte *>(std::data(container)),
+            std::size(container) * sizeof(*std::data(container))};
+}
+
+/// The bytes of elements, to be written: an array becomes a region.
+template <class C>
+span<std::byte> as_writable_bytes(C &container) noexcept
+{
+    return {reinterpret_cast<std::byte *>(std::data(container)),
+            std::size(container) * sizeof(*std::data(container))};
+}
+
+/// Elements at a fixed distance in bytes, as fields of structs are. Made from all that makes a span,
+/// and by `field`.
+template <class T>
+class strided {
+public:
+    /// No elements.
+    constexpr strided() noexcept = default;
+    /// So many elements, each so many bytes behind the one before.
+    constexpr strided(T *first, std::size_t stride_bytes, std::size_t size) noexcept
+        : first_(first), stride_(stride_bytes), size_(size)
+    {
+    }
+    /// Elements side by side, as for `span`.
+    template <class C, std::enable_if_t<std::is_constructible_v<span<T>, C &&>, int> = 0>
+    constexpr strided(C &&container) noexcept
+        : first_(std::data(container)), stride_(sizeof(T)), size_(std::size(container))
+    {
+    }
+    /// The same elements, not to be written.
+    template <class U, std::enable_if_t<std::is_same_v<const U, T> && !std::is_const_v<U>, int> = 0>
+    constexpr strided(const strided<U> &other) noexcept
+        : first_(other.first()), stride_(other.stride()), size_(other.size())
+    {
+    }
+
+    /// The first element; may be null if there is none.
+    constexpr T *first() const noexcept { return first_; }
+    /// Bytes from one element to the next.
+    constexpr std::size_t stride() const noexcept { return stride_; }
+    /// How many elements there are.
+    constexpr std::size_t size() const noexcept { return size_; }
+    /// An element; there must be one.
+    T &operator[](std::size_t i) const noexcept
+    {
+        using byte = std::conditional_t<std::is_const_v<T>, const std::byte, std::byte>;
+        assert(i < size_);
+        return *reinterpret_cast<T *>(reinterpret_cast<byte *>(first_) + i * stride_);
+    }
+
+private:
+    T *first_ = nullptr;
+    std::size_t stride_ = sizeof(T);
+    std::size_t size_ = 0;
+};
+
+/// One field of each struct: `hgrid::field(pixels, &pixel::ray)`.
+template <class C, class S, class M,
+          std::enable_if_t<std::is_convertible_v<detail::element_of<C> *, const S *>, int> = 0>
+constexpr auto field(C &&structs, M S::*member) noexcept
+{
+    using struct_type = detail::element_of<C>;
+    using field_type = std::conditional_t<std::is_const_v<struct_type>, const M, M>;
+    static_assert(std::is_lvalue_reference_v<C> || std::is_trivially_destructible_v<C>,
+                  "the structs must outlive this: give them a name");
+    const bool empty = std::size(structs) == 0;
+    return strided<field_type>(empty ? nullptr : std::addressof(std::data(structs)->*member),
+                               sizeof(struct_type), std::size(structs));
+}
+
+/// One field of each struct that is a field itself.
+template <class T, class S, class M>
+constexpr auto field(const strided<T> &structs, M S::*member) noexcept
+{
+    using field_type = std::conditional_t<std::is_const_v<T>, const M, M>;
+    const bool empty = structs.size() == 0;
+    return strided<field_type>(empty ? nullptr : std::addressof(structs.first()->*member),
+                               structs.stride(), structs.size());
+}
+
+// --- the mesh -------------------------------------------------------------------------------------
+
+namespace detail {
+
+template <class T>
+struct is_strided : std::false_type {};
+template <class T>
+struct is_strided<strided<T>> : std::true_type {};
+
+// What a vertex or a triangle is made of: T itself if it is a number, the element type of an array
+// or of anything with value_type, or else void.
+template <class T, class = void>
+struct scalar {
+    using type = std::conditional_t<std::is_arithmetic_v<T>, T, void>;
+};
+template <class T, std::size_t N>
+struct scalar<T[N], void> {
+    using type = T;
+};
+template <class T>
+struct scalar<T, std::void_t<typename T::value_type>> {
+    using type = typename T::value_type;
+};
+
+template <class C>
+constexpr auto elements(const C &container) noexcept
+{
+    if constexpr (is_strided<C>::value)
+        return strided<const std::remove_pointer_t<decltype(container.first())>>(container);
+    else
+        return strided<const element_of<const C>>(container);
+}
+
+template <class C>
+inline constexpr bool stays = std::is_lvalue_reference_v<C> ||
+                              std::is_trivially_destructible_v<std::remove_reference_t<C>>;
+
+} // namespace detail
+
+/// Where the vertices and triangles are: `hgrid_mesh`. It refers to them; they stay where they are,
+/// unchanged, for as long as a grid of this mesh is queried.
+class mesh {
+public:
+    /// A mesh of a container of vertices and one of indices.
+    ///
+    /// Vertices are structs that begin with three floats x, y, z (anything may follow), arrays of
+    /// floats, or floats alone, three for each vertex. If the floats are elsewhere in the struct:
+    /// `field(vertices, &vertex::position)`.
+    ///
+    /// Indices are numbers of 16 bits (unsigned) or 32, three for each triangle; or arrays of three;
+    /// or a field of a struct, from which on there are three: `field(faces, &face::corners)`.
+    template <class Vertices, class Indices>
+    mesh(Vertices &&vertices, Indices &&indices) noexcept
+    {
+        static_assert(detail::stays<Vertices &&> && detail::stays<Indices &&>,
+                      "the mesh refers to its vertices and indices: give them a name");
+        set_positions<detail::is_strided<std::decay_t<Vertices>>::value>(detail::elements(vertices));
+        set_indices<detail::is_strided<std::decay_t<Indices>>::value>(detail::elements(indices));
+    }
+    /// A mesh that was described in C.
+    explicit mesh(const ::hgrid_mesh &raw) noexcept : raw_(raw) {}
+
+    /// Adds a visibility mask for each triangle, as many as there are triangles.
+    mesh &masks(strided<const std::uint32_t> masks) noexcept
+    {
+        assert(masks.size() == raw_.triangle_count);
+        raw_.masks = masks.first();
+        raw_.mask_stride = masks.stride();
+        return *this;
+    }
+
+    /// How many vertices there are.
+    std::size_t vertex_count() const noexcept { return raw_.vertex_count; }
+    /// How many triangles there are.
+    std::size_t triangle_count() const noexcept { return raw_.triangle_count; }
+    /// The same for a call in C.
+    const ::hgrid_mesh &c() const noexcept { return raw_; }
+
+private:
+    template <bool IsField, class V>
+    void set_positions(const strided<const V> &vertices) noexcept
+    {
+        using number = typename detail::scalar<V>::type;
+        constexpr bool is_flat = std::is_same_v<V, float> && !IsField;
+        static_assert(std::is_same_v<number, float> || std::is_void_v<number>,
+                      "the coordinates of a vertex are floats");
+        static_assert(std::is_same_v<V, float> || sizeof(V) >= 3 * sizeof(float),
+                      "a vertex has three coordinates");
+        static_assert(std::is_standard_layout_v<V>,
+                      "where does the vertex have its coordinates? name the field: "
+                      "hgrid::field(vertices, &vertex::position)");
+        raw_.positions = vertices.first();
+        raw_.position_stride = is_flat ? 3 * sizeof(float) : vertices.stride();
+        raw_.vertex_count = is_flat ? vertices.size() / 3 : vertices.size();
+    }
+
+    template <bool IsField, class I>
+    void set_indices(const strided<const I> &indices) noexcept
+    {
+        using number = typename detail::scalar<I>::type;
+        static_assert(!std::is_void_v<number>,
+                      "where does the triangle have its indices? name the field: "
+                      "hgrid::field(triangles, &triangle::corners)");
+        if constexpr (!std::is_void_v<number>) {
+            constexpr bool is_flat = std::is_same_v<I, number> && !IsField;
+            static_assert(std::is_integral_v<number> &&
+                              (sizeof(number) == 4 ||
+                               (sizeof(number) == 2 && std::is_unsigned_v<number>)),
+                          "indices are integers of 32 bits, or unsigned ones of 16");
+            static_assert(std::is_same_v<I, number> || sizeof(I) >= 3 * sizeof(number),
+                          "a triangle has three indices");
+            raw_.index_type = sizeof(number) == 4 ? HGRID_INDEX_U32 : HGRID_INDEX_U16;
+            raw_.indices = indices.first();
+            raw_.index_stride = is_flat ? 3 * sizeof(number) : indices.stride();
+            raw_.triangle_count = is_flat ? indices.size() / 3 : indices.size();
+        }
+    }
+
+    ::hgrid_mesh raw_ = HGRID_MESH_INIT;
+};
+
+// --- how to build ---------------------------------------------------------------------------------
+
+/// A part of a build: call it with the numbers that `parallel_for` asks for.
+class task {
+public:
+    /// Runs the part of this number.
+    void operator()(std::uint32_t index) const noexcept { function_(context_, index); }
+
+private:
+    friend class config;
+    task(::hgrid_task function, void *context) noexcept : function_(function), context_(context) {}
+    ::hgrid_task function_;
+    void *context_;
+};
+
+/// What a build may be told: `hgrid_config`. Each method has its usual numbers.
+class config {
+public:
+    /// The usual numbers of a method.
+    config(method of = method::one_level) noexcept
+    {
+        static constexpr ::hgrid_config fixed = HGRID_CONFIG_INIT_FIXED;
+        static constexpr ::hgrid_config variable = HGRID_CONFIG_INIT_VARIABLE;
+        static constexpr ::hgrid_config recursive = HGRID_CONFIG_INIT_RECURSIVE;
+        static constexpr ::hgrid_config brick = HGRID_CONFIG_INIT_BRICK;
+        switch (of) {
+        case method::one_level: break;
+        case method::fixed: raw_ = fixed; break;
+        case method::variable: raw_ = variable; break;
+        case method::recursive: raw_ = recursive; break;
+        case method::brick: raw_ = brick; break;
+        }
+    }
+
+    /// Cells for each triangle. Not for brick.
+    config &density(float cells) noexcept { return raw_.density = cells, *this; }
+    /// The width of a cell in multiples of the usual one. For brick.
+    config &cell_size(float factor) noexcept { return raw_.cell_size = factor, *this; }
+    /// Cells in a macrocell, along each axis. For fixed.
+    config &macrocell_factor(std::uint32_t cells) noexcept
+    {
+        return raw_.macrocell_factor = cells, *this;
+    }
+    /// The most triangles in a cell without a subgrid. For variable.
+    config &subdivide_above(std::uint32_t triangles) noexcept
+    {
+        return raw_.subdivide_above = triangles, *this;
+    }
+    /// Levels of grids. For recursive.
+    config &depth(std::uint32_t levels) noexcept { return raw_.depth = levels, *this; }
+    /// Whether triangles that are not finite are an error, or left out.
+    config &strict(bool is_strict) noexcept
+    {
+        return raw_.flags = is_strict ? HGRID_BUILD_STRICT : 0u, *this;
+    }
+
+    /// Calls `callable(float done)` during a build, from 0 to exactly 1, on the thread that builds. If
+    /// it returns a bool, false cancels.
+    template <class F>
+    config &progress(F &callable) noexcept
+    {
+        static_assert(std::is_invocable_v<F &, float>, "progress is called with a float");
+        progress_object_ = address(callable);
+        progress_ = [](void *object, float done) noexcept -> bool {
+            if constexpr (std::is_void_v<std::invoke_result_t<F &, float>>)
+                return (*static_cast<F *>(object))(done), true;
+            else
+                return static_cast<bool>((*static_cast<F *>(object))(done));
+        };
+        return *this;
+    }
+
+    /// Builds in up to so many tasks at once, each of which takes scratch.
+    ///
+    /// `callable(std::uint32_t count, hgrid::task each)` calls `each(i)` for every i below `count`, on
+    /// any threads, and returns when all these calls have. `hgrid_config` says more at `run`.
+    template <class F>
+    config &parallel_for(std::uint32_t tasks, F &callable) noexcept
+    {
+        static_assert(std::is_invocable_v<F &, std::uint32_t, task>,
+                      "parallel_for is called with a std::uint32_t and a hgrid::task");
+        raw_.tasks = tasks;
+        run_object_ = address(callable);
+        run_ = [](void *object, std::uint32_t count, task each) noexcept {
+            (*static_cast<F *>(object))(count, each);
+        };
+        return *this;
+    }
+
+    /// The same for a call in C, which must end before this configuration does.
+    ::hgrid_config c() const noexcept
+    {
+        ::hgrid_config raw = raw_;
+        raw.context = const_cast<config *>(this);
+        if (run_ != nullptr)
+            raw.run = [](void *context, std::uint32_t count, ::hgrid_task function,
+                         void *task_context) noexcept {
+                const auto *self = static_cast<const config *>(context);
+                self->run_(self->run_object_, count, task(function, task_context));
+            };
+        if (progress_ != nullptr)
+            raw.progress = [](void *context, float done) noexcept -> bool {
+                const auto *self = static_cast<const config *>(context);
+                return self->progress_(self->progress_object_, done);
+            };
+        return raw;
+    }
+
+private:
+    friend class grid;
+    friend result<config> fit(const mesh &, const config &, std::size_t, span<std::byte>,
+                              report *) noexcept;
+
+    template <class F>
+    static void *address(F &callable) noexcept
+    {
+        static_assert(!std::is_function_v<F>, "put the function into a lambda");
+        return const_cast<void *>(static_cast<const void *>(std::addressof(callable)));
+    }
+
+    ::hgrid_config raw_ = HGRID_CONFIG_INIT;
+    void *progress_object_ = nullptr;
+    bool (*progress_)(void *, float) noexcept = nullptr;
+    void *run_object_ = nullptr;
+    void (*run_)(void *, std::uint32_t, task) noexcept = nullptr;
+};
+
+// --- what a query may be told ---------------------------------------------------------------------
+
+/// What a query may be told: `hgrid_query_options`. Made once, for any number of queries.
+class options {
+public:
+    /// Triangles are seen whose mask has a bit in common with this one.
+    options &mask(std::uint32_t bits) noexcept { return raw_.mask = bits, *this; }
+    /// Triangles are not hit from this side.
+    options &cull(culling side) noexcept
+    {
+        return raw_.cull = static_cast<std::uint32_t>(side), *this;
+    }
+    /// This triangle is not hit: the one where the ray starts.
+    options &skip(std::uint32_t primitive) noexcept { return raw_.skip = primitive, *this; }
+    /// Adds up the work of queries here. Each thread needs its own.
+    options &count(counters &work) noexcept { return raw_.counters = &work, *this; }
+
+    /// Asks `callable` about each hit, from near to far, each triangle at most once a ray.
+    ///
+    /// It is called with the hit, or with the ray's place in its batch and the hit, and returns a
+    /// `verdict`, or a bool: whether the hit counts.
+    ///
+    ///     auto is_leaf_there = [&](const hgrid::hit &hit) { return alpha(hit) > 0.5f; };
+    ///     hgrid::options options;
+    ///     options.filter(is_leaf_there);
+    template <class F>
+    options &filter(F &callable) noexcept
+    {
+        static_assert(!std::is_function_v<F>, "put the function into a lambda");
+        static_assert(std::is_invocable_v<F &, const hit &> ||
+                          std::is_invocable_v<F &, std::size_t, const hit &>,
+                      "a filter is called with a hit, or with a place and a hit");
+        raw_.context = const_cast<void *>(static_cast<const void *>(std::addressof(callable)));
+        raw_.filter = [](void *context, std::size_t place, const hit *at) noexcept {
+            F &self = *static_cast<F *>(context);
+            if constexpr (std::is_invocable_v<F &, const hit &>)
+                return static_cast<void>(place), number(self(*at));
+            else
+                return number(self(place, *at));
+        };
+        return *this;
+    }
+
+    /// The same for a call in C.
+    const ::hgrid_query_options &c() const noexcept { return raw_; }
+
+private:
+    static ::hgrid_verdict number(verdict answer) noexcept
+    {
+        return static_cast<::hgrid_verdict>(answer);
+    }
+    static ::hgrid_verdict number(bool counts) noexcept
+    {
+        return counts ? HGRID_ACCEPT : HGRID_REJECT;
+    }
+
+    ::hgrid_query_options raw_ = HGRID_QUERY_OPTIONS_INIT;
+};
+
+// --- memory ---------------------------------------------------------------------------------------
+
+/// A region that frees itself: bytes from a multiple of `alignment` on.
+class memory {
+public:
+    /// No bytes.
+    memory() noexcept = default;
+    /// So many bytes, or `out_of_memory`. They may hold anything.
+    static result<memory> allocate(std::uint64_t bytes) noexcept
+    {
+        memory region;
+        if (bytes > std::numeric_limits<std::size_t>::max() / 2)
+            return status::out_of_memory;
+        region.bytes_.reset(static_cast<std::byte *>(::operator new(
+            static_cast<std::size_t>(bytes), std::align_val_t{alignment}, std::nothrow)));
+        if (region.bytes_ == nullptr)
+            return status::out_of_memory;
+        region.size_ = static_cast<std::size_t>(bytes);
+        return region;
+    }
+    /// Takes the other one's bytes; it has none then.
+    memory(memory &&other) noexcept
+        : bytes_(std::move(other.bytes_)), size_(std::exchange(other.size_, 0))
+    {
+    }
+    /// Frees its own bytes and takes the other one's.
+    memory &operator=(memory &&other) noexcept
+    {
+        bytes_ = std::move(other.bytes_);
+        size_ = std::exchange(other.size_, 0);
+        return *this;
+    }
+
+    /// The first byte, or null.
+    std::byte *data() const noexcept { return bytes_.get(); }
+    /// How many bytes there are.
+    std::size_t size() const noexcept { return size_; }
+
+private:
+    struct freed {
+        void operator()(std::byte *bytes) const noexcept
+        {
+            ::operator delete(bytes, std::align_val_t{alignment}, std::nothrow);
+        }
+    };
+    std::unique_ptr<std::byte, freed> bytes_;
+    std::size_t size_ = 0;
+};
+
+// --- a grid in memory of the caller ---------------------------------------------------------------
+
+/// A grid and its mesh, ready for queries: `hgrid_grid`, in memory that stays the caller's. A view of
+/// nothing, as the default one is, hits nothing.
+class view {
+public:
+    /// A view of nothing.
+    view() noexcept = default;
+    /// A view that was built or opened in C.
+    explicit view(const ::hgrid_grid &raw) noexcept : raw_(raw) {}
+
+    /// Builds in an index, which keeps the grid, and a scratch, which is free again afterwards.
+    static result<view> build(const mesh &of, const config &how, span<std::byte> index,
+                              span<std::byte> scratch, report *details = nullptr) noexcept
+    {
+        view built;
+        const ::hgrid_config raw = how.c();
+        const status answer{::hgrid_build(&of.c(), &raw, index.data(), index.size(), scratch.data(),
+                                          scratch.size(), &built.raw_, details)};
+        return answer == status::ok ? result<view>(built) : answer;
+    }
+    /// Opens a blob that was built for this mesh, where it lies.
+    static result<view> open(span<const std::byte> blob, const mesh &of) noexcept
+    {
+        return open(blob, &of.c());
+    }
+    /// Opens a blob that brings its mesh, as `pack` makes them.
+    static result<view> open(span<const std::byte> blob) noexcept { return open(blob, nullptr); }
+    /// Proves that a blob from elsewhere is the grid of its mesh.
+    status validate() const noexcept { return status{::hgrid_validate(&raw_)}; }
+
+    /// The closest triangle that a ray hits.
+    std::optional<hit> intersect(const ray &along) const noexcept
+    {
+        return intersect(along, nullptr);
+    }
+    /// The closest triangle that a ray hits and that the options let count.
+    std::optional<hit> intersect(const ray &along, const options &with) const noexcept
+    {
+        return intersect(along, &with.c());
+    }
+
+    /// Whether a ray hits anything.
+    bool occluded(const ray &along) const noexcept
+    {
+        return ::hgrid_occluded(&raw_, &along, nullptr);
+    }
+    /// Whether a ray hits anything that the options let count.
+    bool occluded(const ray &along, const options &with) const noexcept
+    {
+        return ::hgrid_occluded(&raw_, &along, &with.c());
+    }
+
+    /// The closest hit of each ray; a miss has the primitive `invalid_id`. There are as many hits as
+    /// rays, or the answer is `invalid_answers`.
+    status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know) const noexcept
+    {
+        return intersect_n(rays, hits, know, nullptr);
+    }
+    /// The same with options for all rays.
+    status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
+                       const options &with) const noexcept
+    {
+        return intersect_n(rays, hits, know, &with.c());
+    }
+
+    /// For each ray 1 if it hits anything, or else 0. There are as many answers as rays, or the answer
+    /// is `invalid_answers`.
+    status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers,
+                      coherence know) const noexcept
+    {
+        return occluded_n(rays, answers, know, nullptr);
+    }
+    /// The same with options for all rays.
+    status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
+                      const options &with) const noexcept
+    {
+        return occluded_n(rays, answers, know, &with.c());
+    }
+
+    /// Every triangle that a ray hits, sorted by t, as many as there is room for; gives their number,
+    /// which may be larger.
+    result<std::size_t> intersect_all(const ray &along, span<hit> hits) const noexcept
+    {
+        return intersect_all(along, hits, nullptr);
+    }
+    /// The same with options.
+    result<std::size_t> intersect_all(const ray &along, span<hit> hits,
+                                      const options &with) const noexcept
+    {
+        return intersect_all(along, hits, &with.c());
+    }
+
+    /// The nearest point of the mesh that is no farther away than this.
+    std::optional<closest>
+    closest_point(const point &from,
+                  float max_distance = std::numeric_limits<float>::infinity()) const noexcept
+    {
+        return closest_point(from, max_distance, nullptr);
+    }
+    /// The same with options; culling and filters do not matter.
+    std::optional<closest> closest_point(const point &from, float max_distance,
+                                         const options &with) const noexcept
+    {
+        return closest_point(from, max_distance, &with.c());
+    }
+
+    /// Bytes that `pack` writes; 0 for a view of nothing.
+    std::uint64_t packed_bytes() const noexcept
+    {
+        std::uint64_t bytes = 0;
+        static_cast<void>(::hgrid_pack(&raw_, nullptr, 0, &bytes));
+        return bytes;
+    }
+    /// Writes grid and mesh as one blob, which `open` needs no mesh for.
+    status pack(span<std::byte> to) const noexcept
+    {
+        std::uint64_t bytes = 0;
+        return status{::hgrid_pack(&raw_, to.data(), to.size(), &bytes)};
+    }
+    /// The same in memory of its own.
+    result<memory> pack() const noexcept
+    {
+        auto packed = memory::allocate(packed_bytes());
+        if (!packed)
+            return packed;
+        const status answer = pack(*packed);
+        return answer == status::ok ? std::move(packed) : answer;
+    }
+
+    /// What there is to know about the whole grid; looks at all of it.
+    result<statistics> inspect() const noexcept
+    {
+        statistics found = HGRID_STATISTICS_INIT;
+        const status answer{::hgrid_inspect(&raw_, &found)};
+        return answer == status::ok ? result<statistics>(found) : answer;
+    }
+
+    /// The same for a call in C.
+    const ::hgrid_grid &c() const noexcept { return raw_; }
+
+private:
+    static result<view> open(span<const std::byte> blob, const ::hgrid_mesh *of) noexcept
+    {
+        view opened;
+        const status answer{::hgrid_open(blob.data(), blob.size(), of, &opened.raw_)};
+        return answer == status::ok ? result<view>(opened) : answer;
+    }
+    std::optional<hit> intersect(const ray &along, const ::hgrid_query_options *with) const noexcept
+    {
+        hit at;
+        return ::hgrid_intersect(&raw_, &along, with, &at) ? std::optional<hit>(at) : std::nullopt;
+    }
+    status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
+                       const ::hgrid_query_options *with) const noexcept
+    {
+        if (rays.size() != hits.size())
+            return status::invalid_answers;
+        return status{::hgrid_intersect_n(&raw_, rays.first(), rays.stride(), hits.first(),
+                                          hits.stride(), rays.size(),
+                                          static_cast<::hgrid_coherence>(know), with)};
+    }
+    status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
+                      const ::hgrid_query_options *with) const noexcept
+    {
+        if (rays.size() != answers.size())
+            return status::invalid_answers;
+        return status{::hgrid_occluded_n(&raw_, rays.first(), rays.stride(), answers.first(),
+                                         answers.stride(), rays.size(),
+                                         static_cast<::hgrid_coherence>(know), with)};
+    }
+    result<std::size_t> intersect_all(const ray &along, span<hit> hits,
+                                      const ::hgrid_query_options *with) const noexcept
+    {
+        std::size_t count = 0;
+        const status answer{
+            ::hgrid_intersect_all(&raw_, &along, with, hits.data(), hits.size(), &count)};
+        return answer == status::ok ? result<std::size_t>(count) : answer;
+    }
+    std::optional<closest> closest_point(const point &from, float max_distance,
+                                         const ::hgrid_query_options *with) const noexcept
+    {
+        closest at;
+        return ::hgrid_closest_point(&raw_, from.data(), max_distance, with, &at)
+                   ? std::optional<closest>(at)
+                   : std::nullopt;
+    }
+
+    ::hgrid_grid raw_ = HGRID_GRID_INIT;
+};
+
+// --- a grid that owns its memory ------------------------------------------------------------------
+
+/// A built grid and its memory. The mesh stays the caller's.
+///
+/// It is a view, so it answers queries, and where a view is wanted it can be given; that view is good
+/// for as long as the grid is. Moving it does not move the memory.
+class grid : public view {
+public:
+    /// No grid; hits nothing.
+    grid() noexcept = default;
+
+    /// Builds, in memory that `operator new` gives.
+    ///
+    /// The grid keeps exactly the bytes it takes; the scratch is freed. Errors are those of
+    /// `hgrid_build`, and `out_of_memory`. `details` says which triangle is to blame.
+    static result<grid> build(const mesh &of, const config &how = {},
+                              report *details = nullptr) noexcept;
+
+    /// Opens a blob that was built for this mesh, and takes over its memory.
+    static result<grid> adopt(memory blob, const mesh &of) noexcept
+    {
+        const auto opened = view::open(blob, of);
+        return opened ? result<grid>(grid(*opened, std::move(blob))) : opened.error();
+    }
+    /// Opens a blob that brings its mesh, and takes over its memory.
+    static result<grid> adopt(memory blob) noexcept
+    {
+        const auto opened = view::open(blob);
+        return opened ? result<grid>(grid(*opened, std::move(blob))) : opened.error();
+    }
+
+    /// Takes the other grid, which is none then.
+    grid(grid &&other) noexcept
+        : view(std::exchange(static_cast<view &>(other), view())), blob_(std::move(other.blob_))
+    {
+    }
+    /// Frees its own memory and takes the other grid, which is none then.
+    grid &operator=(grid &&other) noexcept
+    {
+        static_cast<view &>(*this) = std::exchange(static_cast<view &>(other), view());
+        blob_ = std::move(other.blob_);
+        return *this;
+    }
+
+    /// The blob: bytes without pointers, to be stored or sent, and opened elsewhere.
+    span<const std::byte> blob() const noexcept { return blob_; }
+
+private:
+    grid(const view &built, memory blob) noexcept : view(built), blob_(std::move(blob)) {}
+
+    // Bytes of index that most meshes take. What is certainly enough may be a hundred times as much
+    // where the index finds its size while it is written.
+    static std::uint64_t usual_bytes(const mesh &of, const config &how) noexcept
+    {
+        const auto triangles = static_cast<std::uint64_t>(of.triangle_count());
+        switch (method{how.raw_.method}) {
+        case method::variable: return 96 * triangles + 4096;
+        case method::recursive: return 160 * triangles + 4096;
+        case method::brick: return 24 * triangles + 4096;
+        default: return std::numeric_limits<std::uint64_t>::max();
+        }
+    }
+
+    memory blob_;
+};
+
+/// Tells how much memory a build of this mesh takes: roughly, or with scratch exactly.
+inline status sizes(const mesh &of, const config &how, report &found,
+                    span<std::byte> scratch = {}) noexcept
+{
+    const ::hgrid_config raw = how.c();
+    return status{::hgrid_sizes(&of.c(), &raw, scratch.data(), scratch.size(), &found)};
+}
+
+/// Tells how much memory is enough for any mesh with so many triangles.
+inline result<report> bound(std::size_t triangle_count, const config &how) noexcept
+{
+    const ::hgrid_config raw = how.c();
+    report found = HGRID_REPORT_INIT;
+    const status answer{::hgrid_bound(triangle_count, &raw, &found)};
+    return answer == status::ok ? result<report>(found) : answer;
+}
+
+/// Finds the finest grid of a method that fits into so many bytes.
+inline result<config> fit(const mesh &of, const config &how, std::size_t index_bytes,
+                          span<std::byte> scratch, report *details = nullptr) noexcept
+{
+    const ::hgrid_config raw = how.c();
+    config fitted = how;
+    report found = HGRID_REPORT_INIT;
+    const status answer{::hgrid_fit(&of.c(), &raw, index_bytes, scratch.data(), scratch.size(),
+                                    &fitted.raw_, details != nullptr ? details : &found)};
+    // The callables are set for each call.
+    fitted.raw_.context = nullptr, fitted.raw_.run = nullptr, fitted.raw_.progress = nullptr;
+    return answer == status::ok ? result<config>(fitted) : answer;
+}
+
+/// Reads what the first bytes of a blob say, to learn how large it is before all of it is there.
+inline result<blob_info> peek(span<const std::byte> blob) noexcept
+{
+    blob_info found = HGRID_BLOB_INFO_INIT;
+    const status answer{::hgrid_peek(blob.data(), blob.size(), &found)};
+    return answer == status::ok ? result<blob_info>(found) : answer;
+}
+
+inline result<grid> grid::build(const mesh &of, const config &how, report *details) noexcept
+{
+    report own = HGRID_REPORT_INIT;
+    report &found = details != nullptr ? *details : own;
+
+    // There may be two attempts; who watches sees one.
+    float shown = -1;
+    auto forward = [&](float done) {
+        return done <= shown || (shown = done, how.progress_(how.progress_object_, done));
+    };
+    config attempt = how;
+    if (how.progress_ != nullptr)
+        attempt.progress(forward);
+
+    const status known = sizes(of, how, found);
+    if (known != status::ok)
+        return known;
+    auto scratch = memory::allocate(found.scratch_bytes);
+    if (!scratch)
+        return scratch.error();
+    const std::uint64_t usual = usual_bytes(of, how);
+    std::uint64_t bytes = found.index_bytes < usual ? found.index_bytes : usual;
+    for (;;) {
+        auto index = memory::allocate(bytes);
+        if (!index)
+            return index.error();
+        const auto built = view::build(of, attempt, *index, *scratch, &found);
+        if (!built && (built.error() != status::index_too_small || found.index_bytes <= bytes))
+            return built.error();
+        if (!built) {
+            bytes = found.index_bytes;
+            continue;
+        }
+        // Keep what it takes. If there is no memory for that, keep all.
+        auto kept = memory::allocate(found.index_bytes);
+        if (found.index_bytes == bytes || !kept)
+            return grid(*built, std::move(*index));
+        std::memcpy(kept->data(), index->data(), kept->size());
+        return adopt(std::move(*kept), of);
+    }
+}
+
+} // namespace hgrid
+
+#endif

@@ -1,0 +1,98 @@
+//! A query through hgrid.hpp costs what the C call costs, because it is the C call.
+//!
+//! cost.c and cost.cpp hold the same functions; the compiler's output is compared function by
+//! function: what it calls, and how large it is.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+use hgrid_tests::artefact::{is_installed, root, run, warnings};
+use tempfile::TempDir;
+
+use crate::programs::printed;
+
+/// What is known of a compiled function.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Function {
+    /// What it calls of the library, sorted.
+    calls: Vec<String>,
+    bytes: u64,
+}
+
+/// The functions of a compiled file, each of which has a section of its own.
+fn functions(object: &Path) -> BTreeMap<String, Function> {
+    let mut functions = BTreeMap::<String, Function>::new();
+    let sizes = printed(Command::new("nm").args(["--print-size", "--radix=d"]).arg(object));
+    for line in sizes.lines() {
+        if let [_, bytes, "T", name] = line.split_whitespace().collect::<Vec<_>>()[..] {
+            functions.entry(name.to_owned()).or_default().bytes = bytes.parse().expect("a number");
+        }
+    }
+    let mut section = String::new();
+    for line in printed(Command::new("objdump").arg("-r").arg(object)).lines() {
+        if let Some(name) = line.strip_prefix("RELOCATION RECORDS FOR [.text.") {
+            section = name.trim_end_matches("]:").to_owned();
+        } else if line.starts_with("RELOCATION RECORDS") {
+            section.clear();
+        }
+        let symbol = line.split_whitespace().nth(2).unwrap_or_default();
+        let symbol = symbol.split(['-', '+']).next().unwrap_or_default();
+        if let Some(function) = functions.get_mut(&section)
+            && symbol.starts_with("hgrid_")
+        {
+            function.calls.push(symbol.to_owned());
+            function.calls.sort();
+        }
+    }
+    functions
+}
+
+/// What a compiled file wants from others.
+fn wanted(object: &Path) -> Vec<String> {
+    let names = printed(Command::new("nm").arg("--undefined-only").arg(object));
+    let names = names.lines().filter_map(|line| line.split_whitespace().last());
+    // A compiler may copy structs by a call, or not, as it likes.
+    let names = names.filter(|name| !["memcpy", "memset", "_GLOBAL_OFFSET_TABLE_"].contains(name));
+    names.map(str::to_owned).collect()
+}
+
+#[test]
+fn queries_through_the_header_are_the_calls_in_c() {
+    if !is_installed("objdump") || !is_installed("nm") {
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    for (c, cpp) in [("gcc", "g++"), ("clang", "clang++")] {
+        if !is_installed(c) || !is_installed(cpp) {
+            continue;
+        }
+        let object = |name: &str, dialect: &str, source: &str| {
+            let object = dir.path().join("cost.o");
+            let mut compiler = warnings(Command::new(name), dialect);
+            compiler.args(["-O2", "-DNDEBUG", "-ffunction-sections", "-c", "-o"]).arg(&object);
+            if name == cpp {
+                compiler.args(["-fno-exceptions", "-fno-rtti"]);
+            }
+            run(compiler.arg(root().join("tests/examples").join(source)));
+            (functions(&object), wanted(&object))
+        };
+        let (by_hand, wanted_by_hand) = object(c, "c99", "cost.c");
+        let (through_header, wanted_through_header) = object(cpp, "c++17", "cost.cpp");
+        assert_eq!(by_hand.len(), 8, "{by_hand:?}");
+        assert_eq!(wanted_through_header, wanted_by_hand, "{cpp}");
+        for (name, by_hand) in &by_hand {
+            let through_header = &through_header[name];
+            assert_eq!(by_hand.calls.len(), 1, "{name}");
+            assert_eq!(through_header.calls, by_hand.calls, "{cpp}: {name}");
+            // A build takes time for every triangle; its few bytes of arguments may be copied.
+            let most = by_hand.bytes + by_hand.bytes / 4 + 16;
+            assert!(
+                name == "build" || through_header.bytes <= most,
+                "{cpp}: {name} has {} bytes, {} by hand",
+                through_header.bytes,
+                by_hand.bytes
+            );
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! hgrid.hpp does what it says, in every dialect, and refuses what it cannot do.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use hgrid_tests::artefact::{compiler, is_installed, output, root, run, static_library, warnings};
+use tempfile::TempDir;
+
+use crate::programs::{example, printed};
+
+/// What an engine that knows no exceptions sets, and more warnings than the project's own.
+const STRICT: [&str; 5] =
+    ["-fno-exceptions", "-fno-rtti", "-Wconversion", "-Wold-style-cast", "-Wsign-conversion"];
+
+/// A program of several files that include the header.
+const PROGRAM: [&str; 4] = ["hpp_types.cpp", "hpp_builds.cpp", "hpp_queries.cpp", "cost.cpp"];
+
+fn header(name: &str) -> String {
+    fs::read_to_string(root().join("include").join(name)).expect("a header")
+}
+
+/// The compilers that are here, each for a dialect.
+fn compilers(dialect: &str) -> Vec<Command> {
+    let names = ["g++", "clang++"].into_iter().filter(|name| is_installed(name));
+    names.map(|name| warnings(Command::new(name), dialect)).collect()
+}
+
+/// Compiles and links a program.
+fn build(mut compiler: Command, sources: &[PathBuf], flags: &[&str], dir: &Path) -> PathBuf {
+    let program = dir.join("program");
+    compiler.args(["-O1", "-pthread"]).args(flags).args(sources).arg(static_library());
+    run(compiler.arg("-o").arg(&program));
+    program
+}
+
+fn driver(name: &str) -> PathBuf {
+    root().join("tests/examples").join(name)
+}
+
+#[test]
+fn it_does_what_it_says_in_every_dialect() {
+    let dir = TempDir::new().expect("a folder");
+    for dialect in ["c++17", "c++20"] {
+        for compiler in compilers(dialect) {
+            let program = build(compiler, &PROGRAM.map(driver), &STRICT, dir.path());
+            assert_eq!(printed(&mut Command::new(program)), "all is well\n");
+        }
+    }
+}
+
+#[test]
+fn it_does_what_it_says_under_sanitizers() {
+    let dir = TempDir::new().expect("a folder");
+    let flags = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let program = build(compiler("c++17"), &PROGRAM.map(driver), &flags, dir.path());
+    assert_eq!(printed(&mut Command::new(program)), "all is well\n");
+}
+
+/// What hello.cpp prints.
+pub(crate) const HELLO: &str = "\
+triangle 2 at t = 2
+through the hole: triangle 0 at t = 3
+........................
+..______#############_..
+..______###########___..
+..______#########_____..
+..#############_______..
+..###########_________..
+..#########___________..
+..#######_____________..
+..#####_______________..
+..###_________________..
+..#___________________..
+........................
+";
+
+#[test]
+fn hello_prints_what_is_there() {
+    let dir = TempDir::new().expect("a folder");
+    for compiler in compilers("c++17") {
+        let program = build(compiler, &[example("hello.cpp")], &STRICT, dir.path());
+        assert_eq!(printed(&mut Command::new(program)), HELLO);
+    }
+}
+
+/// The program in the head of the header.
+#[test]
+fn its_own_example_prints_the_hit() {
+    let header = header("hgrid.hpp");
+    let lines = header.lines().skip_while(|line| !line.contains("#include <hgrid.hpp>"));
+    let lines: Vec<_> = lines.take_while(|line| !line.contains("Exceptions:")).collect();
+    let program: String =
+        lines.iter().map(|line| line.trim_start_matches(" *").to_owned() + "\n").collect();
+    let dir = TempDir::new().expect("a folder");
+    let source = dir.path().join("program.cpp");
+    fs::write(&source, program).expect("a file");
+    let program = build(compiler("c++17"), &[source], &[], dir.path());
+    assert_eq!(printed(&mut Command::new(program)), "triangle 0 at t = 1\n");
+}
+
+/// Names in a text that begin with a prefix.
+fn names(text: &str, prefix: &str) -> BTreeSet<String> {
+    let words = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+    words.filter(|word| word.starts_with(prefix)).map(str::to_owned).collect()
+}
+
+#[test]
+fn every_status_and_every_function_of_c_is_there() {
+    let (c, cpp) = (header("hgrid.h"), header("hgrid.hpp"));
+    let defined = c.lines().filter_map(|line| line.strip_prefix("#define HGRID_"));
+    let defined: Vec<_> = defined.filter_map(|line| line.split([' ', '(']).next()).collect();
+    for group in ["ERROR_", "METHOD_", "COHERENCE_", "CULL_"] {
+        let of_group: Vec<_> = defined.iter().filter(|name| name.starts_with(group)).collect();
+        assert!(of_group.len() > 1, "{group}");
+        for name in of_group {
+            let value = name.strip_prefix(group).expect("its group").to_lowercase();
+            assert!(cpp.contains(&format!("    {value} = HGRID_{name},\n")), "{name}");
+        }
+    }
+
+    // Declarations begin in the first column and have their arguments behind them.
+    let declared = c.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_lowercase()));
+    let functions = declared.filter_map(|line| line.split_once('(')).flat_map(|(start, _)| {
+        let name = start.rsplit([' ', '*']).next().unwrap_or_default();
+        name.starts_with("hgrid_").then(|| name.to_owned())
+    });
+    let called = names(&cpp, "hgrid_");
+    // Memory by a C callback: hgrid::memory is that here. A text of the version.
+    let without: BTreeSet<_> = ["hgrid_create", "hgrid_destroy", "hgrid_version_string"].into();
+    for function in functions.filter(|name| !without.contains(name.as_str())) {
+        assert!(called.contains(&function), "{function} is not called by hgrid.hpp");
+    }
+}
+
+/// What must not compile, and what the compiler has to say about it.
+const REFUSED: [(&str, &str); 10] = [
+    ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
+    ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
+    ("hgrid::config().progress([](float) {});", "progress"),
+    ("auto f = [](hgrid::task) {}; hgrid::config().parallel_for(2, f);", "std::uint32_t and a"),
+    ("hgrid::mesh m(std::vector<float>(9), indices);", "give them a name"),
+    ("std::vector<double> v(9); hgrid::mesh m(v, indices);", "coordinates of a vertex are floats"),
+    ("std::vector<std::array<float, 2>> v(3); hgrid::mesh m(v, indices);", "three coordinates"),
+    ("std::vector<face> f(1); hgrid::mesh m(vertices, f);", "name the field"),
+    ("std::vector<short> i(3); hgrid::mesh m(vertices, i);", "or unsigned ones of 16"),
+    ("hgrid::grid a; hgrid::grid b = a;", "delete"),
+];
+
+#[test]
+fn what_cannot_work_does_not_compile() {
+    let dir = TempDir::new().expect("a folder");
+    let source = dir.path().join("refused.cpp");
+    let program = |line: &str| {
+        format!(
+            "#include <hgrid.hpp>\n#include <array>\n#include <vector>\n\
+             struct face {{ int material; unsigned corners[3]; }};\n\
+             void refused(const std::vector<float> &vertices, const std::vector<unsigned> &indices);\n\
+             void refused(const std::vector<float> &vertices, const std::vector<unsigned> &indices)\n\
+             {{\n    static_cast<void>(vertices), static_cast<void>(indices);\n    {line}\n}}\n"
+        )
+    };
+    let compile = |mut compiler: Command, line: &str| {
+        fs::write(&source, program(line)).expect("a file");
+        output(compiler.arg("-fsyntax-only").arg(&source))
+    };
+    for compiler in compilers("c++17") {
+        let sound = compile(compiler, "hgrid::mesh m(vertices, indices); static_cast<void>(m);");
+        assert!(sound.status.success(), "{}", String::from_utf8_lossy(&sound.stderr));
+    }
+    for (line, message) in REFUSED {
+        for compiler in compilers("c++17") {
+            let output = compile(compiler, line);
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(!output.status.success() && said.contains(message), "{line}\n{said}");
+        }
+    }
+}
+
+/// An item begins where the one before ended: with `///`, if anybody outside can name it.
+#[test]
+fn every_public_item_is_documented() {
+    let header = header("hgrid.hpp");
+    // Where we are: the items' indentation, and whether they are public.
+    let mut blocks = vec![(0, true)];
+    let mut ends_item = true;
+    let mut items = 0;
+    for line in header.lines().skip_while(|line| *line != "namespace hgrid {").skip(1) {
+        let text = line.trim();
+        let indent = line.len() - line.trim_start().len();
+        let is_type = ["class ", "enum class "].iter().any(|kind| text.starts_with(kind));
+        let is_code = !text.is_empty() && !text.starts_with("//") && !text.starts_with('#');
+        let Some((inside, is_public)) = blocks.last_mut() else { break };
+        let ends_type = text.starts_with('}') && indent + 4 == *inside;
+        if ends_type || text.starts_with("} // namespace") {
+            blocks.pop();
+        } else if text == "public:" || text == "private:" {
+            *is_public = text == "public:";
+        } else if text == "namespace detail {" {
+            blocks.push((0, false));
+        } else if is_code && indent == *inside && *is_public && !text.starts_with('}') {
+            // What is defined outside of its class was documented in it.
+            let is_definition = text.starts_with("inline ") && text.contains(" grid::");
+            assert!(!ends_item || is_definition, "nothing is said about: {line}");
+            items += 1;
+        }
+        if is_type && text.ends_with('{') {
+            let is_public = blocks.iter().all(|(_, is_public)| *is_public);
+            blocks.push((indent + 4, is_public && text.starts_with("enum")));
+        }
+        ends_item = !text.starts_with("///")
+            && (text.is_empty()
+                || text.starts_with("//")
+                || text.ends_with([';', '}', '{', ':', ',']));
+    }
+    assert!(blocks.is_empty() && items > 150, "{blocks:?} {items}");
+}

@@ -1,0 +1,259 @@
+/* Grids in memory of their own and of others, and what building them may be told. */
+
+#include "hpp.h"
+
+#include <atomic>
+#include <new>
+#include <string>
+#include <thread>
+
+using hgrid::status;
+
+/* --- memory that runs out ------------------------------------------------------------------------ */
+
+static long allocations_left = -1, allocations_alive = 0;
+
+void *operator new(std::size_t bytes, std::align_val_t alignment, const std::nothrow_t &) noexcept
+{
+    if (allocations_left == 0)
+        return nullptr;
+    allocations_left -= allocations_left > 0;
+    const auto multiple = static_cast<std::size_t>(alignment);
+    void *memory = std::aligned_alloc(multiple, (bytes + multiple) / multiple * multiple);
+    allocations_alive += memory != nullptr;
+    return memory;
+}
+
+void operator delete(void *memory, std::align_val_t, const std::nothrow_t &) noexcept
+{
+    allocations_alive -= memory != nullptr;
+    std::free(memory);
+}
+
+/* --- building ------------------------------------------------------------------------------------ */
+
+static constexpr hgrid::method METHODS[] = {hgrid::method::one_level, hgrid::method::fixed,
+                                            hgrid::method::variable, hgrid::method::recursive,
+                                            hgrid::method::brick};
+
+static void check_grids()
+{
+    const scene s(3);
+    for (const hgrid::method method : METHODS) {
+        hgrid::report report = HGRID_REPORT_INIT;
+        auto built = hgrid::grid::build(s.mesh(), method, &report);
+        CHECK(built && built.error() == status::ok && report.index_bytes == built->blob().size());
+        CHECK(built->validate() == status::ok);
+        CHECK(reinterpret_cast<std::uintptr_t>(built->blob().data()) % hgrid::alignment == 0);
+
+        /* Moved, it answers from the same memory; what is left answers nothing. */
+        const auto *bytes = built->blob().data();
+        hgrid::grid moved(std::move(*built));
+        CHECK(moved.blob().data() == bytes && built->blob().empty());
+        CHECK(moved.occluded(down()) && !built->occluded(down()));
+        hgrid::grid other;
+        CHECK(!other.occluded(down()));
+        other = std::move(moved);
+        CHECK(other.occluded(down()) && !moved.occluded(down()) && moved.blob().empty());
+
+        /* A view of it, and the same blob elsewhere. */
+        const hgrid::view view = other;
+        CHECK(view.occluded(down()));
+        auto copy = hgrid::memory::allocate(other.blob().size());
+        CHECK(copy && copy->size() == other.blob().size());
+        std::memcpy(copy->data(), other.blob().data(), copy->size());
+        const auto adopted = hgrid::grid::adopt(std::move(*copy), s.mesh());
+        CHECK(adopted && adopted->occluded(down()));
+        const auto opened = hgrid::view::open(other.blob(), s.mesh());
+        CHECK(opened && opened->occluded(down()));
+        CHECK(hgrid::view::open(other.blob().subspan(0, 64), s.mesh()).error() != status::ok);
+        CHECK(hgrid::view::open(other.blob(), scene(2).mesh()).error() == status::mesh_mismatch);
+    }
+    CHECK(allocations_alive == 0);
+
+    /* Errors come with the triangle. */
+    scene broken(1);
+    broken.faces[5].corners[1] = 1000000;
+    hgrid::report report = HGRID_REPORT_INIT;
+    const auto refused = hgrid::grid::build(broken.mesh(), {}, &report);
+    CHECK(!refused && refused.error() == status::index_out_of_range && report.triangle == 5);
+    broken = scene(1);
+    broken.vertices[0].position[0] = NAN;
+    CHECK(hgrid::grid::build(broken.mesh()));
+    CHECK(hgrid::grid::build(broken.mesh(), hgrid::config().strict(true)).error() ==
+          status::non_finite);
+    CHECK(hgrid::grid::build(broken.mesh(), hgrid::config().density(-1)).error() ==
+          status::invalid_density);
+    CHECK(hgrid::message(status::invalid_density) ==
+          std::string(hgrid_status_string(HGRID_ERROR_INVALID_DENSITY)));
+}
+
+/* Whatever allocation fails, the answer is a status, and nothing is left behind. */
+static void check_memory_that_runs_out()
+{
+    const scene s(2);
+    for (const hgrid::method method : METHODS) {
+        long failures = 0;
+        for (;; failures++) {
+            allocations_left = failures;
+            const auto built = hgrid::grid::build(s.mesh(), method);
+            allocations_left = -1;
+            if (built) {
+                CHECK(built->occluded(down()));
+                break;
+            }
+            CHECK(built.error() == status::out_of_memory && allocations_alive == 0);
+        }
+        /* At least the scratch and the index. */
+        CHECK(failures >= 2);
+    }
+    CHECK(hgrid::memory::allocate(std::numeric_limits<std::uint64_t>::max()).error() ==
+          status::out_of_memory);
+    CHECK(allocations_alive == 0);
+}
+
+static void check_views()
+{
+    static constexpr std::size_t triangles = 3 * 8 * 8 * 2;
+    alignas(hgrid::alignment) static unsigned char index[hgrid::index_bound(triangles)];
+    alignas(hgrid::alignment) static unsigned char scratch[hgrid::scratch_bound(triangles)];
+    const scene s(3);
+    CHECK(s.faces.size() == triangles);
+    const auto built = hgrid::view::build(s.mesh(), {}, hgrid::as_writable_bytes(index),
+                                          hgrid::as_writable_bytes(scratch));
+    CHECK(built && built->occluded(down()));
+
+    hgrid::report rough = HGRID_REPORT_INIT, exact = HGRID_REPORT_INIT;
+    CHECK(hgrid::sizes(s.mesh(), {}, rough) == status::ok && !rough.is_exact);
+    CHECK(hgrid::sizes(s.mesh(), {}, exact, hgrid::as_writable_bytes(scratch)) == status::ok);
+    CHECK(exact.is_exact && exact.index_bytes <= rough.index_bytes);
+    const auto bound = hgrid::bound(triangles, {});
+    CHECK(bound && bound->index_bytes >= rough.index_bytes);
+
+    hgrid::report details = HGRID_REPORT_INIT;
+    const auto small = hgrid::view::build(
+        s.mesh(), {}, hgrid::as_writable_bytes(index).subspan(0, exact.index_bytes - 64),
+        hgrid::as_writable_bytes(scratch), &details);
+    CHECK(small.error() == status::index_too_small && details.index_bytes == exact.index_bytes);
+}
+
+static void check_progress_and_threads()
+{
+    const scene s(4, 40);
+    std::vector<float> steps;
+    auto watch = [&](float done) { steps.push_back(done); };
+    std::atomic<int> runs{0};
+    auto run = [&](std::uint32_t count, hgrid::task each) {
+        std::vector<std::thread> threads;
+        for (std::uint32_t i = 0; i < count; i++)
+            threads.emplace_back([=] { each(i); });
+        for (std::thread &thread : threads)
+            thread.join();
+        runs++;
+    };
+    for (const hgrid::method method : METHODS) {
+        steps.clear();
+        hgrid::config config(method);
+        /* Cells that are small enough for a second attempt with more memory. */
+        if (method == hgrid::method::brick)
+            config.cell_size(0.2f);
+        const auto plain = hgrid::grid::build(s.mesh(), config);
+        config.progress(watch).parallel_for(4, run);
+        const auto built = hgrid::grid::build(s.mesh(), config);
+        CHECK(plain && built && built->occluded(down()));
+        CHECK(built->blob().size() == plain->blob().size());
+        CHECK(std::memcmp(built->blob().data(), plain->blob().data(), built->blob().size()) == 0);
+        CHECK(!steps.empty() && steps.back() >= 1 && steps.back() <= 1);
+        for (std::size_t i = 1; i < steps.size(); i++)
+            CHECK(steps[i] > steps[i - 1]);
+        if (method == hgrid::method::brick)
+            CHECK(built->blob().size() > 24 * s.faces.size() + 4096);
+    }
+    CHECK(runs > 0);
+
+    auto cancel = [](float done) { return done < 0.3f; };
+    const auto cancelled =
+        hgrid::grid::build(s.mesh(), hgrid::config(hgrid::method::variable).progress(cancel));
+    CHECK(cancelled.error() == status::cancelled);
+    auto lazy = [](std::uint32_t, hgrid::task) {};
+    CHECK(hgrid::grid::build(s.mesh(), hgrid::config(hgrid::method::brick).parallel_for(2, lazy))
+              .error() == status::parallel_for);
+}
+
+static void check_configs()
+{
+    scene s(3, 40);
+    /* Detail in a corner, for subgrids. */
+    for (vertex &v : s.vertices)
+        if (v.position[2] < 1)
+            v.position = {0.02f * v.position[0], 0.02f * v.position[1], 0};
+    const auto bytes = [&](const hgrid::config &config) {
+        const auto grid = hgrid::grid::build(s.mesh(), config);
+        CHECK(grid && grid->occluded(down()));
+        return grid->blob().size();
+    };
+    using hgrid::config;
+    using hgrid::method;
+    CHECK(bytes(method::one_level) < bytes(config().density(9)));
+    CHECK(bytes(method::fixed) < bytes(config(method::fixed).macrocell_factor(2)));
+    CHECK(bytes(method::variable) > bytes(config(method::variable).subdivide_above(9999)));
+    CHECK(bytes(method::recursive) > bytes(config(method::recursive).depth(1)));
+    CHECK(bytes(method::brick) > bytes(config(method::brick).cell_size(4)));
+    CHECK(hgrid::grid::build(s.mesh(), hgrid::config(hgrid::method::recursive).depth(99)).error() ==
+          status::invalid_depth);
+
+    /* Half the bytes, with what progress was asked for. */
+    const auto plain = hgrid::grid::build(s.mesh(), hgrid::method::fixed);
+    auto scratch = hgrid::memory::allocate(1 << 22);
+    CHECK(plain && scratch);
+    int calls = 0;
+    auto watch = [&](float) { calls++; };
+    const auto fitted = hgrid::fit(s.mesh(), hgrid::config(hgrid::method::fixed).progress(watch),
+                                   plain->blob().size() / 2, *scratch);
+    CHECK(fitted);
+    calls = 0;
+    const auto small = hgrid::grid::build(s.mesh(), *fitted);
+    CHECK(small && small->blob().size() <= plain->blob().size() / 2 && calls > 0);
+    CHECK(hgrid::fit(s.mesh(), hgrid::method::fixed, 64, *scratch).error() ==
+          status::index_too_small);
+}
+
+/* --- blobs --------------------------------------------------------------------------------------- */
+
+static void check_blobs()
+{
+    const scene s(3);
+    const auto grid = hgrid::grid::build(s.mesh(), hgrid::method::brick);
+    CHECK(grid);
+    const auto info = hgrid::peek(grid->blob());
+    CHECK(info && info->method == HGRID_METHOD_BRICK && info->triangle_count == s.faces.size());
+    CHECK(!info->has_mesh && hgrid::view::open(grid->blob()).error() == status::no_mesh);
+    CHECK(hgrid::peek(grid->blob().subspan(0, 8)).error() == status::truncated);
+
+    auto packed = grid->pack();
+    CHECK(packed);
+    const auto about = hgrid::peek(*packed);
+    CHECK(about && about->has_mesh && about->total_bytes == packed->size());
+    const auto opened = hgrid::view::open(*packed);
+    CHECK(opened && opened->validate() == status::ok);
+    CHECK(opened->intersect(down())->primitive == grid->intersect(down())->primitive);
+    CHECK(grid->packed_bytes() == packed->size() && hgrid::view().packed_bytes() == 0);
+    CHECK(grid->pack(hgrid::span<std::byte>(*packed).subspan(0, 64)) == status::index_too_small);
+    CHECK(hgrid::view().pack().error() == status::not_a_grid);
+    const auto adopted = hgrid::grid::adopt(std::move(*packed));
+    CHECK(adopted && adopted->occluded(down()));
+
+    const auto whole = grid->inspect();
+    CHECK(whole && whole->longest_list > 0 && whole->degenerate_count == 0);
+}
+
+void check_builds()
+{
+    check_grids();
+    check_memory_that_runs_out();
+    check_views();
+    check_progress_and_threads();
+    check_configs();
+    check_blobs();
+    CHECK(allocations_alive == 0);
+}

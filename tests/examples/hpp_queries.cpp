@@ -1,0 +1,166 @@
+/* Rays one by one and in batches, with all that a query may be told. */
+
+#include "hpp.h"
+
+using hgrid::status;
+
+struct pixel {
+    char name;
+    hgrid::ray ray;
+    hgrid::hit hit;
+    std::uint8_t is_dark;
+};
+
+static void check_rays()
+{
+    const scene s(5);
+    const auto grid = hgrid::grid::build(s.mesh());
+    CHECK(grid);
+    const auto top = grid->intersect(down());
+    CHECK(top && is_near(top->t, 96) && s.faces[top->primitive].material == 4);
+    CHECK(!grid->intersect(down(2)) && grid->occluded(down()) && !grid->occluded(down(2)));
+
+    std::vector<pixel> pixels(100);
+    for (std::size_t i = 0; i < pixels.size(); i++)
+        pixels[i].ray = down(0.011f * static_cast<float>(i) + 0.003f);
+    for (const auto know : {hgrid::coherence::incoherent, hgrid::coherence::coherent}) {
+        CHECK(grid->intersect_n(hgrid::field(pixels, &pixel::ray), hgrid::field(pixels, &pixel::hit),
+                                know) == status::ok);
+        CHECK(grid->occluded_n(hgrid::field(pixels, &pixel::ray),
+                               hgrid::field(pixels, &pixel::is_dark), know) == status::ok);
+        for (const pixel &p : pixels) {
+            const auto single = grid->intersect(p.ray);
+            CHECK(single ? single->primitive == p.hit.primitive
+                         : p.hit.primitive == hgrid::invalid_id);
+            CHECK(single.has_value() == (p.is_dark == 1));
+        }
+    }
+
+    /* Side by side, of different numbers, and none. */
+    const std::vector<hgrid::ray> rays(3, down());
+    std::vector<hgrid::hit> hits(3);
+    CHECK(grid->intersect_n(rays, hits, hgrid::coherence::coherent) == status::ok);
+    CHECK(hits[2].primitive == top->primitive);
+    hits.resize(2);
+    CHECK(grid->intersect_n(rays, hits, hgrid::coherence::coherent) == status::invalid_answers);
+    std::array<std::uint8_t, 4> bytes{};
+    CHECK(grid->occluded_n(rays, bytes, hgrid::coherence::coherent) == status::invalid_answers);
+    CHECK(grid->intersect_n({}, {}, hgrid::coherence::coherent) == status::ok);
+    CHECK(hgrid::view().intersect_n(rays, hits, hgrid::coherence::coherent) != status::ok);
+
+    hits.resize(3);
+    const auto count = grid->intersect_all(down(), hits);
+    CHECK(count && *count == 5 && is_near(hits[0].t, 96) && is_near(hits[2].t, 98));
+    CHECK(*grid->intersect_all(down(), {}) == 5);
+    CHECK(*grid->intersect_all(down(2), hits) == 0);
+    CHECK(!hgrid::view().intersect_all(down(), hits));
+
+    const auto closest = grid->closest_point({0.5f, 0.5f, 2.25f});
+    CHECK(closest && is_near(closest->distance, 0.25f) && is_near(closest->position[2], 2));
+    CHECK(!grid->closest_point({0.5f, 0.5f, 2.25f}, 0.2f));
+}
+
+static void check_options()
+{
+    const scene s(5);
+    std::vector<std::uint32_t> masks;
+    for (const face &f : s.faces)
+        masks.push_back(1u << f.material);
+    const auto grid = hgrid::grid::build(s.mesh().masks(masks));
+    CHECK(grid);
+    const auto material = [&](const std::optional<hgrid::hit> &hit) {
+        return hit ? s.faces[hit->primitive].material : -1;
+    };
+    CHECK(material(grid->intersect(down(), hgrid::options())) == 4);
+    CHECK(material(grid->intersect(down(), hgrid::options().mask(0x6))) == 2);
+    CHECK(material(grid->intersect(down(), hgrid::options().mask(0x40))) == -1);
+
+    const auto up = hgrid::make_ray({0.31f, 0.57f, -100}, {0, 0, 1});
+    using hgrid::culling;
+    CHECK(material(grid->intersect(down(), hgrid::options().cull(culling::back))) == 4);
+    CHECK(material(grid->intersect(down(), hgrid::options().cull(culling::front))) == -1);
+    CHECK(material(grid->intersect(up, hgrid::options().cull(culling::back))) == -1);
+    CHECK(material(grid->intersect(up, hgrid::options().cull(culling::front))) == 0);
+    CHECK(grid->occluded(up, hgrid::options().cull(culling::front)));
+    CHECK(!grid->occluded(up, hgrid::options().cull(culling::back)));
+
+    const auto top = grid->intersect(down());
+    CHECK(material(grid->intersect(down(), hgrid::options().skip(top->primitive))) == 3);
+    const auto closest =
+        grid->closest_point({0.31f, 0.57f, 9}, 100, hgrid::options().mask(0x2));
+    CHECK(closest && is_near(closest->distance, 8));
+
+    hgrid::counters work{};
+    hgrid::options counting;
+    CHECK(grid->intersect(down(), counting.count(work)));
+    CHECK(work.primitive_tests > 0 && work.cell_steps > 0);
+}
+
+static bool is_below_256(const hgrid::hit &hit)
+{
+    return hit.primitive < 256;
+}
+
+static void check_filters()
+{
+    const scene s(5);
+    const auto grid = hgrid::grid::build(s.mesh());
+    CHECK(grid);
+    const auto material = [&](const std::optional<hgrid::hit> &hit) {
+        return hit ? s.faces[hit->primitive].material : -1;
+    };
+
+    /* From near to far, with what the lambda remembers. */
+    std::vector<std::int64_t> offered;
+    auto below_three = [&](const hgrid::hit &hit) {
+        offered.push_back(s.faces[hit.primitive].material);
+        return offered.back() < 3;
+    };
+    hgrid::options options;
+    options.filter(below_three);
+    CHECK(material(grid->intersect(down(), options)) == 2);
+    CHECK((offered == std::vector<std::int64_t>{4, 3, 2}));
+    CHECK(grid->occluded(down(), options));
+
+    auto second = [n = 0](const hgrid::hit &) mutable {
+        return ++n == 2 ? hgrid::verdict::accept_and_stop : hgrid::verdict::reject;
+    };
+    CHECK(material(grid->intersect(down(), hgrid::options().filter(second))) == 3);
+
+    /* All hits but some; and none of them. */
+    std::vector<hgrid::hit> hits(5);
+    auto odd = [&](const hgrid::hit &hit) { return s.faces[hit.primitive].material % 2 == 1; };
+    const auto count = grid->intersect_all(down(), hits, hgrid::options().filter(odd));
+    CHECK(count && *count == 2 && s.faces[hits[1].primitive].material == 1);
+    const auto nothing = [](const hgrid::hit &) { return false; };
+    CHECK(!grid->intersect(down(), hgrid::options().filter(nothing)));
+
+    /* In a batch, by the ray's place. */
+    const std::vector<hgrid::ray> rays(9, down());
+    std::vector<hgrid::hit> batch(9);
+    auto by_place = [&](std::size_t ray, const hgrid::hit &hit) {
+        return s.faces[hit.primitive].material == static_cast<std::int64_t>(ray % 5)
+                   ? hgrid::verdict::accept
+                   : hgrid::verdict::reject;
+    };
+    for (const auto know : {hgrid::coherence::incoherent, hgrid::coherence::coherent}) {
+        CHECK(grid->intersect_n(rays, batch, know, hgrid::options().filter(by_place)) == status::ok);
+        for (std::size_t i = 0; i < batch.size(); i++)
+            CHECK(s.faces[batch[i].primitive].material == static_cast<std::int64_t>(i % 5));
+    }
+    std::array<std::uint8_t, 9> dark{};
+    CHECK(grid->occluded_n(rays, dark, hgrid::coherence::coherent,
+                           hgrid::options().filter(nothing)) == status::ok);
+    CHECK((dark == std::array<std::uint8_t, 9>{}));
+
+    /* A pointer to a function is a callable, too. */
+    auto *function = is_below_256;
+    CHECK(material(grid->intersect(down(), hgrid::options().filter(function))) == 1);
+}
+
+void check_queries()
+{
+    check_rays();
+    check_options();
+    check_filters();
+}

@@ -1,0 +1,144 @@
+/* hgrid.hpp as a C++ renderer uses it: what its types promise, spans, and meshes in any form. */
+
+#include "hpp.h"
+
+#if __cplusplus >= 202002L
+#include <span>
+#endif
+
+static_assert(!std::is_copy_constructible_v<hgrid::grid> && !std::is_copy_assignable_v<hgrid::grid>);
+static_assert(std::is_nothrow_move_constructible_v<hgrid::grid>);
+static_assert(std::is_nothrow_move_assignable_v<hgrid::grid>);
+static_assert(std::is_trivially_copyable_v<hgrid::view> && sizeof(hgrid::view) == sizeof(hgrid_grid));
+static_assert(std::is_trivially_copyable_v<hgrid::options>);
+static_assert(sizeof(hgrid::options) == sizeof(hgrid_query_options));
+static_assert(sizeof(hgrid::mesh) == sizeof(hgrid_mesh));
+static_assert(noexcept(std::declval<const hgrid::view &>().intersect(
+    std::declval<const hgrid::ray &>(), std::declval<const hgrid::options &>())));
+static_assert(noexcept(hgrid::grid::build(std::declval<const hgrid::mesh &>())));
+static_assert(std::is_convertible_v<std::vector<hgrid::hit> &, hgrid::span<hgrid::hit>>);
+static_assert(std::is_convertible_v<const std::vector<hgrid::hit> &, hgrid::span<const hgrid::hit>>);
+static_assert(!std::is_convertible_v<const std::vector<hgrid::hit> &, hgrid::span<hgrid::hit>>);
+static_assert(!std::is_convertible_v<std::vector<hgrid::hit>, hgrid::span<hgrid::hit>>);
+static_assert(!std::is_convertible_v<std::vector<hgrid::ray> &, hgrid::span<hgrid::hit>>);
+static_assert(std::is_convertible_v<hgrid::span<int>, hgrid::span<const int>>);
+static_assert(!std::is_convertible_v<hgrid::span<const int>, hgrid::span<int>>);
+static_assert(!std::is_convertible_v<hgrid::strided<int>, hgrid::span<int>>);
+static_assert(std::is_convertible_v<hgrid::strided<int>, hgrid::strided<const int>>);
+static_assert(std::is_convertible_v<std::array<int, 3> &, hgrid::strided<int>>);
+static_assert(hgrid::make_ray({1, 2, 3}, {4, 5, 6}, 7, 8).t_max == 8);
+
+/* --- spans --------------------------------------------------------------------------------------- */
+
+struct outer {
+    int before;
+    struct {
+        char c;
+        int value;
+    } inner;
+};
+
+static void check_spans()
+{
+    int numbers[] = {1, 2, 3, 4};
+    const hgrid::span<int> all(numbers);
+    CHECK(all.size() == 4 && !all.empty() && all[3] == 4 && all.subspan(1, 2)[1] == 3);
+    int sum = 0;
+    for (int number : all)
+        sum += number;
+    CHECK(sum == 10);
+    CHECK(hgrid::span<int>().empty() && hgrid::span<int>().begin() == nullptr);
+    CHECK(hgrid::as_bytes(numbers).size() == sizeof numbers);
+    hgrid::as_writable_bytes(numbers)[0] = std::byte{7};
+    CHECK(numbers[0] != 1);
+
+    std::vector<outer> structs(3);
+    for (int i = 0; i < 3; i++)
+        structs[static_cast<std::size_t>(i)].inner.value = i;
+    using inner = decltype(outer::inner);
+    const auto values = hgrid::field(hgrid::field(structs, &outer::inner), &inner::value);
+    static_assert(std::is_same_v<decltype(values), const hgrid::strided<int>>);
+    CHECK(values.size() == 3 && values.stride() == sizeof(outer) && values[2] == 2);
+    const auto &constant = structs;
+    const auto fixed = hgrid::field(constant, &outer::before);
+    static_assert(std::is_same_v<decltype(fixed), const hgrid::strided<const int>>);
+    const std::vector<outer> none;
+    CHECK(hgrid::field(none, &outer::before).first() == nullptr);
+
+#if __cplusplus >= 202002L
+    const std::span<int> standard(numbers);
+    const hgrid::span<const int> ours(standard);
+    const std::span<const int> back(ours);
+    CHECK(ours.data() == numbers && back.size() == 4);
+#endif
+}
+
+/* --- the same mesh in every form ----------------------------------------------------------------- */
+
+struct corners16 {
+    char name[3];
+    std::uint16_t first, second, third;
+};
+
+/* A mesh gives the hits that the scene's own gives. */
+static void check_mesh(const scene &s, const hgrid::mesh &mesh)
+{
+    CHECK(mesh.vertex_count() == s.vertices.size() && mesh.triangle_count() == s.faces.size());
+    const auto expected = hgrid::grid::build(s.mesh());
+    const auto grid = hgrid::grid::build(mesh);
+    CHECK(expected && grid);
+    for (float x = -0.05f; x < 1.1f; x += 0.07f) {
+        const auto a = expected->intersect(down(x)), b = grid->intersect(down(x));
+        CHECK(a.has_value() == b.has_value());
+        CHECK(!a || (a->primitive == b->primitive && a->u <= b->u && a->u >= b->u));
+    }
+}
+
+static void check_meshes()
+{
+    const scene s(2, 3);
+    std::vector<float> flat;
+    std::vector<std::array<float, 3>> arrays;
+    std::vector<double> other(5);
+    for (const vertex &v : s.vertices) {
+        flat.insert(flat.end(), v.position.begin(), v.position.end());
+        arrays.push_back(v.position);
+    }
+    std::vector<std::uint16_t> flat16;
+    std::vector<int> flat32;
+    std::vector<std::array<std::uint32_t, 3>> triples;
+    std::vector<corners16> structs;
+    for (const face &f : s.faces) {
+        const auto narrow = [&](std::size_t i) { return static_cast<std::uint16_t>(f.corners[i]); };
+        structs.push_back({"ab", narrow(0), narrow(1), narrow(2)});
+        triples.push_back(f.corners);
+        for (std::size_t i = 0; i < 3; i++) {
+            flat16.push_back(narrow(i));
+            flat32.push_back(static_cast<int>(f.corners[i]));
+        }
+    }
+    check_mesh(s, {s.vertices, triples});
+    check_mesh(s, {flat, flat16});
+    check_mesh(s, {arrays, flat32});
+    check_mesh(s, {hgrid::field(s.vertices, &vertex::position), triples});
+    check_mesh(s, {hgrid::span<const float>(flat), hgrid::field(structs, &corners16::first)});
+    check_mesh(s, hgrid::mesh(s.mesh().c()));
+#if __cplusplus >= 202002L
+    check_mesh(s, {std::span(arrays), std::span(flat16)});
+#endif
+}
+
+void check_types()
+{
+    check_spans();
+    check_meshes();
+}
+
+int main()
+{
+    CHECK(hgrid::is_compatible());
+    check_types();
+    check_builds();
+    check_queries();
+    std::puts("all is well");
+}

@@ -1,0 +1,55 @@
+//! The picture does not depend on how many threads draw it.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use hgrid_tests::artefact::{output, run};
+use tempfile::TempDir;
+
+use crate::pictures::ascii;
+use crate::programs::{raytracer, raytracer_with};
+
+/// The file that a command with so many threads writes.
+fn drawn(mut program: Command, threads: u32, options: &[&str], dir: &Path) -> Vec<u8> {
+    let path = dir.join("picture.ppm");
+    program.args(["--threads", &threads.to_string(), "-o"]).arg(&path).args(options);
+    run(&mut program);
+    fs::read(path).expect("the picture")
+}
+
+#[test]
+fn any_number_of_threads_draws_the_same_picture() {
+    let dir = TempDir::new().expect("a folder");
+    for options in [
+        // Of these sizes none is a multiple of a tile.
+        &["--size", "100", "--shadows", "--ao", "3", "--method", "brick"][..],
+        &["--size", "61", "--heat", "tests", "--shadows"],
+        &["--size", "99", "--heat", "steps", "--ao", "2"],
+        &["--size", "3"],
+    ] {
+        let one = drawn(raytracer(), 1, options, dir.path());
+        for threads in [2, 5] {
+            let many = drawn(raytracer(), threads, options, dir.path());
+            assert!(many == one, "{threads} threads: {options:?}");
+        }
+    }
+}
+
+#[test]
+fn its_threads_do_not_race() {
+    let dir = TempDir::new().expect("a folder");
+    let scene = dir.path().join("house.ply");
+    fs::write(&scene, ascii()).expect("a file");
+    let program = raytracer_with(&["-g", "-fsanitize=thread"]);
+    let mut raytracer = Command::new(program);
+    raytracer.arg(&scene).args(["--size", "90", "--shadows", "--ao", "2", "--threads", "4"]);
+    raytracer.args(["--method", "brick", "--progress", "-o"]).arg(dir.path().join("picture.ppm"));
+    let output = output(&mut raytracer);
+    let said = String::from_utf8_lossy(&output.stderr);
+    if said.contains("unexpected memory mapping") {
+        println!("skipped: ThreadSanitizer cannot run on this kernel");
+        return;
+    }
+    assert!(output.status.success() && !said.contains("ThreadSanitizer"), "{said}");
+}
