@@ -28,9 +28,9 @@ static void send(const void *from, size_t bytes)
 
 int main(void)
 {
-    hgrid_config config;
+    hgrid_config config = HGRID_CONFIG_INIT;
     uint32_t counts[3];
-    receive(&config, sizeof config);
+    receive(&config.method, offsetof(hgrid_config, tasks) - offsetof(hgrid_config, method));
     receive(counts, sizeof counts);
     hgrid_mesh mesh = HGRID_MESH_INIT;
     mesh.vertex_count = counts[0];

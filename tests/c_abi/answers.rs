@@ -26,14 +26,13 @@ fn rays(count: usize) -> Vec<Ray> {
     (0..count).map(|_| ray()).collect()
 }
 
-/// The words of a `hgrid_config`.
-fn words(config: &Config) -> [u32; 8] {
+/// What `answers.c` fills a `hgrid_config` with.
+fn words(config: &Config) -> [u32; 7] {
     let Config { method, density, macrocell_factor, subdivide_above, depth, cell_size, flags } =
         *config;
-    let size = size_of::<[u32; 8]>() as u32;
     let [density, cell_size] = [density, cell_size].map(f32::to_bits);
     let flags = flags.bits();
-    [size, method as u32, density, macrocell_factor, subdivide_above, depth, cell_size, flags]
+    [method as u32, density, macrocell_factor, subdivide_above, depth, cell_size, flags]
 }
 
 /// What `answers.c` reads.

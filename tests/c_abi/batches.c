@@ -251,8 +251,8 @@ static void misuse_is_refused(void)
     c = good_call(), c.options = &options;
     options.struct_size--;
     refuse(HGRID_ERROR_STRUCT_SIZE, c);
-    options.struct_size++, options.reserved = 1;
-    refuse(HGRID_ERROR_STRUCT_SIZE, c);
+    options.struct_size++, options.cull = 3;
+    refuse(HGRID_ERROR_INVALID_CULL, c);
 }
 
 static void impossible_strides_are_refused(void)

@@ -71,6 +71,7 @@ static void every_shorter_blob_is_refused(void)
 static void another_mesh_is_refused(void)
 {
     hgrid_grid grid;
+    EXPECT(HGRID_ERROR_NO_MESH, hgrid_open(blob, blob_bytes, NULL, &grid));
     hgrid_mesh other = mesh;
     other.triangle_count--;
     EXPECT(HGRID_ERROR_MESH_MISMATCH, hgrid_open(blob, blob_bytes, &other, &grid));

@@ -16,6 +16,8 @@ static void layout(void)
 {
     SIZE(hgrid_status);
     SIZE(hgrid_coherence);
+    SIZE(hgrid_verdict);
+    SIZE(hgrid_task);
     SIZE(hgrid_ray);
     OFFSET(hgrid_ray, origin);
     OFFSET(hgrid_ray, t_min);
@@ -39,6 +41,8 @@ static void layout(void)
     OFFSET(hgrid_mesh, indices);
     OFFSET(hgrid_mesh, index_stride);
     OFFSET(hgrid_mesh, triangle_count);
+    OFFSET(hgrid_mesh, masks);
+    OFFSET(hgrid_mesh, mask_stride);
     SIZE(hgrid_config);
     OFFSET(hgrid_config, struct_size);
     OFFSET(hgrid_config, method);
@@ -48,15 +52,44 @@ static void layout(void)
     OFFSET(hgrid_config, depth);
     OFFSET(hgrid_config, cell_size);
     OFFSET(hgrid_config, flags);
-    SIZE(hgrid_parallel);
-    OFFSET(hgrid_parallel, struct_size);
-    OFFSET(hgrid_parallel, tasks);
-    OFFSET(hgrid_parallel, context);
-    OFFSET(hgrid_parallel, run);
+    OFFSET(hgrid_config, tasks);
+    OFFSET(hgrid_config, reserved);
+    OFFSET(hgrid_config, context);
+    OFFSET(hgrid_config, run);
+    OFFSET(hgrid_config, progress);
     SIZE(hgrid_query_options);
     OFFSET(hgrid_query_options, struct_size);
-    OFFSET(hgrid_query_options, reserved);
+    OFFSET(hgrid_query_options, mask);
+    OFFSET(hgrid_query_options, cull);
+    OFFSET(hgrid_query_options, skip);
+    OFFSET(hgrid_query_options, context);
+    OFFSET(hgrid_query_options, filter);
     OFFSET(hgrid_query_options, counters);
+    SIZE(hgrid_closest);
+    OFFSET(hgrid_closest, position);
+    OFFSET(hgrid_closest, distance);
+    OFFSET(hgrid_closest, u);
+    OFFSET(hgrid_closest, v);
+    OFFSET(hgrid_closest, primitive);
+    SIZE(hgrid_blob_info);
+    OFFSET(hgrid_blob_info, struct_size);
+    OFFSET(hgrid_blob_info, version);
+    OFFSET(hgrid_blob_info, method);
+    OFFSET(hgrid_blob_info, has_mesh);
+    OFFSET(hgrid_blob_info, vertex_count);
+    OFFSET(hgrid_blob_info, triangle_count);
+    OFFSET(hgrid_blob_info, grid_bytes);
+    OFFSET(hgrid_blob_info, total_bytes);
+    SIZE(hgrid_statistics);
+    OFFSET(hgrid_statistics, struct_size);
+    OFFSET(hgrid_statistics, skipped_count);
+    OFFSET(hgrid_statistics, degenerate_count);
+    OFFSET(hgrid_statistics, first_bad);
+    OFFSET(hgrid_statistics, list_count);
+    OFFSET(hgrid_statistics, reference_count);
+    OFFSET(hgrid_statistics, longest_list);
+    OFFSET(hgrid_statistics, reserved);
+    OFFSET(hgrid_statistics, content_hash);
     SIZE(hgrid_report);
     OFFSET(hgrid_report, struct_size);
     OFFSET(hgrid_report, is_exact);
@@ -69,6 +102,7 @@ static void layout(void)
     OFFSET(hgrid_report, resolution);
     OFFSET(hgrid_report, reserved);
     SIZE(hgrid_grid);
+    OFFSET(hgrid_grid, opaque);
     SIZE(hgrid_allocator);
     OFFSET(hgrid_allocator, struct_size);
     OFFSET(hgrid_allocator, reserved);
@@ -92,6 +126,12 @@ static void constants(void)
     NUMBER(HGRID_MAX_DEPTH);
     NUMBER(HGRID_BUILD_STRICT);
     NUMBER(HGRID_MAX_TASKS);
+    NUMBER(HGRID_CULL_NONE);
+    NUMBER(HGRID_CULL_BACK);
+    NUMBER(HGRID_CULL_FRONT);
+    NUMBER(HGRID_REJECT);
+    NUMBER(HGRID_ACCEPT);
+    NUMBER(HGRID_ACCEPT_AND_STOP);
     NUMBER(HGRID_COHERENCE_INCOHERENT);
     NUMBER(HGRID_COHERENCE_COHERENT);
     NUMBER(HGRID_OK);
@@ -108,6 +148,7 @@ static void constants(void)
     NUMBER(HGRID_ERROR_TOO_MANY_TRIANGLES);
     NUMBER(HGRID_ERROR_INDEX_OUT_OF_RANGE);
     NUMBER(HGRID_ERROR_NON_FINITE);
+    NUMBER(HGRID_ERROR_INVALID_MASKS);
     NUMBER(HGRID_ERROR_INVALID_METHOD);
     NUMBER(HGRID_ERROR_INVALID_DENSITY);
     NUMBER(HGRID_ERROR_INVALID_FLAGS);
@@ -115,15 +156,18 @@ static void constants(void)
     NUMBER(HGRID_ERROR_INVALID_DEPTH);
     NUMBER(HGRID_ERROR_INVALID_CELL_SIZE);
     NUMBER(HGRID_ERROR_PARALLEL_FOR);
+    NUMBER(HGRID_ERROR_CANCELLED);
     NUMBER(HGRID_ERROR_NOT_A_GRID);
     NUMBER(HGRID_ERROR_WRONG_BYTE_ORDER);
     NUMBER(HGRID_ERROR_UNSUPPORTED_VERSION);
     NUMBER(HGRID_ERROR_TRUNCATED);
     NUMBER(HGRID_ERROR_MESH_MISMATCH);
     NUMBER(HGRID_ERROR_CORRUPT);
+    NUMBER(HGRID_ERROR_NO_MESH);
     NUMBER(HGRID_ERROR_INVALID_RAYS);
     NUMBER(HGRID_ERROR_INVALID_ANSWERS);
     NUMBER(HGRID_ERROR_INVALID_COHERENCE);
+    NUMBER(HGRID_ERROR_INVALID_CULL);
 }
 
 static void versions(void)
@@ -135,27 +179,50 @@ static void versions(void)
     printf("function_text %s\n", hgrid_version_string());
 }
 
+/* What an _INIT macro sets, one "name struct_size and the other fields" a line. */
 static void defaults(void)
 {
-    const hgrid_mesh mesh = HGRID_MESH_INIT;
+    const hgrid_mesh m = HGRID_MESH_INIT;
     const hgrid_config configs[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
                                     HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
                                     HGRID_CONFIG_INIT_BRICK};
-    const hgrid_parallel parallel = HGRID_PARALLEL_INIT;
-    const hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
-    const hgrid_report report = HGRID_REPORT_INIT;
-    const hgrid_allocator allocator = HGRID_ALLOCATOR_INIT;
-    printf("mesh %lu\n", (unsigned long)mesh.struct_size);
-    printf("parallel %lu\n", (unsigned long)parallel.struct_size);
-    printf("options %lu\n", (unsigned long)options.struct_size);
-    printf("report %lu\n", (unsigned long)report.struct_size);
-    printf("allocator %lu\n", (unsigned long)allocator.struct_size);
+    const hgrid_query_options o = HGRID_QUERY_OPTIONS_INIT;
+    const hgrid_report r = HGRID_REPORT_INIT;
+    const hgrid_blob_info b = HGRID_BLOB_INFO_INIT;
+    const hgrid_statistics s = HGRID_STATISTICS_INIT;
+    const hgrid_allocator a = HGRID_ALLOCATOR_INIT;
+    printf("mesh %lu %lu %d %zu %zu %d %zu %zu %d %zu\n", (unsigned long)m.struct_size,
+           (unsigned long)m.index_type, m.positions != NULL, m.position_stride, m.vertex_count,
+           m.indices != NULL, m.index_stride, m.triangle_count, m.masks != NULL, m.mask_stride);
+    printf("query_options %lu %#lx %lu %#lx %d %d %d\n", (unsigned long)o.struct_size,
+           (unsigned long)o.mask, (unsigned long)o.cull, (unsigned long)o.skip, o.context != NULL,
+           o.filter != NULL, o.counters != NULL);
+    printf("report %lu %lu %llu %llu %#lx %lu %lu %g %lu %lu %lu %lu\n",
+           (unsigned long)r.struct_size, (unsigned long)r.is_exact,
+           (unsigned long long)r.index_bytes, (unsigned long long)r.scratch_bytes,
+           (unsigned long)r.triangle, (unsigned long)r.skipped_count,
+           (unsigned long)r.reference_count, (double)r.density, (unsigned long)r.resolution[0],
+           (unsigned long)r.resolution[1], (unsigned long)r.resolution[2],
+           (unsigned long)r.reserved);
+    printf("blob_info %lu %lu %lu %lu %llu %llu %llu %llu\n", (unsigned long)b.struct_size,
+           (unsigned long)b.version, (unsigned long)b.method, (unsigned long)b.has_mesh,
+           (unsigned long long)b.vertex_count, (unsigned long long)b.triangle_count,
+           (unsigned long long)b.grid_bytes, (unsigned long long)b.total_bytes);
+    printf("statistics %lu %lu %lu %#lx %llu %llu %lu %lu %llu\n", (unsigned long)s.struct_size,
+           (unsigned long)s.skipped_count, (unsigned long)s.degenerate_count,
+           (unsigned long)s.first_bad, (unsigned long long)s.list_count,
+           (unsigned long long)s.reference_count, (unsigned long)s.longest_list,
+           (unsigned long)s.reserved, (unsigned long long)s.content_hash);
+    printf("allocator %lu %lu %d %d %d\n", (unsigned long)a.struct_size, (unsigned long)a.reserved,
+           a.context != NULL, a.allocate != NULL, a.release != NULL);
     for (size_t i = 0; i < sizeof configs / sizeof *configs; i++) {
         const hgrid_config *c = &configs[i];
-        printf("config_%lu %lu %g %lu %lu %lu %g %lu\n", (unsigned long)c->method,
+        printf("config_%lu %lu %g %lu %lu %lu %g %lu %lu %lu %d %d %d\n", (unsigned long)c->method,
                (unsigned long)c->struct_size, (double)c->density,
                (unsigned long)c->macrocell_factor, (unsigned long)c->subdivide_above,
-               (unsigned long)c->depth, (double)c->cell_size, (unsigned long)c->flags);
+               (unsigned long)c->depth, (double)c->cell_size, (unsigned long)c->flags,
+               (unsigned long)c->tasks, (unsigned long)c->reserved, c->context != NULL,
+               c->run != NULL, c->progress != NULL);
     }
 }
 

@@ -20,11 +20,15 @@ static const hgrid_config others[] = {HGRID_CONFIG_INIT_FIXED, HGRID_CONFIG_INIT
 int main(void)
 {
     HGRID_ALIGNED unsigned char local[HGRID_ALIGNMENT] = {0};
-    hgrid_parallel parallel = HGRID_PARALLEL_INIT;
     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
     hgrid_report report = HGRID_REPORT_INIT;
+    hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
+    hgrid_statistics statistics = HGRID_STATISTICS_INIT;
     hgrid_allocator allocator = HGRID_ALLOCATOR_INIT;
-    hgrid_grid grid;
+    hgrid_grid grid = HGRID_GRID_INIT;
+    hgrid_closest closest;
+    const float point[3] = {0, 0, 0};
+    size_t count = 0;
     const hgrid_ray ray = {{0, 0, 0}, 0, {0, 0, 1}, 1};
     hgrid_hit hit;
     const hgrid_coherence coherence = HGRID_COHERENCE_COHERENT;
@@ -33,9 +37,18 @@ int main(void)
     hgrid_status status = hgrid_build(&mesh, &config, index_region, sizeof index_region,
                                       scratch_region, sizeof scratch_region, &grid, &report);
     for (size_t i = 0; i < sizeof others / sizeof *others && status == HGRID_OK; i++)
-        status = hgrid_sizes_parallel(&mesh, &others[i], &parallel, NULL, 0, &report);
+        status = hgrid_sizes(&mesh, &others[i], NULL, 0, &report);
+    if (status == HGRID_OK)
+        status = hgrid_peek(index_region, sizeof index_region, &info);
+    if (status == HGRID_OK)
+        status = hgrid_inspect(&grid, &statistics);
+    options.cull = HGRID_CULL_BACK;
+    options.skip = HGRID_INVALID_ID;
     return misplaced != 0 || status != HGRID_OK || report.triangle != HGRID_INVALID_ID ||
            hgrid_intersect(&grid, &ray, &options, &hit) || hgrid_occluded(&grid, &ray, NULL) ||
            hgrid_intersect_n(&grid, &ray, 0, &hit, 0, 1, coherence, &options) != HGRID_OK ||
-           hit.primitive != HGRID_INVALID_ID || allocator.allocate != NULL;
+           hgrid_intersect_all(&grid, &ray, &options, &hit, 1, &count) != HGRID_OK || count != 0 ||
+           hgrid_closest_point(&grid, point, 1, NULL, &closest) || info.has_mesh != 0 ||
+           statistics.first_bad != HGRID_INVALID_ID || hit.primitive != HGRID_INVALID_ID ||
+           allocator.allocate != NULL;
 }

@@ -10,7 +10,7 @@ enum { WIDE = 60, WIDE_VERTICES = (WIDE + 1) * (WIDE + 1), WIDE_TRIANGLES = 2 * 
 static float positions[WIDE_VERTICES][3];
 static uint32_t indices[WIDE_TRIANGLES][3];
 static hgrid_mesh mesh;
-static const hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+static const hgrid_config serially = HGRID_CONFIG_INIT_BRICK;
 static size_t serial_bytes;
 static unsigned char *serial;
 
@@ -113,13 +113,13 @@ static void run(void *context, uint32_t count, hgrid_task task, void *task_conte
     on_threads(list, length, task, task_context);
 }
 
-static hgrid_parallel parallel_of(plan *p, uint32_t tasks)
+/* A configuration whose tasks run as planned. */
+static hgrid_config in_parallel(hgrid_config config, plan *p, uint32_t tasks)
 {
-    hgrid_parallel parallel = HGRID_PARALLEL_INIT;
-    parallel.tasks = tasks;
-    parallel.context = p;
-    parallel.run = run;
-    return parallel;
+    config.tasks = tasks;
+    config.context = p;
+    config.run = run;
+    return config;
 }
 
 static plan plan_of(loop which, uint32_t at)
@@ -130,30 +130,30 @@ static plan plan_of(loop which, uint32_t at)
 
 static void build_serially(void)
 {
-    const hgrid_report need = exact_sizes(&mesh, &config);
+    const hgrid_report need = exact_sizes(&mesh, &serially);
     void *scratch = guarded((size_t)need.scratch_bytes);
     hgrid_grid grid;
     hgrid_report report = HGRID_REPORT_INIT;
     serial = (unsigned char *)guarded((size_t)need.index_bytes);
-    EXPECT(HGRID_OK, hgrid_build(&mesh, &config, serial, (size_t)need.index_bytes, scratch,
+    EXPECT(HGRID_OK, hgrid_build(&mesh, &serially, serial, (size_t)need.index_bytes, scratch,
                                  (size_t)need.scratch_bytes, &grid, &report));
     serial_bytes = (size_t)report.index_bytes;
 }
 
 /* A build in memory of exactly the size that was said: the blob must be the serial one. */
-static void check_build(const hgrid_parallel *parallel)
+static void check_build(const hgrid_config *config)
 {
     hgrid_report enough = HGRID_REPORT_INIT, exact = HGRID_REPORT_INIT, report = HGRID_REPORT_INIT;
-    EXPECT(HGRID_OK, hgrid_sizes_parallel(&mesh, &config, parallel, NULL, 0, &enough));
+    EXPECT(HGRID_OK, hgrid_sizes(&mesh, config, NULL, 0, &enough));
     const size_t scratch_bytes = (size_t)enough.scratch_bytes;
     void *scratch = guarded(scratch_bytes);
     EXPECT(HGRID_OK,
-           hgrid_sizes_parallel(&mesh, &config, parallel, scratch, scratch_bytes, &exact));
+           hgrid_sizes(&mesh, config, scratch, scratch_bytes, &exact));
     CHECK(exact.is_exact == 1 && exact.index_bytes <= enough.index_bytes);
     const size_t index_bytes = (size_t)exact.index_bytes;
     void *index = guarded(index_bytes);
     hgrid_grid grid;
-    EXPECT(HGRID_OK, hgrid_build_parallel(&mesh, &config, parallel, index, index_bytes, scratch,
+    EXPECT(HGRID_OK, hgrid_build(&mesh, config, index, index_bytes, scratch,
                                           scratch_bytes, &grid, &report));
     CHECK(report.index_bytes == serial_bytes && report.is_exact == 1);
     CHECK(memcmp(index, serial, serial_bytes) == 0);
@@ -162,14 +162,14 @@ static void check_build(const hgrid_parallel *parallel)
 
 static void any_number_of_tasks_builds_the_same_bytes(void)
 {
-    check_build(NULL);
+    check_build(&serially);
     const uint32_t more[] = {13, HGRID_MAX_TASKS, HGRID_MAX_TASKS + 1, UINT32_MAX};
     for (uint32_t i = 0; i < 9 + sizeof more / sizeof *more; i++) {
         const uint32_t tasks = i < 9 ? i : more[i - 9];
         for (int which = ONCE; which <= BACKWARDS; which++) {
             plan p = plan_of((loop)which, 1);
-            const hgrid_parallel parallel = parallel_of(&p, tasks);
-            check_build(&parallel);
+            const hgrid_config config = in_parallel(serially, &p, tasks);
+            check_build(&config);
             CHECK((p.call_count > 0) == (tasks > 1));
             CHECK(p.most_tasks <= tasks);
             CHECK(tasks < 2 || tasks > 8 || p.most_tasks == tasks);
@@ -182,18 +182,18 @@ static void other_methods_call_nothing(void)
     const hgrid_config others[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
                                    HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE};
     plan p = plan_of(NEVER, 0);
-    const hgrid_parallel parallel = parallel_of(&p, 4);
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+        const hgrid_config config = in_parallel(others[i], &p, 4);
         const hgrid_report need = exact_sizes(&mesh, &others[i]);
         hgrid_report report = HGRID_REPORT_INIT;
         const size_t index_bytes = (size_t)need.index_bytes;
         const size_t scratch_bytes = (size_t)need.scratch_bytes;
         void *scratch = guarded(scratch_bytes);
-        EXPECT(HGRID_OK, hgrid_sizes_parallel(&mesh, &others[i], &parallel, scratch, scratch_bytes,
+        EXPECT(HGRID_OK, hgrid_sizes(&mesh, &config, scratch, scratch_bytes,
                                               &report));
         CHECK(report.index_bytes == need.index_bytes);
         hgrid_grid grid;
-        EXPECT(HGRID_OK, hgrid_build_parallel(&mesh, &others[i], &parallel, guarded(index_bytes),
+        EXPECT(HGRID_OK, hgrid_build(&mesh, &config, guarded(index_bytes),
                                               index_bytes, scratch, scratch_bytes, &grid, NULL));
         EXPECT(HGRID_OK, hgrid_validate(&grid));
     }
@@ -204,9 +204,9 @@ static void scratch_for_one_task_is_enough(void)
 {
     hgrid_report need = HGRID_REPORT_INIT, wanted = HGRID_REPORT_INIT;
     plan p = plan_of(ONCE, 0);
-    const hgrid_parallel parallel = parallel_of(&p, 8);
-    EXPECT(HGRID_OK, hgrid_sizes(&mesh, &config, NULL, 0, &need));
-    EXPECT(HGRID_OK, hgrid_sizes_parallel(&mesh, &config, &parallel, NULL, 0, &wanted));
+    const hgrid_config parallel = in_parallel(serially, &p, 8);
+    EXPECT(HGRID_OK, hgrid_sizes(&mesh, &serially, NULL, 0, &need));
+    EXPECT(HGRID_OK, hgrid_sizes(&mesh, &parallel, NULL, 0, &wanted));
     CHECK(need.scratch_bytes < wanted.scratch_bytes);
 
     const size_t index_bytes = (size_t)wanted.index_bytes;
@@ -214,16 +214,16 @@ static void scratch_for_one_task_is_enough(void)
     hgrid_report report = HGRID_REPORT_INIT;
     hgrid_grid grid;
     EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL,
-           hgrid_build_parallel(&mesh, &config, &parallel, index, index_bytes, NULL, 0, &grid,
+           hgrid_build(&mesh, &parallel, index, index_bytes, NULL, 0, &grid,
                                 &report));
     CHECK(report.scratch_bytes <= need.scratch_bytes && report.index_bytes > 0);
     const size_t scratch_bytes = (size_t)report.scratch_bytes;
     void *scratch = guarded(scratch_bytes);
     EXPECT(HGRID_ERROR_INDEX_TOO_SMALL,
-           hgrid_build_parallel(&mesh, &config, &parallel, NULL, 0, scratch, scratch_bytes, &grid,
+           hgrid_build(&mesh, &parallel, NULL, 0, scratch, scratch_bytes, &grid,
                                 &report));
     CHECK(report.index_bytes <= index_bytes && report.scratch_bytes >= scratch_bytes);
-    EXPECT(HGRID_OK, hgrid_build_parallel(&mesh, &config, &parallel, index, index_bytes, scratch,
+    EXPECT(HGRID_OK, hgrid_build(&mesh, &parallel, index, index_bytes, scratch,
                                           scratch_bytes, &grid, NULL));
     CHECK(memcmp(index, serial, serial_bytes) == 0);
 }
@@ -231,15 +231,15 @@ static void scratch_for_one_task_is_enough(void)
 static void a_broken_loop_is_an_error(void)
 {
     plan good = plan_of(ONCE, 0);
-    const hgrid_parallel working = parallel_of(&good, 4);
+    const hgrid_config working = in_parallel(serially, &good, 4);
     hgrid_report need = HGRID_REPORT_INIT;
-    EXPECT(HGRID_OK, hgrid_sizes_parallel(&mesh, &config, &working, NULL, 0, &need));
+    EXPECT(HGRID_OK, hgrid_sizes(&mesh, &working, NULL, 0, &need));
     const size_t index_bytes = (size_t)need.index_bytes;
     const size_t scratch_bytes = (size_t)need.scratch_bytes;
     void *index = guarded(index_bytes), *scratch = guarded(scratch_bytes);
     hgrid_grid grid;
     good.call_count = 0;
-    EXPECT(HGRID_OK, hgrid_build_parallel(&mesh, &config, &working, index, index_bytes, scratch,
+    EXPECT(HGRID_OK, hgrid_build(&mesh, &working, index, index_bytes, scratch,
                                           scratch_bytes, &grid, NULL));
     const uint32_t call_count = good.call_count;
     CHECK(call_count > 1);
@@ -247,11 +247,11 @@ static void a_broken_loop_is_an_error(void)
     for (int which = NEVER; which < LOOPS; which++)
         for (uint32_t at = 0; at < call_count; at++) {
             plan p = plan_of((loop)which, at);
-            const hgrid_parallel broken = parallel_of(&p, 4);
+            const hgrid_config broken = in_parallel(serially, &p, 4);
             hgrid_report report = HGRID_REPORT_INIT;
             memset(&grid, 0xc7, sizeof grid);
             EXPECT(HGRID_ERROR_PARALLEL_FOR,
-                   hgrid_build_parallel(&mesh, &config, &broken, index, index_bytes, scratch,
+                   hgrid_build(&mesh, &broken, index, index_bytes, scratch,
                                         scratch_bytes, &grid, &report));
             CHECK(p.call_count == at + 1);
             CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
@@ -259,8 +259,8 @@ static void a_broken_loop_is_an_error(void)
 
             p.call_count = 0;
             EXPECT(HGRID_ERROR_PARALLEL_FOR,
-                   hgrid_sizes_parallel(&mesh, &config, &broken, scratch, scratch_bytes, &report));
-            EXPECT(HGRID_OK, hgrid_build_parallel(&mesh, &config, &working, index, index_bytes,
+                   hgrid_sizes(&mesh, &broken, scratch, scratch_bytes, &report));
+            EXPECT(HGRID_OK, hgrid_build(&mesh, &working, index, index_bytes,
                                                   scratch, scratch_bytes, &grid, NULL));
             CHECK(memcmp(index, serial, serial_bytes) == 0);
         }
@@ -268,21 +268,15 @@ static void a_broken_loop_is_an_error(void)
 
 static void run_is_null_only_for_one_task(void)
 {
-    hgrid_parallel parallel = HGRID_PARALLEL_INIT;
+    hgrid_config config = serially;
     hgrid_report report = HGRID_REPORT_INIT;
     hgrid_grid grid;
-    check_build(&parallel);
-    parallel.tasks = 0;
-    check_build(&parallel);
-    parallel.tasks = 2;
+    config.tasks = 0;
+    check_build(&config);
+    config.tasks = 2;
+    EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_sizes(&mesh, &config, NULL, 0, &report));
     EXPECT(HGRID_ERROR_NULL_ARGUMENT,
-           hgrid_sizes_parallel(&mesh, &config, &parallel, NULL, 0, &report));
-    EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_build_parallel(&mesh, &config, &parallel, NULL, 0, NULL,
-                                                           0, &grid, &report));
-    EXPECT(HGRID_ERROR_NULL_ARGUMENT,
-           hgrid_sizes_parallel(&mesh, &config, NULL, NULL, 0, NULL));
-    EXPECT(HGRID_ERROR_NULL_ARGUMENT,
-           hgrid_build_parallel(&mesh, &config, NULL, NULL, 0, NULL, 0, NULL, &report));
+           hgrid_build(&mesh, &config, NULL, 0, NULL, 0, &grid, &report));
 }
 
 int main(void)

@@ -16,12 +16,13 @@ use crate::header::statuses;
 
 /// Programs that check for themselves and tell which statuses they reached, and the flavour of the
 /// library that they need.
-const PROGRAMS: [(&str, Flavour); 8] = [
+const PROGRAMS: [(&str, Flavour); 9] = [
     ("queries", Flavour::NoStd),
     ("batches", Flavour::NoStd),
     ("memory", Flavour::NoStd),
     ("methods", Flavour::NoStd),
     ("parallel", Flavour::NoStd),
+    ("progress", Flavour::NoStd),
     ("refusals", Flavour::NoStd),
     ("blobs", Flavour::NoStd),
     ("create", Flavour::Std),

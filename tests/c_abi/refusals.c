@@ -55,7 +55,8 @@ static void null_is_refused_everywhere(void)
     hgrid_grid grid;
     hgrid_mesh input = mesh;
 
-    refuse_mesh(HGRID_ERROR_NULL_ARGUMENT, NULL);
+    EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_sizes(NULL, NULL, NULL, 0, &report));
+    refuse(HGRID_ERROR_NULL_ARGUMENT, NULL, NULL);
     input.positions = NULL;
     refuse_mesh(HGRID_ERROR_NULL_ARGUMENT, &input);
     input = mesh;
@@ -127,7 +128,6 @@ static void struct_sizes_are_checked(void)
 {
     LATER(hgrid_mesh) later_mesh = {mesh, {0}};
     LATER(hgrid_config) later_config = {HGRID_CONFIG_INIT, {0}};
-    LATER(hgrid_parallel) later_parallel = {HGRID_PARALLEL_INIT, {0}};
     LATER(hgrid_report) later_report = {HGRID_REPORT_INIT, {0}};
     hgrid_report report = HGRID_REPORT_INIT;
     hgrid_grid grid;
@@ -146,11 +146,6 @@ static void struct_sizes_are_checked(void)
     CHECK_STRUCT_SIZES(later_report,
                        hgrid_build(&mesh, NULL, region_1, index_bytes, region_2, scratch_bytes,
                                    &grid, &later_report.known));
-    CHECK_STRUCT_SIZES(later_parallel, hgrid_sizes_parallel(&mesh, NULL, &later_parallel.known,
-                                                            NULL, 0, &report));
-    CHECK_STRUCT_SIZES(later_parallel,
-                       hgrid_build_parallel(&mesh, NULL, &later_parallel.known, region_1,
-                                            index_bytes, region_2, scratch_bytes, &grid, NULL));
     CHECK_STRUCT_SIZES(later_mesh,
                        hgrid_open(region_1, index_bytes, &later_mesh.known, &grid));
 
@@ -184,7 +179,7 @@ static void query_options_are_checked(void)
     LATER(hgrid_query_options) later = {HGRID_QUERY_OPTIONS_INIT, {0}};
     later.known.counters = &counters;
     CHECK_STRUCT_SIZES(later, asked(&grid, &later.known));
-    later.known.reserved = 1;
+    later.known.cull = HGRID_CULL_FRONT + 1;
     CHECK(asked(&grid, &later.known) != HGRID_OK);
 }
 
@@ -340,6 +335,12 @@ static void impossible_arrays_are_refused(void)
     refuse_mesh(HGRID_ERROR_INVALID_INDICES, &input);
     input.index_stride = SIZE_MAX;
     refuse_mesh(HGRID_ERROR_INVALID_INDICES, &input);
+    input = mesh;
+    input.masks = mesh_data.indices;
+    for (input.mask_stride = 1; input.mask_stride < 4; input.mask_stride++)
+        refuse_mesh(HGRID_ERROR_INVALID_MASKS, &input);
+    input.mask_stride = SIZE_MAX / TRIANGLES + 1;
+    refuse_mesh(HGRID_ERROR_INVALID_MASKS, &input);
 #if SIZE_MAX > UINT32_MAX
     input = mesh;
     input.triangle_count = 4294967295u;

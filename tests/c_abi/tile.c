@@ -1,5 +1,5 @@
-/* The examples in the header's functions, put in place of FUNCTIONS and run: one triangle fills the
- * lower left half of a tile. POSIX threads are what one of them is about. */
+/* The examples in the header's functions, put in place of FUNCTIONS and run: two triangles, one behind
+ * the other, fill the lower left half of a tile. POSIX threads are what one of them is about. */
 
 #include "hgrid.h"
 
@@ -10,12 +10,13 @@ FUNCTIONS
 
 int main(void)
 {
-    static const float positions[3][3] = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}};
-    static const uint32_t indices[1][3] = {{0, 1, 2}};
-    HGRID_ALIGNED static unsigned char index[HGRID_INDEX_BOUND(1)], scratch[HGRID_SCRATCH_BOUND(1)];
+    static const float positions[6][3] = {{0, 0, 0},  {8, 0, 0},  {0, 8, 0},
+                                          {0, 0, -2}, {8, 0, -2}, {0, 8, -2}};
+    static const uint32_t indices[2][3] = {{0, 1, 2}, {3, 4, 5}};
+    HGRID_ALIGNED static unsigned char index[HGRID_INDEX_BOUND(2)], scratch[HGRID_SCRATCH_BOUND(2)];
     hgrid_mesh mesh = HGRID_MESH_INIT;
-    mesh.positions = positions, mesh.vertex_count = 3;
-    mesh.indices = indices, mesh.triangle_count = 1;
+    mesh.positions = positions, mesh.vertex_count = 6;
+    mesh.indices = indices, mesh.triangle_count = 2;
     hgrid_grid grid;
     if (hgrid_build(&mesh, NULL, index, sizeof index, scratch, sizeof scratch, &grid, NULL))
         return 1;
@@ -34,6 +35,13 @@ int main(void)
             return 3;
     if (count_lit(&grid, rays, 100) != 100 - 36)
         return 4;
+    if (thickness_along(&grid, &rays[0]) != 2 || thickness_along(&grid, &rays[63]) != 0)
+        return 7;
+    const unsigned char none[] = {0, 0}, first[] = {1, 0}, both[] = {1, 1};
+    if (light_along(&grid, &rays[0], none) != 0 || light_along(&grid, &rays[0], first) != 0 ||
+        fabsf(light_along(&grid, &rays[0], both) - 0.64f) > 1e-6f ||
+        light_along(&grid, &rays[63], none) != 1)
+        return 8;
 
     HGRID_ALIGNED static unsigned char more_index[1 << 16], more_scratch[1 << 16];
     if (build_on_threads(&mesh, more_index, sizeof more_index, more_scratch, sizeof more_scratch,
