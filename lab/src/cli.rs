@@ -25,6 +25,7 @@ Examples:
   hgrid                                      the built-in scene, to hgrid.png
   hgrid render bunny.ply -o bunny.png        a mesh of yours, seen from the front
   hgrid render bunny.ply --shading heat      what each ray costs, from blue to red
+  hgrid render bunny.ply+stadium.ply         the first in the middle of the second
   hgrid table bunny.ply dragon.ply           all methods side by side, as in the paper
   hgrid figures buddha.ply -o pictures       the paper's charts, as SVG and PNG
   hgrid animate bunny.ply --threads 4        a moving mesh, built again for every frame

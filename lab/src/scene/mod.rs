@@ -31,7 +31,9 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Loads a `.ply` or `.obj` file, or makes a scene from `procedural:NAME[:TRIANGLES]`.
+    /// Loads a `.ply` or `.obj` file, or makes a scene from `procedural:NAME[:TRIANGLES]`, or puts one of
+    /// them into another: `bunny.ply+stadium.ply` is the bunny, as large as it is, in the middle of the
+    /// stadium, and pictures are of the bunny.
     ///
     /// # Errors
     /// If the words name no scene or the file cannot be read; the message says what to do.
@@ -42,6 +44,9 @@ impl Scene {
     /// # Ok::<(), anyhow::Error>(())
     /// ```
     pub fn load(spec: &str) -> Result<Self> {
+        if let Some((inner, outer)) = spec.split_once('+').filter(|_| !Path::new(spec).exists()) {
+            return Ok(Self::load(inner)?.within(Self::load(outer)?));
+        }
         if let Some(words) = spec.strip_prefix("procedural:") {
             return procedural::make(words).with_context(|| format!("no scene `{spec}`"));
         }
@@ -52,12 +57,33 @@ impl Scene {
             Some("obj") => obj::load(path),
             _ => bail!(
                 "no scene `{spec}`: name a .ply file, an .obj file or procedural:NAME:TRIANGLES, \
-                 where NAME is {}",
+                 where NAME is {}; or one inside another, A+B",
                 procedural::NAMES.join(", ")
             ),
         };
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Ok(Self { name, ..loaded.with_context(|| format!("cannot load `{spec}`"))? })
+    }
+
+    /// This scene in the middle of another, as large as both are; pictures are of what this one is.
+    fn within(self, outer: Self) -> Self {
+        let middle = |scene: &Self| {
+            let (min, max) = scene.bounds().unwrap_or_default();
+            let at: [f32; 3] = std::array::from_fn(|axis| 0.5 * (min[axis] + max[axis]));
+            at
+        };
+        let (from, to) = (middle(&self), middle(&outer));
+        let place = |p: [f32; 3]| -> [f32; 3] {
+            std::array::from_fn(|axis| p[axis] - from[axis] + to[axis])
+        };
+        let (min, max) = self.framed_bounds();
+        let focus = Some((place(min), place(max)));
+        let name = format!("{}+{}", self.name, outer.name);
+        let first = u32::try_from(self.positions.len()).unwrap_or(u32::MAX);
+        let behind = outer.indices.into_iter().map(|triangle| triangle.map(|v| v + first));
+        let positions = self.positions.into_iter().map(place).chain(outer.positions).collect();
+        let indices = self.indices.into_iter().chain(behind).collect();
+        Self { name, positions, indices, focus }
     }
 
     /// The box around all finite vertices, or `None` if there are none.
@@ -91,6 +117,21 @@ mod tests {
             let message = format!("{:#}", Scene::load(spec).unwrap_err());
             assert!(message.contains(spec) && message.contains("knot"), "{message}");
         }
+    }
+
+    #[test]
+    fn one_scene_stands_in_the_middle_of_another() {
+        let spec = "procedural:knot:2000+procedural:knot:3000";
+        let (scene, small) =
+            (Scene::load(spec).unwrap(), Scene::load("procedural:knot:2000").unwrap());
+        assert_eq!(scene.indices.len(), 5000);
+        let (min, max) = small.framed_bounds();
+        let (low, high) = scene.framed_bounds();
+        for axis in 0..3 {
+            assert!(((high[axis] - low[axis]) - (max[axis] - min[axis])).abs() < 1e-5);
+        }
+        let message = format!("{:#}", Scene::load("procedural:knot+nothing").unwrap_err());
+        assert!(message.contains("`nothing`"), "{message}");
     }
 
     #[test]
