@@ -54,6 +54,7 @@ pub use crate::types::*;
 pub use crate::version::*;
 
 /// Nothing in this library or in core panics, so link-time optimisation drops this again.
+#[cfg(not(feature = "rlib"))]
 #[panic_handler]
 const fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     loop {}

@@ -137,6 +137,7 @@ impl<'a> Grid<'a> {
     /// [`Error::Corrupt`], each for what it says.
     pub fn open(blob: &'a [u8], mesh: TriangleMesh<'a>) -> Result<Self, Error> {
         let header = Header::read(blob, &mesh)?;
+        header.has_mesh()?;
         let lattice = header.lattice()?;
         let bytes = usize::try_from(header.blob_bytes).ok().and_then(|bytes| blob.get(..bytes));
         let blob = bytes.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;

@@ -173,8 +173,10 @@ impl<'a> Grid<'a> {
         let section = |start: u64, count: u64, stride: usize| {
             let start = usize::try_from(start).ok()?;
             let count = usize::try_from(count).ok()?;
-            let bytes = blob.get(start..)?.get(..count.checked_mul(stride)?)?;
-            Some(Strided { bytes, stride, count })
+            let (bytes, rest) = blob.get(start..)?.split_at_checked(count.checked_mul(stride)?)?;
+            let padding = bytes.len().next_multiple_of(ALIGNMENT) - bytes.len();
+            let is_zero = rest.get(..padding)?.iter().all(|&byte| byte == 0);
+            is_zero.then_some(Strided { bytes, stride, count })
         };
         if needed_bytes > available_bytes {
             return Err(truncated);

@@ -6,12 +6,13 @@
 use std::collections::HashMap;
 
 use hgrid_core::{Config, Error, Grid, Method, Ray};
+use hgrid_tests::copy::{Copy, word};
 use hgrid_tests::meshes::{Mesh, soup};
 use hgrid_tests::oracle;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 
-use crate::blobs::{Copy, query};
+use crate::blobs::query;
 use crate::bricks::crowds;
 
 /// What a word of a brick grid is.
@@ -54,10 +55,6 @@ pub(crate) struct Site {
     pub(crate) depth: usize,
     /// Whether another word of the same list lies before it.
     follows: bool,
-}
-
-fn word(blob: &[u8], at: usize) -> u32 {
-    u32::from_ne_bytes(blob[at..at + 4].try_into().unwrap())
 }
 
 /// All words of a brick grid behind its header.
@@ -191,7 +188,7 @@ impl Damage {
     }
 
     fn word(&self, at: usize) -> u32 {
-        word(self.copy.bytes(), at)
+        self.copy.word(at)
     }
 
     /// Some words of these kinds, spread over the blob.

@@ -3,12 +3,12 @@
 
 use hgrid_core::{
     BatchField, BuildFlags, Config, ConfigField, Error, IndexType, MAX_COORDINATE, MeshField, Ray,
-    Strided, TriangleMesh, sizes,
+    Sizes, Strided, TriangleMesh, sizes,
 };
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
-use hgrid_tests::oracle;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
+use hgrid_tests::{methods, oracle};
 
 fn build(mesh: &Mesh) -> Result<Owned, Error> {
     Owned::build(&mesh.view(), &Config::default())
@@ -87,6 +87,21 @@ fn densities_outside_the_range_are_refused() {
     }
     for density in [f32::MIN_POSITIVE, 1e-10, 1000.0] {
         assert!(Owned::build(&mesh.view(), &Config { density, ..Config::default() }).is_ok());
+    }
+}
+
+/// What a density asks for that no build takes is still no less than what a lower one asks for.
+#[test]
+fn bounds_grow_with_the_density_however_high() {
+    for config in methods::configs() {
+        let mut least = 0;
+        for density in [1.0, 1e3, 1e10, 1e18, 1e19, 1e30, f32::MAX] {
+            let bound = Sizes::bound(100, &Config { density, ..config });
+            let Some(Sizes { scratch_bytes, .. }) = bound else { continue };
+            assert!(scratch_bytes >= least, "{:?} {density}", config.method);
+            least = scratch_bytes;
+        }
+        assert!(least > 0);
     }
 }
 

@@ -37,7 +37,7 @@ pub(crate) use displacement::displace;
 use layout::Sections;
 pub(crate) use layout::{Layout, longest};
 pub(crate) use spread::{Spread, fill, mark};
-pub(crate) use validate::check_header;
+pub(crate) use validate::{check_header, slots_are_sound};
 
 /// A view of a built one-level grid.
 #[derive(Debug, Clone, Copy)]
@@ -107,6 +107,16 @@ impl<'a> OneLevel<'a> {
     /// All lists, one behind the other.
     pub(crate) const fn lists(&self) -> &'a [u32] {
         self.sections.references
+    }
+
+    /// Where each row starts in the hash table.
+    pub(crate) const fn row_offsets(&self) -> &'a [i32] {
+        self.sections.row_offsets
+    }
+
+    /// For each slot where its list starts, and where the last one ends.
+    pub(crate) const fn hash(&self) -> &'a [u32] {
+        self.sections.hash
     }
 
     /// One bit a cell, row after row: whether it has primitives.

@@ -8,13 +8,14 @@
 //!
 //! Two cells with equal lists could still share a slot while another slot stays orphaned: right
 //! answers, but no build's work. A sum of scrambled slot numbers over the cells and one over the
-//! slots with lists tell that apart.
+//! slots with lists tell that apart. Where among the free slots a row came to lie is all that is left
+//! to whoever wrote the blob.
 
 use glam::Vec3A;
 
 use super::build::MeshSpread;
 use super::spread::count_references;
-use super::{OneLevel, slot};
+use super::{OneLevel, row, slot};
 use crate::aabb::Aabb;
 use crate::bits::{WORD_BITS, each_one, extent};
 use crate::blob::{Header, corrupt};
@@ -68,6 +69,10 @@ impl OneLevel<'_> {
         }
         if hash.last() != Some(&header.reference_count) {
             return Err(at(hash_at, header.hash_count as usize * size_of::<u32>()));
+        }
+        // The table ends with the last list.
+        if matches!(hash, [.., start, end] if start == end) {
+            return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
         }
 
         // Every marked cell lists triangles that cover it, each once; an empty row has offset 0.
@@ -131,6 +136,31 @@ impl OneLevel<'_> {
         };
         if ascends && list.iter().all(covers) { Ok(list) } else { Err(Some(list)) }
     }
+}
+
+/// Whether a table is as displaced rows leave it: a row without marked cells has offset 0, every marked
+/// cell has a slot of its own, and of the slots those are full.
+pub(crate) fn slots_are_sound(
+    [width, height, depth]: [u32; 3],
+    offset: impl Fn(usize) -> Option<i32>,
+    is_marked: impl Fn([u32; 3]) -> bool,
+    is_full: impl Iterator<Item = bool>,
+) -> bool {
+    let full = is_full.zip(0..).filter(|(is_full, _)| *is_full);
+    let mut sum = full.fold(0_u64, |sum, (_, slot)| sum.wrapping_add(scramble(slot)));
+    for (z, y) in (0..depth).flat_map(|z| (0..height).map(move |y| (z, y))) {
+        let Some(offset) = offset(row(height, y, z)) else { return false };
+        let mut is_empty = true;
+        for x in (0..width).filter(|&x| is_marked([x, y, z])) {
+            let Some(slot) = slot(offset, x) else { return false };
+            sum = sum.wrapping_sub(scramble(slot as u64));
+            is_empty = false;
+        }
+        if is_empty && offset != 0 {
+            return false;
+        }
+    }
+    sum == 0
 }
 
 /// A number whose sums do not meet by chance (the finisher of `SplitMix`).

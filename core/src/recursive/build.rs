@@ -36,8 +36,8 @@ use crate::survey::{Survey, boxes};
 /// each of three axes, and no grid has fewer than 8.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bound, rounded up")]
 const fn scratch_words(primitives: u32, density: f32) -> u64 {
-    let cells = (3.5 * density as f64 * primitives as f64) as u64 + 64;
-    cells + 1 + reference_limit(primitives) as u64
+    let cells = (3.5 * density as f64 * primitives as f64) as u64;
+    cells.saturating_add(64 + 1 + reference_limit(primitives) as u64)
 }
 
 /// Bytes of scratch for so many triangles, whatever they look like: their ids, and one grid on each
@@ -123,8 +123,7 @@ impl Root {
 
 /// How many references the outermost grid has, or some number above the limit.
 fn references(mesh: &TriangleMesh<'_>, lattice: &Lattice, limit: u64) -> u64 {
-    let max = Vec3A::from_array(lattice.resolution.map(as_f32));
-    let node = Node::new(0, Vec3A::ZERO, max, lattice.resolution);
+    let node = Node::root(lattice.resolution);
     let mut references = 0;
     for id in 0..mesh.triangle_count() {
         if let Some(placed) = Placed::new(mesh, lattice, id) {
@@ -219,6 +218,36 @@ impl Rule {
         let is_coarse = resolution.iter().product::<u32>() < 8;
         Some(if is_coarse { [2; 3] } else { resolution })
     }
+
+    /// The resolution of a grid in a cell, for so many primitives in this box in cells of the root;
+    /// [1; 3] for none. No cell is so thin that the margin would put everything into it.
+    pub(super) fn within(
+        &self,
+        lattice: &Lattice,
+        bounds: &Aabb,
+        primitives: u32,
+        depth: u32,
+    ) -> Option<[u32; 3]> {
+        let cell_size = lattice.cell_size().to_array().map(f64::from);
+        let (extent, margin) = (bounds.size().to_array(), lattice.margin().to_array());
+        let size = core::array::from_fn(|axis| cell_size[axis] * f64::from(extent[axis]));
+        let cells = self.resolution(size, primitives, depth);
+        let cells = cells.map(|cells| {
+            core::array::from_fn(|axis| {
+                cells[axis].min(whole(extent[axis] / (8.0 * margin[axis]))).max(1)
+            })
+        });
+        cells.or((primitives == 0).then_some([1; 3]))
+    }
+}
+
+/// The part of a cell that its primitives reach.
+pub(super) fn inside(lattice: &Lattice, node: &Node, cell: [u32; 3], reach: &Aabb) -> Aabb {
+    let Aabb { min, max } = node.cell_box(cell);
+    // A reach that only touches the cell leaves a sliver as wide as the margin.
+    let least = lattice.margin();
+    let low = reach.min.max(min).min(max - least);
+    Aabb { min: low, max: reach.max.min(max).max(low + least) }
 }
 
 /// A root of a positive number by Newton's method, from above: the same bits everywhere.
@@ -257,7 +286,8 @@ impl Placed {
         Some(Self { reach, overlap, margin: lattice.margin() })
     }
 
-    /// Shows `visit` the cells of a grid that the triangle overlaps, with their numbers.
+    /// Shows `visit` the cells of a grid that the triangle overlaps, with their numbers: one at least, so
+    /// that a triangle which only touches a cell is not lost in the grid that the cell holds.
     pub(super) fn each_cell(&self, node: &Node, mut visit: impl FnMut(usize, [u32; 3])) {
         let (origin, scale) = (Vec3A::from_array(node.origin), Vec3A::from_array(node.scale));
         let [width, height, _] = node.resolution;
@@ -268,11 +298,16 @@ impl Placed {
         }
         let size = 1.0 / scale;
         let half = size * 0.5 + self.margin;
+        let mut is_anywhere = false;
         for cell in range.cells() {
             let center = origin + (Vec3A::from_array(cell.map(as_f32)) + 0.5) * size;
             if self.overlap.with(center, half) {
                 visit(number(cell), cell);
+                is_anywhere = true;
             }
+        }
+        if !is_anywhere {
+            visit(number(range.min), range.min);
         }
     }
 }
@@ -310,15 +345,12 @@ impl Builder<'_, '_> {
         let at = self.pool.offset()?;
 
         // Count the references of each cell, in coarser grids if they get out of hand.
-        let cell_size = self.lattice.cell_size().to_array().map(f64::from);
-        let extent = bounds.size().to_array();
-        let size: [f64; 3] = core::array::from_fn(|axis| cell_size[axis] * f64::from(extent[axis]));
         let mut primitives = count;
         let (node, references) = loop {
             let resolution = if depth == 0 {
                 Some(self.lattice.resolution)
             } else {
-                self.rule.resolution(size, primitives, depth).map(|cells| self.wide(cells, extent))
+                self.rule.within(self.lattice, bounds, primitives, depth)
             };
             let is_last = primitives == 0;
             primitives /= 2;
@@ -405,22 +437,10 @@ impl Builder<'_, '_> {
         Ok(true)
     }
 
-    /// The same resolution, but no cell so thin that the margin would put everything into it.
-    fn wide(&self, resolution: [u32; 3], extent: [f32; 3]) -> [u32; 3] {
-        let margin = self.lattice.margin().to_array();
-        core::array::from_fn(|axis| {
-            resolution[axis].min(whole(extent[axis] / (8.0 * margin[axis]))).max(1)
-        })
-    }
-
     /// The part of a cell that its primitives reach.
     fn inside(&self, node: &Node, cell: [u32; 3], ids: &[u32]) -> Aabb {
-        let Aabb { min, max } = node.cell_box(cell);
         let reaches = ids.iter().filter_map(|&id| Some(self.place(id)?.reach));
         let reach = reaches.fold(Aabb::EMPTY, |all, reach| all.union(&reach));
-        // A reach that only touches the cell leaves a sliver as wide as the margin.
-        let least = self.lattice.margin();
-        let low = reach.min.max(min).min(max - least);
-        Aabb { min: low, max: reach.max.min(max).max(low + least) }
+        inside(self.lattice, node, cell, &reach)
     }
 }

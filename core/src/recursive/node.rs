@@ -47,6 +47,11 @@ impl Node {
         }
     }
 
+    /// The outermost grid, whose cells are the unit of all others.
+    pub(super) fn root(resolution: [u32; 3]) -> Self {
+        Self::new(0, Vec3A::ZERO, Vec3A::from_array(resolution.map(as_f32)), resolution)
+    }
+
     /// The head of its words.
     pub(super) fn head(&self) -> [u32; HEAD_WORDS] {
         let ([a, b, c], [d, e, f]) = (self.origin.map(f32::to_bits), self.scale.map(f32::to_bits));
@@ -87,13 +92,6 @@ impl Node {
     /// Where in the pool the content of a cell starts, or ends if the number is one too many.
     pub(super) fn start(&self, pool: &[u32], number: usize) -> Option<usize> {
         Some((pool.get(self.entries.checked_add(number)?)? & !GRID) as usize)
-    }
-
-    /// Its box, in cells of the root.
-    pub(super) fn bounds(&self) -> Aabb {
-        let min = Vec3A::from_array(self.origin);
-        let cells = Vec3A::from_array(self.resolution.map(as_f32));
-        Aabb { min, max: min + cells / Vec3A::from_array(self.scale) }
     }
 
     /// The box of a cell, in cells of the root.

@@ -1,30 +1,63 @@
-//! Proof that a foreign blob is a recursive grid of its mesh in which every query answers right.
+//! Proof that a foreign blob is a recursive grid of its mesh.
 //!
 //! Grid by grid from the root: each cell's part of the pool starts where the part before it ends, so
-//! everything is read once, and a grid's box holds what the triangles reach of the cell around it. Every listed triangle overlaps its cell
-//! and the cells around that, and no list has it twice; so there are as many of them as the triangles
-//! have cells if and only if none is missing: one sum against another.
+//! everything is read once. Every listed triangle overlaps its cell and the cells around that, and no
+//! list has it twice; so there are as many of them as the triangles have cells if and only if none is
+//! missing: one sum against another. A grid in a cell has the box and the resolution that a build gives
+//! to the triangles in it, and so many of them that it was worth it.
+//!
+//! Whether a list is long because nothing would separate its triangles would take memory to prove: a
+//! list may have any length. Queries do not mind.
 
-use super::build::{Placed, Rule};
-use super::node::{Content, Node};
-use super::{MAX_DEPTH, Recursive};
+use super::build::{Placed, Rule, inside};
+use super::node::{Content, HEAD_WORDS, Node};
+use super::{FEW, MAX_DEPTH, Recursive};
+use crate::aabb::Aabb;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::{CellRange, Lattice};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
+use crate::one_level::reference_limit;
 
 /// A cell and the grid that it is a cell of.
 type Place = (Node, [u32; 3]);
+
+const LEVELS: usize = MAX_DEPTH as usize;
 
 /// What a check runs over.
 struct Check<'a> {
     pool: &'a [u32],
     mesh: &'a TriangleMesh<'a>,
     lattice: &'a Lattice,
+    rule: Rule,
+    /// Where the pool goes on.
+    cursor: usize,
+    /// The cells around the list that is read, from the root on.
+    places: [Option<Place>; LEVELS],
+    /// For each of them the triangles in its grid, and what they reach.
+    contents: [Contents; LEVELS],
+    /// Ids in all lists.
+    listed: u64,
+}
+
+/// The triangles in a grid.
+#[derive(Debug, Clone, Copy)]
+struct Contents {
+    /// How many there are.
+    count: u32,
+    /// How many its cells have in all.
+    references: u64,
+    /// How many cells have any.
+    lists: u64,
+    reach: Aabb,
+}
+
+impl Contents {
+    const NONE: Self = Self { count: 0, references: 0, lists: 0, reach: Aabb::EMPTY };
 }
 
 impl Recursive<'_> {
-    /// Whether this is a grid of the mesh in which every query answers right.
+    /// Whether this is what a build makes of the mesh.
     pub(crate) fn validate(
         &self,
         header: &Header,
@@ -34,28 +67,41 @@ impl Recursive<'_> {
         if !(1..=MAX_DEPTH).contains(&header.depth) {
             return Err(corrupt(core::mem::offset_of!(Header, depth)));
         }
+        if header.hash_count != 0 {
+            return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
+        }
         let rule = Rule { density: f64::from(header.density), depth: header.depth };
         header.check(lattice, mesh, |size, count| {
             rule.resolution(size.to_array().map(f64::from), count, 0)
         })?;
-        let check = Check { pool: self.pool, mesh, lattice };
-        let root = Node::open(self.pool, 0).filter(|root| root.resolution == lattice.resolution);
-        let root = root.ok_or(corrupt(HEADER_BYTES))?;
-        let mut cursor = 0;
-        let listed = check.listed(&root, &mut cursor, &mut [None; MAX_DEPTH as usize], 0)?;
-        if cursor != self.pool.len() {
-            return Err(Check::wrong(cursor));
+        let mut check = Check {
+            pool: self.pool,
+            mesh,
+            lattice,
+            rule,
+            cursor: 0,
+            places: [None; LEVELS],
+            contents: [Contents::NONE; LEVELS],
+            listed: 0,
+        };
+        let root = Node::root(lattice.resolution);
+        if !check.has_head(0, &root) || Node::open(self.pool, 0) != Some(root) {
+            return Err(corrupt(HEADER_BYTES));
+        }
+        check.grid(&root, 0)?;
+        if check.cursor != self.pool.len() {
+            return Err(Check::wrong(check.cursor));
         }
         let mut expected = 0;
         for id in 0..mesh.triangle_count() {
             if let Some(placed) = Placed::new(mesh, lattice, id) {
-                expected += check.expected(&root, &placed, 0)?;
+                expected += check.expected(&root, &placed, 0);
             }
-            if expected > listed {
+            if expected > check.listed {
                 break;
             }
         }
-        if listed == expected { Ok(()) } else { Err(corrupt(HEADER_BYTES)) }
+        if check.listed == expected { Ok(()) } else { Err(corrupt(HEADER_BYTES)) }
     }
 }
 
@@ -65,83 +111,166 @@ impl Check<'_> {
         corrupt(HEADER_BYTES + at * size_of::<u32>())
     }
 
-    /// How many ids the lists below a grid hold, all of them rightly. `cursor` goes from where the
-    /// grid's words start to where they end.
-    fn listed(
-        &self,
-        node: &Node,
-        cursor: &mut usize,
-        places: &mut [Option<Place>; MAX_DEPTH as usize],
-        depth: usize,
-    ) -> Result<u64, Error> {
-        let at = *cursor;
-        *cursor = node.contents();
-        let mut listed = 0;
+    /// Checks a grid that starts at the cursor, and what is in it, and moves the cursor behind it.
+    fn grid(&mut self, node: &Node, depth: usize) -> Result<(), Error> {
+        let at = self.cursor;
+        let wrong = Self::wrong(at);
+        *self.contents.get_mut(depth).ok_or(wrong)? = Contents::NONE;
+        self.cursor = node.contents();
         let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
         for (number, cell) in all.cells().enumerate() {
-            if node.start(self.pool, number) != Some(*cursor) {
-                return Err(Self::wrong(at));
+            if node.start(self.pool, number) != Some(self.cursor) {
+                return Err(wrong);
             }
-            let place = places.get_mut(depth).ok_or_else(|| Self::wrong(at))?;
-            *place = Some((*node, cell));
+            *self.places.get_mut(depth).ok_or(wrong)? = Some((*node, cell));
+            let references = match node.content(self.pool, cell) {
+                None => 0,
+                Some(Content::List(ids)) => {
+                    let ascends = ids.windows(2).all(|ids| matches!(ids, [a, b] if a < b));
+                    if !ascends || !ids.iter().all(|&id| self.count(id, depth)) {
+                        return Err(wrong);
+                    }
+                    self.listed += ids.len() as u64;
+                    self.cursor += ids.len();
+                    ids.len() as u64
+                }
+                Some(Content::Grid(inner)) => {
+                    let inner = Node::open(self.pool, inner).ok_or(wrong)?;
+                    let start = self.cursor;
+                    self.grid(&inner, depth + 1)?;
+                    let contents = self.contents.get(depth + 1).ok_or(wrong)?;
+                    let bounds = inside(self.lattice, node, cell, &contents.reach);
+                    let built = Node::new(start, bounds.min, bounds.max, inner.resolution);
+                    let is_built = self.is_built(&inner, &bounds, depth + 1, contents);
+                    if !self.has_head(start, &built) || !is_built {
+                        return Err(Self::wrong(start));
+                    }
+                    u64::from(contents.count)
+                }
+            };
+            let contents = self.contents.get_mut(depth).ok_or(wrong)?;
+            contents.references += references;
+            contents.lists += u64::from(references > 0);
+        }
+        // The end is an offset and nothing else.
+        let end = self.pool.get(at + HEAD_WORDS + node.cells());
+        if end.is_none_or(|&end| end as usize != self.cursor) {
+            return Err(wrong);
+        }
+        Ok(())
+    }
+
+    /// Whether a triangle overlaps all of the cells around a list, down to a depth. Counts it in each of
+    /// their grids where this is the first list that has it.
+    fn count(&mut self, id: u32, depth: usize) -> bool {
+        let Some(placed) = Placed::new(self.mesh, self.lattice, id) else { return false };
+        let mut is_first = true;
+        for (place, contents) in self.places.iter().zip(&mut self.contents).take(depth + 1).rev() {
+            let Some((node, cell)) = place else { return false };
+            let (mut first, mut is_there) = (None, false);
+            placed.each_cell(node, |_, other| {
+                first.get_or_insert(other);
+                is_there |= other == *cell;
+            });
+            if !is_there {
+                return false;
+            }
+            is_first &= first == Some(*cell);
+            contents.count += u32::from(is_first);
+            contents.reach = contents.reach.union(&placed.reach);
+        }
+        true
+    }
+
+    /// Whether the words of a grid start as its build writes them.
+    fn has_head(&self, at: usize, node: &Node) -> bool {
+        self.pool.get(at..).and_then(|words| words.first_chunk()) == Some(&node.head())
+    }
+
+    /// Whether a build puts this grid into this box, for what is in it.
+    fn is_built(&self, grid: &Node, bounds: &Aabb, depth: usize, contents: &Contents) -> bool {
+        let Contents { count, references, lists, .. } = *contents;
+        let Ok(level) = u32::try_from(depth) else { return false };
+        let is_worth_it = count as usize > FEW
+            && level < self.rule.depth
+            && 4 * references <= 3 * u64::from(count) * lists;
+        if !is_worth_it {
+            return false;
+        }
+        // It is the finest of the grids that have not too many references.
+        let limit = u64::from(reference_limit(count));
+        let tries = core::iter::successors(Some(count), |&n| (n > 0).then_some(n / 2));
+        for primitives in tries {
+            let tried = self.rule.within(self.lattice, bounds, primitives, level);
+            let Some(resolution) = tried else { continue };
+            if resolution == grid.resolution {
+                return references <= limit || primitives == 0;
+            }
+            let finer = Node::new(0, bounds.min, bounds.max, resolution);
+            let mut references = 0;
+            let mut around = [None; LEVELS];
+            self.each_in(grid, &mut around, 0, &mut |placed| {
+                placed.each_cell(&finer, |_, _| references += 1);
+            });
+            if references <= limit {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// Shows `visit` the triangles in a grid, each once: in the first list that has it.
+    fn each_in(
+        &self,
+        node: &Node,
+        around: &mut [Option<Place>; LEVELS],
+        depth: usize,
+        visit: &mut impl FnMut(&Placed),
+    ) {
+        let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
+        for cell in all.cells() {
+            if let Some(place) = around.get_mut(depth) {
+                *place = Some((*node, cell));
+            }
+            let here = around.get(..=depth).unwrap_or_default();
             match node.content(self.pool, cell) {
                 None => {}
                 Some(Content::List(ids)) => {
-                    let ascends = ids.windows(2).all(|ids| matches!(ids, [a, b] if a < b));
-                    let here = places.get(..=depth).unwrap_or_default();
-                    if !ascends || !ids.iter().all(|&id| self.overlaps(id, here)) {
-                        return Err(Self::wrong(at));
+                    let placed = ids.iter().map(|&id| Placed::new(self.mesh, self.lattice, id));
+                    for placed in placed.flatten().filter(|placed| is_first(placed, here)) {
+                        visit(&placed);
                     }
-                    listed += ids.len() as u64;
-                    *cursor += ids.len();
                 }
-                Some(Content::Grid(inner)) => {
-                    let inner = Node::open(self.pool, inner).ok_or_else(|| Self::wrong(at))?;
-                    listed += self.listed(&inner, cursor, places, depth + 1)?;
+                Some(Content::Grid(at)) => {
+                    if let Some(inner) = Node::open(self.pool, at).filter(|_| depth + 1 < LEVELS) {
+                        self.each_in(&inner, around, depth + 1, visit);
+                    }
                 }
             }
         }
-        if node.start(self.pool, node.cells()) != Some(*cursor) {
-            return Err(Self::wrong(at));
-        }
-        Ok(listed)
-    }
-
-    /// Whether a triangle overlaps all of these cells.
-    fn overlaps(&self, id: u32, places: &[Option<Place>]) -> bool {
-        let Some(placed) = Placed::new(self.mesh, self.lattice, id) else { return false };
-        places.iter().flatten().all(|(node, cell)| {
-            let mut is_there = false;
-            placed.each_cell(node, |_, other| is_there |= other == *cell);
-            is_there
-        })
     }
 
     /// How many lists below a grid must have a triangle.
-    fn expected(&self, node: &Node, placed: &Placed, depth: u32) -> Result<u64, Error> {
-        let mut result = Ok(0);
+    fn expected(&self, node: &Node, placed: &Placed, depth: u32) -> u64 {
+        let mut sum = 0;
         placed.each_cell(node, |_, cell| {
-            let count = match node.content(self.pool, cell) {
-                Some(Content::Grid(at)) if depth + 1 < MAX_DEPTH => {
-                    let inner = Node::open(self.pool, at);
-                    let inner = inner.filter(|inner| self.holds(inner, node, cell, placed));
-                    inner
-                        .ok_or_else(|| Self::wrong(at))
-                        .and_then(|inner| self.expected(&inner, placed, depth + 1))
-                }
-                _ => Ok(1),
+            sum += match node.content(self.pool, cell) {
+                Some(Content::Grid(at)) if depth + 1 < MAX_DEPTH => Node::open(self.pool, at)
+                    .map_or(0, |inner| self.expected(&inner, placed, depth + 1)),
+                _ => 1,
             };
-            result = result.and_then(|sum| Ok(sum + count?));
         });
-        result
+        sum
     }
+}
 
-    /// Whether a grid's box holds what a triangle reaches of the cell around it, but for rounding.
-    fn holds(&self, inner: &Node, outer: &Node, cell: [u32; 3], placed: &Placed) -> bool {
-        let (around, within) = (outer.cell_box(cell), inner.bounds());
-        let slack = self.lattice.margin() * 0.25;
-        let low = placed.reach.min.max(around.min).min(around.max);
-        let high = placed.reach.max.min(around.max).max(around.min);
-        (within.min.cmple(low + slack) & within.max.cmpge(high - slack)).all()
-    }
+/// Whether these cells are the first of their grids that a triangle overlaps.
+fn is_first(placed: &Placed, places: &[Option<Place>]) -> bool {
+    places.iter().flatten().all(|(node, cell)| {
+        let mut first = None;
+        placed.each_cell(node, |_, cell| {
+            first.get_or_insert(cell);
+        });
+        first == Some(*cell)
+    })
 }

@@ -14,7 +14,7 @@ use glam::Vec3A;
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, as_f32, cells_between, woo};
 use crate::dda::{Line, Walk};
-use crate::one_level::{row, slot};
+use crate::one_level::{row, slot, slots_are_sound};
 use crate::visit::Visitor;
 
 /// The most cells of a subgrid on an axis.
@@ -55,6 +55,11 @@ impl Frame {
         Self { low, high: core::array::from_fn(|k| high[k].max(low[k])), resolution: [1; 3] }
     }
 
+    /// Whether this is the frame around what primitives reach of a cell, whatever its resolution.
+    pub(super) fn is_around(&self, reach: &Aabb, cell: [u32; 3]) -> bool {
+        *self == Self { resolution: self.resolution, ..Self::around(reach, cell) }
+    }
+
     /// Woo's resolution for so many primitives in this box of a cell with this size.
     pub(super) fn cut(&mut self, cell_size: Vec3A, density: f64, primitives: u32) -> bool {
         let size = cell_size * self.parts();
@@ -88,12 +93,6 @@ impl Frame {
         let (origin, scale) = self.zoom(cell);
         let within = Aabb { min: (reach.min - origin) * scale, max: (reach.max - origin) * scale };
         cells_between(within, self.resolution)
-    }
-
-    /// Whether the box holds all that a primitive reaches of the cell.
-    pub(super) fn holds(&self, reach: &Aabb, cell: [u32; 3]) -> bool {
-        let needed = Self::around(reach, cell);
-        (0..3).all(|k| self.low[k] <= needed.low[k] && needed.high[k] <= self.high[k])
     }
 }
 
@@ -206,6 +205,40 @@ impl<'a> Subgrid<'a> {
         let slot = slot(self.row_offsets.get(row)?.cast_signed(), x)?;
         let ends = self.hash.get(slot..)?.first_chunk::<2>()?;
         self.references.get(ends[0] as usize..ends[1] as usize)
+    }
+
+    /// Primitive ids in all lists together.
+    pub(super) const fn reference_count(&self) -> usize {
+        self.references.len()
+    }
+
+    /// Cells that have a list.
+    pub(super) fn list_count(&self) -> u32 {
+        self.domain_bits.iter().map(|word| word.count_ones()).sum()
+    }
+
+    /// Whether its sections are as displaced rows leave them, whatever is listed.
+    pub(super) fn is_sound(&self) -> bool {
+        let hash = self.hash;
+        let is_cut = hash.first() == Some(&0)
+            && hash.is_sorted()
+            && hash.last().is_some_and(|&end| end as usize == self.references.len())
+            && !matches!(hash, [.., start, end] if start == end);
+        let is_set = |bit: usize| {
+            let word = self.domain_bits.get(bit / WORD_BITS);
+            word.is_some_and(|word| word >> (bit % WORD_BITS) & 1 != 0)
+        };
+        let resolution @ [width, height, _] = self.frame.resolution;
+        let cells = self.frame.cells();
+        let is_full = hash.windows(2).map(|ends| matches!(ends, [start, end] if start < end));
+        is_cut
+            && !(cells..cells.next_multiple_of(WORD_BITS)).any(is_set)
+            && slots_are_sound(
+                resolution,
+                |row| self.row_offsets.get(row).map(|offset| offset.cast_signed()),
+                |[x, y, z]| is_set(row(height, y, z) * width as usize + x as usize),
+                is_full,
+            )
     }
 }
 

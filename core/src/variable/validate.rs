@@ -1,24 +1,31 @@
 //! Proof that a foreign blob is a variable grid of its mesh.
 //!
-//! The same sum as for one level, over the cells of the top and of the subgrids: every listed
-//! triangle covers the cell that lists it and none is listed twice, so there are as many of them as
-//! the triangles have cells if and only if none is missing. What a triangle has in a subdivided cell
-//! are the cells of the subgrid, whose frame must hold all that the triangle reaches there.
+//! The table of the top cuts the pool into the parts of its cells, so everything is read once and
+//! nothing is left over. Then the same sum as for one level, over the cells of the top and of the
+//! subgrids: every listed triangle covers the cell that lists it and none is listed twice, so there are
+//! as many of them as the triangles have cells if and only if none is missing. A subgrid has the frame
+//! and the resolution that a build gives to the primitives in it, and so many of them that it was worth
+//! it.
+//!
+//! Whether a list is long because nothing would separate its primitives would take memory to prove: a
+//! list may have any length. Queries do not mind.
 
 use glam::Vec3A;
 
 use super::subgrid::Subgrid;
 use super::{Content, Variable};
 use crate::aabb::Aabb;
+use crate::bits::{WORD_BITS, extent};
 use crate::blob::{Header, corrupt};
+use crate::bump::GRID;
 use crate::cell::{CellRange, Lattice};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
-use crate::one_level::check_header;
+use crate::one_level::{check_header, reference_limit, slots_are_sound};
 use crate::survey::boxes;
 
 impl Variable<'_> {
-    /// Whether this is a grid of the mesh in which every query answers right.
+    /// Whether this is what a build makes of the mesh.
     pub(crate) fn validate(
         &self,
         header: &Header,
@@ -27,49 +34,33 @@ impl Variable<'_> {
         mesh: &TriangleMesh<'_>,
     ) -> Result<(), Error> {
         check_header(header, lattice, mesh)?;
+        self.check_table(header, lattice, blob)?;
         let at = |words: &[u32]| corrupt(words.as_ptr().addr() - blob.as_ptr().addr());
-        let reach = |id: u32| {
-            let bounds = mesh.corners(id, Vec3A::new).and_then(Aabb::of)?;
-            Some((lattice.range(&bounds), lattice.reach(&bounds)))
-        };
 
         // Every list ascends, and its triangles cover its cell.
-        let (mut listed, mut claimed) = (0_u64, 0);
+        let mut listed = 0_u64;
         let all = CellRange { min: [0; 3], max: lattice.last() };
         for cell in all.cells() {
             match self.content(cell) {
                 None if self.top.is_marked(cell) => return Err(at(self.top.lists())),
                 None => {}
-                Some(Content::List(words) | Content::Subgrid(words))
-                    if claimed + words.len() > self.top.lists().len() =>
-                {
-                    // Cells that share their words would have them read again and again.
-                    return Err(at(words));
-                }
                 Some(Content::List(ids)) => {
-                    claimed += ids.len();
-                    let covers = |id| reach(id).is_some_and(|(range, _)| range.contains(cell));
-                    if ids.is_empty() || !ascends(ids) || !ids.iter().all(|&id| covers(id)) {
+                    let covers = |&id: &u32| {
+                        let bounds = mesh.corners(id, Vec3A::new).and_then(Aabb::of);
+                        bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
+                    };
+                    if ids.is_empty() || !ascends(ids) || !ids.iter().all(covers) {
                         return Err(at(ids));
                     }
                     listed += ids.len() as u64;
                 }
                 Some(Content::Subgrid(words)) => {
-                    claimed += words.len();
-                    let grid = Subgrid::open(words).ok_or_else(|| at(words))?;
-                    let last = grid.frame.resolution.map(|cells| cells - 1);
-                    for sub in (CellRange { min: [0; 3], max: last }).cells() {
-                        let Some(ids) = grid.references(sub) else { continue };
-                        let covers = |id| {
-                            reach(id).is_some_and(|(range, reach)| {
-                                range.contains(cell) && grid.frame.range(cell, &reach).contains(sub)
-                            })
-                        };
-                        if ids.is_empty() || !ascends(ids) || !ids.iter().all(|&id| covers(id)) {
-                            return Err(at(words));
-                        }
-                        listed += ids.len() as u64;
+                    let grid = Subgrid::open(words).ok_or(at(words))?;
+                    let inside = Inside { grid, cell, lattice, mesh };
+                    if !inside.covers() || !inside.is_built(header) {
+                        return Err(at(words));
                     }
+                    listed += inside.grid.reference_count() as u64;
                 }
             }
         }
@@ -80,18 +71,137 @@ impl Variable<'_> {
             for cell in lattice.range(&bounds).cells() {
                 match self.content(cell) {
                     Some(Content::Subgrid(words)) => {
-                        let grid = Subgrid::open(words).ok_or_else(|| at(words))?;
-                        let reach = lattice.reach(&bounds);
-                        if !grid.frame.holds(&reach, cell) {
-                            return Err(at(words));
-                        }
-                        expected += grid.frame.range(cell, &reach).count();
+                        let grid = Subgrid::open(words).ok_or(at(words))?;
+                        expected += grid.frame.range(cell, &lattice.reach(&bounds)).count();
                     }
                     _ => expected += 1,
                 }
             }
         }
         if listed == expected { Ok(()) } else { Err(at(self.top.lists())) }
+    }
+
+    /// Whether the table of the top cuts the pool into parts of which each belongs to one cell.
+    fn check_table(&self, header: &Header, lattice: &Lattice, blob: &[u8]) -> Result<(), Error> {
+        let at = |section: usize, byte: usize| corrupt(section - blob.as_ptr().addr() + byte);
+        let hash = self.top.hash();
+        let at_slot = |slot: usize| at(hash.as_ptr().addr(), slot * size_of::<u32>());
+        let place = |word: u32| word & !GRID;
+        if hash.first().is_none_or(|&first| place(first) != 0) {
+            return Err(at_slot(0));
+        }
+        for (slot, ends) in hash.windows(2).enumerate() {
+            let &[start, end] = ends else { continue };
+            let is_nothing = place(start) == place(end);
+            if place(start) > place(end) || is_nothing && start & GRID != 0 {
+                return Err(at_slot(slot));
+            }
+        }
+        if hash.last() != Some(&header.reference_count) {
+            return Err(at_slot(header.hash_count as usize));
+        }
+        // The table ends with the last part.
+        if matches!(hash, [.., start, end] if place(*start) == *end) {
+            return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
+        }
+        let rows = self.top.row_offsets();
+        let is_full =
+            hash.windows(2).map(|ends| matches!(ends, [start, end] if place(*start) < place(*end)));
+        let offset = |row: usize| rows.get(row).copied();
+        if !slots_are_sound(lattice.resolution, offset, |cell| self.top.is_marked(cell), is_full) {
+            return Err(at(rows.as_ptr().addr(), 0));
+        }
+        // No bit is set behind the last cell.
+        let (bits, cells) = (self.top.domain_bits(), rows.len() * lattice.resolution[0] as usize);
+        match extent(bits, cells, WORD_BITS) {
+            Some((first, _)) => Err(at(bits.as_ptr().addr(), (cells + first) / 8)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A subgrid where it lies.
+struct Inside<'a> {
+    grid: Subgrid<'a>,
+    cell: [u32; 3],
+    lattice: &'a Lattice,
+    mesh: &'a TriangleMesh<'a>,
+}
+
+impl Inside<'_> {
+    /// The lists, each with its cell in the subgrid.
+    fn lists(&self) -> impl Iterator<Item = ([u32; 3], &[u32])> {
+        let max = self.grid.frame.resolution.map(|cells| cells - 1);
+        let all = CellRange { min: [0; 3], max };
+        all.cells().filter_map(|sub| Some((sub, self.grid.references(sub)?)))
+    }
+
+    /// The cells of the top that a triangle covers, and its reach.
+    fn reach(&self, id: u32) -> Option<(CellRange, Aabb)> {
+        let bounds = self.mesh.corners(id, Vec3A::new).and_then(Aabb::of)?;
+        Some((self.lattice.range(&bounds), self.lattice.reach(&bounds)))
+    }
+
+    /// What the triangles in it reach, each once: where its cells begin.
+    fn reaches(&self) -> impl Iterator<Item = Aabb> {
+        self.lists().flat_map(|(sub, ids)| ids.iter().map(move |&id| (sub, id))).filter_map(
+            |(sub, id)| {
+                let (_, reach) = self.reach(id)?;
+                (self.grid.frame.range(self.cell, &reach).min == sub).then_some(reach)
+            },
+        )
+    }
+
+    /// Whether every list ascends and its triangles cover its cell.
+    fn covers(&self) -> bool {
+        self.lists().all(|(sub, ids)| {
+            let covers = |&id: &u32| {
+                self.reach(id).is_some_and(|(range, reach)| {
+                    range.contains(self.cell)
+                        && self.grid.frame.range(self.cell, &reach).contains(sub)
+                })
+            };
+            !ids.is_empty() && ascends(ids) && ids.iter().all(covers)
+        })
+    }
+
+    /// Whether a build makes this subgrid of the triangles in it.
+    fn is_built(&self, header: &Header) -> bool {
+        let (mut count, mut all) = (0_u32, Aabb::EMPTY);
+        for reach in self.reaches() {
+            all = all.union(&reach);
+            count = count.saturating_add(1);
+        }
+        let references = self.grid.reference_count() as u64;
+        // It separates them.
+        let separates = 4 * references <= 3 * u64::from(count) * u64::from(self.grid.list_count());
+        self.grid.is_sound()
+            && count > header.subdivide_above
+            && self.grid.frame.is_around(&all, self.cell)
+            && references <= u64::from(reference_limit(count))
+            && separates
+            && self.is_settled(header.density, count)
+    }
+
+    /// Whether it is the finest of the grids that have not too many references.
+    fn is_settled(&self, density: f32, count: u32) -> bool {
+        let mut density = f64::from(density);
+        let mut frame = self.grid.frame;
+        loop {
+            let is_cut = frame.cut(self.lattice.cell_size(), density, count);
+            density *= 0.5;
+            if !is_cut {
+                continue;
+            }
+            if frame.resolution == self.grid.frame.resolution {
+                return true;
+            }
+            let references: u64 =
+                self.reaches().map(|reach| frame.range(self.cell, &reach).count()).sum();
+            if references <= u64::from(reference_limit(count)) {
+                return false;
+            }
+        }
     }
 }
 

@@ -69,12 +69,12 @@ impl Scene {
     fn within(self, outer: Self) -> Self {
         let middle = |scene: &Self| {
             let (min, max) = scene.bounds().unwrap_or_default();
-            let at: [f32; 3] = std::array::from_fn(|axis| 0.5 * (min[axis] + max[axis]));
+            let at: [f32; 3] = core::array::from_fn(|axis| 0.5 * (min[axis] + max[axis]));
             at
         };
         let (from, to) = (middle(&self), middle(&outer));
         let place = |p: [f32; 3]| -> [f32; 3] {
-            std::array::from_fn(|axis| p[axis] - from[axis] + to[axis])
+            core::array::from_fn(|axis| p[axis] - from[axis] + to[axis])
         };
         let (min, max) = self.framed_bounds();
         let focus = Some((place(min), place(max)));

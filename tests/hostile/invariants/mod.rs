@@ -1,0 +1,44 @@
+//! What holds of every blob that a build writes, broken one by one: opening or `validate` refuses it, at
+//! a byte that has to do with it, and queries end whatever it is.
+//!
+//! The words are found here from the format's description alone. Those of brick grids are in
+//! tests/edges/chunks.rs.
+
+mod hashed;
+mod header;
+mod recursive;
+mod sections;
+mod variable;
+
+use std::ops::Range;
+
+use hgrid_core::{Error, Grid};
+use hgrid_tests::copy::Copy;
+use hgrid_tests::hostile::{Seed, ends, fixed_rays};
+
+/// What a table says: what is broken, where the error points, and how to break it.
+type Case<'c> = (&'c str, Range<usize>, Box<dyn Fn(&mut Copy) + 'c>);
+
+/// A row of a table.
+fn case<'c>(what: &'c str, at: Range<usize>, change: impl Fn(&mut Copy) + 'c) -> Case<'c> {
+    (what, at, Box::new(change))
+}
+
+/// Changes a blob, makes its checksum right, and asserts that it is refused where it should be.
+fn refused(seed: &Seed, cases: &[Case<'_>]) {
+    let view = seed.mesh.view();
+    for (what, at, change) in cases {
+        let mut copy = Copy::of(&seed.blob);
+        change(&mut copy);
+        assert!(copy.bytes() != seed.blob, "{what}: nothing has changed");
+        copy.sign();
+        let result = Grid::open(copy.bytes(), view).and_then(|grid| {
+            ends(&grid, &fixed_rays(grid.bounds(), 12));
+            grid.validate()
+        });
+        let method = seed.config.method;
+        let is_there = matches!(result, Err(Error::Corrupt { offset })
+            if usize::try_from(offset).is_ok_and(|offset| at.contains(&offset)));
+        assert!(is_there, "{method:?}: {what}: {result:?}, expected at {at:?}");
+    }
+}

@@ -1,0 +1,34 @@
+//! What fuzzing found, and what it found worth keeping: both run again.
+
+use std::fs;
+use std::path::Path;
+
+use hgrid_tests::hostile::TARGETS;
+
+/// Runs all files in a target's folder; how many there were.
+fn run_all(kind: &str, name: &str, run: fn(&[u8])) -> usize {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hostile").join(kind).join(name);
+    let Ok(entries) = fs::read_dir(&folder) else { return 0 };
+    let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    for file in &files {
+        // Shown if the test fails.
+        println!("{}", file.display());
+        run(&fs::read(file).unwrap());
+    }
+    files.len()
+}
+
+#[test]
+fn what_fuzzing_kept_does_no_harm() {
+    for target in TARGETS {
+        run_all("corpus", target.name, target.run);
+    }
+}
+
+#[test]
+fn what_fuzzing_found_does_no_harm_any_more() {
+    for target in TARGETS {
+        run_all("regressions", target.name, target.run);
+    }
+}

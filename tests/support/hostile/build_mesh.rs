@@ -1,0 +1,163 @@
+//! Any bytes as a mesh and a configuration: the build takes the memory that was said, or says why not;
+//! what it makes opens, is valid, and answers as brute force does.
+
+use std::cell::Cell;
+
+use arbitrary::{Arbitrary, Result, Unstructured};
+use hgrid_core::{Block, Config, Control, Error, Grid, Region, Sizes, TriangleMesh, sizes_with};
+
+use super::ask::agrees;
+use super::caller::Loop;
+use super::memory::{CANARY, rarely};
+use super::rays;
+use super::shape::{Shape, config};
+
+/// What is larger is asked about, but not built.
+const MOST_BYTES: usize = 1 << 20;
+
+/// See the head of this file.
+pub fn run(data: &[u8]) {
+    let mut u = Unstructured::new(data);
+    let _ = describe_and_build(&mut u);
+}
+
+fn describe_and_build(u: &mut Unstructured<'_>) -> Result<()> {
+    let config = config(u)?;
+    let (tasks, run) = (u32::arbitrary(u)? % 8, Loop::arbitrary(u)?);
+    let shape = Shape::new(u)?;
+    // Any strides and counts: refused, or a mesh that can be built like any other.
+    if rarely(u, 8)? {
+        let numbers = <[usize; 4]>::arbitrary(u)?.map(|n| if n >> 60 == 0 { n % 64 } else { n });
+        let [stride, vertices, index_stride, triangles] = numbers;
+        if let Ok(view) = shape.strided([stride, vertices], [index_stride, triangles]) {
+            build(u, view, &config, tasks, run);
+        }
+        return Ok(());
+    }
+    build(u, shape.view(), &config, tasks, run);
+    Ok(())
+}
+
+/// A region with canaries around it.
+struct Guarded {
+    blocks: Vec<Block>,
+    bytes: usize,
+}
+
+impl Guarded {
+    fn new(bytes: usize) -> Self {
+        let mut blocks = vec![Block::ZERO; Block::count_for(bytes) + 2];
+        Block::bytes_mut(&mut blocks).fill(CANARY);
+        Self { blocks, bytes }
+    }
+
+    fn region(&mut self) -> &mut [u8] {
+        &mut Block::bytes_mut(&mut self.blocks)[64..64 + self.bytes]
+    }
+
+    fn around_is_intact(&self) -> bool {
+        let all = Block::bytes(&self.blocks);
+        all[..64].iter().chain(&all[64 + self.bytes..]).all(|&byte| byte == CANARY)
+    }
+}
+
+fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, tasks: u32, run: Loop) {
+    let serial = |count: u32, task: &(dyn Fn(u32) + Sync)| (0..count).for_each(task);
+    let honest = Control { tasks, run: &serial, progress: None };
+    let caller = run.for_core();
+    let odd = Control { tasks, run: &caller, progress: None };
+
+    let bound = Sizes::bound_parallel(mesh.triangle_count(), config, tasks);
+    let enough = match sizes_with(&mesh, config, &mut [], &honest) {
+        Ok(enough) => enough,
+        Err(error) => {
+            // Without a size there is no grid either, for the same reason.
+            let (mut index, mut scratch) = (Guarded::new(4096), Guarded::new(4096));
+            let result = Grid::build_with(mesh, config, index.region(), scratch.region(), &honest);
+            assert!(result.is_err_and(|again| is_same(error, again)), "{error:?}");
+            assert!(index.around_is_intact() && scratch.around_is_intact());
+            return;
+        }
+    };
+    if let Some(bound) = bound {
+        assert!(enough.index_bytes <= bound.index_bytes, "{enough:?}, not {bound:?}");
+        assert!(enough.scratch_bytes <= bound.scratch_bytes, "{enough:?}, not {bound:?}");
+    }
+    if enough.scratch_bytes > MOST_BYTES {
+        return;
+    }
+    let mut scratch = Guarded::new(enough.scratch_bytes);
+    let exact = match sizes_with(&mesh, config, scratch.region(), &honest) {
+        Ok(exact) => exact,
+        // What shows only when all is counted.
+        Err(error) => return assert!(matches!(error, Error::InvalidConfig(_)), "{error:?}"),
+    };
+    assert!(exact.is_exact && exact.index_bytes <= enough.index_bytes, "{exact:?} {enough:?}");
+    assert!(exact.scratch_bytes <= enough.scratch_bytes, "{exact:?} {enough:?}");
+    if exact.index_bytes > MOST_BYTES {
+        return;
+    }
+
+    // A loop that does not do its work is found out, or was not needed.
+    if !run.is_right() {
+        let mut index = Guarded::new(exact.index_bytes);
+        let result = Grid::build_with(mesh, config, index.region(), scratch.region(), &odd);
+        let is_told = matches!(result, Err(Error::InvalidParallelFor));
+        assert!(is_told || result.is_ok_and(|grid| grid.validate().is_ok()), "{run:?}");
+        assert!(index.around_is_intact() && scratch.around_is_intact());
+    }
+
+    // One block too little, with the need in the error; then exactly so much.
+    let mut small = Guarded::new(exact.index_bytes.saturating_sub(64));
+    match Grid::build_with(mesh, config, small.region(), scratch.region(), &honest) {
+        Err(Error::OutOfMemory { region: Region::Index, needed_bytes, .. }) => {
+            assert!(needed_bytes >= exact.index_bytes as u64, "{needed_bytes} {exact:?}");
+        }
+        other => panic!("{other:?} in too little memory"),
+    }
+    assert!(small.around_is_intact() && scratch.around_is_intact());
+    let mut index = Guarded::new(exact.index_bytes);
+    let seen = Cell::new((0.0, 0_u32));
+    let progress = |done: f32| {
+        let (before, calls) = seen.get();
+        assert!(before <= done && done <= 1.0, "{done} after {before}");
+        seen.set((done, calls + 1));
+        true
+    };
+    let watched = Control { progress: Some(&progress), ..honest };
+    let blob = {
+        let grid = Grid::build_with(mesh, config, index.region(), scratch.region(), &watched);
+        grid.expect("enough memory").blob().to_vec()
+    };
+    let (done, calls) = seen.get();
+    assert_eq!(done.to_bits(), 1.0_f32.to_bits(), "a build ends with all done");
+    assert!(index.around_is_intact() && scratch.around_is_intact());
+
+    // Stopped at one of these calls: cancelled, or done already.
+    if let Ok(at) = u.int_in_range(0..=calls) {
+        let left = Cell::new(at);
+        let progress = |_| left.replace(left.get().wrapping_sub(1)) != 0;
+        let stopped = Control { progress: Some(&progress), ..honest };
+        match Grid::build_with(mesh, config, index.region(), scratch.region(), &stopped) {
+            Ok(grid) => assert!(at + 1 >= calls && grid.blob() == blob, "{at} of {calls}"),
+            Err(error) => assert!(error == Error::Cancelled && at < calls, "{at} of {calls}"),
+        }
+        assert!(index.around_is_intact() && scratch.around_is_intact());
+    }
+
+    // Alone, on the same memory with whatever is in it now: the same bits.
+    let alone = Grid::build(mesh, config, index.region(), scratch.region()).expect("enough memory");
+    assert!(alone.blob() == blob, "the number of tasks shows");
+    let copy = crate::copy::Copy::of(&blob);
+    let grid = Grid::open(copy.bytes(), mesh).expect("what was built opens");
+    grid.validate().expect("what was built is valid");
+    assert_eq!(grid.method(), config.method);
+    let mut rays = rays::fixed_rays(grid.bounds(), 6);
+    rays.extend(rays::chosen(u, &grid).unwrap_or_default());
+    agrees(&grid, &rays);
+}
+
+/// Whether two errors have one reason: what is too small may be named by either call.
+fn is_same(one: Error, other: Error) -> bool {
+    one == other || matches!(other, Error::OutOfMemory { .. })
+}

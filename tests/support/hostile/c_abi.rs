@@ -1,0 +1,383 @@
+//! Any calls of the C entry points, with any numbers in their structs, as far as the header's rules on
+//! pointers allow: every answer has a status that is known, an error leaves the outputs alone, and what
+//! succeeds answers as the same call in Rust does. Here is what builds; `c_stored` and `c_queries` have
+//! the rest.
+
+use std::cell::Cell;
+use std::ffi::{CStr, c_void};
+use std::ptr::{from_mut, from_ref, null, null_mut};
+
+use arbitrary::{Arbitrary, Result, Unstructured};
+use hgrid_capi::*;
+use hgrid_core::IndexType;
+
+use super::caller::Loop;
+use super::memory::{Memory, Struct, array, rarely};
+use super::shape::{self, Shape};
+
+/// What is larger is not built.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// See the head of this file.
+pub fn run(data: &[u8]) {
+    let mut u = Unstructured::new(data);
+    let Ok(shape) = Shape::new(&mut u) else { return };
+    let mut caller = Caller { shape: &shape, grid: NO_GRID, opened: None, memory: Vec::new() };
+    let _ = caller.calls(&mut u);
+    caller.settle();
+}
+
+pub(super) const NO_GRID: hgrid_grid = hgrid_grid { opaque: [0; 64] };
+
+/// A program that uses the library.
+pub(super) struct Caller<'s> {
+    pub(super) shape: &'s Shape,
+    pub(super) grid: hgrid_grid,
+    pub(super) opened: Option<Opened>,
+    /// All that was lent to the library: a view stays good while others are built.
+    pub(super) memory: Vec<Memory>,
+}
+
+/// What the program's grid is a view of.
+pub(super) struct Opened {
+    /// Which of its memory, and from which byte on.
+    pub(super) blob: usize,
+    pub(super) from: usize,
+    /// `None` for the blob's own.
+    pub(super) mesh: Option<hgrid_mesh>,
+    /// Whether the library built it of this mesh.
+    pub(super) is_right: bool,
+}
+
+/// What the program does next.
+#[derive(Debug, Clone, Copy, Arbitrary)]
+enum Call {
+    Build,
+    Ask,
+    Batch,
+    Sizes,
+    Open,
+    Validate,
+    All,
+    Closest,
+    Fit,
+    Bound,
+    Create,
+    Pack,
+    Peek,
+    Words(i32),
+}
+
+/// The structs of a question for sizes, or of a build.
+pub(super) struct Input {
+    pub(super) mesh: Struct<hgrid_mesh>,
+    pub(super) config: Struct<hgrid_config>,
+    pub(super) report: Struct<hgrid_report>,
+    pub(super) control: Box<Control>,
+}
+
+/// What the callbacks of a build do; the context of the configuration.
+pub(super) struct Control {
+    run: Loop,
+    /// How often progress says to go on.
+    patience: u32,
+    done: Cell<f32>,
+    calls: Cell<u32>,
+}
+
+/// Runs tasks.
+unsafe extern "C" fn run_tasks(
+    context: *mut c_void,
+    count: u32,
+    task: hgrid_task,
+    task_context: *mut c_void,
+) {
+    // SAFETY: only ever given together with one.
+    let control = unsafe { &*context.cast::<Control>() };
+    // SAFETY: any index may be asked for, as long as this runs.
+    control.run.run(count, |index| unsafe { task(task_context, index) });
+}
+
+/// Watches a build.
+unsafe extern "C" fn progress(context: *mut c_void, done: f32) -> bool {
+    // SAFETY: only ever given together with one.
+    let control = unsafe { &*context.cast::<Control>() };
+    assert!(control.done.get() <= done && done <= 1.0, "{done} after {}", control.done.get());
+    control.done.set(done);
+    control.calls.set(control.calls.get() + 1);
+    control.calls.get() <= control.patience
+}
+
+/// The text of a status, which must be one that there is.
+pub(super) fn known(status: hgrid_status) -> hgrid_status {
+    // SAFETY: a text for any number.
+    let text = unsafe { CStr::from_ptr(hgrid_status_string(status)) };
+    assert_ne!(text, c"unknown status", "{status}");
+    status
+}
+
+impl Caller<'_> {
+    fn calls(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
+        for _ in 0..=u.int_in_range(0..=11)? {
+            match Call::arbitrary(u)? {
+                Call::Build => self.build(u)?,
+                Call::Ask => self.ask(u)?,
+                Call::Batch => self.batch(u)?,
+                Call::Sizes => self.sizes(u)?,
+                Call::Open => self.open(u)?,
+                Call::Validate => self.validate(u)?,
+                Call::All => self.all(u)?,
+                Call::Closest => self.closest(u)?,
+                Call::Fit => self.fit(u)?,
+                Call::Bound => self.bound(u)?,
+                Call::Create => self.create(u)?,
+                Call::Pack => self.pack(u)?,
+                Call::Peek => self.peek(u)?,
+                Call::Words(status) => assert!(!hgrid_status_string(status).is_null()),
+            }
+        }
+        Ok(())
+    }
+
+    /// The mesh: as it is, or as far from it as its arrays allow.
+    pub(super) fn mesh(&self, u: &mut Unstructured<'_>) -> Result<Struct<hgrid_mesh>> {
+        let shape = self.shape;
+        let is_short = shape.index_type == IndexType::U16;
+        let mut mesh = hgrid_mesh {
+            struct_size: 0,
+            index_type: if is_short { HGRID_INDEX_U16 } else { HGRID_INDEX_U32 },
+            positions: shape.positions.as_ptr().cast(),
+            position_stride: shape.position_stride,
+            vertex_count: shape.vertex_count,
+            indices: shape.indices.as_ptr().cast(),
+            index_stride: shape.index_stride,
+            triangle_count: shape.triangle_count,
+            masks: if shape.masks.is_empty() { null() } else { shape.masks.as_ptr().cast() },
+            mask_stride: shape.mask_stride,
+        };
+        if rarely(u, 16)? {
+            mesh.index_type = u.int_in_range(0..=2)?;
+            let size = if mesh.index_type == HGRID_INDEX_U16 { 6 } else { 12 };
+            (mesh.position_stride, mesh.vertex_count) = array(u, shape.positions.len(), 12)?;
+            (mesh.index_stride, mesh.triangle_count) = array(u, shape.indices.len(), size)?;
+        }
+        if rarely(u, 48)? {
+            mesh.positions = null();
+        }
+        if rarely(u, 48)? {
+            mesh.indices = null();
+        }
+        if rarely(u, 32)? {
+            mesh.mask_stride = u.int_in_range(0..=8)?;
+        }
+        // Not more masks than there are, unless no memory could hold them.
+        let step = if mesh.mask_stride == 0 { 4 } else { mesh.mask_stride };
+        let span = mesh.triangle_count.saturating_sub(1).checked_mul(step);
+        let span = span.and_then(|span| span.checked_add(4));
+        if span.is_some_and(|span| span > shape.masks.len() && isize::try_from(span).is_ok()) {
+            mesh.masks = null();
+        }
+        Struct::new(u, mesh)
+    }
+
+    pub(super) fn input(&self, u: &mut Unstructured<'_>) -> Result<Input> {
+        let mesh = self.mesh(u)?;
+        let chosen = shape::config(u)?;
+        let patience = if rarely(u, 4)? { u8::arbitrary(u)?.into() } else { u32::MAX };
+        let run = Loop::arbitrary(u)?;
+        let control = Control { run, patience, done: Cell::new(0.0), calls: Cell::new(0) };
+        let control = Box::new(control);
+        let mut config = hgrid_config {
+            struct_size: 0,
+            method: chosen.method as u32,
+            density: chosen.density,
+            macrocell_factor: chosen.macrocell_factor,
+            subdivide_above: chosen.subdivide_above,
+            depth: chosen.depth,
+            cell_size: chosen.cell_size,
+            flags: chosen.flags.bits(),
+            tasks: u32::from(u8::arbitrary(u)? % 80),
+            reserved: u32::from(rarely(u, 48)?),
+            context: from_ref(&*control).cast_mut().cast(),
+            run: if rarely(u, 32)? { None } else { Some(run_tasks) },
+            progress: if bool::arbitrary(u)? { Some(progress) } else { None },
+        };
+        if rarely(u, 32)? {
+            config.method = u32::arbitrary(u)?;
+        }
+        let report = hgrid_report {
+            struct_size: 0,
+            is_exact: 7,
+            index_bytes: 7,
+            scratch_bytes: 7,
+            triangle: 7,
+            skipped_count: 7,
+            reference_count: 7,
+            density: 7.0,
+            resolution: [7; 3],
+            reserved: 7,
+        };
+        let (config, report) = (Struct::new(u, config)?, Struct::new(u, report)?);
+        Ok(Input { mesh, config, report, control })
+    }
+
+    fn sizes(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
+        let mut input = self.input(u)?;
+        let scratch = Memory::new(usize::from(u16::arbitrary(u)?));
+        let start = u.int_in_range(0..=65)?.min(scratch.bytes().len());
+        let length = scratch.bytes().len() - start;
+        let is_sound = input.report.is_sound();
+        let before = *input.report.value();
+        let status = known(input.ask(scratch.at(start), length));
+        let report = input.report.value();
+        if is_sound {
+            assert_eq!(report.struct_size, before.struct_size);
+            assert_eq!((report.skipped_count, report.reserved), (0, 0));
+        } else {
+            assert_ne!(status, HGRID_OK);
+            assert_eq!(report.index_bytes, 7);
+        }
+        Ok(())
+    }
+
+    fn build(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
+        let mut input = self.input(u)?;
+        let [index_bytes, scratch_bytes] = input.need().unwrap_or([4096; 2]);
+        let odd = |u: &mut Unstructured<'_>, bytes: usize| {
+            Ok(if rarely(u, 16)? {
+                match u.int_in_range(0..=2)? {
+                    0 => bytes.saturating_sub(u8::arbitrary(u)?.into()),
+                    1 => bytes + usize::from(u8::arbitrary(u)?),
+                    _ => u16::arbitrary(u)?.into(),
+                }
+            } else {
+                bytes
+            })
+        };
+        let (index_bytes, scratch_bytes) = (odd(u, index_bytes)?, odd(u, scratch_bytes)?);
+        let (index, scratch) = (Memory::new(index_bytes), Memory::new(scratch_bytes));
+        let shift = |u: &mut Unstructured<'_>, memory: &Memory| {
+            let shift = if rarely(u, 32)? { u.int_in_range(0..=64)? } else { 0 };
+            Ok(shift.min(memory.bytes().len()))
+        };
+        let (index_at, scratch_at) = (shift(u, &index)?, shift(u, &scratch)?);
+        let (mut index_start, mut scratch_start) = (index.at(index_at), scratch.at(scratch_at));
+        let (index_bytes, scratch_bytes) = (index_bytes - index_at, scratch_bytes - scratch_at);
+        let mut lengths = [index_bytes, scratch_bytes];
+        match u.int_in_range(0..=63)? {
+            61 => index_start = null_mut(),
+            62 => scratch_start = null_mut(),
+            63 => {
+                // One memory twice: refused, unless it is of no bytes.
+                (scratch_start, lengths[1]) = (index_start, lengths[0]);
+            }
+            _ => {}
+        }
+        let mut grid = self.grid;
+        let to = if rarely(u, 48)? { null_mut() } else { from_mut(&mut grid) };
+        let (mesh, config, report) =
+            (input.mesh.as_ptr(), input.config.as_ptr(), input.report.as_mut_ptr());
+        let [index_length, scratch_length] = lengths;
+        // SAFETY: all pointers are NULL or good for what is said with them.
+        let status = known(unsafe {
+            hgrid_build(
+                mesh,
+                config,
+                index_start,
+                index_length,
+                scratch_start,
+                scratch_length,
+                to,
+                report,
+            )
+        });
+        if status != HGRID_OK {
+            assert_eq!(grid.opaque, self.grid.opaque, "{status}");
+            return Ok(());
+        }
+        assert!(input.mesh.is_sound() && !to.is_null() && index_at % 64 == 0);
+        let Control { done, calls, patience, .. } = &*input.control;
+        let is_watched = !input.config.is_null() && input.config.value().progress.is_some();
+        assert!(!is_watched || done.get().to_bits() == 1.0_f32.to_bits());
+        assert!(calls.get() <= patience.saturating_add(1), "went on when it was to stop");
+        self.grid = grid;
+        self.opened = Some(Opened {
+            blob: self.memory.len(),
+            from: index_at,
+            mesh: Some(*input.mesh.value()),
+            is_right: true,
+        });
+        self.memory.push(index);
+        Ok(())
+    }
+
+    fn fit(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
+        let mut input = self.input(u)?;
+        let budget = usize::from(u16::arbitrary(u)?);
+        let scratch = Memory::new(usize::from(u16::arbitrary(u)?));
+        let mut fitted = *input.config.value();
+        let to = if rarely(u, 48)? { null_mut() } else { from_mut(&mut fitted) };
+        let (mesh, config, report) =
+            (input.mesh.as_ptr(), input.config.as_ptr(), input.report.as_mut_ptr());
+        // SAFETY: all pointers are NULL or good for what is said with them.
+        let status = known(unsafe {
+            hgrid_fit(mesh, config, budget, scratch.at(0), scratch.bytes().len(), to, report)
+        });
+        if status == HGRID_OK {
+            // What fits says so again.
+            assert!(!to.is_null() && input.mesh.is_sound());
+            let is_told = input.report.is_sound();
+            assert!(!is_told || input.report.value().index_bytes <= budget as u64);
+            // Without tasks, which take memory of their own.
+            input.config = Struct::right(hgrid_config { tasks: 1, ..fitted });
+            let again = input.ask(scratch.at(0), scratch.bytes().len());
+            assert!(again == HGRID_OK || !is_told, "{again}");
+            assert!(!is_told || input.report.value().index_bytes <= budget as u64);
+        }
+        Ok(())
+    }
+
+    fn bound(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
+        let mut input = self.input(u)?;
+        let count = if rarely(u, 4)? { usize::arbitrary(u)? } else { self.shape.triangle_count };
+        // SAFETY: all pointers are NULL or good for what is said with them.
+        let status =
+            known(unsafe { hgrid_bound(count, input.config.as_ptr(), input.report.as_mut_ptr()) });
+        let is_mine = count == self.shape.triangle_count && input.report.is_sound();
+        if status == HGRID_OK && is_mine && input.mesh.is_sound() {
+            let bound = *input.report.value();
+            let is_asked = input.ask(null_mut(), 0) == HGRID_OK;
+            let report = input.report.value();
+            let same = input.mesh.value().triangle_count == count;
+            assert!(!is_asked || !same || report.index_bytes <= bound.index_bytes);
+            assert!(!is_asked || !same || report.scratch_bytes <= bound.scratch_bytes);
+        }
+        Ok(())
+    }
+}
+
+impl Input {
+    /// Asks for sizes.
+    fn ask(&mut self, scratch: *mut c_void, scratch_bytes: usize) -> hgrid_status {
+        let (mesh, config) = (self.mesh.as_ptr(), self.config.as_ptr());
+        let report = self.report.as_mut_ptr();
+        // SAFETY: all pointers are NULL or good for what is said with them.
+        unsafe { hgrid_sizes(mesh, config, scratch, scratch_bytes, report) }
+    }
+
+    /// What a build takes, if it can be asked for and is not too much.
+    pub(super) fn need(&mut self) -> Option<[usize; 2]> {
+        if !self.report.is_sound() || self.ask(null_mut(), 0) != HGRID_OK {
+            return None;
+        }
+        let enough = self.report.value().scratch_bytes;
+        let scratch = Memory::new(usize::try_from(enough).ok().filter(|_| enough <= MOST_BYTES)?);
+        if self.ask(scratch.at(0), scratch.bytes().len()) != HGRID_OK {
+            return None;
+        }
+        let report = self.report.value();
+        assert!(report.is_exact == 1 && report.scratch_bytes <= enough);
+        let index_bytes = usize::try_from(report.index_bytes).ok();
+        Some([index_bytes.filter(|_| report.index_bytes <= MOST_BYTES)?, scratch.bytes().len()])
+    }
+}

@@ -1,0 +1,147 @@
+//! The options of a query: in C as a fuzzer chooses them, and the same in Rust.
+
+use std::cell::RefCell;
+use std::ffi::c_void;
+use std::ptr::{from_mut, from_ref, null_mut};
+
+use arbitrary::{Arbitrary, Result, Unstructured};
+use hgrid_capi::*;
+use hgrid_core::{Counters, Cull, Hit, INVALID_ID, QueryOptions, Verdict};
+
+use super::memory::{Struct, rarely};
+
+/// A hit in bits.
+pub(super) fn bits(hit: &Hit) -> [u32; 4] {
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
+}
+
+/// A hit of C's in bits.
+pub(super) fn c_bits(hit: &hgrid_hit) -> [u32; 4] {
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
+}
+
+/// Options and what they point to.
+pub(super) struct Options {
+    options: Struct<hgrid_query_options>,
+    filter: Box<Filter>,
+    counters: Box<hgrid_counters>,
+}
+
+/// Says of hit after hit what two bits say, round and round.
+struct Filter {
+    verdicts: u32,
+    shown: RefCell<Vec<(usize, [u32; 4])>>,
+}
+
+impl Filter {
+    fn ask(&self, ray: usize, hit: [u32; 4]) -> u32 {
+        let mut shown = self.shown.borrow_mut();
+        shown.push((ray, hit));
+        self.verdicts >> (shown.len() % 16 * 2) & 3
+    }
+}
+
+unsafe extern "C" fn filter(
+    context: *mut c_void,
+    ray: usize,
+    hit: *const hgrid_hit,
+) -> hgrid_verdict {
+    // SAFETY: only ever given together with one.
+    let filter = unsafe { &*context.cast::<Filter>() };
+    // SAFETY: a hit by the header.
+    filter.ask(ray, c_bits(unsafe { &*hit }))
+}
+
+/// What questions in Rust came to.
+#[derive(Default)]
+pub(super) struct Told {
+    shown: Vec<(usize, [u32; 4])>,
+    work: Counters,
+}
+
+impl Options {
+    pub(super) fn new(u: &mut Unstructured<'_>) -> Result<Self> {
+        let mut counters =
+            Box::new(hgrid_counters { primitive_tests: 1, cell_steps: 2, grid_steps: 3 });
+        let verdicts = u32::arbitrary(u)?;
+        let filter_box = Box::new(Filter { verdicts, shown: RefCell::default() });
+        let [has_filter, has_counters, is_plain] = <[bool; 3]>::arbitrary(u)?;
+        let mut options = hgrid_query_options {
+            struct_size: 0,
+            mask: u32::MAX,
+            cull: HGRID_CULL_NONE,
+            skip: INVALID_ID,
+            context: from_ref(&*filter_box).cast_mut().cast(),
+            filter: if has_filter { Some(filter) } else { None },
+            counters: if has_counters { from_mut(&mut *counters) } else { null_mut() },
+        };
+        if !is_plain {
+            options.mask = u8::arbitrary(u)?.into();
+            options.cull = u.int_in_range(0..=2)?;
+            options.skip = u8::arbitrary(u)?.into();
+        }
+        if rarely(u, 32)? {
+            options.cull = u32::arbitrary(u)?;
+        }
+        Ok(Self { options: Struct::new(u, options)?, filter: filter_box, counters })
+    }
+
+    /// NULL is fine.
+    pub(super) fn are_sound(&self) -> bool {
+        self.options.is_null() || self.options.is_sound() && self.cull().is_some()
+    }
+
+    pub(super) fn as_ptr(&self) -> *const hgrid_query_options {
+        self.options.as_ptr()
+    }
+
+    fn cull(&self) -> Option<Cull> {
+        [Cull::None, Cull::Back, Cull::Front].get(self.options.value().cull as usize).copied()
+    }
+
+    /// Asks in Rust what is asked in C about the ray at a place.
+    pub(super) fn ask<T>(
+        &self,
+        told: &mut Told,
+        ray: usize,
+        ask: impl FnOnce(&mut QueryOptions<'_>) -> T,
+    ) -> T {
+        if self.options.is_null() {
+            return ask(&mut QueryOptions::default());
+        }
+        let hgrid_query_options { mask, skip, filter, .. } = *self.options.value();
+        let verdicts = self.filter.verdicts;
+        let Told { shown, work } = told;
+        let again = Filter { verdicts, shown: RefCell::new(std::mem::take(shown)) };
+        let mut offer = |hit: &Hit| match again.ask(ray, bits(hit)) {
+            HGRID_ACCEPT => Verdict::Accept,
+            HGRID_ACCEPT_AND_STOP => Verdict::AcceptAndStop,
+            _ => Verdict::Reject,
+        };
+        let cull = self.cull().unwrap_or_default();
+        let mut options = QueryOptions { mask, cull, skip, ..QueryOptions::counting(work) };
+        if filter.is_some() {
+            options.filter = Some(&mut offer);
+        }
+        let answer = ask(&mut options);
+        *shown = again.shown.into_inner();
+        answer
+    }
+
+    /// Whether the filter was shown, and the counters count, what the questions in Rust came to.
+    pub(super) fn agree(&self, told: &Told) -> bool {
+        let is_counting = !self.options.is_null() && !self.options.value().counters.is_null();
+        let work = if is_counting { told.work } else { Counters::default() };
+        let hgrid_counters { primitive_tests, cell_steps, grid_steps } = *self.counters;
+        *self.filter.shown.borrow() == told.shown
+            && [primitive_tests, cell_steps, grid_steps]
+                == [work.primitive_tests + 1, work.cell_steps + 2, work.grid_steps + 3]
+    }
+
+    /// Whether rays are traced one by one.
+    pub(super) fn are_default(&self) -> bool {
+        let hgrid_query_options { mask, cull, skip, filter, counters, .. } = *self.options.value();
+        let is_plain = mask == u32::MAX && cull == HGRID_CULL_NONE && skip == INVALID_ID;
+        self.options.is_null() || is_plain && filter.is_none() && counters.is_null()
+    }
+}

@@ -1,0 +1,55 @@
+//! How much work one ray can cost, whatever the bytes say.
+
+use hgrid_core::{Counters, Grid, Method};
+
+/// The most that a query of one ray may count.
+///
+/// A walk moves one axis towards its end at every step, so it has no more steps than the cells on the
+/// three axes of its box sum up to. Boxes within boxes multiply that; where bytes say how deep, there
+/// is a last depth.
+#[must_use]
+pub fn most(grid: &Grid<'_>) -> Counters {
+    let sum = |cells: [u32; 3]| cells.iter().map(|&c| u64::from(c)).sum::<u64>();
+    let words = grid.blob_bytes() as u64 / 4;
+    let cells = sum(grid.resolution());
+    let cell_steps = match grid.method() {
+        // One walk.
+        Method::OneLevel => cells,
+        Method::Fixed => macrocells(grid.resolution(), grid.config().macrocell_factor),
+        // In every cell a subgrid of no more than 255 cells on an axis.
+        Method::Variable => cells * (1 + 3 * 255),
+        // One step for each entry.
+        Method::Recursive => words,
+        // Four bricks on an axis of a block, four cells on one of a brick, each divided twice.
+        Method::Brick => {
+            let bricks = |cell: u64| 10 * (1 + 10 * (1 + cell));
+            sum(grid.resolution().map(|c| c.div_ceil(16))) * (1 + bricks(bricks(bricks(0))))
+        }
+        method => panic!("nobody has said what {method:?} may cost"),
+    };
+    // Lists hold each word once.
+    Counters { primitive_tests: words, cell_steps, grid_steps: cell_steps }
+}
+
+/// Steps on all levels, if all macrocells were full.
+fn macrocells(resolution: [u32; 3], factor: u32) -> u64 {
+    let sum = |cells: [u32; 3]| cells.iter().map(|&c| u64::from(c)).sum::<u64>();
+    let few = |cells: [u32; 3]| cells.iter().map(|&c| u64::from(c)).product::<u64>() <= 10_000;
+    let mut levels = vec![resolution];
+    while levels.len() <= 4 {
+        let above = levels[levels.len() - 1].map(|cells| cells.div_ceil(factor));
+        levels.push(above);
+        if few(above) {
+            break;
+        }
+    }
+    let mut walks = 1;
+    let mut steps = 0;
+    for (level, cells) in levels.iter().enumerate().rev() {
+        let is_top = level + 1 == levels.len();
+        let box_of_one = if is_top { *cells } else { cells.map(|c| c.min(factor)) };
+        walks *= sum(box_of_one);
+        steps += walks;
+    }
+    steps
+}

@@ -1,0 +1,50 @@
+//! What fuzzing runs: functions of any bytes that panic where the library breaks a promise.
+//!
+//! `tests/fuzz` gives them the bytes that a fuzzer invents, `tests/hostile` those that were kept. What
+//! the bytes mean is said by the types of each target, through `arbitrary`: most bytes mean something,
+//! and what is missing at the end is zero.
+//!
+//! A new entry point of the library belongs into [`ask`], where every target that has a grid asks it,
+//! and into [`c_abi`], where C does.
+
+mod ask;
+mod build_mesh;
+mod c_abi;
+mod c_options;
+mod c_queries;
+mod c_stored;
+mod caller;
+mod damage;
+mod limits;
+mod memory;
+mod open_query;
+mod rays;
+mod seeds;
+mod shape;
+mod validate;
+
+pub use ask::{agrees, ends};
+pub use build_mesh::run as build_mesh;
+pub use c_abi::run as c_abi;
+pub use damage::Edit;
+pub use open_query::run as open_query;
+pub use rays::fixed_rays;
+pub use seeds::{Seed, nested, seeds};
+pub use validate::run as validate;
+
+/// What a fuzzer runs, and the folder of its bytes.
+#[derive(Debug, Clone, Copy)]
+pub struct Target {
+    /// Its name, and that of its folders.
+    pub name: &'static str,
+    /// What it does.
+    pub run: fn(&[u8]),
+}
+
+/// All of them.
+pub const TARGETS: [Target; 4] = [
+    Target { name: "open_query", run: open_query },
+    Target { name: "validate", run: validate },
+    Target { name: "build_mesh", run: build_mesh },
+    Target { name: "c_abi", run: c_abi },
+];
