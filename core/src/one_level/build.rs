@@ -191,12 +191,14 @@ pub(crate) fn build<'a>(
     let blob = bytes.and_then(|bytes| index.get_mut(..bytes)).ok_or(too_small)?;
     let sections = plan.layout.sections_mut(blob).ok_or(too_small)?;
 
-    *sections.header = plan.header(config, mesh).to_bytes();
+    // What was here is no grid any more, should the build be cancelled.
+    sections.header.fill(0);
     copy(rows.offsets, sections.row_offsets);
     copy(rows.domain_bits, sections.domain_bits);
     let spread = MeshSpread { mesh, lattice: &plan.lattice };
     fill(&spread, sections.row_offsets, sections.hash, sections.references, watch)?;
     overlay.fill(plan.lattice.resolution, sections.domain_bits, sections.overlay);
+    *sections.header = plan.header(config, mesh).to_bytes();
     Ok(blob)
 }
 

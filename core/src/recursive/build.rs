@@ -153,7 +153,9 @@ fn run(
     }
     let (scratch, _) = split_mut::<u32>(scratch, needed_bytes / 4).ok_or(too_small)?;
 
-    let pool = index.get_mut(HEADER_BYTES..).unwrap_or_default();
+    let (header, pool) = index.split_at_mut_checked(HEADER_BYTES).unwrap_or_default();
+    // What was here is no grid any more, should the build end with an error.
+    header.fill(0);
     let mut builder = Builder { mesh, lattice: &lattice, rule, pool: Bump::over(pool), watch };
 
     let finite = usize::try_from(survey.finite_count).unwrap_or(usize::MAX);

@@ -221,6 +221,8 @@ fn run(
     };
     let mut pool = Bump::over(pool);
     let mut slots = head.map(|sections| {
+        // What was here is no grid any more, should the build end with an error.
+        sections.header.fill(0);
         copy(offsets, sections.row_offsets);
         copy(domain_bits, sections.domain_bits);
         sections.hash
