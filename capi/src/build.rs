@@ -11,7 +11,7 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 /// Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
 /// is looked at.
 ///
-/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration, for array
+/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are a little more, for the default configuration and for array
 /// declarations. How much more than enough it is depends on the method: a scan takes a sixth of it or
 /// less with one level; with recursive and brick it is generous beyond use.
 ///
@@ -89,12 +89,15 @@ pub unsafe extern "C" fn hgrid_sizes(
 ///
 /// `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
 /// (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no more than a
-/// step too much: a step is a factor of 1.41 in the number of cells, and takes as long as `hgrid_sizes`.
-/// Bring scratch, as for `hgrid_sizes`; without, a grid must fit by its bound, and gets coarser than it
-/// had to be. The scratch holds nothing of use afterwards.
+/// step too much: a step is a factor of 1.41 in the number of cells. It takes a dozen times as long as `hgrid_sizes`, or
+/// less.
+/// Bring as much scratch as `hgrid_sizes` without scratch says: with `HGRID_METHOD_ONE_LEVEL` and
+/// `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser than it had
+/// to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
+/// afterwards. A density, or cells, that would be too fine for a build count as too large here.
 ///
 /// `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be the same as
-/// `fitted`. `report` may be NULL.
+/// `fitted`, which else may hold anything. `report` may be NULL.
 ///
 /// Returns `HGRID_OK`, and the report says what the fitted grid takes; or
 /// `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or what

@@ -12,7 +12,8 @@ use crate::types::hgrid_grid;
 /// Finds the closest triangle that a ray hits.
 ///
 /// Returns true and writes `hit`; or returns false and writes nothing. Where several triangles are
-/// hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count.
+/// hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count, unless
+/// `cull` of the options says otherwise.
 /// A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
 /// without area, or one that is seen exactly edge-on, is not hit.
 ///
@@ -75,8 +76,9 @@ pub unsafe extern "C" fn hgrid_occluded(
 /// Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
 ///
 /// Writes as many hits as there is room for, the nearest, and to `count` how many there are, which may
-/// be more. With room for all, the ray is walked once; otherwise, and with a filter, once more for each
-/// sixteen hits, from where it got to: so nothing is allocated, whatever their number. Options as
+/// be more. With room for more than there are, the ray is walked once; otherwise, and with a filter, once
+/// more for each sixteen hits, from where it got to: so nothing is allocated, whatever their number, but
+/// thousands of hits in one cell take long, as the square of their number. Options as
 /// with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what it accepts is
 /// written and counted.
 ///
@@ -94,7 +96,8 @@ pub unsafe extern "C" fn hgrid_occluded(
 /// }
 /// ```
 ///
-/// `hits` may be NULL if `capacity` is 0. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
+/// `hits` may be NULL if `capacity` is 0, and overlaps nothing else that the call uses; a filter may look
+/// at those that it has accepted. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
 /// returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
 /// `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_ANSWERS`
 /// (a capacity that is impossible). A ray that is none hits nothing: the count is 0.
@@ -135,8 +138,9 @@ pub unsafe extern "C" fn hgrid_intersect_all(
 /// anything that is not as it should be (another NULL, a view of zeros, options that break the rules, a point that
 /// is not finite, a distance that is NaN or negative) the answer is false.
 ///
-/// The call allocates nothing and always ends. How long it takes grows with the number of cells that
-/// are as close as the answer: far from the mesh and in the middle of nothing, limit the distance.
+/// The call allocates nothing and always ends. How long it takes grows with the triangles in a cube
+/// around the point that reaches as far as the answer: it is short near the mesh, and far outside of it
+/// that of a loop over a good part of all triangles.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///

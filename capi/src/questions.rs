@@ -110,8 +110,9 @@ pub struct hgrid_query_options {
     pub mask: u32,
     /// Which sides are not hit: one of `HGRID_CULL_...`.
     pub cull: u32,
-    /// A triangle that is not hit, usually the one that the ray leaves, so that it needs no epsilon;
-    /// or `HGRID_INVALID_ID`.
+    /// A triangle that is not hit, usually the one that the ray leaves, which then cannot hit itself, without any
+    /// epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge still may be hit, where the origin was rounded
+    /// to just below it: where that matters, give a small `t_min`, too.
     pub skip: u32,
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
@@ -218,8 +219,8 @@ pub struct hgrid_statistics {
     pub longest_list: u32,
     /// 0.
     pub reserved: u32,
-    /// A hash of the grid's box, resolution and lists: the same for the same grid on every platform,
-    /// whatever its byte order. It tells grids apart; it is no defence against forgery.
+    /// A hash of the grid's box, resolution and lists in order, not of which cell has which: the same for
+    /// the same grid on every platform, whatever its byte order. No defence against forgery.
     pub content_hash: u64,
 }
 
@@ -246,12 +247,17 @@ impl From<Hit> for hgrid_hit {
     }
 }
 
-impl hgrid_counters {
-    /// Adds the work of a query.
-    pub(crate) fn add(&mut self, work: &Counters) {
-        self.primitive_tests = self.primitive_tests.wrapping_add(work.primitive_tests);
-        self.cell_steps = self.cell_steps.wrapping_add(work.cell_steps);
-        self.grid_steps = self.grid_steps.wrapping_add(work.grid_steps);
+impl From<hgrid_counters> for Counters {
+    fn from(counters: hgrid_counters) -> Self {
+        let hgrid_counters { primitive_tests, cell_steps, grid_steps } = counters;
+        Self { primitive_tests, cell_steps, grid_steps }
+    }
+}
+
+impl From<Counters> for hgrid_counters {
+    fn from(counters: Counters) -> Self {
+        let Counters { primitive_tests, cell_steps, grid_steps } = counters;
+        Self { primitive_tests, cell_steps, grid_steps }
     }
 }
 

@@ -17,17 +17,17 @@ pub const HGRID_OK: hgrid_status = 0;
 pub const HGRID_ERROR_NULL_ARGUMENT: hgrid_status = -1;
 
 /// A struct's `struct_size` is smaller than the struct, or larger and what is behind the known
-/// fields is not zero. The usual cause is a struct that was not initialised with its `_INIT` macro.
+/// fields, or a reserved one, is not zero. The usual cause is a struct that was not initialised with its `_INIT` macro.
 pub const HGRID_ERROR_STRUCT_SIZE: hgrid_status = -2;
 
 /// The index, the scratch or the blob does not start at a multiple of `HGRID_ALIGNMENT`.
 pub const HGRID_ERROR_MISALIGNED: hgrid_status = -3;
 
 /// The index or the scratch overlaps the other one or the mesh; or answers of a batch overlap its
-/// rays.
+/// rays; or memory for a packed blob overlaps its grid or its mesh.
 pub const HGRID_ERROR_OVERLAP: hgrid_status = -4;
 
-/// The index is too small. The report says how many bytes it needs.
+/// The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `bytes` says it.
 ///
 /// With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
 /// methods the grid was written as far as it went, so the index may hold anything.
@@ -160,7 +160,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_OK => c"success",
         HGRID_ERROR_NULL_ARGUMENT => c"a pointer is NULL: pass what the function asks for",
         HGRID_ERROR_STRUCT_SIZE => {
-            c"wrong struct_size: initialise the struct with its HGRID_..._INIT macro"
+            c"wrong struct_size, or a reserved field that is not 0: use the struct's HGRID_..._INIT macro"
         }
         HGRID_ERROR_MISALIGNED => {
             c"misaligned region: start index, scratch and blob at a multiple of 64 bytes"
@@ -168,7 +168,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_OVERLAP => {
             c"overlapping memory: keep index, scratch and mesh apart, and answers off their rays"
         }
-        HGRID_ERROR_INDEX_TOO_SMALL => c"index too small: bring the report's index_bytes",
+        HGRID_ERROR_INDEX_TOO_SMALL => c"index too small: bring as many bytes as the report, or hgrid_pack, says",
         HGRID_ERROR_SCRATCH_TOO_SMALL => c"scratch too small: bring the report's scratch_bytes",
         HGRID_ERROR_OUT_OF_MEMORY => {
             c"out of memory: the report says how many bytes index and scratch need"

@@ -14,8 +14,8 @@ use crate::types::{hgrid_grid, hgrid_mesh};
 /// Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
 ///
 /// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
-/// in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
-/// ignored. It says itself which method built it and how. The mesh is the one it was built for,
+/// in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of `hgrid_pack`;
+/// bytes behind it are ignored. It says itself which method built it and how. The mesh is the one it was built for,
 /// of which only the counts are compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh`
 /// may be NULL.
 ///
@@ -25,7 +25,10 @@ use crate::types::{hgrid_grid, hgrid_mesh};
 /// memory of your own.
 ///
 /// `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
-/// and leaves `grid` as it was.
+/// and leaves `grid` as it was: `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_NOT_A_GRID`,
+/// `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_TRUNCATED`,
+/// `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`, `HGRID_ERROR_CORRUPT`, or what is wrong with the
+/// mesh.
 ///
 /// Threads: any number of calls at once, also on the same blob, each with a view of its own.
 ///
@@ -54,10 +57,10 @@ pub unsafe extern "C" fn hgrid_open(
 
 /// Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
 ///
-/// The bytes may lie at any address. Neither argument may be NULL, unless `blob_bytes` is 0. Returns
+/// The bytes may lie at any address. `info` may not be NULL; `blob` may only if `blob_bytes` is 0. Returns
 /// `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was: `HGRID_ERROR_NOT_A_GRID`,
 /// `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`,
-/// `HGRID_ERROR_CORRUPT`.
+/// `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`.
 ///
 /// Threads: any number of calls at once, each with an info of its own.
 ///
@@ -85,13 +88,15 @@ pub unsafe extern "C" fn hgrid_peek(
 /// multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid. Nothing is
 /// copied when it is opened.
 ///
-/// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh. It may be NULL if
+/// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh nor any argument of this
+/// call. It may be NULL if
 /// `capacity` is 0: to ask for the size. `grid` and `bytes` may not be NULL.
 ///
 /// Returns `HGRID_OK` and has written the blob; or the reason, and has written nothing:
 /// `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
-/// `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged, `HGRID_ERROR_NOT_A_GRID`. In the first two
-/// cases of all these `bytes` becomes the size of the packed blob.
+/// `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged, `HGRID_ERROR_NOT_A_GRID`,
+/// `HGRID_ERROR_NULL_ARGUMENT`. With `HGRID_OK` and with `HGRID_ERROR_INDEX_TOO_SMALL`, `bytes` becomes the size
+/// of the packed blob; otherwise it is left as it was.
 ///
 /// Threads: any number of calls and queries on the same grid at once, each with memory of its own.
 ///

@@ -430,7 +430,7 @@ impl hgrid_mesh {
         let Self { masks, mask_stride, triangle_count, .. } = *self;
         let count = if masks.is_null() { 0 } else { triangle_count };
         Elements::new(masks, mask_stride, count, size_of::<u32>())
-            .filter(|elements| elements.stride >= size_of::<u32>())
+            .filter(|elements| count == 0 || elements.stride >= size_of::<u32>())
             .ok_or(HGRID_ERROR_INVALID_MASKS)
     }
 }

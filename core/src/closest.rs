@@ -99,6 +99,9 @@ impl Grid<'_> {
     /// The point of the mesh that is closest to a point, and no farther than `max_distance`; where
     /// several triangles are equally close, that of the lowest id.
     ///
+    /// The time grows with the triangles in a cube around the point that reaches as far as the answer: it
+    /// is short near the mesh, and that of a good part of all triangles far outside of it.
+    ///
     /// Of the options, mask, the triangle to skip and counters mean something here: a cell step is a list that
     /// was looked at. A point or a distance that is NaN, an infinite point and a negative distance find
     /// nothing.
@@ -139,7 +142,8 @@ impl Grid<'_> {
         let (min, max) = self.bounds();
         let [min, max] = [min, max].map(|corner| DVec3::from_array(corner.map(f64::from)));
         let outside = (min - center).max(center - max).max(DVec3::ZERO).max_element();
-        let mut inside = f64::from(self.cell_size().max_element());
+        // No less than what makes a difference so far out.
+        let mut inside = f64::from(self.cell_size().max_element()).max(outside * FAR);
         let mut reach = outside + inside;
         loop {
             self.visit(&around(center, reach), &mut |ids| {
@@ -175,6 +179,9 @@ impl ClosestPoint {
     const NONE: Self =
         Self { position: [0.0; 3], distance: 0.0, u: 0.0, v: 0.0, primitive: INVALID_ID };
 }
+
+/// Less than this part of its distance nobody sees.
+const FAR: f64 = 1.0 / 1_125_899_906_842_624.0; // 2^-50
 
 /// A cube around a point, rounded outwards.
 fn around(center: DVec3, reach: f64) -> Aabb {

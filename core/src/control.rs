@@ -110,6 +110,10 @@ impl<'c> Watch<'c> {
     /// Tells that this much is done; an error if the caller does not want the rest.
     pub(crate) fn at(&self, done: f32) -> Result<(), Error> {
         let Some(progress) = self.progress else { return Ok(()) };
+        // That all is done is said once, at the end, whatever the numbers of a loop round to.
+        if done >= 1.0 {
+            return Ok(());
+        }
         // Not for nothing; and where a build starts anew, with coarser cells say, it does not go back.
         if done >= self.done.get() + LEAST {
             self.done.set(done);

@@ -14,7 +14,7 @@ pub struct Counters {
 
 impl Counters {
     /// Adds the work of other queries. Sums stop at the largest number instead of starting again.
-    pub(crate) const fn add(&mut self, work: &Self) {
+    pub const fn add(&mut self, work: &Self) {
         self.primitive_tests = self.primitive_tests.saturating_add(work.primitive_tests);
         self.cell_steps = self.cell_steps.saturating_add(work.cell_steps);
         self.grid_steps = self.grid_steps.saturating_add(work.grid_steps);

@@ -97,8 +97,9 @@ impl<'a> Grid<'a> {
     /// where there is less, but enough for fewer, there are fewer.
     ///
     /// # Errors
-    /// Those of [`build`](Self::build), and [`Error::InvalidParallelFor`] if a task was run twice or
-    /// not at all.
+    /// Those of [`build`](Self::build), [`Error::InvalidParallelFor`] if a task was run twice or not at
+    /// all, and [`Error::Cancelled`] if the progress callback had enough; after these two the index holds
+    /// nothing of use.
     pub fn build_with(
         mesh: TriangleMesh<'a>,
         config: &Config,
@@ -301,7 +302,8 @@ impl<'a> Grid<'a> {
         &self.mesh
     }
 
-    /// The grid as bytes: what to copy, store or send in order to [`open`](Self::open) it again.
+    /// The grid as bytes: what to copy, store or send in order to [`open`](Self::open) it again. Of a packed grid it is the
+    /// grid alone, to be opened with its mesh; [`pack`](Self::pack) makes a packed one again.
     #[must_use]
     pub const fn blob(&self) -> &'a [u8] {
         self.blob

@@ -22,8 +22,8 @@ pub struct Statistics {
     pub reference_count: u64,
     /// Ids in the longest list.
     pub longest_list: u32,
-    /// A hash of the box, the resolution and all lists: the same for the same grid on every platform,
-    /// whatever its byte order. Not a defence against forgery.
+    /// A hash of the box, the resolution and all lists in order, not of which cell has which: the same for
+    /// the same grid on every platform, whatever its byte order. Not a defence against forgery.
     pub content_hash: u64,
 }
 

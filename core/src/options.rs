@@ -65,8 +65,9 @@ pub struct QueryOptions<'q> {
     pub mask: u32,
     /// Which sides are not hit.
     pub cull: Cull,
-    /// A triangle that is not hit: the one that the ray leaves, so that no epsilon is needed. At first
-    /// [`INVALID_ID`].
+    /// A triangle that is not hit: the one that the ray leaves, which it cannot hit again, without any
+    /// epsilon. A neighbour across an edge still may be, where the origin was rounded to just below
+    /// it. At first [`INVALID_ID`].
     pub skip: u32,
     /// Says of a hit whether it counts. Asked about hits from near to far, where `t` is equal by
     /// ascending id, and about each triangle at most once for each ray.
@@ -139,7 +140,7 @@ impl Grid<'_> {
     /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
     /// let hit = grid.intersect(&ray).expect("in front of the camera");
     ///
-    /// // Leave the surface: no epsilon, the triangle is named.
+    /// // Leave the surface: the triangle itself is named, and needs no epsilon.
     /// let from = Ray::new([0.25, 0.25, 0.0], [0.0, 0.0, 1.0]);
     /// let mut options = QueryOptions { skip: hit.primitive, ..QueryOptions::default() };
     /// assert!(grid.occluded(&from) && !grid.occluded_with(&from, &mut options));
@@ -168,8 +169,9 @@ impl Grid<'_> {
     /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.
     ///
     /// Writes as many of them as `hits` has room for, the nearest, and returns how many there are. With
-    /// room for all, the ray is walked once. Otherwise, and with a filter, it is walked once more for
-    /// each sixteen hits, from where it got to: so no memory is taken, whatever their number.
+    /// room for more than there are, the ray is walked once. Otherwise, and with a filter, it is walked
+    /// once more for each sixteen hits, from where it got to: so no memory is taken, whatever their number,
+    /// but thousands of hits in one cell take long, as the square of their number.
     ///
     /// ```
     /// # use hgrid_core::*;

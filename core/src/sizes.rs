@@ -3,10 +3,11 @@
 use crate::brick;
 use crate::config::{Config, Method};
 use crate::control::Control;
-use crate::error::{Error, Region};
+use crate::error::{ConfigField, Error, Region};
 use crate::fixed;
 use crate::mesh::TriangleMesh;
 use crate::one_level;
+use crate::ray::round;
 use crate::recursive;
 use crate::variable;
 
@@ -25,8 +26,8 @@ pub struct Sizes {
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A one-level grid of a scan takes a sixth of it or less; for recursive grids it is generous beyond
-    /// use. `None` if no build takes the configuration, or the sizes do not fit the machine's address
+    /// A one-level grid of a scan takes a sixth of it or less; for recursive and brick grids it is generous
+    /// beyond use. `None` if no build takes the configuration, or the sizes do not fit the machine's address
     /// space.
     ///
     /// ```
@@ -91,9 +92,9 @@ impl Sizes {
 ///
 /// With an empty `scratch` the answer takes two passes over the triangles, one more for each halving
 /// of the density, and `index_bytes` is enough: for a scan up to twice what one level takes, four
-/// times what a fixed grid takes, for the other two a generous multiple. With `scratch_bytes` of
+/// times what a fixed grid takes, for the others a generous multiple. With `scratch_bytes` of
 /// scratch (same alignment rule as for a build) the grid is planned in it and `index_bytes` is exact,
-/// for about half the time of a build, up to all of it for a variable or recursive grid. The scratch
+/// for about half the time of a build, up to all of it for the others. The scratch
 /// holds nothing of use afterwards.
 ///
 /// # Errors
@@ -142,12 +143,14 @@ pub fn sizes_with(
 /// that is the given one, or has a lower density (larger cells for [`Method::Brick`]), by no more than a
 /// step too much.
 ///
-/// A step is a factor of the square root of 2 in the number of cells. The time is that of
-/// [`sizes`] for each step. `scratch` is for [`sizes`], too: without, a configuration must fit by its bound,
-/// so that the grid gets coarser than it had to be.
+/// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls of
+/// [`sizes`] at most. `scratch` is for them: with one-level and fixed grids there may be none, then a
+/// grid must fit by its bound and gets coarser than it had to be; the others need as much as [`sizes`]
+/// without scratch says.
 ///
 /// # Errors
-/// [`Error::OutOfMemory`] with the bytes that the coarsest grid needs; those of [`sizes`].
+/// [`Error::OutOfMemory`] with the bytes of index that the coarsest grid needs, or the scratch; those of
+/// [`sizes`].
 ///
 /// ```
 /// use hgrid_core::{Config, TriangleMesh, fit};
@@ -163,19 +166,74 @@ pub fn fit(
     index_bytes: usize,
     scratch: &mut [u8],
 ) -> Result<(Config, Sizes), Error> {
-    /// From many cells for each triangle to one cell for all of them.
-    const STEPS: u32 = 80;
-    let mut config = *config;
-    let mut least = usize::MAX;
-    for _ in 0..STEPS {
-        let needed = sizes(mesh, &config, scratch)?;
-        if needed.index_bytes <= index_bytes {
-            return Ok((config, needed));
+    config.check()?;
+    let mut try_with = |steps: u32| fits(mesh, &coarsened(config, steps), index_bytes, scratch);
+    // The first number of steps of 0, 1, 2, 4, ... that fits, then the smallest one below it.
+    let (mut low, mut high) = (0, 0);
+    let mut needed = loop {
+        match try_with(high) {
+            Ok(needed) => break needed,
+            Err(error) if high >= MOST_STEPS || !is_too_large(error) => return Err(error),
+            Err(_) => (low, high) = (high, (2 * high).max(1)),
         }
-        least = least.min(needed.index_bytes);
-        config.density *= core::f32::consts::FRAC_1_SQRT_2;
-        config.cell_size *= 1.122_462; // 2^(1/6)
+    };
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        match try_with(middle) {
+            Ok(less) => (high, needed) = (middle, less),
+            Err(_) => low = middle,
+        }
     }
-    let (needed_bytes, available_bytes) = (least as u64, index_bytes as u64);
-    Err(Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes })
+    Ok((coarsened(config, high), needed))
+}
+
+/// From the finest grid that f32 can ask for to one cell.
+const MOST_STEPS: u32 = 1024;
+
+/// A configuration that asks for so many steps fewer cells.
+fn coarsened(config: &Config, steps: u32) -> Config {
+    let fewer = |factor: f64| (0..steps).fold(1.0, |all, _| all * factor);
+    let mut coarser = *config;
+    if config.method.has_density() {
+        let density = f64::from(config.density) * fewer(core::f64::consts::FRAC_1_SQRT_2);
+        coarser.density = round(density).max(f32::MIN_POSITIVE);
+    }
+    if config.method.has_cell_size() {
+        let cell_size = f64::from(config.cell_size) * fewer(1.122_462_048_309_373); // 2^(1/6)
+        coarser.cell_size = round(cell_size).min(f32::MAX);
+    }
+    if steps == 0 { *config } else { coarser }
+}
+
+/// What a grid needs, if it fits into so much memory.
+fn fits(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index_bytes: usize,
+    scratch: &mut [u8],
+) -> Result<Sizes, Error> {
+    let needed = sizes(mesh, config, scratch)?;
+    let missing = |region, needed: usize, available: usize| Error::OutOfMemory {
+        region,
+        needed_bytes: needed as u64,
+        available_bytes: available as u64,
+    };
+    // Their bounds say nothing of what a mesh takes.
+    let has_pool = !matches!(config.method, Method::OneLevel | Method::Fixed);
+    if has_pool && !needed.is_exact {
+        return Err(missing(Region::Scratch, needed.scratch_bytes, scratch.len()));
+    }
+    if needed.index_bytes > index_bytes {
+        return Err(missing(Region::Index, needed.index_bytes, index_bytes));
+    }
+    Ok(needed)
+}
+
+/// Whether a coarser grid may do: one that would be too fine is one that is too large.
+const fn is_too_large(error: Error) -> bool {
+    matches!(
+        error,
+        Error::OutOfMemory { .. }
+            | Error::InvalidConfig(ConfigField::Density | ConfigField::CellSize)
+    )
 }

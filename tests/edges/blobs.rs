@@ -4,9 +4,9 @@
 use hgrid_core::{BLOB_VERSION, Config, Error, Grid, Ray, Region};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
+use hgrid_tests::methods;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
-use hgrid_tests::{methods, oracle};
 
 fn built(mesh: &Mesh) -> Owned {
     Owned::build(&mesh.view(), &Config::default()).unwrap()

@@ -1,6 +1,6 @@
 //! Grids for a budget: as fine as fits.
 
-use hgrid_core::{Block, Error, Grid, Region, fit, sizes};
+use hgrid_core::{Block, Config, Error, Grid, Method, Region, fit, sizes};
 use hgrid_tests::meshes::{Mesh, ball};
 use hgrid_tests::methods::configs;
 
@@ -48,8 +48,30 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
         );
         assert!(is_told, "{config:?}: {error}");
     }
+    // Too fine to be built at all is too large, not wrong.
+    for config in configs() {
+        let finer = Config { density: 1e9, cell_size: 1e-9, ..config };
+        let enough = sizes(&view, &config, &mut []).unwrap();
+        let mut scratch = vec![Block::ZERO; 2 * Block::count_for(enough.scratch_bytes)];
+        let scratch = Block::bytes_mut(&mut scratch);
+        let budget = 40 * 6 * 40 * 40 * 2;
+        let (fitted, needed) = fit(&view, &finer, budget, scratch).unwrap();
+        assert!(needed.index_bytes <= budget, "{config:?}");
+        // What means nothing to the method stays as it was.
+        let is_brick = config.method == Method::Brick;
+        assert!(fitted.density < finer.density || is_brick && fitted.density >= finer.density);
+        assert!(is_brick == (fitted.cell_size > finer.cell_size), "{fitted:?}");
+    }
     let nothing = Mesh::default();
     for config in configs() {
-        assert_eq!(fit(&nothing.view(), &config, 1 << 24, &mut []).unwrap().0, config);
+        let enough = sizes(&nothing.view(), &config, &mut []).unwrap();
+        let mut scratch = vec![Block::ZERO; Block::count_for(enough.scratch_bytes)];
+        let scratch = Block::bytes_mut(&mut scratch);
+        assert_eq!(fit(&nothing.view(), &config, 1 << 24, scratch).unwrap().0, config);
+        let without = fit(&mesh.view(), &config, usize::MAX, &mut []);
+        let needs_scratch = !matches!(config.method, Method::OneLevel | Method::Fixed);
+        let is_asked_for =
+            matches!(without, Err(Error::OutOfMemory { region: Region::Scratch, .. }));
+        assert_eq!(is_asked_for, needs_scratch, "{config:?}: {without:?}");
     }
 }

@@ -9,7 +9,9 @@ use hgrid_core::{ClosestPoint, Counters, Cull, Error, Grid, Hit, QueryOptions, R
 use super::{bytes_mut, grid, read, read_sized, write};
 use crate::batch::Batch;
 use crate::questions::{hgrid_counters, hgrid_hit, hgrid_query_options, hgrid_ray, verdict};
-use crate::status::{HGRID_ERROR_INVALID_ANSWERS, hgrid_status, status_of};
+use crate::status::{
+    HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_NULL_ARGUMENT, hgrid_status, status_of,
+};
 use crate::types::{Elements, hgrid_grid};
 
 /// The options of a query, `None` if they are the defaults.
@@ -40,13 +42,31 @@ impl Asked {
     /// # Safety
     /// The caller's promise.
     unsafe fn ask<T>(&self, ray: usize, ask: impl FnOnce(&mut QueryOptions<'_>) -> T) -> T {
+        // SAFETY: this function's contract.
+        unsafe { self.ask_and_see(ray, |_| {}, ask) }
+    }
+
+    /// The same; `see` is shown what the caller's filter accepts.
+    ///
+    /// # Safety
+    /// The caller's promise.
+    unsafe fn ask_and_see<T>(
+        &self,
+        ray: usize,
+        mut see: impl FnMut(hgrid_hit),
+        ask: impl FnOnce(&mut QueryOptions<'_>) -> T,
+    ) -> T {
         let hgrid_query_options { mask, skip, context, filter, counters, .. } = self.options;
         let mut work = Counters::default();
         let mut offer = |hit: &Hit| {
             let hit = hgrid_hit::from(*hit);
             let Some(filter) = filter else { return Verdict::Accept };
             // SAFETY: a function of this type by the caller's promise; the hit lives until it returns.
-            verdict(unsafe { filter(context, ray, &raw const hit) })
+            let verdict = verdict(unsafe { filter(context, ray, &raw const hit) });
+            if verdict != Verdict::Reject {
+                see(hit);
+            }
+            verdict
         };
         let mut options = QueryOptions { mask, cull: self.cull, skip, ..QueryOptions::default() };
         if filter.is_some() {
@@ -102,18 +122,36 @@ pub(crate) unsafe fn query_all(
 ) -> Result<usize, hgrid_status> {
     let elements = Elements::new(hits.cast(), 0, capacity, size_of::<hgrid_hit>());
     let bytes = elements.ok_or(HGRID_ERROR_INVALID_ANSWERS)?.bytes;
-    // SAFETY: the caller's promise; hits overlap nothing else by it.
-    let hits = unsafe { bytes_mut(hits.cast(), bytes) }?;
-    // SAFETY: any bytes are hits, and `Hit` is laid out as `hgrid_hit`; what is not aligned, which by the
-    // caller's promise nothing is, is left out.
-    let (_, hits, _) = unsafe { hits.align_to_mut::<Hit>() };
     // SAFETY: this function's contract.
     let grid = unsafe { grid(view) }?;
     // SAFETY: the caller's promise.
     let ray = unsafe { read(ray) }?.into();
-    let mut all = |options: &mut QueryOptions<'_>| grid.intersect_all(&ray, options, hits);
     // SAFETY: the caller's promise.
-    match unsafe { options(asked) }? {
+    let asked = unsafe { options(asked) }?;
+    if hits.is_null() && capacity > 0 {
+        return Err(HGRID_ERROR_NULL_ARGUMENT);
+    }
+    if let Some(asked) = asked.as_ref().filter(|asked| asked.options.filter.is_some()) {
+        // A filter may look at what it has accepted: so nothing refers to the hits while it runs.
+        let mut count = 0;
+        let see = |hit| {
+            if count < capacity {
+                // SAFETY: the caller's promise, and within the array.
+                unsafe { hits.wrapping_add(count).write(hit) };
+                count += 1;
+            }
+        };
+        let all = |options: &mut QueryOptions<'_>| grid.intersect_all(&ray, options, &mut []);
+        // SAFETY: the caller's promise.
+        return Ok(unsafe { asked.ask_and_see(0, see, all) });
+    }
+    // SAFETY: the caller's promise; hits overlap nothing else that the call uses.
+    let hits = unsafe { bytes_mut(hits.cast(), bytes) }?;
+    // SAFETY: any bytes are hits, and `Hit` is laid out as `hgrid_hit`; what is not aligned, which by the
+    // caller's promise nothing is, is left out.
+    let (_, hits, _) = unsafe { hits.align_to_mut::<Hit>() };
+    let mut all = |options: &mut QueryOptions<'_>| grid.intersect_all(&ray, options, hits);
+    match asked {
         None => Ok(all(&mut QueryOptions::default())),
         // SAFETY: the caller's promise.
         Some(asked) => Ok(unsafe { asked.ask(0, all) }),
@@ -198,8 +236,8 @@ pub(crate) unsafe fn batch<A: Copy, T: From<A>>(
 /// The caller's promise.
 unsafe fn add(to: NonNull<hgrid_counters>, work: &Counters) {
     // SAFETY: the caller's promise: not NULL, so aligned and readable.
-    let mut sum = unsafe { to.read() };
+    let mut sum = Counters::from(unsafe { to.read() });
     sum.add(work);
     // SAFETY: the caller's promise.
-    unsafe { write(to, sum) };
+    unsafe { write(to, sum.into()) };
 }

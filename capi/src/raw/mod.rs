@@ -30,7 +30,7 @@ use core::ffi::c_void;
 use core::ptr::{NonNull, null_mut};
 use core::slice;
 
-use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
+use hgrid_core::{BlobInfo, Config, Grid, Method, Strided, Task, TriangleMesh};
 
 pub(crate) use ask::{batch, closest, query, query_all};
 
@@ -194,11 +194,14 @@ unsafe fn config(config: *const hgrid_config) -> Result<(Config, Caller), hgrid_
     // SAFETY: the caller's promise.
     let config = unsafe { settings(config) }?;
     let hgrid_config { tasks, context, run, progress, .. } = config;
+    let config = config.to_core()?;
+    // The other methods have no tasks, and a field of another method is not looked at.
+    let tasks = if config.method == Method::Brick { tasks } else { 1 };
     if tasks > 1 && run.is_none() {
         return Err(HGRID_ERROR_NULL_ARGUMENT);
     }
     let run = run.filter(|_| tasks > 1);
-    Ok((config.to_core()?, Caller { tasks, context, run, progress }))
+    Ok((config, Caller { tasks, context, run, progress }))
 }
 
 /// What a caller has for a build: a loop over tasks, and an eye on how far it is.

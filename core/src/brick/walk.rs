@@ -70,6 +70,9 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
         let large = brick.large();
         if !large.is_empty() {
             self.test(simd, large);
+            if self.is_over() {
+                return;
+            }
         }
         let line = self.line;
         let mut walk = line.walk(0.0, as_f32(BLOCK), [0; 3], brick.width.map(|blocks| blocks - 1));
@@ -79,7 +82,7 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
                 if let Some(ids) = chunk.list() {
                     self.test(simd, ids);
                 }
-                if chunk.mask != 0 {
+                if chunk.mask != 0 && !self.is_over() {
                     let corner = walk.cell.map(|block| block * BLOCK);
                     let last =
                         core::array::from_fn(|axis| (corner[axis] + 15).min(brick.last[axis]));
@@ -107,7 +110,7 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
                 if let Some(ids) = list(chunk.words, brick.list) {
                     self.test(simd, ids);
                 }
-                if mask(brick.mask) != 0 {
+                if mask(brick.mask) != 0 && !self.is_over() {
                     self.cells(simd, part, &brick, walk.cell.map(|at| at << 2), walk.entered);
                 }
             }
@@ -197,5 +200,11 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
                 return;
             }
         }
+    }
+
+    /// Whether the search is.
+    #[inline(always)]
+    const fn is_over(&self) -> bool {
+        self.limit == f32::NEG_INFINITY
     }
 }

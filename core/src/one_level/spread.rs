@@ -88,7 +88,7 @@ pub(crate) fn fill(
 
     // Put every primitive before the end of its lists, the last one first: lists ascend by id.
     for place in (0..spread.count()).rev() {
-        watch.step(spread.count() - place, spread.count(), [0.7, 1.0])?;
+        watch.step(spread.count() - 1 - place, spread.count(), [0.7, 1.0])?;
         let Some((id, range)) = spread.at(place) else { continue };
         for_each_slot(height, &range, row_offsets, hash, |end| {
             *end = end.wrapping_sub(1);
