@@ -321,6 +321,7 @@ mod tests {
     #[test]
     fn every_level_finds_what_the_triangles_give_one_by_one() {
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
+        let rounds = if cfg!(miri) { 10 } else { 600_usize };
         let (mut survivors, mut hits) = (0, 0);
         for scale in [1e-38, 1e-30, 1e-18, 1.0, 1e18, 1e30, 1e36] {
             let positions = triangles(&mut random, scale, 200);
@@ -328,7 +329,7 @@ mod tests {
             let mesh = TriangleMesh::new(&positions, &indices).unwrap();
             let bounds = ([-scale; 3], [scale; 3]);
             let mut eight = Eight::EMPTY;
-            for round in 0..600_usize {
+            for round in 0..rounds {
                 let target = positions[random.next() as usize % positions.len()];
                 let origin = random.point().map(|x| x * scale * 2.0);
                 let mut direction = match round % 3 {
@@ -357,7 +358,7 @@ mod tests {
                 hits += expected.1.len();
             }
         }
-        assert!(survivors > 1000 && hits > 200, "{survivors} {hits}");
+        assert!(survivors as usize > 2 * rounds && 3 * hits > rounds, "{survivors} {hits}");
     }
 
     #[test]
@@ -375,7 +376,9 @@ mod tests {
                 _ => [random.next() % 27, random.next() % 27, random.next() % 27],
             })
             .collect();
-        for position_stride in [12, 13, 16, 32, 65_535, 65_536] {
+        // Miri takes minutes for each.
+        let strides = &[12, 13, 16, 32, 65_535, 65_536][..if cfg!(miri) { 2 } else { 6 }];
+        for &position_stride in strides {
             let mut vertices = Vec::new();
             for position in &positions {
                 vertices.resize(vertices.len().next_multiple_of(position_stride), 0xff);
@@ -413,7 +416,8 @@ mod tests {
 
     fn check_lanes(mesh: &TriangleMesh<'_>) {
         let mut eight = Eight::EMPTY;
-        for first in 0..48 {
+        let step = if cfg!(miri) { 19 } else { 1 };
+        for first in (0..48).step_by(step) {
             for length in 0..=9 {
                 let ids: Vec<u32> = (first..first + length).collect();
                 eight.gather(mesh, &ids);

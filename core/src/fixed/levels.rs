@@ -229,6 +229,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn a_macrocell_is_full_if_a_cell_below_it_is() {
         let resolution = [131, 37, 50];
         let mut domain_bits = vec![0; (131 * 37 * 50_usize).div_ceil(64)];

@@ -115,6 +115,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn no_two_cells_share_a_slot() {
         for (count, width, sparsity) in [(1, 64, 2), (50, 33, 1), (300, 100, 9), (2000, 250, 50)] {
             let domain_bits = rows(count * width, sparsity);

@@ -82,7 +82,10 @@ pub fn ends(grid: &Grid<'_>, rays: &[Ray]) {
         let (hits, occluded) = batch(grid, rays, coherence);
         for (ray, (hit, occluded)) in rays.iter().zip(hits.iter().zip(occluded)) {
             let is_miss = bits(hit) == bits(&Hit::MISS);
-            assert!(is_miss || is_possible(grid, ray, hit), "{coherence:?} {hit:?} {ray:?}");
+            // Tiles do not ask whether a ray meets the box: a damaged one may lie beside its triangles.
+            let is_hit = hit.primitive < grid.mesh().triangle_count()
+                && (ray.t_min..=ray.t_max).contains(&hit.t);
+            assert!(is_miss || is_hit, "{coherence:?} {hit:?} {ray:?}");
             assert!(occluded <= 1, "{coherence:?} {ray:?}");
         }
     }
