@@ -207,7 +207,9 @@ impl Walk {
     #[inline(always)]
     fn step_along<const AXIS: usize>(&mut self, limit: f32) -> Step {
         self.entered = self.next[AXIS];
-        if limit <= self.entered {
+        // Damaged bytes make numbers that are none: whatever is not before the limit is behind it.
+        let is_before = self.entered < limit;
+        if !is_before {
             return Step::Ended;
         }
         self.cell[AXIS] = self.cell[AXIS].wrapping_add(self.step[AXIS]);
