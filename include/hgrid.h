@@ -128,8 +128,8 @@
  * Results
  * -------
  * Meshes and hits are in your units; t is in multiples of the ray's direction, whatever its length.
- * There is no epsilon, so the scale of a mesh does not matter. Only IEEE + - * / and square
- * roots are used, in a fixed order: the same input gives the same bits on every machine.
+ * There is no epsilon, so the scale of a mesh does not matter. Only IEEE + - * / are used, in a
+ * fixed order: the same input gives the same bits on every machine.
  *
  * Versions
  * --------
@@ -643,9 +643,8 @@ typedef struct hgrid_query_options {
      */
     uint32_t cull;
     /**
-     * A triangle that is not hit, usually the one that the ray leaves, which then cannot hit itself, without any
-     * epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge still may be hit, where the origin was rounded
-     * to just below it: where that matters, give a small `t_min`, too.
+     * A triangle that is not hit, usually the one that the ray leaves, so that it needs no epsilon;
+     * or `HGRID_INVALID_ID`.
      */
     uint32_t skip;
     /**
@@ -802,8 +801,8 @@ typedef struct hgrid_statistics {
      */
     uint32_t reserved;
     /**
-     * A hash of the grid's box, resolution and lists in order, not of which cell has which: the same for
-     * the same grid on every platform, whatever its byte order. No defence against forgery.
+     * A hash of the grid's box, resolution and lists: the same for the same grid on every platform,
+     * whatever its byte order. It tells grids apart; it is no defence against forgery.
      */
     uint64_t content_hash;
 } hgrid_statistics;
@@ -881,24 +880,26 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_NULL_ARGUMENT -1
 
 /**
- * A struct's `struct_size` is smaller than the struct, or larger and what is behind the known
- * fields, or a reserved one, is not zero. The usual cause is a struct that was not initialised with its `_INIT` macro.
+ * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct and what
+ * is behind the known fields is not zero; or a `reserved` field is not 0. The usual cause is a struct
+ * that was not initialised with its `_INIT` macro.
  */
 #define HGRID_ERROR_STRUCT_SIZE -2
 
 /**
- * The index, the scratch or the blob does not start at a multiple of `HGRID_ALIGNMENT`.
+ * The index, the scratch, the blob or the room for one does not start at a multiple of
+ * `HGRID_ALIGNMENT`.
  */
 #define HGRID_ERROR_MISALIGNED -3
 
 /**
- * The index or the scratch overlaps the other one or the mesh; or answers of a batch overlap its
- * rays; or memory for a packed blob overlaps its grid or its mesh.
+ * The index or the scratch overlaps the other one or the mesh; the room for a packed blob overlaps the
+ * blob or the mesh; or answers of a batch overlap its rays.
  */
 #define HGRID_ERROR_OVERLAP -4
 
 /**
- * The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `bytes` says it.
+ * The index is too small, or the room for a packed blob. The report says how many bytes it needs.
  *
  * With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
  * methods the grid was written as far as it went, so the index may hold anything.
@@ -1057,13 +1058,17 @@ extern "C" {
  * Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
  * is looked at.
  *
- * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are a little more, for the default configuration and for array
- * declarations. How much more than enough it is depends on the method: a scan takes a sixth of it or
+ * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are for array declarations: for the default configuration
+ * they are never less, and little more. How much more than enough it is depends on the method: a scan takes a sixth of it or
  * less with one level; with recursive and brick it is generous beyond use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
- * `index_bytes` and `scratch_bytes`; or what is wrong with the configuration; or
- * `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space.
+ * `index_bytes` and `scratch_bytes`; or what is wrong:
+ * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`,
+ *   `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space;
+ * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
+ *   `HGRID_ERROR_INVALID_FLAGS`, `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
+ *   `HGRID_ERROR_INVALID_CELL_SIZE`.
  *
  * Threads: any number of calls at once, each with a report of its own.
  *
@@ -1090,9 +1095,18 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * the index is filled by all of them and may be a little larger. `run` is called for the answer, too;
  * `progress` is not.
  *
- * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. Returns `HGRID_OK` or
- * the reason, with the triangle that is to blame in the report; scratch that is too small is no
- * error, and counts as none.
+ * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL if its
+ * size is 0; scratch that is too small is no error, and counts as none.
+ *
+ * Returns `HGRID_OK`; or what is wrong, with the triangle that is to blame in the report:
+ * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
+ *   `HGRID_ERROR_OVERLAP`;
+ * - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
+ *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`,
+ *   `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_NON_FINITE`;
+ * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
+ *   `HGRID_ERROR_INVALID_FLAGS`, `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
+ *   `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_ERROR_PARALLEL_FOR`.
  *
  * Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
  * call starts no thread; tasks are called on those that `run` chooses.
@@ -1111,19 +1125,17 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  *
  * `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
  * (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no more than a
- * step too much: a step is a factor of 1.41 in the number of cells. It takes a dozen times as long as `hgrid_sizes`, or
- * less.
- * Bring as much scratch as `hgrid_sizes` without scratch says: with `HGRID_METHOD_ONE_LEVEL` and
- * `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser than it had
- * to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
- * afterwards. A density, or cells, that would be too fine for a build count as too large here.
+ * step too much: a step is a factor of 1.41 in the number of cells, and takes as long as `hgrid_sizes`.
+ * Bring scratch, as for `hgrid_sizes`; without, a grid must fit by its bound, and gets coarser than it
+ * had to be. The scratch holds nothing of use afterwards.
  *
  * `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be the same as
- * `fitted`, which else may hold anything. `report` may be NULL.
+ * `fitted`, which is initialised before in either case. `report` may be NULL.
  *
  * Returns `HGRID_OK`, and the report says what the fitted grid takes; or
  * `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or what
- * `hgrid_sizes` returns. Neither `tasks` nor `progress` matters here; both are copied.
+ * `hgrid_sizes` returns. After an error `fitted` is as it was. `run` and `progress` are not called, and
+ * the sizes are those of one task; all three are copied.
  *
  * Threads: any number of calls at once, as long as each has a scratch, a configuration to write and a
  * report of its own.
@@ -1153,8 +1165,9 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * be NULL if their size is 0. `report` may be NULL.
  *
  * Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `grid` as it
- * was. The report is written in both cases: what was built; or, if a region is too small, what
- * both need; or the triangle that is to blame.
+ * was: `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_CANCELLED`, or
+ * what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region is
+ * too small, what both need; or the triangle that is to blame.
  *
  * After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
  * anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
@@ -1235,8 +1248,7 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * Finds the closest triangle that a ray hits.
  *
  * Returns true and writes `hit`; or returns false and writes nothing. Where several triangles are
- * hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count, unless
- * `cull` of the options says otherwise.
+ * hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count.
  * A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
  * without area, or one that is seen exactly edge-on, is not hit.
  *
@@ -1278,9 +1290,8 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
  * Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
  *
  * Writes as many hits as there is room for, the nearest, and to `count` how many there are, which may
- * be more. With room for more than there are, the ray is walked once; otherwise, and with a filter, once
- * more for each sixteen hits, from where it got to: so nothing is allocated, whatever their number, but
- * thousands of hits in one cell take long, as the square of their number. Options as
+ * be more. With room for all, the ray is walked once; otherwise, and with a filter, once more for each
+ * sixteen hits, from where it got to: so nothing is allocated, whatever their number. Options as
  * with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what it accepts is
  * written and counted.
  *
@@ -1298,8 +1309,7 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
  * }
  * ```
  *
- * `hits` may be NULL if `capacity` is 0, and overlaps nothing else that the call uses; a filter may look
- * at those that it has accepted. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
+ * `hits` may be NULL if `capacity` is 0. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
  * returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
  * `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_ANSWERS`
  * (a capacity that is impossible). A ray that is none hits nothing: the count is 0.
@@ -1329,9 +1339,8 @@ hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
  * anything that is not as it should be (another NULL, a view of zeros, options that break the rules, a point that
  * is not finite, a distance that is NaN or negative) the answer is false.
  *
- * The call allocates nothing and always ends. How long it takes grows with the triangles in a cube
- * around the point that reaches as far as the answer: it is short near the mesh, and far outside of it
- * that of a loop over a good part of all triangles.
+ * The call allocates nothing and always ends. How long it takes grows with the number of cells that
+ * are as close as the answer: far from the mesh and in the middle of nothing, limit the distance.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -1408,8 +1417,9 @@ hgrid_status hgrid_intersect_n(const struct hgrid_grid *grid,
  *
  * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
  * from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that hold a ray and
- * its byte, what may be NULL, coherence, options, statuses, stack. For the shadow rays of a tile,
- * towards one light:
+ * its byte, coherence, options, stack. `rays` and `occluded` may be NULL if `count` is 0, `options` may
+ * be NULL. Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_n` returns and
+ * has written none. For the shadow rays of a tile, towards one light:
  *
  * ```c
  * static size_t count_lit(const hgrid_grid *grid, const hgrid_ray *rays, size_t count)
@@ -1447,8 +1457,8 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
  * Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
  *
  * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
- * in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of `hgrid_pack`;
- * bytes behind it are ignored. It says itself which method built it and how. The mesh is the one it was built for,
+ * in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
+ * ignored. It says itself which method built it and how. The mesh is the one it was built for,
  * of which only the counts are compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh`
  * may be NULL.
  *
@@ -1457,11 +1467,14 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
  * not change while the grid is in use: a file that others may write is not for mapping, read it into
  * memory of your own.
  *
- * `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
- * and leaves `grid` as it was: `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_NOT_A_GRID`,
- * `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_TRUNCATED`,
- * `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`, `HGRID_ERROR_CORRUPT`, or what is wrong with the
- * mesh.
+ * `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`; or returns what is
+ * wrong and leaves `grid` as it was:
+ * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`;
+ * - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
+ *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+ * - with the blob: `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
+ *   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`;
+ * - with both: `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`.
  *
  * Threads: any number of calls at once, also on the same blob, each with a view of its own.
  *
@@ -1476,10 +1489,10 @@ hgrid_status hgrid_open(const void *blob,
 /**
  * Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
  *
- * The bytes may lie at any address. `info` may not be NULL; `blob` may only if `blob_bytes` is 0. Returns
- * `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was: `HGRID_ERROR_NOT_A_GRID`,
- * `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`,
- * `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`.
+ * The bytes may lie at any address. `info` may not be NULL, `blob` only if `blob_bytes` is 0. Returns
+ * `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was: `HGRID_ERROR_NULL_ARGUMENT`,
+ * `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`,
+ * `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`.
  *
  * Threads: any number of calls at once, each with an info of its own.
  *
@@ -1498,15 +1511,13 @@ hgrid_status hgrid_peek(const void *blob,
  * multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid. Nothing is
  * copied when it is opened.
  *
- * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh nor any argument of this
- * call. It may be NULL if
+ * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh. It may be NULL if
  * `capacity` is 0: to ask for the size. `grid` and `bytes` may not be NULL.
  *
- * Returns `HGRID_OK` and has written the blob; or the reason, and has written nothing:
- * `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
- * `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged, `HGRID_ERROR_NOT_A_GRID`,
- * `HGRID_ERROR_NULL_ARGUMENT`. With `HGRID_OK` and with `HGRID_ERROR_INDEX_TOO_SMALL`, `bytes` becomes the size
- * of the packed blob; otherwise it is left as it was.
+ * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of
+ * it; in both cases `bytes` becomes its size. Or returns the reason and has written nothing:
+ * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+ * `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged. More than is needed is not touched.
  *
  * Threads: any number of calls and queries on the same grid at once, each with memory of its own.
  *

@@ -11,13 +11,17 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 /// Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
 /// is looked at.
 ///
-/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are a little more, for the default configuration and for array
-/// declarations. How much more than enough it is depends on the method: a scan takes a sixth of it or
-/// less with one level; with recursive and brick it is generous beyond use.
+/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are for array declarations, and a little more for the
+/// default configuration. How much more than enough it is depends on the method: a scan takes a sixth of
+/// it or less with one level; with recursive and brick it is generous beyond use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
-/// `index_bytes` and `scratch_bytes`; or what is wrong with the configuration; or
-/// `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space.
+/// `index_bytes` and `scratch_bytes`; or what is wrong:
+/// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`,
+///   `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space;
+/// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
+///   `HGRID_ERROR_INVALID_FLAGS`, `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
+///   `HGRID_ERROR_INVALID_CELL_SIZE`.
 ///
 /// Threads: any number of calls at once, each with a report of its own.
 ///
@@ -55,9 +59,18 @@ pub unsafe extern "C" fn hgrid_bound(
 /// the index is filled by all of them and may be a little larger. `run` is called for the answer, too;
 /// `progress` is not.
 ///
-/// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. Returns `HGRID_OK` or
-/// the reason, with the triangle that is to blame in the report; scratch that is too small is no
-/// error, and counts as none.
+/// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL if its
+/// size is 0; scratch that is too small is no error, and counts as none.
+///
+/// Returns `HGRID_OK`; or what is wrong, with the triangle that is to blame in the report:
+/// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
+///   `HGRID_ERROR_OVERLAP`;
+/// - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
+///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`,
+///   `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_NON_FINITE`;
+/// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
+///   `HGRID_ERROR_INVALID_FLAGS`, `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
+///   `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_ERROR_PARALLEL_FOR`.
 ///
 /// Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
 /// call starts no thread; tasks are called on those that `run` chooses.
@@ -89,19 +102,23 @@ pub unsafe extern "C" fn hgrid_sizes(
 ///
 /// `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
 /// (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no more than a
-/// step too much: a step is a factor of 1.41 in the number of cells. It takes a dozen times as long as `hgrid_sizes`, or
-/// less.
+/// step too much: a step is a factor of 1.41 in the number of cells. It takes a dozen times as long as
+/// `hgrid_sizes`, or less. A density, or cells, that would be too fine for a build count as too large here.
+///
 /// Bring as much scratch as `hgrid_sizes` without scratch says: with `HGRID_METHOD_ONE_LEVEL` and
 /// `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser than it had
 /// to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
-/// afterwards. A density, or cells, that would be too fine for a build count as too large here.
+/// afterwards.
 ///
 /// `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be the same as
-/// `fitted`, which else may hold anything. `report` may be NULL.
+/// `fitted`, which is initialised before in either case. `report` may be NULL, and so may `scratch` if its
+/// size is 0.
 ///
 /// Returns `HGRID_OK`, and the report says what the fitted grid takes; or
-/// `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or what
-/// `hgrid_sizes` returns. Neither `tasks` nor `progress` matters here; both are copied.
+/// `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or
+/// `HGRID_ERROR_SCRATCH_TOO_SMALL`, and its `scratch_bytes` is what it takes; or what `hgrid_sizes`
+/// returns. After an error `fitted` is as it was. `run` and `progress` are not called, and the sizes are
+/// those of one task; all three are copied.
 ///
 /// Threads: any number of calls at once, as long as each has a scratch, a configuration to write and a
 /// report of its own.
@@ -122,11 +139,15 @@ pub unsafe extern "C" fn hgrid_fit(
     let scratch = Region { start: scratch, bytes: scratch_bytes };
     let call = |report: &mut hgrid_report| {
         let to = NonNull::new(fitted).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // Room for all that is written, which may be more than the caller's version knows.
+        // SAFETY: the caller's promise.
+        let hgrid_config { struct_size, .. } = unsafe { raw::read_sized(fitted) }?;
         // SAFETY: the caller's promise.
         let found =
             unsafe { raw::input(mesh, config, [none, scratch]) }?.fit(index_bytes, report)?;
         // SAFETY: the caller's promise.
         let mut config = unsafe { raw::settings(config) }?;
+        config.struct_size = struct_size;
         (config.density, config.cell_size) = (found.density, found.cell_size);
         // SAFETY: the caller's promise.
         unsafe { raw::write(to, config) };
@@ -149,8 +170,9 @@ pub unsafe extern "C" fn hgrid_fit(
 /// be NULL if their size is 0. `report` may be NULL.
 ///
 /// Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `grid` as it
-/// was. The report is written in both cases: what was built; or, if a region is too small, what
-/// both need; or the triangle that is to blame.
+/// was: `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_CANCELLED`, or
+/// what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region is
+/// too small, what both need; or the triangle that is to blame.
 ///
 /// After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
 /// anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,

@@ -48,7 +48,7 @@ use crate::types::hgrid_grid;
 /// impossible), `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no
 /// error: it misses.
 ///
-/// The call allocates nothing and needs at most about 16 KiB of stack.
+/// The call allocates nothing and needs at most 16 KiB of stack.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with hits and counters of
 /// its own.
@@ -86,8 +86,9 @@ pub unsafe extern "C" fn hgrid_intersect_n(
 ///
 /// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
 /// from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that hold a ray and
-/// its byte, what may be NULL, coherence, options, statuses, stack. For the shadow rays of a tile,
-/// towards one light:
+/// its byte, coherence, options, stack. `rays` and `occluded` may be NULL if `count` is 0, `options` may
+/// be NULL. Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_n` returns and
+/// has written none. For the shadow rays of a tile, towards one light:
 ///
 /// ```c
 /// static size_t count_lit(const hgrid_grid *grid, const hgrid_ray *rays, size_t count)

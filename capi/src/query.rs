@@ -20,8 +20,8 @@ use crate::types::hgrid_grid;
 /// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
 /// opened, or with options that break the rules for structs, nothing is hit.
 ///
-/// A query allocates nothing, needs at most about 4 KiB of stack and always ends: on one level
-/// after no more steps than the three resolutions sum up to.
+/// A query allocates nothing, needs at most 6 KiB of stack, as all queries of one ray or point do, and
+/// always ends: on one level after no more steps than the three resolutions sum up to.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///

@@ -24,11 +24,14 @@ use crate::types::{hgrid_grid, hgrid_mesh};
 /// not change while the grid is in use: a file that others may write is not for mapping, read it into
 /// memory of your own.
 ///
-/// `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`, or returns the reason
-/// and leaves `grid` as it was: `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_NOT_A_GRID`,
-/// `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_TRUNCATED`,
-/// `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`, `HGRID_ERROR_CORRUPT`, or what is wrong with the
-/// mesh.
+/// `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`; or returns what is
+/// wrong and leaves `grid` as it was:
+/// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`;
+/// - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
+///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+/// - with the blob: `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
+///   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`;
+/// - with both: `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`.
 ///
 /// Threads: any number of calls at once, also on the same blob, each with a view of its own.
 ///
@@ -57,10 +60,10 @@ pub unsafe extern "C" fn hgrid_open(
 
 /// Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
 ///
-/// The bytes may lie at any address. `info` may not be NULL; `blob` may only if `blob_bytes` is 0. Returns
-/// `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was: `HGRID_ERROR_NOT_A_GRID`,
-/// `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`,
-/// `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`.
+/// The bytes may lie at any address. `info` may not be NULL, `blob` only if `blob_bytes` is 0. Returns
+/// `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was: `HGRID_ERROR_NULL_ARGUMENT`,
+/// `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`,
+/// `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`.
 ///
 /// Threads: any number of calls at once, each with an info of its own.
 ///
@@ -92,11 +95,10 @@ pub unsafe extern "C" fn hgrid_peek(
 /// call. It may be NULL if
 /// `capacity` is 0: to ask for the size. `grid` and `bytes` may not be NULL.
 ///
-/// Returns `HGRID_OK` and has written the blob; or the reason, and has written nothing:
-/// `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
-/// `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged, `HGRID_ERROR_NOT_A_GRID`,
-/// `HGRID_ERROR_NULL_ARGUMENT`. With `HGRID_OK` and with `HGRID_ERROR_INDEX_TOO_SMALL`, `bytes` becomes the size
-/// of the packed blob; otherwise it is left as it was.
+/// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of
+/// it; in both cases `bytes` becomes its size. Or returns the reason and has written nothing:
+/// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+/// `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged. More than is needed is not touched.
 ///
 /// Threads: any number of calls and queries on the same grid at once, each with memory of its own.
 ///

@@ -14,7 +14,8 @@ use hgrid_core::{
 use crate::status::{
     HGRID_ERROR_INVALID_FLAGS, HGRID_ERROR_INVALID_INDEX_TYPE, HGRID_ERROR_INVALID_INDICES,
     HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_METHOD, HGRID_ERROR_INVALID_POSITIONS,
-    HGRID_ERROR_STRUCT_SIZE, HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
+    HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_STRUCT_SIZE, HGRID_ERROR_TOO_MANY_TRIANGLES,
+    hgrid_status, status_of,
 };
 
 /// Every memory region starts at a multiple of this many bytes: index, scratch and blob.
@@ -291,14 +292,24 @@ impl hgrid_config {
         triangle_count: usize,
         report: &mut hgrid_report,
     ) -> Result<(), hgrid_status> {
-        let config = self.to_core()?;
+        let (config, tasks) = (self.to_core()?, self.task_count()?);
         // Without triangles there is nothing that could be wrong but the configuration.
         let nothing = TriangleMesh::new(&[], &[]).map_err(status_of)?;
         sizes(&nothing, &config, &mut []).map_err(status_of)?;
         let count = u32::try_from(triangle_count).ok().filter(|&c| c as usize <= MAX_TRIANGLES);
-        let bound = count.and_then(|count| Sizes::bound_parallel(count, &config, self.tasks));
+        let bound = count.and_then(|count| Sizes::bound_parallel(count, &config, tasks));
         report.note_sizes(&bound.ok_or(HGRID_ERROR_TOO_MANY_TRIANGLES)?);
         Ok(())
+    }
+
+    /// How many tasks may run at once; more than one need someone who runs them. The other methods have
+    /// none, and a field of another method is not looked at.
+    pub(crate) const fn task_count(&self) -> Result<u32, hgrid_status> {
+        match (self.method, self.tasks, self.run) {
+            (HGRID_METHOD_BRICK, 2.., None) => Err(HGRID_ERROR_NULL_ARGUMENT),
+            (HGRID_METHOD_BRICK, tasks, _) => Ok(tasks),
+            _ => Ok(1),
+        }
     }
 
     /// The configuration as core knows it. The numbers are core's to judge.

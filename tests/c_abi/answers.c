@@ -1,81 +1,102 @@
-/* Builds the mesh and asks the rays that come in, and sends out the blob and the answers: the test
- * compares them with what core says in Rust.
- *
- *   in   the configuration; counts of vertices, triangles and rays; positions; indices; rays
- *   out  bytes of the blob; the blob; for each ray a hit (zero if none) and whether it is occluded;
- *        the counters of all closest-hit queries; for each coherence the hits of all rays in one
- *        batch, and a byte for each that says whether it is occluded
- */
+/* Asks the questions of the table in C (and as C++, which C is, too). */
 
-#include "check.h"
+#include <hgrid.h>
 
-static void receive(void *to, size_t bytes)
+typedef hgrid_grid grid_view;
+
+#include "answers.h"
+
+static hgrid_verdict filter(void *context, size_t ray, const hgrid_hit *hit)
 {
-    CHECK(fread(to, 1, bytes, stdin) == bytes);
+    return offer((offers *)context, ray, hit);
 }
 
-static void *receive_array(size_t bytes)
+/* The options of a group, or NULL. */
+static const hgrid_query_options *options_of(const asked *how, hgrid_query_options *options)
 {
-    void *array = guarded(bytes);
-    receive(array, bytes);
-    return array;
+    const hgrid_query_options defaults = HGRID_QUERY_OPTIONS_INIT;
+    *options = defaults;
+    if (how->of == NULL)
+        return NULL;
+    options->mask = how->of->mask, options->cull = how->of->cull, options->skip = how->of->skip;
+    options->counters = how->counters;
+    if (how->of->rule != 0)
+        options->filter = filter, options->context = how->seen;
+    return options;
 }
 
-static void send(const void *from, size_t bytes)
+static void make_views(const hgrid_mesh *mesh, const hgrid_config *config, const void *blob,
+                       size_t blob_bytes, grid_view views[VIEWS])
 {
-    CHECK(fwrite(from, 1, bytes, stdout) == bytes);
-}
-
-int main(void)
-{
-    hgrid_config config = HGRID_CONFIG_INIT;
-    uint32_t counts[3];
-    receive(&config.method, offsetof(hgrid_config, tasks) - offsetof(hgrid_config, method));
-    receive(counts, sizeof counts);
-    hgrid_mesh mesh = HGRID_MESH_INIT;
-    mesh.vertex_count = counts[0];
-    mesh.positions = receive_array(12 * mesh.vertex_count);
-    mesh.triangle_count = counts[1];
-    mesh.indices = receive_array(12 * mesh.triangle_count);
-
-    hgrid_report need = HGRID_REPORT_INIT, report = HGRID_REPORT_INIT;
-    CHECK(hgrid_sizes(&mesh, &config, NULL, 0, &need) == HGRID_OK);
+    const hgrid_report new_report = HGRID_REPORT_INIT;
+    hgrid_report need = new_report, report = new_report;
+    uint64_t packed_bytes;
+    CHECK(hgrid_sizes(mesh, config, NULL, 0, &need) == HGRID_OK);
     void *scratch = guarded(need.scratch_bytes);
-    CHECK(hgrid_sizes(&mesh, &config, scratch, need.scratch_bytes, &need) == HGRID_OK);
-    if (config.method == HGRID_METHOD_ONE_LEVEL && config.density == 4) {
-        /* The bounds are enough for any mesh. */
-        CHECK(need.index_bytes <= HGRID_INDEX_BOUND(counts[1]) / 64 * 64);
-        CHECK(need.scratch_bytes <= HGRID_SCRATCH_BOUND(counts[1]) / 64 * 64);
-    }
+    CHECK(hgrid_sizes(mesh, config, scratch, need.scratch_bytes, &need) == HGRID_OK);
     void *index = guarded(need.index_bytes);
-    hgrid_grid grid;
-    CHECK(hgrid_build(&mesh, &config, index, need.index_bytes, scratch, need.scratch_bytes, &grid,
-                      &report) == HGRID_OK);
-    send(&report.index_bytes, sizeof report.index_bytes);
-    send(index, (size_t)report.index_bytes);
+    CHECK(hgrid_build(mesh, config, index, need.index_bytes, scratch, need.scratch_bytes,
+                      &views[0], &report) == HGRID_OK);
+    CHECK_ANSWER(report.index_bytes == blob_bytes && memcmp(index, blob, blob_bytes) == 0);
+    const void *elsewhere = guarded_copy(blob, blob_bytes);
+    CHECK(hgrid_open(elsewhere, blob_bytes, mesh, &views[1]) == HGRID_OK);
+    CHECK(hgrid_pack(&views[1], NULL, 0, &packed_bytes) == HGRID_ERROR_INDEX_TOO_SMALL);
+    void *packed = guarded(packed_bytes);
+    CHECK(hgrid_pack(&views[1], packed, packed_bytes, &packed_bytes) == HGRID_OK);
+    CHECK(hgrid_open(packed, packed_bytes, NULL, &views[2]) == HGRID_OK);
+    for (int i = 0; i < VIEWS; i++)
+        CHECK_ANSWER(hgrid_validate(&views[i]) == HGRID_OK);
+}
 
-    hgrid_counters counters = {0, 0, 0};
-    hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
-    options.counters = &counters;
-    const size_t count = counts[2];
-    const hgrid_ray *rays = (const hgrid_ray *)receive_array(count * sizeof *rays);
-    for (size_t i = 0; i < count; i++) {
-        hgrid_hit hit = {0, 0, 0, 0};
-        const bool is_hit = hgrid_intersect(&grid, &rays[i], &options, &hit);
-        const uint32_t answers[2] = {is_hit, hgrid_occluded(&grid, &rays[i], NULL)};
-        send(&hit, sizeof hit);
-        send(answers, sizeof answers);
-    }
-    send(&counters, sizeof counters);
+static bool ask_closest_hit(const grid_view *view, const asked *how, const hgrid_ray *ray,
+                            hgrid_hit *hit)
+{
+    hgrid_query_options options;
+    return hgrid_intersect(view, ray, options_of(how, &options), hit);
+}
 
-    hgrid_hit *hits = (hgrid_hit *)guarded(count * sizeof *hits);
-    uint8_t *occluded = (uint8_t *)guarded(count);
-    const hgrid_coherence all[] = {HGRID_COHERENCE_INCOHERENT, HGRID_COHERENCE_COHERENT};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
-        CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, count, all[i], NULL) == HGRID_OK);
-        CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, count, all[i], NULL) == HGRID_OK);
-        send(hits, count * sizeof *hits);
-        send(occluded, count);
-    }
-    return 0;
+static bool ask_any_hit(const grid_view *view, const asked *how, const hgrid_ray *ray)
+{
+    hgrid_query_options options;
+    return hgrid_occluded(view, ray, options_of(how, &options));
+}
+
+static size_t ask_all_hits(const grid_view *view, const asked *how, const hgrid_ray *ray,
+                           hgrid_hit *hits, size_t room)
+{
+    hgrid_query_options options;
+    size_t count;
+    CHECK(hgrid_intersect_all(view, ray, options_of(how, &options), hits, room, &count) ==
+          HGRID_OK);
+    return count;
+}
+
+static void ask_closest_hits(const grid_view *view, const asked *how, const hgrid_ray *rays,
+                             size_t ray_stride, hgrid_hit *hits, size_t hit_stride, size_t count,
+                             hgrid_coherence coherence)
+{
+    hgrid_query_options options;
+    CHECK(hgrid_intersect_n(view, rays, ray_stride, hits, hit_stride, count, coherence,
+                            options_of(how, &options)) == HGRID_OK);
+}
+
+static void ask_any_hits(const grid_view *view, const asked *how, const hgrid_ray *rays,
+                         size_t ray_stride, uint8_t *occluded, size_t stride, size_t count,
+                         hgrid_coherence coherence)
+{
+    hgrid_query_options options;
+    CHECK(hgrid_occluded_n(view, rays, ray_stride, occluded, stride, count, coherence,
+                           options_of(how, &options)) == HGRID_OK);
+}
+
+static bool ask_closest_point(const grid_view *view, const asked *how, const float point[3],
+                              float max, hgrid_closest *closest)
+{
+    hgrid_query_options options;
+    return hgrid_closest_point(view, point, max, options_of(how, &options), closest);
+}
+
+int main(int argc, char **argv)
+{
+    return check_table(argc, argv);
 }

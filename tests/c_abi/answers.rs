@@ -1,109 +1,142 @@
-//! Does C get what Rust gets, bit by bit?
+//! Do Rust, C and C++ get the same answers, those of brute force? One table of questions for all.
 
-use std::io::Write as _;
+use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
-use hgrid_core::{Config, Counters, Hit, Method, QueryOptions, Ray};
-use hgrid_tests::artefact::static_library;
-use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
-use hgrid_tests::methods::configs;
+use hgrid_core::{
+    Coherence, Config, Counters, Grid, Hit, QueryOptions, Ray, Strided, StridedMut, Verdict,
+};
+use hgrid_tests::artefact::{compiler, is_installed, root, run, static_library, warnings};
 use hgrid_tests::owned::Owned;
-use hgrid_tests::random::Random;
 use tempfile::TempDir;
 
-use crate::programs::compile;
+use crate::cases::{Built, Case, Group, Point, accepted, bytes, cases, verdict};
+use crate::programs::SANITIZERS;
 
-/// Rays from around the cube from -1 to 1 towards points inside it, some of them short.
-fn rays(count: usize) -> Vec<Ray> {
-    let mut random = Random(7);
-    let mut ray = || {
-        let (from, to) = (random.point().map(|c| 3.0 * c), random.point());
-        let direction = std::array::from_fn(|axis| to[axis] - from[axis]);
-        let t_max = if random.below(4) == 0 { random.unit() } else { f32::INFINITY };
-        Ray { t_max, ..Ray::new(from, direction) }
-    };
-    (0..count).map(|_| ray()).collect()
-}
-
-/// What `answers.c` fills a `hgrid_config` with.
-fn words(config: &Config) -> [u32; 7] {
-    let Config { method, density, macrocell_factor, subdivide_above, depth, cell_size, flags } =
-        *config;
-    let [density, cell_size] = [density, cell_size].map(f32::to_bits);
-    let flags = flags.bits();
-    [method as u32, density, macrocell_factor, subdivide_above, depth, cell_size, flags]
-}
-
-/// What `answers.c` reads.
-fn question(config: &Config, mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
-    let counts = [mesh.positions.len(), mesh.indices.len(), rays.len()].map(|n| n as u32);
-    let numbers = words(config).into_iter().chain(counts);
-    let mut bytes: Vec<u8> = numbers.flat_map(u32::to_ne_bytes).collect();
-    bytes.extend(mesh.positions.iter().flatten().flat_map(|c| c.to_ne_bytes()));
-    bytes.extend(mesh.indices.iter().flatten().flat_map(|i| i.to_ne_bytes()));
-    for ray in rays {
-        let Ray { origin: [a, b, c], t_min, direction: [x, y, z], t_max } = *ray;
-        bytes.extend([a, b, c, t_min, x, y, z, t_max].iter().flat_map(|f| f.to_ne_bytes()));
-    }
-    bytes
-}
-
-/// What `answers.c` must write.
-fn answer(config: &Config, mesh: &Mesh, rays: &[Ray]) -> Vec<u8> {
-    let owned = Owned::build(&mesh.view(), config).expect("a sound mesh");
-    let grid = owned.open(&mesh.view()).expect("its own mesh");
-    let mut bytes = (grid.blob_bytes() as u64).to_ne_bytes().to_vec();
-    bytes.extend(grid.blob());
-    let mut counters = Counters::default();
-    for ray in rays {
-        let found = grid.intersect_with(ray, &mut QueryOptions::counting(&mut counters));
-        let Hit { t, u, v, primitive } =
-            found.unwrap_or(Hit { t: 0.0, u: 0.0, v: 0.0, primitive: 0 });
-        bytes.extend([t, u, v].iter().flat_map(|f| f.to_ne_bytes()));
-        let words = [primitive, found.is_some().into(), grid.occluded(ray).into()];
-        bytes.extend(words.iter().flat_map(|w| w.to_ne_bytes()));
-    }
-    let Counters { primitive_tests, cell_steps, grid_steps } = counters;
-    bytes.extend([primitive_tests, cell_steps, grid_steps].iter().flat_map(|n| n.to_ne_bytes()));
-    // Both batches, whatever is known of the rays.
-    for _ in 0..2 {
-        for ray in rays {
-            let Hit { t, u, v, primitive } = grid.intersect(ray).unwrap_or(Hit::MISS);
-            bytes.extend([t, u, v].iter().flat_map(|f| f.to_ne_bytes()));
-            bytes.extend(primitive.to_ne_bytes());
+/// Asks a grid all of its case's questions in Rust; returns the work that each group took.
+fn check_in_rust(case: &Case, grid: &Grid<'_>) -> Vec<u64> {
+    let mut all_work = Vec::new();
+    for group in &case.groups {
+        let mut work = [Counters::default(); 2];
+        for (ray, offered) in case.rays.iter().zip(&group.offered) {
+            check_ray(grid, group, ray, offered, &mut work);
         }
-        bytes.extend(rays.iter().map(|ray| u8::from(grid.occluded(ray))));
+        let numbers = |w: Counters| [w.primitive_tests, w.cell_steps, w.grid_steps];
+        all_work.extend(work.into_iter().flat_map(numbers));
     }
-    bytes
+    check_batches(grid, &case.rays, &case.groups[0]);
+    for &Point { point, max, mask, skip, ref answer } in &case.points {
+        let mut options = QueryOptions { mask, skip, ..QueryOptions::default() };
+        assert_eq!(grid.closest_point(point, max, &mut options), *answer, "{point:?} {max}");
+    }
+    all_work
 }
 
-/// What a program answers to a question.
-fn ask(program: &Path, question: Vec<u8>) -> Vec<u8> {
-    let mut child = Command::new(program)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the program starts");
-    let mut stdin = child.stdin.take().expect("a pipe");
-    let writer = std::thread::spawn(move || stdin.write_all(&question));
-    let output = child.wait_with_output().expect("the program ends");
-    writer.join().expect("no panic").expect("the program reads everything");
-    assert!(output.status.success(), "{}", output.status);
-    output.stdout
+/// Asks with a group's options, and looks what is offered to its filter.
+fn with_options(
+    &Group { mask, cull, skip, rule, .. }: &Group,
+    offered: &[Hit],
+    counters: Option<&mut Counters>,
+    ask: impl FnOnce(&mut QueryOptions<'_>),
+) {
+    let mut asked = 0;
+    let mut filter = |hit: &Hit| {
+        assert_eq!(Some(hit), offered.get(asked), "out of order");
+        asked += 1;
+        verdict(rule, hit.primitive)
+    };
+    let filter: Option<&mut dyn FnMut(&Hit) -> Verdict> =
+        if rule == 0 { None } else { Some(&mut filter) };
+    ask(&mut QueryOptions { mask, cull, skip, filter, counters });
+}
+
+/// One ray in every query that there is for one.
+fn check_ray(
+    grid: &Grid<'_>,
+    group: &Group,
+    ray: &Ray,
+    offered: &[Hit],
+    [closest, any]: &mut [Counters; 2],
+) {
+    let expected = accepted(group.rule, offered);
+    with_options(group, offered, Some(closest), |options| {
+        assert_eq!(grid.intersect_with(ray, options), expected.first().copied(), "{ray:?}");
+    });
+    with_options(group, offered, Some(any), |options| {
+        assert_eq!(grid.occluded_with(ray, options), !expected.is_empty(), "{ray:?}");
+    });
+    for room in [0, 1, 17, expected.len(), expected.len() + 1] {
+        with_options(group, offered, None, |options| {
+            let mut hits = vec![Hit::MISS; room];
+            assert_eq!(grid.intersect_all(ray, options, &mut hits), expected.len(), "{ray:?}");
+            let written = room.min(expected.len());
+            assert_eq!(hits[..written], expected[..written], "room for {room}, {ray:?}");
+        });
+    }
+}
+
+/// All rays at once, without options.
+fn check_batches(grid: &Grid<'_>, rays: &[Ray], group: &Group) {
+    for coherence in [Coherence::Incoherent, Coherence::Coherent] {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        let mut occluded = vec![7; rays.len()];
+        grid.intersect_n(&Strided::new(rays), &mut StridedMut::new(&mut hits), coherence)
+            .and_then(|()| {
+                let mut occluded = StridedMut::new(&mut occluded);
+                grid.occluded_n(&Strided::new(rays), &mut occluded, coherence)
+            })
+            .expect("sound arrays");
+        for ((hit, occluded), offered) in hits.iter().zip(occluded).zip(&group.offered) {
+            assert_eq!(*hit, offered.first().copied().unwrap_or(Hit::MISS));
+            assert_eq!(occluded, u8::from(!offered.is_empty()));
+        }
+    }
+}
+
+/// Builds in Rust, asks everything, and returns what C and C++ have to build and do.
+fn built(case: &Case, config: &Config) -> Built {
+    let owned = Owned::build(&case.view(), config).expect("a sound mesh");
+    let grid = owned.open(&case.view()).expect("its own mesh");
+    let counters = check_in_rust(case, &grid);
+    Built { blob: grid.blob().to_vec(), counters }
+}
+
+/// Compiles a program that asks all questions, and runs it; returns how many answers it compared.
+fn ask(mut compiler: Command, source: &str, flags: &[&str], table: &Path) -> usize {
+    let program = table.with_extension("program");
+    let language = if source.ends_with(".cpp") { "c++" } else { "c" };
+    let is_cpp = format!("{compiler:?}").contains("-std=c++");
+    let language = if is_cpp { "c++" } else { language };
+    compiler.args(["-D_DEFAULT_SOURCE", "-g"]).args(flags).args(["-x", language]);
+    compiler.arg(root().join("tests/c_abi").join(source)).args(["-x", "none"]);
+    run(compiler.arg(static_library()).arg("-o").arg(&program));
+    let printed = run(Command::new(&program).arg(table)).stdout;
+    let printed = String::from_utf8(printed).expect("text");
+    printed.trim().parse().expect("a number of answers")
 }
 
 #[test]
-fn c_gets_the_bits_that_rust_gets() {
+fn rust_c_and_cpp_answer_as_brute_force_does() {
+    let cases = cases();
     let dir = TempDir::new().expect("a folder");
-    let program = compile("answers", "c99", &["-O2"], &static_library(), dir.path());
-    let rays = rays(2000);
-    let meshes =
-        [Mesh::default(), one_triangle(), ball(20, 1.0), soup(3000, 0.1, 1), soup(200, 2.0, 2)];
-    let configs: Vec<_> = Method::ALL.iter().copied().map(Config::new).chain(configs()).collect();
-    for (config, mesh) in configs.iter().flat_map(|c| meshes.iter().map(move |mesh| (c, mesh))) {
-        let found = ask(&program, question(config, mesh, &rays));
-        let triangles = mesh.indices.len();
-        assert!(found == answer(config, mesh, &rays), "{triangles} triangles, {config:?}");
+    let table = dir.path().join("table");
+    fs::write(&table, bytes(&cases, built)).expect("a file");
+
+    let sanitized: Vec<_> = SANITIZERS.into_iter().chain(["-O1"]).collect();
+    let mut counts = vec![
+        ask(compiler("c99"), "answers.c", &sanitized, &table),
+        ask(compiler("c++17"), "answers.c", &["-O2"], &table),
+        ask(compiler("c++17"), "answers.cpp", &sanitized, &table),
+    ];
+    if is_installed("clang") {
+        let clang = |name: &str, dialect| warnings(Command::new(name), dialect);
+        counts.push(ask(clang("clang", "c17"), "answers.c", &["-O2"], &table));
+        if is_installed("clang++") {
+            let flags = ["-O2", "-fno-exceptions", "-fno-rtti"];
+            counts.push(ask(clang("clang++", "c++20"), "answers.cpp", &flags, &table));
+        }
     }
+    // All of them asked everything.
+    assert!(counts[0] > 500_000 && counts.iter().all(|count| *count == counts[0]), "{counts:?}");
 }

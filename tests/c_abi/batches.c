@@ -2,9 +2,6 @@
 
 #include "check.h"
 
-static const hgrid_config METHODS[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
-                                       HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
-                                       HGRID_CONFIG_INIT_BRICK};
 static const hgrid_coherence COHERENCES[] = {HGRID_COHERENCE_INCOHERENT, HGRID_COHERENCE_COHERENT};
 
 /* More than a chunk, less than two, and many chunks with a rest. */
@@ -371,11 +368,9 @@ int main(void)
     make_sheet(&mesh_data);
     mesh = mesh_of(&mesh_data);
     make_rays();
-    for (size_t m = 0; m < sizeof METHODS / sizeof *METHODS; m++) {
-        const hgrid_report need = exact_sizes(&mesh, &METHODS[m]);
-        void *index = guarded(need.index_bytes), *scratch = guarded(need.scratch_bytes);
-        EXPECT(HGRID_OK, hgrid_build(&mesh, &METHODS[m], index, need.index_bytes, scratch,
-                                     need.scratch_bytes, &grid, NULL));
+    for (int method = 0; method < METHODS; method++) {
+        const hgrid_config config = usual(method);
+        grid = build_exactly(&mesh, &config, NULL, NULL);
         ask_one_by_one();
         for (size_t c = 0; c < sizeof COHERENCES / sizeof *COHERENCES; c++) {
             tight_arrays(COHERENCES[c]);

@@ -21,7 +21,7 @@
         } \
     } while (0)
 
-/* Checks what a call returns, and tells the test which statuses were reached. */
+/* Checks what a call returns, and tells the test which function reached which status. */
 #define EXPECT(expected, call) \
     do { \
         const hgrid_status status_ = (call); \
@@ -30,8 +30,23 @@
                     hgrid_status_string(status_)); \
             exit(1); \
         } \
-        printf("reached %d\n", (int)status_); \
+        reached(#call, status_); \
     } while (0)
+
+/* Tells it of a call like "hgrid_open(...)", each pair once. */
+static inline void reached(const char *call, hgrid_status status)
+{
+    static char told[64][256];
+    static size_t told_count;
+    char line[256];
+    snprintf(line, sizeof line, "reached %d %.*s", (int)status, (int)strcspn(call, "("), call);
+    for (size_t i = 0; i < told_count; i++)
+        if (strcmp(told[i], line) == 0)
+            return;
+    if (told_count < sizeof told / sizeof *told)
+        strcpy(told[told_count++], line);
+    puts(line);
+}
 
 /* Memory that ends where a page ends that nobody may touch, so that reading or writing one byte
  * behind it stops the program, also inside a library that no sanitizer watches. Filled with a
@@ -80,8 +95,8 @@ static inline void make_sheet(sheet *s)
     for (uint32_t y = 0; y <= SIDE; y++)
         for (uint32_t x = 0; x <= SIDE; x++) {
             float *p = s->positions[y * (SIDE + 1) + x];
-            p[0] = (float)x / SIDE;
-            p[1] = (float)y / SIDE;
+            p[0] = (float)x / (float)SIDE;
+            p[1] = (float)y / (float)SIDE;
             p[2] = (float)((x * 5 + y * 3) % 7) / 70;
         }
     for (uint32_t y = 0; y < SIDE; y++)
@@ -100,6 +115,17 @@ static inline hgrid_mesh mesh_of(const sheet *s)
     mesh.indices = s->indices;
     mesh.triangle_count = TRIANGLES;
     return mesh;
+}
+
+/* The usual configuration of each method. */
+enum { METHODS = 5 };
+
+static inline hgrid_config usual(int method)
+{
+    const hgrid_config all[METHODS] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
+                                       HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
+                                       HGRID_CONFIG_INIT_BRICK};
+    return all[method];
 }
 
 /* A ray straight down onto the sheet. */
@@ -123,6 +149,21 @@ static inline hgrid_report exact_sizes(const hgrid_mesh *mesh, const hgrid_confi
         CHECK(exact.scratch_bytes == enough.scratch_bytes);
     CHECK(exact.index_bytes <= enough.index_bytes);
     return exact;
+}
+
+/* A grid in memory of exactly its size. `blob`, `blob_bytes`: where it lies; may be NULL. */
+static inline hgrid_grid build_exactly(const hgrid_mesh *mesh, const hgrid_config *config,
+                                       void **blob, size_t *blob_bytes)
+{
+    const hgrid_report need = exact_sizes(mesh, config);
+    void *index = guarded(need.index_bytes), *scratch = guarded(need.scratch_bytes);
+    hgrid_report report = HGRID_REPORT_INIT;
+    hgrid_grid grid;
+    EXPECT(HGRID_OK, hgrid_build(mesh, config, index, need.index_bytes, scratch,
+                                 need.scratch_bytes, &grid, &report));
+    if (blob != NULL)
+        *blob = index, *blob_bytes = (size_t)report.index_bytes;
+    return grid;
 }
 
 #endif

@@ -4,14 +4,10 @@
 #ifndef HGRID_STD
 #define HGRID_STD
 #endif
-#include "check.h"
+#include "versions.h"
 
 static sheet mesh_data;
 static hgrid_mesh mesh;
-static const hgrid_config configs[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
-                                       HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
-                                       HGRID_CONFIG_INIT_BRICK};
-enum { CONFIGS = sizeof configs / sizeof *configs };
 
 /* Takes a note of every block that is out, and runs out of memory on demand. */
 typedef struct {
@@ -113,31 +109,33 @@ static void compare_with_a_build(const hgrid_grid *grid, const hgrid_report *rep
 
 static void the_systems_memory_serves(void)
 {
-    for (int i = 0; i < CONFIGS; i++) {
+    for (int i = 0; i < METHODS; i++) {
+        const hgrid_config config = usual(i);
         hgrid_grid *grid = NULL;
         hgrid_report report = HGRID_REPORT_INIT;
-        EXPECT(HGRID_OK, hgrid_create(&mesh, &configs[i], NULL, &grid, &report));
-        compare_with_a_build(grid, &report, &configs[i]);
+        EXPECT(HGRID_OK, hgrid_create(&mesh, &config, NULL, &grid, &report));
+        compare_with_a_build(grid, &report, &config);
         hgrid_destroy(grid);
     }
 }
 
 static void all_memory_is_given_back_as_it_was_asked_for(void)
 {
-    for (int i = 0; i < CONFIGS; i++) {
+    for (int i = 0; i < METHODS; i++) {
+        const hgrid_config config = usual(i);
         arena a = new_arena();
         hgrid_grid *grid = NULL;
         hgrid_report report = HGRID_REPORT_INIT;
         {
             /* The struct itself is gone when the grid is destroyed. */
             hgrid_allocator allocator = allocator_of(&a);
-            EXPECT(HGRID_OK, hgrid_create(&mesh, &configs[i], &allocator, &grid, &report));
+            EXPECT(HGRID_OK, hgrid_create(&mesh, &config, &allocator, &grid, &report));
             memset(&allocator, 0xc7, sizeof allocator);
         }
-        compare_with_a_build(grid, &report, &configs[i]);
+        compare_with_a_build(grid, &report, &config);
 
         /* The grid is all that is out: the exact index and a little for the view. */
-        const hgrid_report need = exact_sizes(&mesh, &configs[i]);
+        const hgrid_report need = exact_sizes(&mesh, &config);
         CHECK(a.live == 1 && a.calls == 2);
         CHECK(a.bytes > need.index_bytes && a.bytes < need.index_bytes + 1024);
         CHECK(a.blocks[0].start == (void *)grid && a.blocks[0].alignment == HGRID_ALIGNMENT);
@@ -148,15 +146,16 @@ static void all_memory_is_given_back_as_it_was_asked_for(void)
 
 static void every_allocation_may_fail(void)
 {
-    for (int i = 0; i < CONFIGS; i++) {
-        const hgrid_report need = exact_sizes(&mesh, &configs[i]);
+    for (int i = 0; i < METHODS; i++) {
+        const hgrid_config config = usual(i);
+        const hgrid_report need = exact_sizes(&mesh, &config);
         size_t fail_at = 1;
         for (;; fail_at++) {
             arena a = new_arena();
             a.fail_at = fail_at;
             const hgrid_allocator allocator = allocator_of(&a);
             hgrid_grid *grid = &untouched;
-            if (hgrid_create(&mesh, &configs[i], &allocator, &grid, NULL) == HGRID_OK) {
+            if (hgrid_create(&mesh, &config, &allocator, &grid, NULL) == HGRID_OK) {
                 CHECK(a.calls == fail_at - 1);
                 hgrid_destroy(grid);
                 CHECK(a.live == 0);
@@ -165,7 +164,7 @@ static void every_allocation_may_fail(void)
             a = new_arena();
             a.fail_at = fail_at;
             const hgrid_report report =
-                refuse(HGRID_ERROR_OUT_OF_MEMORY, &mesh, &configs[i], &a);
+                refuse(HGRID_ERROR_OUT_OF_MEMORY, &mesh, &config, &a);
             CHECK(report.index_bytes >= need.index_bytes && report.triangle == HGRID_INVALID_ID);
             CHECK(report.scratch_bytes >= need.scratch_bytes);
             CHECK(report.is_exact == (fail_at > 1));
@@ -206,8 +205,9 @@ static void a_build_that_fails_gives_back_both_regions(void)
     hgrid_allocator allocator = HGRID_ALLOCATOR_INIT;
     allocator.allocate = give_the_only_region;
     allocator.release = take_the_only_region;
+    const hgrid_config config = usual(4);
     hgrid_grid *grid = &untouched;
-    EXPECT(HGRID_ERROR_OVERLAP, hgrid_create(&mesh, &configs[4], &allocator, &grid, NULL));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_create(&mesh, &config, &allocator, &grid, NULL));
     CHECK(grid == &untouched && times_released == 2);
 }
 
@@ -218,7 +218,9 @@ static void null_is_refused_where_it_is_not_allowed(void)
     hgrid_report report = HGRID_REPORT_INIT;
     hgrid_grid *grid = &untouched;
     refuse(HGRID_ERROR_NULL_ARGUMENT, NULL, NULL, &a);
+    puts("null hgrid_create.mesh");
     EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_create(&mesh, NULL, &allocator, NULL, &report));
+    puts("null hgrid_create.grid");
     EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_create(NULL, NULL, NULL, NULL, NULL));
     allocator.allocate = NULL;
     EXPECT(HGRID_ERROR_NULL_ARGUMENT, hgrid_create(&mesh, NULL, &allocator, &grid, &report));
@@ -236,37 +238,37 @@ static void null_is_refused_where_it_is_not_allowed(void)
     /* Config, allocator and report may be NULL, and so may what is destroyed. */
     EXPECT(HGRID_OK, hgrid_create(&mesh, NULL, NULL, &grid, NULL));
     EXPECT(HGRID_OK, hgrid_validate(grid));
+    puts("null hgrid_create.config\nnull hgrid_create.allocator\nnull hgrid_create.report");
     hgrid_destroy(grid);
     hgrid_destroy(NULL);
+    puts("null hgrid_destroy.grid");
 }
 
-static void the_allocators_struct_is_checked(void)
+/* Creates and destroys, all in one. */
+static hgrid_status create(const hgrid_mesh *input, const hgrid_config *config,
+                           const hgrid_allocator *allocator, hgrid_report *report)
 {
-    arena a = new_arena();
-    struct {
-        hgrid_allocator known;
-        unsigned char tail[16];
-    } later = {allocator_of(&a), {0}};
-    const uint32_t sizes[] = {0, sizeof later.known - 1, sizeof later.known, sizeof later,
-                              UINT32_MAX};
-    for (int i = 0; i < 5; i++) {
-        later.known.struct_size = sizes[i];
-        hgrid_grid *grid = &untouched;
-        if (sizes[i] == sizeof later.known || sizes[i] == sizeof later) {
-            EXPECT(HGRID_OK, hgrid_create(&mesh, NULL, &later.known, &grid, NULL));
-            hgrid_destroy(grid);
-        } else {
-            EXPECT(HGRID_ERROR_STRUCT_SIZE, hgrid_create(&mesh, NULL, &later.known, &grid, NULL));
-            CHECK(grid == &untouched);
-        }
-    }
     hgrid_grid *grid = &untouched;
-    later.tail[15] = 1;
-    later.known.struct_size = sizeof later;
-    EXPECT(HGRID_ERROR_STRUCT_SIZE, hgrid_create(&mesh, NULL, &later.known, &grid, NULL));
-    later.known = allocator_of(&a);
-    later.known.reserved = 1;
-    EXPECT(HGRID_ERROR_STRUCT_SIZE, hgrid_create(&mesh, NULL, &later.known, &grid, NULL));
+    const hgrid_status status = hgrid_create(input, config, allocator, &grid, report);
+    CHECK((grid == &untouched) == (status != HGRID_OK));
+    if (status == HGRID_OK)
+        hgrid_destroy(grid);
+    return status;
+}
+
+static void structs_are_checked(void)
+{
+    const hgrid_report report = HGRID_REPORT_INIT;
+    arena a = new_arena();
+    hgrid_allocator allocator = allocator_of(&a);
+    CHECK_VERSIONS(hgrid_create.mesh, hgrid_mesh, mesh, create(it, NULL, NULL, NULL));
+    CHECK_VERSIONS(hgrid_create.config, hgrid_config, usual(0), create(&mesh, it, NULL, NULL));
+    CHECK_VERSIONS(hgrid_create.allocator, hgrid_allocator, allocator,
+                   create(&mesh, NULL, it, NULL));
+    CHECK_VERSIONS(hgrid_create.report, hgrid_report, report, create(&mesh, NULL, NULL, it));
+    allocator.reserved = 1;
+    hgrid_grid *grid = &untouched;
+    EXPECT(HGRID_ERROR_STRUCT_SIZE, hgrid_create(&mesh, NULL, &allocator, &grid, NULL));
     CHECK(grid == &untouched && a.live == 0);
 }
 
@@ -283,7 +285,7 @@ static void what_a_build_refuses_is_refused(void)
     CHECK(refuse(HGRID_ERROR_INDEX_OUT_OF_RANGE, &input, NULL, &a).triangle == 77);
     broken = mesh_data;
     broken.positions[VERTICES - 1][2] = NAN;
-    config = configs[4];
+    config = usual(4);
     config.flags = HGRID_BUILD_STRICT;
     CHECK(refuse(HGRID_ERROR_NON_FINITE, &input, &config, &a).triangle == TRIANGLES - 2);
     CHECK(a.calls == 0);
@@ -297,11 +299,12 @@ static void what_a_build_refuses_is_refused(void)
 static void an_empty_mesh_is_a_grid(void)
 {
     const hgrid_mesh empty = HGRID_MESH_INIT;
-    for (int i = 0; i < CONFIGS; i++) {
+    for (int i = 0; i < METHODS; i++) {
+        const hgrid_config config = usual(i);
         arena a = new_arena();
         const hgrid_allocator allocator = allocator_of(&a);
         hgrid_grid *grid = NULL;
-        EXPECT(HGRID_OK, hgrid_create(&empty, &configs[i], &allocator, &grid, NULL));
+        EXPECT(HGRID_OK, hgrid_create(&empty, &config, &allocator, &grid, NULL));
         const hgrid_ray ray = ray_down(0, 0);
         CHECK(!hgrid_occluded(grid, &ray, NULL));
         hgrid_destroy(grid);
@@ -320,7 +323,7 @@ int main(void)
     memory_that_is_not_aligned_is_given_back();
     a_build_that_fails_gives_back_both_regions();
     null_is_refused_where_it_is_not_allowed();
-    the_allocators_struct_is_checked();
+    structs_are_checked();
     what_a_build_refuses_is_refused();
     an_empty_mesh_is_a_grid();
     CHECK(all_bytes_are(&untouched, sizeof untouched, 0xc7));

@@ -15,7 +15,8 @@ fn it_leaks_nothing() {
         return;
     }
     let dir = TempDir::new().expect("a folder");
-    let program = compile("create", "c99", &[], &Flavour::Std.static_library(), dir.path());
+    let program =
+        compile("create", compiler("c99"), &[], &Flavour::Std.static_library(), dir.path());
     let mut valgrind = Command::new("valgrind");
     valgrind.args(["--quiet", "--error-exitcode=99", "--leak-check=full"]);
     run(valgrind.args(["--show-leak-kinds=all", "--errors-for-leak-kinds=all"]).arg(program));

@@ -5,7 +5,9 @@
 //! libraries' symbols show that there is nothing else in them.
 
 mod answers;
+mod cases;
 mod create;
 mod header;
 mod programs;
+mod promises;
 mod symbols;

@@ -5,33 +5,77 @@
 
 static sheet mesh_data;
 static hgrid_mesh tight;
+static hgrid_config config;
 static hgrid_report need;
 static unsigned char *expected_blob;
+static size_t blob_bytes;
+
+/* Asks everything about rays onto all of the sheet, in memory that ends with each argument. */
+static void ask_everything(const hgrid_grid *view, const hgrid_mesh *mesh)
+{
+    enum { RAYS = 66 };
+    const hgrid_grid *grid = (hgrid_grid *)guarded_copy(view, sizeof *view);
+    hgrid_ray *rays = (hgrid_ray *)guarded(RAYS * sizeof *rays);
+    hgrid_hit *hits = (hgrid_hit *)guarded(RAYS * sizeof *hits);
+    hgrid_hit *hit = (hgrid_hit *)guarded(sizeof *hit), all[4];
+    uint8_t *occluded = (uint8_t *)guarded(RAYS);
+    size_t *count = (size_t *)guarded(sizeof *count);
+    hgrid_closest *closest = (hgrid_closest *)guarded(sizeof *closest);
+    hgrid_query_options *options = (hgrid_query_options *)guarded(sizeof *options);
+    const hgrid_query_options defaults = HGRID_QUERY_OPTIONS_INIT;
+    const hgrid_counters zero = {0, 0, 0};
+    *options = defaults;
+    options->counters = (hgrid_counters *)guarded_copy(&zero, sizeof zero);
+    for (int i = 0; i < RAYS; i++)
+        rays[i] = ray_down((float)(i % 11) / 10.1f + 0.003f, (float)(i / 11) / 6.1f + 0.005f);
+    for (hgrid_coherence c = 0; c < 2; c++)
+        for (int with = 0; with < 2; with++) {
+            const hgrid_query_options *as = with ? options : NULL;
+            EXPECT(HGRID_OK, hgrid_intersect_n(grid, rays, 0, hits, 0, RAYS, c, as));
+            EXPECT(HGRID_OK, hgrid_occluded_n(grid, rays, 0, occluded, 0, RAYS, c, as));
+            for (int i = 0; i < RAYS; i++)
+                CHECK(hits[i].primitive < TRIANGLES && occluded[i] == 1);
+        }
+    for (int i = 0; i < RAYS; i += 13) {
+        const hgrid_ray *ray = (hgrid_ray *)guarded_copy(&rays[i], sizeof *ray);
+        const float *point = (float *)guarded_copy(ray->origin, sizeof ray->origin);
+        const uint32_t id = hits[i].primitive;
+        options->mask = UINT32_MAX;
+        CHECK(hgrid_intersect(grid, ray, NULL, hit) && hit->primitive == id);
+        CHECK(hgrid_intersect(grid, ray, options, hit) && hit->primitive == id);
+        CHECK(hgrid_occluded(grid, ray, options));
+        CHECK(hgrid_closest_point(grid, point, INFINITY, options, closest));
+        /* Masks are read when a ray hits. */
+        options->mask = 1u << id % 31;
+        CHECK(hgrid_occluded(grid, ray, options));
+        options->mask = 1u << (id + 1) % 31;
+        CHECK(hgrid_occluded(grid, ray, options) == (mesh->masks == NULL));
+        EXPECT(HGRID_OK, hgrid_intersect_all(grid, ray, options, all, 4, count));
+        CHECK(*count == (mesh->masks == NULL));
+    }
+    CHECK(options->counters->primitive_tests > RAYS);
+}
 
 /* Builds a mesh that is the sheet in another form: the blob must be the same, byte by byte. */
 static void check_form(const hgrid_mesh *mesh)
 {
     void *index = guarded(need.index_bytes), *scratch = guarded(need.scratch_bytes);
     hgrid_grid grid;
-    EXPECT(HGRID_OK, hgrid_build(mesh, NULL, index, need.index_bytes, scratch, need.scratch_bytes,
-                                 &grid, NULL));
-    CHECK(memcmp(index, expected_blob, need.index_bytes) == 0);
+    EXPECT(HGRID_OK, hgrid_build(mesh, &config, index, need.index_bytes, scratch,
+                                 need.scratch_bytes, &grid, NULL));
+    CHECK(memcmp(index, expected_blob, blob_bytes) == 0);
     EXPECT(HGRID_OK, hgrid_validate(&grid));
-    const hgrid_ray ray = ray_down(0.99f, 0.98f);
-    hgrid_hit hit;
-    CHECK(hgrid_intersect(&grid, &ray, NULL, &hit) && hit.primitive >= TRIANGLES - 2);
+    ask_everything(&grid, mesh);
 }
 
 static void build_the_expected_blob(void)
 {
     make_sheet(&mesh_data);
     tight = mesh_of(&mesh_data);
-    need = exact_sizes(&tight, NULL);
-    expected_blob = (unsigned char *)guarded(need.index_bytes);
-    void *scratch = guarded(need.scratch_bytes);
-    hgrid_grid grid;
-    EXPECT(HGRID_OK, hgrid_build(&tight, NULL, expected_blob, need.index_bytes, scratch,
-                                 need.scratch_bytes, &grid, NULL));
+    need = exact_sizes(&tight, &config);
+    void *blob;
+    build_exactly(&tight, &config, &blob, &blob_bytes);
+    expected_blob = (unsigned char *)blob;
 }
 
 static void tight_arrays_are_read_to_their_last_byte_and_no_further(void)
@@ -45,10 +89,26 @@ static void tight_arrays_are_read_to_their_last_byte_and_no_further(void)
     check_form(&mesh);
 }
 
+/* One for each triangle, at any address. */
+static void masks_are_read_to_their_last_byte_and_no_further(void)
+{
+    for (size_t stride = 4; stride < 8; stride++) {
+        unsigned char *masks = (unsigned char *)guarded((TRIANGLES - 1) * stride + 4);
+        for (uint32_t i = 0; i < TRIANGLES; i++) {
+            const uint32_t mask = 1u << i % 31;
+            memcpy(masks + i * stride, &mask, sizeof mask);
+        }
+        hgrid_mesh mesh = tight;
+        mesh.masks = masks;
+        mesh.mask_stride = stride == 4 ? 0 : stride;
+        check_form(&mesh);
+    }
+}
+
 /* The caller's own structs, at an odd address, cut off behind the last element's own bytes. */
 static void strides_need_no_alignment_and_no_padding_at_the_end(void)
 {
-    for (size_t extra = 1; extra < 9; extra++) {
+    for (size_t extra = 1; extra < 9; extra += extra < 3 ? 1 : 5) {
         const size_t stride = 12 + extra;
         const size_t position_bytes = (VERTICES - 1) * stride + 12;
         const size_t index_bytes = (TRIANGLES - 1) * stride + 12;
@@ -67,7 +127,7 @@ static void strides_need_no_alignment_and_no_padding_at_the_end(void)
 
 static void indices_of_16_bits_are_read_as_such(void)
 {
-    for (size_t stride = 6; stride < 12; stride++) {
+    for (size_t stride = 6; stride < 12; stride += stride < 8 ? 1 : 3) {
         unsigned char *indices = (unsigned char *)guarded((TRIANGLES - 1) * stride + 6);
         for (size_t i = 0; i < TRIANGLES; i++) {
             uint16_t triangle[3];
@@ -172,10 +232,16 @@ static void an_empty_mesh_needs_no_arrays(void)
 
 int main(void)
 {
-    build_the_expected_blob();
-    tight_arrays_are_read_to_their_last_byte_and_no_further();
-    strides_need_no_alignment_and_no_padding_at_the_end();
-    indices_of_16_bits_are_read_as_such();
+    for (int method = METHODS; method-- > 0;) {
+        config = usual(method);
+        build_the_expected_blob();
+        tight_arrays_are_read_to_their_last_byte_and_no_further();
+        strides_need_no_alignment_and_no_padding_at_the_end();
+        indices_of_16_bits_are_read_as_such();
+        masks_are_read_to_their_last_byte_and_no_further();
+    }
+    /* The others are asked in methods.c: these are the promises to the byte. */
+    CHECK(config.method == HGRID_METHOD_ONE_LEVEL);
     one_byte_less_is_refused_and_nothing_is_touched();
     what_is_more_than_needed_is_not_touched();
     regions_may_hold_anything();

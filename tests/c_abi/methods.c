@@ -5,11 +5,7 @@
 static sheet mesh_data;
 static hgrid_mesh mesh;
 
-static const hgrid_config USUAL[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
-                                     HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
-                                     HGRID_CONFIG_INIT_BRICK};
-
-enum { METHODS = sizeof USUAL / sizeof *USUAL, RAYS = 200 };
+enum { RAYS = 200 };
 
 /* Numbers with which the small sheet has several levels, and subgrids in most cells. */
 static hgrid_config deep(hgrid_config config)
@@ -297,11 +293,12 @@ int main(void)
     make_sheet(&mesh_data);
     mesh = mesh_of(&mesh_data);
     for (int i = 0; i < METHODS; i++) {
-        CHECK(USUAL[i].method == (uint32_t)i + 1);
-        check_method(&USUAL[i]);
+        const hgrid_config config = usual(i);
+        CHECK(config.method == (uint32_t)i + 1);
+        check_method(&config);
     }
     for (int i = 0; i < METHODS; i++) {
-        const hgrid_config config = deep(USUAL[i]);
+        const hgrid_config config = deep(usual(i));
         check_method(&config);
     }
     return 0;

@@ -6,9 +6,6 @@
 
 static sheet mesh_data;
 static hgrid_mesh mesh;
-static const hgrid_config configs[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
-                                       HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
-                                       HGRID_CONFIG_INIT_BRICK};
 
 /* Says stop at a call, counted from 0, and looks that there is none behind it. */
 typedef struct {
@@ -90,9 +87,10 @@ int main(void)
 {
     make_sheet(&mesh_data);
     mesh = mesh_of(&mesh_data);
-    for (size_t i = 0; i < sizeof configs / sizeof *configs; i++) {
-        every_call_may_cancel(&configs[i], 1);
-        every_call_may_cancel(&configs[i], 4);
+    for (int method = 0; method < METHODS; method++) {
+        const hgrid_config config = usual(method);
+        every_call_may_cancel(&config, 1);
+        every_call_may_cancel(&config, 4);
     }
     return 0;
 }

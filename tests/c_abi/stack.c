@@ -11,7 +11,7 @@ static hgrid_grid grid;
 static hgrid_ray rays[RAYS];
 static hgrid_hit hits[RAYS];
 static uint8_t occluded[RAYS];
-static hgrid_coherence coherence;
+static hgrid_counters counters;
 
 static void one(void)
 {
@@ -21,10 +21,48 @@ static void one(void)
     }
 }
 
+static hgrid_verdict reject(void *context, size_t ray, const hgrid_hit *hit)
+{
+    return context == &grid && ray < RAYS && hit->t >= 0 ? HGRID_REJECT : HGRID_ACCEPT;
+}
+
+static hgrid_query_options options(void)
+{
+    hgrid_query_options all = HGRID_QUERY_OPTIONS_INIT;
+    all.mask = 1, all.skip = 3;
+    all.filter = reject, all.context = &grid, all.counters = &counters;
+    return all;
+}
+
+static void with_options(void)
+{
+    const hgrid_query_options all = options();
+    size_t count;
+    for (int i = 0; i < RAYS; i++) {
+        hgrid_intersect(&grid, &rays[i], &all, &hits[i]);
+        hgrid_occluded(&grid, &rays[i], &all);
+        CHECK(hgrid_intersect_all(&grid, &rays[i], &all, hits, RAYS, &count) == HGRID_OK);
+        CHECK(hgrid_intersect_all(&grid, &rays[i], NULL, hits, RAYS, &count) == HGRID_OK);
+    }
+}
+
+static void closest(void)
+{
+    for (int i = 0; i < RAYS; i += 20) {
+        hgrid_closest found;
+        hgrid_closest_point(&grid, rays[i].origin, INFINITY, NULL, &found);
+    }
+}
+
 static void many(void)
 {
-    CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, coherence, NULL) == HGRID_OK);
-    CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, coherence, NULL) == HGRID_OK);
+    const hgrid_query_options all = options();
+    for (hgrid_coherence c = 0; c < 2; c++) {
+        CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, c, NULL) == HGRID_OK);
+        CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, c, NULL) == HGRID_OK);
+        CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, c, &all) == HGRID_OK);
+        CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, c, &all) == HGRID_OK);
+    }
 }
 
 /* Bytes of stack that a call takes. */
@@ -50,9 +88,6 @@ int main(void)
     static sheet data;
     make_sheet(&data);
     const hgrid_mesh mesh = mesh_of(&data);
-    const hgrid_config configs[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
-                                    HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
-                                    HGRID_CONFIG_INIT_BRICK};
     for (int i = 0; i < RAYS; i++) {
         /* Tiles, some of them with rays that go elsewhere. */
         const int tile = i / 64, pixel = i % 64;
@@ -60,19 +95,22 @@ int main(void)
                            (float)(tile / 4 * 8 + pixel / 8) / 32);
         rays[i].direction[0] = tile > 4 && i % 7 == 0 ? -3.0f : 0.1f;
     }
-    size_t most_of_one = 0, most_of_many = 0;
-    for (size_t i = 0; i < sizeof configs / sizeof *configs; i++) {
-        const hgrid_report need = exact_sizes(&mesh, &configs[i]);
-        void *index = guarded(need.index_bytes), *scratch = guarded(need.scratch_bytes);
-        CHECK(hgrid_build(&mesh, &configs[i], index, need.index_bytes, scratch, need.scratch_bytes,
-                          &grid, NULL) == HGRID_OK);
-        const size_t bytes = stack_of(one);
-        most_of_one = bytes > most_of_one ? bytes : most_of_one;
-        for (coherence = 0; coherence < 2; coherence++) {
-            const size_t batch = stack_of(many);
-            most_of_many = batch > most_of_many ? batch : most_of_many;
+    struct {
+        const char *name;
+        void (*call)(void);
+        size_t most;
+    } calls[] = {{"one", one, 0}, {"options", with_options, 0}, {"closest", closest, 0},
+                 {"many", many, 0}};
+    enum { CALLS = sizeof calls / sizeof *calls };
+    for (int method = 0; method < METHODS; method++) {
+        const hgrid_config config = usual(method);
+        grid = build_exactly(&mesh, &config, NULL, NULL);
+        for (int i = 0; i < CALLS; i++) {
+            const size_t bytes = stack_of(calls[i].call);
+            calls[i].most = bytes > calls[i].most ? bytes : calls[i].most;
         }
     }
-    printf("one %zu\nmany %zu\n", most_of_one, most_of_many);
+    for (int i = 0; i < CALLS; i++)
+        printf("%s %zu\n", calls[i].name, calls[i].most);
     return 0;
 }

@@ -30,7 +30,7 @@ use core::ffi::c_void;
 use core::ptr::{NonNull, null_mut};
 use core::slice;
 
-use hgrid_core::{BlobInfo, Config, Grid, Method, Strided, Task, TriangleMesh};
+use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
 pub(crate) use ask::{batch, closest, query, query_all};
 
@@ -180,10 +180,7 @@ pub(crate) unsafe fn settings(config: *const hgrid_config) -> Result<hgrid_confi
         return Ok(hgrid_config::DEFAULT);
     }
     // SAFETY: the caller's promise.
-    let mut config = unsafe { read_sized(config) }?;
-    // What a later version has behind it is zero and not copied.
-    config.struct_size = hgrid_config::DEFAULT.struct_size;
-    Ok(config)
+    unsafe { read_sized(config) }
 }
 
 /// What a build may be told, and whom it asks on the way; NULL means the defaults and nobody.
@@ -193,15 +190,10 @@ pub(crate) unsafe fn settings(config: *const hgrid_config) -> Result<hgrid_confi
 unsafe fn config(config: *const hgrid_config) -> Result<(Config, Caller), hgrid_status> {
     // SAFETY: the caller's promise.
     let config = unsafe { settings(config) }?;
-    let hgrid_config { tasks, context, run, progress, .. } = config;
-    let config = config.to_core()?;
-    // The other methods have no tasks, and a field of another method is not looked at.
-    let tasks = if config.method == Method::Brick { tasks } else { 1 };
-    if tasks > 1 && run.is_none() {
-        return Err(HGRID_ERROR_NULL_ARGUMENT);
-    }
+    let hgrid_config { context, run, progress, .. } = config;
+    let tasks = config.task_count()?;
     let run = run.filter(|_| tasks > 1);
-    Ok((config, Caller { tasks, context, run, progress }))
+    Ok((config.to_core()?, Caller { tasks, context, run, progress }))
 }
 
 /// What a caller has for a build: a loop over tasks, and an eye on how far it is.
