@@ -128,8 +128,8 @@
  * Results
  * -------
  * Meshes and hits are in your units; t is in multiples of the ray's direction, whatever its length.
- * There is no epsilon, so the scale of a mesh does not matter. Only IEEE + - * / are used, in a
- * fixed order: the same input gives the same bits on every machine.
+ * There is no epsilon, so the scale of a mesh does not matter. Only IEEE + - * / and square
+ * roots are used, in a fixed order: the same input gives the same bits on every machine.
  *
  * Versions
  * --------
@@ -643,8 +643,9 @@ typedef struct hgrid_query_options {
      */
     uint32_t cull;
     /**
-     * A triangle that is not hit, usually the one that the ray leaves, so that it needs no epsilon;
-     * or `HGRID_INVALID_ID`.
+     * A triangle that is not hit, usually the one that the ray leaves, which then cannot hit itself, without any
+     * epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge still may be hit, where the origin was rounded
+     * to just below it: where that matters, give a small `t_min`, too.
      */
     uint32_t skip;
     /**
@@ -801,8 +802,8 @@ typedef struct hgrid_statistics {
      */
     uint32_t reserved;
     /**
-     * A hash of the grid's box, resolution and lists: the same for the same grid on every platform,
-     * whatever its byte order. It tells grids apart; it is no defence against forgery.
+     * A hash of the grid's box, resolution and lists in order, not of which cell has which: the same for
+     * the same grid on every platform, whatever its byte order. No defence against forgery.
      */
     uint64_t content_hash;
 } hgrid_statistics;
@@ -893,13 +894,13 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_MISALIGNED -3
 
 /**
- * The index or the scratch overlaps the other one or the mesh; the room for a packed blob overlaps the
- * blob or the mesh; or answers of a batch overlap its rays.
+ * The index or the scratch overlaps the other one or the mesh; the room for a packed blob overlaps its
+ * grid or its mesh; or answers of a batch overlap its rays.
  */
 #define HGRID_ERROR_OVERLAP -4
 
 /**
- * The index is too small, or the room for a packed blob. The report says how many bytes it needs.
+ * The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `bytes` says it.
  *
  * With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
  * methods the grid was written as far as it went, so the index may hold anything.
@@ -1058,9 +1059,9 @@ extern "C" {
  * Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
  * is looked at.
  *
- * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are for array declarations: for the default configuration
- * they are never less, and little more. How much more than enough it is depends on the method: a scan takes a sixth of it or
- * less with one level; with recursive and brick it is generous beyond use.
+ * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are for array declarations, and a little more for the
+ * default configuration. How much more than enough it is depends on the method: a scan takes a sixth of
+ * it or less with one level; with recursive and brick it is generous beyond use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
  * `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -1125,17 +1126,23 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  *
  * `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
  * (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no more than a
- * step too much: a step is a factor of 1.41 in the number of cells, and takes as long as `hgrid_sizes`.
- * Bring scratch, as for `hgrid_sizes`; without, a grid must fit by its bound, and gets coarser than it
- * had to be. The scratch holds nothing of use afterwards.
+ * step too much: a step is a factor of 1.41 in the number of cells. It takes a dozen times as long as
+ * `hgrid_sizes`, or less. A density, or cells, that would be too fine for a build count as too large here.
+ *
+ * Bring as much scratch as `hgrid_sizes` without scratch says: with `HGRID_METHOD_ONE_LEVEL` and
+ * `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser than it had
+ * to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
+ * afterwards.
  *
  * `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be the same as
- * `fitted`, which is initialised before in either case. `report` may be NULL.
+ * `fitted`, which is initialised before in either case. `report` may be NULL, and so may `scratch` if its
+ * size is 0.
  *
  * Returns `HGRID_OK`, and the report says what the fitted grid takes; or
- * `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or what
- * `hgrid_sizes` returns. After an error `fitted` is as it was. `run` and `progress` are not called, and
- * the sizes are those of one task; all three are copied.
+ * `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or
+ * `HGRID_ERROR_SCRATCH_TOO_SMALL`, and its `scratch_bytes` is what it takes; or what `hgrid_sizes`
+ * returns. After an error `fitted` is as it was. `run` and `progress` are not called, and the sizes are
+ * those of one task; all three are copied.
  *
  * Threads: any number of calls at once, as long as each has a scratch, a configuration to write and a
  * report of its own.
@@ -1248,15 +1255,16 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * Finds the closest triangle that a ray hits.
  *
  * Returns true and writes `hit`; or returns false and writes nothing. Where several triangles are
- * hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count.
+ * hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count, unless
+ * `cull` of the options says otherwise.
  * A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
  * without area, or one that is seen exactly edge-on, is not hit.
  *
  * `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
  * opened, or with options that break the rules for structs, nothing is hit.
  *
- * A query allocates nothing, needs at most about 4 KiB of stack and always ends: on one level
- * after no more steps than the three resolutions sum up to.
+ * A query allocates nothing, needs at most 6 KiB of stack, as all queries of one ray or point do, and
+ * always ends: on one level after no more steps than the three resolutions sum up to.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -1290,8 +1298,9 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
  * Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
  *
  * Writes as many hits as there is room for, the nearest, and to `count` how many there are, which may
- * be more. With room for all, the ray is walked once; otherwise, and with a filter, once more for each
- * sixteen hits, from where it got to: so nothing is allocated, whatever their number. Options as
+ * be more. With room for more than there are, the ray is walked once; otherwise, and with a filter, once
+ * more for each sixteen hits, from where it got to: so nothing is allocated, whatever their number, but
+ * thousands of hits in one cell take long, as the square of their number. Options as
  * with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what it accepts is
  * written and counted.
  *
@@ -1309,7 +1318,8 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
  * }
  * ```
  *
- * `hits` may be NULL if `capacity` is 0. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
+ * `hits` may be NULL if `capacity` is 0, and overlaps nothing else that the call uses; a filter may look
+ * at those that it has accepted. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
  * returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
  * `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_ANSWERS`
  * (a capacity that is impossible). A ray that is none hits nothing: the count is 0.
@@ -1339,8 +1349,9 @@ hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
  * anything that is not as it should be (another NULL, a view of zeros, options that break the rules, a point that
  * is not finite, a distance that is NaN or negative) the answer is false.
  *
- * The call allocates nothing and always ends. How long it takes grows with the number of cells that
- * are as close as the answer: far from the mesh and in the middle of nothing, limit the distance.
+ * The call allocates nothing and always ends. How long it takes grows with the triangles in a cube
+ * around the point that reaches as far as the answer: it is short near the mesh, and far outside of it
+ * that of a loop over a good part of all triangles.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -1394,7 +1405,7 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * impossible), `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no
  * error: it misses.
  *
- * The call allocates nothing and needs at most about 16 KiB of stack.
+ * The call allocates nothing and needs at most 16 KiB of stack.
  *
  * Threads: any number of queries on the same grid at once; each thread with hits and counters of
  * its own.
@@ -1457,8 +1468,8 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
  * Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
  *
  * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
- * in a mapped file, in flash. It is `index_bytes` of the build's report long; bytes behind it are
- * ignored. It says itself which method built it and how. The mesh is the one it was built for,
+ * in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of `hgrid_pack`;
+ * bytes behind it are ignored. It says itself which method built it and how. The mesh is the one it was built for,
  * of which only the counts are compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh`
  * may be NULL.
  *
@@ -1511,7 +1522,8 @@ hgrid_status hgrid_peek(const void *blob,
  * multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid. Nothing is
  * copied when it is opened.
  *
- * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh. It may be NULL if
+ * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh nor any argument of this
+ * call. It may be NULL if
  * `capacity` is 0: to ask for the size. `grid` and `bytes` may not be NULL.
  *
  * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of
