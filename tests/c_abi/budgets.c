@@ -172,6 +172,15 @@ static void the_finest_grid_that_fits_is_found(void)
             hgrid_config fitted = usual(0);
             hgrid_report report = new_report;
             config.tasks = 1;
+            const bool is_planned = config.method == HGRID_METHOD_ONE_LEVEL
+                                    || config.method == HGRID_METHOD_FIXED;
+            if (!with && !is_planned) {
+                /* Their bounds say nothing of what a mesh takes. */
+                EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL,
+                       hgrid_fit(&mesh, &config, SIZE_MAX, scratch, bytes, &fitted, &report));
+                CHECK(report.scratch_bytes > 0);
+                continue;
+            }
             EXPECT(HGRID_OK, hgrid_fit(&mesh, &config, SIZE_MAX, scratch, bytes, &fitted, &report));
             CHECK(memcmp(&fitted, &config, sizeof config) == 0);
             CHECK(report.index_bytes <= whole.index_bytes);

@@ -63,7 +63,7 @@ impl OneLevel<'_> {
             return Err(at(hash_at, 0));
         }
         if let Some(slot) =
-            hash.windows(2).position(|ends| matches!(ends, [start, end] if start > end))
+            hash.iter().zip(hash.iter().skip(1)).position(|(start, end)| start > end)
         {
             return Err(at(hash_at, (slot + 1) * size_of::<u32>()));
         }

@@ -126,7 +126,7 @@ impl Check<'_> {
             let references = match node.content(self.pool, cell) {
                 None => 0,
                 Some(Content::List(ids)) => {
-                    let ascends = ids.windows(2).all(|ids| matches!(ids, [a, b] if a < b));
+                    let ascends = ids.iter().zip(ids.iter().skip(1)).all(|(a, b)| a < b);
                     if !ascends || !ids.iter().all(|&id| self.count(id, depth)) {
                         return Err(wrong);
                     }

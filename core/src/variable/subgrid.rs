@@ -230,7 +230,7 @@ impl<'a> Subgrid<'a> {
         };
         let resolution @ [width, height, _] = self.frame.resolution;
         let cells = self.frame.cells();
-        let is_full = hash.windows(2).map(|ends| matches!(ends, [start, end] if start < end));
+        let is_full = hash.iter().zip(hash.iter().skip(1)).map(|(start, end)| start < end);
         is_cut
             && !(cells..cells.next_multiple_of(WORD_BITS)).any(is_set)
             && slots_are_sound(

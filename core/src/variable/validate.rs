@@ -90,8 +90,7 @@ impl Variable<'_> {
         if hash.first().is_none_or(|&first| place(first) != 0) {
             return Err(at_slot(0));
         }
-        for (slot, ends) in hash.windows(2).enumerate() {
-            let &[start, end] = ends else { continue };
+        for (slot, (&start, &end)) in hash.iter().zip(hash.iter().skip(1)).enumerate() {
             let is_nothing = place(start) == place(end);
             if place(start) > place(end) || is_nothing && start & GRID != 0 {
                 return Err(at_slot(slot));
@@ -106,7 +105,7 @@ impl Variable<'_> {
         }
         let rows = self.top.row_offsets();
         let is_full =
-            hash.windows(2).map(|ends| matches!(ends, [start, end] if place(*start) < place(*end)));
+            hash.iter().zip(hash.iter().skip(1)).map(|(start, end)| place(*start) < place(*end));
         let offset = |row: usize| rows.get(row).copied();
         if !slots_are_sound(lattice.resolution, offset, |cell| self.top.is_marked(cell), is_full) {
             return Err(at(rows.as_ptr().addr(), 0));
@@ -207,5 +206,5 @@ impl Inside<'_> {
 
 /// Whether every id is larger than the one before it.
 fn ascends(ids: &[u32]) -> bool {
-    ids.windows(2).all(|ids| matches!(ids, [id, next] if id < next))
+    ids.iter().zip(ids.iter().skip(1)).all(|(id, next)| id < next)
 }
