@@ -175,7 +175,7 @@ impl Check<'_> {
             let home = corners.and_then(|corners| home(lattice, *most_blocks, corners));
             matches!(home, Some((_, None)))
         };
-        let ascends = large.windows(2).all(|ids| matches!(ids, [id, next] if id < next));
+        let ascends = large.iter().zip(large.iter().skip(1)).all(|(id, next)| id < next);
         if !ascends || !large.iter().all(is_large) {
             return Err(wrong);
         }

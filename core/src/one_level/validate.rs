@@ -81,9 +81,10 @@ impl OneLevel<'_> {
         let domain_at = sections.domain_bits.as_ptr().addr();
         let mut listed = 0;
         let mut slots = hash
-            .windows(2)
+            .iter()
+            .zip(hash.iter().skip(1))
             .zip(0..)
-            .filter(|(ends, _)| matches!(ends, [start, end] if start < end))
+            .filter(|((start, end), _)| start < end)
             .fold(0_u64, |sum, (_, slot)| sum.wrapping_add(scramble(slot)));
         for (row, &offset) in sections.row_offsets.iter().enumerate() {
             if offset != 0 && extent(sections.domain_bits, row * width, width).is_none() {
@@ -129,7 +130,7 @@ impl OneLevel<'_> {
     ) -> Result<&[u32], Option<&[u32]>> {
         let cell = cell.ok_or(None)?;
         let list = self.references(cell).filter(|list| !list.is_empty()).ok_or(None)?;
-        let ascends = list.windows(2).all(|ids| matches!(ids, [id, next] if id < next));
+        let ascends = list.iter().zip(list.iter().skip(1)).all(|(id, next)| id < next);
         let covers = |&id: &u32| {
             let bounds = mesh.corners(id, Vec3A::new).and_then(Aabb::of);
             bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
