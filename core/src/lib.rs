@@ -66,6 +66,7 @@ mod fixed;
 mod grid;
 mod hash;
 mod inspect;
+mod lists;
 mod mesh;
 mod one_level;
 mod options;

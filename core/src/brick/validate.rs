@@ -23,6 +23,7 @@ use crate::bump::GRID;
 use crate::cell::{CellRange, Lattice};
 use crate::config::{Config, Method};
 use crate::error::Error;
+use crate::lists::ascends;
 use crate::mesh::TriangleMesh;
 
 impl Brick<'_> {
@@ -175,8 +176,7 @@ impl Check<'_> {
             let home = corners.and_then(|corners| home(lattice, *most_blocks, corners));
             matches!(home, Some((_, None)))
         };
-        let ascends = large.iter().zip(large.iter().skip(1)).all(|(id, next)| id < next);
-        if !ascends || !large.iter().all(is_large) {
+        if !ascends(large) || !large.iter().all(is_large) {
             return Err(wrong);
         }
         self.listed += large.len() as u64;

@@ -22,6 +22,7 @@ use crate::blob::{Header, corrupt};
 use crate::cell::{Lattice, woo};
 use crate::control::Watch;
 use crate::error::Error;
+use crate::lists::{ascends, pairs};
 use crate::mesh::TriangleMesh;
 
 /// Whether the header says what the mesh and Woo's rule say.
@@ -62,9 +63,7 @@ impl OneLevel<'_> {
         if hash.first() != Some(&0) {
             return Err(at(hash_at, 0));
         }
-        if let Some(slot) =
-            hash.iter().zip(hash.iter().skip(1)).position(|(start, end)| start > end)
-        {
+        if let Some(slot) = pairs(hash).position(|(start, end)| start > end) {
             return Err(at(hash_at, (slot + 1) * size_of::<u32>()));
         }
         if hash.last() != Some(&header.reference_count) {
@@ -80,9 +79,7 @@ impl OneLevel<'_> {
         let width = width as usize;
         let domain_at = sections.domain_bits.as_ptr().addr();
         let mut listed = 0;
-        let mut slots = hash
-            .iter()
-            .zip(hash.iter().skip(1))
+        let mut slots = pairs(hash)
             .zip(0..)
             .filter(|((start, end), _)| start < end)
             .fold(0_u64, |sum, (_, slot)| sum.wrapping_add(scramble(slot)));
@@ -130,12 +127,11 @@ impl OneLevel<'_> {
     ) -> Result<&[u32], Option<&[u32]>> {
         let cell = cell.ok_or(None)?;
         let list = self.references(cell).filter(|list| !list.is_empty()).ok_or(None)?;
-        let ascends = list.iter().zip(list.iter().skip(1)).all(|(id, next)| id < next);
         let covers = |&id: &u32| {
             let bounds = mesh.corners(id, Vec3A::new).and_then(Aabb::of);
             bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
         };
-        if ascends && list.iter().all(covers) { Ok(list) } else { Err(Some(list)) }
+        if ascends(list) && list.iter().all(covers) { Ok(list) } else { Err(Some(list)) }
     }
 }
 

@@ -16,6 +16,7 @@ use crate::aabb::Aabb;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::{CellRange, Lattice};
 use crate::error::Error;
+use crate::lists::ascends;
 use crate::mesh::TriangleMesh;
 use crate::one_level::reference_limit;
 
@@ -126,8 +127,7 @@ impl Check<'_> {
             let references = match node.content(self.pool, cell) {
                 None => 0,
                 Some(Content::List(ids)) => {
-                    let ascends = ids.iter().zip(ids.iter().skip(1)).all(|(a, b)| a < b);
-                    if !ascends || !ids.iter().all(|&id| self.count(id, depth)) {
+                    if !ascends(ids) || !ids.iter().all(|&id| self.count(id, depth)) {
                         return Err(wrong);
                     }
                     self.listed += ids.len() as u64;

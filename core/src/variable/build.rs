@@ -22,6 +22,7 @@ use crate::cell::{CellRange, Lattice};
 use crate::config::Config;
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
+use crate::lists::pairs;
 use crate::mesh::TriangleMesh;
 use crate::one_level::{
     Layout, MeshSpread, Plan, Rows, Spread, copy, displace, fill, mark, reference_limit, slot,
@@ -203,7 +204,7 @@ fn run(
     let Lists { hash, references, owners, rest } = lists;
     fill(&MeshSpread { mesh, lattice: &plan.lattice }, offsets, hash, references, &Watch::none())?;
     watch.at(0.5)?;
-    let longest = hash.windows(2).map(|ends| ends[1].wrapping_sub(ends[0])).max().unwrap_or(0);
+    let longest = pairs(hash).map(|(start, end)| end.wrapping_sub(start)).max().unwrap_or(0);
     let bench = Layout::bound(longest, plan.density, 0).scratch(rest).ok_or(too_small)?;
     let mut bench = Bench {
         row_offsets: bench.row_offsets,
@@ -234,10 +235,8 @@ fn run(
             *entry = value;
         }
     };
-    let lists = hash.windows(2).map(|ends| match ends {
-        &[start, end] => references.get(start as usize..end as usize).unwrap_or_default(),
-        _ => &[],
-    });
+    let lists = pairs(hash)
+        .map(|(start, end)| references.get(start as usize..end as usize).unwrap_or_default());
     let slot_count = plan.layout.hash_count;
     for (slot, (ids, &owner)) in lists.zip(&*owners).enumerate() {
         watch.step(u32::try_from(slot).unwrap_or(u32::MAX), slot_count, [0.5, 1.0])?;

@@ -14,6 +14,7 @@ use glam::Vec3A;
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, as_f32, cells_between, woo};
 use crate::dda::{Line, Walk};
+use crate::lists::pairs;
 use crate::one_level::{row, slot, slots_are_sound};
 use crate::visit::Visitor;
 
@@ -221,7 +222,7 @@ impl<'a> Subgrid<'a> {
     pub(super) fn is_sound(&self) -> bool {
         let hash = self.hash;
         let is_cut = hash.first() == Some(&0)
-            && hash.is_sorted()
+            && pairs(hash).all(|(start, end)| start <= end)
             && hash.last().is_some_and(|&end| end as usize == self.references.len())
             && !matches!(hash, [.., start, end] if start == end);
         let is_set = |bit: usize| {
@@ -230,7 +231,7 @@ impl<'a> Subgrid<'a> {
         };
         let resolution @ [width, height, _] = self.frame.resolution;
         let cells = self.frame.cells();
-        let is_full = hash.iter().zip(hash.iter().skip(1)).map(|(start, end)| start < end);
+        let is_full = pairs(hash).map(|(start, end)| start < end);
         is_cut
             && !(cells..cells.next_multiple_of(WORD_BITS)).any(is_set)
             && slots_are_sound(

@@ -20,6 +20,7 @@ use crate::blob::{Header, corrupt};
 use crate::bump::GRID;
 use crate::cell::{CellRange, Lattice};
 use crate::error::Error;
+use crate::lists::{ascends, pairs};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{check_header, reference_limit, slots_are_sound};
 use crate::survey::boxes;
@@ -90,7 +91,7 @@ impl Variable<'_> {
         if hash.first().is_none_or(|&first| place(first) != 0) {
             return Err(at_slot(0));
         }
-        for (slot, (&start, &end)) in hash.iter().zip(hash.iter().skip(1)).enumerate() {
+        for (slot, (start, end)) in pairs(hash).enumerate() {
             let is_nothing = place(start) == place(end);
             if place(start) > place(end) || is_nothing && start & GRID != 0 {
                 return Err(at_slot(slot));
@@ -104,8 +105,7 @@ impl Variable<'_> {
             return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
         }
         let rows = self.top.row_offsets();
-        let is_full =
-            hash.iter().zip(hash.iter().skip(1)).map(|(start, end)| place(*start) < place(*end));
+        let is_full = pairs(hash).map(|(start, end)| place(start) < place(end));
         let offset = |row: usize| rows.get(row).copied();
         if !slots_are_sound(lattice.resolution, offset, |cell| self.top.is_marked(cell), is_full) {
             return Err(at(rows.as_ptr().addr(), 0));
@@ -202,9 +202,4 @@ impl Inside<'_> {
             }
         }
     }
-}
-
-/// Whether every id is larger than the one before it.
-fn ascends(ids: &[u32]) -> bool {
-    ids.iter().zip(ids.iter().skip(1)).all(|(id, next)| id < next)
 }

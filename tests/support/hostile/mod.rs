@@ -4,8 +4,8 @@
 //! the bytes mean is said by the types of each target, through `arbitrary`: most bytes mean something,
 //! and what is missing at the end is zero.
 //!
-//! A new entry point of the library belongs into [`ask`], where every target that has a grid asks it,
-//! and into [`c_abi`], where C does.
+//! A new entry point of the library belongs into `ask`, where every target that has a grid asks it,
+//! and into `c_abi`, where C does.
 
 mod ask;
 mod build_mesh;
