@@ -43,14 +43,14 @@ pub(crate) fn functions(flavour: Flavour) -> Vec<String> {
     names.map(str::to_owned).collect()
 }
 
-/// What the header says of a function.
+/// What the header says of a function, each paragraph in one line.
 pub(crate) fn documentation(function: &str) -> String {
     let header = committed();
     let is_text = |line: &&str| !line.contains(&format!("{function}(")) || line.starts_with(' ');
     let before: Vec<_> = header.lines().take_while(is_text).collect();
     let before = before.join("\n");
     let (_, text) = before.rsplit_once("/**").expect("a comment");
-    text.to_owned()
+    text.replace("\n * ", " ")
 }
 
 /// What a function takes.

@@ -18,19 +18,14 @@ static void prepare(void)
     region_2 = (unsigned char *)guarded(scratch_bytes);
 }
 
-/* A build, the two questions for sizes and the one for a budget, which must all say the same; returns
- * the build's report. Nothing else is touched. */
-static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
-                           const hgrid_config *config)
+/* A build and the two questions for sizes, which must all say the same; returns the build's report.
+ * Nothing else is touched. */
+static hgrid_report refuse_sizes(hgrid_status expected, const hgrid_mesh *input,
+                                 const hgrid_config *config)
 {
     hgrid_report report = HGRID_REPORT_INIT;
     EXPECT(expected, hgrid_sizes(input, config, NULL, 0, &report));
     EXPECT(expected, hgrid_sizes(input, config, region_2, scratch_bytes, &report));
-
-    const hgrid_config before = HGRID_CONFIG_INIT_BRICK;
-    hgrid_config fitted = before;
-    EXPECT(expected, hgrid_fit(input, config, index_bytes, region_2, scratch_bytes, &fitted, NULL));
-    CHECK(memcmp(&fitted, &before, sizeof fitted) == 0);
 
     hgrid_grid grid;
     memset(&grid, 0xc7, sizeof grid);
@@ -42,6 +37,17 @@ static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
     CHECK(all_bytes_are(region_1, index_bytes, 0xc7));
     CHECK(report.struct_size == sizeof report && report.reserved == 0 && report.index_bytes == 0);
     return report;
+}
+
+/* The same, and no coarser grid is possible either. */
+static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
+                           const hgrid_config *config)
+{
+    const hgrid_config before = HGRID_CONFIG_INIT_BRICK;
+    hgrid_config fitted = before;
+    EXPECT(expected, hgrid_fit(input, config, index_bytes, region_2, scratch_bytes, &fitted, NULL));
+    CHECK(memcmp(&fitted, &before, sizeof fitted) == 0);
+    return refuse_sizes(expected, input, config);
 }
 
 /* The same for a configuration, with which nothing can be said of any mesh. */
@@ -81,12 +87,14 @@ static void unknown_values_are_errors(void)
             refuse_mesh(HGRID_ERROR_INVALID_INDEX_TYPE, &input);
         }
     }
-    /* These are too much for this mesh, the others for any (see below). */
+    /* These are too much for this mesh, but less is not; the others are for any (see below). */
     const float densities[] = {1e30f, FLT_MAX};
     for (size_t i = 0; i < sizeof densities / sizeof *densities; i++) {
         hgrid_config config = HGRID_CONFIG_INIT;
         config.density = densities[i];
-        refuse(HGRID_ERROR_INVALID_DENSITY, &mesh, &config);
+        refuse_sizes(HGRID_ERROR_INVALID_DENSITY, &mesh, &config);
+        EXPECT(HGRID_OK, hgrid_fit(&mesh, &config, index_bytes, region_2, scratch_bytes, &config, NULL));
+        CHECK(config.density < densities[i]);
     }
 }
 
