@@ -156,6 +156,32 @@ fn two_copies_in_one_program_do_not_clash() {
     run(&mut Command::new(program));
 }
 
+/// And a library in Rust that knows nothing of this one has the same run-time parts.
+#[test]
+fn the_library_of_another_vendor_in_rust_does_not_clash() {
+    let dir = TempDir::new().expect("a folder");
+    let [vendor, program] = ["libvendor.a", "vendors"].map(|name| dir.path().join(name));
+    let source = |name: &str| root().join("tests/c_abi").join(name);
+    // What is not used of core is left out, as it must be: it asks for unwinding, which no_std has not.
+    for level in ["3", "s"] {
+        run(Command::new("rustc")
+            .args(["--edition", "2024", "--crate-type", "staticlib", "-C", "panic=abort"])
+            .args(["-C", "lto=fat", "-C", &format!("opt-level={level}")])
+            .arg(source("vendor.rs"))
+            .arg("-o")
+            .arg(&vendor));
+        for flavour in Flavour::ALL {
+            let ours = flavour.static_library();
+            for order in [[&vendor, &ours], [&ours, &vendor]] {
+                let mut compiler = compiler("c99");
+                compiler.arg("-D_DEFAULT_SOURCE").arg(source("vendors.c")).args(order);
+                run(compiler.arg("-o").arg(&program));
+                run(&mut Command::new(&program));
+            }
+        }
+    }
+}
+
 #[test]
 fn the_shared_libraries_need_nothing_but_libc() {
     if !is_installed("nm") {

@@ -2,5 +2,6 @@
 
 mod flips;
 mod invariants;
+mod random;
 mod replay;
 mod truncations;

@@ -1,0 +1,26 @@
+//! What random bytes do: a fuzzer's first minute, the same every time. A little of it runs under Miri,
+//! which sees in the C entry points what a fuzzer does not.
+
+use hgrid_tests::hostile::{build_mesh, c_abi};
+use hgrid_tests::random::Random;
+
+/// Runs a target on so many strings of bytes.
+fn run(target: fn(&[u8]), rounds: u64, bytes: usize) {
+    for round in 0..rounds {
+        let mut random = Random(round);
+        let bytes: Vec<_> = (0..bytes / 8).flat_map(|_| random.bits().to_le_bytes()).collect();
+        // Shown if the test fails.
+        println!("round {round}");
+        target(&bytes);
+    }
+}
+
+#[test]
+fn calls_from_c() {
+    run(c_abi, if cfg!(miri) { 12 } else { 3000 }, 600);
+}
+
+#[test]
+fn meshes() {
+    run(build_mesh, if cfg!(miri) { 2 } else { 500 }, 400);
+}
