@@ -358,7 +358,7 @@ mod tests {
                 hits += expected.1.len();
             }
         }
-        assert!(survivors as usize > 2 * rounds && 3 * hits > rounds, "{survivors} {hits}");
+        assert!(survivors as usize > 2 * rounds && 4 * hits > rounds, "{survivors} {hits}");
     }
 
     #[test]
@@ -385,7 +385,8 @@ mod tests {
                 vertices.extend_from_slice(bytemuck::bytes_of(position));
             }
             for (index_type, size) in [(IndexType::U32, 12), (IndexType::U16, 6)] {
-                for index_stride in [size, size + 5, 65_536] {
+                let far = if cfg!(miri) { 100 } else { 65_536 };
+                for index_stride in [size, size + 5, far] {
                     let mut bytes = Vec::new();
                     for triangle in &indices {
                         bytes.resize(bytes.len().next_multiple_of(index_stride), 0xff);
