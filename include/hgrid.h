@@ -540,7 +540,7 @@ typedef struct hgrid_mesh {
  */
 typedef struct hgrid_grid {
     /**
-     * Private.
+     * Private; some of its bytes may never have been written.
      */
     uint64_t opaque[64];
 } hgrid_grid;

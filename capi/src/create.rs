@@ -177,7 +177,7 @@ unsafe fn create(
 
     let owned = memory.start.cast::<Owned>();
     // SAFETY: `memory` has room for an `Owned`, aligned, and the index lies behind it.
-    unsafe { owned.write(Owned { view: hgrid_grid { opaque: [0; 64] }, memory }) };
+    unsafe { owned.write(Owned { view: hgrid_grid::NONE, memory }) };
     // SAFETY: the view comes first in what was just written.
     unsafe { raw::write_grid(owned.cast(), &built) };
     Ok(owned.cast())

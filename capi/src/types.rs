@@ -4,6 +4,7 @@
 //! The docs here are the text of `hgrid.h`: they are written for C readers.
 
 use core::ffi::c_void;
+use core::mem::MaybeUninit;
 use core::ptr::null_mut;
 
 use hgrid_core::{
@@ -258,8 +259,13 @@ pub struct hgrid_report {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_grid {
-    /// Private.
-    pub opaque: [u64; 64],
+    /// Private; some of its bytes may never have been written.
+    pub opaque: [MaybeUninit<u64>; 64],
+}
+
+impl hgrid_grid {
+    /// What means nothing.
+    pub const NONE: Self = Self { opaque: [MaybeUninit::zeroed(); 64] };
 }
 
 impl hgrid_config {

@@ -9,7 +9,7 @@ use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_capi::*;
 use hgrid_core::BlobInfo;
 
-use super::c_abi::{Caller, Opened, known};
+use super::c_abi::{Caller, Opened, UNWRITTEN, is_unwritten, known};
 use super::damage::Edit;
 use super::memory::{CANARY, Memory, Struct, rarely};
 use crate::copy::Copy;
@@ -43,13 +43,13 @@ impl Caller<'_> {
         let start = start.min(copy.bytes().len());
         let mesh = if rarely(u, 4)? { None } else { Some(self.mesh(u)?) };
         let from = if rarely(u, 48)? { null_mut() } else { blob.at(start) };
-        let mut grid = self.grid;
+        let mut grid = UNWRITTEN;
         let to = if rarely(u, 48)? { null_mut() } else { from_mut(&mut grid) };
         let of = mesh.as_ref().map_or(null(), Struct::as_ptr);
         // SAFETY: all pointers are NULL or good for what is said with them.
         let status = known(unsafe { hgrid_open(from, copy.bytes().len() - start, of, to) });
         if status != HGRID_OK {
-            assert_eq!(grid.opaque, self.grid.opaque, "{status}");
+            assert!(is_unwritten(&grid), "{status}");
             return Ok(());
         }
         assert!(!to.is_null() && start % 64 == 0);
