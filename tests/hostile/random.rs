@@ -17,7 +17,7 @@ fn run(target: fn(&[u8]), rounds: u64, bytes: usize) {
 
 #[test]
 fn calls_from_c() {
-    run(c_abi, if cfg!(miri) { 12 } else { 3000 }, 600);
+    run(c_abi, if cfg!(miri) { 60 } else { 3000 }, 600);
 }
 
 #[test]

@@ -6,14 +6,14 @@
 use std::cell::Cell;
 use std::ffi::{CStr, c_void};
 use std::mem::MaybeUninit;
-use std::ptr::{from_mut, from_ref, null, null_mut};
+use std::ptr::{from_mut, null, null_mut};
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_capi::*;
 use hgrid_core::IndexType;
 
 use super::caller::Loop;
-use super::memory::{Memory, Struct, array, rarely};
+use super::memory::{Lent, Memory, Struct, array, rarely};
 use super::shape::{self, Shape};
 
 /// What is larger is not built.
@@ -84,7 +84,7 @@ pub(super) struct Input {
     pub(super) mesh: Struct<hgrid_mesh>,
     pub(super) config: Struct<hgrid_config>,
     pub(super) report: Struct<hgrid_report>,
-    pub(super) control: Box<Control>,
+    pub(super) control: Lent<Control>,
 }
 
 /// What the callbacks of a build do; the context of the configuration.
@@ -197,7 +197,7 @@ impl Caller<'_> {
         let patience = if rarely(u, 4)? { u8::arbitrary(u)?.into() } else { u32::MAX };
         let run = Loop::arbitrary(u)?;
         let control = Control { run, patience, done: Cell::new(0.0), calls: Cell::new(0) };
-        let control = Box::new(control);
+        let control = Lent::new(control);
         let mut config = hgrid_config {
             struct_size: 0,
             method: chosen.method as u32,
@@ -209,7 +209,7 @@ impl Caller<'_> {
             flags: chosen.flags.bits(),
             tasks: u32::from(u8::arbitrary(u)? % 80),
             reserved: u32::from(rarely(u, 48)?),
-            context: from_ref(&*control).cast_mut().cast(),
+            context: control.as_ptr().cast(),
             run: if rarely(u, 32)? { None } else { Some(run_tasks) },
             progress: if bool::arbitrary(u)? { Some(progress) } else { None },
         };
@@ -326,21 +326,21 @@ impl Caller<'_> {
         let mut input = self.input(u)?;
         let budget = usize::from(u16::arbitrary(u)?);
         let scratch = Memory::new(usize::from(u16::arbitrary(u)?));
-        let mut fitted = *input.config.value();
-        let to = if rarely(u, 48)? { null_mut() } else { from_mut(&mut fitted) };
+        let mut fitted = Struct::new(u, *input.config.value())?;
         let (mesh, config, report) =
             (input.mesh.as_ptr(), input.config.as_ptr(), input.report.as_mut_ptr());
+        let to = fitted.as_mut_ptr();
         // SAFETY: all pointers are NULL or good for what is said with them.
         let status = known(unsafe {
             hgrid_fit(mesh, config, budget, scratch.at(0), scratch.bytes().len(), to, report)
         });
         if status == HGRID_OK {
             // What fits says so again.
-            assert!(!to.is_null() && input.mesh.is_sound());
+            assert!(fitted.is_sound() && input.mesh.is_sound());
             let is_told = input.report.is_sound();
             assert!(!is_told || input.report.value().index_bytes <= budget as u64);
             // Without tasks, which take memory of their own.
-            input.config = Struct::right(hgrid_config { tasks: 1, ..fitted });
+            input.config = Struct::right(hgrid_config { tasks: 1, ..*fitted.value() });
             let again = input.ask(scratch.at(0), scratch.bytes().len());
             assert!(again == HGRID_OK || !is_told, "{again}");
             assert!(!is_told || input.report.value().index_bytes <= budget as u64);

@@ -2,13 +2,13 @@
 
 use std::cell::RefCell;
 use std::ffi::c_void;
-use std::ptr::{from_mut, from_ref, null_mut};
+use std::ptr::null_mut;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_capi::*;
 use hgrid_core::{Counters, Cull, Hit, INVALID_ID, QueryOptions, Verdict};
 
-use super::memory::{Struct, rarely};
+use super::memory::{Lent, Struct, rarely};
 
 /// A hit in bits.
 pub(super) fn bits(hit: &Hit) -> [u32; 4] {
@@ -23,8 +23,8 @@ pub(super) fn c_bits(hit: &hgrid_hit) -> [u32; 4] {
 /// Options and what they point to.
 pub(super) struct Options {
     options: Struct<hgrid_query_options>,
-    filter: Box<Filter>,
-    counters: Box<hgrid_counters>,
+    filter: Lent<Filter>,
+    counters: Lent<hgrid_counters>,
 }
 
 /// Says of hit after hit what two bits say, round and round.
@@ -61,19 +61,19 @@ pub(super) struct Told {
 
 impl Options {
     pub(super) fn new(u: &mut Unstructured<'_>) -> Result<Self> {
-        let mut counters =
-            Box::new(hgrid_counters { primitive_tests: 1, cell_steps: 2, grid_steps: 3 });
+        let counters =
+            Lent::new(hgrid_counters { primitive_tests: 1, cell_steps: 2, grid_steps: 3 });
         let verdicts = u32::arbitrary(u)?;
-        let filter_box = Box::new(Filter { verdicts, shown: RefCell::default() });
+        let context = Lent::new(Filter { verdicts, shown: RefCell::default() });
         let [has_filter, has_counters, is_plain] = <[bool; 3]>::arbitrary(u)?;
         let mut options = hgrid_query_options {
             struct_size: 0,
             mask: u32::MAX,
             cull: HGRID_CULL_NONE,
             skip: INVALID_ID,
-            context: from_ref(&*filter_box).cast_mut().cast(),
+            context: context.as_ptr().cast(),
             filter: if has_filter { Some(filter) } else { None },
-            counters: if has_counters { from_mut(&mut *counters) } else { null_mut() },
+            counters: if has_counters { counters.as_ptr() } else { null_mut() },
         };
         if !is_plain {
             options.mask = u8::arbitrary(u)?.into();
@@ -83,7 +83,7 @@ impl Options {
         if rarely(u, 32)? {
             options.cull = u32::arbitrary(u)?;
         }
-        Ok(Self { options: Struct::new(u, options)?, filter: filter_box, counters })
+        Ok(Self { options: Struct::new(u, options)?, filter: context, counters })
     }
 
     /// NULL is fine.

@@ -2,6 +2,7 @@
 
 use std::alloc::{Layout, alloc, dealloc, handle_alloc_error};
 use std::ffi::c_void;
+use std::ops::Deref;
 use std::ptr::{NonNull, from_mut, from_ref, null, null_mut};
 
 use arbitrary::{Arbitrary, Result, Unstructured};
@@ -60,6 +61,35 @@ impl Drop for Memory {
     fn drop(&mut self) {
         // SAFETY: allocated so.
         unsafe { dealloc(self.start.as_ptr(), self.layout) };
+    }
+}
+
+/// What a program lends to the library by its address and looks at itself, too: a box that may be moved.
+pub(super) struct Lent<T>(NonNull<T>);
+
+impl<T> Lent<T> {
+    pub(super) fn new(value: T) -> Self {
+        Self(NonNull::from(Box::leak(Box::new(value))))
+    }
+
+    pub(super) const fn as_ptr(&self) -> *mut T {
+        self.0.as_ptr()
+    }
+}
+
+impl<T> Deref for Lent<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        // SAFETY: of a box; no call of the library, which alone writes to it, is under way.
+        unsafe { self.0.as_ref() }
+    }
+}
+
+impl<T> Drop for Lent<T> {
+    fn drop(&mut self) {
+        // SAFETY: it was leaked to be given back here.
+        drop(unsafe { Box::from_raw(self.0.as_ptr()) });
     }
 }
 

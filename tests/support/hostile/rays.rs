@@ -6,7 +6,7 @@ use hgrid_core::{Grid, Ray, TriangleMesh};
 use crate::random::Random;
 
 /// No fuzzer needs more at once: two tiles and a ray.
-const MOST: usize = 130;
+const MOST: usize = if cfg!(miri) { 9 } else { 130 };
 
 /// How the numbers of a ray are chosen.
 #[derive(Debug, Clone, Arbitrary)]

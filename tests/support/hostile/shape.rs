@@ -9,8 +9,8 @@ use hgrid_core::{
 use super::memory::rarely;
 
 /// The most triangles that a fuzzer writes down, and after they are repeated.
-const MOST: usize = 48;
-const MOST_REPEATED: usize = 400;
+const MOST: usize = if cfg!(miri) { 6 } else { 48 };
+const MOST_REPEATED: usize = if cfg!(miri) { 12 } else { 400 };
 
 /// How coordinates are chosen.
 #[derive(Debug, Clone, Copy, Arbitrary)]
