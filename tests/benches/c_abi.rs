@@ -8,6 +8,7 @@
 use core::ffi::c_void;
 use core::hint::black_box;
 use core::ptr::null;
+use std::time::Instant;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hgrid_core::{Config, Hit, Method, Ray};
@@ -21,6 +22,9 @@ use libloading::{Library, Symbol};
 
 /// Rays on a side of the picture.
 const SIZE: u16 = 256;
+
+/// How often both sides are timed.
+const PAIRS: usize = 201;
 
 /// `hgrid_mesh`.
 #[repr(C)]
@@ -43,6 +47,19 @@ struct CGrid([u64; 64]);
 
 type Open = unsafe extern "C" fn(*const u8, usize, *const CMesh, *mut CGrid) -> i32;
 type Intersect = unsafe extern "C" fn(*const CGrid, *const Ray, *const c_void, *mut Hit) -> bool;
+
+/// How many times as long one thing takes as another: the median of pairs one after the other, which
+/// what else the machine does slows down alike.
+fn ratio(one: impl Fn() -> usize, other: impl Fn() -> usize) -> f64 {
+    let time = |what: &dyn Fn() -> usize| {
+        let start = Instant::now();
+        black_box(what());
+        start.elapsed().as_secs_f64()
+    };
+    let mut ratios: Vec<_> = (0..PAIRS).map(|_| time(&one) / time(&other)).collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios[PAIRS / 2]
+}
 
 fn c_abi(criterion: &mut Criterion) {
     let mesh = scans::load("bunny").unwrap_or_else(|| {
@@ -83,22 +100,22 @@ fn c_abi(criterion: &mut Criterion) {
         let status = unsafe { open(blob, bytes, &raw const c_mesh, &raw mut c_grid) };
         assert_eq!(status, 0, "hgrid_open");
 
+        let in_rust = || rays.iter().filter(|ray| grid.intersect(black_box(ray)).is_some()).count();
+        let in_c = || {
+            let mut hit = Hit::MISS;
+            let call = |ray: &&Ray| {
+                let ray: *const Ray = black_box(*ray);
+                // SAFETY: a view that was opened, a ray, no options, a hit.
+                unsafe { intersect(&raw const c_grid, ray, null(), &raw mut hit) }
+            };
+            rays.iter().filter(call).count()
+        };
+        assert_eq!(in_rust(), in_c());
+        println!("{}: C takes {:.3} times as long as Rust", method.name(), ratio(in_c, in_rust));
         let mut group = criterion.benchmark_group(format!("intersect, {}", method.name()));
         group.sample_size(60).throughput(Throughput::Elements(rays.len() as u64));
-        group.bench_function("Rust", |b| {
-            b.iter(|| rays.iter().filter(|ray| grid.intersect(black_box(ray)).is_some()).count());
-        });
-        group.bench_function("C", |b| {
-            let mut hit = Hit::MISS;
-            b.iter(|| {
-                let call = |ray: &&Ray| {
-                    let ray: *const Ray = black_box(*ray);
-                    // SAFETY: a view that was opened, a ray, no options, a hit.
-                    unsafe { intersect(&raw const c_grid, ray, null(), &raw mut hit) }
-                };
-                rays.iter().filter(call).count()
-            });
-        });
+        group.bench_function("Rust", |b| b.iter(in_rust));
+        group.bench_function("C", |b| b.iter(in_c));
         group.finish();
     }
 }
