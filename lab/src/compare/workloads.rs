@@ -6,7 +6,7 @@
 
 use anyhow::{Context as _, Result};
 use clap::ValueEnum;
-use hgrid_core::{Config, Grid, Hit, Ray, TriangleMesh};
+use hgrid_core::{Config, Grid, Hit, Method, Ray, TriangleMesh};
 use serde::Serialize;
 
 use super::input::Input;
@@ -76,13 +76,14 @@ pub struct Rays {
 }
 
 impl Rays {
-    /// Makes the rays with the help of a grid.
+    /// Makes the rays with the help of a brick grid, which takes any scene.
     ///
     /// # Errors
     /// If the grid cannot be built, or the scene has no finite vertex.
     pub fn new(input: &Input, bounds: Bounds, picture: Picture, count: usize) -> Result<Self> {
         let mesh = input.mesh()?;
-        let memory = measure::build(mesh, &Config::default()).context("no grid for the rays")?;
+        let memory =
+            measure::build(mesh, &Config::new(Method::Brick)).context("no grid for the rays")?;
         let grid = Grid::open(&memory.index, mesh)?;
         let closest = |ray: &Ray| grid.intersect(ray).unwrap_or(MISS);
 
