@@ -76,11 +76,11 @@
  * A grid is built by one of five methods, which hgrid_config says; all of them answer every ray the
  * same, hit for hit and bit for bit.
  *
- *   HGRID_METHOD_ONE_LEVEL   the default: one hashed grid; the shortest build, the least memory
+ *   HGRID_METHOD_ONE_LEVEL   the default: one hashed grid; the least memory for large meshes
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
  *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
  *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
- *   HGRID_METHOD_BRICK       cells as large as triangles, a bit for each: the fastest build
+ *   HGRID_METHOD_BRICK       cells as large as triangles, a bit for each: the shortest build
  *
  *   hgrid_config config = HGRID_CONFIG_INIT_VARIABLE;
  *
@@ -209,7 +209,7 @@
 /**
  * One hashed grid with a single cell size: the default of `hgrid_config`.
  *
- * Choose it for the shortest build in the least memory: meshes that move, and small machines. It
+ * Choose it for the least memory for a large mesh, and the least code to run: small machines. It
  * is at its best where triangles are of similar size and everywhere, and slow where all detail is
  * in a few places of a large scene.
  *
@@ -224,7 +224,7 @@
  * Rays cross empty space in large steps, and the small cells hold few triangles each. Choose it
  * where many rays are shot for each build. `macrocell_factor` belongs to it.
  *
- * Memory: two to three times that of one level. The build plans every byte in the scratch before
+ * Memory: one and a half to three times that of one level. The build plans every byte in the scratch before
  * it writes the index.
  */
 #define HGRID_METHOD_FIXED 2
@@ -426,7 +426,9 @@ typedef struct hgrid_config {
  * What a build, or a question for sizes, found out. Initialise it with `HGRID_REPORT_INIT`.
  *
  * Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
- * what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`.
+ * what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another pass
+ * over mesh and grid, `hgrid_inspect` tells: triangles without area, the first bad one, the longest
+ * list, a hash of the content.
  */
 typedef struct hgrid_report {
     /**
@@ -453,7 +455,7 @@ typedef struct hgrid_report {
      */
     uint32_t triangle;
     /**
-     * Triangles left out because a coordinate is not finite. Known after a build, as are all
+     * Triangles left out because a coordinate is not finite, or beyond 2^120. Known after a build, as are all
      * below.
      */
     uint32_t skipped_count;
@@ -773,7 +775,7 @@ typedef struct hgrid_statistics {
      */
     uint32_t struct_size;
     /**
-     * Triangles left out because a coordinate is not finite.
+     * Triangles left out because a coordinate is not finite, or beyond 2^120.
      */
     uint32_t skipped_count;
     /**

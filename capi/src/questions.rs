@@ -204,7 +204,7 @@ pub struct hgrid_blob_info {
 pub struct hgrid_statistics {
     /// `sizeof(hgrid_statistics)`.
     pub struct_size: u32,
-    /// Triangles left out because a coordinate is not finite.
+    /// Triangles left out because a coordinate is not finite, or beyond 2^120.
     pub skipped_count: u32,
     /// Triangles of which two corners are the same point. They are in the grid, and no ray hits them.
     pub degenerate_count: u32,

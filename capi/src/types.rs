@@ -34,7 +34,7 @@ pub const HGRID_INDEX_U16: u32 = 1;
 
 /// One hashed grid with a single cell size: the default of `hgrid_config`.
 ///
-/// Choose it for the shortest build in the least memory: meshes that move, and small machines. It
+/// Choose it for the least memory for a large mesh, and the least code to run: small machines. It
 /// is at its best where triangles are of similar size and everywhere, and slow where all detail is
 /// in a few places of a large scene.
 ///
@@ -47,7 +47,7 @@ pub const HGRID_METHOD_ONE_LEVEL: u32 = 1;
 /// Rays cross empty space in large steps, and the small cells hold few triangles each. Choose it
 /// where many rays are shot for each build. `macrocell_factor` belongs to it.
 ///
-/// Memory: two to three times that of one level. The build plans every byte in the scratch before
+/// Memory: one and a half to three times that of one level. The build plans every byte in the scratch before
 /// it writes the index.
 pub const HGRID_METHOD_FIXED: u32 = 2;
 
@@ -217,7 +217,9 @@ pub type hgrid_task = unsafe extern "C" fn(task_context: *mut c_void, index: u32
 /// What a build, or a question for sizes, found out. Initialise it with `HGRID_REPORT_INIT`.
 ///
 /// Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
-/// what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`.
+/// what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another pass
+/// over mesh and grid, `hgrid_inspect` tells: triangles without area, the first bad one, the longest
+/// list, a hash of the content.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_report {
@@ -234,7 +236,7 @@ pub struct hgrid_report {
     pub scratch_bytes: u64,
     /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
     pub triangle: u32,
-    /// Triangles left out because a coordinate is not finite. Known after a build, as are all
+    /// Triangles left out because a coordinate is not finite, or beyond 2^120. Known after a build, as are all
     /// below.
     pub skipped_count: u32,
     /// Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`

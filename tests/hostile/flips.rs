@@ -77,6 +77,7 @@ fn flip_all(seed: &Seed, rays: usize) -> Ends {
 
 fn flip(method: Method) {
     let is_one = |seed: &&Seed| seed.config.method == method && seed.blob.len() < 6500;
+    assert!(seeds().filter(is_one).count() > 1);
     for seed in seeds().filter(is_one) {
         // Fewer rays where there are more bits.
         let rays = (12_000 / seed.blob.len().max(1000)).max(4);
@@ -145,4 +146,28 @@ fn packed_meshes() {
         assert_eq!(refused, 8 * 80, "what fills up sections");
         assert!(found > 1000 && valid > 1000, "{found} {valid}");
     }
+}
+
+/// Every bit of the header of a blob with its mesh, where it says how the mesh lies.
+#[test]
+#[cfg_attr(miri, ignore = "hours")]
+fn packed_headers() {
+    let mut opened = 0;
+    for Seed { packed, .. } in seeds() {
+        for (at, bit) in (0..CHECKSUM + 4).flat_map(|at| (0..8).map(move |bit| (at, bit))) {
+            let mut copy = Copy::of(packed);
+            copy.set(at, &[packed[at] ^ 1 << bit]);
+            assert!(Grid::open_packed(copy.bytes()).is_err(), "bit {bit} of byte {at}");
+            copy.sign();
+            if let Ok(grid) = Grid::open_packed(copy.bytes()) {
+                let rays = fixed_rays(grid.bounds(), 4);
+                ends(&grid, &rays);
+                if grid.validate().is_ok() {
+                    agrees(&grid, &rays);
+                }
+                opened += 1;
+            }
+        }
+    }
+    assert!(opened > 1000, "{opened}");
 }

@@ -34,6 +34,24 @@ fn every_truncation_is_refused() {
     }
 }
 
+/// A blob with its mesh that ends anywhere: whatever its header says of its length, nothing is opened that
+/// was not there.
+#[test]
+#[cfg_attr(miri, ignore = "hours")]
+fn every_truncation_of_a_packed_blob_is_refused() {
+    for Seed { packed, .. } in seeds() {
+        for length in 0..packed.len() {
+            let mut copy = Copy::of(&packed[..length]);
+            assert!(Grid::open_packed(copy.bytes()).is_err(), "{length}");
+            if length >= 128 {
+                copy.set(BLOB_BYTES, &(length as u64).to_ne_bytes());
+                copy.sign();
+                assert!(Grid::open_packed(copy.bytes()).is_err(), "{length}");
+            }
+        }
+    }
+}
+
 /// The blob with fewer words in its last section, and a header that says so. Macrocells, which lie
 /// behind, are left out: they are of no number of lists.
 fn shortened(seed: &Seed, words: u32) -> Copy {

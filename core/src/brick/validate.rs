@@ -7,6 +7,9 @@
 //!
 //! A list has no triangle twice if its ids ascend. They need to do so only among triangles of one
 //! shape, as sorting leaves them: a triangle that came twice would have the same shape both times.
+//!
+//! Whether a build would have divided a crowded cell, and into as many cells, would take memory to prove:
+//! any division is a right one. Queries do not mind.
 
 use glam::Vec3A;
 
