@@ -120,9 +120,15 @@ fn collect<S: Simd>(
     listed: u32,
     bench: &mut Bench<'_>,
 ) -> Option<(Frame, Groups)> {
-    // The ids, and soon the entries, wait where cells will be counted, if there is room.
-    let waiting: &mut [Entry] = bytemuck::try_cast_slice_mut(bench.cells).ok()?;
-    let waiting = waiting.get_mut(..listed as usize).unwrap_or_default();
+    // The ids, and soon the entries, wait where cells will be counted, or behind the entries, if there is
+    // room.
+    let length = listed as usize;
+    let (sorted, behind) = bench.entries.split_at_mut_checked(length)?;
+    let in_cells: &mut [Entry] = bytemuck::try_cast_slice_mut(bench.cells).ok()?;
+    let waiting = match in_cells.get_mut(..length) {
+        Some(waiting) => waiting,
+        None => behind.get_mut(..length).unwrap_or_default(),
+    };
     let mut slots = waiting.iter_mut();
     each_of_cell(simd, entries, cell, |id| {
         if let Some(slot) = slots.next() {
@@ -162,9 +168,9 @@ fn collect<S: Simd>(
         *slot = entry(slot.id)?;
     }
     let groups = if waiting.is_empty() {
-        Groups::collect(|| of_cell(entries, cell).filter_map(entry), bench.entries)
+        Groups::collect(|| of_cell(entries, cell).filter_map(entry), sorted)
     } else {
-        Groups::collect(|| waiting.iter().copied(), bench.entries)
+        Groups::collect(|| waiting.iter().copied(), sorted)
     };
     Some((frame, groups?))
 }
