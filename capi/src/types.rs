@@ -34,7 +34,7 @@ pub const HGRID_INDEX_U16: u32 = 1;
 
 /// One hashed grid with a single cell size: the default of `hgrid_config`.
 ///
-/// Choose it for the least memory for a large mesh, and the least code to run: small machines. It
+/// Choose it where memory is dear and the mesh is large: it takes the least for each triangle. It
 /// is at its best where triangles are of similar size and everywhere, and slow where all detail is
 /// in a few places of a large scene.
 ///

@@ -25,7 +25,7 @@
 //! ```
 //!
 //! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `approach`, `triangle`,
-//! `simd`, `eight`, `config`, `control`, `search`, `arena`, `bump`, `bits`, `cell`, `dda`, `counters`, `survey`, `tasks`,
+//! `simd`, `eight`, `config`, `control`, `search`, `arena`, `bump`, `bits`, `lists`, `cell`, `dda`, `counters`, `survey`, `tasks`,
 //! `blob`), one folder per structure above them (`one_level`; `fixed` and `variable` on top of it;
 //! `recursive`; `brick`), and `grid`: the view that queries run on, `batch` for many rays. core/DESIGN.md
 //! tells how it all works and what was left out.

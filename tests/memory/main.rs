@@ -3,40 +3,11 @@
 
 mod budget;
 
-use hgrid_core::{Block, Config, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes};
+use hgrid_core::{Config, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes};
+use hgrid_tests::guarded::Guarded;
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::methods;
 use hgrid_tests::owned::Owned;
-
-/// What the memory around and behind the regions holds.
-const CANARY: u8 = 0xc7;
-
-/// A region of `bytes` bytes with canaries before and behind.
-struct Guarded {
-    blocks: Vec<Block>,
-    bytes: usize,
-}
-
-impl Guarded {
-    fn new(bytes: usize) -> Self {
-        let mut blocks = vec![Block::ZERO; Block::count_for(bytes) + 2];
-        Block::bytes_mut(&mut blocks).fill(CANARY);
-        Self { blocks, bytes }
-    }
-
-    fn region(&mut self) -> &mut [u8] {
-        &mut Block::bytes_mut(&mut self.blocks)[64..64 + self.bytes]
-    }
-
-    fn around_is_intact(&self) -> bool {
-        let all = Block::bytes(&self.blocks);
-        all[..64].iter().chain(&all[64 + self.bytes..]).all(|&byte| byte == CANARY)
-    }
-
-    fn is_untouched(&self) -> bool {
-        Block::bytes(&self.blocks).iter().all(|&byte| byte == CANARY)
-    }
-}
 
 /// Builds with every size of one region, from 0 to a little more than enough, the other ample.
 fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {

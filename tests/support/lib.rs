@@ -3,6 +3,7 @@
 #[cfg(feature = "full")]
 pub mod artefact;
 pub mod copy;
+pub mod guarded;
 pub mod hostile;
 pub mod meshes;
 pub mod methods;

@@ -4,13 +4,14 @@
 use std::cell::Cell;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
-use hgrid_core::{Block, Config, Control, Error, Grid, Region, Sizes, TriangleMesh, sizes_with};
+use hgrid_core::{Config, Control, Error, Grid, Region, Sizes, TriangleMesh, sizes_with};
 
 use super::ask::agrees;
 use super::caller::Loop;
-use super::memory::{CANARY, rarely};
+use super::memory::rarely;
 use super::rays;
 use super::shape::{Shape, config};
+use crate::guarded::Guarded;
 
 /// What is larger is asked about, but not built.
 const MOST_BYTES: usize = 1 << 20;
@@ -36,29 +37,6 @@ fn describe_and_build(u: &mut Unstructured<'_>) -> Result<()> {
     }
     build(u, shape.view(), &config, tasks, run);
     Ok(())
-}
-
-/// A region with canaries around it.
-struct Guarded {
-    blocks: Vec<Block>,
-    bytes: usize,
-}
-
-impl Guarded {
-    fn new(bytes: usize) -> Self {
-        let mut blocks = vec![Block::ZERO; Block::count_for(bytes) + 2];
-        Block::bytes_mut(&mut blocks).fill(CANARY);
-        Self { blocks, bytes }
-    }
-
-    fn region(&mut self) -> &mut [u8] {
-        &mut Block::bytes_mut(&mut self.blocks)[64..64 + self.bytes]
-    }
-
-    fn around_is_intact(&self) -> bool {
-        let all = Block::bytes(&self.blocks);
-        all[..64].iter().chain(&all[64 + self.bytes..]).all(|&byte| byte == CANARY)
-    }
 }
 
 fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, tasks: u32, run: Loop) {

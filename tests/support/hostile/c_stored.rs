@@ -11,8 +11,9 @@ use hgrid_core::BlobInfo;
 
 use super::c_abi::{Caller, Opened, UNWRITTEN, is_unwritten, known};
 use super::damage::Edit;
-use super::memory::{CANARY, Memory, Struct, rarely};
+use super::memory::{Memory, Struct, rarely};
 use crate::copy::Copy;
+use crate::guarded::CANARY;
 
 impl Caller<'_> {
     /// The bytes of the grid's blob, or of none.

@@ -8,8 +8,7 @@ use std::ptr::{NonNull, from_mut, from_ref, null, null_mut};
 use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_core::ALIGNMENT;
 
-/// What memory holds that nobody has written.
-pub(super) const CANARY: u8 = 0xc7;
+use crate::guarded::CANARY;
 
 /// True once in about `n` times; not where the bytes have ended.
 pub(super) fn rarely(u: &mut Unstructured<'_>, n: u8) -> Result<bool> {
