@@ -117,8 +117,11 @@ impl Grid<'_> {
     ) -> Result<(), Error> {
         check(rays, hits, size_of::<Hit>())?;
         self.each::<false>(rays, coherence, |index, hit| {
-            let hit = hit.or_else(|| self.intersect(&rays.read(index)));
-            hits.write(index, &hit.unwrap_or(Hit::MISS));
+            if let Some(hit) = hit {
+                hits.write(index, hit);
+            } else {
+                hits.write(index, &self.intersect(&rays.read(index)).unwrap_or(Hit::MISS));
+            }
         });
         Ok(())
     }
@@ -150,7 +153,7 @@ impl Grid<'_> {
         &self,
         rays: &Strided<'_>,
         coherence: Coherence,
-        mut answer: impl FnMut(usize, Option<Hit>),
+        mut answer: impl FnMut(usize, Option<&Hit>),
     ) {
         let is_done = coherence == Coherence::Coherent && self.tiles::<ANY>(rays, &mut answer);
         if !is_done {

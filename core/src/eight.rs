@@ -24,7 +24,7 @@ use crate::triangle::{Axis, TriangleHit, TriangleTest};
 pub(crate) const LANES: usize = 8;
 
 /// A vertex and four bytes that mean nothing.
-type Row = [u8; 16];
+pub(crate) type Row = [u8; 16];
 
 /// x, y and z of three corners, a lane for each triangle.
 pub(crate) type Lanes<S> = [[f32x8<S>; 3]; 3];
@@ -82,7 +82,7 @@ impl Eight {
 
     /// The triangle in a lane below eight.
     #[inline(always)]
-    fn triangle(&self, lane: usize) -> Triangle {
+    pub(crate) fn triangle(&self, lane: usize) -> Triangle {
         // The mask costs less than a check and leaves nothing that could panic.
         let corner = |rows: &[Row; LANES]| {
             let [x, y, z, _]: [f32; 4] = bytemuck::cast(rows[lane & (LANES - 1)]);
@@ -212,12 +212,13 @@ fn transpose<S: Simd>(simd: S, [a, b, c, d, e, f, g, h]: &[Row; LANES]) -> [f32x
     [low[0].combine(high[0]), low[1].combine(high[1]), low[2].combine(high[2])]
 }
 
+/// The four numbers of four rows, those of each place together.
 #[inline(always)]
-fn transpose_four<S: Simd>(simd: S, [a, b, c, d]: [&Row; 4]) -> [f32x4<S>; 3] {
+pub(crate) fn transpose_four<S: Simd>(simd: S, [a, b, c, d]: [&Row; 4]) -> [f32x4<S>; 4] {
     let (a, b, c, d) = (load(simd, a), load(simd, b), load(simd, c), load(simd, d));
     let (ac_xy, bd_xy) = (a.zip_low(c), b.zip_low(d));
     let (ac_z, bd_z) = (a.zip_high(c), b.zip_high(d));
-    [ac_xy.zip_low(bd_xy), ac_xy.zip_high(bd_xy), ac_z.zip_low(bd_z)]
+    [ac_xy.zip_low(bd_xy), ac_xy.zip_high(bd_xy), ac_z.zip_low(bd_z), ac_z.zip_high(bd_z)]
 }
 
 #[inline(always)]

@@ -267,7 +267,7 @@ impl<'a> Grid<'a> {
     pub(crate) fn tiles<const ANY: bool>(
         &self,
         rays: &Strided<'_>,
-        answer: impl FnMut(usize, Option<Hit>),
+        answer: impl FnMut(usize, Option<&Hit>),
     ) -> bool {
         if !HAS_VECTORS {
             return false;

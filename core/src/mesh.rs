@@ -62,7 +62,7 @@ impl<'a> Strided<'a> {
 
     /// The first `N` bytes of element `index`.
     #[inline(always)]
-    fn element<const N: usize>(&self, index: usize) -> Option<&'a [u8; N]> {
+    pub(crate) fn element<const N: usize>(&self, index: usize) -> Option<&'a [u8; N]> {
         if index >= self.count {
             return None;
         }

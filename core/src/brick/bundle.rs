@@ -3,13 +3,16 @@
 //! Along one axis, k, all rays of a bundle run forward (it is mirrored if they run backward), at least
 //! half as fast as along any other. So they can be written as lines over k: `u = start + slope * k`.
 
+use core::ops::Range;
+
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, mask32x16};
+use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
 
 use super::Brick;
 use super::layout::BLOCK;
 use crate::approach::FAR_EXTENTS;
 use crate::cell::{Lattice, as_f32};
+use crate::eight::{Row, transpose_four};
 use crate::mesh::Strided;
 use crate::ray::{Ray, round};
 
@@ -33,6 +36,8 @@ pub(super) struct Bundle {
     pub(super) t_max: PerRay,
     /// Bit `i`: ray `i` is one of them.
     pub(super) members: u64,
+    /// Those that have not ended before the slice of blocks they are in.
+    pub(super) alive: u64,
     /// The axes u, v and k.
     pub(super) axes: [u8; 3],
     /// Whether k counts from the grid's far end.
@@ -48,6 +53,13 @@ pub(super) struct Bundle {
     pub(super) to: PerRay,
     /// How far off places may be, in cells: as much as a triangle's box is grown by.
     pub(super) margin: f32,
+    /// The grid's first corner, cells for each unit, and k of its far end.
+    pub(super) corner: [f32; 3],
+    pub(super) rate: [f32; 3],
+    pub(super) width: f32,
+    /// The planes of k between which all members have their hits, and between what they lie there.
+    pub(super) planes: [f32; 2],
+    pub(super) bounds: Bounds,
 }
 
 /// Between what the rays lie, on u and v.
@@ -71,7 +83,39 @@ pub(super) fn below_three([u, v, k]: [u8; 3]) -> [usize; 3] {
 }
 
 /// Sixteen rays at once.
-const WIDTH: usize = 16;
+pub(super) const WIDTH: usize = 16;
+
+/// Sixteen numbers from `first` on.
+#[inline(always)]
+pub(super) fn row_of<S: Simd>(simd: S, array: &PerRay, first: usize) -> f32x16<S> {
+    let rows = array.as_chunks::<WIDTH>().0;
+    f32x16::simd_from(simd, rows[first / WIDTH % (RAYS / WIDTH)])
+}
+
+/// A ray as its origin and `t_min`, and its direction and `t_max`.
+#[inline(always)]
+fn halves(ray: &[u8; 32]) -> [&Row; 2] {
+    let (near, far) = ray.split_at(16);
+    [near, far].map(|half| half.first_chunk().unwrap_or(&[0; 16]))
+}
+
+/// The least of sixteen numbers.
+#[inline(always)]
+fn least<S: Simd>(numbers: f32x16<S>) -> f32 {
+    let (a, b) = numbers.split();
+    let (a, b) = a.min(b).split();
+    let [a, b, c, d]: [f32; 4] = a.min(b).into();
+    a.min(b).min(c.min(d))
+}
+
+/// The greatest of sixteen numbers.
+#[inline(always)]
+fn most<S: Simd>(numbers: f32x16<S>) -> f32 {
+    let (a, b) = numbers.split();
+    let (a, b) = a.max(b).split();
+    let [a, b, c, d]: [f32; 4] = a.max(b).into();
+    a.max(b).max(c.max(d))
+}
 
 /// Bit `i` for ray `i` where a comparison of two numbers holds.
 #[inline(always)]
@@ -96,6 +140,7 @@ impl Bundle {
         t_min: [0.0; RAYS],
         t_max: [0.0; RAYS],
         members: 0,
+        alive: 0,
         axes: [0, 1, 2],
         is_mirrored: false,
         start: [[0.0; RAYS]; 2],
@@ -105,6 +150,11 @@ impl Bundle {
         from: [0.0; RAYS],
         to: [0.0; RAYS],
         margin: 0.0,
+        corner: [0.0; 3],
+        rate: [0.0; 3],
+        width: 0.0,
+        planes: [0.0; 2],
+        bounds: Bounds::NONE,
     };
 
     /// Replaces the rays by `count` of the caller's, and makes those that run along the same axis as
@@ -120,17 +170,35 @@ impl Bundle {
         count: usize,
     ) {
         let mut leader = None;
-        for lane in 0..count.min(RAYS) {
-            let ray: Ray = rays.read(first + lane);
-            for axis in 0..3 {
-                self.origin[axis][lane] = ray.origin[axis];
-                self.direction[axis][lane] = ray.direction[axis];
+        for four in 0..RAYS / 4 {
+            let at = 4 * four;
+            if at >= count {
+                break;
             }
-            self.t_min[lane] = ray.t_min;
-            self.t_max[lane] = ray.t_max;
-            if leader.is_none() && ray.is_valid() {
-                leader = Some(ray.direction);
+            // Zeros where there are no more: such a ray is none.
+            let ray = |lane: usize| -> &[u8; 32] {
+                let place = (at + lane < count).then_some(first + at + lane);
+                place.and_then(|place| rays.element(place)).unwrap_or(&[0; 32])
+            };
+            let four_rays = [ray(0), ray(1), ray(2), ray(3)];
+            if leader.is_none() {
+                let rays = four_rays.iter().map(|&&ray| bytemuck::cast::<[u8; 32], Ray>(ray));
+                leader = rays.filter(Ray::is_valid).map(|ray| ray.direction).next();
             }
+            let [a, b, c, d] = four_rays.map(halves);
+            let [x, y, z, t_min] = transpose_four(simd, [a[0], b[0], c[0], d[0]]);
+            let set = |column: &mut PerRay, four_rays: f32x4<S>| {
+                column.as_chunks_mut().0[four] = four_rays.into();
+            };
+            set(&mut self.origin[0], x);
+            set(&mut self.origin[1], y);
+            set(&mut self.origin[2], z);
+            set(&mut self.t_min, t_min);
+            let [x, y, z, t_max] = transpose_four(simd, [a[1], b[1], c[1], d[1]]);
+            set(&mut self.direction[0], x);
+            set(&mut self.direction[1], y);
+            set(&mut self.direction[2], z);
+            set(&mut self.t_max, t_max);
         }
         self.members = 0;
         let Some(leader) = leader else { return };
@@ -165,6 +233,7 @@ impl Bundle {
         let rate = [0, 1, 2].map(|axis| round(lattice.cells_per_unit(axis)));
         let width = as_f32(brick.width[K] * BLOCK);
         self.margin = lattice.margin().max_element();
+        (self.corner, self.rate, self.width) = (lattice.min, rate, width);
 
         let [ox, oy, oz] = &self.origin;
         let [dx, dy, dz] = &self.direction;
@@ -210,6 +279,17 @@ impl Bundle {
             #[inline(always)]
             |belongs, _| belongs.simd_gt(half),
         );
+
+        // Who does not belong stands where one does that belongs: bounds need not ask.
+        let stand_in = self.members.trailing_zeros() as usize % RAYS;
+        let [u, v] = &mut self.start;
+        let [du, dv] = &mut self.slope;
+        for numbers in [u, v, du, dv, &mut self.from, &mut self.to] {
+            let stand_in = numbers[stand_in];
+            for (number, &belongs) in numbers.iter_mut().zip(&belongs) {
+                *number = if belongs > 0.5 { *number } else { stand_in };
+            }
+        }
         is_mirrored
     }
 
@@ -221,50 +301,43 @@ impl Bundle {
 
     /// The first k of any member, and the last.
     #[inline(always)]
-    pub(super) fn ends(&self) -> (f32, f32) {
-        let (mut first, mut last) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-        for row in 0..RAYS / WIDTH {
-            for lane in 0..WIDTH {
-                let ray = row * WIDTH + lane;
-                let is_member = self.members >> ray & 1 == 1;
-                first[lane] =
-                    first[lane].min(if is_member { self.from[ray] } else { f32::INFINITY });
-                last[lane] =
-                    last[lane].max(if is_member { self.to[ray] } else { f32::NEG_INFINITY });
-            }
-        }
-        let first = first.into_iter().fold(f32::INFINITY, f32::min);
-        (first, last.into_iter().fold(f32::NEG_INFINITY, f32::max))
+    pub(super) fn ends<S: Simd>(&self, simd: S) -> (f32, f32) {
+        let rows = |array: &PerRay| {
+            let [a, b, c, d] = core::array::from_fn(|row| row_of(simd, array, row * WIDTH));
+            [a, b, c, d]
+        };
+        let [a, b, c, d] = rows(&self.from);
+        let first = least(a.min(b).min(c.min(d)));
+        let [a, b, c, d] = rows(&self.to);
+        (first, most(a.max(b).max(c.max(d))))
     }
 
-    /// Chords around the members between two planes; `None` if they are too far apart.
+    /// Chords around the members of some rows between two planes; `None` if they are too far apart.
     #[inline(always)]
-    pub(super) fn bounds(&self, planes: [f32; 2]) -> Option<Bounds> {
+    pub(super) fn around<S: Simd>(
+        &self,
+        simd: S,
+        planes: [f32; 2],
+        rows: Range<usize>,
+    ) -> Option<Bounds> {
         /// The most cells that a bundle may be wide.
         const WIDEST: f32 = 64.0;
-        let none = Chord { start: 0.0, slope: 0.0 };
-        let mut bounds = Bounds { low: [none; 2], high: [none; 2] };
+        let mut bounds = Bounds::NONE;
         for side in 0..2 {
-            let (mut low, mut high) =
-                ([[f32::INFINITY; WIDTH]; 2], [[f32::NEG_INFINITY; WIDTH]; 2]);
-            for row in 0..RAYS / WIDTH {
-                for lane in 0..WIDTH {
-                    let ray = row * WIDTH + lane;
-                    let is_member = self.members >> ray & 1 == 1;
-                    let (start, slope) = (self.start[side][ray], self.slope[side][ray]);
-                    for end in 0..2 {
-                        let at = start + slope * planes[end];
-                        let (least, most) =
-                            if is_member { (at, at) } else { (f32::INFINITY, f32::NEG_INFINITY) };
-                        low[end][lane] = low[end][lane].min(least);
-                        high[end][lane] = high[end][lane].max(most);
-                    }
+            let (mut low, mut high) = ([0.0; 2], [0.0; 2]);
+            for end in 0..2 {
+                let plane = f32x16::splat(simd, planes[end]);
+                let mut lowest = f32x16::splat(simd, f32::INFINITY);
+                let mut highest = f32x16::splat(simd, f32::NEG_INFINITY);
+                for row in rows.clone() {
+                    let start = row_of(simd, &self.start[side], row * WIDTH);
+                    let slope = row_of(simd, &self.slope[side], row * WIDTH);
+                    let at = start + slope * plane;
+                    lowest = lowest.min(at);
+                    highest = highest.max(at);
                 }
+                (low[end], high[end]) = (least(lowest), most(highest));
             }
-            let least = |lanes: &[f32; WIDTH]| lanes.iter().copied().fold(f32::INFINITY, f32::min);
-            let most =
-                |lanes: &[f32; WIDTH]| lanes.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            let (low, high) = ([least(&low[0]), least(&low[1])], [most(&high[0]), most(&high[1])]);
             let is_narrow = |width: f32| (0.0..=WIDEST).contains(&width);
             if !(is_narrow(high[0] - low[0]) && is_narrow(high[1] - low[1])) {
                 return None;
@@ -273,6 +346,19 @@ impl Bundle {
             bounds.high[side] = Chord::new(planes, high);
         }
         Some(bounds)
+    }
+
+    /// Marks those alive that have not ended before a plane.
+    #[inline(always)]
+    pub(super) fn reach<S: Simd>(&mut self, simd: S, near: f32) {
+        let near = f32x16::splat(simd, near);
+        let alive = rays_where(
+            simd,
+            [&self.to, &self.to],
+            #[inline(always)]
+            |to, _| to.simd_ge(near),
+        );
+        self.alive = self.members & alive;
     }
 
     /// The members between two planes, unless they have ended before.
@@ -303,6 +389,12 @@ impl Chord {
 }
 
 impl Bounds {
+    /// Around nothing.
+    pub(super) const NONE: Self = {
+        let none = Chord { start: 0.0, slope: 0.0 };
+        Self { low: [none; 2], high: [none; 2] }
+    };
+
     /// The first and the last of `count` cells on an axis that rays may meet between two planes, each
     /// cell `size` wide; `None` if they pass all of them.
     #[inline(always)]

@@ -1,13 +1,17 @@
 //! Many rays against triangles: rays side by side where a triangle is large, triangles side by side
 //! where it is small.
 //!
+//! Rays side by side cost the same whether all sixteen meet a cell or one, so a triangle is tested
+//! against all that are alive when the first cell with it has many rays, and not again for others.
+//!
 //! Both do for every ray and triangle what [`TriangleTest`] does, so hits have the same bits.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16};
 
-use super::bundle::{Bundle, PerRay, RAYS, rays_where};
-use crate::eight::{Eight, LANES};
+use super::bundle::{Bundle, PerRay, RAYS, WIDTH, rays_where, row_of};
+use super::frusta::Frusta;
+use crate::eight::{Eight, LANES, Row, transpose_four};
 use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Cull;
 use crate::ray::{Hit, INVALID_ID, round};
@@ -15,10 +19,12 @@ use crate::triangle::{Axis, TriangleTest};
 
 /// From so many rays on they are tested side by side. A choice by the number of rows and triangles
 /// was no better.
-const MANY: u32 = 12;
+const MANY: u32 = 8;
 
-/// Rays tested at once, and resolved at once.
-const WIDTH: usize = 16;
+/// How many triangles a mailbox remembers.
+const SLOTS: usize = 256;
+
+/// Rays resolved at once.
 const HALF: usize = WIDTH / 2;
 
 /// What the rays of a bundle have hit, and what of a [`TriangleTest`] each needs for it.
@@ -35,6 +41,20 @@ pub(super) struct Hits {
     v: PerRay,
     primitive: [u32; RAYS],
     eight: Eight,
+    frusta: Frusta,
+    /// Whether these are around the bundle.
+    is_surrounded: bool,
+    /// For which bundle a triangle was last tested against all rays that may meet it.
+    mailbox: [Letter; SLOTS],
+    /// The number of the bundle.
+    bundle: u32,
+}
+
+/// A triangle in the mailbox. Who comes later takes the place: a second test does no harm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Letter {
+    bundle: u32,
+    id: u32,
 }
 
 impl Hits {
@@ -48,11 +68,17 @@ impl Hits {
         v: [0.0; RAYS],
         primitive: [INVALID_ID; RAYS],
         eight: Eight::EMPTY,
+        frusta: Frusta::EMPTY,
+        is_surrounded: false,
+        mailbox: [Letter { bundle: 0, id: 0 }; SLOTS],
+        bundle: 0,
     };
 
     /// Forgets the rays and what they hit.
     pub(super) const fn clear(&mut self) {
         self.is_ready = false;
+        self.is_surrounded = false;
+        self.bundle = self.bundle.wrapping_add(1);
         self.t = Self::EMPTY.t;
         self.u = Self::EMPTY.u;
         self.v = Self::EMPTY.v;
@@ -61,9 +87,27 @@ impl Hits {
 
     /// The closest hit of a ray, or [`Hit::MISS`].
     #[inline(always)]
-    pub(super) fn hit(&self, lane: usize) -> Hit {
+    fn hit(&self, lane: usize) -> Hit {
         let lane = lane % RAYS;
         Hit { t: self.t[lane], u: self.u[lane], v: self.v[lane], primitive: self.primitive[lane] }
+    }
+
+    /// The closest hit of every ray, or [`Hit::MISS`].
+    #[inline(always)]
+    pub(super) fn all<S: Simd>(&self, simd: S) -> [Hit; RAYS] {
+        let rows: [&[Row; RAYS / 4]; 4] = [
+            bytemuck::cast_ref(&self.t),
+            bytemuck::cast_ref(&self.u),
+            bytemuck::cast_ref(&self.v),
+            bytemuck::cast_ref(&self.primitive),
+        ];
+        let mut hits = [Hit::MISS; RAYS];
+        let (fours, _) = hits.as_chunks_mut::<4>();
+        for (at, four) in fours.iter_mut().enumerate() {
+            let hits = transpose_four(simd, rows.map(|rows| &rows[at]));
+            *four = hits.map(|hit| bytemuck::cast(<[f32; 4]>::from(hit)));
+        }
+        hits
     }
 
     /// Prepares the rays of a bundle.
@@ -98,7 +142,8 @@ impl Hits {
         }
     }
 
-    /// Tests rays of a bundle against the triangles of a list.
+    /// Tests rays of a bundle against the triangles of a list; if they are many, all rays that are
+    /// alive.
     #[inline(always)]
     pub(super) fn test<S: Simd, const ANY: bool>(
         &mut self,
@@ -111,49 +156,99 @@ impl Hits {
         if !self.is_ready {
             self.prepare(simd, bundle);
         }
-        if rays.count_ones() >= MANY {
-            for &id in ids {
-                let Some(triangle) = mesh.triangle(id) else { continue };
-                let rays = if ANY { rays & bundle.members } else { rays };
-                for axis in 0..3 {
-                    let rays = rays & self.axes[axis];
-                    if rays != 0 {
-                        match axis {
-                            0 => self.side_by_side::<S, 0, ANY>(simd, bundle, &triangle, id, rays),
-                            1 => self.side_by_side::<S, 1, ANY>(simd, bundle, &triangle, id, rays),
-                            _ => self.side_by_side::<S, 2, ANY>(simd, bundle, &triangle, id, rays),
-                        }
-                    }
-                }
+        if rays.count_ones() < MANY {
+            for ids in ids.chunks(LANES) {
+                self.few::<S, ANY>(simd, bundle, mesh, ids, rays);
             }
             return;
         }
-        for ids in ids.chunks(LANES) {
-            self.eight.gather(mesh, ids);
-            let lanes = self.eight.lanes(simd);
-            let mut rest = if ANY { rays & bundle.members } else { rays };
-            while rest != 0 {
-                let lane = rest.trailing_zeros() as usize % RAYS;
-                rest &= rest - 1;
-                let test = self.one(bundle, lane);
-                let mut survivors = test.survivors_of(simd, &lanes) & self.eight.used();
-                while survivors != 0 {
-                    let place = survivors.trailing_zeros() as usize;
-                    survivors &= survivors - 1;
-                    let Some(&id) = ids.get(place) else { break };
-                    let Some(hit) = test.resolve_lane(&self.eight, place) else { continue };
-                    let hit = hit.on(id);
-                    if hit.is_closer(&self.hit(lane)) {
-                        self.t[lane] = hit.t;
-                        self.u[lane] = hit.u;
-                        self.v[lane] = hit.v;
-                        self.primitive[lane] = id;
-                        bundle.to[lane] =
-                            bundle.zero[lane] + bundle.speed[lane] * hit.t + bundle.margin;
-                        if ANY {
-                            bundle.members &= !(1 << lane);
-                            break;
-                        }
+        if !self.is_surrounded {
+            self.is_surrounded = true;
+            self.frusta.surround(simd, bundle);
+        }
+        // Eight by eight those that were not tested yet.
+        let (mut fresh, mut count) = ([0; LANES], 0);
+        for (place, &id) in ids.iter().enumerate() {
+            let letter = Letter { bundle: self.bundle, id };
+            let slot = &mut self.mailbox[id as usize % SLOTS];
+            fresh[count % LANES] = id;
+            count += usize::from(*slot != letter);
+            *slot = letter;
+            if count == LANES || place + 1 == ids.len() {
+                let fresh = fresh.get(..core::mem::take(&mut count)).unwrap_or_default();
+                self.many::<S, ANY>(simd, bundle, mesh, fresh);
+            }
+        }
+    }
+
+    /// Tests all rays that are alive, side by side, against up to eight triangles one by one: those
+    /// that the planes around the rays let through.
+    #[inline(always)]
+    fn many<S: Simd, const ANY: bool>(
+        &mut self,
+        simd: S,
+        bundle: &mut Bundle,
+        mesh: &TriangleMesh<'_>,
+        ids: &[u32],
+    ) {
+        self.eight.gather(mesh, ids);
+        let triangles = self.eight.lanes(simd);
+        let mut near = self.frusta.meet(simd, &triangles) & self.eight.used();
+        while near != 0 {
+            let place = near.trailing_zeros() as usize;
+            near &= near - 1;
+            let Some(&id) = ids.get(place) else { break };
+            let triangle = self.eight.triangle(place);
+            let rays = self.frusta.rays(simd, &triangle) & bundle.alive;
+            let rays = if ANY { rays & bundle.members } else { rays };
+            for axis in 0..3 {
+                let rays = rays & self.axes[axis];
+                if rays == 0 {
+                    continue;
+                }
+                match axis {
+                    0 => self.side_by_side::<S, 0, ANY>(simd, bundle, &triangle, id, rays),
+                    1 => self.side_by_side::<S, 1, ANY>(simd, bundle, &triangle, id, rays),
+                    _ => self.side_by_side::<S, 2, ANY>(simd, bundle, &triangle, id, rays),
+                }
+            }
+        }
+    }
+
+    /// Tests rays one by one against up to eight triangles at once.
+    #[inline(always)]
+    fn few<S: Simd, const ANY: bool>(
+        &mut self,
+        simd: S,
+        bundle: &mut Bundle,
+        mesh: &TriangleMesh<'_>,
+        ids: &[u32],
+        rays: u64,
+    ) {
+        self.eight.gather(mesh, ids);
+        let triangles = self.eight.lanes(simd);
+        let mut rest = if ANY { rays & bundle.members } else { rays };
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize % RAYS;
+            rest &= rest - 1;
+            let test = self.one(bundle, lane);
+            let mut survivors = test.survivors_of(simd, &triangles) & self.eight.used();
+            while survivors != 0 {
+                let place = survivors.trailing_zeros() as usize;
+                survivors &= survivors - 1;
+                let Some(&id) = ids.get(place) else { break };
+                let Some(hit) = test.resolve_lane(&self.eight, place) else { continue };
+                let hit = hit.on(id);
+                if hit.is_closer(&self.hit(lane)) {
+                    self.t[lane] = hit.t;
+                    self.u[lane] = hit.u;
+                    self.v[lane] = hit.v;
+                    self.primitive[lane] = id;
+                    bundle.to[lane] =
+                        bundle.zero[lane] + bundle.speed[lane] * hit.t + bundle.margin;
+                    if ANY {
+                        bundle.members &= !(1 << lane);
+                        break;
                     }
                 }
             }
@@ -336,11 +431,4 @@ fn sheared<S: Simd, const AXIS: usize>(
     let y = f32x16::splat(simd, corner[(AXIS + 2) % 3]) - oy;
     let z = f32x16::splat(simd, corner[AXIS]) - oz;
     [x - shear_x * z, y - shear_y * z]
-}
-
-/// Sixteen numbers from `first` on.
-#[inline(always)]
-fn row_of<S: Simd>(simd: S, array: &PerRay, first: usize) -> f32x16<S> {
-    let rows = array.as_chunks::<WIDTH>().0;
-    f32x16::simd_from(simd, rows[first / WIDTH % (RAYS / WIDTH)])
 }

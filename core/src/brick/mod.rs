@@ -21,6 +21,7 @@ mod build;
 mod bundle;
 mod divide;
 mod frame;
+mod frusta;
 mod groups;
 mod hits;
 mod layout;
@@ -127,7 +128,7 @@ pub(crate) struct Tiles<'q, F, const ANY: bool> {
     pub(crate) answer: F,
 }
 
-impl<F: FnMut(usize, Option<Hit>), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
+impl<F: FnMut(usize, Option<&Hit>), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
     type Output = ();
 
     #[inline(always)]
@@ -136,9 +137,9 @@ impl<F: FnMut(usize, Option<Hit>), const ANY: bool> Kernel for Tiles<'_, F, ANY>
         for first in (0..self.rays.count).step_by(RAYS) {
             let count = RAYS.min(self.rays.count - first);
             let members = tile.trace(simd, self.rays, first, count);
-            for lane in 0..count {
-                let hit = (members >> lane & 1 == 1).then(|| tile.hit(lane));
-                (self.answer)(first + lane, hit);
+            let hits = tile.hits(simd);
+            for (lane, hit) in hits.iter().enumerate().take(count) {
+                (self.answer)(first + lane, (members >> lane & 1 == 1).then_some(hit));
             }
         }
     }

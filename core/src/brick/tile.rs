@@ -20,7 +20,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u8x64};
 
-use super::bundle::{Bounds, Bundle, PerRay, RAYS, below_three};
+use super::bundle::{Bounds, Bundle, PerRay, RAYS, WIDTH, below_three};
 use super::hits::Hits;
 use super::layout::{BLOCK, mask as mask_of, place};
 use super::{Brick, Chunk, Content, list};
@@ -245,32 +245,34 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         if members != 0 && self.go(simd) { members } else { 0 }
     }
 
-    /// The hit of a ray that was traced, or [`Hit::MISS`].
+    /// The hits of the rays that were traced, or [`Hit::MISS`].
     #[inline(always)]
-    pub(super) fn hit(&self, lane: usize) -> Hit {
-        self.hits.hit(lane)
+    pub(super) fn hits<S: Simd>(&self, simd: S) -> [Hit; RAYS] {
+        self.hits.all(simd)
     }
 
     /// Goes through the grid; `false` if the tile is too wide for it.
     #[inline(always)]
     fn go<S: Simd>(&mut self, simd: S) -> bool {
         let brick = self.brick;
-        let large = brick.large();
-        if !large.is_empty() {
-            self.test(simd, large, self.bundle.members);
-        }
         let [u, v, k] = self.bundle.axes();
         let width = as_f32(brick.width[k] * BLOCK);
         // Where the rays are inside on k; what the last block has too many is at its beginning if
         // k is mirrored.
         let depth = as_f32(brick.last[k] + 1);
         let inside = if self.bundle.is_mirrored { [width - depth, width] } else { [0.0, depth] };
-        let (first, last) = self.bundle.ends();
+        let (first, last) = self.bundle.ends(simd);
         let planes = [first.max(inside[0]), last.min(inside[1])];
         if planes[0] > planes[1] {
             return true;
         }
-        let Some(bounds) = self.bundle.bounds(planes) else { return false };
+        let Some(bounds) = self.bundle.around(simd, planes, 0..RAYS / WIDTH) else { return false };
+        (self.bundle.planes, self.bundle.bounds) = (planes, bounds);
+        self.bundle.alive = self.bundle.members;
+        let large = brick.large();
+        if !large.is_empty() {
+            self.test(simd, large, self.bundle.members);
+        }
 
         let slice = |plane: f32| whole(plane) / BLOCK;
         for step in slice(planes[0])..=slice(planes[1]).min(brick.width[k] - 1) {
@@ -283,6 +285,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
                 bounds.cells(side, planes, as_f32(BLOCK), brick.width[axis], self.bundle.margin)
             };
             let (Some([u0, u1]), Some([v0, v1])) = (cells(0, u), cells(1, v)) else { continue };
+            self.bundle.reach(simd, planes[0]);
             for at_v in v0..=v1 {
                 for at_u in u0..=u1 {
                     let mut block = [0; 3];

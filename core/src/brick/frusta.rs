@@ -1,0 +1,155 @@
+//! What the rays of a tile cannot meet: triangles outside the planes around them.
+//!
+//! A cell is often wider than a tile, and most of its triangles lie beside it. All rays lie between
+//! chords on u and v ([`Bounds`]), each of which is a plane; a triangle whose corners all lie behind one
+//! of them meets no ray. Eight triangles are compared with the planes of the whole tile, and what is left
+//! with those of its four rows of sixteen rays, which are squares of 4 x 4 pixels if a tile is in Morton
+//! order: half of them are far from a small triangle.
+//!
+//! Hits lie between the planes of k between which the chords hold, wherever the corners lie: behind
+//! means behind there, and a triangle is on one side of a plane if its corners are.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, f32x16};
+
+use super::bundle::{Bounds, Bundle, RAYS, WIDTH};
+use crate::eight::Lanes;
+use crate::mesh::Triangle;
+
+/// Rows of rays, and planes around each of them.
+const ROWS: usize = RAYS / WIDTH;
+const PLANES: usize = 4;
+
+/// The planes around the rays of a tile.
+#[derive(Debug)]
+pub(super) struct Frusta {
+    /// The axes u, v and k.
+    axes: [u8; 3],
+    /// Where u, v and k are 0, in scene units, and how many cells a unit is.
+    corner: [f32; 3],
+    rate: [f32; 3],
+    /// What is added on k: a mirrored one counts from the other end.
+    offset: f32,
+    /// How far off a triangle may be, in cells.
+    margin: f32,
+    whole: Bounds,
+    /// For every row its planes: what lies behind `a * u + b * v + c * k + d = 0` is outside.
+    rows: [[f32; ROWS * PLANES]; 4],
+}
+
+impl Frusta {
+    /// Around nothing.
+    pub(super) const EMPTY: Self = Self {
+        axes: [0, 1, 2],
+        corner: [0.0; 3],
+        rate: [0.0; 3],
+        offset: 0.0,
+        margin: 0.0,
+        whole: Bounds::NONE,
+        rows: [[0.0; ROWS * PLANES]; 4],
+    };
+
+    /// Replaces the planes by those around the rays of a bundle.
+    #[inline(always)]
+    pub(super) fn surround<S: Simd>(&mut self, simd: S, bundle: &Bundle) {
+        let [u, v, k] = bundle.axes();
+        self.axes = bundle.axes;
+        let in_order = |xyz: [f32; 3]| [xyz[u], xyz[v], xyz[k]];
+        self.corner = in_order(bundle.corner);
+        self.rate = in_order(bundle.rate);
+        self.offset = 0.0;
+        if bundle.is_mirrored {
+            self.rate[2] = -self.rate[2];
+            self.offset = bundle.width;
+        }
+        // A ray is as far off as a triangle.
+        self.margin = 2.0 * bundle.margin;
+        self.whole = bundle.bounds;
+        let [a, b, c, d] = &mut self.rows;
+        for row in 0..ROWS {
+            // What is around all of them is around some.
+            let bounds = bundle.around(simd, bundle.planes, row..row + 1).unwrap_or(self.whole);
+            for side in 0..2 {
+                let (low, high) = (bounds.low[side], bounds.high[side]);
+                let on_side = |axis: usize| if side == axis { 1.0 } else { 0.0 };
+                let place = row * PLANES + side * 2;
+                (a[place], b[place]) = (on_side(0), on_side(1));
+                (c[place], d[place]) = (-low.slope, self.margin - low.start);
+                (a[place + 1], b[place + 1]) = (-on_side(0), -on_side(1));
+                (c[place + 1], d[place + 1]) = (high.slope, self.margin + high.start);
+            }
+        }
+    }
+
+    /// Those of eight triangles that rays of the tile may meet, as bits.
+    #[inline(always)]
+    pub(super) fn meet<S: Simd>(&self, simd: S, triangles: &Lanes<S>) -> u32 {
+        let [u, v, k] = super::bundle::below_three(self.axes);
+        let splat = |number: f32| f32x8::splat(simd, number);
+        let place = |xyz: &[f32x8<S>; 3], axis: usize, side: usize| {
+            (xyz[axis] - splat(self.corner[side])) * splat(self.rate[side])
+        };
+        let [a, b, c] = triangles;
+        let on_k = |xyz| place(xyz, k, 2) + splat(self.offset);
+        let ks = [on_k(a), on_k(b), on_k(c)];
+        let margin = splat(self.margin);
+        let mut outside = splat(0.0).simd_lt(splat(0.0));
+        for (side, axis) in [u, v].into_iter().enumerate() {
+            let at = [place(a, axis, side), place(b, axis, side), place(c, axis, side)];
+            let (low, high) = (self.whole.low[side], self.whole.high[side]);
+            let low = ks.map(
+                #[inline(always)]
+                |k| k * splat(low.slope) + splat(low.start) - margin,
+            );
+            let high = ks.map(
+                #[inline(always)]
+                |k| k * splat(high.slope) + splat(high.start) + margin,
+            );
+            outside |= at[0].simd_lt(low[0]) & at[1].simd_lt(low[1]) & at[2].simd_lt(low[2]);
+            outside |= at[0].simd_gt(high[0]) & at[1].simd_gt(high[1]) & at[2].simd_gt(high[2]);
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
+        let outside = outside.to_bitmask() as u32;
+        !outside & 0xff
+    }
+
+    /// The rays that may meet a triangle, row by row.
+    #[inline(always)]
+    pub(super) fn rays<S: Simd>(&self, simd: S, triangle: &Triangle) -> u64 {
+        /// The rays of each set of rows.
+        const RAYS_OF: [u64; 1 << ROWS] = {
+            let mut rays = [0; 1 << ROWS];
+            let mut set = 0;
+            while set < rays.len() {
+                let mut row = 0;
+                while row < ROWS {
+                    if set >> row & 1 == 1 {
+                        rays[set] |= 0xffff << (row * WIDTH);
+                    }
+                    row += 1;
+                }
+                set += 1;
+            }
+            rays
+        };
+        let [u, v, k] = super::bundle::below_three(self.axes);
+        let [a, b, c, d] = &self.rows;
+        let row = |numbers: &[f32; ROWS * PLANES]| f32x16::simd_from(simd, *numbers);
+        let [a, b, c, d] = [row(a), row(b), row(c), row(d)];
+        let behind = |corner: &[f32; 3]| {
+            let splat = |number: f32| f32x16::splat(simd, number);
+            let place = |axis: usize, side: usize| {
+                splat((corner[axis] - self.corner[side]) * self.rate[side])
+            };
+            let on_k = place(k, 2) + splat(self.offset);
+            (a * place(u, 0) + b * place(v, 1) + c * on_k + d).simd_lt(splat(0.0))
+        };
+        let [p, q, r] = triangle;
+        let planes = (behind(p) & behind(q) & behind(r)).to_bitmask();
+        // A row is out if the triangle is behind one of its four planes.
+        let planes = planes | planes >> 1;
+        let planes = planes | planes >> 2;
+        let out = planes & 1 | planes >> 3 & 2 | planes >> 6 & 4 | planes >> 9 & 8;
+        RAYS_OF[(!out & 0xf) as usize]
+    }
+}
