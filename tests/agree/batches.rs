@@ -78,6 +78,13 @@ fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
         (0..64)
             .map(|i| Ray { t_max: i as f32 * 0.1, ..Ray::new([-3.0, 0.1, 0.1], [1.0, 0.01, 0.0]) }),
     );
+    // Tiles whose rays start and end anywhere, also behind the first surface or between two.
+    for corner in [[24, 16], [24, 24], [32, 24]] {
+        rays.extend(tile(bounds, View::Front, corner).into_iter().map(|ray| {
+            let t_min = random.unit() * 6.0;
+            Ray { t_min, t_max: t_min + random.unit() * 6.0, ..ray }
+        }));
+    }
     rays.extend((0..100).map(|_| Ray::new(random.point().map(|c| 3.0 * c), random.point())));
     rays.extend(odd_rays());
     // Strangers among neighbours: other octants, other axes, and no rays at all.
