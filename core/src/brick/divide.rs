@@ -1,6 +1,6 @@
 //! Whether a crowded cell is divided, and the entries that it then has.
 //!
-//! It is if its triangles are smaller than it, and its parts list fewer of them.
+//! It is if its triangles are smaller than it, and its parts list fewer of them, or can be divided again.
 
 #![expect(clippy::cast_possible_truncation, reason = "numbers of cells")]
 
@@ -9,7 +9,7 @@ use fearless_simd::{Simd, mask32x8, u32x8};
 
 use super::frame::{Frame, Scene, classify};
 use super::groups::Groups;
-use super::layout::{AXES, Bench, Class, ENTRY_WORDS, Entry, place};
+use super::layout::{AXES, BLOCK, Bench, Class, ENTRY_WORDS, Entry, place};
 use super::sort::{measure, tally};
 
 /// Shows the entries that a cell lists.
@@ -75,7 +75,7 @@ pub(super) fn count_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize) ->
 }
 
 /// Puts the triangles of a cell on the next bench, if to divide the cell gains something: the
-/// triangles are smaller than it, and its parts list fewer of them.
+/// triangles are smaller than it, and its parts list fewer of them or can be divided again.
 pub(super) fn plan<S: Simd>(
     simd: S,
     scene: &Scene<'_>,
@@ -88,16 +88,19 @@ pub(super) fn plan<S: Simd>(
     simd.vectorize(
         #[inline(always)]
         || {
-            let bench = benches.first_mut()?;
-            let (frame, groups) = collect(simd, scene, frame, entries, cell, listed, bench)?;
+            let (bench, deeper) = benches.split_first_mut()?;
+            let (frame, groups, wanted) =
+                collect(simd, scene, frame, entries, cell, listed, bench)?;
             let Bench { cells, bricks, entries: inner, .. } = bench;
             let (inner, cells) = (inner.get(..groups.count())?, cells.first_chunk_mut()?);
             let block = tally(&groups, inner, cells, bricks);
             let measure = measure(simd, cells, bricks, block);
             // Whatever lists a triangle counts: this is what bounds the words of a mesh.
             let references = u64::from(measure.references) + u64::from(measure.large);
-            let gains = references <= 4 * u64::from(listed)
-                && 10 * u64::from(measure.longest.max(block)) <= 9 * u64::from(listed);
+            // Triangles so small that they all lie in one part are for the next division.
+            let is_finer = wanted > frame.cells && !deeper.is_empty();
+            let separates = 10 * u64::from(measure.longest.max(block)) <= 9 * u64::from(listed);
+            let gains = references <= 4 * u64::from(listed) && (separates || is_finer);
             gains.then_some((frame, groups))
         },
     )
@@ -109,7 +112,8 @@ const fn wholes(number: f64) -> u32 {
     number as u32
 }
 
-/// Puts the triangles of a cell on a bench, if they are small enough to divide it.
+/// Puts the triangles of a cell on a bench, if they are small enough to divide it; tells into how many
+/// cells an axis they would.
 #[inline(always)]
 fn collect<S: Simd>(
     simd: S,
@@ -119,7 +123,7 @@ fn collect<S: Simd>(
     cell: usize,
     listed: u32,
     bench: &mut Bench<'_>,
-) -> Option<(Frame, Groups)> {
+) -> Option<(Frame, Groups, u32)> {
     // The ids, and soon the entries, wait where cells will be counted, or behind the entries, if there is
     // room.
     let length = listed as usize;
@@ -153,7 +157,7 @@ fn collect<S: Simd>(
     let mean = sum / f64::from(listed);
     let width = (2.0 * mean).max(4.0 * f64::from(scene.lattice.margin().max_element()));
     let count = wholes(1.0 / (width * f64::from(frame.scale)));
-    let frame = frame.child(place(cell as u32), count.min(16));
+    let frame = frame.child(place(cell as u32), count.min(BLOCK));
     if count < 2 {
         return None;
     }
@@ -172,5 +176,5 @@ fn collect<S: Simd>(
     } else {
         Groups::collect(|| waiting.iter().copied(), sorted)
     };
-    Some((frame, groups?))
+    Some((frame, groups?, count))
 }

@@ -8,7 +8,7 @@
 //!
 //! A triangle counts for no more than [`MOST`] cells: large ones are listed elsewhere and must not
 //! make the cells of all others coarse. Memory has the last word: cells are made larger until there
-//! are no more than one block for eight triangles, and no more than [`reference_limit`] references.
+//! are no more than one block for 32 triangles, and no more than [`reference_limit`] references.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -41,7 +41,7 @@ pub(super) const fn reference_limit(triangles: u32) -> u64 {
 
 /// The most blocks for so many triangles.
 pub(super) const fn block_limit(triangles: u32) -> u64 {
-    triangles as u64 / 8 + 8
+    triangles as u64 / 32 + 8
 }
 
 /// What a cell grows by where there are too many: half as many cells.
