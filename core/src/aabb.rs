@@ -59,14 +59,25 @@ impl Aabb {
                 if low > 0.0 || high < 0.0 {
                     return None;
                 }
-            } else if inverse > 0.0 {
-                near = near.max(low * inverse);
-                far = far.min(high * inverse);
             } else {
-                near = near.max(high * inverse);
-                far = far.min(low * inverse);
+                // No branch: which way a ray runs is as good as random.
+                let (a, b) = (low * inverse, high * inverse);
+                near = greater(near, lesser(a, b));
+                far = lesser(far, greater(a, b));
             }
         }
         (near <= far).then_some((near, far))
     }
+}
+
+/// The lesser of two numbers, in one instruction: neither is a NaN.
+#[inline(always)]
+const fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers, in one instruction: neither is a NaN.
+#[inline(always)]
+pub(crate) const fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }

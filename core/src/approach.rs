@@ -37,7 +37,8 @@ impl Approach {
         if !ray.is_valid() {
             return None;
         }
-        let inverse = ray.direction.map(|direction| 1.0 / f64::from(direction));
+        let [x, y, z] = ray.direction;
+        let inverse = [1.0 / f64::from(x), 1.0 / f64::from(y), 1.0 / f64::from(z)];
         let (near, far) = bounds.clip(ray.origin, inverse)?;
         let center = (bounds.min + bounds.max) * 0.5;
         let distance = (Vec3A::from_array(ray.origin) - center).abs().max_element();

@@ -194,7 +194,8 @@ impl Lattice {
     /// The most cells per unit on any axis.
     #[inline(always)]
     pub(crate) fn finest(&self) -> f64 {
-        self.cells_per_unit.map(f64::from).into_iter().fold(0.0, f64::max)
+        let [x, y, z] = self.cells_per_unit;
+        f64::from(x.max(y).max(z))
     }
 }
 

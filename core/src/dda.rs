@@ -11,6 +11,7 @@
 
 use glam::Vec3A;
 
+use crate::aabb::greater;
 use crate::approach::Approach;
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::ray::{Ray, round};
@@ -82,35 +83,41 @@ impl Line {
         if start > end {
             return None;
         }
-        let direction = ray.direction.map(f64::from);
-        let longest = direction.map(f64::abs).into_iter().fold(0.0, f64::max);
-        let scale = longest * lattice.finest();
+        let [x, y, z] = ray.direction;
+        let direction = [f64::from(x), f64::from(y), f64::from(z)];
+        let [x, y, z] = direction;
+        let longest = greater(x.abs(), greater(y.abs(), z.abs()));
+        let finest = lattice.finest();
+        let scale = longest * finest;
         let inverse_scale = 1.0 / scale;
 
-        let mut line = Self {
-            position: Vec3A::ZERO,
-            rate: Vec3A::ZERO,
-            delta: Vec3A::ZERO,
-            base: Vec3A::INFINITY,
-            step: [0; 3],
+        // Axis by axis as numbers, vectors at last: one that is filled number by number is slow to read.
+        let (mut position, mut rate, mut delta) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+        let (mut base, mut step) = ([f32::INFINITY; 3], [0; 3]);
+        for axis in 0..3 {
+            let direction = direction[axis];
+            let point = f64::from(approach.anchor[axis]) + start * direction;
+            position[axis] = round(lattice.position(axis, point));
+            if direction.abs() >= longest * PARALLEL {
+                let speed = direction * lattice.cells_per_unit(axis);
+                rate[axis] = round(speed * inverse_scale);
+                let fineness = finest / lattice.cells_per_unit(axis);
+                delta[axis] = round(longest * approach.inverse[axis] * fineness);
+                base[axis] = -position[axis] * delta[axis];
+                step[axis] = if direction > 0.0 { 1 } else { u32::MAX };
+            }
+        }
+        Some(Self {
+            position: Vec3A::from_array(position),
+            rate: Vec3A::from_array(rate),
+            delta: Vec3A::from_array(delta),
+            base: Vec3A::from_array(base),
+            step,
             margin: lattice.margin(),
             end: round((end - start) * scale),
             start: approach.t + start,
             scale,
-        };
-        for (axis, &direction) in direction.iter().enumerate() {
-            let point = f64::from(approach.anchor[axis]) + start * direction;
-            line.position[axis] = round(lattice.position(axis, point));
-            if direction.abs() >= longest * PARALLEL {
-                let speed = direction * lattice.cells_per_unit(axis);
-                line.rate[axis] = round(speed * inverse_scale);
-                let fineness = lattice.finest() / lattice.cells_per_unit(axis);
-                line.delta[axis] = round(longest * approach.inverse[axis] * fineness);
-                line.base[axis] = -line.position[axis] * line.delta[axis];
-                line.step[axis] = if direction > 0.0 { 1 } else { u32::MAX };
-            }
-        }
-        Some(line)
+        })
     }
 
     /// The distance behind which every `t` is larger than this one, its rounding included.

@@ -1,6 +1,7 @@
 //! Rays and hits: the two structs that cross every boundary, laid out as C sees them.
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3A;
 
 /// The id that no primitive has.
 pub const INVALID_ID: u32 = u32::MAX;
@@ -38,11 +39,11 @@ impl Ray {
     /// Whether this ray can hit anything at all: finite, not null, a range that is not empty.
     #[inline]
     pub(crate) fn is_valid(&self) -> bool {
-        let finite = |[x, y, z]: [f32; 3]| x.is_finite() && y.is_finite() && z.is_finite();
-        let [dx, dy, dz] = self.direction.map(f32::abs);
-        finite(self.origin)
-            && finite(self.direction)
-            && (dx > 0.0 || dy > 0.0 || dz > 0.0)
+        let (origin, direction) =
+            (Vec3A::from_array(self.origin), Vec3A::from_array(self.direction));
+        origin.is_finite()
+            && direction.is_finite()
+            && direction.cmpne(Vec3A::ZERO).any()
             && self.t_min <= self.t_max
     }
 }

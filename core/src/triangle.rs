@@ -127,8 +127,14 @@ impl TriangleTest {
     #[inline(always)]
     #[must_use]
     pub fn test(&self, triangle: &Triangle) -> Option<TriangleHit> {
-        let sheared = triangle.map(|corner| self.shear(corner));
+        let sheared = self.sheared(triangle);
         if is_dropped(sheared) { None } else { self.resolve_sheared(triangle, sheared) }
+    }
+
+    /// The corners as the filter sees them.
+    #[inline(always)]
+    fn sheared(&self, &[a, b, c]: &Triangle) -> [[f32; 2]; 3] {
+        [self.shear(a), self.shear(b), self.shear(c)]
     }
 
     /// A corner relative to the ray, sheared so that the ray is the z axis.
@@ -142,13 +148,16 @@ impl TriangleTest {
     /// Decides in f64 what the filter let through.
     #[inline]
     pub(crate) fn resolve(&self, triangle: &Triangle) -> Option<TriangleHit> {
-        self.resolve_sheared(triangle, triangle.map(|corner| self.shear(corner)))
+        self.resolve_sheared(triangle, self.sheared(triangle))
     }
 
     /// The same for a triangle that was sheared.
     #[inline]
     fn resolve_sheared(&self, triangle: &Triangle, sheared: [[f32; 2]; 3]) -> Option<TriangleHit> {
-        let [a, b, c] = sheared.map(|corner| corner.map(f64::from));
+        // Said for each: what is mapped over arrays is called, corner by corner.
+        let wide = |[x, y]: [f32; 2]| [f64::from(x), f64::from(y)];
+        let [a, b, c] = sheared;
+        let (a, b, c) = (wide(a), wide(b), wide(c));
 
         // Compute the edge functions again: exact products, so the signs are exact.
         let u = c[0] * b[1] - c[1] * b[0];
@@ -173,11 +182,12 @@ impl TriangleTest {
         let weights = [u * share + 0.0, v * share + 0.0, w * share + 0.0];
 
         // Interpolate the depth from the ray's own origin, wherever the sheared space has its.
-        let depths = triangle.map(|corner| {
+        let depth = |corner| {
             let [_, _, z] = self.axis.to_z(corner);
             f64::from(z) - self.origin_z
-        });
-        let depth = weights[0] * depths[0] + weights[1] * depths[1] + weights[2] * depths[2];
+        };
+        let [p, q, r] = *triangle;
+        let depth = weights[0] * depth(p) + weights[1] * depth(q) + weights[2] * depth(r);
         let t = round(depth / self.direction_z);
         let hit = TriangleHit { t, u: round(weights[1]), v: round(weights[2]) };
         (t >= self.t_min && t <= self.t_max && t.is_finite()).then_some(hit)
@@ -200,7 +210,7 @@ fn is_dropped([a, b, c]: [[f32; 2]; 3]) -> bool {
 impl TriangleTest {
     /// Whether the filter lets a triangle through.
     pub(crate) fn passes(&self, triangle: &Triangle) -> bool {
-        !is_dropped(triangle.map(|corner| self.shear(corner)))
+        !is_dropped(self.sheared(triangle))
     }
 }
 

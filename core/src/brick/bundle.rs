@@ -12,7 +12,7 @@ use super::Brick;
 use super::layout::BLOCK;
 use crate::approach::FAR_EXTENTS;
 use crate::cell::{Lattice, as_f32};
-use crate::eight::{Row, transpose_four};
+use crate::eight::{Row, load, transpose};
 use crate::mesh::Strided;
 use crate::ray::{Ray, round};
 
@@ -185,8 +185,10 @@ impl Bundle {
                 let rays = four_rays.iter().map(|&&ray| bytemuck::cast::<[u8; 32], Ray>(ray));
                 leader = rays.filter(Ray::is_valid).map(|ray| ray.direction).next();
             }
-            let [a, b, c, d] = four_rays.map(halves);
-            let [x, y, z, t_min] = transpose_four(simd, [a[0], b[0], c[0], d[0]]);
+            let [a, b, c, d] = four_rays;
+            let half = |ray, half: usize| load(simd, halves(ray)[half]);
+            let row = |at: usize| [half(a, at), half(b, at), half(c, at), half(d, at)];
+            let [x, y, z, t_min] = transpose(row(0));
             let set = |column: &mut PerRay, four_rays: f32x4<S>| {
                 column.as_chunks_mut().0[four] = four_rays.into();
             };
@@ -194,7 +196,7 @@ impl Bundle {
             set(&mut self.origin[1], y);
             set(&mut self.origin[2], z);
             set(&mut self.t_min, t_min);
-            let [x, y, z, t_max] = transpose_four(simd, [a[1], b[1], c[1], d[1]]);
+            let [x, y, z, t_max] = transpose(row(1));
             set(&mut self.direction[0], x);
             set(&mut self.direction[1], y);
             set(&mut self.direction[2], z);

@@ -13,7 +13,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16};
 
 use super::bundle::{Bounds, Bundle, RAYS, WIDTH};
-use crate::eight::Lanes;
+use crate::eight::Eight;
 use crate::mesh::Triangle;
 
 /// Rows of rays, and planes around each of them.
@@ -83,13 +83,13 @@ impl Frusta {
 
     /// Those of eight triangles that rays of the tile may meet, as bits.
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(&self, simd: S, triangles: &Lanes<S>) -> u32 {
+    pub(super) fn meet<S: Simd>(&self, simd: S, triangles: &Eight<S>) -> u32 {
         let [u, v, k] = super::bundle::below_three(self.axes);
         let splat = |number: f32| f32x8::splat(simd, number);
         let place = |xyz: &[f32x8<S>; 3], axis: usize, side: usize| {
             (xyz[axis] - splat(self.corner[side])) * splat(self.rate[side])
         };
-        let [a, b, c] = triangles;
+        let [a, b, c] = &triangles.corners;
         let on_k = |xyz| place(xyz, k, 2) + splat(self.offset);
         let ks = [on_k(a), on_k(b), on_k(c)];
         let margin = splat(self.margin);
@@ -110,7 +110,7 @@ impl Frusta {
         }
         #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
         let outside = outside.to_bitmask() as u32;
-        !outside & 0xff
+        !outside & triangles.used
     }
 
     /// The rays that may meet a triangle, row by row.

@@ -7,11 +7,11 @@
 //! Both do for every ray and triangle what [`TriangleTest`] does, so hits have the same bits.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16};
+use fearless_simd::{Simd, f32x4, f32x16};
 
 use super::bundle::{Bundle, PerRay, RAYS, WIDTH, rays_where, row_of};
 use super::frusta::Frusta;
-use crate::eight::{Eight, LANES, Row, transpose_four};
+use crate::eight::{Eight, LANES, Row, load, transpose};
 use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Cull;
 use crate::ray::{Hit, INVALID_ID, round};
@@ -40,7 +40,6 @@ pub(super) struct Hits {
     u: PerRay,
     v: PerRay,
     primitive: [u32; RAYS],
-    eight: Eight,
     frusta: Frusta,
     /// Whether these are around the bundle.
     is_surrounded: bool,
@@ -67,7 +66,6 @@ impl Hits {
         u: [0.0; RAYS],
         v: [0.0; RAYS],
         primitive: [INVALID_ID; RAYS],
-        eight: Eight::EMPTY,
         frusta: Frusta::EMPTY,
         is_surrounded: false,
         mailbox: [Letter { bundle: 0, id: 0 }; SLOTS],
@@ -104,8 +102,15 @@ impl Hits {
         let mut hits = [Hit::MISS; RAYS];
         let (fours, _) = hits.as_chunks_mut::<4>();
         for (at, four) in fours.iter_mut().enumerate() {
-            let hits = transpose_four(simd, rows.map(|rows| &rows[at]));
-            *four = hits.map(|hit| bytemuck::cast(<[f32; 4]>::from(hit)));
+            let [t, u, v, primitive] = rows;
+            let [a, b, c, d] = transpose([
+                load(simd, &t[at]),
+                load(simd, &u[at]),
+                load(simd, &v[at]),
+                load(simd, &primitive[at]),
+            ]);
+            let hit = |hit: f32x4<S>| bytemuck::cast(<[f32; 4]>::from(hit));
+            *four = [hit(a), hit(b), hit(c), hit(d)];
         }
         hits
     }
@@ -157,8 +162,16 @@ impl Hits {
             self.prepare(simd, bundle);
         }
         if rays.count_ones() < MANY {
-            for ids in ids.chunks(LANES) {
-                self.few::<S, ANY>(simd, bundle, mesh, ids, rays);
+            let (eights, rest) = ids.as_chunks();
+            for ids in eights {
+                self.few::<S, ANY>(simd, bundle, mesh, ids, LANES, rays);
+            }
+            if let Some(&last) = rest.last() {
+                let mut ids = [last; LANES];
+                for (slot, &id) in ids.iter_mut().zip(rest) {
+                    *slot = id;
+                }
+                self.few::<S, ANY>(simd, bundle, mesh, &ids, rest.len(), rays);
             }
             return;
         }
@@ -167,7 +180,7 @@ impl Hits {
             self.frusta.surround(simd, bundle);
         }
         // Eight by eight those that were not tested yet.
-        let (mut fresh, mut count) = ([0; LANES], 0);
+        let (mut fresh, mut count) = ([ids.first().copied().unwrap_or(0); LANES], 0);
         for (place, &id) in ids.iter().enumerate() {
             let letter = Letter { bundle: self.bundle, id };
             let slot = &mut self.mailbox[id as usize % SLOTS];
@@ -175,8 +188,7 @@ impl Hits {
             count += usize::from(*slot != letter);
             *slot = letter;
             if count == LANES || place + 1 == ids.len() {
-                let fresh = fresh.get(..core::mem::take(&mut count)).unwrap_or_default();
-                self.many::<S, ANY>(simd, bundle, mesh, fresh);
+                self.many::<S, ANY>(simd, bundle, mesh, &fresh, core::mem::take(&mut count));
             }
         }
     }
@@ -189,16 +201,16 @@ impl Hits {
         simd: S,
         bundle: &mut Bundle,
         mesh: &TriangleMesh<'_>,
-        ids: &[u32],
+        ids: &[u32; LANES],
+        count: usize,
     ) {
-        self.eight.gather(mesh, ids);
-        let triangles = self.eight.lanes(simd);
-        let mut near = self.frusta.meet(simd, &triangles) & self.eight.used();
+        let triangles = Eight::gather(simd, mesh, ids, count);
+        let mut near = self.frusta.meet(simd, &triangles);
         while near != 0 {
             let place = near.trailing_zeros() as usize;
             near &= near - 1;
             let Some(&id) = ids.get(place) else { break };
-            let triangle = self.eight.triangle(place);
+            let Some(triangle) = mesh.triangle(id) else { continue };
             let rays = self.frusta.rays(simd, &triangle) & bundle.alive;
             let rays = if ANY { rays & bundle.members } else { rays };
             for axis in 0..3 {
@@ -222,28 +234,27 @@ impl Hits {
         simd: S,
         bundle: &mut Bundle,
         mesh: &TriangleMesh<'_>,
-        ids: &[u32],
+        ids: &[u32; LANES],
+        count: usize,
         rays: u64,
     ) {
-        self.eight.gather(mesh, ids);
-        let triangles = self.eight.lanes(simd);
+        let triangles = Eight::gather(simd, mesh, ids, count);
         let mut rest = if ANY { rays & bundle.members } else { rays };
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize % RAYS;
             rest &= rest - 1;
             let test = self.one(bundle, lane);
-            let mut survivors = test.survivors_of(simd, &triangles) & self.eight.used();
+            let mut survivors = test.survivors(simd, &triangles);
             while survivors != 0 {
                 let place = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
-                let Some(&id) = ids.get(place) else { break };
-                let Some(hit) = test.resolve_lane(&self.eight, place) else { continue };
-                let hit = hit.on(id);
+                let hit = ids.get(place).and_then(|&id| test.decide(mesh, id));
+                let Some(hit) = hit else { continue };
                 if hit.is_closer(&self.hit(lane)) {
                     self.t[lane] = hit.t;
                     self.u[lane] = hit.u;
                     self.v[lane] = hit.v;
-                    self.primitive[lane] = id;
+                    self.primitive[lane] = hit.primitive;
                     bundle.to[lane] =
                         bundle.zero[lane] + bundle.speed[lane] * hit.t + bundle.margin;
                     if ANY {

@@ -36,7 +36,6 @@ struct Way<'q, F, T> {
     limit: f32,
     /// A ray meets every list at most once; damaged bytes may list everything in every cell.
     unread: usize,
-    eight: Eight,
 }
 
 /// A block, or a divided cell.
@@ -58,8 +57,8 @@ impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let Self { brick, mesh, line, test, search, tally } = self;
-        let (limit, unread, eight) = (line.end, brick.list_words(), Eight::EMPTY);
-        Way { mesh, line, test, search, tally, limit, unread, eight }.blocks(simd, brick);
+        let (limit, unread) = (line.end, brick.list_words());
+        Way { mesh, line, test, search, tally, limit, unread }.blocks(simd, brick);
     }
 }
 
@@ -172,32 +171,57 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
     }
 
     /// Tests the ray against the triangles of a list.
-    #[inline(always)]
+    ///
+    /// Out of line, or it would be five times in the walk; so it says once more what vectors it is
+    /// compiled for.
     fn test<S: Simd>(&mut self, simd: S, ids: &[u32]) {
+        simd.vectorize(
+            #[inline(always)]
+            || self.test_list(simd, ids),
+        );
+    }
+
+    #[inline(always)]
+    fn test_list<S: Simd>(&mut self, simd: S, ids: &[u32]) {
         let Some(rest) = self.unread.checked_sub(ids.len()) else {
             self.limit = f32::NEG_INFINITY;
             return;
         };
         self.unread = rest;
         self.tally.primitive_tests(ids.len());
-        let (search, limit, line) = (&mut *self.search, &mut self.limit, self.line);
-        for ids in ids.chunks(LANES) {
-            self.eight.gather(self.mesh, ids);
-            self.test.test_eight(
-                simd,
-                &self.eight,
-                #[inline(always)]
-                |lane, hit| {
-                    let Some(hit) = ids.get(lane).map(|&id| hit.on(id)) else { return };
-                    match search.show(hit) {
-                        Outcome::Unchanged => {}
-                        Outcome::EndsAt(t) => *limit = line.distance(t),
-                        Outcome::Done => *limit = f32::NEG_INFINITY,
-                    }
-                },
-            );
-            if *limit == f32::NEG_INFINITY {
+        let (eights, rest) = ids.as_chunks();
+        for ids in eights {
+            self.test_eight(simd, ids, LANES);
+            if self.is_over() {
                 return;
+            }
+        }
+        if let Some(&last) = rest.last() {
+            let mut ids = [last; LANES];
+            for (slot, &id) in ids.iter_mut().zip(rest) {
+                *slot = id;
+            }
+            self.test_eight(simd, &ids, rest.len());
+        }
+    }
+
+    /// Tests the ray against the first `count` of eight triangles.
+    #[inline(always)]
+    fn test_eight<S: Simd>(&mut self, simd: S, ids: &[u32; LANES], count: usize) {
+        let eight = Eight::gather(simd, self.mesh, ids, count);
+        let mut survivors = self.test.survivors(simd, &eight);
+        while survivors != 0 {
+            let lane = survivors.trailing_zeros() as usize;
+            survivors &= survivors - 1;
+            let hit = ids.get(lane).and_then(|&id| self.test.decide(self.mesh, id));
+            let Some(hit) = hit else { continue };
+            match self.search.show(hit) {
+                Outcome::Unchanged => {}
+                Outcome::EndsAt(t) => self.limit = self.line.distance(t),
+                Outcome::Done => {
+                    self.limit = f32::NEG_INFINITY;
+                    return;
+                }
             }
         }
     }
