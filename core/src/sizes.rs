@@ -45,7 +45,7 @@ impl Sizes {
     }
 
     /// Enough for any mesh with so many triangles and a build with so many tasks
-    /// ([`Control::tasks`]), each of which takes scratch: four bytes for eight triangles and those of
+    /// ([`Control::tasks`]), each of which takes scratch: four bytes for 32 triangles and those of
     /// the fullest block.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "compared before")]

@@ -80,7 +80,7 @@ impl Axis {
 }
 
 impl TriangleTest {
-    /// Prepares a ray for tests against triangles inside `bounds` (least and greatest corner).
+    /// Prepares a ray for tests against triangles inside `bounds` (least and greatest corner, finite).
     ///
     /// `None` if the ray cannot hit anything there: it is invalid or passes the box.
     #[must_use]

@@ -172,9 +172,6 @@ impl Bundle {
         let mut leader = None;
         for four in 0..RAYS / 4 {
             let at = 4 * four;
-            if at >= count {
-                break;
-            }
             // Zeros where there are no more: such a ray is none.
             let ray = |lane: usize| -> &[u8; 32] {
                 let place = (at + lane < count).then_some(first + at + lane);

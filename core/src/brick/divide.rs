@@ -100,7 +100,8 @@ pub(super) fn plan<S: Simd>(
             // Triangles so small that they all lie in one part are for the next division.
             let is_finer = wanted > frame.cells && !deeper.is_empty();
             let separates = 10 * u64::from(measure.longest.max(block)) <= 9 * u64::from(listed);
-            let gains = references <= 4 * u64::from(listed) && (separates || is_finer);
+            let most = if separates { 4 } else { 2 * u64::from(is_finer) };
+            let gains = references <= most * u64::from(listed);
             gains.then_some((frame, groups))
         },
     )

@@ -214,7 +214,7 @@ pub(super) struct Layout {
 
 /// How often a cell can be divided.
 pub(super) const MAX_CHILDREN: usize = 2;
-/// A cell with more triangles is divided if that separates them.
+/// A cell with more triangles is divided if that separates them, or lets the next division do so.
 pub(super) const CROWDED: u32 = 128;
 
 /// Where a task sorts: a bench for blocks, and one for each depth of divided cells.

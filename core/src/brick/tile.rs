@@ -2,7 +2,8 @@
 //!
 //! The axis that the rays run along fastest becomes k. Between two planes of k, one cell apart, a ray
 //! stays in a rectangle of u and v; where a cell that lists something meets rectangles, its triangles
-//! are gathered once and tested against just those rays. Along k there is nothing to search and no
+//! are tested: against those rays if they are few, against all that may meet a triangle if they are many
+//! ([`hits`](super::hits)). Along k there is nothing to search and no
 //! order to keep but that of the slices: a ray is done when its closest hit lies before the next.
 //!
 //! ```text
@@ -425,7 +426,9 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         let rays = rays & self.bundle.members;
         self.spend(ids.len().max(1) as u64 * u64::from(rays.count_ones()));
         let rays = rays & self.bundle.members;
-        self.hits.test::<S, ANY>(simd, &mut self.bundle, self.mesh, ids, rays);
+        if rays != 0 {
+            self.hits.test::<S, ANY>(simd, &mut self.bundle, self.mesh, ids, rays);
+        }
     }
 }
 
