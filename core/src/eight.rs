@@ -103,10 +103,11 @@ fn corner<S: Simd>(vertices: [f32x4<S>; 4]) -> [f32x4<S>; 3] {
 #[inline(never)]
 fn read(mesh: &TriangleMesh<'_>, ids: [u32; 4]) -> ([[Row; 4]; 3], u32) {
     let (mut rows, mut used) = ([[[0; 16]; 4]; 3], 0);
-    for (lane, id) in ids.into_iter().enumerate() {
+    let [a, b, c] = &mut rows;
+    for (lane, (((id, a), b), c)) in ids.into_iter().zip(a).zip(b).zip(c).enumerate() {
         let Some(triangle) = mesh.triangle(id) else { continue };
-        for (rows, [x, y, z]) in rows.iter_mut().zip(triangle) {
-            rows[lane] = bytemuck::cast([x, y, z, 0.0]);
+        for (row, [x, y, z]) in [a, b, c].into_iter().zip(triangle) {
+            *row = bytemuck::cast([x, y, z, 0.0]);
         }
         used |= 1 << lane;
     }

@@ -172,6 +172,9 @@ impl Bundle {
         let mut leader = None;
         for four in 0..RAYS / 4 {
             let at = 4 * four;
+            if at >= count {
+                break;
+            }
             // Zeros where there are no more: such a ray is none.
             let ray = |lane: usize| -> &[u8; 32] {
                 let place = (at + lane < count).then_some(first + at + lane);
@@ -187,7 +190,9 @@ impl Bundle {
             let row = |at: usize| [half(a, at), half(b, at), half(c, at), half(d, at)];
             let [x, y, z, t_min] = transpose(row(0));
             let set = |column: &mut PerRay, four_rays: f32x4<S>| {
-                column.as_chunks_mut().0[four] = four_rays.into();
+                if let Some(slot) = column.as_chunks_mut().0.get_mut(four) {
+                    *slot = four_rays.into();
+                }
             };
             set(&mut self.origin[0], x);
             set(&mut self.origin[1], y);
@@ -203,11 +208,10 @@ impl Bundle {
         let Some(leader) = leader else { return };
         let [x, y, z] = [leader[0].abs(), leader[1].abs(), leader[2].abs()];
         self.is_mirrored = match (x >= y && x >= z, y >= z) {
-            (true, _) => self.along::<0, S>(simd, brick, lattice, leader[0] < 0.0),
-            (_, true) => self.along::<1, S>(simd, brick, lattice, leader[1] < 0.0),
-            _ => self.along::<2, S>(simd, brick, lattice, leader[2] < 0.0),
+            (true, _) => self.along::<0, S>(simd, brick, lattice, leader[0] < 0.0, count),
+            (_, true) => self.along::<1, S>(simd, brick, lattice, leader[1] < 0.0, count),
+            _ => self.along::<2, S>(simd, brick, lattice, leader[2] < 0.0, count),
         };
-        self.members &= u64::MAX >> (RAYS - count.clamp(1, RAYS));
     }
 
     /// Makes the rays that run along an axis lines over it.
@@ -218,6 +222,7 @@ impl Bundle {
         brick: &Brick<'_>,
         lattice: &Lattice,
         is_mirrored: bool,
+        count: usize,
     ) -> bool {
         let axes = [(K + 1) % 3, (K + 2) % 3, K];
         self.axes = match K {
@@ -251,8 +256,11 @@ impl Bundle {
                 .max(dy[lane].abs() * rate[1])
                 .max(dz[lane].abs() * rate[2]);
             let is_along = (along >= 0.5 * turn) & (speed > LEAST_SPEED) & (fastest < MOST_SPEED);
-            let is_member =
-                is_near & is_along & (nothing >= 0.0) & (self.t_min[lane] <= self.t_max[lane]);
+            let is_member = (lane < count)
+                & is_near
+                & is_along
+                & (nothing >= 0.0)
+                & (self.t_min[lane] <= self.t_max[lane]);
             belongs[lane] = if is_member { 1.0 } else { 0.0 };
 
             // Its line in cells, k growing.
@@ -284,9 +292,11 @@ impl Bundle {
         let [u, v] = &mut self.start;
         let [du, dv] = &mut self.slope;
         for numbers in [u, v, du, dv, &mut self.from, &mut self.to] {
-            let stand_in = numbers[stand_in];
-            for (number, &belongs) in numbers.iter_mut().zip(&belongs) {
-                *number = if belongs > 0.5 { *number } else { stand_in };
+            let stand_in = f32x16::splat(simd, numbers[stand_in]);
+            let rows = numbers.as_chunks_mut::<WIDTH>().0.iter_mut();
+            for (numbers, &belongs) in rows.zip(belongs.as_chunks().0) {
+                let belongs = f32x16::simd_from(simd, belongs).simd_gt(half);
+                *numbers = belongs.select(f32x16::simd_from(simd, *numbers), stand_in).into();
             }
         }
         is_mirrored

@@ -10,7 +10,7 @@
 //! means behind there, and a triangle is on one side of a plane if its corners are.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, f32x16};
+use fearless_simd::{Simd, f32x8, f32x16, mask32x16};
 
 use super::bundle::{Bounds, Bundle, RAYS, WIDTH};
 use crate::eight::Eight;
@@ -72,11 +72,12 @@ impl Frusta {
             for side in 0..2 {
                 let (low, high) = (bounds.low[side], bounds.high[side]);
                 let on_side = |axis: usize| if side == axis { 1.0 } else { 0.0 };
-                let place = row * PLANES + side * 2;
+                let place = (row * PLANES + side * 2) % (ROWS * PLANES);
+                let next = (place + 1) % (ROWS * PLANES);
                 (a[place], b[place]) = (on_side(0), on_side(1));
                 (c[place], d[place]) = (-low.slope, self.margin - low.start);
-                (a[place + 1], b[place + 1]) = (-on_side(0), -on_side(1));
-                (c[place + 1], d[place + 1]) = (high.slope, self.margin + high.start);
+                (a[next], b[next]) = (-on_side(0), -on_side(1));
+                (c[next], d[next]) = (high.slope, self.margin + high.start);
             }
         }
     }
@@ -87,7 +88,7 @@ impl Frusta {
         let [u, v, k] = super::bundle::below_three(self.axes);
         let splat = |number: f32| f32x8::splat(simd, number);
         let place = |xyz: &[f32x8<S>; 3], axis: usize, side: usize| {
-            (xyz[axis] - splat(self.corner[side])) * splat(self.rate[side])
+            (xyz[axis % 3] - splat(self.corner[side])) * splat(self.rate[side])
         };
         let [a, b, c] = &triangles.corners;
         let on_k = |xyz| place(xyz, k, 2) + splat(self.offset);
@@ -132,24 +133,26 @@ impl Frusta {
             }
             rays
         };
-        let [u, v, k] = super::bundle::below_three(self.axes);
-        let [a, b, c, d] = &self.rows;
-        let row = |numbers: &[f32; ROWS * PLANES]| f32x16::simd_from(simd, *numbers);
-        let [a, b, c, d] = [row(a), row(b), row(c), row(d)];
-        let behind = |corner: &[f32; 3]| {
-            let splat = |number: f32| f32x16::splat(simd, number);
-            let place = |axis: usize, side: usize| {
-                splat((corner[axis] - self.corner[side]) * self.rate[side])
-            };
-            let on_k = place(k, 2) + splat(self.offset);
-            (a * place(u, 0) + b * place(v, 1) + c * on_k + d).simd_lt(splat(0.0))
-        };
         let [p, q, r] = triangle;
-        let planes = (behind(p) & behind(q) & behind(r)).to_bitmask();
+        let behind = self.behind(simd, p) & self.behind(simd, q) & self.behind(simd, r);
+        let planes = behind.to_bitmask();
         // A row is out if the triangle is behind one of its four planes.
         let planes = planes | planes >> 1;
         let planes = planes | planes >> 2;
         let out = planes & 1 | planes >> 3 & 2 | planes >> 6 & 4 | planes >> 9 & 8;
         RAYS_OF[(!out & 0xf) as usize]
+    }
+
+    /// Behind which planes of the rows a corner lies.
+    #[inline(always)]
+    fn behind<S: Simd>(&self, simd: S, corner: &[f32; 3]) -> mask32x16<S> {
+        let [u, v, k] = super::bundle::below_three(self.axes);
+        let [a, b, c, d] = &self.rows;
+        let row = |numbers: &[f32; ROWS * PLANES]| f32x16::simd_from(simd, *numbers);
+        let splat = |number: f32| f32x16::splat(simd, number);
+        let u = (corner[u] - self.corner[0]) * self.rate[0];
+        let v = (corner[v] - self.corner[1]) * self.rate[1];
+        let k = (corner[k] - self.corner[2]) * self.rate[2] + self.offset;
+        (row(a) * splat(u) + row(b) * splat(v) + row(c) * splat(k) + row(d)).simd_lt(splat(0.0))
     }
 }

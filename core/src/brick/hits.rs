@@ -43,17 +43,9 @@ pub(super) struct Hits {
     frusta: Frusta,
     /// Whether these are around the bundle.
     is_surrounded: bool,
-    /// For which bundle a triangle was last tested against all rays that may meet it.
-    mailbox: [Letter; SLOTS],
-    /// The number of the bundle.
-    bundle: u32,
-}
-
-/// A triangle in the mailbox. Who comes later takes the place: a second test does no harm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Letter {
-    bundle: u32,
-    id: u32,
+    /// Triangles that were tested against all rays that may meet them. Who comes later takes the
+    /// place: a second test does no harm.
+    mailbox: [u32; SLOTS],
 }
 
 impl Hits {
@@ -68,15 +60,13 @@ impl Hits {
         primitive: [INVALID_ID; RAYS],
         frusta: Frusta::EMPTY,
         is_surrounded: false,
-        mailbox: [Letter { bundle: 0, id: 0 }; SLOTS],
-        bundle: 0,
+        mailbox: [INVALID_ID; SLOTS],
     };
 
     /// Forgets the rays and what they hit.
     pub(super) const fn clear(&mut self) {
         self.is_ready = false;
         self.is_surrounded = false;
-        self.bundle = self.bundle.wrapping_add(1);
         self.t = Self::EMPTY.t;
         self.u = Self::EMPTY.u;
         self.v = Self::EMPTY.v;
@@ -93,22 +83,14 @@ impl Hits {
     /// The closest hit of every ray, or [`Hit::MISS`].
     #[inline(always)]
     pub(super) fn all<S: Simd>(&self, simd: S) -> [Hit; RAYS] {
-        let rows: [&[Row; RAYS / 4]; 4] = [
-            bytemuck::cast_ref(&self.t),
-            bytemuck::cast_ref(&self.u),
-            bytemuck::cast_ref(&self.v),
-            bytemuck::cast_ref(&self.primitive),
-        ];
+        let rows = |numbers| -> &[Row; RAYS / 4] { bytemuck::cast_ref::<PerRay, _>(numbers) };
+        let primitive: &[Row; RAYS / 4] = bytemuck::cast_ref(&self.primitive);
         let mut hits = [Hit::MISS; RAYS];
-        let (fours, _) = hits.as_chunks_mut::<4>();
-        for (at, four) in fours.iter_mut().enumerate() {
-            let [t, u, v, primitive] = rows;
-            let [a, b, c, d] = transpose([
-                load(simd, &t[at]),
-                load(simd, &u[at]),
-                load(simd, &v[at]),
-                load(simd, &primitive[at]),
-            ]);
+        let fours = hits.as_chunks_mut::<4>().0.iter_mut();
+        let numbers = rows(&self.t).iter().zip(rows(&self.u)).zip(rows(&self.v)).zip(primitive);
+        for (four, (((t, u), v), primitive)) in fours.zip(numbers) {
+            let [a, b, c, d] =
+                transpose([load(simd, t), load(simd, u), load(simd, v), load(simd, primitive)]);
             let hit = |hit: f32x4<S>| bytemuck::cast(<[f32; 4]>::from(hit));
             *four = [hit(a), hit(b), hit(c), hit(d)];
         }
@@ -177,16 +159,16 @@ impl Hits {
         }
         if !self.is_surrounded {
             self.is_surrounded = true;
+            self.mailbox = [INVALID_ID; SLOTS];
             self.frusta.surround(simd, bundle);
         }
         // Eight by eight those that were not tested yet.
         let (mut fresh, mut count) = ([ids.first().copied().unwrap_or(0); LANES], 0);
         for (place, &id) in ids.iter().enumerate() {
-            let letter = Letter { bundle: self.bundle, id };
             let slot = &mut self.mailbox[id as usize % SLOTS];
             fresh[count % LANES] = id;
-            count += usize::from(*slot != letter);
-            *slot = letter;
+            count += usize::from(*slot != id);
+            *slot = id;
             if count == LANES || place + 1 == ids.len() {
                 self.many::<S, ANY>(simd, bundle, mesh, &fresh, core::mem::take(&mut count));
             }
