@@ -48,7 +48,7 @@ use crate::types::hgrid_grid;
 /// impossible), `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no
 /// error: it misses.
 ///
-/// The call allocates nothing and needs at most 24 KiB of stack.
+/// The call allocates nothing and needs at most 16 KiB of stack.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with hits and counters of
 /// its own.

@@ -37,18 +37,23 @@ pub(crate) struct Eight<S: Simd> {
 }
 
 impl<S: Simd> Eight<S> {
-    /// The first `count` of the triangles with these ids, each in the lane of its place.
+    /// The first eight of the triangles with these ids, each in the lane of its place.
     ///
-    /// The lane of an id without a triangle stays unused; ids behind the first `count` are read, too, four
-    /// in a row, so they should be near.
+    /// The lane of an id without a triangle stays unused.
     #[inline(always)]
-    pub(crate) fn gather(
-        simd: S,
-        mesh: &TriangleMesh<'_>,
-        ids: &[u32; LANES],
-        count: usize,
-    ) -> Self {
-        let &[i, j, k, l, m, n, o, p] = ids;
+    pub(crate) fn gather(simd: S, mesh: &TriangleMesh<'_>, ids: &[u32]) -> Self {
+        // What is behind the last is read, too, four in a row: the last once more.
+        let [i, j, k, l, m, n, o, p] = ids.first_chunk().copied().unwrap_or_else(
+            #[inline(always)]
+            || {
+                let mut padded = [ids.last().copied().unwrap_or(0); LANES];
+                for (slot, &id) in padded.iter_mut().zip(ids) {
+                    *slot = id;
+                }
+                padded
+            },
+        );
+        let count = ids.len();
         let (low, used) = four(simd, mesh, [i, j, k, l]);
         let (high, used_high) =
             if count > LANES / 2 { four(simd, mesh, [m, n, o, p]) } else { (low, 0) };
@@ -268,8 +273,7 @@ mod tests {
     struct Test<'a> {
         ray: &'a TriangleTest,
         mesh: &'a TriangleMesh<'a>,
-        ids: [u32; LANES],
-        count: usize,
+        ids: &'a [u32],
     }
 
     impl Kernel for Test<'_> {
@@ -277,19 +281,13 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Answer {
-            let Self { ray, mesh, ids, count } = self;
-            let survivors = ray.survivors(simd, &Eight::gather(simd, mesh, &ids, count));
+            let Self { ray, mesh, ids } = self;
+            let survivors = ray.survivors(simd, &Eight::gather(simd, mesh, ids));
             let lanes = (0..LANES).filter(|lane| survivors >> lane & 1 == 1);
             let hits =
                 lanes.filter_map(|lane| Some((lane, hit_bits(ray.decide(mesh, ids[lane])?))));
             (survivors, hits.collect())
         }
-    }
-
-    /// The first eight of some ids, and how many there are.
-    fn eight_of(ids: &[u32]) -> ([u32; LANES], usize) {
-        let count = ids.len().min(LANES);
-        (core::array::from_fn(|lane| if lane < count { ids[lane] } else { 0 }), count)
     }
 
     fn hit_bits(hit: Hit) -> [u32; 3] {
@@ -335,8 +333,7 @@ mod tests {
                 // One to eight, some of which do not exist, sometimes more than eight.
                 let ids: Vec<u32> = (0..round % 11).map(|_| random.next() % 220).collect();
                 let expected = expected(&test, &mesh, &ids[..ids.len().min(LANES)]);
-                let (eight, count) = eight_of(&ids);
-                let kernel = Test { ray: &test, mesh: &mesh, ids: eight, count };
+                let kernel = Test { ray: &test, mesh: &mesh, ids: &ids };
                 for level in SimdLevel::available() {
                     let answer = dispatch(level, kernel);
                     assert_eq!(answer, expected, "{level:?} {scale} {ray:?} {ids:?}");
@@ -405,14 +402,14 @@ mod tests {
     }
 
     /// The lanes of some triangles, in bits.
-    struct Gather<'a>(&'a TriangleMesh<'a>, [u32; LANES], usize);
+    struct Gather<'a>(&'a TriangleMesh<'a>, &'a [u32]);
 
     impl Kernel for Gather<'_> {
         type Output = [Option<[u32; 9]>; LANES];
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
-            let Eight { corners, used } = Eight::gather(simd, self.0, &self.1, self.2);
+            let Eight { corners, used } = Eight::gather(simd, self.0, self.1);
             let lanes: [[[f32; LANES]; 3]; 3] = corners.map(|corner| corner.map(Into::into));
             core::array::from_fn(|lane| {
                 let triangle = lanes.map(|corner| corner.map(|axis| axis[lane]));
@@ -426,11 +423,10 @@ mod tests {
         for first in (0..48).step_by(step) {
             for length in 0..=8 {
                 let ids: Vec<u32> = (first..first + length).collect();
-                let (eight, count) = eight_of(&ids);
                 let expected = core::array::from_fn(|lane| {
                     ids.get(lane).and_then(|&id| mesh.triangle(id)).map(bits)
                 });
-                let held = dispatch(SimdLevel::detect(), Gather(mesh, eight, count));
+                let held = dispatch(SimdLevel::detect(), Gather(mesh, &ids));
                 assert_eq!(held, expected, "{ids:?}");
             }
         }

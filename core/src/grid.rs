@@ -30,7 +30,7 @@ use crate::visit::Visitor;
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
 /// number of threads may query it at once. Queries never fail, never allocate and never panic; their
 /// steps are bounded by the resolutions (one level: by their sum). A single query's stack is below
-/// 6 KiB, a batch's below 24 KiB.
+/// 6 KiB, a batch's below 16 KiB.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,
@@ -213,9 +213,23 @@ impl<'a> Grid<'a> {
         if let Structure::Brick(brick) = &self.structure {
             let mesh = &self.mesh;
             let ray = OneRay { brick, mesh, line: &line, test: &test, search, tally };
-            return dispatch(self.simd, ray);
+            dispatch(self.simd, ray);
+        } else {
+            self.traverse(&line, &test, search, tally);
         }
+    }
 
+    /// Walks a ray through a structure that shows its triangles one by one.
+    ///
+    /// Out of line, or its stack would be that of the other, too.
+    #[inline(never)]
+    fn traverse<F: Search, T: Tally>(
+        &self,
+        line: &Line,
+        test: &TriangleTest,
+        search: &mut F,
+        tally: &mut T,
+    ) {
         let mut limit = line.end;
         // A ray meets every list at most once; damaged bytes may list everything in every cell.
         let mut unread = self.list_words();
@@ -235,10 +249,10 @@ impl<'a> Grid<'a> {
             limit
         };
         match &self.structure {
-            Structure::OneLevel(grid) => grid.traverse(&line, tally, leaf),
-            Structure::Fixed(grid) => grid.traverse(&line, tally, leaf),
-            Structure::Variable(grid) => grid.traverse(&line, tally, leaf),
-            Structure::Recursive(grid) => grid.traverse(&line, tally, leaf),
+            Structure::OneLevel(grid) => grid.traverse(line, tally, leaf),
+            Structure::Fixed(grid) => grid.traverse(line, tally, leaf),
+            Structure::Variable(grid) => grid.traverse(line, tally, leaf),
+            Structure::Recursive(grid) => grid.traverse(line, tally, leaf),
             Structure::Brick(_) => {}
         }
     }

@@ -177,12 +177,15 @@ mod machine {
             _ => {
                 // SAFETY: this module exists where the target promises `sse2` and `fxsr`.
                 let simd = unsafe { Sse2::assume_supported() };
-                simd.vectorize(
-                    #[inline(always)]
-                    || kernel.run(simd),
-                )
+                base(simd, kernel)
             }
         }
+    }
+
+    /// Out of line as the others are, or its stack would be that of the others, too.
+    #[inline(never)]
+    fn base<K: Kernel>(simd: Sse2, kernel: K) -> K::Output {
+        kernel.run(simd)
     }
 
     /// Asks the processor for all that the tokens promise, not only for what gives them the name.

@@ -18,12 +18,7 @@ fn it_leaks_nothing() {
     let program =
         compile("create", compiler("c99"), &[], &Flavour::Std.static_library(), dir.path());
     let mut valgrind = Command::new("valgrind");
-    valgrind.args([
-        "--quiet",
-        "--vex-guest-max-insns=20",
-        "--error-exitcode=99",
-        "--leak-check=full",
-    ]);
+    valgrind.args(["--quiet", "--error-exitcode=99", "--leak-check=full"]);
     run(valgrind.args(["--show-leak-kinds=all", "--errors-for-leak-kinds=all"]).arg(program));
 }
 

@@ -1,11 +1,19 @@
-/* Prints how much stack queries take, in bytes, one "name most" a line: the most of all methods, on
- * a stack that was filled before. */
+/* Prints how much stack queries take, in bytes, one "name most" a line: the most of all methods and
+ * meshes, on a stack that was filled before. Cells of a brick grid are divided up to twice, and
+ * queries call themselves there: a sheet, then one with a crowd of small triangles on it, then one
+ * with a crowd in the crowd. */
 
 #include "check.h"
 
 #include <ucontext.h>
 
-enum { RAYS = 640, STACK = 256 * 1024 };
+enum { RAYS = 640, STACK = 256 * 1024, CROWDS = 2, CROWD = 3000 };
+
+/* Where the crowds are, and half their width. */
+static const float CENTER[3] = {0.3f, 0.3f, 0.05f}, WIDTH[CROWDS] = {0.01f, 0.0005f};
+
+static float positions[VERTICES + CROWDS * CROWD * 3][3];
+static uint32_t indices[TRIANGLES + CROWDS * CROWD][3];
 
 static hgrid_grid grid;
 static hgrid_ray rays[RAYS];
@@ -83,17 +91,53 @@ static size_t stack_of(void (*call)(void))
     return sizeof stack - unused;
 }
 
-int main(void)
+/* From -1 to 1. */
+static float random_number(void)
+{
+    static uint32_t state = 1;
+    state = state * 1664525u + 1013904223u;
+    return (float)(state >> 8) / 8388608.0f - 1;
+}
+
+/* The sheet and the first crowds. */
+static hgrid_mesh crowded(uint32_t crowds)
 {
     static sheet data;
     make_sheet(&data);
-    const hgrid_mesh mesh = mesh_of(&data);
+    memcpy(positions, data.positions, sizeof data.positions);
+    memcpy(indices, data.indices, sizeof data.indices);
+    for (uint32_t i = 0; i < CROWDS * CROWD; i++) {
+        float center[3];
+        for (int axis = 0; axis < 3; axis++)
+            center[axis] = CENTER[axis] + WIDTH[i / CROWD] * random_number();
+        for (uint32_t corner = 0; corner < 3; corner++) {
+            const uint32_t vertex = VERTICES + 3 * i + corner;
+            indices[TRIANGLES + i][corner] = vertex;
+            for (int axis = 0; axis < 3; axis++)
+                positions[vertex][axis] = center[axis] + 0.03f * WIDTH[i / CROWD] * random_number();
+        }
+    }
+    hgrid_mesh mesh = mesh_of(&data);
+    mesh.positions = positions;
+    mesh.vertex_count = VERTICES + crowds * CROWD * 3;
+    mesh.indices = indices;
+    mesh.triangle_count = TRIANGLES + crowds * CROWD;
+    return mesh;
+}
+
+int main(void)
+{
     for (int i = 0; i < RAYS; i++) {
-        /* Tiles, some of them with rays that go elsewhere. */
-        const int tile = i / 64, pixel = i % 64;
-        rays[i] = ray_down((float)(tile % 4 * 8 + pixel % 8) / 32,
-                           (float)(tile / 4 * 8 + pixel / 8) / 32);
+        /* Tiles of the sheet, some of them with rays that go elsewhere, then of the crowds. */
+        const int tile = i / 64, pixel = i % 64, crowd = tile - RAYS / 64 + CROWDS;
+        const float u = (float)(pixel % 8), v = (float)(pixel / 8);
+        rays[i] = ray_down((float)(tile % 4) / 4 + u / 32, (float)(tile / 4) / 4 + v / 32);
         rays[i].direction[0] = tile > 4 && i % 7 == 0 ? -3.0f : 0.1f;
+        if (crowd >= 0) {
+            rays[i] = ray_down(CENTER[0] + WIDTH[crowd] * (u / 4 - 1),
+                               CENTER[1] + WIDTH[crowd] * (v / 4 - 1));
+            rays[i].direction[0] = i % 7 == 0 ? -3.0f : 0.0f;
+        }
     }
     struct {
         const char *name;
@@ -102,14 +146,22 @@ int main(void)
     } calls[] = {{"one", one, 0}, {"options", with_options, 0}, {"closest", closest, 0},
                  {"many", many, 0}};
     enum { CALLS = sizeof calls / sizeof *calls };
-    for (int method = 0; method < METHODS; method++) {
-        const hgrid_config config = usual(method);
-        grid = build_exactly(&mesh, &config, NULL, NULL);
-        for (int i = 0; i < CALLS; i++) {
-            const size_t bytes = stack_of(calls[i].call);
-            calls[i].most = bytes > calls[i].most ? bytes : calls[i].most;
+    size_t before[CALLS] = {0};
+    for (uint32_t crowds = 0; crowds <= CROWDS; crowds++)
+        for (int method = 0; method < METHODS; method++) {
+            const hgrid_mesh mesh = crowded(crowds);
+            const hgrid_config config = usual(method);
+            grid = build_exactly(&mesh, &config, NULL, NULL);
+            for (int i = 0; i < CALLS; i++) {
+                const size_t bytes = stack_of(calls[i].call);
+                calls[i].most = bytes > calls[i].most ? bytes : calls[i].most;
+                if (method != HGRID_METHOD_BRICK)
+                    continue;
+                /* Every division takes some more, or there was none. */
+                CHECK(bytes > before[i]);
+                before[i] = bytes;
+            }
         }
-    }
     for (int i = 0; i < CALLS; i++)
         printf("%s %zu\n", calls[i].name, calls[i].most);
     return 0;

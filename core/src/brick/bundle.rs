@@ -29,10 +29,15 @@ pub(super) type PerRay = [f32; RAYS];
 /// Up to 64 rays, and those of them that go together.
 #[derive(Debug)]
 pub(super) struct Bundle {
-    /// The rays, by axis.
+    /// By axis.
     pub(super) origin: [PerRay; 3],
-    pub(super) direction: [PerRay; 3],
+    /// What a [`TriangleTest`](crate::triangle::TriangleTest) needs of a direction, and the rays whose
+    /// longest axis is x, y, z.
+    pub(super) shear: [PerRay; 2],
+    pub(super) direction_z: PerRay,
+    pub(super) longest: [u64; 3],
     pub(super) t_min: PerRay,
+    /// Where a ray ends: closer with every hit.
     pub(super) t_max: PerRay,
     /// Bit `i`: ray `i` is one of them.
     pub(super) members: u64,
@@ -48,7 +53,7 @@ pub(super) struct Bundle {
     /// k at t = 0, and for each unit of t.
     pub(super) zero: PerRay,
     pub(super) speed: PerRay,
-    /// k where the rays start, and where they end: closer with every hit.
+    /// k where the rays start, and where they end.
     pub(super) from: PerRay,
     pub(super) to: PerRay,
     /// How far off places may be, in cells: as much as a triangle's box is grown by.
@@ -92,6 +97,35 @@ pub(super) fn row_of<S: Simd>(simd: S, array: &PerRay, first: usize) -> f32x16<S
     f32x16::simd_from(simd, rows[first / WIDTH % (RAYS / WIDTH)])
 }
 
+/// The same to be written.
+#[inline(always)]
+fn row_mut(array: &mut PerRay, first: usize) -> &mut [f32; WIDTH] {
+    &mut array.as_chunks_mut().0[first / WIDTH % (RAYS / WIDTH)]
+}
+
+/// Bit `i` for ray `i` of sixteen from `first` on.
+#[inline(always)]
+fn rays_of<S: Simd>(mask: mask32x16<S>, first: usize) -> u64 {
+    (mask.to_bitmask() & 0xffff) << (first % RAYS)
+}
+
+/// Sixteen rays from `first` on, of which some belong to a bundle; for the others one stands in.
+#[derive(Clone, Copy)]
+struct Belonging<S: Simd> {
+    is_member: mask32x16<S>,
+    first: usize,
+    stand_in: usize,
+}
+
+impl<S: Simd> Belonging<S> {
+    /// Their numbers.
+    #[inline(always)]
+    fn of(self, simd: S, array: &PerRay) -> f32x16<S> {
+        let stand_in = f32x16::splat(simd, array[self.stand_in % RAYS]);
+        self.is_member.select(row_of(simd, array, self.first), stand_in)
+    }
+}
+
 /// A ray as its origin and `t_min`, and its direction and `t_max`.
 #[inline(always)]
 fn halves(ray: &[u8; 32]) -> [&Row; 2] {
@@ -125,9 +159,8 @@ pub(super) fn rays_where<S: Simd>(
     test: impl Fn(f32x16<S>, f32x16<S>) -> mask32x16<S>,
 ) -> u64 {
     let mut rays = 0;
-    for (row, (&a, &b)) in a.as_chunks().0.iter().zip(b.as_chunks().0).enumerate() {
-        let (a, b) = (f32x16::simd_from(simd, a), f32x16::simd_from(simd, b));
-        rays |= (test(a, b).to_bitmask() & 0xffff) << (row * WIDTH);
+    for first in (0..RAYS).step_by(WIDTH) {
+        rays |= rays_of(test(row_of(simd, a, first), row_of(simd, b, first)), first);
     }
     rays
 }
@@ -136,7 +169,9 @@ impl Bundle {
     /// No rays.
     pub(super) const EMPTY: Self = Self {
         origin: [[0.0; RAYS]; 3],
-        direction: [[0.0; RAYS]; 3],
+        shear: [[0.0; RAYS]; 2],
+        direction_z: [0.0; RAYS],
+        longest: [0; 3],
         t_min: [0.0; RAYS],
         t_max: [0.0; RAYS],
         members: 0,
@@ -159,7 +194,10 @@ impl Bundle {
 
     /// Replaces the rays by `count` of the caller's, and makes those that run along the same axis as
     /// the first valid one the members.
-    #[inline(always)]
+    ///
+    /// Out of line, or its variables would be on the stack all the way; so it says once more what
+    /// vectors it is compiled for.
+    #[inline(never)]
     pub(super) fn load<S: Simd>(
         &mut self,
         simd: S,
@@ -169,12 +207,36 @@ impl Bundle {
         first: usize,
         count: usize,
     ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                self.members = 0;
+                let mut directions = [[0.0; RAYS]; 3];
+                let leader = self.read(simd, &mut directions, rays, first, count);
+                let Some(leader) = leader else { return };
+                let [x, y, z] = [leader[0].abs(), leader[1].abs(), leader[2].abs()];
+                match (x >= y && x >= z, y >= z) {
+                    (true, _) => self.along::<0, S>(simd, brick, lattice, &directions, leader),
+                    (_, true) => self.along::<1, S>(simd, brick, lattice, &directions, leader),
+                    _ => self.along::<2, S>(simd, brick, lattice, &directions, leader),
+                }
+            },
+        );
+    }
+
+    /// Reads rays by axes, and gives the direction of the first valid one.
+    #[inline(always)]
+    fn read<S: Simd>(
+        &mut self,
+        simd: S,
+        directions: &mut [PerRay; 3],
+        rays: &Strided<'_>,
+        first: usize,
+        count: usize,
+    ) -> Option<[f32; 3]> {
         let mut leader = None;
-        for four in 0..RAYS / 4 {
+        for four in 0..count.div_ceil(4) {
             let at = 4 * four;
-            if at >= count {
-                break;
-            }
             // Zeros where there are no more: such a ray is none.
             let ray = |lane: usize| -> &[u8; 32] {
                 let place = (at + lane < count).then_some(first + at + lane);
@@ -188,30 +250,23 @@ impl Bundle {
             let [a, b, c, d] = four_rays;
             let half = |ray, half: usize| load(simd, halves(ray)[half]);
             let row = |at: usize| [half(a, at), half(b, at), half(c, at), half(d, at)];
-            let [x, y, z, t_min] = transpose(row(0));
             let set = |column: &mut PerRay, four_rays: f32x4<S>| {
                 if let Some(slot) = column.as_chunks_mut().0.get_mut(four) {
                     *slot = four_rays.into();
                 }
             };
+            let [x, y, z, t_min] = transpose(row(0));
             set(&mut self.origin[0], x);
             set(&mut self.origin[1], y);
             set(&mut self.origin[2], z);
             set(&mut self.t_min, t_min);
             let [x, y, z, t_max] = transpose(row(1));
-            set(&mut self.direction[0], x);
-            set(&mut self.direction[1], y);
-            set(&mut self.direction[2], z);
+            set(&mut directions[0], x);
+            set(&mut directions[1], y);
+            set(&mut directions[2], z);
             set(&mut self.t_max, t_max);
         }
-        self.members = 0;
-        let Some(leader) = leader else { return };
-        let [x, y, z] = [leader[0].abs(), leader[1].abs(), leader[2].abs()];
-        self.is_mirrored = match (x >= y && x >= z, y >= z) {
-            (true, _) => self.along::<0, S>(simd, brick, lattice, leader[0] < 0.0, count),
-            (_, true) => self.along::<1, S>(simd, brick, lattice, leader[1] < 0.0, count),
-            _ => self.along::<2, S>(simd, brick, lattice, leader[2] < 0.0, count),
-        };
+        leader
     }
 
     /// Makes the rays that run along an axis lines over it.
@@ -221,85 +276,100 @@ impl Bundle {
         simd: S,
         brick: &Brick<'_>,
         lattice: &Lattice,
-        is_mirrored: bool,
-        count: usize,
-    ) -> bool {
-        let axes = [(K + 1) % 3, (K + 2) % 3, K];
+        directions: &[PerRay; 3],
+        leader: [f32; 3],
+    ) {
         self.axes = match K {
             0 => [1, 2, 0],
             1 => [2, 0, 1],
             _ => [0, 1, 2],
         };
-        let sign = if is_mirrored { -1.0 } else { 1.0 };
+        self.is_mirrored = leader[K] < 0.0;
+        self.corner = lattice.min;
+        self.rate = [0, 1, 2].map(|axis| round(lattice.cells_per_unit(axis)));
+        self.width = as_f32(brick.width[K] * BLOCK);
+        self.margin = lattice.margin().max_element();
         let bounds = lattice.bounds();
         let center = ((bounds.min + bounds.max) * 0.5).to_array();
-        let reach = FAR_EXTENTS * bounds.size().max_element();
-        let rate = [0, 1, 2].map(|axis| round(lattice.cells_per_unit(axis)));
-        let width = as_f32(brick.width[K] * BLOCK);
-        self.margin = lattice.margin().max_element();
-        (self.corner, self.rate, self.width) = (lattice.min, rate, width);
+        let splat = |number: f32| f32x16::splat(simd, number);
+        let (reach, zero) = (splat(FAR_EXTENTS * bounds.size().max_element()), splat(0.0));
+        let sign = splat(if self.is_mirrored { -1.0 } else { 1.0 });
+        self.longest = [0; 3];
+        for first in (0..RAYS).step_by(WIDTH) {
+            let ox = row_of(simd, &self.origin[0], first);
+            let oy = row_of(simd, &self.origin[1], first);
+            let oz = row_of(simd, &self.origin[2], first);
+            let dx = row_of(simd, &directions[0], first);
+            let dy = row_of(simd, &directions[1], first);
+            let dz = row_of(simd, &directions[2], first);
+            let t_min = row_of(simd, &self.t_min, first);
+            let t_max = row_of(simd, &self.t_max, first);
+            let [x, y, z] = [dx.abs(), dy.abs(), dz.abs()];
 
-        let [ox, oy, oz] = &self.origin;
-        let [dx, dy, dz] = &self.direction;
-        let mut belongs = [0.0; RAYS];
-        #[expect(clippy::needless_bitwise_bool, reason = "no branch: lanes side by side")]
-        for lane in 0..RAYS {
             // Who belongs to the bundle: runs along the axis, from nearby, with numbers that are some.
-            let along = self.direction[K][lane] * sign;
-            let turn = dx[lane].abs().max(dy[lane].abs()).max(dz[lane].abs());
-            let is_near = ((ox[lane] - center[0]).abs() <= reach)
-                & ((oy[lane] - center[1]).abs() <= reach)
-                & ((oz[lane] - center[2]).abs() <= reach);
-            let nothing = dx[lane] * 0.0 + dy[lane] * 0.0 + dz[lane] * 0.0;
-            let speed = along * rate[K];
-            let fastest = (dx[lane].abs() * rate[0])
-                .max(dy[lane].abs() * rate[1])
-                .max(dz[lane].abs() * rate[2]);
-            let is_along = (along >= 0.5 * turn) & (speed > LEAST_SPEED) & (fastest < MOST_SPEED);
-            let is_member = (lane < count)
-                & is_near
-                & is_along
-                & (nothing >= 0.0)
-                & (self.t_min[lane] <= self.t_max[lane]);
-            belongs[lane] = if is_member { 1.0 } else { 0.0 };
+            let along = [dx, dy, dz][K] * sign;
+            let speed = along * splat(self.rate[K]);
+            let is_near = (ox - splat(center[0])).abs().simd_le(reach)
+                & (oy - splat(center[1])).abs().simd_le(reach)
+                & (oz - splat(center[2])).abs().simd_le(reach);
+            let rate = [splat(self.rate[0]), splat(self.rate[1]), splat(self.rate[2])];
+            let fastest = (x * rate[0]).max(y * rate[1]).max(z * rate[2]);
+            let is_along = along.simd_ge(splat(0.5) * x.max(y).max(z))
+                & speed.simd_gt(splat(LEAST_SPEED))
+                & fastest.simd_lt(splat(MOST_SPEED));
+            let is_ray = (dx * zero + dy * zero + dz * zero).simd_ge(zero) & t_min.simd_le(t_max);
+            let is_member = is_near & is_along & is_ray;
+            self.members |= rays_of(is_member, first);
+            *row_mut(&mut self.speed, first) = is_member.select(speed, zero).into();
 
-            // Its line in cells, k growing.
-            let speed = if is_member { speed } else { 1.0 };
-            let inverse = 1.0 / speed;
-            let at = (self.origin[K][lane] - lattice.min[K]) * rate[K];
-            let zero = if is_mirrored { width - at } else { at };
-            self.speed[lane] = speed;
-            self.zero[lane] = zero;
-            self.from[lane] = zero + speed * self.t_min[lane] - self.margin;
-            self.to[lane] = zero + speed * self.t_max[lane] + self.margin;
-            for (side, axis) in [axes[0], axes[1]].into_iter().enumerate() {
-                let at = (self.origin[axis][lane] - lattice.min[axis]) * rate[axis];
-                let slope = self.direction[axis][lane] * rate[axis] * inverse;
-                self.slope[side][lane] = slope;
-                self.start[side][lane] = at - slope * zero;
-            }
+            // What tests of triangles need.
+            let is_x = x.simd_gt(y) & x.simd_gt(z);
+            let is_y = !is_x & y.simd_gt(z);
+            let longest = is_x.select(dx, is_y.select(dy, dz));
+            let shear_x = is_x.select(dy, is_y.select(dz, dx)) / longest;
+            let shear_y = is_x.select(dz, is_y.select(dx, dy)) / longest;
+            *row_mut(&mut self.shear[0], first) = shear_x.into();
+            *row_mut(&mut self.shear[1], first) = shear_y.into();
+            *row_mut(&mut self.direction_z, first) = longest.into();
+            self.longest[0] |= rays_of(is_x, first);
+            self.longest[1] |= rays_of(is_y, first);
         }
-        let half = f32x16::splat(simd, 0.5);
-        self.members = rays_where(
-            simd,
-            [&belongs, &belongs],
-            #[inline(always)]
-            |belongs, _| belongs.simd_gt(half),
-        );
+        self.longest[2] = !(self.longest[0] | self.longest[1]);
+        if self.members != 0 {
+            self.draw::<K, S>(simd, directions);
+        }
+    }
 
-        // Who does not belong stands where one does that belongs: bounds need not ask.
+    /// Writes the members as lines in cells, k growing. Who does not belong stands where one does that
+    /// belongs: bounds need not ask.
+    #[inline(always)]
+    fn draw<const K: usize, S: Simd>(&mut self, simd: S, directions: &[PerRay; 3]) {
         let stand_in = self.members.trailing_zeros() as usize % RAYS;
-        let [u, v] = &mut self.start;
-        let [du, dv] = &mut self.slope;
-        for numbers in [u, v, du, dv, &mut self.from, &mut self.to] {
-            let stand_in = f32x16::splat(simd, numbers[stand_in]);
-            let rows = numbers.as_chunks_mut::<WIDTH>().0.iter_mut();
-            for (numbers, &belongs) in rows.zip(belongs.as_chunks().0) {
-                let belongs = f32x16::simd_from(simd, belongs).simd_gt(half);
-                *numbers = belongs.select(f32x16::simd_from(simd, *numbers), stand_in).into();
-            }
+        let splat = |number: f32| f32x16::splat(simd, number);
+        let (corner, rate, speed) = (&self.corner, &self.rate, self.speed[stand_in]);
+        let [u, v] = [(K + 1) % 3, (K + 2) % 3];
+        for first in (0..RAYS).step_by(WIDTH) {
+            let is_member = row_of(simd, &self.speed, first).simd_gt(splat(0.0));
+            let rays = Belonging { is_member, first, stand_in };
+            let speed = is_member.select(row_of(simd, &self.speed, first), splat(speed));
+            let zero = (rays.of(simd, &self.origin[K]) - splat(corner[K])) * splat(rate[K]);
+            let zero = if self.is_mirrored { splat(self.width) - zero } else { zero };
+            let inverse = splat(1.0) / speed;
+            let from = zero + speed * rays.of(simd, &self.t_min) - splat(self.margin);
+            let to = zero + speed * rays.of(simd, &self.t_max) + splat(self.margin);
+            let slope_u = rays.of(simd, &directions[u]) * splat(rate[u]) * inverse;
+            let slope_v = rays.of(simd, &directions[v]) * splat(rate[v]) * inverse;
+            let at_u = (rays.of(simd, &self.origin[u]) - splat(corner[u])) * splat(rate[u]);
+            let at_v = (rays.of(simd, &self.origin[v]) - splat(corner[v])) * splat(rate[v]);
+            let (start_u, start_v) = (at_u - slope_u * zero, at_v - slope_v * zero);
+            *row_mut(&mut self.zero, first) = zero.into();
+            *row_mut(&mut self.from, first) = from.into();
+            *row_mut(&mut self.to, first) = to.into();
+            *row_mut(&mut self.slope[0], first) = slope_u.into();
+            *row_mut(&mut self.slope[1], first) = slope_v.into();
+            *row_mut(&mut self.start[0], first) = start_u.into();
+            *row_mut(&mut self.start[1], first) = start_v.into();
         }
-        is_mirrored
     }
 
     /// The axes u, v and k.
@@ -392,7 +462,7 @@ impl Chord {
     }
 
     #[inline(always)]
-    fn at(self, plane: f32) -> f32 {
+    pub(super) fn at(self, plane: f32) -> f32 {
         self.start + self.slope * plane
     }
 }

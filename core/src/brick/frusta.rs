@@ -12,7 +12,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16};
 
-use super::bundle::{Bounds, Bundle, RAYS, WIDTH};
+use super::bundle::{Bounds, Bundle, RAYS, WIDTH, below_three};
 use crate::eight::Eight;
 use crate::mesh::Triangle;
 
@@ -85,7 +85,7 @@ impl Frusta {
     /// Those of eight triangles that rays of the tile may meet, as bits.
     #[inline(always)]
     pub(super) fn meet<S: Simd>(&self, simd: S, triangles: &Eight<S>) -> u32 {
-        let [u, v, k] = super::bundle::below_three(self.axes);
+        let [u, v, k] = below_three(self.axes);
         let splat = |number: f32| f32x8::splat(simd, number);
         let place = |xyz: &[f32x8<S>; 3], axis: usize, side: usize| {
             (xyz[axis % 3] - splat(self.corner[side])) * splat(self.rate[side])
@@ -146,7 +146,7 @@ impl Frusta {
     /// Behind which planes of the rows a corner lies.
     #[inline(always)]
     fn behind<S: Simd>(&self, simd: S, corner: &[f32; 3]) -> mask32x16<S> {
-        let [u, v, k] = super::bundle::below_three(self.axes);
+        let [u, v, k] = below_three(self.axes);
         let [a, b, c, d] = &self.rows;
         let row = |numbers: &[f32; ROWS * PLANES]| f32x16::simd_from(simd, *numbers);
         let splat = |number: f32| f32x16::splat(simd, number);

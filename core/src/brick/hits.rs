@@ -9,7 +9,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16};
 
-use super::bundle::{Bundle, PerRay, RAYS, WIDTH, rays_where, row_of};
+use super::bundle::{Bundle, PerRay, RAYS, WIDTH, row_of};
 use super::frusta::Frusta;
 use crate::eight::{Eight, LANES, Row, load, transpose};
 use crate::mesh::{Triangle, TriangleMesh};
@@ -27,16 +27,10 @@ const SLOTS: usize = 256;
 /// Rays resolved at once.
 const HALF: usize = WIDTH / 2;
 
-/// What the rays of a bundle have hit, and what of a [`TriangleTest`] each needs for it.
+/// What the rays of a bundle have hit.
 #[derive(Debug)]
 pub(super) struct Hits {
-    /// The rays whose longest axis is x, y, z.
-    axes: [u64; 3],
-    shear: [PerRay; 2],
-    /// Whether the above is that of the bundle: one that meets nothing needs none.
-    is_ready: bool,
-    /// The closest hit of each ray.
-    t: PerRay,
+    /// The closest hit of each ray; its t is where the ray ends ([`Bundle::t_max`]).
     u: PerRay,
     v: PerRay,
     primitive: [u32; RAYS],
@@ -51,10 +45,6 @@ pub(super) struct Hits {
 impl Hits {
     /// Of no rays.
     pub(super) const EMPTY: Self = Self {
-        axes: [0; 3],
-        shear: [[0.0; RAYS]; 2],
-        is_ready: false,
-        t: [f32::INFINITY; RAYS],
         u: [0.0; RAYS],
         v: [0.0; RAYS],
         primitive: [INVALID_ID; RAYS],
@@ -65,73 +55,35 @@ impl Hits {
 
     /// Forgets the rays and what they hit.
     pub(super) const fn clear(&mut self) {
-        self.is_ready = false;
         self.is_surrounded = false;
-        self.t = Self::EMPTY.t;
         self.u = Self::EMPTY.u;
         self.v = Self::EMPTY.v;
         self.primitive = Self::EMPTY.primitive;
     }
 
-    /// The closest hit of a ray, or [`Hit::MISS`].
+    /// The closest hits of four rays, or [`Hit::MISS`].
     #[inline(always)]
-    fn hit(&self, lane: usize) -> Hit {
-        let lane = lane % RAYS;
-        Hit { t: self.t[lane], u: self.u[lane], v: self.v[lane], primitive: self.primitive[lane] }
-    }
-
-    /// The closest hit of every ray, or [`Hit::MISS`].
-    #[inline(always)]
-    pub(super) fn all<S: Simd>(&self, simd: S) -> [Hit; RAYS] {
-        let rows = |numbers| -> &[Row; RAYS / 4] { bytemuck::cast_ref::<PerRay, _>(numbers) };
-        let primitive: &[Row; RAYS / 4] = bytemuck::cast_ref(&self.primitive);
-        let mut hits = [Hit::MISS; RAYS];
-        let fours = hits.as_chunks_mut::<4>().0.iter_mut();
-        let numbers = rows(&self.t).iter().zip(rows(&self.u)).zip(rows(&self.v)).zip(primitive);
-        for (four, (((t, u), v), primitive)) in fours.zip(numbers) {
-            let [a, b, c, d] =
-                transpose([load(simd, t), load(simd, u), load(simd, v), load(simd, primitive)]);
-            let hit = |hit: f32x4<S>| bytemuck::cast(<[f32; 4]>::from(hit));
-            *four = [hit(a), hit(b), hit(c), hit(d)];
-        }
-        hits
-    }
-
-    /// Prepares the rays of a bundle.
-    #[inline(always)]
-    fn prepare<S: Simd>(&mut self, simd: S, bundle: &Bundle) {
-        self.is_ready = true;
-        let [dx, dy, dz] = &bundle.direction;
-        let mut axes = [0.0; RAYS];
-        for lane in 0..RAYS {
-            let (x, y, z) = (dx[lane], dy[lane], dz[lane]);
-            let is_x = (x.abs() > y.abs()) & (x.abs() > z.abs());
-            let is_y = (x.abs() <= y.abs()) & (y.abs() > z.abs());
-            let (x, y, z, axis) = if is_x {
-                (y, z, x, 0.0)
-            } else if is_y {
-                (z, x, y, 1.0)
-            } else {
-                (x, y, z, 2.0)
-            };
-            self.shear[0][lane] = x / z;
-            self.shear[1][lane] = y / z;
-            axes[lane] = axis;
-        }
-        for (axis, rays) in [0.0, 1.0, 2.0].into_iter().zip(&mut self.axes) {
-            let axis = f32x16::splat(simd, axis);
-            *rays = rays_where(
-                simd,
-                [&axes, &axes],
-                #[inline(always)]
-                |axes, _| axes.simd_eq(axis),
-            );
-        }
+    pub(super) fn four<S: Simd>(&self, simd: S, bundle: &Bundle, four: usize) -> [Hit; 4] {
+        let primitive: &PerRay = bytemuck::cast_ref(&self.primitive);
+        let row = |numbers: &PerRay| {
+            let rows: &[Row; RAYS / 4] = bytemuck::cast_ref(numbers);
+            load(simd, &rows[four % (RAYS / 4)])
+        };
+        let [a, b, c, d] =
+            transpose([row(&bundle.t_max), row(&self.u), row(&self.v), row(primitive)]);
+        let hit = |hit: f32x4<S>| {
+            let hit: Hit = bytemuck::cast(<[f32; 4]>::from(hit));
+            if hit.primitive == INVALID_ID { Hit::MISS } else { hit }
+        };
+        [hit(a), hit(b), hit(c), hit(d)]
     }
 
     /// Tests rays of a bundle against the triangles of a list; if they are many, all rays that are
     /// alive.
-    #[inline(always)]
+    ///
+    /// Out of line, or it would be on the stack once for each division of a cell; so it says once more
+    /// what vectors it is compiled for.
+    #[inline(never)]
     pub(super) fn test<S: Simd, const ANY: bool>(
         &mut self,
         simd: S,
@@ -140,20 +92,24 @@ impl Hits {
         ids: &[u32],
         rays: u64,
     ) {
-        if !self.is_ready {
-            self.prepare(simd, bundle);
-        }
+        simd.vectorize(
+            #[inline(always)]
+            || self.test_list::<S, ANY>(simd, bundle, mesh, ids, rays),
+        );
+    }
+
+    #[inline(always)]
+    fn test_list<S: Simd, const ANY: bool>(
+        &mut self,
+        simd: S,
+        bundle: &mut Bundle,
+        mesh: &TriangleMesh<'_>,
+        ids: &[u32],
+        rays: u64,
+    ) {
         if rays.count_ones() < MANY {
-            let (eights, rest) = ids.as_chunks();
-            for ids in eights {
-                self.few::<S, ANY>(simd, bundle, mesh, ids, LANES, rays);
-            }
-            if let Some(&last) = rest.last() {
-                let mut ids = [last; LANES];
-                for (slot, &id) in ids.iter_mut().zip(rest) {
-                    *slot = id;
-                }
-                self.few::<S, ANY>(simd, bundle, mesh, &ids, rest.len(), rays);
+            for ids in ids.chunks(LANES) {
+                self.few::<S, ANY>(simd, bundle, mesh, ids, rays);
             }
             return;
         }
@@ -170,7 +126,8 @@ impl Hits {
             count += usize::from(*slot != id);
             *slot = id;
             if count == LANES || place + 1 == ids.len() {
-                self.many::<S, ANY>(simd, bundle, mesh, &fresh, core::mem::take(&mut count));
+                self.many::<S, ANY>(simd, bundle, mesh, &fresh[..count.min(LANES)]);
+                count = 0;
             }
         }
     }
@@ -183,10 +140,9 @@ impl Hits {
         simd: S,
         bundle: &mut Bundle,
         mesh: &TriangleMesh<'_>,
-        ids: &[u32; LANES],
-        count: usize,
+        ids: &[u32],
     ) {
-        let triangles = Eight::gather(simd, mesh, ids, count);
+        let triangles = Eight::gather(simd, mesh, ids);
         let mut near = self.frusta.meet(simd, &triangles);
         while near != 0 {
             let place = near.trailing_zeros() as usize;
@@ -196,7 +152,7 @@ impl Hits {
             let rays = self.frusta.rays(simd, &triangle) & bundle.alive;
             let rays = if ANY { rays & bundle.members } else { rays };
             for axis in 0..3 {
-                let rays = rays & self.axes[axis];
+                let rays = rays & bundle.longest[axis];
                 if rays == 0 {
                     continue;
                 }
@@ -216,24 +172,25 @@ impl Hits {
         simd: S,
         bundle: &mut Bundle,
         mesh: &TriangleMesh<'_>,
-        ids: &[u32; LANES],
-        count: usize,
+        ids: &[u32],
         rays: u64,
     ) {
-        let triangles = Eight::gather(simd, mesh, ids, count);
+        let triangles = Eight::gather(simd, mesh, ids);
         let mut rest = if ANY { rays & bundle.members } else { rays };
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize % RAYS;
             rest &= rest - 1;
-            let test = self.one(bundle, lane);
+            let test = one(bundle, lane);
             let mut survivors = test.survivors(simd, &triangles);
             while survivors != 0 {
                 let place = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
                 let hit = ids.get(place).and_then(|&id| test.decide(mesh, id));
                 let Some(hit) = hit else { continue };
-                if hit.is_closer(&self.hit(lane)) {
-                    self.t[lane] = hit.t;
+                let best =
+                    Hit { t: bundle.t_max[lane], primitive: self.primitive[lane], ..Hit::MISS };
+                if hit.is_closer(&best) {
+                    bundle.t_max[lane] = hit.t;
                     self.u[lane] = hit.u;
                     self.v[lane] = hit.v;
                     self.primitive[lane] = hit.primitive;
@@ -245,29 +202,6 @@ impl Hits {
                     }
                 }
             }
-        }
-    }
-
-    /// The test of one ray.
-    #[inline(always)]
-    fn one(&self, bundle: &Bundle, lane: usize) -> TriangleTest {
-        let lane = lane % RAYS;
-        let (axis, [x, y, z]) = if self.axes[0] >> lane & 1 == 1 {
-            (Axis::X, [1, 2, 0])
-        } else if self.axes[1] >> lane & 1 == 1 {
-            (Axis::Y, [2, 0, 1])
-        } else {
-            (Axis::Z, [0, 1, 2])
-        };
-        TriangleTest {
-            axis,
-            anchor: [bundle.origin[x][lane], bundle.origin[y][lane], bundle.origin[z][lane]],
-            shear: [self.shear[0][lane], self.shear[1][lane]],
-            origin_z: f64::from(bundle.origin[z][lane]),
-            direction_z: f64::from(bundle.direction[z][lane]),
-            t_min: bundle.t_min[lane],
-            t_max: bundle.t_max[lane],
-            cull: Cull::None,
         }
     }
 
@@ -295,7 +229,7 @@ impl Hits {
                 row_of(simd, &bundle.origin[z], first),
             );
             let (shear_x, shear_y) =
-                (row_of(simd, &self.shear[0], first), row_of(simd, &self.shear[1], first));
+                (row_of(simd, &bundle.shear[0], first), row_of(simd, &bundle.shear[1], first));
 
             // Shear the corners, and drop the triangle where two edge functions have opposite signs.
             let (origin, shear) = ([ox, oy, oz], [shear_x, shear_y]);
@@ -348,10 +282,10 @@ impl Hits {
         survivors: u32,
     ) -> u64 {
         let origin = eight_of(&bundle.origin[z], first);
-        let direction = eight_of(&bundle.direction[z], first);
-        let (t_min, t_max) = (eight_of(&bundle.t_min, first), eight_of(&bundle.t_max, first));
-        let (best_t, best_u) = (eight_of(&self.t, first), eight_of(&self.u, first));
-        let (best_v, to) = (eight_of(&self.v, first), eight_of(&bundle.to, first));
+        let direction = eight_of(&bundle.direction_z, first);
+        let (t_min, best_t) = (eight_of(&bundle.t_min, first), eight_of(&bundle.t_max, first));
+        let (best_u, best_v) = (eight_of(&self.u, first), eight_of(&self.v, first));
+        let to = eight_of(&bundle.to, first);
         let (zero, speed) = (eight_of(&bundle.zero, first), eight_of(&bundle.speed, first));
         let best_id = eight_of(&self.primitive, first);
         let depths = [f64::from(depths[0]), f64::from(depths[1]), f64::from(depths[2])];
@@ -379,7 +313,6 @@ impl Hits {
             let is_hit = !(any_negative & any_positive)
                 & is_area
                 & (t >= t_min[lane])
-                & (t <= t_max[lane])
                 & (t.abs() < f32::INFINITY)
                 & (survivors >> lane & 1 == 1);
             let is_closer = (t < best_t[lane]) | ((t <= best_t[lane]) & (id < best_id[lane]));
@@ -392,12 +325,35 @@ impl Hits {
             new_to[lane] = if is_taken { end } else { to[lane] };
             is_new[lane] = u32::from(is_taken) << lane;
         }
-        *eight_mut(&mut self.t, first) = new_t;
+        *eight_mut(&mut bundle.t_max, first) = new_t;
         *eight_mut(&mut self.u, first) = new_u;
         *eight_mut(&mut self.v, first) = new_v;
         *eight_mut(&mut self.primitive, first) = new_id;
         *eight_mut(&mut bundle.to, first) = new_to;
         u64::from(is_new.iter().fold(0, |all, ray| all | ray))
+    }
+}
+
+/// The test of one ray.
+#[inline(always)]
+fn one(bundle: &Bundle, lane: usize) -> TriangleTest {
+    let lane = lane % RAYS;
+    let (axis, [x, y, z]) = if bundle.longest[0] >> lane & 1 == 1 {
+        (Axis::X, [1, 2, 0])
+    } else if bundle.longest[1] >> lane & 1 == 1 {
+        (Axis::Y, [2, 0, 1])
+    } else {
+        (Axis::Z, [0, 1, 2])
+    };
+    TriangleTest {
+        axis,
+        anchor: [bundle.origin[x][lane], bundle.origin[y][lane], bundle.origin[z][lane]],
+        shear: [bundle.shear[0][lane], bundle.shear[1][lane]],
+        origin_z: f64::from(bundle.origin[z][lane]),
+        direction_z: f64::from(bundle.direction_z[lane]),
+        t_min: bundle.t_min[lane],
+        t_max: bundle.t_max[lane],
+        cull: Cull::None,
     }
 }
 

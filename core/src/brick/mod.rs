@@ -137,9 +137,11 @@ impl<F: FnMut(usize, Option<&Hit>), const ANY: bool> Kernel for Tiles<'_, F, ANY
         for first in (0..self.rays.count).step_by(RAYS) {
             let count = RAYS.min(self.rays.count - first);
             let members = tile.trace(simd, self.rays, first, count);
-            let hits = tile.hits(simd);
-            for (lane, hit) in hits.iter().enumerate().take(count) {
-                (self.answer)(first + lane, (members >> lane & 1 == 1).then_some(hit));
+            for four in 0..count.div_ceil(4) {
+                let hits = tile.hits(simd, four);
+                for (lane, hit) in (4 * four..count).zip(&hits) {
+                    (self.answer)(first + lane, (members >> lane & 1 == 1).then_some(hit));
+                }
             }
         }
     }

@@ -3,8 +3,8 @@
 //! The axis that the rays run along fastest becomes k. Between two planes of k, one cell apart, a ray
 //! stays in a rectangle of u and v; where a cell that lists something meets rectangles, its triangles
 //! are tested: against those rays if they are few, against all that may meet a triangle if they are many
-//! ([`hits`](super::hits)). Along k there is nothing to search and no
-//! order to keep but that of the slices: a ray is done when its closest hit lies before the next.
+//! ([`hits`](super::hits)). Along k there is nothing to search and no order to keep but that of the
+//! slices: a ray is done when its closest hit lies before the next.
 //!
 //! ```text
 //! k ->   | block slice: 16 cells | ...        per slice, from the bounds of all rays: which blocks,
@@ -21,7 +21,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u8x64};
 
-use super::bundle::{Bounds, Bundle, PerRay, RAYS, WIDTH, below_three};
+use super::bundle::{Bounds, Bundle, RAYS, WIDTH, below_three};
 use super::hits::Hits;
 use super::layout::{BLOCK, mask as mask_of, place};
 use super::{Brick, Chunk, Content, list};
@@ -51,6 +51,8 @@ pub(super) struct Tile<'a, const ANY: bool> {
     mesh: &'a TriangleMesh<'a>,
     bundle: Bundle,
     hits: Hits,
+    /// The cells that rays may meet in the slice at hand, on u and v.
+    reach: [Reach; 2],
     /// Primitives that may still be shown, over all rays: damaged bytes may list everything in every
     /// cell.
     unread: u64,
@@ -76,18 +78,27 @@ struct Reach {
 }
 
 impl Reach {
-    /// Between two planes.
+    /// Of no rays.
+    const NONE: Self = Self { low: [0; RAYS], high: [0; RAYS] };
+
+    /// Sets them to those between two planes, `place` being where the cells are counted from.
     #[inline(always)]
-    fn new(start: &PerRay, slope: &PerRay, planes: [f32; 2], margin: f32) -> Self {
-        let mut reach = Self { low: [0; RAYS], high: [0; RAYS] };
-        let Self { low, high } = &mut reach;
-        for (((start, slope), low), high) in start.iter().zip(slope).zip(low).zip(high) {
+    fn set(
+        &mut self,
+        bundle: &Bundle,
+        side: usize,
+        planes: [f32; 2],
+        place: impl Fn(f32) -> f32,
+        margin: f32,
+    ) {
+        let Self { low, high } = self;
+        let lines = bundle.start[side].iter().zip(&bundle.slope[side]);
+        for (((start, slope), low), high) in lines.zip(low).zip(high) {
             let a = start + slope * planes[0];
             let b = start + slope * planes[1];
-            *low = byte(if a < b { a } else { b } + (1.0 - margin));
-            *high = byte(if a < b { b } else { a } + (1.0 + margin));
+            *low = byte(place(if a < b { a } else { b }) + (1.0 - margin));
+            *high = byte(place(if a < b { b } else { a }) + (1.0 + margin));
         }
-        reach
     }
 
     /// The rays that meet any of the cells `first..=last`.
@@ -142,29 +153,22 @@ struct View<'a> {
     part: Part<'a>,
     axes: [u8; 3],
     is_mirrored: bool,
-    /// u and v of each ray on the first plane.
-    start: [PerRay; 2],
     bounds: Bounds,
     margin: f32,
 }
 
 impl<'a> View<'a> {
     #[inline(always)]
-    fn new(bundle: &Bundle, part: &Part<'a>, bounds: &Bounds) -> Self {
+    fn new(bundle: &Bundle, part: &Part<'a>) -> Self {
         let [_, _, near] = part.corner;
-        let (mut start, mut bounds) = (bundle.start, *bounds);
+        let mut bounds = bundle.bounds;
         for side in 0..2 {
-            let place =
-                |start: f32, slope: f32| (start + slope * near - part.corner[side]) * part.scale;
-            for (start, &slope) in start[side].iter_mut().zip(&bundle.slope[side]) {
-                *start = place(*start, slope);
-            }
             for chord in [&mut bounds.low[side], &mut bounds.high[side]] {
-                chord.start = place(chord.start, chord.slope);
+                chord.start = (chord.at(near) - part.corner[side]) * part.scale;
             }
         }
         let (axes, is_mirrored) = (bundle.axes, bundle.is_mirrored);
-        Self { part: *part, axes, is_mirrored, start, bounds, margin: bundle.margin * part.scale }
+        Self { part: *part, axes, is_mirrored, bounds, margin: bundle.margin * part.scale }
     }
 
     /// The planes of k between which cells lie, from the first to before the end.
@@ -207,16 +211,14 @@ impl<'a> View<'a> {
     /// The rays that look for hits beside some cells on k.
     #[inline(always)]
     fn between<S: Simd>(&self, simd: S, bundle: &Bundle, run: [u32; 2]) -> u64 {
-        let lattice = |plane: f32| self.part.corner[2] + plane / self.part.scale;
-        let [near, far] = self.planes(run);
-        bundle.between(simd, [lattice(near), lattice(far)])
+        bundle.between(simd, self.in_lattice(self.planes(run)))
     }
 
-    /// What each ray may meet between two planes.
+    /// Planes in cells of the lattice.
     #[inline(always)]
-    fn reach(&self, bundle: &Bundle, planes: [f32; 2]) -> [Reach; 2] {
-        let ([u, v], [du, dv]) = (&self.start, &bundle.slope);
-        [Reach::new(u, du, planes, self.margin), Reach::new(v, dv, planes, self.margin)]
+    fn in_lattice(&self, [near, far]: [f32; 2]) -> [f32; 2] {
+        let place = |plane: f32| self.part.corner[2] + plane / self.part.scale;
+        [place(near), place(far)]
     }
 }
 
@@ -227,7 +229,15 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         lattice: &'a Lattice,
         mesh: &'a TriangleMesh<'a>,
     ) -> Self {
-        Self { brick, lattice, mesh, bundle: Bundle::EMPTY, hits: Hits::EMPTY, unread: 0 }
+        Self {
+            brick,
+            lattice,
+            mesh,
+            bundle: Bundle::EMPTY,
+            hits: Hits::EMPTY,
+            reach: [Reach::NONE; 2],
+            unread: 0,
+        }
     }
 
     /// Traces up to 64 rays, and tells which of them: the others need a way of their own.
@@ -246,10 +256,10 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         if members != 0 && self.go(simd) { members } else { 0 }
     }
 
-    /// The hits of the rays that were traced, or [`Hit::MISS`].
+    /// The hits of four rays that were traced, or [`Hit::MISS`].
     #[inline(always)]
-    pub(super) fn hits<S: Simd>(&self, simd: S) -> [Hit; RAYS] {
-        self.hits.all(simd)
+    pub(super) fn hits<S: Simd>(&self, simd: S, four: usize) -> [Hit; 4] {
+        self.hits.four(simd, &self.bundle, four)
     }
 
     /// Goes through the grid; `false` if the tile is too wide for it.
@@ -300,7 +310,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
                     }
                     let corner = [as_f32(at_u * BLOCK), as_f32(at_v * BLOCK), corner];
                     let part = Part { chunk, corner, scale: 1.0, cells: BLOCK, depth: 2 };
-                    self.through(simd, &part, &bounds);
+                    self.through(simd, &part);
                 }
             }
         }
@@ -309,21 +319,20 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
 
     /// Goes through a part of the grid. It is part of itself where cells are divided, so it is not
     /// inlined and says once more what vectors it is compiled for.
-    fn through<S: Simd>(&mut self, simd: S, part: &Part<'a>, bounds: &Bounds) {
+    #[inline(never)]
+    fn through<S: Simd>(&mut self, simd: S, part: &Part<'a>) {
         simd.vectorize(
             #[inline(always)]
             || {
-                let view = View::new(&self.bundle, part, bounds);
+                let view = View::new(&self.bundle, part);
                 if let Some(ids) = part.chunk.list() {
-                    let all = [0, part.cells];
-                    let [u, v] = view.reach(&self.bundle, view.planes(all));
                     let cells = [0, part.cells - 1];
-                    let rays = u.meets(simd, cells) & v.meets(simd, cells);
-                    self.test(simd, ids, rays & view.between(simd, &self.bundle, all));
+                    let rays = self.rays(simd, &view, [0, part.cells], [cells; 2]);
+                    self.test(simd, ids, rays);
                 }
                 let slices = part.cells.div_ceil(4);
                 for step in 0..slices {
-                    self.bricks(simd, &view, view.in_order(step, slices), bounds);
+                    self.bricks(simd, &view, view.in_order(step, slices));
                 }
             },
         );
@@ -331,7 +340,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
 
     /// Goes through a slice of bricks.
     #[inline(always)]
-    fn bricks<S: Simd>(&mut self, simd: S, view: &View<'a>, slice: u32, bounds: &Bounds) {
+    fn bricks<S: Simd>(&mut self, simd: S, view: &View<'a>, slice: u32) {
         let Part { chunk, cells, .. } = view.part;
         let [u, v, k] = view.axes();
         let run = [4 * slice, (4 * slice + 4).min(cells)];
@@ -349,30 +358,22 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
             all_cells |= mask_of(brick.mask);
             if let Some(ids) = list(chunk.words, brick.list) {
                 let at = place(bit).map(|brick| 4 * brick);
-                let [in_u, in_v] = view.reach(&self.bundle, view.planes(run));
-                let rays = in_u.meets(simd, [at[u], at[u] + 3]);
-                let rays = rays & in_v.meets(simd, [at[v], at[v] + 3]);
-                self.test(simd, ids, rays & view.between(simd, &self.bundle, run));
+                let cells = [[at[u], at[u] + 3], [at[v], at[v] + 3]];
+                let rays = self.rays(simd, view, run, cells);
+                self.test(simd, ids, rays);
             }
         }
         for step in 0..run[1] - run[0] {
             let cell = run[0] + view.in_order(step, run[1] - run[0]);
             if all_cells & LAYERS[k][cell as usize & 3][cell as usize & 3] != 0 {
-                self.cells(simd, view, bricks, cell, bounds);
+                self.cells(simd, view, bricks, cell);
             }
         }
     }
 
     /// Goes through a slice of cells, those of some bricks.
     #[inline(always)]
-    fn cells<S: Simd>(
-        &mut self,
-        simd: S,
-        view: &View<'a>,
-        bricks: u64,
-        slice: u32,
-        bounds: &Bounds,
-    ) {
+    fn cells<S: Simd>(&mut self, simd: S, view: &View<'a>, bricks: u64, slice: u32) {
         let Part { chunk, depth, .. } = view.part;
         let [u, v, k] = view.axes();
         let run = [slice, slice + 1];
@@ -380,7 +381,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         let Some([us, vs]) = view.cells(run).filter(|_| alive != 0) else { return };
         let in_slice = LAYERS[k][slice as usize & 3][slice as usize & 3];
         let planes = view.planes(run);
-        let mut reach = None;
+        let mut is_reach_known = false;
         for bit in ones(bricks) {
             let Some(brick) = chunk.brick(bit) else { continue };
             let at = place(bit).map(|brick| 4 * brick);
@@ -388,8 +389,12 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
             if cells == 0 {
                 continue;
             }
-            let [in_u, in_v] = reach.get_or_insert_with(|| view.reach(&self.bundle, planes));
             for bit in ones(cells) {
+                if !is_reach_known {
+                    self.reach(simd, view, run);
+                    is_reach_known = true;
+                }
+                let [in_u, in_v] = &self.reach;
                 let inside = place(bit);
                 let [cell_u, cell_v] = [at[u] + inside[u], at[v] + inside[v]];
                 let rays = in_u.meets(simd, [cell_u; 2]) & in_v.meets(simd, [cell_v; 2]) & alive;
@@ -403,12 +408,44 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
                         let (scale, depth) = (view.part.scale * as_f32(cells), depth - 1);
                         // Entering costs, too: damaged bytes may divide every cell.
                         self.spend(RAYS as u64 * u64::from(1 + chunk.mask.count_ones()));
-                        self.through(simd, &Part { chunk, corner, scale, cells, depth }, bounds);
+                        self.through(simd, &Part { chunk, corner, scale, cells, depth });
+                        is_reach_known = false;
                     }
                     _ => {}
                 }
             }
         }
+    }
+
+    /// The rays that look for hits in cells beside some on k.
+    #[inline(always)]
+    fn rays<S: Simd>(
+        &mut self,
+        simd: S,
+        view: &View<'a>,
+        run: [u32; 2],
+        [us, vs]: [[u32; 2]; 2],
+    ) -> u64 {
+        self.reach(simd, view, run);
+        let [u, v] = &self.reach;
+        u.meets(simd, us) & v.meets(simd, vs) & view.between(simd, &self.bundle, run)
+    }
+
+    /// Sets what each ray may meet beside some cells on k.
+    ///
+    /// Out of line like [`through`](Self::through), where it would be three times.
+    #[inline(never)]
+    fn reach<S: Simd>(&mut self, simd: S, view: &View<'a>, run: [u32; 2]) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let planes = view.in_lattice(view.planes(run));
+                let Part { corner, scale, .. } = view.part;
+                let [u, v] = &mut self.reach;
+                u.set(&self.bundle, 0, planes, |at| (at - corner[0]) * scale, view.margin);
+                v.set(&self.bundle, 1, planes, |at| (at - corner[1]) * scale, view.margin);
+            },
+        );
     }
 
     /// Pays for work; who cannot is done: only damaged bytes ask for so much.

@@ -189,26 +189,18 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
         };
         self.unread = rest;
         self.tally.primitive_tests(ids.len());
-        let (eights, rest) = ids.as_chunks();
-        for ids in eights {
-            self.test_eight(simd, ids, LANES);
+        for ids in ids.chunks(LANES) {
+            self.test_eight(simd, ids);
             if self.is_over() {
                 return;
             }
         }
-        if let Some(&last) = rest.last() {
-            let mut ids = [last; LANES];
-            for (slot, &id) in ids.iter_mut().zip(rest) {
-                *slot = id;
-            }
-            self.test_eight(simd, &ids, rest.len());
-        }
     }
 
-    /// Tests the ray against the first `count` of eight triangles.
+    /// Tests the ray against up to eight triangles.
     #[inline(always)]
-    fn test_eight<S: Simd>(&mut self, simd: S, ids: &[u32; LANES], count: usize) {
-        let eight = Eight::gather(simd, self.mesh, ids, count);
+    fn test_eight<S: Simd>(&mut self, simd: S, ids: &[u32]) {
+        let eight = Eight::gather(simd, self.mesh, ids);
         let mut survivors = self.test.survivors(simd, &eight);
         while survivors != 0 {
             let lane = survivors.trailing_zeros() as usize;
