@@ -57,6 +57,18 @@ impl<'a> StridedMut<'a> {
             slot.copy_from_slice(bytes_of(value));
         }
     }
+
+    /// Writes elements from `first` on.
+    #[inline(always)]
+    fn write_all<T: Pod>(&mut self, first: usize, values: &[T]) {
+        let bytes = bytemuck::cast_slice(values);
+        let start = first.saturating_mul(self.stride);
+        let slots = self.bytes.get_mut(start..).and_then(|rest| rest.get_mut(..bytes.len()));
+        match slots {
+            Some(slots) if self.stride == size_of::<T>() => slots.copy_from_slice(bytes),
+            _ => (first..).zip(values).for_each(|(index, value)| self.write(index, value)),
+        }
+    }
 }
 
 impl<'a> Strided<'a> {
@@ -116,11 +128,11 @@ impl Grid<'_> {
         coherence: Coherence,
     ) -> Result<(), Error> {
         check(rays, hits, size_of::<Hit>())?;
-        self.each::<false>(rays, coherence, |index, hit| {
-            if let Some(hit) = hit {
-                hits.write(index, hit);
-            } else {
+        self.each::<false>(rays, coherence, |index, found| {
+            if found.is_empty() {
                 hits.write(index, &self.intersect(&rays.read(index)).unwrap_or(Hit::MISS));
+            } else {
+                hits.write_all(index, found);
             }
         });
         Ok(())
@@ -137,27 +149,29 @@ impl Grid<'_> {
         coherence: Coherence,
     ) -> Result<(), Error> {
         check(rays, occluded, size_of::<u8>())?;
-        self.each::<true>(rays, coherence, |index, hit| {
-            let is_hit = match hit {
-                Some(hit) => hit.primitive != INVALID_ID,
-                None => self.occluded(&rays.read(index)),
-            };
-            occluded.write(index, &u8::from(is_hit));
+        self.each::<true>(rays, coherence, |index, found| {
+            if found.is_empty() {
+                occluded.write(index, &u8::from(self.occluded(&rays.read(index))));
+            }
+            for (index, hit) in (index..).zip(found) {
+                occluded.write(index, &u8::from(hit.primitive != INVALID_ID));
+            }
         });
         Ok(())
     }
 
-    /// Shows `answer` the place of every ray, and its hit if the rays were traced together.
+    /// Shows `answer` the place of every ray, and its hit if the rays were traced together: perhaps
+    /// several at once.
     #[inline(always)]
     fn each<const ANY: bool>(
         &self,
         rays: &Strided<'_>,
         coherence: Coherence,
-        mut answer: impl FnMut(usize, Option<&Hit>),
+        mut answer: impl FnMut(usize, &[Hit]),
     ) {
         let is_done = coherence == Coherence::Coherent && self.tiles::<ANY>(rays, &mut answer);
         if !is_done {
-            (0..rays.count).for_each(|index| answer(index, None));
+            (0..rays.count).for_each(|index| answer(index, &[]));
         }
     }
 }

@@ -277,11 +277,12 @@ impl<'a> Grid<'a> {
     }
 
     /// Traces neighbouring rays together where the structure can; tells whether it does. `answer` gets
-    /// the place of each ray and its hit, or `None` for one that must be traced alone.
+    /// the place of a ray and its hit and perhaps those of the next ones, or no hit for a ray that must
+    /// be traced alone.
     pub(crate) fn tiles<const ANY: bool>(
         &self,
         rays: &Strided<'_>,
-        answer: impl FnMut(usize, Option<&Hit>),
+        answer: impl FnMut(usize, &[Hit]),
     ) -> bool {
         if !HAS_VECTORS {
             return false;

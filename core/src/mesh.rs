@@ -68,6 +68,14 @@ impl<'a> Strided<'a> {
         }
         self.bytes.get(index * self.stride..)?.first_chunk::<N>()
     }
+
+    /// Elements of `N` bytes from `first` on, if they lie side by side.
+    #[inline(always)]
+    pub(crate) fn tight<const N: usize>(&self, first: usize, count: usize) -> &'a [[u8; N]] {
+        let bytes = self.bytes.get(first.saturating_mul(N)..).unwrap_or_default();
+        let elements = if self.stride == N { bytes.as_chunks().0 } else { &[] };
+        elements.get(..count).unwrap_or_default()
+    }
 }
 
 /// A view of the caller's triangle mesh: vertices of three floats, triangles of three indices.

@@ -235,14 +235,19 @@ impl Bundle {
         count: usize,
     ) -> Option<[f32; 3]> {
         let mut leader = None;
+        let tight = rays.tight(first, count).as_chunks::<4>().0;
         for four in 0..count.div_ceil(4) {
             let at = 4 * four;
-            // Zeros where there are no more: such a ray is none.
-            let ray = |lane: usize| -> &[u8; 32] {
-                let place = (at + lane < count).then_some(first + at + lane);
-                place.and_then(|place| rays.element(place)).unwrap_or(&[0; 32])
+            let four_rays = if let Some([a, b, c, d]) = tight.get(four) {
+                [a, b, c, d]
+            } else {
+                // Zeros where there are no more: such a ray is none.
+                let ray = |lane: usize| -> &[u8; 32] {
+                    let place = (at + lane < count).then_some(first + at + lane);
+                    place.and_then(|place| rays.element(place)).unwrap_or(&[0; 32])
+                };
+                [ray(0), ray(1), ray(2), ray(3)]
             };
-            let four_rays = [ray(0), ray(1), ray(2), ray(3)];
             if leader.is_none() {
                 let rays = four_rays.iter().map(|&&ray| bytemuck::cast::<[u8; 32], Ray>(ray));
                 leader = rays.filter(Ray::is_valid).map(|ray| ray.direction).next();

@@ -35,6 +35,8 @@ mod tile;
 mod validate;
 mod walk;
 
+use core::slice::from_ref;
+
 use fearless_simd::Simd;
 use glam::Vec3A;
 
@@ -124,11 +126,12 @@ pub(crate) struct Tiles<'q, F, const ANY: bool> {
     pub(crate) lattice: &'q Lattice,
     pub(crate) mesh: &'q TriangleMesh<'q>,
     pub(crate) rays: &'q Strided<'q>,
-    /// Gets the place of each ray and its hit, or `None` if the ray did not go with its tile.
+    /// Gets the place of a ray and its hit and perhaps those of the next ones, or no hit if the ray did
+    /// not go with its tile.
     pub(crate) answer: F,
 }
 
-impl<F: FnMut(usize, Option<&Hit>), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
+impl<F: FnMut(usize, &[Hit]), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
     type Output = ();
 
     #[inline(always)]
@@ -139,8 +142,13 @@ impl<F: FnMut(usize, Option<&Hit>), const ANY: bool> Kernel for Tiles<'_, F, ANY
             let members = tile.trace(simd, self.rays, first, count);
             for four in 0..count.div_ceil(4) {
                 let hits = tile.hits(simd, four);
+                if members >> (4 * four) & 0xf == 0xf {
+                    (self.answer)(first + 4 * four, &hits);
+                    continue;
+                }
                 for (lane, hit) in (4 * four..count).zip(&hits) {
-                    (self.answer)(first + lane, (members >> lane & 1 == 1).then_some(hit));
+                    let is_traced = members >> lane & 1 == 1;
+                    (self.answer)(first + lane, if is_traced { from_ref(hit) } else { &[] });
                 }
             }
         }
