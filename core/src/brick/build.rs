@@ -21,8 +21,11 @@
 
 use fearless_simd::Simd;
 
+use super::divide::MOST_GROWTH;
 use super::frame::{Frame, Scene};
-use super::layout::{Benches, Block, ENTRY_WORDS, Layout};
+use super::layout::{
+    Benches, Block, CHILD_WORDS, CROWDED, ENTRY_WORDS, Layout, MASK_BITS, RECORD_WORDS,
+};
 pub(super) use super::pass::home;
 use super::pass::{Census, Ground, Scatter};
 use super::pool::{Filled, Part, Pool};
@@ -56,24 +59,35 @@ const fn likely_words(census: &Census) -> u64 {
     if likely > least { likely } else { least }
 }
 
-/// The most words that so many references can take.
+/// The most words that so many references in so many blocks can take.
 ///
-/// Each may be the only one of its cell and its brick: six words. Dividing a cell multiplies its
-/// references by four at most, and a part of it may be divided once more.
-const fn words_for(references: u64, large: u64) -> u64 {
-    1 + large + references * 6 * (1 + 4 + 16)
+/// Most are taken if every cell is crowded and divided, and its parts, too. Then a reference is several
+/// in the end, each of which may be the only one of its cell: two words. A chunk has up to 64 bricks,
+/// each with a record and the length of a list, the end of its cells and the length of its own list.
+const fn words_for(references: u64, blocks: u64, large: u64) -> u64 {
+    let least = CROWDED as u64 + 1;
+    let divided = references / least + references * MOST_GROWTH / least;
+    let of_blocks = MASK_BITS as u64 * blocks;
+    let bricks = if of_blocks < references { of_blocks } else { references };
+    let bricks = bricks + MASK_BITS as u64 * divided;
+    // A divided cell has a record, and a start.
+    let chunks = 2 * blocks + (2 + CHILD_WORDS as u64 + 1) * divided;
+    let lists = 2 * references * MOST_GROWTH * MOST_GROWTH;
+    1 + large + lists + (RECORD_WORDS as u64 + 1) * bricks + chunks
 }
 
 /// Words that are enough for a mesh, whatever comes out when it is sorted.
-fn enough_words(census: &Census) -> u64 {
-    words_for(census.references, census.large.into()).max(least_words(census))
+fn enough_words(layout: &Layout, census: &Census) -> u64 {
+    let words = words_for(census.references, layout.block_count(), census.large.into());
+    words.max(least_words(census))
 }
 
 /// The most memory that a mesh with so many triangles can need.
 pub(crate) const fn bound(triangles: u32, tasks: u32) -> (u64, u64) {
-    let words = words_for(reference_limit(triangles), MOST_LARGE as u64);
-    let layout = Layout::largest(block_limit(triangles), triangles);
-    let bins = 1 + MOST_LARGE as u64 + reference_limit(triangles) * ENTRY_WORDS as u64;
+    let (references, blocks) = (reference_limit(triangles), block_limit(triangles));
+    let words = words_for(references, blocks, MOST_LARGE as u64);
+    let layout = Layout::largest(blocks, triangles);
+    let bins = 1 + MOST_LARGE as u64 + references * ENTRY_WORDS as u64;
     let scratch = layout.scratch_bytes(clamped(tasks)) + section_bytes::<u32>(bins);
     (layout.index_bytes(words), scratch)
 }
@@ -126,7 +140,7 @@ fn sizes_in<const N: usize>(
     let scratch_bytes = layout.scratch_bytes(shares.wanted);
     // With the bins in the scratch, too, the answer would be exact.
     let enough = scratch_bytes + section_bytes::<u32>(least_words(census));
-    let bound = || Sizes::new(layout.index_bytes(enough_words(census)), enough, false);
+    let bound = || Sizes::new(layout.index_bytes(enough_words(layout, census)), enough, false);
     let ground = settled.ground(mesh, config.flags);
     let Some((mut work, rest)) = Work::new(&ground, &settled, &shares, scratch, parallel) else {
         return bound();
@@ -191,7 +205,7 @@ fn build_in<const N: usize>(
     let least = least_words(census);
     let Some((header, blocks, words)) = parts.filter(|(.., words)| words.len() as u64 >= least)
     else {
-        return Err(too_small(enough_words(census)));
+        return Err(too_small(enough_words(layout, census)));
     };
 
     watch.at(0.4)?;

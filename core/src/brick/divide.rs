@@ -12,6 +12,9 @@ use super::groups::Groups;
 use super::layout::{AXES, BLOCK, Bench, Class, ENTRY_WORDS, Entry, place};
 use super::sort::{measure, tally};
 
+/// How many references a divided cell may have for each that it had before.
+pub(super) const MOST_GROWTH: u64 = 4;
+
 /// Shows the entries that a cell lists.
 ///
 /// Every crowded cell looks at all entries of its block, so it looks at eight at once.
@@ -100,7 +103,7 @@ pub(super) fn plan<S: Simd>(
             // Triangles so small that they all lie in one part are for the next division.
             let is_finer = wanted > frame.cells && !deeper.is_empty();
             let separates = 10 * u64::from(measure.longest.max(block)) <= 9 * u64::from(listed);
-            let most = if separates { 4 } else { 2 * u64::from(is_finer) };
+            let most = if separates { MOST_GROWTH } else { 2 * u64::from(is_finer) };
             let gains = references <= most * u64::from(listed);
             gains.then_some((frame, groups))
         },
