@@ -20,7 +20,7 @@ pub type hgrid_coherence = u32;
 pub const HGRID_COHERENCE_INCOHERENT: hgrid_coherence = 0;
 
 /// Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 64
-/// rays, a tile of 8 x 8 pixels after the other.
+/// rays, a tile of 8 x 8 pixels after the other, each sixteen of them a square of 4 x 4.
 pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
 
 /// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.

@@ -79,7 +79,8 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 ///
 /// Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
 /// detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
-/// Choose it where many rays are shot for each build. `cell_size` belongs to it, `density` does not.
+/// Choose it for the shortest build and the first image, and for tiles of rays through
+/// `hgrid_intersect_n`. `cell_size` belongs to it, `density` does not.
 ///
 /// Memory: on scans about that of one level. How much index it takes shows only while it is written,
 /// and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch

@@ -10,8 +10,9 @@
 //! spreading             4 * 2^-24                     v - min, * cells per unit, + margin
 //! the triangle test    25 * 2^-24                     vertex - origin at up to 5 extents, shear
 //! the walk              4 * 2^-24                     base, cell * delta, their sum
-//! a tile's lines       60 * 2^-24                     start - slope * zero, origin 4.5 extents off
-//! the planes of a tile 16 * 2^-24                     slope * k + start (two margins: a line's, a triangle's)
+//! a tile's lines       60 * 2^-24                     start - slope * zero, origin 4.5 extents off (two
+//!                                                     margins: a line's, a triangle's)
+//! the planes of a tile 16 * 2^-24                     slope * k + start (likewise)
 //! a moved far origin   1/2 ulp of the coordinate      see approach.rs
 //! margin               64 * 2^-24 + 1 ulp of the largest coordinate (pad: twice the margin)
 //! ```

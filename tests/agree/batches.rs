@@ -162,7 +162,6 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
     }
 }
 
-/// One ray at a time, too, gives the same bits with all vectors.
 /// What a ray moves in a unit of `t` may be far from what a cell is wide.
 #[test]
 fn rays_of_any_speed_agree_at_any_scale() {
@@ -194,6 +193,7 @@ fn rays_of_any_speed_agree_at_any_scale() {
     }
 }
 
+/// One ray at a time, too, gives the same bits with all vectors.
 #[test]
 fn single_rays_agree_at_every_level() {
     let mesh = scene();

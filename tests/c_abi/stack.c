@@ -57,8 +57,10 @@ static void with_options(void)
 static void closest(void)
 {
     for (int i = 0; i < RAYS; i += 20) {
+        const hgrid_query_options all = options();
         hgrid_closest found;
         hgrid_closest_point(&grid, rays[i].origin, INFINITY, NULL, &found);
+        hgrid_closest_point(&grid, rays[i].origin, INFINITY, &all, &found);
     }
 }
 
@@ -136,6 +138,8 @@ int main(void)
         if (crowd >= 0) {
             rays[i] = ray_down(CENTER[0] + WIDTH[crowd] * (u / 4 - 1),
                                CENTER[1] + WIDTH[crowd] * (v / 4 - 1));
+            /* From among the triangles of the crowd, or all would end in the larger one around it. */
+            rays[i].origin[2] = CENTER[2] + 1.2f * WIDTH[crowd];
             rays[i].direction[0] = i % 7 == 0 ? -3.0f : 0.0f;
         }
     }
@@ -155,7 +159,7 @@ int main(void)
             for (int i = 0; i < CALLS; i++) {
                 const size_t bytes = stack_of(calls[i].call);
                 calls[i].most = bytes > calls[i].most ? bytes : calls[i].most;
-                if (method != HGRID_METHOD_BRICK)
+                if (config.method != HGRID_METHOD_BRICK)
                     continue;
                 /* Every division takes some more, or there was none. */
                 CHECK(bytes > before[i]);

@@ -63,7 +63,9 @@ const fn likely_words(census: &Census) -> u64 {
 ///
 /// Most are taken if every cell is crowded and divided, and its parts, too. Then a reference is several
 /// in the end, each of which may be the only one of its cell: two words. A chunk has up to 64 bricks,
-/// each with a record and the length of a list, the end of its cells and the length of its own list.
+/// each with a record and the length of a list. It also has an end of its cells, and the length of its
+/// own list. A bin that was not read yet takes no more: two words an entry, which is a reference at
+/// least.
 const fn words_for(references: u64, blocks: u64, large: u64) -> u64 {
     let least = CROWDED as u64 + 1;
     let divided = references / least + references * MOST_GROWTH / least;

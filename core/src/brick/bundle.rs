@@ -41,7 +41,7 @@ pub(super) struct Bundle {
     pub(super) t_max: PerRay,
     /// Bit `i`: ray `i` is one of them.
     pub(super) members: u64,
-    /// Those that have not ended before the slice of blocks they are in.
+    /// Members that had not ended where the slice of blocks at hand begins.
     pub(super) alive: u64,
     /// The axes u, v and k.
     pub(super) axes: [u8; 3],
@@ -62,12 +62,12 @@ pub(super) struct Bundle {
     pub(super) corner: [f32; 3],
     pub(super) rate: [f32; 3],
     pub(super) width: f32,
-    /// The planes of k between which all members have their hits, and between what they lie there.
+    /// The planes of k between which all members have their hits, and the chords around them there.
     pub(super) planes: [f32; 2],
     pub(super) bounds: Bounds,
 }
 
-/// Between what the rays lie, on u and v.
+/// Chords around the rays, on u and v.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
     pub(super) low: [Chord; 2],
@@ -149,20 +149,6 @@ fn most<S: Simd>(numbers: f32x16<S>) -> f32 {
     let (a, b) = a.max(b).split();
     let [a, b, c, d]: [f32; 4] = a.max(b).into();
     a.max(b).max(c.max(d))
-}
-
-/// Bit `i` for ray `i` where a comparison of two numbers holds.
-#[inline(always)]
-pub(super) fn rays_where<S: Simd>(
-    simd: S,
-    [a, b]: [&PerRay; 2],
-    test: impl Fn(f32x16<S>, f32x16<S>) -> mask32x16<S>,
-) -> u64 {
-    let mut rays = 0;
-    for first in (0..RAYS).step_by(WIDTH) {
-        rays |= rays_of(test(row_of(simd, a, first), row_of(simd, b, first)), first);
-    }
-    rays
 }
 
 impl Bundle {
@@ -434,14 +420,12 @@ impl Bundle {
 
     /// Marks those alive that have not ended before a plane.
     #[inline(always)]
-    pub(super) fn reach<S: Simd>(&mut self, simd: S, near: f32) {
+    pub(super) fn outlive<S: Simd>(&mut self, simd: S, near: f32) {
         let near = f32x16::splat(simd, near);
-        let alive = rays_where(
-            simd,
-            [&self.to, &self.to],
-            #[inline(always)]
-            |to, _| to.simd_ge(near),
-        );
+        let mut alive = 0;
+        for first in (0..RAYS).step_by(WIDTH) {
+            alive |= rays_of(row_of(simd, &self.to, first).simd_ge(near), first);
+        }
         self.alive = self.members & alive;
     }
 
@@ -449,13 +433,13 @@ impl Bundle {
     #[inline(always)]
     pub(super) fn between<S: Simd>(&self, simd: S, [near, far]: [f32; 2]) -> u64 {
         let (near, far) = (f32x16::splat(simd, near), f32x16::splat(simd, far));
-        self.members
-            & rays_where(
-                simd,
-                [&self.from, &self.to],
-                #[inline(always)]
-                |from, to| from.simd_le(far) & to.simd_ge(near),
-            )
+        let mut between = 0;
+        for first in (0..RAYS).step_by(WIDTH) {
+            let from = row_of(simd, &self.from, first);
+            let to = row_of(simd, &self.to, first);
+            between |= rays_of(from.simd_le(far) & to.simd_ge(near), first);
+        }
+        self.members & between
     }
 }
 

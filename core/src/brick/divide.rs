@@ -101,7 +101,7 @@ pub(super) fn plan<S: Simd>(
             // Whatever lists a triangle counts: this is what bounds the words of a mesh.
             let references = u64::from(measure.references) + u64::from(measure.large);
             // Triangles so small that they all lie in one part are for the next division.
-            let is_finer = wanted > frame.cells && !deeper.is_empty();
+            let is_finer = wanted >= 2 * frame.cells && !deeper.is_empty();
             let separates = 10 * u64::from(measure.longest.max(block)) <= 9 * u64::from(listed);
             let most = if separates { MOST_GROWTH } else { 2 * u64::from(is_finer) };
             let gains = references <= most * u64::from(listed);

@@ -67,7 +67,7 @@ impl Frusta {
         self.whole = bundle.bounds;
         let [a, b, c, d] = &mut self.rows;
         for row in 0..ROWS {
-            // What is around all of them is around some.
+            // They are no farther apart than all of them.
             let bounds = bundle.around(simd, bundle.planes, row..row + 1).unwrap_or(self.whole);
             for side in 0..2 {
                 let (low, high) = (bounds.low[side], bounds.high[side]);

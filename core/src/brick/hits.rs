@@ -2,7 +2,8 @@
 //! where it is small.
 //!
 //! Rays side by side cost the same whether all sixteen meet a cell or one, so a triangle is tested
-//! against all that are alive when the first cell with it has many rays, and not again for others.
+//! against all that are alive when the first cell with it has many rays, and not again for others,
+//! unless the mailbox forgot it.
 //!
 //! Both do for every ray and triangle what [`TriangleTest`] does, so hits have the same bits.
 
@@ -55,7 +56,10 @@ impl Hits {
 
     /// Forgets the rays and what they hit.
     pub(super) const fn clear(&mut self) {
-        self.is_surrounded = false;
+        if self.is_surrounded {
+            self.is_surrounded = false;
+            self.mailbox = Self::EMPTY.mailbox;
+        }
         self.u = Self::EMPTY.u;
         self.v = Self::EMPTY.v;
         self.primitive = Self::EMPTY.primitive;
@@ -115,7 +119,6 @@ impl Hits {
         }
         if !self.is_surrounded {
             self.is_surrounded = true;
-            self.mailbox = [INVALID_ID; SLOTS];
             self.frusta.surround(simd, bundle);
         }
         // Eight by eight those that were not tested yet.
@@ -125,7 +128,7 @@ impl Hits {
             fresh[count % LANES] = id;
             count += usize::from(*slot != id);
             *slot = id;
-            if count == LANES || place + 1 == ids.len() {
+            if count == LANES || (count > 0 && place + 1 == ids.len()) {
                 self.many::<S, ANY>(simd, bundle, mesh, &fresh[..count.min(LANES)]);
                 count = 0;
             }

@@ -11,7 +11,7 @@
 use core::ops::Range;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, u8x16, u32x8};
+use fearless_simd::{Simd, f32x4, f32x8, u32x8};
 use glam::{Vec3A, Vec4};
 
 use super::frame::{classify, lists};
@@ -19,6 +19,7 @@ use super::layout::{Class, Entry, GROUP};
 use crate::aabb::{Aabb, MAX_COORDINATE};
 use crate::cell::{CellRange, Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::config::BuildFlags;
+use crate::eight::{Row, load, transpose};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::simd::{Kernel, SimdLevel, dispatch};
@@ -210,24 +211,14 @@ impl<S: Simd> Corners<S> {
         let [a, b, c, d, e, f, g, h] = rows;
         let low = Self::four(simd, a[corner], b[corner], c[corner], d[corner]);
         let high = Self::four(simd, e[corner], f[corner], g[corner], h[corner]);
-        Self { x: low.0.combine(high.0), y: low.1.combine(high.1), z: low.2.combine(high.2) }
+        Self { x: low[0].combine(high[0]), y: low[1].combine(high[1]), z: low[2].combine(high[2]) }
     }
 
     #[inline(always)]
-    fn four(
-        simd: S,
-        a: &[u8; 16],
-        b: &[u8; 16],
-        c: &[u8; 16],
-        d: &[u8; 16],
-    ) -> (f32x4<S>, f32x4<S>, f32x4<S>) {
-        let a = u8x16::simd_from(simd, *a).bitcast::<f32x4<S>>();
-        let b = u8x16::simd_from(simd, *b).bitcast::<f32x4<S>>();
-        let c = u8x16::simd_from(simd, *c).bitcast::<f32x4<S>>();
-        let d = u8x16::simd_from(simd, *d).bitcast::<f32x4<S>>();
-        let (ac_xy, bd_xy) = (a.zip_low(c), b.zip_low(d));
-        let (ac_z, bd_z) = (a.zip_high(c), b.zip_high(d));
-        (ac_xy.zip_low(bd_xy), ac_xy.zip_high(bd_xy), ac_z.zip_low(bd_z))
+    fn four(simd: S, a: &Row, b: &Row, c: &Row, d: &Row) -> [f32x4<S>; 3] {
+        let vertices = [load(simd, a), load(simd, b), load(simd, c), load(simd, d)];
+        let [x, y, z, _] = transpose(vertices);
+        [x, y, z]
     }
 
     /// The largest magnitudes, as the bits that they have: those of what is not finite or no number
@@ -242,7 +233,7 @@ impl<S: Simd> Corners<S> {
 }
 
 /// The bytes of a triangle's corners.
-type Rows<'m> = [&'m [u8; 16]; 3];
+type Rows<'m> = [&'m Row; 3];
 
 /// The places of eight triangles: blocks, cells, and whether they are simple.
 ///

@@ -43,7 +43,7 @@ struct Part<'a> {
     depth: u32,
 }
 
-/// The rays of a tile on their way through a grid. Several KiB: keep one for many tiles.
+/// The rays of a tile on their way through a grid: 7 KiB.
 #[derive(Debug)]
 pub(super) struct Tile<'a, const ANY: bool> {
     brick: &'a Brick<'a>,
@@ -53,8 +53,8 @@ pub(super) struct Tile<'a, const ANY: bool> {
     hits: Hits,
     /// The cells that rays may meet in the slice at hand, on u and v.
     reach: [Reach; 2],
-    /// Primitives that may still be shown, over all rays: damaged bytes may list everything in every
-    /// cell.
+    /// Work that may still be done, about a primitive for a ray: damaged bytes may list everything in
+    /// every cell.
     unread: u64,
 }
 
@@ -267,11 +267,14 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
     fn go<S: Simd>(&mut self, simd: S) -> bool {
         let brick = self.brick;
         let [u, v, k] = self.bundle.axes();
-        let width = as_f32(brick.width[k] * BLOCK);
         // Where the rays are inside on k; what the last block has too many is at its beginning if
         // k is mirrored.
         let depth = as_f32(brick.last[k] + 1);
-        let inside = if self.bundle.is_mirrored { [width - depth, width] } else { [0.0, depth] };
+        let inside = if self.bundle.is_mirrored {
+            [self.bundle.width - depth, self.bundle.width]
+        } else {
+            [0.0, depth]
+        };
         let (first, last) = self.bundle.ends(simd);
         let planes = [first.max(inside[0]), last.min(inside[1])];
         if planes[0] > planes[1] {
@@ -296,7 +299,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
                 bounds.cells(side, planes, as_f32(BLOCK), brick.width[axis], self.bundle.margin)
             };
             let (Some([u0, u1]), Some([v0, v1])) = (cells(0, u), cells(1, v)) else { continue };
-            self.bundle.reach(simd, planes[0]);
+            self.bundle.outlive(simd, planes[0]);
             for at_v in v0..=v1 {
                 for at_u in u0..=u1 {
                     let mut block = [0; 3];
