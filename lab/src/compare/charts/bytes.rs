@@ -9,7 +9,7 @@ use crate::plot::{
     Area, AreaResult, Drawing, HEADING, INK, Pen, Scale, Stops, WORDS, Words, centred, chart,
     heading,
 };
-use crate::table::{display_name, times};
+use crate::table::display_name;
 
 /// The drawing.
 pub(super) struct Figure<'a>(pub(super) &'a Comparison);
@@ -29,8 +29,8 @@ impl Drawing for Figure<'_> {
     }
 
     fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B> {
-        let Comparison { machine, repeats, scenes, .. } = self.0;
-        let source = format!("{}; {}", machine.summary(), times(*repeats));
+        let Comparison { machine, scenes, .. } = self.0;
+        let source = machine.summary();
         let legend = scenes.iter().zip(0..);
         let legend: Vec<_> =
             legend.map(|(scene, place)| (display_name(&scene.facts.scene), color(place))).collect();
