@@ -65,8 +65,9 @@ impl<S: Simd> Eight<S> {
     }
 }
 
+/// Eight vertices from four and four.
 #[inline(always)]
-fn join<S: Simd>([x, y, z]: [f32x4<S>; 3], [u, v, w]: [f32x4<S>; 3]) -> [f32x8<S>; 3] {
+pub(crate) fn join<S: Simd>([x, y, z]: [f32x4<S>; 3], [u, v, w]: [f32x4<S>; 3]) -> [f32x8<S>; 3] {
     [x.combine(u), y.combine(v), z.combine(w)]
 }
 
@@ -98,7 +99,7 @@ fn four<S: Simd>(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; 4]) -> ([[f32x4<S>
 
 /// x, y and z of four vertices.
 #[inline(always)]
-fn corner<S: Simd>(vertices: [f32x4<S>; 4]) -> [f32x4<S>; 3] {
+pub(crate) fn corner<S: Simd>(vertices: [f32x4<S>; 4]) -> [f32x4<S>; 3] {
     let [x, y, z, _] = transpose(vertices);
     [x, y, z]
 }

@@ -98,41 +98,31 @@ impl Hits {
     ) {
         simd.vectorize(
             #[inline(always)]
-            || self.test_list::<S, ANY>(simd, bundle, mesh, ids, rays),
+            || {
+                if rays.count_ones() < MANY {
+                    for ids in ids.chunks(LANES) {
+                        self.few::<S, ANY>(simd, bundle, mesh, ids, rays);
+                    }
+                    return;
+                }
+                if !self.is_surrounded {
+                    self.is_surrounded = true;
+                    self.frusta.surround(simd, bundle);
+                }
+                // Eight by eight those that were not tested yet.
+                let (mut fresh, mut count) = ([ids.first().copied().unwrap_or(0); LANES], 0);
+                for (place, &id) in ids.iter().enumerate() {
+                    let slot = &mut self.mailbox[id as usize % SLOTS];
+                    fresh[count % LANES] = id;
+                    count += usize::from(*slot != id);
+                    *slot = id;
+                    if count == LANES || (count > 0 && place + 1 == ids.len()) {
+                        self.many::<S, ANY>(simd, bundle, mesh, &fresh[..count.min(LANES)]);
+                        count = 0;
+                    }
+                }
+            },
         );
-    }
-
-    #[inline(always)]
-    fn test_list<S: Simd, const ANY: bool>(
-        &mut self,
-        simd: S,
-        bundle: &mut Bundle,
-        mesh: &TriangleMesh<'_>,
-        ids: &[u32],
-        rays: u64,
-    ) {
-        if rays.count_ones() < MANY {
-            for ids in ids.chunks(LANES) {
-                self.few::<S, ANY>(simd, bundle, mesh, ids, rays);
-            }
-            return;
-        }
-        if !self.is_surrounded {
-            self.is_surrounded = true;
-            self.frusta.surround(simd, bundle);
-        }
-        // Eight by eight those that were not tested yet.
-        let (mut fresh, mut count) = ([ids.first().copied().unwrap_or(0); LANES], 0);
-        for (place, &id) in ids.iter().enumerate() {
-            let slot = &mut self.mailbox[id as usize % SLOTS];
-            fresh[count % LANES] = id;
-            count += usize::from(*slot != id);
-            *slot = id;
-            if count == LANES || (count > 0 && place + 1 == ids.len()) {
-                self.many::<S, ANY>(simd, bundle, mesh, &fresh[..count.min(LANES)]);
-                count = 0;
-            }
-        }
     }
 
     /// Tests all rays that are alive, side by side, against up to eight triangles one by one: those

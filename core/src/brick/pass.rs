@@ -11,7 +11,7 @@
 use core::ops::Range;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, u32x8};
+use fearless_simd::{Simd, f32x8, u32x8};
 use glam::{Vec3A, Vec4};
 
 use super::frame::{classify, lists};
@@ -19,7 +19,7 @@ use super::layout::{Class, Entry, GROUP};
 use crate::aabb::{Aabb, MAX_COORDINATE};
 use crate::cell::{CellRange, Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::config::BuildFlags;
-use crate::eight::{Row, load, transpose};
+use crate::eight::{Row, corner, join, load};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::simd::{Kernel, SimdLevel, dispatch};
@@ -207,18 +207,12 @@ struct Corners<S: Simd> {
 
 impl<S: Simd> Corners<S> {
     #[inline(always)]
-    fn load(simd: S, rows: &[Rows<'_>; LANES], corner: usize) -> Self {
+    fn load(simd: S, rows: &[Rows<'_>; LANES], at: usize) -> Self {
         let [a, b, c, d, e, f, g, h] = rows;
-        let low = Self::four(simd, a[corner], b[corner], c[corner], d[corner]);
-        let high = Self::four(simd, e[corner], f[corner], g[corner], h[corner]);
-        Self { x: low[0].combine(high[0]), y: low[1].combine(high[1]), z: low[2].combine(high[2]) }
-    }
-
-    #[inline(always)]
-    fn four(simd: S, a: &Row, b: &Row, c: &Row, d: &Row) -> [f32x4<S>; 3] {
-        let vertices = [load(simd, a), load(simd, b), load(simd, c), load(simd, d)];
-        let [x, y, z, _] = transpose(vertices);
-        [x, y, z]
+        let low = [load(simd, a[at]), load(simd, b[at]), load(simd, c[at]), load(simd, d[at])];
+        let high = [load(simd, e[at]), load(simd, f[at]), load(simd, g[at]), load(simd, h[at])];
+        let [x, y, z] = join(corner(low), corner(high));
+        Self { x, y, z }
     }
 
     /// The largest magnitudes, as the bits that they have: those of what is not finite or no number
