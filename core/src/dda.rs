@@ -11,7 +11,7 @@
 
 use glam::Vec3A;
 
-use crate::aabb::greater;
+use crate::aabb::{Aabb, greater};
 use crate::approach::Approach;
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::ray::{Ray, round};
@@ -148,23 +148,36 @@ impl Line {
     /// `None` if it passes the box or has left it by then. A line that runs along the border is in.
     #[inline]
     pub(crate) fn walk_in(&self, entered: f32, resolution: [u32; 3]) -> Option<Walk> {
-        let (mut near, mut far) = (entered, f32::INFINITY);
-        for (axis, &cells) in resolution.iter().enumerate() {
-            let (position, margin) = (self.position[axis], self.margin[axis]);
-            let (low, high) = (-margin - position, as_f32(cells) + margin - position);
-            let delta = self.delta[axis];
-            if delta > 0.0 {
-                near = near.max(low * delta);
-                far = far.min(high * delta);
-            } else if delta < 0.0 {
-                near = near.max(high * delta);
-                far = far.min(low * delta);
-            } else if low > 0.0 || high < 0.0 {
-                return None;
-            }
-        }
+        let cells = Vec3A::from_array(resolution.map(as_f32));
+        let [near, far] = self.inside(&Aabb { min: Vec3A::ZERO, max: cells });
+        let near = entered.max(near);
         let last = resolution.map(|cells| cells.saturating_sub(1));
         (near <= far).then(|| self.walk(near, 1.0, [0; 3], last))
+    }
+
+    /// Whether the line comes to a box before a distance, or along its border: one that is given in
+    /// cells from a corner on.
+    #[inline(always)]
+    pub(crate) fn meets(&self, reach: &Aabb, corner: [f32; 3], limit: f32) -> bool {
+        let corner = Vec3A::from_array(corner);
+        let [near, far] = self.inside(&Aabb { min: corner + reach.min, max: corner + reach.max });
+        near.max(0.0) <= far.min(limit)
+    }
+
+    /// From where to where the line is inside a box given in cells, or along its border; the second is
+    /// less than the first if it passes the box.
+    #[inline(always)]
+    fn inside(&self, reach: &Aabb) -> [f32; 2] {
+        let low = reach.min - self.margin - self.position;
+        let high = reach.max + self.margin - self.position;
+        let is_outside = low.cmpgt(Vec3A::ZERO) | high.cmplt(Vec3A::ZERO);
+        let (low, high) = (low * self.delta, high * self.delta);
+        // On an axis that it runs parallel to, it is inside all the way or nowhere.
+        let is_parallel = self.delta.cmpeq(Vec3A::ZERO);
+        let leaves = Vec3A::select(is_outside, Vec3A::NEG_INFINITY, Vec3A::INFINITY);
+        let near = Vec3A::select(is_parallel, Vec3A::NEG_INFINITY, low.min(high));
+        let far = Vec3A::select(is_parallel, leaves, low.max(high));
+        [near.max_element(), far.min_element()]
     }
 
     /// A walk from a distance on through the cells `min..=max`, each `size` cells of the lattice

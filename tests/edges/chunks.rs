@@ -38,6 +38,8 @@ pub(crate) enum Kind {
     BrickId,
     WholeCount,
     WholeId,
+    /// Where the triangles of a list of a brick or block lie.
+    Extent,
     /// Of a divided cell.
     ChildMask,
     ChildBase,
@@ -121,6 +123,8 @@ pub(crate) fn sites(blob: &[u8]) -> Vec<Site> {
         }
         for (list, counts, ids) in large.into_iter().filter(|(list, ..)| *list != 0) {
             let at = place(list) - 4;
+            push(Kind::Extent, at - 8, depth, false);
+            push(Kind::Extent, at - 4, depth, false);
             push(counts, at, depth, false);
             for i in 0..word(blob, at) as usize {
                 push(ids, at + 4 + 4 * i, depth, i > 0);
@@ -150,7 +154,7 @@ fn config() -> Config {
     Config { cell_size: 0.5, ..Config::new(Method::Brick) }
 }
 
-const KINDS: [Kind; 19] = [
+const KINDS: [Kind; 20] = [
     Kind::LargeCount,
     Kind::LargeId,
     Kind::BlockMask,
@@ -166,6 +170,7 @@ const KINDS: [Kind; 19] = [
     Kind::BrickId,
     Kind::WholeCount,
     Kind::WholeId,
+    Kind::Extent,
     Kind::ChildMask,
     Kind::ChildBase,
     Kind::ChildList,

@@ -22,6 +22,7 @@
 use fearless_simd::Simd;
 
 use super::divide::MOST_GROWTH;
+use super::extent::LIST_WORDS;
 use super::frame::{Frame, Scene};
 use super::layout::{
     Benches, Block, CHILD_WORDS, CROWDED, ENTRY_WORDS, Layout, MASK_BITS, RECORD_WORDS,
@@ -63,7 +64,7 @@ const fn likely_words(census: &Census) -> u64 {
 ///
 /// Most are taken if every cell is crowded and divided, and its parts, too. Then a reference is several
 /// in the end, each of which may be the only one of its cell: two words. A chunk has up to 64 bricks,
-/// each with a record and the length of a list. It also has an end of its cells, and the length of its
+/// each with a record and the head of a list. It also has an end of its cells, and the head of its
 /// own list. A bin that was not read yet takes no more: two words an entry, which is a reference at
 /// least.
 const fn words_for(references: u64, blocks: u64, large: u64) -> u64 {
@@ -73,9 +74,10 @@ const fn words_for(references: u64, blocks: u64, large: u64) -> u64 {
     let bricks = if of_blocks < references { of_blocks } else { references };
     let bricks = bricks + MASK_BITS as u64 * divided;
     // A divided cell has a record, and a start.
-    let chunks = 2 * blocks + (2 + CHILD_WORDS as u64 + 1) * divided;
+    let chunk = 1 + LIST_WORDS as u64;
+    let chunks = chunk * blocks + (chunk + CHILD_WORDS as u64 + 1) * divided;
     let lists = 2 * references * MOST_GROWTH * MOST_GROWTH;
-    1 + large + lists + (RECORD_WORDS as u64 + 1) * bricks + chunks
+    1 + large + lists + (RECORD_WORDS + LIST_WORDS) as u64 * bricks + chunks
 }
 
 /// Words that are enough for a mesh, whatever comes out when it is sorted.

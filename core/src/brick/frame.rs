@@ -47,11 +47,15 @@ impl Frame {
         Self { origin: self.origin + corner / self.scale, scale: self.scale * as_f32(cells), cells }
     }
 
+    /// A box in cells of the lattice, in those of the frame.
+    pub(super) fn zoom(&self, reach: &Aabb) -> Aabb {
+        let zoom = |point: Vec3A| (point - self.origin) * self.scale;
+        Aabb { min: zoom(reach.min), max: zoom(reach.max) }
+    }
+
     /// The cells of the frame that a box in cells of the lattice overlaps.
     pub(super) fn range(&self, reach: &Aabb) -> CellRange {
-        let zoom = |point: Vec3A| (point - self.origin) * self.scale;
-        let reach = Aabb { min: zoom(reach.min), max: zoom(reach.max) };
-        cells_between(reach, [self.cells; 3])
+        cells_between(self.zoom(reach), [self.cells; 3])
     }
 }
 

@@ -33,8 +33,8 @@ pub(super) struct Block {
     pub(super) mask: [u32; 2],
     /// Where its words start: in the pool for a block, behind the start of its block for a cell.
     pub(super) base: u32,
-    /// Where the list of primitives that belong to the whole block lies behind the start of the
-    /// block, plus 1; 0 if there is none.
+    /// Where the length of the list of primitives that belong to the whole block lies behind the start
+    /// of the block, plus 1; 0 if there is none.
     pub(super) list: u32,
 }
 
@@ -46,7 +46,7 @@ pub(super) struct Brick {
     pub(super) mask: [u32; 2],
     /// Where the starts of its cells' lists lie, behind the start of the block.
     pub(super) cells: u32,
-    /// Where the list of primitives that belong to the whole brick lies, plus 1; 0 if none.
+    /// Where the length of the list of primitives that belong to the whole brick lies, plus 1; 0 if none.
     pub(super) list: u32,
 }
 

@@ -20,6 +20,7 @@
 mod build;
 mod bundle;
 mod divide;
+mod extent;
 mod frame;
 mod frusta;
 mod groups;
@@ -51,6 +52,7 @@ use crate::simd::Kernel;
 use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
 use bundle::RAYS;
+use extent::{EXTENT_WORDS, Extent, Owner};
 use layout::{Block, Layout};
 pub(crate) use walk::OneRay;
 
@@ -176,6 +178,24 @@ fn list(words: &[u32], at: u32) -> Option<&[u32]> {
     ids.get(..length as usize)
 }
 
+/// The primitives that belong to all of a brick or a chunk, and where in it they lie.
+#[derive(Debug, Clone, Copy)]
+struct Large<'a> {
+    owner: Owner,
+    extent: Extent,
+    ids: &'a [u32],
+}
+
+impl<'a> Large<'a> {
+    #[inline(always)]
+    fn new(words: &'a [u32], at: u32, owner: Owner) -> Option<Self> {
+        let ids = list(words, at)?;
+        let start = (at as usize).checked_sub(1 + EXTENT_WORDS)?;
+        let extent = words.get(start..)?.first_chunk::<EXTENT_WORDS>()?;
+        Some(Self { owner, extent: bytemuck::cast(*extent), ids })
+    }
+}
+
 /// What a cell holds.
 #[derive(Debug, Clone, Copy)]
 enum Content<'a> {
@@ -188,8 +208,14 @@ enum Content<'a> {
 impl<'a> Chunk<'a> {
     /// The primitives that belong to all of it.
     #[inline(always)]
-    fn list(&self) -> Option<&'a [u32]> {
-        list(self.words, self.list)
+    fn large(&self) -> Option<Large<'a>> {
+        Large::new(self.words, self.list, Owner::Chunk)
+    }
+
+    /// Those that belong to all of one of its bricks.
+    #[inline(always)]
+    fn large_of(&self, brick: &layout::Brick, bit: u32) -> Option<Large<'a>> {
+        Large::new(self.words, brick.list, Owner::Brick(bit))
     }
 
     /// Shows the lists of all cells that a box meets, given in cells of the chunk, of which it has some
@@ -200,7 +226,7 @@ impl<'a> Chunk<'a> {
             min: range.min.map(|cell| cell >> 2),
             max: range.max.map(|cell| cell >> 2),
         };
-        self.list().is_none_or(|ids| visitor.list(ids))
+        self.large().is_none_or(|large| visitor.list(large.ids))
             && bricks.cells().all(|at| {
                 let corner = at.map(|at| at << 2);
                 let bit = layout::number(corner) >> 6;
@@ -213,7 +239,7 @@ impl<'a> Chunk<'a> {
                     max: core::array::from_fn(|axis| range.max[axis].min(corner[axis] + 3)),
                 };
                 visitor.spend(1)
-                    && list(self.words, brick.list).is_none_or(|ids| visitor.list(ids))
+                    && self.large_of(&brick, bit).is_none_or(|large| visitor.list(large.ids))
                     && inside
                         .cells()
                         .all(|cell| self.visit_cell(&brick, cell, reach, depth, visitor))

@@ -4,7 +4,7 @@
 //! collect  entries with the same number of cells together
 //! tally    for each cell, brick and the block: how many triangles it lists
 //! measure  the masks; which cells are crowded and gain by being divided; how many words it takes
-//! write    bricks, starts of cells, and from the entries once more the lists
+//! write    bricks, starts of cells, and from the entries once more the lists; where they lie
 //! divide   each crowded cell like a block of its own, up to 16 cells wide
 //!
 //! chunk | bricks | starts of cells, and the end | lists of cells | of bricks | of the block | chunks of cells
@@ -21,6 +21,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x8};
 
 use super::divide::{count_of_cell, plan};
+use super::extent::{EXTENT_WORDS, Extent, LIST_WORDS, Owner};
 use super::frame::{Frame, Scene};
 use super::groups::Groups;
 use super::layout::{
@@ -28,7 +29,7 @@ use super::layout::{
     place,
 };
 use super::pool::Pool;
-use crate::bits::halves;
+use crate::bits::{halves, ones};
 use crate::bump::GRID;
 
 /// How many words a chunk takes, and what for.
@@ -38,7 +39,7 @@ pub(super) struct Measure {
     cells: u32,
     /// Words of the cells' lists and records.
     lists: u32,
-    /// Words of the lists of bricks and of the block, their lengths included.
+    /// Words of the lists of bricks and of the block, with what is before the ids.
     pub(super) large: u32,
     /// Triangles for the whole block.
     block: u32,
@@ -117,6 +118,7 @@ fn chunk<S: Simd>(
     let base = pool.position();
     if let Some(words) = pool.take(measure.words()) {
         write(simd, words, base, &measure, groups, entries, cells, bench.bricks, divided);
+        surround(scene, frame, words, &measure);
     }
     // The records of divided cells lie where the tally left the cursors of their cells.
     for (brick, &rest) in divided.iter().enumerate() {
@@ -219,7 +221,8 @@ fn occupancy<S: Simd>(simd: S, cells: &[u32]) -> u64 {
 /// How many words the lists take that a tally counted.
 #[inline(always)]
 pub(super) fn measure<S: Simd>(simd: S, cells: &[u32], bricks: &[u32], block: u32) -> Measure {
-    let mut measure = Measure { block, large: block + u32::from(block > 0), ..Measure::default() };
+    let words = |listed: u32| listed + LIST_WORDS as u32 * u32::from(listed > 0);
+    let mut measure = Measure { block, large: words(block), ..Measure::default() };
     let (mut sum, mut longest) = (u32x8::splat(simd, 0), u32x8::splat(simd, 0));
     for (brick, (cells, &listed)) in cells.chunks_exact(MASK_BITS).zip(bricks).enumerate() {
         let mask = occupancy(simd, cells);
@@ -234,7 +237,7 @@ pub(super) fn measure<S: Simd>(simd: S, cells: &[u32], bricks: &[u32], block: u3
             sum += eight;
             longest = longest.max(eight);
         }
-        measure.large += listed + u32::from(listed > 0);
+        measure.large += words(listed);
     }
     let (sum, longest): ([u32; 8], [u32; 8]) = (sum.into(), longest.into());
     measure.references = sum.into_iter().sum();
@@ -276,18 +279,18 @@ fn write<S: Simd>(
         // The brick.
         let mask = occupancy(simd, cells);
         let [low, high] = halves(mask);
-        let is_large = u32::from(*listed > 0);
-        let list = is_large * (base + large_at + 1);
+        let head = if *listed > 0 { LIST_WORDS as u32 } else { 0 };
+        let list = if *listed > 0 { base + large_at + head } else { 0 };
         for (at, word) in (brick_at..).zip([low, high, base + cell_at, list]) {
             put(words, at, word);
         }
         brick_at += RECORD_WORDS as u32;
         // Its own list: the length, then room for the ids.
         if *listed > 0 {
-            put(words, large_at, *listed);
+            put(words, large_at + EXTENT_WORDS as u32, *listed);
         }
-        let next = large_at + is_large + *listed;
-        *listed = large_at + is_large;
+        let next = large_at + head + *listed;
+        *listed = large_at + head;
         large_at = next;
         // The starts of its cells' lists.
         let divided = divided.get(brick).copied().unwrap_or(0);
@@ -308,8 +311,8 @@ fn write<S: Simd>(
         put(words, cell_at, base + list_at);
     }
     if measure.block > 0 {
-        put(words, large_at, measure.block);
-        large_at += 1;
+        put(words, large_at + EXTENT_WORDS as u32, measure.block);
+        large_at += LIST_WORDS as u32;
     }
 
     // The lists, group by group in the order of the ids.
@@ -345,5 +348,19 @@ fn write<S: Simd>(
                 large_at += 1;
             }
         }
+    }
+}
+
+/// Writes before each list of a brick, and of all of a chunk, where its triangles lie.
+fn surround(scene: &Scene<'_>, frame: &Frame, words: &mut [u32], measure: &Measure) {
+    let first = measure.words() - measure.large as usize;
+    let Some((records, mut lists)) = words.split_at_mut_checked(first) else { return };
+    let bricks = ones(measure.mask).zip(records.as_chunks::<RECORD_WORDS>().0);
+    let bricks = bricks.filter_map(|(bit, &[.., list])| (list > 0).then_some(Owner::Brick(bit)));
+    for owner in bricks.chain((measure.block > 0).then_some(Owner::Chunk)) {
+        let Some(([first, last, count], rest)) = lists.split_first_chunk_mut() else { return };
+        let Some((ids, rest)) = rest.split_at_mut_checked(*count as usize) else { return };
+        [*first, *last] = Extent::of(scene, frame, owner, ids).words();
+        lists = rest;
     }
 }

@@ -24,7 +24,8 @@ use fearless_simd::{Simd, u8x64};
 use super::bundle::{Bounds, Bundle, RAYS, WIDTH, below_three};
 use super::hits::Hits;
 use super::layout::{BLOCK, mask as mask_of, place};
-use super::{Brick, Chunk, Content, list};
+use super::{Brick, Chunk, Content, Large};
+use crate::bits::ones;
 use crate::cell::{Lattice, as_f32, whole};
 use crate::mesh::{Strided, TriangleMesh};
 use crate::ray::Hit;
@@ -328,10 +329,8 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
             #[inline(always)]
             || {
                 let view = View::new(&self.bundle, part);
-                if let Some(ids) = part.chunk.list() {
-                    let cells = [0, part.cells - 1];
-                    let rays = self.rays(simd, &view, [0, part.cells], [cells; 2]);
-                    self.test(simd, ids, rays);
+                if let Some(large) = part.chunk.large() {
+                    self.test_large(simd, &view, &large);
                 }
                 let slices = part.cells.div_ceil(4);
                 for step in 0..slices {
@@ -359,11 +358,8 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         for bit in ones(bricks) {
             let Some(brick) = chunk.brick(bit) else { continue };
             all_cells |= mask_of(brick.mask);
-            if let Some(ids) = list(chunk.words, brick.list) {
-                let at = place(bit).map(|brick| 4 * brick);
-                let cells = [[at[u], at[u] + 3], [at[v], at[v] + 3]];
-                let rays = self.rays(simd, view, run, cells);
-                self.test(simd, ids, rays);
+            if let Some(large) = chunk.large_of(&brick, bit) {
+                self.test_large(simd, view, &large);
             }
         }
         for step in 0..run[1] - run[0] {
@@ -420,18 +416,19 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         }
     }
 
-    /// The rays that look for hits in cells beside some on k.
+    /// Tests the triangles of a brick or of all of a part, for the rays that look for hits in the cells
+    /// where they lie.
     #[inline(always)]
-    fn rays<S: Simd>(
-        &mut self,
-        simd: S,
-        view: &View<'a>,
-        run: [u32; 2],
-        [us, vs]: [[u32; 2]; 2],
-    ) -> u64 {
+    fn test_large<S: Simd>(&mut self, simd: S, view: &View<'a>, large: &Large<'a>) {
+        let last = view.part.cells - 1;
+        let cells = large.extent.cells(large.owner).map(|ends| ends.map(|cell| cell.min(last)));
+        let [u, v, k] = view.axes();
+        let run = [cells[k][0], cells[k][1] + 1];
         self.reach(simd, view, run);
-        let [u, v] = &self.reach;
-        u.meets(simd, us) & v.meets(simd, vs) & view.between(simd, &self.bundle, run)
+        let [in_u, in_v] = &self.reach;
+        let rays = in_u.meets(simd, cells[u]) & in_v.meets(simd, cells[v]);
+        let rays = rays & view.between(simd, &self.bundle, run);
+        self.test(simd, large.ids, rays);
     }
 
     /// Sets what each ray may meet beside some cells on k.
@@ -470,14 +467,4 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
             self.hits.test::<S, ANY>(simd, &mut self.bundle, self.mesh, ids, rays);
         }
     }
-}
-
-/// The places of the ones of a mask, in order.
-#[inline(always)]
-fn ones(mut mask: u64) -> impl Iterator<Item = u32> {
-    core::iter::from_fn(move || {
-        let bit = mask.trailing_zeros();
-        mask &= mask.wrapping_sub(1);
-        (bit < 64).then_some(bit)
-    })
 }

@@ -14,13 +14,15 @@
 use glam::Vec3A;
 
 use super::build::home;
-use super::frame::{Frame, classify, lists};
+use super::extent::{EXTENT_WORDS, Extent, LIST_WORDS, Owner};
+use super::frame::{Frame, Scene, classify, lists};
 use super::layout::{
     BLOCK, Block, CHILD_WORDS, Class, Layout, MAX_CHILDREN, RECORD_WORDS, mask, number, place,
 };
 use super::size::{Settled, settle};
-use super::{Brick, Chunk, Content, list};
+use super::{Brick, Chunk, Content, Large, list};
 use crate::aabb::Aabb;
+use crate::bits::ones;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::bump::GRID;
 use crate::cell::{CellRange, Lattice};
@@ -256,16 +258,26 @@ impl Check<'_> {
         }
 
         // Those of bricks and of all of it.
-        let of_bricks = ones(chunk.mask)
-            .filter_map(|bit| Some((chunk.brick(bit)?.list, Class::Bricks, place(bit << 6))));
-        for (at, class, cell) in of_bricks.chain([(chunk.list, Class::Blocks, [0; 3])]) {
+        let scene = Scene { mesh: self.mesh, lattice: &self.settled.lattice };
+        let of_bricks =
+            ones(chunk.mask).filter_map(|bit| Some((chunk.brick(bit)?.list, Owner::Brick(bit))));
+        for (at, owner) in of_bricks.chain([(chunk.list, Owner::Chunk)]) {
             if at == 0 {
                 continue;
             }
-            let ids = list(chunk.words, at).filter(|_| at as usize == list_at + 1);
-            let ids = ids.ok_or(self.wrong(base + list_at))?;
-            self.list(base + list_at, ids, domain, class, cell)?;
-            list_at += 1 + ids.len();
+            let wrong = self.wrong(base + list_at);
+            let large = Large::new(chunk.words, at, owner);
+            let large = large.filter(|_| at as usize == list_at + LIST_WORDS).ok_or(wrong)?;
+            let Large { ids, extent, .. } = large;
+            let (class, cell) = match owner {
+                Owner::Brick(bit) => (Class::Bricks, place(bit << 6)),
+                Owner::Chunk => (Class::Blocks, [0; 3]),
+            };
+            self.list(base + list_at + EXTENT_WORDS, ids, domain, class, cell)?;
+            if extent != Extent::of(&scene, &domain.frame, owner, ids) {
+                return Err(wrong);
+            }
+            list_at += LIST_WORDS + ids.len();
         }
 
         // The divided cells.
@@ -378,11 +390,4 @@ fn content<'a>(chunk: &Chunk<'a>, cell: [u32; 3]) -> Option<Content<'a>> {
     }
     let brick = chunk.brick(brick)?;
     if mask(brick.mask) >> bit & 1 == 0 { None } else { chunk.content(&brick, bit) }
-}
-
-/// The bits of a mask that are set.
-fn ones(mask: u64) -> impl Iterator<Item = u32> {
-    let first = Some(mask).filter(|&rest| rest != 0);
-    let next = |&rest: &u64| Some(rest & (rest - 1)).filter(|&rest| rest != 0);
-    core::iter::successors(first, next).map(u64::trailing_zeros)
 }

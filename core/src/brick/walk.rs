@@ -4,7 +4,7 @@
 use fearless_simd::Simd;
 
 use super::layout::{BLOCK, mask, number};
-use super::{Brick, Chunk, Content, list};
+use super::{Brick, Chunk, Content, Large};
 use crate::cell::as_f32;
 use crate::counters::Tally;
 use crate::dda::{Line, Step};
@@ -78,8 +78,9 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
         loop {
             self.tally.cell_step();
             if let Some(chunk) = brick.block(walk.cell) {
-                if let Some(ids) = chunk.list() {
-                    self.test(simd, ids);
+                if let Some(large) = chunk.large() {
+                    let corner = walk.cell.map(|block| as_f32(block * BLOCK));
+                    self.test_large(simd, &large, line, corner);
                 }
                 if chunk.mask != 0 && !self.is_over() {
                     let corner = walk.cell.map(|block| block * BLOCK);
@@ -106,8 +107,8 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
             if chunk.mask >> bit & 1 != 0
                 && let Some(brick) = chunk.brick(bit)
             {
-                if let Some(ids) = list(chunk.words, brick.list) {
-                    self.test(simd, ids);
+                if let Some(large) = chunk.large_of(&brick, bit) {
+                    self.test_large(simd, &large, line, corner.map(as_f32));
                 }
                 if mask(brick.mask) != 0 && !self.is_over() {
                     self.cells(simd, part, &brick, walk.cell.map(|at| at << 2), walk.entered);
@@ -160,14 +161,23 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
         simd.vectorize(
             #[inline(always)]
             || {
-                if let Some(ids) = part.chunk.list() {
-                    self.test(simd, ids);
+                if let Some(large) = part.chunk.large() {
+                    self.test_large(simd, &large, part.line, [0.0; 3]);
                 }
                 if let Some(walk) = part.line.walk_in(from, part.last.map(|last| last + 1)) {
                     self.part(simd, part, walk.entered);
                 }
             },
         );
+    }
+
+    /// Tests the ray against the triangles of a brick or a chunk that begins at a corner, if it comes
+    /// near them.
+    #[inline(always)]
+    fn test_large<S: Simd>(&mut self, simd: S, large: &Large<'_>, line: &Line, corner: [f32; 3]) {
+        if line.meets(&large.extent.reach(large.owner), corner, self.limit) {
+            self.test(simd, large.ids);
+        }
     }
 
     /// Tests the ray against the triangles of a list.
