@@ -54,7 +54,7 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
         let enough = sizes(&view, &config, &mut []).unwrap();
         let mut scratch = vec![Block::ZERO; 2 * Block::count_for(enough.scratch_bytes)];
         let scratch = Block::bytes_mut(&mut scratch);
-        let budget = 40 * 6 * 40 * 40;
+        let budget = 12 * mesh.indices.len();
         let (fitted, needed) = fit(&view, &finer, budget, scratch).unwrap();
         assert!(needed.index_bytes <= budget, "{config:?}");
         // What means nothing to the method stays as it was.

@@ -21,12 +21,10 @@
 
 use fearless_simd::Simd;
 
-use super::divide::MOST_GROWTH;
-use super::extent::LIST_WORDS;
+use super::divide::{self, share};
+use super::extent::EXTENT_WORDS;
 use super::frame::{Frame, Scene};
-use super::layout::{
-    Benches, Block, CHILD_WORDS, CROWDED, ENTRY_WORDS, Layout, MASK_BITS, RECORD_WORDS,
-};
+use super::layout::{Benches, Block, ENTRY_WORDS, Layout, MASK_BITS, RECORD_WORDS};
 pub(super) use super::pass::home;
 use super::pass::{Census, Ground, Scatter};
 use super::pool::{Filled, Part, Pool};
@@ -60,36 +58,29 @@ const fn likely_words(census: &Census) -> u64 {
     if likely > least { likely } else { least }
 }
 
-/// The most words that so many references in so many blocks can take.
+/// The most words that so many references of so many triangles in so many blocks can take.
 ///
-/// Most are taken if every cell is crowded and divided, and its parts, too. Then a reference is several
-/// in the end, each of which may be the only one of its cell: two words. A chunk has up to 64 bricks,
-/// each with a record and the head of a list. It also has an end of its cells, and the head of its
-/// own list. A bin that was not read yet takes no more: two words an entry, which is a reference at
-/// least.
-const fn words_for(references: u64, blocks: u64, large: u64) -> u64 {
-    let least = CROWDED as u64 + 1;
-    let divided = references / least + references * MOST_GROWTH / least;
+/// A reference takes two words if it is the only one of its list: one more for where the list starts, or
+/// how long it is. A brick has a record, a chunk the end of its cells, and either may have a list with an
+/// extent. A bin that was not read yet takes no more: two words an entry, which is a reference at least.
+/// Divided cells have words of their own.
+const fn words_for(triangles: u32, references: u64, blocks: u64, large: u64) -> u64 {
     let of_blocks = MASK_BITS as u64 * blocks;
     let bricks = if of_blocks < references { of_blocks } else { references };
-    let bricks = bricks + MASK_BITS as u64 * divided;
-    // A divided cell has a record, and a start.
-    let chunk = 1 + LIST_WORDS as u64;
-    let chunks = chunk * blocks + (chunk + CHILD_WORDS as u64 + 1) * divided;
-    let lists = 2 * references * MOST_GROWTH * MOST_GROWTH;
-    1 + large + lists + (RECORD_WORDS + LIST_WORDS) as u64 * bricks + chunks
+    let heads = (RECORD_WORDS + EXTENT_WORDS) as u64 * bricks + (1 + EXTENT_WORDS) as u64 * blocks;
+    1 + large + 2 * references + heads + divide::WORDS * triangles as u64
 }
 
 /// Words that are enough for a mesh, whatever comes out when it is sorted.
-fn enough_words(layout: &Layout, census: &Census) -> u64 {
-    let words = words_for(census.references, layout.block_count(), census.large.into());
-    words.max(least_words(census))
+fn enough_words(triangles: u32, layout: &Layout, census: &Census) -> u64 {
+    let blocks = layout.block_count();
+    words_for(triangles, census.references, blocks, census.large.into()).max(least_words(census))
 }
 
 /// The most memory that a mesh with so many triangles can need.
 pub(crate) const fn bound(triangles: u32, tasks: u32) -> (u64, u64) {
     let (references, blocks) = (reference_limit(triangles), block_limit(triangles));
-    let words = words_for(references, blocks, MOST_LARGE as u64);
+    let words = words_for(triangles, references, blocks, MOST_LARGE as u64);
     let layout = Layout::largest(blocks, triangles);
     let bins = 1 + MOST_LARGE as u64 + references * ENTRY_WORDS as u64;
     let scratch = layout.scratch_bytes(clamped(tasks)) + section_bytes::<u32>(bins);
@@ -144,7 +135,13 @@ fn sizes_in<const N: usize>(
     let scratch_bytes = layout.scratch_bytes(shares.wanted);
     // With the bins in the scratch, too, the answer would be exact.
     let enough = scratch_bytes + section_bytes::<u32>(least_words(census));
-    let bound = || Sizes::new(layout.index_bytes(enough_words(layout, census)), enough, false);
+    let bound = || {
+        Sizes::new(
+            layout.index_bytes(enough_words(mesh.triangle_count(), layout, census)),
+            enough,
+            false,
+        )
+    };
     let ground = settled.ground(mesh, config.flags);
     let Some((mut work, rest)) = Work::new(&ground, &settled, &shares, scratch, parallel) else {
         return bound();
@@ -209,7 +206,7 @@ fn build_in<const N: usize>(
     let least = least_words(census);
     let Some((header, blocks, words)) = parts.filter(|(.., words)| words.len() as u64 >= least)
     else {
-        return Err(too_small(enough_words(layout, census)));
+        return Err(too_small(enough_words(mesh.triangle_count(), layout, census)));
     };
 
     watch.at(0.4)?;
@@ -496,6 +493,7 @@ impl Kernel for Fill<'_, '_> {
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let Self { ground, settled, part, ends, benches, blocks, words } = self;
         let scene = Scene { mesh: ground.mesh, lattice: &settled.lattice };
+        let share = share(scene.mesh.triangle_count(), settled.census.references);
         let [width, height, _] = settled.layout.blocks.map(|blocks| blocks.max(1));
         let mut start = part.bins as u32;
         let mut pool = Pool::new(&part, words);
@@ -509,7 +507,7 @@ impl Kernel for Fill<'_, '_> {
                 let groups = pool.read_bin(words, bench.unwrap_or_default()).unwrap_or_default();
                 let at = [number % width, number / width % height, number / width / height];
                 let frame = Frame::of_block(at);
-                let sorted = sort(simd, &scene, &frame, benches, &groups, &mut pool);
+                let sorted = sort(simd, &scene, &frame, benches, &groups, share, &mut pool);
                 block = pool.placed(sorted.unwrap_or_default());
             }
             if let Some(slot) = slots.next() {

@@ -1,6 +1,9 @@
 //! Whether a crowded cell is divided, and the entries that it then has.
 //!
 //! It is if its triangles are smaller than it, and its parts list fewer of them, or can be divided again.
+//! What it then takes is paid for: each reference of a cell brings a share of [`WORDS`] for each triangle
+//! of the mesh, of which the chunk of a divided cell takes its words, and its own crowded cells share the
+//! rest. A cell whose share is too small is cut into fewer parts, or not at all.
 
 #![expect(clippy::cast_possible_truncation, reason = "numbers of cells")]
 
@@ -12,8 +15,35 @@ use super::groups::Groups;
 use super::layout::{AXES, BLOCK, Bench, Class, ENTRY_WORDS, Entry, place};
 use super::sort::{measure, tally};
 
-/// How many references a divided cell may have for each that it had before.
-pub(super) const MOST_GROWTH: u64 = 4;
+/// Words that all divided cells may take for each triangle of the mesh.
+pub(super) const WORDS: u64 = 12;
+
+/// The words that each of so many references brings.
+pub(super) const fn share(triangles: u32, references: u64) -> u64 {
+    match (WORDS * triangles as u64).checked_div(references) {
+        Some(share) if share < WORDS => share,
+        _ => WORDS,
+    }
+}
+
+/// A crowded cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crowd {
+    /// Its number.
+    pub(super) cell: usize,
+    /// Triangles that it lists.
+    pub(super) listed: u32,
+    /// Words that each of them brings.
+    pub(super) share: u64,
+}
+
+/// How a cell is divided: its triangles are sorted into this frame, in these groups, and each reference
+/// has this share left.
+pub(super) struct Plan {
+    pub(super) frame: Frame,
+    pub(super) groups: Groups,
+    pub(super) share: u64,
+}
 
 /// Shows the entries that a cell lists.
 ///
@@ -84,28 +114,36 @@ pub(super) fn plan<S: Simd>(
     scene: &Scene<'_>,
     frame: &Frame,
     entries: &[Entry],
-    cell: usize,
-    listed: u32,
+    crowd: &Crowd,
     benches: &mut [Bench<'_>],
-) -> Option<(Frame, Groups)> {
+) -> Option<Plan> {
     simd.vectorize(
         #[inline(always)]
         || {
             let (bench, deeper) = benches.split_first_mut()?;
-            let (frame, groups, wanted) =
-                collect(simd, scene, frame, entries, cell, listed, bench)?;
-            let Bench { cells, bricks, entries: inner, .. } = bench;
-            let (inner, cells) = (inner.get(..groups.count())?, cells.first_chunk_mut()?);
-            let block = tally(&groups, inner, cells, bricks);
-            let measure = measure(simd, cells, bricks, block);
-            // Whatever lists a triangle counts: this is what bounds the words of a mesh.
-            let references = u64::from(measure.references) + u64::from(measure.large);
-            // Triangles so small that they all lie in one part are for the next division.
-            let is_finer = wanted >= 2 * frame.cells && !deeper.is_empty();
-            let separates = 10 * u64::from(measure.longest.max(block)) <= 9 * u64::from(listed);
-            let most = if separates { MOST_GROWTH } else { 2 * u64::from(is_finer) };
-            let gains = references <= most * u64::from(listed);
-            gains.then_some((frame, groups))
+            let room = crowd.share * u64::from(crowd.listed);
+            let mut most = BLOCK;
+            loop {
+                let (inner, groups, wanted) =
+                    collect(simd, scene, frame, entries, crowd, most, bench)?;
+                let sorted = bench.entries.get(..groups.count())?;
+                let block = tally(&groups, sorted, bench.cells.first_chunk_mut()?, bench.bricks);
+                let measure = measure(simd, bench.cells, bench.bricks, block);
+                let rest = room.checked_sub(measure.words() as u64);
+                let Some(rest) = rest else {
+                    // Too many words: fewer parts.
+                    most = inner.cells / 2;
+                    continue;
+                };
+                let listed = u64::from(crowd.listed);
+                let separates = 10 * u64::from(measure.longest.max(block)) <= 9 * listed;
+                // Triangles so small that they all lie in one part are for the next division.
+                let is_finer = wanted >= 2 * inner.cells && !deeper.is_empty();
+                let is_no_more = u64::from(measure.references + measure.large) <= 2 * listed;
+                let share = rest / u64::from(measure.references.max(1));
+                let gains = separates || is_finer && is_no_more;
+                break gains.then_some(Plan { frame: inner, groups, share });
+            }
         },
     )
 }
@@ -116,16 +154,16 @@ const fn wholes(number: f64) -> u32 {
     number as u32
 }
 
-/// Puts the triangles of a cell on a bench, if they are small enough to divide it; tells into how many
-/// cells an axis they would.
+/// Puts the triangles of a cell on a bench, if they are small enough to divide it, into so many cells an
+/// axis at most; tells into how many they would.
 #[inline(always)]
 fn collect<S: Simd>(
     simd: S,
     scene: &Scene<'_>,
     frame: &Frame,
     entries: &[Entry],
-    cell: usize,
-    listed: u32,
+    &Crowd { cell, listed, .. }: &Crowd,
+    most: u32,
     bench: &mut Bench<'_>,
 ) -> Option<(Frame, Groups, u32)> {
     // The ids, and soon the entries, wait where cells will be counted, or behind the entries, if there is
@@ -161,8 +199,8 @@ fn collect<S: Simd>(
     let mean = sum / f64::from(listed);
     let width = (2.0 * mean).max(4.0 * f64::from(scene.lattice.margin().max_element()));
     let count = wholes(1.0 / (width * f64::from(frame.scale)));
-    let frame = frame.child(place(cell as u32), count.min(BLOCK));
-    if count < 2 {
+    let frame = frame.child(place(cell as u32), count.min(most));
+    if count.min(most) < 2 {
         return None;
     }
 

@@ -63,8 +63,7 @@ impl Extent {
         let (mut first, mut last) = ([PARTS - 1; 3], [0; 3]);
         for reach in ids.iter().filter_map(|&id| scene.reach(id)) {
             let reach = frame.zoom(&reach);
-            let parts =
-                Aabb { min: (reach.min - corner) * unit, max: (reach.max - corner) * unit };
+            let parts = Aabb { min: (reach.min - corner) * unit, max: (reach.max - corner) * unit };
             let range = cells_between(parts, [PARTS; 3]);
             for axis in 0..3 {
                 first[axis] = range.min[axis].min(first[axis]);

@@ -33,8 +33,8 @@ use crate::tasks::run;
 
 /// The most references of a mesh with so many triangles.
 pub(super) const fn reference_limit(triangles: u32) -> u64 {
-    /// Three times what scans need.
-    const PER_TRIANGLE: u64 = 8;
+    /// Half as many again as scans need.
+    const PER_TRIANGLE: u64 = 4;
     const AT_LEAST: u64 = 64;
     triangles as u64 * PER_TRIANGLE + AT_LEAST
 }

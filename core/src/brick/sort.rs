@@ -20,7 +20,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x8};
 
-use super::divide::{count_of_cell, plan};
+use super::divide::{Crowd, Plan, count_of_cell, plan};
 use super::extent::{EXTENT_WORDS, Extent, LIST_WORDS, Owner};
 use super::frame::{Frame, Scene};
 use super::groups::Groups;
@@ -51,7 +51,7 @@ pub(super) struct Measure {
 }
 
 impl Measure {
-    const fn words(&self) -> usize {
+    pub(super) const fn words(&self) -> usize {
         RECORD_WORDS * self.bricks as usize
             + self.cells as usize
             + (self.cells > 0) as usize
@@ -60,7 +60,8 @@ impl Measure {
     }
 }
 
-/// Sorts the entries of the first bench; what is crowded, on the benches behind it.
+/// Sorts the entries of the first bench; what is crowded, on the benches behind it, if its share of words
+/// for each reference lets it.
 ///
 /// It calls itself, so it is not inlined and says once more what vectors it is compiled for.
 pub(super) fn sort<S: Simd>(
@@ -69,11 +70,12 @@ pub(super) fn sort<S: Simd>(
     frame: &Frame,
     benches: &mut [Bench<'_>],
     groups: &Groups,
+    share: u64,
     pool: &mut Pool<'_>,
 ) -> Option<Block> {
     simd.vectorize(
         #[inline(always)]
-        || chunk(simd, scene, frame, benches, groups, pool),
+        || chunk(simd, scene, frame, benches, groups, share, pool),
     )
 }
 
@@ -84,6 +86,7 @@ fn chunk<S: Simd>(
     frame: &Frame,
     benches: &mut [Bench<'_>],
     groups: &Groups,
+    share: u64,
     pool: &mut Pool<'_>,
 ) -> Option<Block> {
     let (bench, deeper) = benches.split_first_mut()?;
@@ -101,14 +104,15 @@ fn chunk<S: Simd>(
             while crowded != 0 {
                 let bit = crowded.trailing_zeros() as usize;
                 crowded &= crowded - 1;
-                let (number, listed) = (8 * eighth + bit, eight.get(bit).copied().unwrap_or(0));
-                if plan(simd, scene, frame, entries, number, listed, deeper).is_none() {
+                let (cell, listed) = (8 * eighth + bit, eight.get(bit).copied().unwrap_or(0));
+                let crowd = Crowd { cell, listed, share };
+                if plan(simd, scene, frame, entries, &crowd, deeper).is_none() {
                     continue;
                 }
                 measure.lists -= listed;
                 measure.lists += CHILD_WORDS as u32;
-                if let Some(divided) = bench.divided.get_mut(number / MASK_BITS) {
-                    *divided |= 1 << (number % MASK_BITS);
+                if let Some(divided) = bench.divided.get_mut(cell / MASK_BITS) {
+                    *divided |= 1 << (cell % MASK_BITS);
                 }
             }
         }
@@ -129,11 +133,13 @@ fn chunk<S: Simd>(
             let Some(cell) = cells.get(number) else { continue };
             let at = base + cell;
             let listed = count_of_cell(simd, entries, number);
-            let Some((frame, groups)) = plan(simd, scene, frame, entries, number, listed, deeper)
+            let crowd = Crowd { cell: number, listed, share };
+            let Some(Plan { frame, groups, share }) =
+                plan(simd, scene, frame, entries, &crowd, deeper)
             else {
                 continue;
             };
-            let block = sort(simd, scene, &frame, deeper, &groups, pool)?;
+            let block = sort(simd, scene, &frame, deeper, &groups, share, pool)?;
             let [low, high] = block.mask;
             pool.set(at, &[low, high, block.base, block.list, frame.cells]);
         }
