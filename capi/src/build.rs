@@ -13,7 +13,7 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 ///
 /// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are for array declarations, and a little more for the
 /// default configuration. How much more than enough it is depends on the method: a scan takes a sixth of
-/// it or less with one level; with recursive and brick it is generous beyond use.
+/// it or less with one level, a twelfth with brick; with recursive it is generous beyond use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
 /// `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -49,7 +49,7 @@ pub unsafe extern "C" fn hgrid_bound(
 /// Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
 /// `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
 /// more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
-/// with variable; with recursive and brick it is a bound that no mesh comes near.
+/// with variable, 8 with brick; with recursive it is a bound that no mesh comes near.
 ///
 /// With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
 /// is 1. That takes about half the time of a build; with recursive and brick, which have to build

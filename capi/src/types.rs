@@ -84,8 +84,8 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 ///
 /// Memory: on scans about that of one level. How much index it takes shows only while it is written,
 /// and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch
-/// answers with a bound that no mesh comes near, and with more scratch than a build takes: ask with
-/// scratch, which gives the exact size.
+/// answers with what is enough, eight times as much for a scan, and with more scratch than a build takes;
+/// with scratch it gives the exact size.
 pub const HGRID_METHOD_BRICK: u32 = 5;
 
 /// The most levels of a recursive grid.
