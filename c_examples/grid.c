@@ -6,11 +6,11 @@
 #include <stdlib.h>
 
 const method METHODS[METHOD_COUNT] = {
-    {"one-level", HGRID_CONFIG_INIT},
+    {"brick", HGRID_CONFIG_INIT},
+    {"one-level", HGRID_CONFIG_INIT_ONE_LEVEL},
     {"fixed", HGRID_CONFIG_INIT_FIXED},
     {"variable", HGRID_CONFIG_INIT_VARIABLE},
     {"recursive", HGRID_CONFIG_INIT_RECURSIVE},
-    {"brick", HGRID_CONFIG_INIT_BRICK},
 };
 
 void check(hgrid_status status, const hgrid_report *report)
@@ -42,8 +42,8 @@ static bool is_planned(const hgrid_config *config)
  *
  * The question without scratch says enough for the index, not exactly what it takes: where memory
  * comes in pages, those that are never touched cost nothing. With the methods that find their size
- * while they write, enough is far too much, so they are asked again, with scratch, for up to the
- * time of a build. */
+ * while they write, enough is far more than that, so they are asked again, with scratch, for up to
+ * the time of a build. */
 static region allocate_grid(const hgrid_mesh *mesh, const hgrid_config *config, region *index)
 {
     hgrid_report report = HGRID_REPORT_INIT;

@@ -245,7 +245,7 @@ int main(int count, char **words)
     const mapped_options o = parse(count, words);
     scene s = load_scene(o.input);
     const hgrid_mesh mesh = mesh_of(&s);
-    const hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+    const hgrid_config config = HGRID_CONFIG_INIT;
     built_grid b = build_grid(&mesh, &config, 1, NULL);
     const size_t stored_bytes = store(o.grid_file, &b.grid);
     printf("stored     %lu bytes: %lu of grid, and a mesh of %lu triangles\n",

@@ -151,7 +151,7 @@ static shared_grid build(const mpi_options *o)
     shared_grid g;
     g.scene = load_scene(o->input);
     const hgrid_mesh mesh = mesh_of(&g.scene);
-    const hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+    const hgrid_config config = HGRID_CONFIG_INIT;
     const built_grid b = build_grid(&mesh, &config, 1, NULL);
     g.blob = b.index;
     g.blob.bytes = (size_t)b.report.index_bytes;

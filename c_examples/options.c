@@ -23,7 +23,7 @@ static const char HELP[] =
     "                     tests (of triangles) or steps (from cell to cell)\n"
     "\n"
     "the grid\n"
-    "  --method NAME      one-level, fixed, variable, recursive or brick; one-level\n"
+    "  --method NAME      brick, one-level, fixed, variable or recursive; brick\n"
     "  --density CELLS    for each triangle; not for brick\n"
     "  --cell-size FACTOR 2 makes cells twice as wide as usual; for brick\n"
     "\n"
@@ -33,7 +33,7 @@ static const char HELP[] =
     "  --progress         say how far it is, even where nobody sits at a terminal\n"
     "  --help             this text\n"
     "\n"
-    "Try: raytracer --method brick --shadows --ao 64 --threads 4\n"
+    "Try: raytracer --shadows --ao 64 --threads 4\n"
     "     raytracer --method fixed --heat steps -o steps.ppm\n";
 
 const char *value_of(int count, char **words, int *i)
@@ -67,7 +67,7 @@ static int parse_method(const char *value)
     for (int i = 0; i < METHOD_COUNT; i++)
         if (strcmp(value, METHODS[i].name) == 0)
             return i;
-    fail("--method is one-level, fixed, variable, recursive or brick, not `%s`", value);
+    fail("--method is brick, one-level, fixed, variable or recursive, not `%s`", value);
     return 0;
 }
 

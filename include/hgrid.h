@@ -76,16 +76,18 @@
  * A grid is built by one of five methods, which hgrid_config says; all of them answer every ray the
  * same, hit for hit and bit for bit.
  *
- *   HGRID_METHOD_ONE_LEVEL   the default: one hashed grid; the least memory for large meshes
+ *   HGRID_METHOD_BRICK       the default: cells as large as triangles, a bit for each: the shortest
+ *                            build, and no scene that it does not take
+ *   HGRID_METHOD_ONE_LEVEL   one hashed grid; the least memory for large scans, and for arrays of a
+ *                            fixed size
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
  *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
  *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
- *   HGRID_METHOD_BRICK       cells as large as triangles, a bit for each: the shortest build
  *
  *   hgrid_config config = HGRID_CONFIG_INIT_VARIABLE;
  *
- * The first two know the size of the index, to the byte, before they write it. The others find it
- * while they write: hgrid_sizes tells it in advance if it is given scratch, and an index that
+ * One level and fixed know the size of the index, to the byte, before they write it. The others find
+ * it while they write: hgrid_sizes tells it in advance if it is given scratch, and an index that
  * turns out to be too small is lost, see HGRID_ERROR_INDEX_TOO_SMALL.
  *
  * Pointers
@@ -104,7 +106,7 @@
  * need:
  *
  *   hgrid_config config = HGRID_CONFIG_INIT;
- *   config.density = 8;
+ *   config.cell_size = 0.5f;
  *
  * A later version may add fields at the end, where 0 means what was before. A larger struct from a
  * program that was compiled with a later header is accepted as long as all that this version does
@@ -165,15 +167,28 @@
 
 /**
  * Bytes of index that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. A scan takes a sixth of it or less.
+ * default configuration: a constant expression. A scan takes a twelfth of it.
  */
-#define HGRID_INDEX_BOUND(triangles) ((size_t)85 * (triangles) + 1280)
+#define HGRID_INDEX_BOUND(triangles) \
+    ((triangles) < 224 ? (size_t)177 * (triangles) + 3584 : (size_t)129 * (triangles) + 14336)
 
 /**
  * Bytes of scratch that are enough for any mesh with so many triangles, wherever they lie, with the
  * default configuration: a constant expression.
  */
-#define HGRID_SCRATCH_BOUND(triangles) ((size_t)5 * (triangles) + 1024)
+#define HGRID_SCRATCH_BOUND(triangles) \
+    ((triangles) < 129 ? (size_t)41 * (triangles) + 18944 : (size_t)57 * (triangles) + 53376)
+
+/**
+ * The same with `HGRID_CONFIG_INIT_ONE_LEVEL`, which wants less for arrays of a fixed size: bytes of
+ * index. A scan takes a sixth of it or less.
+ */
+#define HGRID_INDEX_BOUND_ONE_LEVEL(triangles) ((size_t)85 * (triangles) + 1280)
+
+/**
+ * The same with `HGRID_CONFIG_INIT_ONE_LEVEL`, bytes of scratch.
+ */
+#define HGRID_SCRATCH_BOUND_ONE_LEVEL(triangles) ((size_t)5 * (triangles) + 1024)
 
 /**
  * The id that no triangle has.
@@ -213,7 +228,7 @@
  * is at its best where triangles are of similar size and everywhere, and slow where all detail is
  * in a few places of a large scene.
  *
- * Memory: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. The build plans every byte in
+ * Memory: `HGRID_INDEX_BOUND_ONE_LEVEL` and `HGRID_SCRATCH_BOUND_ONE_LEVEL` hold for it. The build plans every byte in
  * the scratch before it writes the index.
  */
 #define HGRID_METHOD_ONE_LEVEL 1
@@ -262,13 +277,13 @@
  *
  * Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
  * detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
- * Choose it for the shortest build and the first image, and for tiles of rays through
- * `hgrid_intersect_n`. `cell_size` belongs to it, `density` does not.
+ * It is the default: the shortest build, the first image, tiles of rays through `hgrid_intersect_n`, and
+ * scenes of which nobody knows what is in them. `cell_size` belongs to it, `density` does not.
  *
- * Memory: on scans about that of one level. How much index it takes shows only while it is written,
+ * Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. How much index it takes shows only while it is written,
  * and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch
- * answers with a bound that no mesh comes near, and with more scratch than a build takes: ask with
- * scratch, which gives the exact size.
+ * answers with what is enough, eight times as much for a scan, and with more scratch than a build takes;
+ * with scratch it gives the exact size.
  */
 #define HGRID_METHOD_BRICK 5
 
@@ -339,8 +354,8 @@ typedef void (*hgrid_task)(void *task_context, uint32_t index);
 
 /**
  * What a build may be told: which grid, and how to go about it. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
- * or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`,
- * `_BRICK`.
+ * or with the macro of another method: `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`,
+ * `_RECURSIVE`.
  *
  * Each macro sets all fields to what the method's authors use. To change the method later, set
  * `method` and `density`: a field that belongs to another method is not looked at.
@@ -1064,7 +1079,7 @@ extern "C" {
  *
  * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are for array declarations, and a little more for the
  * default configuration. How much more than enough it is depends on the method: a scan takes a sixth of
- * it or less with one level; with recursive and brick it is generous beyond use.
+ * it or less with one level, a twelfth with brick; with recursive it is generous beyond use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
  * `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -1089,7 +1104,7 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
  * `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
  * more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
- * with variable; with recursive and brick it is a bound that no mesh comes near.
+ * with variable, 8 with brick; with recursive it is a bound that no mesh comes near.
  *
  * With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
  * is 1. That takes about half the time of a build; with recursive and brick, which have to build
@@ -1228,7 +1243,7 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * static hgrid_status build_on_threads(const hgrid_mesh *mesh, void *index, size_t index_bytes,
  *                                      void *scratch, size_t scratch_bytes, hgrid_grid *grid)
  * {
- *     hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+ *     hgrid_config config = HGRID_CONFIG_INIT;
  *     config.tasks = 8, config.run = run_on_threads;
  *     return hgrid_build(mesh, &config, index, index_bytes, scratch, scratch_bytes, grid, NULL);
  * }
@@ -1681,9 +1696,15 @@ const char *hgrid_version_string(void);
 #define HGRID_MESH_INIT {sizeof(hgrid_mesh), HGRID_INDEX_U32, NULL, 0, 0, NULL, 0, 0, NULL, 0}
 
 /**
- * The default configuration: one level.
+ * The default configuration: a brick grid.
  */
-#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 6, 16, 3, 1.0f, 0, \
+#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_BRICK, 4.0f, 6, 16, 3, 1.0f, 0, \
+                           1, 0, NULL, NULL, NULL}
+
+/**
+ * The usual configuration of a grid of one level.
+ */
+#define HGRID_CONFIG_INIT_ONE_LEVEL {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 6, 16, 3, 1.0f, 0, \
                            1, 0, NULL, NULL, NULL}
 
 /**
@@ -1702,12 +1723,6 @@ const char *hgrid_version_string(void);
  * The usual configuration of a recursive grid.
  */
 #define HGRID_CONFIG_INIT_RECURSIVE {sizeof(hgrid_config), HGRID_METHOD_RECURSIVE, 8.0f, 6, 16, 3, 1.0f, 0, \
-                           1, 0, NULL, NULL, NULL}
-
-/**
- * The usual configuration of a brick grid.
- */
-#define HGRID_CONFIG_INIT_BRICK {sizeof(hgrid_config), HGRID_METHOD_BRICK, 4.0f, 6, 16, 3, 1.0f, 0, \
                            1, 0, NULL, NULL, NULL}
 
 /**

@@ -106,6 +106,16 @@ inline constexpr std::size_t scratch_bound(std::size_t triangles) noexcept
 {
     return HGRID_SCRATCH_BOUND(triangles);
 }
+/// The same with `method::one_level`, which wants less for arrays of a fixed size: bytes of index.
+inline constexpr std::size_t one_level_index_bound(std::size_t triangles) noexcept
+{
+    return HGRID_INDEX_BOUND_ONE_LEVEL(triangles);
+}
+/// The same with `method::one_level`, bytes of scratch.
+inline constexpr std::size_t one_level_scratch_bound(std::size_t triangles) noexcept
+{
+    return HGRID_SCRATCH_BOUND_ONE_LEVEL(triangles);
+}
 #if defined(__GNUC__)
 #pragma GCC diagnostic pop
 #endif
@@ -565,18 +575,18 @@ private:
 class config {
 public:
     /// The usual numbers of a method.
-    config(method of = method::one_level) noexcept
+    config(method of = method::brick) noexcept
     {
+        static constexpr ::hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
         static constexpr ::hgrid_config fixed = HGRID_CONFIG_INIT_FIXED;
         static constexpr ::hgrid_config variable = HGRID_CONFIG_INIT_VARIABLE;
         static constexpr ::hgrid_config recursive = HGRID_CONFIG_INIT_RECURSIVE;
-        static constexpr ::hgrid_config brick = HGRID_CONFIG_INIT_BRICK;
         switch (of) {
-        case method::one_level: break;
+        case method::one_level: raw_ = one_level; break;
         case method::fixed: raw_ = fixed; break;
         case method::variable: raw_ = variable; break;
         case method::recursive: raw_ = recursive; break;
-        case method::brick: raw_ = brick; break;
+        case method::brick: break;
         }
     }
 
@@ -1022,7 +1032,7 @@ public:
 private:
     grid(const view &built, memory blob) noexcept : view(built), blob_(std::move(blob)) {}
 
-    // Bytes of index that most meshes take. What is certainly enough may be a hundred times as much
+    // Bytes of index that most meshes take. What is certainly enough may be ten or a hundred times as much
     // where the index finds its size while it is written.
     static std::uint64_t usual_bytes(const mesh &of, const config &how) noexcept
     {
@@ -1030,7 +1040,7 @@ private:
         switch (method{how.raw_.method}) {
         case method::variable: return 96 * triangles + 4096;
         case method::recursive: return 160 * triangles + 4096;
-        case method::brick: return 24 * triangles + 4096;
+        case method::brick: return 16 * triangles + 4096;
         default: return std::numeric_limits<std::uint64_t>::max();
         }
     }

@@ -223,7 +223,7 @@ pub unsafe extern "C" fn hgrid_fit(
 /// static hgrid_status build_on_threads(const hgrid_mesh *mesh, void *index, size_t index_bytes,
 ///                                      void *scratch, size_t scratch_bytes, hgrid_grid *grid)
 /// {
-///     hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+///     hgrid_config config = HGRID_CONFIG_INIT;
 ///     config.tasks = 8, config.run = run_on_threads;
 ///     return hgrid_build(mesh, &config, index, index_bytes, scratch, scratch_bytes, grid, NULL);
 /// }

@@ -38,7 +38,7 @@ pub const HGRID_INDEX_U16: u32 = 1;
 /// is at its best where triangles are of similar size and everywhere, and slow where all detail is
 /// in a few places of a large scene.
 ///
-/// Memory: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. The build plans every byte in
+/// Memory: `HGRID_INDEX_BOUND_ONE_LEVEL` and `HGRID_SCRATCH_BOUND_ONE_LEVEL` hold for it. The build plans every byte in
 /// the scratch before it writes the index.
 pub const HGRID_METHOD_ONE_LEVEL: u32 = 1;
 
@@ -79,10 +79,10 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 ///
 /// Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
 /// detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
-/// Choose it for the shortest build and the first image, and for tiles of rays through
-/// `hgrid_intersect_n`. `cell_size` belongs to it, `density` does not.
+/// It is the default: the shortest build, the first image, tiles of rays through `hgrid_intersect_n`, and
+/// scenes of which nobody knows what is in them. `cell_size` belongs to it, `density` does not.
 ///
-/// Memory: on scans about that of one level. How much index it takes shows only while it is written,
+/// Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. How much index it takes shows only while it is written,
 /// and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch
 /// answers with what is enough, eight times as much for a scan, and with more scratch than a build takes;
 /// with scratch it gives the exact size.
@@ -141,8 +141,8 @@ pub struct hgrid_mesh {
 }
 
 /// What a build may be told: which grid, and how to go about it. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
-/// or with the macro of another method: `HGRID_CONFIG_INIT_FIXED`, `_VARIABLE`, `_RECURSIVE`,
-/// `_BRICK`.
+/// or with the macro of another method: `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`,
+/// `_RECURSIVE`.
 ///
 /// Each macro sets all fields to what the method's authors use. To change the method later, set
 /// `method` and `density`: a field that belongs to another method is not looked at.

@@ -11,7 +11,6 @@ use crate::recursive::MAX_DEPTH;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Method {
     /// One level, row displacement compression (Lagae and Dutré 2008; the paper's baseline).
-    #[default]
     OneLevel = 1,
     /// A fine one-level grid under macrocell levels (the paper's multi-level fixed grid, §3.2).
     Fixed = 2,
@@ -20,7 +19,9 @@ pub enum Method {
     Variable = 3,
     /// An uncompressed recursive grid, as in the Manta ray tracer: what the paper compares with.
     Recursive = 4,
-    /// Occupancy masks and ranks, cells as large as triangles: this project's own.
+    /// Occupancy masks and ranks, cells as large as triangles: this project's own, with the shortest
+    /// build and the least trouble with triangles of all sizes.
+    #[default]
     Brick = 5,
 }
 

@@ -153,10 +153,13 @@ pub fn sizes_with(
 /// [`sizes`].
 ///
 /// ```
-/// use hgrid_core::{Config, TriangleMesh, fit};
+/// use hgrid_core::{Block, Config, TriangleMesh, fit, sizes};
 /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 /// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-/// let (config, sizes) = fit(&mesh, &Config::default(), 10_000, &mut [])?;
+/// let enough = sizes(&mesh, &Config::default(), &mut [])?;
+/// let mut scratch = vec![Block::ZERO; Block::count_for(enough.scratch_bytes)];
+/// let scratch = Block::bytes_mut(&mut scratch);
+/// let (config, sizes) = fit(&mesh, &Config::default(), 10_000, scratch)?;
 /// assert!(config == Config::default() && sizes.index_bytes <= 10_000);
 /// # Ok::<(), hgrid_core::Error>(())
 /// ```

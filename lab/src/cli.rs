@@ -35,7 +35,7 @@ Examples:
 const RENDER_EXAMPLES: &str = "\
 Examples:
   hgrid render bunny.ply -o bunny.png        a mesh of yours, seen from the front
-  hgrid render bunny.ply --density 8         more cells: fewer tests, more steps, more memory
+  hgrid render bunny.ply --cell-size 0.8     smaller cells: fewer tests, more steps, more memory
   hgrid render bunny.ply --method fixed --macrocell-factor 4
   hgrid render bunny.ply --shading heat      what each ray costs, from blue to red
   hgrid render bunny.ply --shading heat --counter primitive-tests --heat-top 50
@@ -136,7 +136,7 @@ pub struct RenderArgs {
     /// The structure to build
     #[arg(long, value_parser = method_parser(), default_value = Method::default().name())]
     pub method: Method,
-    /// Cells per triangle [default: the paper's for the method]
+    /// Cells per triangle, for other methods than brick [default: the paper's for the method]
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true)]
     pub density: Option<f32>,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
@@ -238,7 +238,7 @@ pub struct AnimateArgs {
           value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
     /// The structure to build
-    #[arg(long, value_parser = method_parser(), default_value = Method::Brick.name())]
+    #[arg(long, value_parser = method_parser(), default_value = Method::default().name())]
     pub method: Method,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]

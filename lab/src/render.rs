@@ -122,9 +122,10 @@ mod tests {
     #[test]
     fn failures_leave_no_picture_and_name_the_cause() {
         let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-        let cases: [(&[&str], _, &str); 3] = [
+        let cases: [(&[&str], _, &str); 4] = [
             (&["procedural:teapot"], None, "knot, stage, soup"),
-            (&["--density", "-1"], Some(("a.obj", triangle)), "density"),
+            (&["--method", "fixed", "--density", "-1"], Some(("a.obj", triangle)), "density"),
+            (&["--density", "8"], Some(("c.obj", triangle)), "brick grid has no density"),
             (&[], Some(("b.ply", triangle)), "not a PLY file"),
         ];
         for (at, (words, file, expected)) in cases.into_iter().enumerate() {

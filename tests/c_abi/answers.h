@@ -290,7 +290,7 @@ static hgrid_mesh scattered(const hgrid_mesh *mesh)
 
 static void check_config(table *t, const test_case *c, bool is_scattered)
 {
-    hgrid_config config = HGRID_CONFIG_INIT;
+    hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL;
     const size_t config_bytes = offsetof(hgrid_config, tasks) - offsetof(hgrid_config, method);
     static hgrid_counters expected[GROUPS_AT_MOST][2], work[GROUPS_AT_MOST][2];
     memcpy(&config.method, next(t, config_bytes), config_bytes);

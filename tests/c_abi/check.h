@@ -122,9 +122,9 @@ enum { METHODS = 5 };
 
 static inline hgrid_config usual(int method)
 {
-    const hgrid_config all[METHODS] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
+    const hgrid_config all[METHODS] = {HGRID_CONFIG_INIT_ONE_LEVEL, HGRID_CONFIG_INIT_FIXED,
                                        HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
-                                       HGRID_CONFIG_INIT_BRICK};
+                                       HGRID_CONFIG_INIT};
     return all[method];
 }
 

@@ -17,7 +17,7 @@ int main(void)
     static sheet data;
     make_sheet(&data);
     const hgrid_mesh mesh = mesh_of(&data);
-    const hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+    const hgrid_config config = HGRID_CONFIG_INIT;
     const hgrid_report need = exact_sizes(&mesh, &config);
     void *scratch = guarded(need.scratch_bytes);
     void *index[2] = {guarded(need.index_bytes), guarded(need.index_bytes)};

@@ -275,7 +275,7 @@ static void structs_are_checked(void)
 static void what_a_build_refuses_is_refused(void)
 {
     arena a = new_arena();
-    hgrid_config config = HGRID_CONFIG_INIT;
+    hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL;
     config.method = 99;
     refuse(HGRID_ERROR_INVALID_METHOD, &mesh, &config, &a);
     static sheet broken;

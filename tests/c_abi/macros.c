@@ -9,8 +9,8 @@ HGRID_ALIGNED unsigned char scratch_region[HGRID_SCRATCH_BOUND(3)];
 
 static hgrid_mesh mesh = HGRID_MESH_INIT;
 static const hgrid_config config = HGRID_CONFIG_INIT;
-static const hgrid_config others[] = {HGRID_CONFIG_INIT_FIXED, HGRID_CONFIG_INIT_VARIABLE,
-                                      HGRID_CONFIG_INIT_RECURSIVE, HGRID_CONFIG_INIT_BRICK};
+static const hgrid_config others[] = {HGRID_CONFIG_INIT_ONE_LEVEL, HGRID_CONFIG_INIT_FIXED,
+                                      HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE};
 
 #if HGRID_VERSION < 0x000100 || HGRID_BLOB_VERSION < 1 || HGRID_ALIGNMENT != 64 || HGRID_MAX_DEPTH < 1 || \
     HGRID_MAX_TASKS != 64

@@ -143,6 +143,9 @@ static void indices_of_16_bits_are_read_as_such(void)
     }
 }
 
+/* What plans every byte before it writes one. */
+static const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
+
 static void one_byte_less_is_refused_and_nothing_is_touched(void)
 {
     unsigned char *index = (unsigned char *)guarded(need.index_bytes);
@@ -152,7 +155,7 @@ static void one_byte_less_is_refused_and_nothing_is_touched(void)
 
     hgrid_report report = HGRID_REPORT_INIT;
     EXPECT(HGRID_ERROR_INDEX_TOO_SMALL,
-           hgrid_build(&tight, NULL, index, need.index_bytes - 1, scratch, need.scratch_bytes,
+           hgrid_build(&tight, &one_level, index, need.index_bytes - 1, scratch, need.scratch_bytes,
                        &grid, &report));
     CHECK(report.index_bytes == need.index_bytes && report.is_exact == 1);
     CHECK(report.scratch_bytes == need.scratch_bytes);
@@ -160,7 +163,7 @@ static void one_byte_less_is_refused_and_nothing_is_touched(void)
 
     const size_t less = (size_t)need.scratch_bytes - 1;
     memset(scratch, 0xc7, need.scratch_bytes);
-    EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL, hgrid_build(&tight, NULL, index, need.index_bytes,
+    EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL, hgrid_build(&tight, &one_level, index, need.index_bytes,
                                                       scratch, less, &grid, &report));
     CHECK(report.scratch_bytes == need.scratch_bytes);
     CHECK(report.index_bytes >= need.index_bytes && report.is_exact == 0);
@@ -168,9 +171,9 @@ static void one_byte_less_is_refused_and_nothing_is_touched(void)
 
     /* With nothing at all, the report names enough of both. */
     EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL,
-           hgrid_build(&tight, NULL, NULL, 0, NULL, 0, &grid, &report));
+           hgrid_build(&tight, &one_level, NULL, 0, NULL, 0, &grid, &report));
     CHECK(report.scratch_bytes == need.scratch_bytes && report.index_bytes >= need.index_bytes);
-    EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_build(&tight, NULL, NULL, 0, scratch,
+    EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_build(&tight, &one_level, NULL, 0, scratch,
                                                     need.scratch_bytes, &grid, &report));
     CHECK(report.index_bytes == need.index_bytes && report.is_exact == 1);
 
@@ -185,9 +188,9 @@ static void what_is_more_than_needed_is_not_touched(void)
     unsigned char *scratch = (unsigned char *)guarded(need.scratch_bytes + more);
     hgrid_grid grid;
     hgrid_report report = HGRID_REPORT_INIT;
-    EXPECT(HGRID_OK, hgrid_sizes(&tight, NULL, scratch, need.scratch_bytes + more, &report));
+    EXPECT(HGRID_OK, hgrid_sizes(&tight, &one_level, scratch, need.scratch_bytes + more, &report));
     CHECK(report.index_bytes == need.index_bytes && report.is_exact == 1);
-    EXPECT(HGRID_OK, hgrid_build(&tight, NULL, index, need.index_bytes + more, scratch,
+    EXPECT(HGRID_OK, hgrid_build(&tight, &one_level, index, need.index_bytes + more, scratch,
                                  need.scratch_bytes + more, &grid, &report));
     CHECK(memcmp(index, expected_blob, need.index_bytes) == 0);
     CHECK(all_bytes_are(index + need.index_bytes, more, 0xc7));
@@ -204,7 +207,7 @@ static void regions_may_hold_anything(void)
         if (fill > 0)
             memset(index, fill == 1 ? 0 : 0xff, need.index_bytes + need.scratch_bytes);
         hgrid_grid grid;
-        EXPECT(HGRID_OK, hgrid_build(&tight, NULL, index, need.index_bytes,
+        EXPECT(HGRID_OK, hgrid_build(&tight, &one_level, index, need.index_bytes,
                                      index + need.index_bytes, need.scratch_bytes, &grid, NULL));
         CHECK(memcmp(index, expected_blob, need.index_bytes) == 0);
         EXPECT(HGRID_OK, hgrid_validate(&grid));

@@ -10,7 +10,7 @@ enum { WIDE = 60, WIDE_VERTICES = (WIDE + 1) * (WIDE + 1), WIDE_TRIANGLES = 2 * 
 static float positions[WIDE_VERTICES][3];
 static uint32_t indices[WIDE_TRIANGLES][3];
 static hgrid_mesh mesh;
-static const hgrid_config serially = HGRID_CONFIG_INIT_BRICK;
+static const hgrid_config serially = HGRID_CONFIG_INIT;
 static size_t serial_bytes;
 static unsigned char *serial;
 
@@ -179,7 +179,7 @@ static void any_number_of_tasks_builds_the_same_bytes(void)
 
 static void other_methods_call_nothing(void)
 {
-    const hgrid_config others[] = {HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_FIXED,
+    const hgrid_config others[] = {HGRID_CONFIG_INIT_ONE_LEVEL, HGRID_CONFIG_INIT_FIXED,
                                    HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE};
     plan p = plan_of(NEVER, 0);
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {

@@ -11,12 +11,13 @@ static void build(void)
 {
     make_sheet(&mesh_data);
     const hgrid_mesh mesh = mesh_of(&mesh_data);
-    const hgrid_report need = exact_sizes(&mesh, NULL);
+    const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
+    const hgrid_report need = exact_sizes(&mesh, &one_level);
     blob = guarded(need.index_bytes);
     void *scratch = guarded(need.scratch_bytes);
     hgrid_report report = HGRID_REPORT_INIT;
-    EXPECT(HGRID_OK, hgrid_build(&mesh, NULL, blob, need.index_bytes, scratch, need.scratch_bytes,
-                                 &grid, &report));
+    EXPECT(HGRID_OK, hgrid_build(&mesh, &one_level, blob, need.index_bytes, scratch,
+                                 need.scratch_bytes, &grid, &report));
     CHECK(report.index_bytes == need.index_bytes && report.is_exact == 1);
     CHECK(report.scratch_bytes == need.scratch_bytes);
     CHECK(report.triangle == HGRID_INVALID_ID && report.skipped_count == 0);

@@ -43,7 +43,7 @@ static hgrid_report refuse_sizes(hgrid_status expected, const hgrid_mesh *input,
 static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
                            const hgrid_config *config)
 {
-    const hgrid_config before = HGRID_CONFIG_INIT_BRICK;
+    const hgrid_config before = HGRID_CONFIG_INIT;
     hgrid_config fitted = before;
     EXPECT(expected, hgrid_fit(input, config, index_bytes, region_2, scratch_bytes, &fitted, NULL));
     CHECK(memcmp(&fitted, &before, sizeof fitted) == 0);
@@ -74,12 +74,12 @@ static void unknown_values_are_errors(void)
 {
     const uint32_t unknown[] = {0, 6, 100, 0x7fffffffu, 0x80000000u, UINT32_MAX};
     for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) {
-        hgrid_config config = HGRID_CONFIG_INIT;
+        hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL;
         config.method = unknown[i];
         refuse_config(HGRID_ERROR_INVALID_METHOD, &config);
         /* All of them have a bit that no flag has. */
         if (unknown[i] != 0) {
-            hgrid_config flags = HGRID_CONFIG_INIT;
+            hgrid_config flags = HGRID_CONFIG_INIT_ONE_LEVEL;
             flags.flags = unknown[i];
             refuse_config(HGRID_ERROR_INVALID_FLAGS, &flags);
             hgrid_mesh input = mesh;
@@ -90,7 +90,7 @@ static void unknown_values_are_errors(void)
     /* These are too much for this mesh, but less is not; the others are for any (see below). */
     const float densities[] = {1e30f, FLT_MAX};
     for (size_t i = 0; i < sizeof densities / sizeof *densities; i++) {
-        hgrid_config config = HGRID_CONFIG_INIT;
+        hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL;
         config.density = densities[i];
         refuse_sizes(HGRID_ERROR_INVALID_DENSITY, &mesh, &config);
         EXPECT(HGRID_OK, hgrid_fit(&mesh, &config, index_bytes, region_2, scratch_bytes, &config, NULL));
@@ -177,7 +177,7 @@ static void impossible_arrays_are_refused(void)
 
 static void bad_triangles_are_named(void)
 {
-    hgrid_config strict = HGRID_CONFIG_INIT;
+    hgrid_config strict = HGRID_CONFIG_INIT_ONE_LEVEL;
     strict.flags = HGRID_BUILD_STRICT;
     static sheet bad;
     const hgrid_mesh input = mesh_of(&bad);

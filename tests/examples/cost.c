@@ -75,6 +75,6 @@ hgrid_status build(const float (*positions)[3], size_t vertex_count, const uint3
     mesh.vertex_count = vertex_count;
     mesh.indices = indices, mesh.index_stride = sizeof *indices;
     mesh.triangle_count = triangle_count;
-    const hgrid_config config = HGRID_CONFIG_INIT_BRICK;
+    const hgrid_config config = HGRID_CONFIG_INIT;
     return hgrid_build(&mesh, &config, index, index_bytes, scratch, scratch_bytes, grid, NULL);
 }

@@ -158,7 +158,7 @@ fn the_bound_is_one() {
         }
     }
     for density in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert_eq!(Sizes::bound(1, &Config { density, ..Config::default() }), None);
+        assert_eq!(Sizes::bound(1, &Config { density, ..Config::new(Method::OneLevel) }), None);
     }
 }
 
