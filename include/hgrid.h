@@ -282,7 +282,7 @@
  *
  * Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. How much index it takes shows only while it is written,
  * and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch
- * answers with what is enough, eight times as much for a scan, and with more scratch than a build takes;
+ * answers with what is enough, seven times as much for a scan, and with more scratch than a build takes;
  * with scratch it gives the exact size.
  */
 #define HGRID_METHOD_BRICK 5
@@ -1104,7 +1104,7 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
  * `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
  * more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
- * with variable, 8 with brick; with recursive it is a bound that no mesh comes near.
+ * with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
  *
  * With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
  * is 1. That takes about half the time of a build; with recursive and brick, which have to build

@@ -49,7 +49,7 @@ pub unsafe extern "C" fn hgrid_bound(
 /// Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
 /// `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
 /// more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
-/// with variable, 8 with brick; with recursive it is a bound that no mesh comes near.
+/// with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
 ///
 /// With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
 /// is 1. That takes about half the time of a build; with recursive and brick, which have to build

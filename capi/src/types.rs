@@ -84,7 +84,7 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 ///
 /// Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. How much index it takes shows only while it is written,
 /// and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch
-/// answers with what is enough, eight times as much for a scan, and with more scratch than a build takes;
+/// answers with what is enough, seven times as much for a scan, and with more scratch than a build takes;
 /// with scratch it gives the exact size.
 pub const HGRID_METHOD_BRICK: u32 = 5;
 

@@ -92,7 +92,7 @@ impl Sizes {
 ///
 /// With an empty `scratch` the answer takes two passes over the triangles, one more for each halving
 /// of the density, and `index_bytes` is enough: for a scan up to twice what one level takes, four
-/// times what a fixed grid takes, eight times what a brick grid takes, for the others a generous multiple. With `scratch_bytes` of
+/// times what a fixed grid takes, seven times what a brick grid takes, for the others a generous multiple. With `scratch_bytes` of
 /// scratch (same alignment rule as for a build) the grid is planned in it and `index_bytes` is exact,
 /// for about half the time of a build, up to all of it for the others. The scratch
 /// holds nothing of use afterwards.
