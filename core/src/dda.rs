@@ -47,16 +47,21 @@ pub(crate) struct Walk {
     /// Distance at which it was entered.
     pub(crate) entered: f32,
     /// Distance at which the ray leaves the cell through its border on each axis.
-    next: [f32; 3],
+    pub(crate) next: [f32; 3],
+    /// Distance at which the ray leaves the walk's last cell on each axis.
+    exits: [f32; 3],
     /// Distance from one border to the next, negative where the ray runs downwards.
     delta: [f32; 3],
     /// Distance of the border through which the ray leaves cell 0; infinite if parallel.
     base: [f32; 3],
     /// What to add to the cell on each axis: 1 or, in wrapping arithmetic, -1.
     step: [u32; 3],
-    /// The first cell on each axis that the walk does not enter.
-    outside: [u32; 3],
+    /// The last cell on each axis that the walk enters.
+    last: [u32; 3],
 }
+
+/// The exits of a walk that only the end of the ray ends.
+pub(crate) const NEVER: [f32; 3] = [f32::INFINITY; 3];
 
 /// What became of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -152,7 +157,7 @@ impl Line {
         let [near, far] = self.inside(&Aabb { min: Vec3A::ZERO, max: cells });
         let near = entered.max(near);
         let last = resolution.map(|cells| cells.saturating_sub(1));
-        (near <= far).then(|| self.walk(near, 1.0, [0; 3], last))
+        (near <= far).then(|| self.walk(near, 1.0, [0; 3], last, [far; 3]))
     }
 
     /// Whether the line comes to a box before a distance, or along its border: one that is given in
@@ -181,27 +186,39 @@ impl Line {
     }
 
     /// A walk from a distance on through the cells `min..=max`, each `size` cells of the lattice
-    /// wide.
+    /// wide, which ends where the ray passes `exits`.
+    ///
+    /// They are those of the larger cell around these ([`Walk::next`]), not computed from these: along a
+    /// border that the ray hardly crosses the two differ by many cells, and between them would be a gap.
     #[inline(always)]
-    pub(crate) fn walk(&self, from: f32, size: f32, min: [u32; 3], max: [u32; 3]) -> Walk {
+    pub(crate) fn walk(
+        &self,
+        from: f32,
+        size: f32,
+        min: [u32; 3],
+        max: [u32; 3],
+        exits: [f32; 3],
+    ) -> Walk {
         // All axes at once: a ray begins many walks, and most are short.
         let position = (self.position + self.rate * from) / size;
         let (low, high) = (Vec3A::from_array(min.map(as_f32)), Vec3A::from_array(max.map(as_f32)));
         let cell = position.max(low).min(high).trunc();
         let delta = self.delta * size;
         let base = self.base + self.delta.max(Vec3A::ZERO) * size;
-        let next = base + cell * delta;
+        let last = Vec3A::select(delta.cmpgt(Vec3A::ZERO), high, low);
+        let exit = Vec3A::from_array(exits);
+        let next = Vec3A::select(cell.cmpeq(last), exit, base + cell * delta);
+        let whole =
+            |cells: Vec3A| (cells + WHOLE_SHIFT).to_array().map(|cell| cell.to_bits() & WHOLE_BITS);
         Walk {
-            cell: (cell + WHOLE_SHIFT).to_array().map(|cell| cell.to_bits() & WHOLE_BITS),
+            cell: whole(cell),
             entered: from,
             next: next.to_array(),
+            exits,
             delta: delta.to_array(),
             base: base.to_array(),
             step: self.step,
-            outside: core::array::from_fn(|axis| match self.step[axis] {
-                1 => max[axis].wrapping_add(1),
-                _ => min[axis].wrapping_sub(1),
-            }),
+            last: whole(last),
         }
     }
 }
@@ -232,14 +249,18 @@ impl Walk {
         if !is_before {
             return Step::Ended;
         }
+        if self.cell[AXIS] == self.last[AXIS] {
+            return Step::Outside;
+        }
         self.cell[AXIS] = self.cell[AXIS].wrapping_add(self.step[AXIS]);
         self.aim(AXIS);
-        if self.cell[AXIS] == self.outside[AXIS] { Step::Outside } else { Step::Inside }
+        Step::Inside
     }
 
     /// Computes the distance to the next border on an axis from the cell.
     #[inline(always)]
     fn aim(&mut self, axis: usize) {
-        self.next[axis] = self.base[axis] + as_f32(self.cell[axis]) * self.delta[axis];
+        let next = self.base[axis] + as_f32(self.cell[axis]) * self.delta[axis];
+        self.next[axis] = if self.cell[axis] == self.last[axis] { self.exits[axis] } else { next };
     }
 }

@@ -138,7 +138,7 @@ pub(super) fn plan<S: Simd>(
                 let listed = u64::from(crowd.listed);
                 let separates = 10 * u64::from(measure.longest.max(block)) <= 9 * listed;
                 // Triangles so small that they all lie in one part are for the next division.
-                let is_finer = wanted >= 2 * inner.cells && !deeper.is_empty();
+                let is_finer = wanted >= 2 * BLOCK && !deeper.is_empty();
                 let is_no_more = u64::from(measure.references + measure.large) <= 2 * listed;
                 let share = rest / u64::from(measure.references.max(1));
                 let gains = separates || is_finer && is_no_more;

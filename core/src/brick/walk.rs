@@ -7,7 +7,7 @@ use super::layout::{BLOCK, mask, number};
 use super::{Brick, Chunk, Content, Large};
 use crate::cell::as_f32;
 use crate::counters::Tally;
-use crate::dda::{Line, Step};
+use crate::dda::{Line, NEVER, Step, Walk};
 use crate::eight::{Eight, LANES};
 use crate::mesh::TriangleMesh;
 use crate::search::{Outcome, Search};
@@ -47,6 +47,8 @@ struct Part<'a, 'l> {
     corner: [u32; 3],
     /// Its last one.
     last: [u32; 3],
+    /// The distances at which the line leaves it.
+    exits: [f32; 3],
     /// How often it may be divided: damaged bytes may say for ever.
     depth: u32,
 }
@@ -74,7 +76,8 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
             }
         }
         let line = self.line;
-        let mut walk = line.walk(0.0, as_f32(BLOCK), [0; 3], brick.width.map(|blocks| blocks - 1));
+        let last = brick.width.map(|blocks| blocks - 1);
+        let mut walk = line.walk(0.0, as_f32(BLOCK), [0; 3], last, NEVER);
         loop {
             self.tally.cell_step();
             if let Some(chunk) = brick.block(walk.cell) {
@@ -86,7 +89,8 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
                     let corner = walk.cell.map(|block| block * BLOCK);
                     let last =
                         core::array::from_fn(|axis| (corner[axis] + 15).min(brick.last[axis]));
-                    self.part(simd, &Part { chunk, line, corner, last, depth: 2 }, walk.entered);
+                    let part = Part { chunk, line, corner, last, exits: walk.next, depth: 2 };
+                    self.part(simd, &part, walk.entered);
                 }
             }
             if walk.advance(self.limit) != Step::Inside {
@@ -98,9 +102,9 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
     /// Walks from brick to brick, from a distance on.
     #[inline(always)]
     fn part<S: Simd>(&mut self, simd: S, part: &Part<'_, '_>, from: f32) {
-        let Part { chunk, line, corner, last, .. } = *part;
+        let Part { chunk, line, corner, last, exits, .. } = *part;
         self.tally.grid_step();
-        let mut walk = line.walk(from, 4.0, corner.map(|c| c >> 2), last.map(|c| c >> 2));
+        let mut walk = line.walk(from, 4.0, corner.map(|c| c >> 2), last.map(|c| c >> 2), exits);
         loop {
             self.tally.cell_step();
             let bit = number(walk.cell.map(|brick| (brick & 3) << 2)) >> 6;
@@ -111,7 +115,7 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
                     self.test_large(simd, &large, line, corner.map(as_f32));
                 }
                 if mask(brick.mask) != 0 && !self.is_over() {
-                    self.cells(simd, part, &brick, walk.cell.map(|at| at << 2), walk.entered);
+                    self.cells(simd, part, &brick, &walk);
                 }
             }
             if walk.advance(self.limit) != Step::Inside {
@@ -120,20 +124,20 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
         }
     }
 
-    /// Walks from cell to cell of a brick, from a distance on.
+    /// Walks from cell to cell of the brick that a walk is in.
     #[inline(always)]
     fn cells<S: Simd>(
         &mut self,
         simd: S,
         part: &Part<'_, '_>,
         brick: &super::layout::Brick,
-        min: [u32; 3],
-        from: f32,
+        around: &Walk,
     ) {
         let Part { chunk, line, last, depth, .. } = *part;
         self.tally.grid_step();
+        let min = around.cell.map(|at| at << 2);
         let max = core::array::from_fn(|axis| (min[axis] + 3).min(last[axis]));
-        let mut walk = line.walk(from, 1.0, min, max);
+        let mut walk = line.walk(around.entered, 1.0, min, max, around.next);
         loop {
             self.tally.cell_step();
             let bit = number(walk.cell.map(|cell| cell & 3));
@@ -142,8 +146,9 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
                     Some(Content::List(ids)) => self.test(simd, ids),
                     Some(Content::Chunk(chunk, cells)) if depth > 0 => {
                         let line = line.zoom(walk.cell.map(as_f32), [as_f32(cells); 3]);
-                        let (corner, last) = ([0; 3], [cells - 1; 3]);
-                        let part = Part { chunk, line: &line, corner, last, depth: depth - 1 };
+                        let (corner, last, exits) = ([0; 3], [cells - 1; 3], walk.next);
+                        let depth = depth - 1;
+                        let part = Part { chunk, line: &line, corner, last, exits, depth };
                         self.divided(simd, &part, walk.entered);
                     }
                     _ => {}

@@ -19,7 +19,7 @@ use crate::blob::{Header, corrupt};
 use crate::cell::{Lattice, as_f32};
 use crate::config::Config;
 use crate::counters::Tally;
-use crate::dda::{Line, Step};
+use crate::dda::{Line, NEVER, Step};
 use crate::error::Error;
 use crate::one_level::{self, OneLevel, Overlay};
 use crate::visit::Visitor;
@@ -103,7 +103,7 @@ impl<'a> Fixed<'a> {
         let mut level = self.levels.count();
         let top = self.levels.level(level);
         let mut size = self.levels.size(level);
-        let mut walk = line.walk(0.0, as_f32(size), [0; 3], top.resolution.map(|r| r - 1));
+        let mut walk = line.walk(0.0, as_f32(size), [0; 3], top.resolution.map(|r| r - 1), NEVER);
         let mut above = [walk; MAX_LEVELS];
         loop {
             tally.cell_step();
@@ -123,7 +123,7 @@ impl<'a> Fixed<'a> {
                 let min = walk.cell.map(|cell| cell * factor);
                 let last = self.last(level);
                 let max = core::array::from_fn(|axis| (min[axis] + factor - 1).min(last[axis]));
-                walk = line.walk(walk.entered, as_f32(size), min, max);
+                walk = line.walk(walk.entered, as_f32(size), min, max, walk.next);
                 continue;
             }
             // Take a step; where a macrocell ends, take it on the level above.

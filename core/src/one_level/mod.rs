@@ -27,7 +27,7 @@ use crate::cell::{Lattice, cells_between};
 use crate::config::Config;
 use crate::control::Watch;
 use crate::counters::Tally;
-use crate::dda::{Line, Step};
+use crate::dda::{Line, NEVER, Step};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::sizes::Sizes;
@@ -200,7 +200,7 @@ impl<'a> OneLevel<'a> {
         mut leaf: impl FnMut(&[u32], &mut T) -> f32,
     ) {
         let mut limit = line.end;
-        let mut walk = line.walk(0.0, 1.0, [0; 3], self.last);
+        let mut walk = line.walk(0.0, 1.0, [0; 3], self.last, NEVER);
         loop {
             tally.cell_step();
             if let Some(references) = self.references(walk.cell) {

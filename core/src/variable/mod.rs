@@ -25,7 +25,7 @@ use crate::blob::Header;
 use crate::bump::GRID;
 use crate::cell::Lattice;
 use crate::counters::Tally;
-use crate::dda::{Line, Step};
+use crate::dda::{Line, NEVER, Step};
 use crate::error::Error;
 use crate::one_level::OneLevel;
 use crate::visit::Visitor;
@@ -88,7 +88,7 @@ impl<'a> Variable<'a> {
         mut leaf: impl FnMut(&[u32], &mut T) -> f32,
     ) {
         let mut limit = line.end;
-        let mut walk = line.walk(0.0, 1.0, [0; 3], self.top.last());
+        let mut walk = line.walk(0.0, 1.0, [0; 3], self.top.last(), NEVER);
         // While the walk is in a subgrid: the subgrid, and the walk around it.
         let mut inside: Option<(Subgrid<'a>, _)> = None;
         loop {
