@@ -4,7 +4,8 @@
 //! so they need no scene scale. The distance to the next border is computed from the integer cell
 //! at every step, `base + cell * delta`, and never summed up: its error stays a few roundings
 //! however long the walk, and what error remains lies inside the margin by which triangles were
-//! spread over cells.
+//! spread over cells. A walk within a larger cell ends where the walk around it leaves that cell: a
+//! border has one distance.
 //!
 //! A [`Line`] is the ray in a lattice; a [`Walk`] goes along it through equal cells, those of the
 //! lattice or larger ones of a macrocell level.

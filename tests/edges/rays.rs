@@ -1,7 +1,7 @@
 //! Rays that are no rays miss; rays at the limits of what is one are answered as brute force does.
 
 use hgrid_core::{Config, Grid, Ray};
-use hgrid_tests::meshes::{Mesh, ball};
+use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
@@ -116,4 +116,35 @@ fn directions_of_any_length_give_t_in_their_multiples() {
         assert_eq!((hit.t * length, hit.u, hit.v), (expected.t, expected.u, expected.v));
         assert_eq!(hit.primitive, expected.primitive);
     }
+}
+
+/// Along such a border a ray takes so many cells to cross one that a rounding is a step.
+#[test]
+fn rays_along_borders_that_they_hardly_cross() {
+    let mut random = Random(97);
+    let mut hits = 0;
+    for seed in 0..60 {
+        let mesh = soup(200, 0.15, seed);
+        let view = mesh.view();
+        for config in methods::configs() {
+            let owned = Owned::build(&view, &config).unwrap();
+            let grid = owned.open(&view).unwrap();
+            let ((min, max), resolution) = (grid.bounds(), grid.resolution());
+            for i in 0..120 {
+                let axis = i % 3;
+                let cells = resolution[axis] as usize;
+                let border = random.below(cells + 1) as f32 / cells as f32;
+                let mut origin = random.point().map(|c| 2.0 * c);
+                origin[axis] = min[axis] + (max[axis] - min[axis]) * border;
+                let target = mesh.positions[random.below(mesh.positions.len())];
+                let mut direction: [f32; 3] = std::array::from_fn(|k| target[k] - origin[k]);
+                let slope = 10_f32.powf(-5.0 - 3.0 * random.unit());
+                direction[axis] = if i % 2 == 0 { slope } else { -slope };
+                let ray = Ray::new(origin, direction);
+                oracle::check(&grid, &ray);
+                hits += usize::from(grid.occluded(&ray));
+            }
+        }
+    }
+    assert!(hits > 3000, "{hits}");
 }
