@@ -246,7 +246,8 @@ impl Header {
         if lattice.bounds() != Lattice::pad(&survey.bounds) {
             return Err(corrupt(core::mem::offset_of!(Self, bounds_min)));
         }
-        if !self.config(Config::default()).density_is_valid() {
+        let asked = Config { density: self.density, ..Config::default() };
+        if !asked.density_is_valid() {
             return Err(corrupt(core::mem::offset_of!(Self, density)));
         }
         if rule(lattice.bounds().size(), survey.finite_count) != Some(lattice.resolution) {
