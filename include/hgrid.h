@@ -228,8 +228,8 @@
  * is at its best where triangles are of similar size and everywhere, and slow where all detail is
  * in a few places of a large scene.
  *
- * Memory: `HGRID_INDEX_BOUND_ONE_LEVEL` and `HGRID_SCRATCH_BOUND_ONE_LEVEL` hold for it. The build plans every byte in
- * the scratch before it writes the index.
+ * Memory: `HGRID_INDEX_BOUND_ONE_LEVEL` and `HGRID_SCRATCH_BOUND_ONE_LEVEL` hold for it. The build
+ * plans every byte in the scratch before it writes the index.
  */
 #define HGRID_METHOD_ONE_LEVEL 1
 
@@ -248,8 +248,8 @@
  * A hashed grid whose crowded cells hold hashed grids of their own: subgrids, cut to what is
  * there.
  *
- * Choose it where detail is uneven, up to the proverbial teapot in a stadium, or where nobody
- * knows in advance. `subdivide_above` belongs to it.
+ * Choose it where detail is uneven but spread over the scene. Where all of it is in one spot of a
+ * large scene, two levels are not enough: choose brick. `subdivide_above` belongs to it.
  *
  * Memory: four to seven times that of one level. How much it takes shows only while the index is
  * written: `hgrid_sizes` without scratch answers with a generous bound, with scratch with the
@@ -280,10 +280,10 @@
  * It is the default: the shortest build, the first image, tiles of rays through `hgrid_intersect_n`, and
  * scenes of which nobody knows what is in them. `cell_size` belongs to it, `density` does not.
  *
- * Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. How much index it takes shows only while it is written,
- * and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch
- * answers with what is enough, seven times as much for a scan, and with more scratch than a build takes;
- * with scratch it gives the exact size.
+ * Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it.
+ * How much index it takes shows only while it is written, and a build may need somewhat more than the
+ * blob has in the end. `hgrid_sizes` without scratch answers with what is enough, seven times as much
+ * for a scan, and with more scratch than a build takes; with scratch it gives the exact size.
  */
 #define HGRID_METHOD_BRICK 5
 
@@ -353,9 +353,9 @@ typedef int32_t hgrid_status;
 typedef void (*hgrid_task)(void *task_context, uint32_t index);
 
 /**
- * What a build may be told: which grid, and how to go about it. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
- * or with the macro of another method: `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`,
- * `_RECURSIVE`.
+ * What a build may be told: which grid, and how to go about it. Initialise it with
+ * `HGRID_CONFIG_INIT`, which is also what NULL means, or with the macro of another method:
+ * `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`, `_RECURSIVE`.
  *
  * Each macro sets all fields to what the method's authors use. To change the method later, set
  * `method` and `density`: a field that belongs to another method is not looked at.

@@ -1032,8 +1032,8 @@ public:
 private:
     grid(const view &built, memory blob) noexcept : view(built), blob_(std::move(blob)) {}
 
-    // Bytes of index that most meshes take. What is certainly enough may be ten or a hundred times as much
-    // where the index finds its size while it is written.
+    // Bytes of index that most meshes take. What is certainly enough may be ten or a hundred times as
+    // much where the index finds its size while it is written.
     static std::uint64_t usual_bytes(const mesh &of, const config &how) noexcept
     {
         const auto triangles = static_cast<std::uint64_t>(of.triangle_count());

@@ -38,8 +38,8 @@ pub const HGRID_INDEX_U16: u32 = 1;
 /// is at its best where triangles are of similar size and everywhere, and slow where all detail is
 /// in a few places of a large scene.
 ///
-/// Memory: `HGRID_INDEX_BOUND_ONE_LEVEL` and `HGRID_SCRATCH_BOUND_ONE_LEVEL` hold for it. The build plans every byte in
-/// the scratch before it writes the index.
+/// Memory: `HGRID_INDEX_BOUND_ONE_LEVEL` and `HGRID_SCRATCH_BOUND_ONE_LEVEL` hold for it. The build
+/// plans every byte in the scratch before it writes the index.
 pub const HGRID_METHOD_ONE_LEVEL: u32 = 1;
 
 /// A hashed grid of many small cells, and above it levels of macrocells that say where anything is.
@@ -54,8 +54,8 @@ pub const HGRID_METHOD_FIXED: u32 = 2;
 /// A hashed grid whose crowded cells hold hashed grids of their own: subgrids, cut to what is
 /// there.
 ///
-/// Choose it where detail is uneven, up to the proverbial teapot in a stadium, or where nobody
-/// knows in advance. `subdivide_above` belongs to it.
+/// Choose it where detail is uneven but spread over the scene. Where all of it is in one spot of a
+/// large scene, two levels are not enough: choose brick. `subdivide_above` belongs to it.
 ///
 /// Memory: four to seven times that of one level. How much it takes shows only while the index is
 /// written: `hgrid_sizes` without scratch answers with a generous bound, with scratch with the
@@ -82,10 +82,10 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 /// It is the default: the shortest build, the first image, tiles of rays through `hgrid_intersect_n`, and
 /// scenes of which nobody knows what is in them. `cell_size` belongs to it, `density` does not.
 ///
-/// Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it. How much index it takes shows only while it is written,
-/// and a build may need somewhat more than the blob has in the end. `hgrid_sizes` without scratch
-/// answers with what is enough, seven times as much for a scan, and with more scratch than a build takes;
-/// with scratch it gives the exact size.
+/// Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it.
+/// How much index it takes shows only while it is written, and a build may need somewhat more than the
+/// blob has in the end. `hgrid_sizes` without scratch answers with what is enough, seven times as much
+/// for a scan, and with more scratch than a build takes; with scratch it gives the exact size.
 pub const HGRID_METHOD_BRICK: u32 = 5;
 
 /// The most levels of a recursive grid.
@@ -140,9 +140,9 @@ pub struct hgrid_mesh {
     pub mask_stride: usize,
 }
 
-/// What a build may be told: which grid, and how to go about it. Initialise it with `HGRID_CONFIG_INIT`, which is also what NULL means,
-/// or with the macro of another method: `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`,
-/// `_RECURSIVE`.
+/// What a build may be told: which grid, and how to go about it. Initialise it with
+/// `HGRID_CONFIG_INIT`, which is also what NULL means, or with the macro of another method:
+/// `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`, `_RECURSIVE`.
 ///
 /// Each macro sets all fields to what the method's authors use. To change the method later, set
 /// `method` and `density`: a field that belongs to another method is not looked at.

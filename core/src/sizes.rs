@@ -27,8 +27,8 @@ impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
     /// A one-level grid of a scan takes a sixth of it or less, a brick grid a twelfth; for recursive grids
-    /// it is generous beyond use. `None` if no build takes the configuration, or the sizes do not fit the machine's address
-    /// space.
+    /// it is generous beyond use. `None` if no build takes the configuration, or the sizes do not fit the
+    /// machine's address space.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Method, Sizes};
@@ -92,10 +92,10 @@ impl Sizes {
 ///
 /// With an empty `scratch` the answer takes two passes over the triangles, one more for each halving
 /// of the density, and `index_bytes` is enough: for a scan up to twice what one level takes, four
-/// times what a fixed grid takes, seven times what a brick grid takes, for the others a generous multiple. With `scratch_bytes` of
-/// scratch (same alignment rule as for a build) the grid is planned in it and `index_bytes` is exact,
-/// for about half the time of a build, up to all of it for the others. The scratch
-/// holds nothing of use afterwards.
+/// times what a fixed grid takes, seven times what a brick grid takes, for the others a generous
+/// multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid is planned in
+/// it and `index_bytes` is exact, for about half the time of a build, up to all of it for the others. The
+/// scratch holds nothing of use afterwards.
 ///
 /// # Errors
 /// Those of [`Grid::build`](crate::Grid::build), but for index memory.

@@ -36,16 +36,18 @@ impl fmt::Display for Report {
             0 | 1 => String::new(),
             count => format!(" (median of {count})"),
         };
-        let index = HumanCount(m.index_bytes as u64);
+        let references = m.references.map(|count| HumanCount(count.into()).to_string());
+        let (index, peak) = (HumanCount(m.index_bytes as u64), HumanCount(m.peak_bytes as u64));
+        let peak_per_triangle = ratio(m.peak_bytes as u64, scene.triangles as u64);
         let rows = [
             ("scene", scene.scene.clone()),
             ("triangles", format!("{}{skipped}", HumanCount(scene.triangles as u64))),
             ("vertices", HumanCount(scene.vertices as u64).to_string()),
             ("method", m.built_title()),
             ("resolution", format!("{x} x {y} x {z}")),
-            ("references", m.references.map_or("-".into(), |r| HumanCount(r.into()).to_string())),
+            ("references", references.unwrap_or_default()),
             ("index", format!("{index} bytes, {:.1} per triangle", m.index_bytes_per_triangle)),
-            ("scratch", format!("{} bytes", HumanCount(m.scratch_bytes as u64))),
+            ("peak", format!("{peak} bytes, {peak_per_triangle:.1} per triangle with scratch")),
             ("rays", format!("{} ({size} x {size})", HumanCount(m.rays), size = m.size)),
             ("hits", format!("{} ({:.1} %)", HumanCount(m.hits), 100.0 * ratio(m.hits, m.rays))),
             ("primitive tests / ray", format!("{:.2}", m.primitive_tests_per_ray)),
@@ -59,7 +61,7 @@ impl fmt::Display for Report {
         ];
         let mut table = Table::new();
         table.load_style(presets::NOTHING);
-        for (name, value) in rows {
+        for (name, value) in rows.into_iter().filter(|(_, value)| !value.is_empty()) {
             table.add_row([name.to_owned(), value]);
         }
         f.write_str(&table.trim_fmt())

@@ -107,8 +107,8 @@ pub(super) fn count_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize) ->
     )
 }
 
-/// Puts the triangles of a cell on the next bench, if to divide the cell gains something: the
-/// triangles are smaller than it, and its parts list fewer of them or can be divided again.
+/// Puts the triangles of a cell on the next bench, if to divide the cell gains something and is paid for:
+/// the triangles are smaller than it, and its parts list fewer of them or can be divided again.
 pub(super) fn plan<S: Simd>(
     simd: S,
     scene: &Scene<'_>,
@@ -129,8 +129,7 @@ pub(super) fn plan<S: Simd>(
                 let sorted = bench.entries.get(..groups.count())?;
                 let block = tally(&groups, sorted, bench.cells.first_chunk_mut()?, bench.bricks);
                 let measure = measure(simd, bench.cells, bench.bricks, block);
-                let rest = room.checked_sub(measure.words() as u64);
-                let Some(rest) = rest else {
+                let Some(rest) = room.checked_sub(measure.words() as u64) else {
                     // Too many words: fewer parts.
                     most = inner.cells / 2;
                     continue;
