@@ -170,6 +170,17 @@ impl Line {
         near.max(0.0) <= far.min(limit)
     }
 
+    /// On which axes a cell's lower half is not crossed between two distances, and on which its upper
+    /// half is not.
+    #[inline(always)]
+    pub(crate) fn halves(&self, cell: [u32; 3], near: f32, far: f32) -> [u32; 2] {
+        let middle = Vec3A::from_array(cell.map(as_f32)) + 0.5;
+        let (from, near, far) = (self.position - middle, self.rate * near, self.rate * far);
+        let is_above = (from + near.min(far)).cmpgt(self.margin);
+        let is_below = (from + near.max(far)).cmplt(-self.margin);
+        [is_above.bitmask(), is_below.bitmask()]
+    }
+
     /// From where to where the line is inside a box given in cells, or along its border; the second is
     /// less than the first if it passes the box.
     #[inline(always)]

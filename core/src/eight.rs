@@ -43,7 +43,7 @@ impl<S: Simd> Eight<S> {
     #[inline(always)]
     pub(crate) fn gather(simd: S, mesh: &TriangleMesh<'_>, ids: &[u32]) -> Self {
         // What is behind the last is read, too, four in a row: the last once more.
-        let [i, j, k, l, m, n, o, p] = ids.first_chunk().copied().unwrap_or_else(
+        let eight = ids.first_chunk().copied().unwrap_or_else(
             #[inline(always)]
             || {
                 let mut padded = [ids.last().copied().unwrap_or(0); LANES];
@@ -53,7 +53,13 @@ impl<S: Simd> Eight<S> {
                 padded
             },
         );
-        let count = ids.len();
+        Self::of(simd, mesh, eight, ids.len())
+    }
+
+    /// The first `count` of eight triangles; the others are read, too.
+    #[inline(always)]
+    pub(crate) fn of(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; LANES], count: usize) -> Self {
+        let [i, j, k, l, m, n, o, p] = ids;
         let (low, used) = four(simd, mesh, [i, j, k, l]);
         let (high, used_high) =
             if count > LANES / 2 { four(simd, mesh, [m, n, o, p]) } else { (low, 0) };

@@ -23,7 +23,7 @@ use crate::search::{Any, Closest, Outcome, Search};
 use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
 use crate::triangle::TriangleTest;
 use crate::variable::{self, Variable};
-use crate::visit::Visitor;
+use crate::visit::{Ids, Visitor};
 
 /// A built grid and the mesh it was built for, ready for queries.
 ///
@@ -258,7 +258,7 @@ impl<'a> Grid<'a> {
     }
 
     /// Shows the lists of all cells that a box meets, and perhaps some others.
-    pub(crate) fn visit(&self, bounds: &Aabb, leaf: &mut dyn FnMut(&[u32])) {
+    pub(crate) fn visit(&self, bounds: &Aabb, leaf: &mut dyn FnMut(Ids<'_>)) {
         // What lies outside belongs to the cells at the border.
         let reach = self.lattice.reach(bounds);
         let visitor = &mut Visitor::new(self.list_words(), leaf);

@@ -77,9 +77,7 @@ impl Grid<'_> {
             found.reference_count += u64::from(length);
             found.longest_list = found.longest_list.max(length);
             hash.add(length);
-            for &id in ids {
-                hash.add(id);
-            }
+            ids.iter().for_each(|id| hash.add(id));
         });
         found.content_hash = hash.finish();
         found

@@ -25,7 +25,6 @@ use super::divide::{self, share};
 use super::extent::EXTENT_WORDS;
 use super::frame::{Frame, Scene};
 use super::layout::{Benches, Block, ENTRY_WORDS, Layout, MASK_BITS, RECORD_WORDS};
-pub(super) use super::pass::home;
 use super::pass::{Census, Ground, Scatter};
 use super::pool::{Filled, Part, Pool};
 use super::size::{MOST_LARGE, Settled, Shares, block_limit, reference_limit, settle_in};

@@ -49,7 +49,7 @@ pub(super) struct Plan {
 ///
 /// Every crowded cell looks at all entries of its block, so it looks at eight at once.
 #[inline(always)]
-fn each_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize, mut visit: impl FnMut(u32)) {
+fn each_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize, mut visit: impl FnMut(Entry)) {
     let (eights, rest) = entries.as_chunks::<8>();
     for eight in eights {
         let mut listed = listed_of_eight(simd, eight, cell as u32);
@@ -57,7 +57,7 @@ fn each_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize, mut visit: imp
             let bit = listed.trailing_zeros() as usize;
             listed &= listed - 1;
             if let Some(entry) = eight.get(bit) {
-                visit(entry.id);
+                visit(*entry);
             }
         }
     }
@@ -65,12 +65,12 @@ fn each_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize, mut visit: imp
 }
 
 /// The entries that a cell lists, one by one.
-fn of_cell(entries: &[Entry], cell: usize) -> impl Iterator<Item = u32> + '_ {
+fn of_cell(entries: &[Entry], cell: usize) -> impl Iterator<Item = Entry> + '_ {
     let cell = place(cell as u32);
-    entries.iter().filter_map(move |entry| {
+    entries.iter().copied().filter(move |entry| {
         let (min, max) = (place(entry.min()), place(entry.max()));
         let holds = (0..3).all(|axis| (min[axis]..=max[axis]).contains(&cell[axis]));
-        (holds && entry.class() == Class::Cells).then_some(entry.id)
+        holds && entry.class() == Class::Cells
     })
 }
 
@@ -127,7 +127,13 @@ pub(super) fn plan<S: Simd>(
                 let (inner, groups, wanted) =
                     collect(simd, scene, frame, entries, crowd, most, bench)?;
                 let sorted = bench.entries.get(..groups.count())?;
-                let block = tally(&groups, sorted, bench.cells.first_chunk_mut()?, bench.bricks);
+                let block = tally(
+                    &groups,
+                    sorted,
+                    scene.format(),
+                    bench.cells.first_chunk_mut()?,
+                    bench.bricks,
+                );
                 let measure = measure(simd, bench.cells, bench.bricks, block);
                 let Some(rest) = room.checked_sub(measure.words() as u64) else {
                     // Too many words: fewer parts.
@@ -165,7 +171,7 @@ fn collect<S: Simd>(
     most: u32,
     bench: &mut Bench<'_>,
 ) -> Option<(Frame, Groups, u32)> {
-    // The ids, and soon the entries, wait where cells will be counted, or behind the entries, if there is
+    // What the cell lists, and soon what its parts will, waits where cells will be counted, or behind the entries, if there is
     // room.
     let length = listed as usize;
     let (sorted, behind) = bench.entries.split_at_mut_checked(length)?;
@@ -175,25 +181,24 @@ fn collect<S: Simd>(
         None => behind.get_mut(..length).unwrap_or_default(),
     };
     let mut slots = waiting.iter_mut();
-    each_of_cell(simd, entries, cell, |id| {
+    each_of_cell(simd, entries, cell, |entry| {
         if let Some(slot) = slots.next() {
-            slot.id = id;
+            *slot = entry;
         }
     });
 
     // As many cells as two of its mean triangles are wide, but none so small that the margin counts.
+    let format = scene.format();
     let mut sum = 0.0;
-    let mut add = |id: u32| {
-        if let Some(reach) = scene.reach(id) {
+    let mut add = |entry: Entry| {
+        if let Some(reach) = scene.reach(entry.id(format)) {
             sum += f64::from(reach.size().max_element());
         }
     };
     if waiting.is_empty() {
         of_cell(entries, cell).for_each(&mut add);
     } else {
-        for entry in waiting.iter() {
-            add(entry.id);
-        }
+        waiting.iter().copied().for_each(&mut add);
     }
     let mean = sum / f64::from(listed);
     let width = (2.0 * mean).max(4.0 * f64::from(scene.lattice.margin().max_element()));
@@ -203,14 +208,15 @@ fn collect<S: Simd>(
         return None;
     }
 
-    let entry = |id: u32| {
-        let range = frame.range(&scene.reach(id)?);
+    let entry = |around: Entry| {
+        let id = around.id(format);
+        let (range, halves) = frame.range(&scene.reach(id)?);
         // No list of the lattice's blocks takes it: at most it is in the list of all of the cell.
         let class = classify(range.min, range.max, 1).unwrap_or(Class::Blocks);
-        Some(Entry::new(id, range.min, range.max, class))
+        Some(Entry::new(format.word(id, halves), range.min, range.max, class))
     };
     for slot in waiting.iter_mut() {
-        *slot = entry(slot.id)?;
+        *slot = entry(*slot)?;
     }
     let groups = if waiting.is_empty() {
         Groups::collect(|| of_cell(entries, cell).filter_map(entry), sorted)

@@ -1,7 +1,9 @@
-//! Where a triangle belongs: its cells in a block or a divided cell, and which lists take it.
+//! Where a triangle belongs: its cells in a block or a divided cell, the halves of them, and which
+//! lists take it.
 
 use glam::Vec3A;
 
+use super::halves::{Format, Halves};
 use super::layout::{BLOCK, Class};
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, Lattice, as_f32, cells_between};
@@ -15,6 +17,12 @@ pub(super) struct Scene<'m> {
 }
 
 impl Scene<'_> {
+    /// How the mesh's ids are written.
+    #[inline(always)]
+    pub(super) const fn format(&self) -> Format {
+        Format::of(self.mesh.triangle_count())
+    }
+
     /// The box of a triangle in cells of the lattice, grown by the margin.
     #[inline(always)]
     pub(super) fn reach(&self, id: u32) -> Option<Aabb> {
@@ -53,10 +61,21 @@ impl Frame {
         Aabb { min: zoom(reach.min), max: zoom(reach.max) }
     }
 
-    /// The cells of the frame that a box in cells of the lattice overlaps.
-    pub(super) fn range(&self, reach: &Aabb) -> CellRange {
-        cells_between(self.zoom(reach), [self.cells; 3])
+    /// The cells of the frame that a box in cells of the lattice overlaps, and the halves of the outermost.
+    pub(super) fn range(&self, reach: &Aabb) -> (CellRange, Halves) {
+        range(self.zoom(reach), [self.cells; 3])
     }
+}
+
+/// The cells that a box overlaps which is given in cells; those at the border if it lies outside. And the
+/// halves: upper ones of its first cells, lower ones of its last cells.
+#[inline(always)]
+pub(super) fn range(reach: Aabb, resolution: [u32; 3]) -> (CellRange, Halves) {
+    let halves = Aabb { min: reach.min * 2.0, max: reach.max * 2.0 };
+    let CellRange { min, max } = cells_between(halves, resolution.map(|cells| 2 * cells));
+    let axes = |[x, y, z]: [u32; 3]| x & 1 | (y & 1) << 1 | (z & 1) << 2;
+    let in_halves = Halves::new(axes(min), !axes(max));
+    (CellRange { min: min.map(|half| half >> 1), max: max.map(|half| half >> 1) }, in_halves)
 }
 
 /// How many cells hold a triangle with these first and last cells, or with a shift of 2 bricks, of 4

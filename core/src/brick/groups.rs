@@ -1,5 +1,6 @@
 //! Entries with the same number of cells together, so that going through their cells needs no branch.
 
+use super::halves::Format;
 use super::layout::{AXES, Entry, OTHERS};
 
 /// Entries of a block, together those that have two cells on the same axes.
@@ -55,34 +56,44 @@ impl Groups {
         range.and_then(|range| entries.get(range)).unwrap_or_default()
     }
 
-    /// Shows every cell of the small entries.
+    /// Shows every cell of the small entries, and what it lists of the entry.
     #[inline(always)]
-    pub(super) fn each_small(&self, entries: &[Entry], mut visit: impl FnMut(usize, u32)) {
-        let mut visit = |cell: u32, id: u32| visit(cell as usize, id);
+    pub(super) fn each_small(
+        &self,
+        entries: &[Entry],
+        format: Format,
+        mut visit: impl FnMut(usize, u32),
+    ) {
+        // On its axes it is in a cell behind the near ones, and in one before the far ones.
+        let mut show = |entry: &Entry, cell: u32, axes: u32, far: u32| {
+            visit(cell as usize, entry.reference(format, far, axes & !far));
+        };
         for entry in self.group(0, entries) {
-            visit(entry.min(), entry.id);
+            show(entry, entry.min(), 0, 0);
         }
         for axis in [1, 2, 4] {
-            for entry in self.group(axis, entries) {
-                visit(entry.min(), entry.id);
-                visit(entry.max(), entry.id);
+            for entry in self.group(axis as usize, entries) {
+                show(entry, entry.min(), axis, 0);
+                show(entry, entry.max(), axis, axis);
             }
         }
         // Four cells: one of the two axes is x, or it is z.
-        for (axes, axis) in [(3, AXES[0]), (5, AXES[2]), (6, AXES[2])] {
-            for entry in self.group(axes, entries) {
+        for (axes, axis, bits) in [(3, 1, AXES[0]), (5, 4, AXES[2]), (6, 4, AXES[2])] {
+            for entry in self.group(axes as usize, entries) {
                 let (min, max) = (entry.min(), entry.max());
-                let step = (min ^ max) & axis;
-                for cell in [min, min ^ step, max ^ step, max] {
-                    visit(cell, entry.id);
-                }
+                let step = (min ^ max) & bits;
+                show(entry, min, axes, 0);
+                show(entry, min ^ step, axes, axis);
+                show(entry, max ^ step, axes, axes & !axis);
+                show(entry, max, axes, axes);
             }
         }
         for entry in self.group(7, entries) {
             let (min, max) = (entry.min(), entry.max());
             let [x, y, z] = AXES.map(|axis| (min ^ max) & axis);
-            for cell in [min, min ^ x, min ^ y, max ^ z, min ^ z, max ^ y, max ^ x, max] {
-                visit(cell, entry.id);
+            let cells = [min, min ^ x, min ^ y, max ^ z, min ^ z, max ^ y, max ^ x, max];
+            for (far, cell) in (0..).zip(cells) {
+                show(entry, cell, 7, far);
             }
         }
     }

@@ -15,6 +15,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::halves::Format;
 use crate::arena::{section_bytes, split_mut};
 use crate::blob::HEADER_BYTES;
 
@@ -87,7 +88,8 @@ pub(super) const fn place(number: u32) -> [u32; 3] {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 pub(super) struct Entry {
-    pub(super) id: u32,
+    /// And above it, if there is room, the halves of its first and its last cell.
+    id: u32,
     /// First and last cell in twelve bits each, then the class, then the group.
     cells: u32,
 }
@@ -115,7 +117,8 @@ impl Class {
 }
 
 impl Entry {
-    /// A triangle with its cells in a block, both ends included and below 16.
+    /// A triangle with its cells in a block, both ends included and below 16; above the id its halves,
+    /// if there is room.
     #[inline(always)]
     pub(super) const fn new(id: u32, min: [u32; 3], max: [u32; 3], class: Class) -> Self {
         let [x, y, z] =
@@ -135,7 +138,7 @@ impl Entry {
     /// The part in one of its blocks of an entry in two cells an axis: `straddles` are the axes on
     /// which the second cell is the first of the next block, `far` those on which this is the block.
     #[inline(always)]
-    pub(super) const fn beside(self, straddles: u32, far: u32) -> Self {
+    pub(super) const fn beside(self, straddles: u32, far: u32, format: Format) -> Self {
         /// The bits of each set of axes at either end.
         const ENDS: [u32; 8] = {
             let mut ends = [0; 8];
@@ -154,13 +157,26 @@ impl Entry {
         };
         let near = ENDS[(straddles & !far & 7) as usize];
         let others = !(ENDS[(straddles & 7) as usize] | straddles << GROUP);
-        Self { id: self.id, cells: self.cells & others | near }
+        let id = format.through(self.id, straddles & far, straddles & !far);
+        Self { id, cells: self.cells & others | near }
     }
 
     /// Its words.
     #[inline(always)]
     pub(super) const fn words(self) -> [u32; ENTRY_WORDS] {
         [self.id, self.cells]
+    }
+
+    #[inline(always)]
+    pub(super) const fn id(self, format: Format) -> u32 {
+        format.id(self.id)
+    }
+
+    /// What a cell lists of it, if it is in the cell before that one on some axes, too, and in the one
+    /// behind it on others.
+    #[inline(always)]
+    pub(super) const fn reference(self, format: Format, before: u32, behind: u32) -> u32 {
+        format.through(self.id, before, behind)
     }
 
     /// The bits of the class.

@@ -25,6 +25,7 @@ mod extent;
 mod frame;
 mod frusta;
 mod groups;
+mod halves;
 mod hits;
 mod layout;
 mod pass;
@@ -54,6 +55,7 @@ use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
 use bundle::RAYS;
 use extent::{EXTENT_WORDS, Extent, Owner};
+use halves::Format;
 use layout::{Block, Layout};
 pub(crate) use walk::OneRay;
 
@@ -66,6 +68,7 @@ pub(crate) struct Brick<'a> {
     width: [u32; 3],
     /// The last cell on each axis.
     last: [u32; 3],
+    format: Format,
 }
 
 impl<'a> Brick<'a> {
@@ -80,7 +83,8 @@ impl<'a> Brick<'a> {
         let (blocks, pool) = sections
             .filter(|_| header.blob_bytes == layout.index_bytes(words))
             .ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
-        Ok(Self { blocks, pool, width: layout.blocks, last: lattice.last() })
+        let format = Format::of(header.triangle_count);
+        Ok(Self { blocks, pool, width: layout.blocks, last: lattice.last(), format })
     }
 
     /// The words of all lists and what leads to them: no ray is shown more primitives.
@@ -104,6 +108,7 @@ impl<'a> Brick<'a> {
             min: range.min.map(|cell| cell / layout::BLOCK),
             max: range.max.map(|cell| cell / layout::BLOCK),
         };
+        visitor.read_only(self.format.ids());
         visitor.list(self.large())
             && blocks.cells().all(|block| {
                 let Some(chunk) = self.block(block) else { return true };
@@ -200,7 +205,7 @@ impl<'a> Large<'a> {
 /// What a cell holds.
 #[derive(Debug, Clone, Copy)]
 enum Content<'a> {
-    /// Primitive ids.
+    /// Ids, and above them the [`halves`].
     List(&'a [u32]),
     /// A divided cell, and how many cells it has on each axis.
     Chunk(Chunk<'a>, u32),
@@ -261,7 +266,7 @@ impl<'a> Chunk<'a> {
             return true;
         }
         match self.content(brick, bit) {
-            Some(Content::List(ids)) => visitor.list(ids),
+            Some(Content::List(references)) => visitor.list(references),
             Some(Content::Chunk(chunk, cells)) if depth > 0 && visitor.spend(1) => {
                 let corner = Vec3A::from_array(cell.map(as_f32));
                 let within = |position: Vec3A| (position - corner) * as_f32(cells);

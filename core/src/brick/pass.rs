@@ -14,8 +14,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};
 use glam::{Vec3A, Vec4};
 
-use super::frame::{classify, lists};
-use super::layout::{Class, Entry, GROUP};
+use super::frame::{classify, lists, range};
+use super::halves::{Format, Halves, ID_BITS};
+use super::layout::{BLOCK, Class, Entry, GROUP};
 use crate::aabb::{Aabb, MAX_COORDINATE};
 use crate::cell::{CellRange, Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::config::BuildFlags;
@@ -62,39 +63,59 @@ pub(super) struct Ground<'g> {
     pub(super) flags: BuildFlags,
 }
 
-/// Where a triangle with these corners belongs: its cells, and what lists it, if not the whole grid.
-/// `None` if a coordinate is not finite.
-#[inline(always)]
-pub(super) fn home(
-    lattice: &Lattice,
-    most_blocks: u64,
-    corners: [Vec3A; 3],
-) -> Option<(CellRange, Option<Class>)> {
-    let range = lattice.range(&Aabb::of(corners)?);
-    Some((range, classify(range.min, range.max, most_blocks)))
+/// Where a triangle belongs.
+pub(super) struct Home {
+    /// Its cells, and the halves of the outermost.
+    pub(super) range: CellRange,
+    pub(super) halves: Halves,
+    /// What lists it, if not the whole grid.
+    pub(super) class: Option<Class>,
 }
 
-/// The blocks of a range of cells, and the cells there.
-#[inline(always)]
-fn each_block(
-    blocks: [u32; 3],
-    range: &CellRange,
-    mut visit: impl FnMut(usize, [u32; 3], [u32; 3]),
-) {
-    let CellRange { min, max } = *range;
-    let (low, high) = (min.map(|cell| cell >> 4), max.map(|cell| cell >> 4));
-    let first = |axis: usize, at: u32| if at == low[axis] { min[axis] & 15 } else { 0 };
-    let last = |axis: usize, at: u32| if at == high[axis] { max[axis] & 15 } else { 15 };
-    for z in low[2]..=high[2] {
-        for y in low[1]..=high[1] {
-            for x in low[0]..=high[0] {
-                let block = x + blocks[0] * (y + blocks[1] * z);
-                let (first, last) =
-                    ([first(0, x), first(1, y), first(2, z)], [last(0, x), last(1, y), last(2, z)]);
-                visit(block as usize, first, last);
-            }
+impl Home {
+    /// That of a triangle with these corners; `None` if a coordinate is not finite.
+    #[inline(always)]
+    pub(super) fn of(lattice: &Lattice, most_blocks: u64, corners: [Vec3A; 3]) -> Option<Self> {
+        let reach = lattice.reach(&Aabb::of(corners)?);
+        let (range, halves) = range(reach, lattice.resolution);
+        Some(Self { range, halves, class: classify(range.min, range.max, most_blocks) })
+    }
+
+    /// The part of it in a block that it reaches: its cells there, and the halves.
+    #[inline(always)]
+    pub(super) fn in_block(&self, [x, y, z]: [u32; 3]) -> (CellRange, Halves) {
+        self.part([self.along(0, x), self.along(1, y), self.along(2, z)])
+    }
+
+    #[inline(always)]
+    fn part(&self, [x, y, z]: [Along; 3]) -> (CellRange, Halves) {
+        let before = x.before | y.before << 1 | z.before << 2;
+        let behind = x.behind | y.behind << 1 | z.behind << 2;
+        let range = CellRange { min: [x.first, y.first, z.first], max: [x.last, y.last, z.last] };
+        (range, self.halves.through(before, behind))
+    }
+
+    /// An axis of the part in a block.
+    #[inline(always)]
+    fn along(&self, axis: usize, block: u32) -> Along {
+        let (min, max) = (self.range.min[axis], self.range.max[axis]);
+        let (is_first, is_last) = (min / BLOCK == block, max / BLOCK == block);
+        Along {
+            first: if is_first { min % BLOCK } else { 0 },
+            last: if is_last { max % BLOCK } else { BLOCK - 1 },
+            before: u32::from(!is_first),
+            behind: u32::from(!is_last),
         }
     }
+}
+
+/// The cells of a triangle in a block along an axis, and whether it has others before and behind them.
+#[derive(Clone, Copy)]
+struct Along {
+    first: u32,
+    last: u32,
+    before: u32,
+    behind: u32,
 }
 
 /// What is done with the entries of triangles.
@@ -119,10 +140,12 @@ const BATCH: usize = 64;
 const LANES: usize = 8;
 /// The first of three bits above the group of simple triangles.
 const STRADDLES: u32 = GROUP + 3;
+/// The bits of a block's number, above which there is room.
+const BLOCK_BITS: u32 = (1 << 24) - 1;
 
 /// Where the triangles of a batch lie.
 struct Places {
-    /// The number of the first block.
+    /// The number of the first block, and above it the halves.
     blocks: [[u32; LANES]; BATCH / LANES],
     /// The cells, as an entry has them, and above them the axes on which the second one is in the
     /// next block.
@@ -135,7 +158,8 @@ struct Places {
 #[derive(Clone, Copy)]
 struct Axis<S: Simd> {
     origin: f32x8<S>,
-    cells_per_unit: f32x8<S>,
+    halves_per_unit: f32x8<S>,
+    /// In halves of cells, as the end.
     margin: f32x8<S>,
     end: f32x8<S>,
 }
@@ -146,19 +170,20 @@ impl<S: Simd> Axis<S> {
         let splat = |value| f32x8::splat(simd, value);
         Self {
             origin: splat(lattice.min[axis]),
-            cells_per_unit: splat(lattice.scale()[axis]),
-            margin: splat(lattice.margin()[axis]),
-            end: splat(as_f32(lattice.resolution[axis]) - 0.5),
+            halves_per_unit: splat(2.0 * lattice.scale()[axis]),
+            margin: splat(2.0 * lattice.margin()[axis]),
+            end: splat(as_f32(2 * lattice.resolution[axis]) - 0.5),
         }
     }
 
-    /// The first and the last cell of triangles. The same bits as [`Lattice::range`].
+    /// The first and the last cell of triangles, and the halves. The same bits as [`range`].
     #[inline(always)]
     fn range(&self, simd: S, a: f32x8<S>, b: f32x8<S>, c: f32x8<S>) -> Span<S> {
         let (min, max) = (a.min(b).min(c), a.max(b).max(c));
-        let min = (min - self.origin) * self.cells_per_unit - self.margin;
-        let max = (max - self.origin) * self.cells_per_unit + self.margin;
-        Span { min: self.whole(simd, min), max: self.whole(simd, max) }
+        let min = (min - self.origin) * self.halves_per_unit - self.margin;
+        let max = (max - self.origin) * self.halves_per_unit + self.margin;
+        let (first, last) = (self.whole(simd, min), self.whole(simd, max));
+        Span { first, last, min: first >> 1, max: last >> 1 }
     }
 
     #[inline(always)]
@@ -168,9 +193,11 @@ impl<S: Simd> Axis<S> {
     }
 }
 
-/// First and last cells on an axis.
+/// First and last halves of cells on an axis, and the cells.
 #[derive(Clone, Copy)]
 struct Span<S: Simd> {
+    first: u32x8<S>,
+    last: u32x8<S>,
     min: u32x8<S>,
     max: u32x8<S>,
 }
@@ -195,6 +222,16 @@ impl<S: Simd> Span<S> {
     fn group(self) -> u32x8<S> {
         (self.max - self.min) << GROUP
     }
+}
+
+/// The bits of [`Halves`], from the last one to the first.
+#[inline(always)]
+fn halves<S: Simd>([x, y, z]: [Span<S>; 3]) -> u32x8<S> {
+    let mut bits = !z.last & 1;
+    for half in [!y.last, !x.last, z.first, y.first, x.first] {
+        bits = (bits << 1) | (half & 1);
+    }
+    bits
 }
 
 /// Corners of eight triangles.
@@ -234,7 +271,7 @@ type Rows<'m> = [&'m Row; 3];
 /// What works on vectors is a function of its own, always inlined: closures and arrays' own functions
 /// are not, and what is not inlined is not compiled for the level.
 #[inline(always)]
-fn places<S: Simd>(
+fn places<S: Simd, const HALVES: bool>(
     simd: S,
     axes: &[Axis<S>; 3],
     [width, height, _]: [u32; 3],
@@ -253,6 +290,7 @@ fn places<S: Simd>(
     let is_simple = steps.simd_le(u32x8::splat(simd, 1)) & is_finite;
 
     let block = (x.min >> 4) + ((y.min >> 4) + (z.min >> 4) * height) * width;
+    let block = if HALVES { block | (halves([x, y, z]) << ID_BITS) } else { block };
     let ends = x.inside() | (y.inside() << 2) | (z.inside() << 4);
     let group = x.group() | (y.group() << 1) | (z.group() << 2);
     let straddles = x.straddles() | (y.straddles() << 1) | (z.straddles() << 2);
@@ -262,16 +300,17 @@ fn places<S: Simd>(
 
 /// Visits the entries of triangles.
 #[inline(always)]
-fn visit<S: Simd>(
+fn visit<S: Simd, V: Visit, const HALVES: bool>(
     simd: S,
     ground: &Ground<'_>,
     ids: Range<u32>,
-    visitor: &mut impl Visit,
+    visitor: &mut V,
 ) -> Result<(), Error> {
     /// Of a triangle that is not there: no number.
     const NONE: [u8; 16] = [0xff; 16];
     let axis = |axis| Axis::new(simd, ground.lattice, axis);
     let axes = [axis(0), axis(1), axis(2)];
+    let format = Format::of(ground.mesh.triangle_count());
     let wide = ground.mesh.wide();
     let [x, y, z] = [1, ground.blocks[0], ground.blocks[0] * ground.blocks[1]];
     let offsets = [0, x, y, x + y, z, x + z, y + z, x + y + z];
@@ -284,7 +323,7 @@ fn visit<S: Simd>(
             let row = |lane: u32| wide.corners(first.wrapping_add(at + lane)).unwrap_or([&NONE; 3]);
             let rows = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)];
             let simple;
-            (*blocks, *cells, simple) = places(simd, &axes, ground.blocks, &rows);
+            (*blocks, *cells, simple) = places::<S, HALVES>(simd, &axes, ground.blocks, &rows);
             batch.simple |= simple << at;
         }
 
@@ -298,16 +337,17 @@ fn visit<S: Simd>(
             }
             let straddles = cells >> STRADDLES;
             visitor.listed(1 << (cells >> GROUP & 7).count_ones());
+            let (word, block) = (id | block & format.halves(), block & BLOCK_BITS);
             if straddles == 0 {
-                visitor.entry(block as usize, Entry::of(id, cells));
+                visitor.entry(block as usize, Entry::of(word, cells));
                 continue;
             }
             // Each of its blocks: those on the far side of the axes of every subset.
-            let entry = Entry::of(id, cells & !(7 << STRADDLES));
+            let entry = Entry::of(word, cells & !(7 << STRADDLES));
             let mut far = 0;
             loop {
                 let offset = offsets.get(far as usize).copied().unwrap_or(0);
-                visitor.entry((block + offset) as usize, entry.beside(straddles, far));
+                visitor.entry((block + offset) as usize, entry.beside(straddles, far, format));
                 if far == straddles {
                     break;
                 }
@@ -330,6 +370,7 @@ fn visit_any<S: Simd>(
     simd.vectorize(
         #[inline(always)]
         || {
+            let format = Format::of(ground.mesh.triangle_count());
             let corners = match ground.mesh.wide().corners(id) {
                 Some([a, b, c]) => Some([vector(a), vector(b), vector(c)]),
                 None => ground.mesh.corners(id, Vec3A::new),
@@ -337,15 +378,28 @@ fn visit_any<S: Simd>(
             let Some(corners) = corners else {
                 return Err(Error::IndexOutOfRange { triangle: id });
             };
-            match home(ground.lattice, ground.most_blocks, corners) {
-                Some((range, Some(class))) => {
-                    visitor.listed(lists(range.min, range.max, class.shift()));
-                    each_block(ground.blocks, &range, |block, first, last| {
-                        visitor.entry(block, Entry::new(id, first, last, class));
-                    });
+            let Some(home) = Home::of(ground.lattice, ground.most_blocks, corners) else {
+                return visitor.skipped(id);
+            };
+            let CellRange { min, max } = home.range;
+            let Some(class) = home.class else {
+                visitor.large(id);
+                return Ok(());
+            };
+            visitor.listed(lists(min, max, class.shift()));
+            let (low, high) = (min.map(|cell| cell / BLOCK), max.map(|cell| cell / BLOCK));
+            for z in low[2]..=high[2] {
+                let on_z = home.along(2, z);
+                for y in low[1]..=high[1] {
+                    let on_y = home.along(1, y);
+                    for x in low[0]..=high[0] {
+                        let block = x + ground.blocks[0] * (y + ground.blocks[1] * z);
+                        let (part, halves) = home.part([home.along(0, x), on_y, on_z]);
+                        let word = format.word(id, halves);
+                        let entry = Entry::new(word, part.min, part.max, class);
+                        visitor.entry(block as usize, entry);
+                    }
                 }
-                Some((_, None)) => visitor.large(id),
-                None => visitor.skipped(id)?,
             }
             Ok(())
         },
@@ -420,7 +474,7 @@ impl Kernel for Pass<'_, Count<'_>> {
         heads.fill(0);
         let is_strict = self.ground.flags.contains(BuildFlags::STRICT);
         let mut counting = Counting { heads, census: Census::default(), is_strict };
-        visit(simd, self.ground, ids, &mut counting)?;
+        visit::<S, _, false>(simd, self.ground, ids, &mut counting)?;
         Ok(counting.census)
     }
 }
@@ -471,6 +525,6 @@ impl Kernel for Pass<'_, Scatter<'_, '_>> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let mut scatter = self.work;
-        visit(simd, self.ground, scatter.ids.clone(), &mut scatter)
+        visit::<S, _, true>(simd, self.ground, scatter.ids.clone(), &mut scatter)
     }
 }

@@ -213,7 +213,7 @@ fn bounds(mesh: &TriangleMesh<'_>, sample: &Sample, flags: BuildFlags) -> Result
 }
 
 /// Cells in which a triangle lies on average.
-const REFERENCES: f64 = 2.4;
+const REFERENCES: f64 = 2.2;
 /// Cells in which a triangle lies at most, for the average.
 const MOST: f64 = 8.0;
 

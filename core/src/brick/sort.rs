@@ -24,6 +24,7 @@ use super::divide::{Crowd, Plan, count_of_cell, plan};
 use super::extent::{EXTENT_WORDS, Extent, LIST_WORDS, Owner};
 use super::frame::{Frame, Scene};
 use super::groups::Groups;
+use super::halves::Format;
 use super::layout::{
     BLOCK_CELLS, Bench, Block, CHILD_WORDS, CROWDED, Class, Entry, MASK_BITS, RECORD_WORDS, number,
     place,
@@ -92,7 +93,8 @@ fn chunk<S: Simd>(
     let (bench, deeper) = benches.split_first_mut()?;
     let entries = bench.entries.get(..groups.count())?;
     let cells = bench.cells.first_chunk_mut()?;
-    let block_count = tally(groups, entries, cells, bench.bricks);
+    let format = scene.format();
+    let block_count = tally(groups, entries, format, cells, bench.bricks);
     let mut measure = measure(simd, cells, bench.bricks, block_count);
 
     // Decide which cells are divided.
@@ -121,7 +123,7 @@ fn chunk<S: Simd>(
 
     let base = pool.position();
     if let Some(words) = pool.take(measure.words()) {
-        write(simd, words, base, &measure, groups, entries, cells, bench.bricks, divided);
+        write(simd, words, base, &measure, groups, entries, format, cells, bench.bricks, divided);
         surround(scene, frame, words, &measure);
     }
     // The records of divided cells lie where the tally left the cursors of their cells.
@@ -160,12 +162,13 @@ fn crowded<S: Simd>(simd: S, cells: [u32; 8]) -> u64 {
 pub(super) fn tally(
     groups: &Groups,
     entries: &[Entry],
+    format: Format,
     cells: &mut [u32; BLOCK_CELLS],
     bricks: &mut [u32],
 ) -> u32 {
     cells.fill(0);
     bricks.fill(0);
-    groups.each_small(entries, |cell, _| {
+    groups.each_small(entries, format, |cell, _| {
         if let Some(count) = cells.get_mut(cell) {
             *count += 1;
         }
@@ -173,7 +176,7 @@ pub(super) fn tally(
     let mut block = 0;
     for &entry in groups.group(Groups::OTHERS, entries) {
         match entry.class() {
-            Class::Cells => each_cell(entry, |number| {
+            Class::Cells => each_cell(entry, format, |number, _| {
                 if let Some(count) = cells.get_mut(number) {
                     *count += 1;
                 }
@@ -189,13 +192,20 @@ pub(super) fn tally(
     block
 }
 
+/// Shows every cell of an entry, and what it lists of it.
 #[inline(always)]
-fn each_cell(entry: Entry, mut visit: impl FnMut(usize)) {
+fn each_cell(entry: Entry, format: Format, mut visit: impl FnMut(usize, u32)) {
     let (min, max) = (place(entry.min()), place(entry.max()));
+    // On which axes it is in a cell before this one, and in one behind it.
+    let before = |axis: usize, at: u32| u32::from(at > min[axis]) << axis;
+    let behind = |axis: usize, at: u32| u32::from(at < max[axis]) << axis;
     for z in min[2]..=max[2] {
+        let on_z = entry.reference(format, before(2, z), behind(2, z));
         for y in min[1]..=max[1] {
+            let on_y = format.through(on_z, before(1, y), behind(1, y));
             for x in min[0]..=max[0] {
-                visit(number([x, y, z]) as usize);
+                let on_x = format.through(on_y, before(0, x), behind(0, x));
+                visit(number([x, y, z]) as usize, on_x);
             }
         }
     }
@@ -269,6 +279,7 @@ fn write<S: Simd>(
     measure: &Measure,
     groups: &Groups,
     entries: &[Entry],
+    format: Format,
     cells: &mut [u32; BLOCK_CELLS],
     bricks: &mut [u32],
     divided: &[u64],
@@ -324,9 +335,9 @@ fn write<S: Simd>(
     // The lists, group by group in the order of the ids.
     let mut others = entries;
     if divided.is_empty() {
-        groups.each_small(entries, |cell, id| {
+        groups.each_small(entries, format, |cell, reference| {
             if let Some(cursor) = cells.get_mut(cell) {
-                put(words, *cursor, id);
+                put(words, *cursor, reference);
                 *cursor += 1;
             }
         });
@@ -334,23 +345,23 @@ fn write<S: Simd>(
     }
     for &entry in others {
         match entry.class() {
-            Class::Cells => each_cell(entry, |number| {
+            Class::Cells => each_cell(entry, format, |number, reference| {
                 let bit = number % MASK_BITS;
                 let is_divided =
                     divided.get(number / MASK_BITS).is_some_and(|cells| cells >> bit & 1 != 0);
                 if let Some(cursor) = cells.get_mut(number).filter(|_| !is_divided) {
-                    put(words, *cursor, entry.id);
+                    put(words, *cursor, reference);
                     *cursor += 1;
                 }
             }),
             Class::Bricks => each_brick(entry, |number| {
                 if let Some(cursor) = bricks.get_mut(number) {
-                    put(words, *cursor, entry.id);
+                    put(words, *cursor, entry.id(format));
                     *cursor += 1;
                 }
             }),
             Class::Blocks => {
-                put(words, large_at, entry.id);
+                put(words, large_at, entry.id(format));
                 large_at += 1;
             }
         }

@@ -11,6 +11,7 @@ use crate::control::Control;
 use crate::error::{Error, Region};
 use crate::grid::Grid;
 use crate::mesh::TriangleMesh;
+use crate::ray::Ray;
 use crate::sizes::{Sizes, sizes_with};
 
 type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
@@ -107,6 +108,48 @@ fn bits_do_not_depend_on_the_tasks_nor_on_their_order() {
                 assert!(built == serial, "{tasks} tasks, {} triangles", mesh.1.len());
             }
         }
+    }
+}
+
+/// With few triangles and with many: what ids have room for differs ([`halves`](super::halves)).
+#[test]
+#[cfg_attr(miri, ignore = "hours")]
+fn rays_find_what_a_hashed_grid_finds() {
+    let mut state = 7_u64;
+    #[expect(clippy::cast_precision_loss, reason = "24 bits")]
+    let mut random = || {
+        state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+        (state >> 40) as f32 / 16_777_216.0
+    };
+    for triangles in [2048, 2049, 6000] {
+        let (positions, indices) = soup(triangles);
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        let [hashed, brick] = [Config::new(Method::OneLevel), config()].map(|config| {
+            let sizes = sizes_with(&mesh, &config, &mut [], &Control::SERIAL).unwrap();
+            let [mut index, mut scratch] = regions(sizes.index_bytes, sizes.scratch_bytes);
+            let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
+            Grid::build(mesh, &config, index, scratch).unwrap().blob().to_vec()
+        });
+        let open = |blob: &[u8]| {
+            let mut memory = vec![Memory::ZERO; Memory::count_for(blob.len())];
+            Memory::bytes_mut(&mut memory)[..blob.len()].copy_from_slice(blob);
+            memory
+        };
+        let (hashed, brick) = (open(&hashed), open(&brick));
+        let hashed = Grid::open(Memory::bytes(&hashed), mesh).unwrap();
+        let brick = Grid::open(Memory::bytes(&brick), mesh).unwrap();
+        brick.validate().unwrap();
+        let mut hits = 0;
+        for at in positions.iter().step_by(3) {
+            let from = [0; 3].map(|_| 1.4 * random() - 0.2);
+            let past = at.map(|at| at + 0.01 * (random() - 0.5));
+            let ray = Ray::new(from, core::array::from_fn(|axis| past[axis] - from[axis]));
+            let expected = hashed.intersect(&ray);
+            assert_eq!(brick.intersect(&ray), expected, "{triangles}: {ray:?}");
+            assert_eq!(brick.occluded(&ray), expected.is_some());
+            hits += usize::from(expected.is_some());
+        }
+        assert!(hits > 500, "{hits} hits of {triangles} rays");
     }
 }
 

@@ -401,7 +401,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
                     continue;
                 }
                 match chunk.content(&brick, bit) {
-                    Some(Content::List(ids)) => self.test(simd, ids, rays),
+                    Some(Content::List(references)) => self.test_cell(simd, references, rays),
                     Some(Content::Chunk(chunk, cells)) if depth > 0 => {
                         let corner = view.corner([as_f32(cell_u), as_f32(cell_v), planes[0]]);
                         let (scale, depth) = (view.part.scale * as_f32(cells), depth - 1);
@@ -454,6 +454,18 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         match self.unread.checked_sub(work) {
             Some(rest) => self.unread = rest,
             None => self.bundle.members = 0,
+        }
+    }
+
+    /// Tests rays against the triangles of a cell.
+    #[inline(always)]
+    fn test_cell<S: Simd>(&mut self, simd: S, references: &[u32], rays: u64) {
+        for references in references.chunks(RAYS) {
+            let mut ids = [0; RAYS];
+            for (id, &reference) in ids.iter_mut().zip(references) {
+                *id = self.brick.format.id(reference);
+            }
+            self.test(simd, ids.get(..references.len()).unwrap_or_default(), rays);
         }
     }
 

@@ -13,12 +13,13 @@
 
 use glam::Vec3A;
 
-use super::build::home;
 use super::extent::{EXTENT_WORDS, Extent, LIST_WORDS, Owner};
 use super::frame::{Frame, Scene, classify, lists};
+use super::halves::{Format, Halves};
 use super::layout::{
     BLOCK, Block, CHILD_WORDS, Class, Layout, MAX_CHILDREN, RECORD_WORDS, mask, number, place,
 };
+use super::pass::Home;
 use super::size::{Settled, settle};
 use super::{Brick, Chunk, Content, Large, list};
 use crate::aabb::Aabb;
@@ -117,16 +118,26 @@ enum Within<'d> {
 /// A triangle in a domain.
 struct Placed {
     range: CellRange,
+    halves: Halves,
     class: Class,
     /// Its shapes in the domain and in those around it, as one number.
     shape: usize,
 }
 
 impl Placed {
-    fn new(range: CellRange, class: Class, around: usize) -> Self {
+    fn new((range, halves): (CellRange, Halves), class: Class, around: usize) -> Self {
         let [x, y, z] = core::array::from_fn(|axis| (range.max[axis] - range.min[axis]) as usize);
         let shape = if x | y | z <= 1 { x | y << 1 | z << 2 } else { SHAPES - 1 };
-        Self { range, class, shape: around * SHAPES + shape }
+        Self { range, halves, class, shape: around * SHAPES + shape }
+    }
+
+    /// The halves of one of its cells in which it lies.
+    fn halves(&self, cell: [u32; 3]) -> Halves {
+        let CellRange { min, max } = self.range;
+        let axes = |is: [bool; 3]| (0..3).map(|axis| u32::from(is[axis]) << axis).sum();
+        let before = axes(core::array::from_fn(|axis| min[axis] < cell[axis]));
+        let behind = axes(core::array::from_fn(|axis| cell[axis] < max[axis]));
+        self.halves.through(before, behind)
     }
 }
 
@@ -135,31 +146,27 @@ impl Domain<'_> {
     fn place(&self, settled: &Settled, corners: [Vec3A; 3]) -> Option<Placed> {
         match self.within {
             Within::Lattice(block) => {
-                let (range, class) = home(&settled.lattice, settled.most_blocks, corners)?;
-                let first = block.map(|at| at * BLOCK);
-                let is_in = |k: usize| range.min[k] < first[k] + BLOCK && range.max[k] >= first[k];
-                if !(0..3).all(is_in) {
-                    return None;
-                }
-                let min = core::array::from_fn(|k| range.min[k].saturating_sub(first[k]));
-                let max = core::array::from_fn(|k| (range.max[k] - first[k]).min(BLOCK - 1));
-                Some(Placed::new(CellRange { min, max }, class?, 0))
+                let home = Home::of(&settled.lattice, settled.most_blocks, corners)?;
+                let CellRange { min, max } = home.range;
+                let is_in = |k: usize| (min[k] / BLOCK..=max[k] / BLOCK).contains(&block[k]);
+                let class = home.class.filter(|_| (0..3).all(is_in))?;
+                Some(Placed::new(home.in_block(block), class, 0))
             }
             Within::Domain(around, cell) => {
                 let placed = around.place(settled, corners)?;
                 let reach = settled.lattice.reach(&Aabb::of(corners)?);
-                let (range, class) = inside(&self.frame, &reach);
+                let (range, halves, class) = inside(&self.frame, &reach);
                 let is_in = placed.class == Class::Cells && placed.range.contains(cell);
-                is_in.then(|| Placed::new(range, class, placed.shape))
+                is_in.then(|| Placed::new((range, halves), class, placed.shape))
             }
         }
     }
 }
 
 /// Where a triangle of a divided cell belongs in it.
-fn inside(frame: &Frame, reach: &Aabb) -> (CellRange, Class) {
-    let range = frame.range(reach);
-    (range, classify(range.min, range.max, 1).unwrap_or(Class::Blocks))
+fn inside(frame: &Frame, reach: &Aabb) -> (CellRange, Halves, Class) {
+    let (range, halves) = frame.range(reach);
+    (range, halves, classify(range.min, range.max, 1).unwrap_or(Class::Blocks))
 }
 
 impl Check<'_> {
@@ -178,8 +185,8 @@ impl Check<'_> {
         let Settled { lattice, most_blocks, .. } = self.settled;
         let is_large = |&id: &u32| {
             let corners = self.mesh.corners(id, Vec3A::new);
-            let home = corners.and_then(|corners| home(lattice, *most_blocks, corners));
-            matches!(home, Some((_, None)))
+            let home = corners.and_then(|corners| Home::of(lattice, *most_blocks, corners));
+            home.is_some_and(|home| home.class.is_none())
         };
         if !ascends(large) || !large.iter().all(is_large) {
             return Err(wrong);
@@ -239,10 +246,10 @@ impl Check<'_> {
                     return Err(wrong);
                 }
                 match chunk.content(&brick, cell).ok_or(wrong)? {
-                    Content::List(ids) => {
+                    Content::List(references) => {
                         let cell = place(bit << 6 | cell);
-                        self.list(base + list_at, ids, domain, Class::Cells, cell)?;
-                        list_at += ids.len();
+                        self.list(base + list_at, references, domain, Class::Cells, cell)?;
+                        list_at += references.len();
                     }
                     Content::Chunk(..) => {
                         is_divided = true;
@@ -309,32 +316,38 @@ impl Check<'_> {
     fn list(
         &mut self,
         at: usize,
-        ids: &[u32],
+        words: &[u32],
         domain: &Domain<'_>,
         class: Class,
         cell: [u32; 3],
     ) -> Result<(), Error> {
         let wrong = self.wrong(at);
-        if ids.is_empty() {
+        if words.is_empty() {
             return Err(wrong);
         }
         let shapes = [SHAPES, SHAPES * SHAPES, self.last.len()];
         let shapes = shapes.get(domain.depth).and_then(|&count| self.last.get_mut(..count));
         shapes.ok_or(wrong)?.fill(0);
         let shift = class.shift();
-        for &id in ids {
+        let format = Format::of(self.mesh.triangle_count());
+        for &word in words {
+            let id = format.id(word);
             let corners = self.mesh.corners(id, Vec3A::new).ok_or(wrong)?;
             let placed = domain.place(self.settled, corners).ok_or(wrong)?;
             let CellRange { min, max } = placed.range;
             let is_in =
                 |k: usize| (min[k] >> shift..=max[k] >> shift).contains(&(cell[k] >> shift));
             let last = self.last.get_mut(placed.shape).ok_or(wrong)?;
-            if placed.class != class || !(0..3).all(is_in) || *last > id {
+            let expected = match class {
+                Class::Cells => format.word(id, placed.halves(cell)),
+                _ => id,
+            };
+            if placed.class != class || !(0..3).all(is_in) || *last > id || word != expected {
                 return Err(wrong);
             }
             *last = id + 1;
         }
-        self.listed += ids.len() as u64;
+        self.listed += words.len() as u64;
         Ok(())
     }
 
@@ -344,10 +357,11 @@ impl Check<'_> {
         let corners = self.mesh.corners(id, Vec3A::new);
         let home = corners.and_then(|corners| {
             let reach = lattice.reach(&Aabb::of(corners)?);
-            Some((home(lattice, *most_blocks, corners)?, reach))
+            let Home { range, class, .. } = Home::of(lattice, *most_blocks, corners)?;
+            Some((range, class, reach))
         });
         match home {
-            Some(((range, Some(Class::Cells)), reach)) if self.has_children => {
+            Some((range, Some(Class::Cells), reach)) if self.has_children => {
                 let parts = |cell: [u32; 3]| {
                     let block = cell.map(|c| c / BLOCK);
                     let chunk = self.grid.block(block);
@@ -358,8 +372,8 @@ impl Check<'_> {
                 };
                 range.cells().map(parts).sum()
             }
-            Some(((range, Some(class)), _)) => lists(range.min, range.max, class.shift()),
-            Some(((_, None), _)) => 1,
+            Some((range, Some(class), _)) => lists(range.min, range.max, class.shift()),
+            Some((_, None, _)) => 1,
             None => 0,
         }
     }
@@ -371,10 +385,10 @@ fn parts(chunk: &Chunk<'_>, frame: &Frame, cell: [u32; 3], reach: &Aabb, depth: 
         Some(Content::Chunk(child, count)) if depth < MAX_CHILDREN => {
             let frame = frame.child(cell, count);
             match inside(&frame, reach) {
-                (range, Class::Cells) => {
+                (range, _, Class::Cells) => {
                     range.cells().map(|cell| parts(&child, &frame, cell, reach, depth + 1)).sum()
                 }
-                (range, class) => lists(range.min, range.max, class.shift()),
+                (range, _, class) => lists(range.min, range.max, class.shift()),
             }
         }
         _ => 1,

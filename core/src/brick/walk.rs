@@ -3,6 +3,7 @@
 
 use fearless_simd::Simd;
 
+use super::halves::{Format, Halves};
 use super::layout::{BLOCK, mask, number};
 use super::{Brick, Chunk, Content, Large};
 use crate::cell::as_f32;
@@ -32,6 +33,7 @@ struct Way<'q, F, T> {
     test: &'q TriangleTest,
     search: &'q mut F,
     tally: &'q mut T,
+    format: Format,
     /// The distance at which the ray now ends.
     limit: f32,
     /// A ray meets every list at most once; damaged bytes may list everything in every cell.
@@ -59,8 +61,8 @@ impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let Self { brick, mesh, line, test, search, tally } = self;
-        let (limit, unread) = (line.end, brick.list_words());
-        Way { mesh, line, test, search, tally, limit, unread }.blocks(simd, brick);
+        let (format, limit, unread) = (brick.format, line.end, brick.list_words());
+        Way { mesh, line, test, search, tally, format, limit, unread }.blocks(simd, brick);
     }
 }
 
@@ -70,7 +72,7 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
     fn blocks<S: Simd>(&mut self, simd: S, brick: &Brick<'_>) {
         let large = brick.large();
         if !large.is_empty() {
-            self.test(simd, large);
+            self.test(simd, large, 0);
             if self.is_over() {
                 return;
             }
@@ -143,7 +145,12 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
             let bit = number(walk.cell.map(|cell| cell & 3));
             if mask(brick.mask) >> bit & 1 != 0 {
                 match chunk.content(brick, bit) {
-                    Some(Content::List(ids)) => self.test(simd, ids),
+                    Some(Content::List(references)) => {
+                        // Eight take one test, however many are missed.
+                        let missed =
+                            if references.len() > LANES { self.missed(line, &walk) } else { 0 };
+                        self.test(simd, references, missed);
+                    }
                     Some(Content::Chunk(chunk, cells)) if depth > 0 => {
                         let line = line.zoom(walk.cell.map(as_f32), [as_f32(cells); 3]);
                         let (corner, last, exits) = ([0; 3], [cells - 1; 3], walk.next);
@@ -181,42 +188,99 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
     #[inline(always)]
     fn test_large<S: Simd>(&mut self, simd: S, large: &Large<'_>, line: &Line, corner: [f32; 3]) {
         if line.meets(&large.extent.reach(large.owner), corner, self.limit) {
-            self.test(simd, large.ids);
+            self.test(simd, large.ids, 0);
         }
     }
 
-    /// Tests the ray against the triangles of a list.
+    /// The bits of references that the ray does not meet in the cell that a walk is in.
+    #[inline(always)]
+    fn missed(&self, line: &Line, walk: &Walk) -> u32 {
+        let [x, y, z] = walk.next;
+        let far = x.min(y).min(z).min(self.limit);
+        let [upper, lower] = line.halves(walk.cell, walk.entered, far);
+        self.format.missed(Halves::new(upper, lower))
+    }
+
+    /// Tests the ray against the triangles of a list, but for those of which a reference has any of the
+    /// bits `missed`.
     ///
-    /// Out of line, or it would be five times in the walk; so it says once more what vectors it is
+    /// Out of line, or it would be four times in the walk; so it says once more what vectors it is
     /// compiled for.
-    fn test<S: Simd>(&mut self, simd: S, ids: &[u32]) {
+    fn test<S: Simd>(&mut self, simd: S, references: &[u32], missed: u32) {
         simd.vectorize(
             #[inline(always)]
-            || self.test_list(simd, ids),
+            || {
+                let Some(rest) = self.unread.checked_sub(references.len()) else {
+                    self.limit = f32::NEG_INFINITY;
+                    return;
+                };
+                self.unread = rest;
+                if missed == 0 {
+                    self.test_all(simd, references);
+                } else {
+                    self.test_some(simd, references, missed);
+                }
+            },
         );
     }
 
     #[inline(always)]
-    fn test_list<S: Simd>(&mut self, simd: S, ids: &[u32]) {
-        let Some(rest) = self.unread.checked_sub(ids.len()) else {
-            self.limit = f32::NEG_INFINITY;
-            return;
-        };
-        self.unread = rest;
-        self.tally.primitive_tests(ids.len());
-        for ids in ids.chunks(LANES) {
-            self.test_eight(simd, ids);
+    fn test_all<S: Simd>(&mut self, simd: S, references: &[u32]) {
+        for some in references.chunks(LANES) {
+            let eight = some.first_chunk().copied().unwrap_or_else(
+                #[inline(always)]
+                || {
+                    let mut eight = [some.first().copied().unwrap_or(0); LANES];
+                    for (slot, &reference) in eight.iter_mut().zip(some) {
+                        *slot = reference;
+                    }
+                    eight
+                },
+            );
+            let ids = eight.map(
+                #[inline(always)]
+                |reference| self.format.id(reference),
+            );
+            self.test_eight(simd, &ids, some.len());
             if self.is_over() {
                 return;
             }
         }
     }
 
-    /// Tests the ray against up to eight triangles.
     #[inline(always)]
-    fn test_eight<S: Simd>(&mut self, simd: S, ids: &[u32]) {
-        let eight = Eight::gather(simd, self.mesh, ids);
-        let mut survivors = self.test.survivors(simd, &eight);
+    fn test_some<S: Simd>(&mut self, simd: S, references: &[u32], missed: u32) {
+        /// References that are looked at in one go.
+        const MOST: usize = 4 * LANES;
+        for some in references.chunks(MOST) {
+            // No branch tells who is missed: it would be as good as random.
+            let any = self.format.id(some.first().copied().unwrap_or(0));
+            let (mut ids, mut count) = ([any; MOST + LANES], 0);
+            let mut take = |reference: u32| {
+                ids[count % MOST] = self.format.id(reference);
+                count += usize::from(reference & missed == 0);
+            };
+            let (eights, rest) = some.as_chunks::<LANES>();
+            for eight in eights {
+                eight.iter().copied().for_each(&mut take);
+            }
+            rest.iter().copied().for_each(&mut take);
+            for first in (0..count).step_by(LANES) {
+                let Some(eight) = ids.get(first..).and_then(|ids| ids.first_chunk()) else { break };
+                self.test_eight(simd, eight, count - first);
+                if self.is_over() {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Tests the ray against the first `count` of eight triangles; the others are read, too.
+    #[inline(always)]
+    fn test_eight<S: Simd>(&mut self, simd: S, ids: &[u32; LANES], count: usize) {
+        self.tally.primitive_tests(count.min(LANES));
+        let triangles = Eight::of(simd, self.mesh, *ids, count);
+        let mut survivors = self.test.survivors(simd, &triangles);
         while survivors != 0 {
             let lane = survivors.trailing_zeros() as usize;
             survivors &= survivors - 1;
