@@ -161,20 +161,29 @@ static size_t draw_and_count(const shared *s, sample *tile, size_t count)
 
 /* --- tiles ----------------------------------------------------------------------------------- */
 
-/* The rays of a tile; at the right and lower edge it may be smaller. */
+/* Every other bit of a number. */
+static int even_bits(int number)
+{
+    return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4);
+}
+
+/* The rays of a tile, each sixteen of them a square, as hgrid_intersect_n likes them best; at the right
+   and lower edge it may be smaller. */
 static size_t aim(const shared *s, size_t number, sample *tile)
 {
     const picture_job *job = s->job;
     const int left = (int)(number % s->columns) * TILE, top = (int)(number / s->columns) * TILE;
     size_t count = 0;
-    for (int row = top; row < top + TILE && row < job->row_count; row++)
-        for (int column = left; column < left + TILE && column < job->size; column++) {
-            sample *at = &tile[count++];
-            at->ray = ray_of(job->camera, column, job->first_row + row, job->size);
-            at->number = (uint32_t)(job->first_row + row) * (uint32_t)job->size + (uint32_t)column;
-            at->place = (size_t)row * (size_t)job->size + (size_t)column;
-            at->lit = at->open = 1;
-        }
+    for (int ray = 0; ray < TILE_PIXELS; ray++) {
+        const int column = left + even_bits(ray), row = top + even_bits(ray >> 1);
+        if (row >= job->row_count || column >= job->size)
+            continue;
+        sample *at = &tile[count++];
+        at->ray = ray_of(job->camera, column, job->first_row + row, job->size);
+        at->number = (uint32_t)(job->first_row + row) * (uint32_t)job->size + (uint32_t)column;
+        at->place = (size_t)row * (size_t)job->size + (size_t)column;
+        at->lit = at->open = 1;
+    }
     return count;
 }
 

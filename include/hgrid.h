@@ -1,7 +1,7 @@
 /*
  * hgrid: a ray-tracing acceleration structure that a renderer links and a microcontroller can carry.
  *
- * It turns a triangle mesh into a hashed grid, in time proportional to the number of triangles and
+ * It turns a triangle mesh into a grid, in time proportional to the number of triangles and
  * in memory that you bring, and answers ray queries on it. This file is the whole manual. It is
  * made from the sources in capi/: change it there.
  *
@@ -77,7 +77,7 @@
  * same, hit for hit and bit for bit.
  *
  *   HGRID_METHOD_BRICK       the default: cells as large as triangles, a bit for each: the shortest
- *                            build, and no scene that it does not take
+ *                            build, and little memory whatever the scene
  *   HGRID_METHOD_ONE_LEVEL   one hashed grid; the least memory for large scans, and for arrays of a
  *                            fixed size
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
@@ -97,8 +97,8 @@
  * next to them say. Each function says which of its pointers may be NULL; any other NULL is answered
  * with HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of
  * a batch right after its rays. They are written when a call succeeds and not touched when it
- * fails, except for the report, which is written in both cases, and for an index that was too small
- * (hgrid_build).
+ * fails, except for the report, which is written in both cases, for the size that hgrid_pack wants,
+ * and for an index in the cases that hgrid_build names.
  *
  * Structs
  * -------
@@ -222,7 +222,7 @@
 #define HGRID_INDEX_U16 1
 
 /**
- * One hashed grid with a single cell size: the default of `hgrid_config`.
+ * One hashed grid with a single cell size.
  *
  * Choose it where memory is dear and the mesh is large: it takes the least for each triangle. It
  * is at its best where triangles are of similar size and everywhere, and slow where all detail is
@@ -280,7 +280,7 @@
  * It is the default: the shortest build, the first image, tiles of rays through `hgrid_intersect_n`, and
  * scenes of which nobody knows what is in them. `cell_size` belongs to it, `density` does not.
  *
- * Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it.
+ * Memory: on scans about 9 bytes a triangle; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it.
  * How much index it takes shows only while it is written, and a build may need somewhat more than the
  * blob has in the end. `hgrid_sizes` without scratch answers with what is enough, seven times as much
  * for a scan, and with more scratch than a build takes; with scratch it gives the exact size.
@@ -443,7 +443,7 @@ typedef struct hgrid_config {
  *
  * Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
  * what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another pass
- * over mesh and grid, `hgrid_inspect` tells: triangles without area, the first bad one, the longest
+ * over mesh and grid, `hgrid_inspect` tells: triangles with two equal corners, the first bad one, the longest
  * list, a hash of the content.
  */
 typedef struct hgrid_report {
@@ -452,7 +452,7 @@ typedef struct hgrid_report {
      */
     uint32_t struct_size;
     /**
-     * 1 if `index_bytes` is what the grid takes, to the byte; 0 if it is only enough.
+     * 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough.
      */
     uint32_t is_exact;
     /**
@@ -644,7 +644,8 @@ typedef struct hgrid_counters {
  * What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
  *
  * A query with options that are not the defaults is somewhat slower than one without, and rays of a
- * batch are then traced one by one.
+ * batch are then traced one by one. Options that break the rules for structs make a query of one ray
+ * answer as for a miss: `hgrid_intersect_all` with the same options returns what is wrong with them.
  */
 typedef struct hgrid_query_options {
     /**
@@ -1077,8 +1078,8 @@ extern "C" {
  * Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
  * is looked at.
  *
- * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are for array declarations, and a little more for the
- * default configuration. How much more than enough it is depends on the method: a scan takes a sixth of
+ * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants,
+ * rounded up a little. How much more than enough it is depends on the method: a scan takes a sixth of
  * it or less with one level, a twelfth with brick; with recursive it is generous beyond use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
@@ -1102,8 +1103,8 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * Tells how much memory a build of this mesh takes.
  *
  * Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
- * `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
- * more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
+ * `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more than
+ * enough the index is depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
  * with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
  *
  * With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`

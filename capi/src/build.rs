@@ -11,8 +11,8 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 /// Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
 /// is looked at.
 ///
-/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are for array declarations, and a little more for the
-/// default configuration. How much more than enough it is depends on the method: a scan takes a sixth of
+/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants,
+/// rounded up a little. How much more than enough it is depends on the method: a scan takes a sixth of
 /// it or less with one level, a twelfth with brick; with recursive it is generous beyond use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
@@ -47,8 +47,8 @@ pub unsafe extern "C" fn hgrid_bound(
 /// Tells how much memory a build of this mesh takes.
 ///
 /// Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
-/// `scratch_bytes` is what a build takes, `index_bytes` is enough, and `is_exact` is 0. How much
-/// more than enough depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
+/// `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more than
+/// enough the index is depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
 /// with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
 ///
 /// With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`

@@ -99,7 +99,8 @@ pub const HGRID_CULL_FRONT: u32 = 2;
 /// What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
 ///
 /// A query with options that are not the defaults is somewhat slower than one without, and rays of a
-/// batch are then traced one by one.
+/// batch are then traced one by one. Options that break the rules for structs make a query of one ray
+/// answer as for a miss: `hgrid_intersect_all` with the same options returns what is wrong with them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_query_options {

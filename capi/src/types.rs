@@ -32,7 +32,7 @@ pub const HGRID_INDEX_U32: u32 = 0;
 /// Indices of 16 bits.
 pub const HGRID_INDEX_U16: u32 = 1;
 
-/// One hashed grid with a single cell size: the default of `hgrid_config`.
+/// One hashed grid with a single cell size.
 ///
 /// Choose it where memory is dear and the mesh is large: it takes the least for each triangle. It
 /// is at its best where triangles are of similar size and everywhere, and slow where all detail is
@@ -82,7 +82,7 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 /// It is the default: the shortest build, the first image, tiles of rays through `hgrid_intersect_n`, and
 /// scenes of which nobody knows what is in them. `cell_size` belongs to it, `density` does not.
 ///
-/// Memory: on scans about that of one level; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it.
+/// Memory: on scans about 9 bytes a triangle; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it.
 /// How much index it takes shows only while it is written, and a build may need somewhat more than the
 /// blob has in the end. `hgrid_sizes` without scratch answers with what is enough, seven times as much
 /// for a scan, and with more scratch than a build takes; with scratch it gives the exact size.
@@ -219,14 +219,14 @@ pub type hgrid_task = unsafe extern "C" fn(task_context: *mut c_void, index: u32
 ///
 /// Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
 /// what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another pass
-/// over mesh and grid, `hgrid_inspect` tells: triangles without area, the first bad one, the longest
+/// over mesh and grid, `hgrid_inspect` tells: triangles with two equal corners, the first bad one, the longest
 /// list, a hash of the content.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_report {
     /// `sizeof(hgrid_report)`.
     pub struct_size: u32,
-    /// 1 if `index_bytes` is what the grid takes, to the byte; 0 if it is only enough.
+    /// 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough.
     pub is_exact: u32,
     /// Bytes that the index region needs; after a build, the size of the blob, which for
     /// `HGRID_METHOD_BRICK` may be smaller than the index had to be.
@@ -276,7 +276,7 @@ impl hgrid_config {
     #[expect(clippy::cast_possible_truncation, reason = "64 bytes")]
     pub(crate) const DEFAULT: Self = {
         let Config { method, density, macrocell_factor, subdivide_above, depth, cell_size, .. } =
-            Config::new(Method::OneLevel);
+            Config::new(Method::Brick);
         let (struct_size, method) = (size_of::<Self>() as u32, method as u32);
         Self {
             struct_size,

@@ -1,6 +1,6 @@
 //! What can go wrong, with the number that helps: one enum for build and open, no strings, no allocation.
 //!
-//! A query has no error: a miss is not one, and a grid that was opened answers every ray.
+//! A query of one ray has no error: a miss is not one, and a grid that was opened answers every ray.
 
 use core::fmt;
 

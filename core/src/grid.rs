@@ -371,7 +371,7 @@ impl<'a> Grid<'a> {
     }
 
     /// The density that the grid has: the configured one, or a half, a quarter, ... of it where the
-    /// mesh would have needed more than 16 references a triangle.
+    /// mesh would have needed more than 16 references a triangle. It means nothing for a brick grid.
     #[must_use]
     pub fn density(&self) -> f32 {
         self.config().density
@@ -390,7 +390,7 @@ impl<'a> Grid<'a> {
         self.header().map_or(0, |header| header.skipped_count)
     }
 
-    /// Primitive ids in all cells together; words of the pool for a variable or recursive grid.
+    /// Primitive ids in all cells together; words of the pool for a variable, recursive or brick grid.
     #[must_use]
     pub fn reference_count(&self) -> u32 {
         self.header().map_or(0, |header| header.reference_count)

@@ -18,8 +18,8 @@ pub struct Sizes {
     pub index_bytes: usize,
     /// For the region that only the build needs.
     pub scratch_bytes: usize,
-    /// Whether `index_bytes` is what the grid will take, to the byte, or only no less than that.
-    /// `scratch_bytes` is exact for one-level and fixed grids, and enough for the others.
+    /// Whether `index_bytes` is what the build needs, to the byte, or only no less than that; the blob of a
+    /// brick grid may be smaller. `scratch_bytes` is enough; for one-level and fixed grids it is exact.
     pub is_exact: bool,
 }
 

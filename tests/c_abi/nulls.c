@@ -71,12 +71,13 @@ static void prepare(void)
 {
     make_sheet(&mesh_data);
     mesh = mesh_of(&mesh_data);
-    config = usual(0);
+    const hgrid_config what_null_means = HGRID_CONFIG_INIT;
+    config = what_null_means;
     const hgrid_query_options defaults = HGRID_QUERY_OPTIONS_INIT;
     options = defaults;
     grid = build_exactly(&mesh, &config, &blob, &blob_bytes);
-    const hgrid_report need = exact_sizes(&mesh, &config);
-    index_bytes = (size_t)need.index_bytes, scratch_bytes = (size_t)need.scratch_bytes;
+    EXPECT(HGRID_OK, hgrid_sizes(&mesh, &config, NULL, 0, &report));
+    index_bytes = (size_t)report.index_bytes, scratch_bytes = (size_t)report.scratch_bytes;
     index_region = (unsigned char *)guarded(index_bytes);
     scratch = (unsigned char *)guarded(scratch_bytes);
     uint64_t bytes;
@@ -108,8 +109,10 @@ static void questions_for_sizes(void)
     ALLOWED(hgrid_fit.config,
             hgrid_fit(&mesh, NULL, index_bytes, scratch, scratch_bytes, &out.fitted, &report));
     CHECK(memcmp(&out.fitted, &config, sizeof config) == 0);
+    /* With brick, the default, fitting takes scratch. */
+    const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
     ALLOWED(hgrid_fit.scratch,
-            hgrid_fit(&mesh, &config, index_bytes, NULL, 0, &out.fitted, &report));
+            hgrid_fit(&mesh, &one_level, index_bytes, NULL, 0, &out.fitted, &report));
     REFUSED(hgrid_fit.scratch, HGRID_ERROR_NULL_ARGUMENT,
             hgrid_fit(&mesh, &config, index_bytes, NULL, 1, &out.fitted, &report));
     REFUSED(hgrid_fit.fitted, HGRID_ERROR_NULL_ARGUMENT,

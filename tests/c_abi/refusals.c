@@ -177,7 +177,7 @@ static void impossible_arrays_are_refused(void)
 
 static void bad_triangles_are_named(void)
 {
-    hgrid_config strict = HGRID_CONFIG_INIT_ONE_LEVEL;
+    hgrid_config strict = HGRID_CONFIG_INIT;
     strict.flags = HGRID_BUILD_STRICT;
     static sheet bad;
     const hgrid_mesh input = mesh_of(&bad);

@@ -16,9 +16,11 @@ static void prepare(void)
 {
     make_sheet(&mesh_data);
     mesh = mesh_of(&mesh_data);
-    config = usual(0);
+    const hgrid_config what_null_means = HGRID_CONFIG_INIT;
+    config = what_null_means;
     grid = build_exactly(&mesh, &config, &blob, &blob_bytes);
-    const hgrid_report need = exact_sizes(&mesh, &config);
+    hgrid_report need = HGRID_REPORT_INIT;
+    EXPECT(HGRID_OK, hgrid_sizes(&mesh, &config, NULL, 0, &need));
     index_bytes = (size_t)need.index_bytes, scratch_bytes = (size_t)need.scratch_bytes;
     index_region = (unsigned char *)guarded(index_bytes);
     scratch = (unsigned char *)guarded(scratch_bytes);

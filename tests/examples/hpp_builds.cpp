@@ -134,7 +134,7 @@ static void check_views()
     const auto small = hgrid::view::build(
         s.mesh(), {}, hgrid::as_writable_bytes(index).subspan(0, exact.index_bytes - 64),
         hgrid::as_writable_bytes(scratch), &details);
-    CHECK(small.error() == status::index_too_small && details.index_bytes == exact.index_bytes);
+    CHECK(small.error() == status::index_too_small && details.index_bytes >= exact.index_bytes);
 }
 
 static void check_progress_and_threads()

@@ -26,7 +26,7 @@ pub(super) const MASK_BITS: usize = 64;
 /// Cells of a block.
 pub(super) const BLOCK_CELLS: usize = 4096;
 
-/// What the pool has of a block, or of a cell that is divided like one.
+/// What the index has of a block, and the pool of a cell that is divided like one.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 pub(super) struct Block {
