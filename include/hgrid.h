@@ -167,7 +167,7 @@
 
 /**
  * Bytes of index that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. A scan takes a twelfth of it.
+ * default configuration: a constant expression. A scan takes a thirteenth of it.
  */
 #define HGRID_INDEX_BOUND(triangles) \
     ((triangles) < 224 ? (size_t)177 * (triangles) + 3584 : (size_t)129 * (triangles) + 14336)
@@ -1080,7 +1080,7 @@ extern "C" {
  *
  * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants,
  * rounded up a little. How much more than enough it is depends on the method: a scan takes a sixth of
- * it or less with one level, a twelfth with brick; with recursive it is generous beyond use.
+ * it or less with one level, a thirteenth with brick; with recursive it is generous beyond use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
  * `index_bytes` and `scratch_bytes`; or what is wrong:

@@ -10,6 +10,8 @@
 //! spreading             4 * 2^-24                     v - min, * cells per unit, + margin
 //! the triangle test    25 * 2^-24                     vertex - origin at up to 5 extents, shear
 //! the walk              4 * 2^-24                     base, cell * delta, their sum
+//! halves of a cell      4 * 2^-24                     position + rate * t (two margins: a line's, a
+//!                                                     triangle's)
 //! a tile's lines       60 * 2^-24                     start - slope * zero, origin 4.5 extents off (two
 //!                                                     margins: a line's, a triangle's)
 //! the planes of a tile 16 * 2^-24                     slope * k + start (likewise)

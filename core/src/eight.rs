@@ -42,18 +42,7 @@ impl<S: Simd> Eight<S> {
     /// The lane of an id without a triangle stays unused.
     #[inline(always)]
     pub(crate) fn gather(simd: S, mesh: &TriangleMesh<'_>, ids: &[u32]) -> Self {
-        // What is behind the last is read, too, four in a row: the last once more.
-        let eight = ids.first_chunk().copied().unwrap_or_else(
-            #[inline(always)]
-            || {
-                let mut padded = [ids.last().copied().unwrap_or(0); LANES];
-                for (slot, &id) in padded.iter_mut().zip(ids) {
-                    *slot = id;
-                }
-                padded
-            },
-        );
-        Self::of(simd, mesh, eight, ids.len())
+        Self::of(simd, mesh, first_eight(ids), ids.len())
     }
 
     /// The first `count` of eight triangles; the others are read, too.
@@ -69,6 +58,21 @@ impl<S: Simd> Eight<S> {
         let used = used | used_high << (LANES / 2);
         Self { corners, used: used & ((1 << count.min(LANES)) - 1) }
     }
+}
+
+/// The first eight of some ids; where there are fewer, the first once more: it is read, too.
+#[inline(always)]
+pub(crate) fn first_eight(ids: &[u32]) -> [u32; LANES] {
+    ids.first_chunk().copied().unwrap_or_else(
+        #[inline(always)]
+        || {
+            let mut eight = [ids.first().copied().unwrap_or(0); LANES];
+            for (slot, &id) in eight.iter_mut().zip(ids) {
+                *slot = id;
+            }
+            eight
+        },
+    )
 }
 
 /// Eight vertices from four and four.

@@ -26,7 +26,7 @@ pub struct Sizes {
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A one-level grid of a scan takes a sixth of it or less, a brick grid a twelfth; for recursive grids
+    /// A one-level grid of a scan takes a sixth of it or less, a brick grid a thirteenth; for recursive grids
     /// it is generous beyond use. `None` if no build takes the configuration, or the sizes do not fit the
     /// machine's address space.
     ///

@@ -171,8 +171,8 @@ fn collect<S: Simd>(
     most: u32,
     bench: &mut Bench<'_>,
 ) -> Option<(Frame, Groups, u32)> {
-    // What the cell lists, and soon what its parts will, waits where cells will be counted, or behind the entries, if there is
-    // room.
+    // What the cell lists, and soon what its parts will, waits where cells will be counted, or behind the
+    // entries, if there is room.
     let length = listed as usize;
     let (sorted, behind) = bench.entries.split_at_mut_checked(length)?;
     let in_cells: &mut [Entry] = bytemuck::try_cast_slice_mut(bench.cells).ok()?;

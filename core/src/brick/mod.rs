@@ -11,7 +11,7 @@
 //! blocks   for each block of 16^3 cells: mask of its bricks, where its chunk lies, its list
 //! pool     list of the grid, and the chunk of each block:
 //!          | bricks: mask, cells, list | starts of cells, end | lists of cells | of bricks | of the block |
-//!                                                                           (extent, count, ids)
+//!                                             (halves and ids)              (extent, count, ids)
 //! ```
 //!
 //! A cell is a few triangles wide, whatever their number ([`size`]). A triangle that would be in too

@@ -460,6 +460,10 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
     /// Tests rays against the triangles of a cell.
     #[inline(always)]
     fn test_cell<S: Simd>(&mut self, simd: S, references: &[u32], rays: u64) {
+        // Only damaged bytes have an empty list; to look at it costs, too.
+        if references.is_empty() {
+            self.spend(u64::from(rays.count_ones()));
+        }
         for references in references.chunks(RAYS) {
             let mut ids = [0; RAYS];
             for (id, &reference) in ids.iter_mut().zip(references) {

@@ -9,7 +9,7 @@ use super::{Brick, Chunk, Content, Large};
 use crate::cell::as_f32;
 use crate::counters::Tally;
 use crate::dda::{Line, NEVER, Step, Walk};
-use crate::eight::{Eight, LANES};
+use crate::eight::{Eight, LANES, first_eight};
 use crate::mesh::TriangleMesh;
 use crate::search::{Outcome, Search};
 use crate::simd::Kernel;
@@ -204,7 +204,7 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
     /// Tests the ray against the triangles of a list, but for those of which a reference has any of the
     /// bits `missed`.
     ///
-    /// Out of line, or it would be four times in the walk; so it says once more what vectors it is
+    /// Out of line, or it would be several times in the walk; so it says once more what vectors it is
     /// compiled for.
     fn test<S: Simd>(&mut self, simd: S, references: &[u32], missed: u32) {
         simd.vectorize(
@@ -227,17 +227,7 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
     #[inline(always)]
     fn test_all<S: Simd>(&mut self, simd: S, references: &[u32]) {
         for some in references.chunks(LANES) {
-            let eight = some.first_chunk().copied().unwrap_or_else(
-                #[inline(always)]
-                || {
-                    let mut eight = [some.first().copied().unwrap_or(0); LANES];
-                    for (slot, &reference) in eight.iter_mut().zip(some) {
-                        *slot = reference;
-                    }
-                    eight
-                },
-            );
-            let ids = eight.map(
+            let ids = first_eight(some).map(
                 #[inline(always)]
                 |reference| self.format.id(reference),
             );
@@ -255,7 +245,7 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
         for some in references.chunks(MOST) {
             // No branch tells who is missed: it would be as good as random.
             let any = self.format.id(some.first().copied().unwrap_or(0));
-            let (mut ids, mut count) = ([any; MOST + LANES], 0);
+            let (mut ids, mut count) = ([any; MOST], 0);
             let mut take = |reference: u32| {
                 ids[count % MOST] = self.format.id(reference);
                 count += usize::from(reference & missed == 0);
