@@ -48,7 +48,7 @@ impl<'v> Visitor<'v> {
     }
 
     /// Says which bits of the words of all lists are ids.
-    pub(crate) const fn read_only(&mut self, mask: u32) {
+    pub(crate) const fn ids_have(&mut self, mask: u32) {
         self.mask = mask;
     }
 

@@ -328,10 +328,12 @@ fn lists_of_different_places_cannot_be_exchanged() {
 #[test]
 fn divided_cells_in_circles_end() {
     let mut damage = Damage::new();
+    let mut count = 0;
     for Site { at, .. } in damage.some(&[Kind::ChildBase], false) {
         let (base, list) = (damage.word(at), damage.word(at + 4));
         damage.is_refused(&[(at, 0)], "a cell that holds its block");
         if [damage.word(at - 8), damage.word(at - 4)] != [u32::MAX; 2] {
+            count += 1;
             damage.is_refused(&[(at - 8, u32::MAX), (at - 4, u32::MAX)], "a mask of all bricks");
         }
         damage.is_refused(
@@ -349,6 +351,7 @@ fn divided_cells_in_circles_end() {
         let start = damage.word(at);
         damage.is_refused(&[(at, start ^ 1 << 31)], "a list is no divided cell");
     }
+    assert!(count > 0, "every divided cell has all bricks");
     damage.open().validate().unwrap();
 }
 

@@ -108,7 +108,7 @@ impl<'a> Brick<'a> {
             min: range.min.map(|cell| cell / layout::BLOCK),
             max: range.max.map(|cell| cell / layout::BLOCK),
         };
-        visitor.read_only(self.format.ids());
+        visitor.ids_have(self.format.ids());
         visitor.list(self.large())
             && blocks.cells().all(|block| {
                 let Some(chunk) = self.block(block) else { return true };
