@@ -90,7 +90,7 @@ pub(crate) fn extent(words: &[u64], bit: usize, count: usize) -> Option<(usize, 
 
 /// The `count` lowest bits set; all of them from 64 on.
 #[inline(always)]
-const fn low_bits(count: usize) -> u64 {
+pub(crate) const fn low_bits(count: usize) -> u64 {
     if count < WORD_BITS { (1 << count) - 1 } else { u64::MAX }
 }
 

@@ -25,7 +25,7 @@
 //! ```
 //!
 //! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `approach`, `triangle`,
-//! `simd`, `eight`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`, `hash`,
+//! `simd`, `eight`, `spans`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`, `hash`,
 //! `cell`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure above them
 //! (`one_level`; `fixed` and `variable` on top of it; `recursive`; `brick`), and `grid`: the view that
 //! queries run on. Then the questions: `sizes`, `options`, `batch`, `closest`, `inspect`, `packed`.
@@ -76,6 +76,7 @@ mod recursive;
 mod search;
 mod simd;
 mod sizes;
+mod spans;
 mod survey;
 mod tasks;
 mod triangle;

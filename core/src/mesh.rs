@@ -290,7 +290,7 @@ impl<'a> TriangleMesh<'a> {
 ///
 /// Strides of 16 bits leave products of an index without overflow, so that the end of the bytes is
 /// all there is to check: they end with the last element, so what lies inside is an element.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct WideMesh<'a> {
     positions: &'a [u8],
     indices: &'a [u8],
@@ -299,6 +299,11 @@ pub(crate) struct WideMesh<'a> {
 }
 
 impl<'a> WideMesh<'a> {
+    /// Whether nothing can be read this way.
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.indices.is_empty()
+    }
+
     /// The corners of a triangle, each with the four bytes behind it.
     ///
     /// `None` does not mean that there is no such triangle: one with the mesh's last vertex has

@@ -11,19 +11,20 @@
 use core::ops::Range;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u32x8};
+use fearless_simd::{Simd, u32x8};
 use glam::{Vec3A, Vec4};
 
 use super::frame::{classify, lists, range};
 use super::halves::{Format, Halves, ID_BITS};
 use super::layout::{BLOCK, Class, Entry, GROUP};
-use crate::aabb::{Aabb, MAX_COORDINATE};
-use crate::cell::{CellRange, Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
+use crate::aabb::Aabb;
+use crate::cell::{CellRange, Lattice};
 use crate::config::BuildFlags;
-use crate::eight::{Row, corner, join, load};
+use crate::eight::LANES;
 use crate::error::Error;
-use crate::mesh::TriangleMesh;
+use crate::mesh::{TriangleMesh, WideMesh};
 use crate::simd::{Kernel, SimdLevel, dispatch};
+use crate::spans::{Span, Spans};
 use crate::tasks::Shared;
 
 /// What the mesh will be in its blocks.
@@ -137,7 +138,6 @@ trait Visit {
 ///
 /// In between nothing is called, so that all constants stay in vector registers.
 const BATCH: usize = 64;
-const LANES: usize = 8;
 /// The first of three bits above the group of simple triangles.
 const STRADDLES: u32 = GROUP + 3;
 /// The bits of a block's number, above which there is room.
@@ -154,55 +154,20 @@ struct Places {
     simple: u64,
 }
 
-/// What takes coordinates on one axis to cells.
-#[derive(Clone, Copy)]
-struct Axis<S: Simd> {
-    origin: f32x8<S>,
-    halves_per_unit: f32x8<S>,
-    /// In halves of cells, as the end.
-    margin: f32x8<S>,
-    end: f32x8<S>,
-}
-
-impl<S: Simd> Axis<S> {
-    #[inline(always)]
-    fn new(simd: S, lattice: &Lattice, axis: usize) -> Self {
-        let splat = |value| f32x8::splat(simd, value);
-        Self {
-            origin: splat(lattice.min[axis]),
-            halves_per_unit: splat(2.0 * lattice.scale()[axis]),
-            margin: splat(2.0 * lattice.margin()[axis]),
-            end: splat(as_f32(2 * lattice.resolution[axis]) - 0.5),
-        }
-    }
-
-    /// The first and the last cell of triangles, and the halves. The same bits as [`range`].
-    #[inline(always)]
-    fn range(&self, simd: S, a: f32x8<S>, b: f32x8<S>, c: f32x8<S>) -> Span<S> {
-        let (min, max) = (a.min(b).min(c), a.max(b).max(c));
-        let min = (min - self.origin) * self.halves_per_unit - self.margin;
-        let max = (max - self.origin) * self.halves_per_unit + self.margin;
-        let (first, last) = (self.whole(simd, min), self.whole(simd, max));
-        Span { first, last, min: first >> 1, max: last >> 1 }
-    }
-
-    #[inline(always)]
-    fn whole(&self, simd: S, position: f32x8<S>) -> u32x8<S> {
-        let clamped = position.max(f32x8::splat(simd, 0.0)).min(self.end);
-        (clamped - 0.5 + WHOLE_SHIFT).bitcast::<u32x8<S>>() & WHOLE_BITS
-    }
-}
-
 /// First and last halves of cells on an axis, and the cells.
 #[derive(Clone, Copy)]
-struct Span<S: Simd> {
-    first: u32x8<S>,
-    last: u32x8<S>,
+struct Cells<S: Simd> {
+    halves: Span<S>,
     min: u32x8<S>,
     max: u32x8<S>,
 }
 
-impl<S: Simd> Span<S> {
+impl<S: Simd> Cells<S> {
+    #[inline(always)]
+    fn of(halves: Span<S>) -> Self {
+        Self { halves, min: halves.first >> 1, max: halves.last >> 1 }
+    }
+
     /// Whether the second cell is in the next block: the lowest bit of the block's number then differs.
     #[inline(always)]
     fn straddles(self) -> u32x8<S> {
@@ -226,45 +191,14 @@ impl<S: Simd> Span<S> {
 
 /// The bits of [`Halves`], from the last one to the first.
 #[inline(always)]
-fn halves<S: Simd>([x, y, z]: [Span<S>; 3]) -> u32x8<S> {
+fn halves<S: Simd>([x, y, z]: [Cells<S>; 3]) -> u32x8<S> {
+    let [x, y, z] = [x.halves, y.halves, z.halves];
     let mut bits = !z.last & 1;
     for half in [!y.last, !x.last, z.first, y.first, x.first] {
         bits = (bits << 1) | (half & 1);
     }
     bits
 }
-
-/// Corners of eight triangles.
-#[derive(Clone, Copy)]
-struct Corners<S: Simd> {
-    x: f32x8<S>,
-    y: f32x8<S>,
-    z: f32x8<S>,
-}
-
-impl<S: Simd> Corners<S> {
-    #[inline(always)]
-    fn load(simd: S, rows: &[Rows<'_>; LANES], at: usize) -> Self {
-        let [a, b, c, d, e, f, g, h] = rows;
-        let low = [load(simd, a[at]), load(simd, b[at]), load(simd, c[at]), load(simd, d[at])];
-        let high = [load(simd, e[at]), load(simd, f[at]), load(simd, g[at]), load(simd, h[at])];
-        let [x, y, z] = join(corner(low), corner(high));
-        Self { x, y, z }
-    }
-
-    /// The largest magnitudes, as the bits that they have: those of what is not finite or no number
-    /// are larger than all others.
-    #[inline(always)]
-    fn largest(self) -> u32x8<S> {
-        let x = self.x.bitcast::<u32x8<S>>() & 0x7fff_ffff;
-        let y = self.y.bitcast::<u32x8<S>>() & 0x7fff_ffff;
-        let z = self.z.bitcast::<u32x8<S>>() & 0x7fff_ffff;
-        x.max(y).max(z)
-    }
-}
-
-/// The bytes of a triangle's corners.
-type Rows<'m> = [&'m Row; 3];
 
 /// The places of eight triangles: blocks, cells, and whether they are simple.
 ///
@@ -273,19 +207,13 @@ type Rows<'m> = [&'m Row; 3];
 #[inline(always)]
 fn places<S: Simd, const HALVES: bool>(
     simd: S,
-    axes: &[Axis<S>; 3],
+    spans: &Spans<S>,
     [width, height, _]: [u32; 3],
-    rows: &[Rows<'_>; LANES],
+    mesh: &WideMesh<'_>,
+    first: u32,
 ) -> ([u32; LANES], [u32; LANES], u64) {
-    let a = Corners::load(simd, rows, 0);
-    let b = Corners::load(simd, rows, 1);
-    let c = Corners::load(simd, rows, 2);
-    let limit = u32x8::splat(simd, MAX_COORDINATE.to_bits());
-    let is_finite = a.largest().max(b.largest()).max(c.largest()).simd_le(limit);
-
-    let x = axes[0].range(simd, a.x, b.x, c.x);
-    let y = axes[1].range(simd, a.y, b.y, c.y);
-    let z = axes[2].range(simd, a.z, b.z, c.z);
+    let ([x, y, z], is_finite) = spans.of(simd, mesh, first);
+    let [x, y, z] = [Cells::of(x), Cells::of(y), Cells::of(z)];
     let steps = (x.max - x.min) | (y.max - y.min) | (z.max - z.min);
     let is_simple = steps.simd_le(u32x8::splat(simd, 1)) & is_finite;
 
@@ -306,10 +234,7 @@ fn visit<S: Simd, V: Visit, const HALVES: bool>(
     ids: Range<u32>,
     visitor: &mut V,
 ) -> Result<(), Error> {
-    /// Of a triangle that is not there: no number.
-    const NONE: [u8; 16] = [0xff; 16];
-    let axis = |axis| Axis::new(simd, ground.lattice, axis);
-    let axes = [axis(0), axis(1), axis(2)];
+    let spans = Spans::new(simd, ground.lattice, 2);
     let format = Format::of(ground.mesh.triangle_count());
     let wide = ground.mesh.wide();
     let [x, y, z] = [1, ground.blocks[0], ground.blocks[0] * ground.blocks[1]];
@@ -320,11 +245,10 @@ fn visit<S: Simd, V: Visit, const HALVES: bool>(
         batch.simple = 0;
         let slots = batch.blocks.iter_mut().zip(&mut batch.cells);
         for (at, (blocks, cells)) in (0_u32..).step_by(LANES).zip(slots) {
-            let row = |lane: u32| wide.corners(first.wrapping_add(at + lane)).unwrap_or([&NONE; 3]);
-            let rows = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)];
-            let simple;
-            (*blocks, *cells, simple) = places::<S, HALVES>(simd, &axes, ground.blocks, &rows);
-            batch.simple |= simple << at;
+            let (simple, first) = (&mut batch.simple, first.wrapping_add(at));
+            let found = places::<S, HALVES>(simd, &spans, ground.blocks, &wide, first);
+            *simple |= found.2 << at;
+            (*blocks, *cells) = (found.0, found.1);
         }
 
         let count = (ids.end - first).min(BATCH as u32);

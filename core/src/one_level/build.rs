@@ -16,42 +16,17 @@
 //! this does not happen: a mesh that would need more is built with half the density, again and
 //! again until it fits. Scans never come near it (core/DESIGN.md has the numbers).
 
-use glam::Vec3A;
-
 use super::displacement::displace;
 use super::layout::{Layout, Scratch};
-use super::spread::{Spread, count_references, fill, mark};
-use crate::aabb::Aabb;
+use super::spread::{count_references, fill, mark};
+use super::triangles::MeshSpread;
 use crate::blob::Header;
-use crate::cell::{CellRange, Lattice, woo};
+use crate::cell::{Lattice, woo};
 use crate::config::Config;
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
-
-/// The triangles of a mesh over a lattice.
-#[derive(Debug)]
-pub(crate) struct MeshSpread<'m> {
-    pub(crate) mesh: &'m TriangleMesh<'m>,
-    pub(crate) lattice: &'m Lattice,
-}
-
-impl Spread for MeshSpread<'_> {
-    fn resolution(&self) -> [u32; 3] {
-        self.lattice.resolution
-    }
-
-    fn count(&self) -> u32 {
-        self.mesh.triangle_count()
-    }
-
-    #[inline(always)]
-    fn at(&self, place: u32) -> Option<(u32, CellRange)> {
-        let bounds = self.mesh.corners(place, Vec3A::new).and_then(Aabb::of)?;
-        Some((place, self.lattice.range(&bounds)))
-    }
-}
 
 /// What a structure keeps behind the sections of its one-level grid.
 pub(crate) trait Overlay {
@@ -119,10 +94,10 @@ impl<'s> Plan<'s> {
             let resolution = woo(bounds.size(), f64::from(density), survey.finite_count)
                 .ok_or(Error::InvalidConfig(ConfigField::Density))?;
             let lattice = Lattice::new(bounds, resolution);
-            let spread = MeshSpread { mesh, lattice: &lattice };
+            let spread = MeshSpread::new(mesh, &lattice);
             let count = match Layout::new(resolution, 0, 0, 0).scratch(scratch) {
                 Some(Scratch { domain_bits, .. }) => mark(&spread, domain_bits, limit, watch)?,
-                None => count_references(&spread, limit, watch, |_| {})?,
+                None => count_references(&spread, limit, watch, |_, _| {})?,
             };
             match count {
                 Some(count) => break (lattice, count),
@@ -195,7 +170,7 @@ pub(crate) fn build<'a>(
     sections.header.fill(0);
     copy(rows.offsets, sections.row_offsets);
     copy(rows.domain_bits, sections.domain_bits);
-    let spread = MeshSpread { mesh, lattice: &plan.lattice };
+    let spread = MeshSpread::new(mesh, &plan.lattice);
     fill(&spread, sections.row_offsets, sections.hash, sections.references, watch)?;
     overlay.fill(plan.lattice.resolution, sections.domain_bits, sections.overlay);
     *sections.header = plan.header(config, mesh).to_bytes();

@@ -17,7 +17,9 @@
 mod build;
 mod displacement;
 mod layout;
+mod placed;
 mod spread;
+mod triangles;
 mod validate;
 
 use crate::aabb::Aabb;
@@ -32,11 +34,12 @@ use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::sizes::Sizes;
 use crate::visit::Visitor;
-pub(crate) use build::{MeshSpread, Overlay, Plan, Rows, build, copy, reference_limit};
+pub(crate) use build::{Overlay, Plan, Rows, build, copy, reference_limit};
 pub(crate) use displacement::displace;
 use layout::Sections;
 pub(crate) use layout::{Layout, longest};
 pub(crate) use spread::{Spread, fill, mark};
+pub(crate) use triangles::MeshSpread;
 pub(crate) use validate::{check_header, slots_are_sound};
 
 /// A view of a built one-level grid.

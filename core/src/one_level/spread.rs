@@ -2,9 +2,13 @@
 //!
 //! Two passes of a compact grid (LD08) over a hash table: count the references of every slot, sum
 //! up, and fill in reverse, so that every list ascends by id. What is spread comes from a
-//! [`Spread`]: the triangles of a mesh over a lattice, or the triangles of one cell over a subgrid.
+//! [`Spread`]: the triangles of a mesh over a lattice, or the triangles of one cell over a subgrid;
+//! batch after batch of them is placed (`placed.rs`) and then spread.
 
-use super::{row, slot};
+use core::ops::Range;
+
+use super::placed::Batch;
+use super::slot;
 use crate::bits::set_range;
 use crate::cell::CellRange;
 use crate::control::Watch;
@@ -18,8 +22,20 @@ pub(crate) trait Spread {
     /// Number of places where a primitive may be.
     fn count(&self) -> u32;
 
-    /// The primitive at a place and its cells, or nothing. Ids ascend; every call answers the same.
-    fn at(&self, place: u32) -> Option<(u32, CellRange)>;
+    /// The id of the primitive at a place. Ids ascend.
+    fn id(&self, place: u32) -> u32;
+
+    /// The cells of the primitive at a place, if it has any. Every call answers the same.
+    fn range(&self, place: u32) -> Option<CellRange>;
+
+    /// Finds the cells of the primitives at some places, as many as a batch has or fewer.
+    #[inline(always)]
+    fn find(&self, places: Range<u32>, batch: &mut Batch)
+    where
+        Self: Sized,
+    {
+        batch.find(self, places);
+    }
 }
 
 /// Marks the cells that primitives overlap and counts the references, up to a limit.
@@ -30,35 +46,33 @@ pub(crate) fn mark(
     watch: &Watch<'_>,
 ) -> Result<Option<u32>, Error> {
     domain_bits.fill(0);
-    let [width, height, _] = spread.resolution();
-    count_references(spread, limit, watch, |range| {
-        let [from, to] = [range.min[0] as usize, range.max[0] as usize];
-        for_each_row(height, range, |row| {
-            set_range(domain_bits, row * width as usize + from, to - from);
+    let [width, ..] = spread.resolution();
+    count_references(spread, limit, watch, |batch, places| {
+        batch.each_row::<false>(spread, places, |_, row, x, length| {
+            set_range(domain_bits, row * width as usize + x as usize, length as usize - 1);
         });
     })
 }
 
-/// Counts the references of a grid, showing every primitive's cells to `visit`; `None` if there are
-/// more than `limit`.
+/// Counts the references of a grid, showing every batch to `visit`; `None` if there are more than
+/// `limit`.
 #[inline(always)]
 pub(crate) fn count_references(
     spread: &impl Spread,
     limit: u32,
     watch: &Watch<'_>,
-    mut visit: impl FnMut(&CellRange),
+    mut visit: impl FnMut(&Batch, Range<u32>),
 ) -> Result<Option<u32>, Error> {
     let mut count = 0;
-    for place in 0..spread.count() {
-        watch.step(place, spread.count(), [0.15, 0.4])?;
-        let Some((_, range)) = spread.at(place) else { continue };
-        count += range.count();
-        if count > u64::from(limit) {
-            return Ok(None);
+    let is_all = Batch::each::<false>(spread, watch, [0.15, 0.4], |batch, places| {
+        count += batch.references(spread, places.clone());
+        let goes_on = count <= u64::from(limit);
+        if goes_on {
+            visit(batch, places);
         }
-        visit(&range);
-    }
-    Ok(u32::try_from(count).ok())
+        goes_on
+    })?;
+    Ok(u32::try_from(count).ok().filter(|_| is_all))
 }
 
 /// Sorts the primitives into the cells' lists: count, sum up, fill in reverse.
@@ -69,15 +83,16 @@ pub(crate) fn fill(
     references: &mut [u32],
     watch: &Watch<'_>,
 ) -> Result<(), Error> {
-    let [_, height, _] = spread.resolution();
-
     // Count the references of each slot.
     hash.fill(0);
-    for place in 0..spread.count() {
-        watch.step(place, spread.count(), [0.5, 0.7])?;
-        let Some((_, range)) = spread.at(place) else { continue };
-        for_each_slot(height, &range, row_offsets, hash, |count| *count += 1);
-    }
+    Batch::each::<false>(spread, watch, [0.5, 0.7], |batch, places| {
+        batch.each_row::<false>(spread, places, |_, row, x, length| {
+            for count in slots(row_offsets, hash, row, x, length) {
+                *count += 1;
+            }
+        });
+        true
+    })?;
 
     // Sum up: every slot now says where its list ends.
     let mut end = 0_u32;
@@ -87,45 +102,131 @@ pub(crate) fn fill(
     }
 
     // Put every primitive before the end of its lists, the last one first: lists ascend by id.
-    for place in (0..spread.count()).rev() {
-        watch.step(spread.count() - 1 - place, spread.count(), [0.7, 1.0])?;
-        let Some((id, range)) = spread.at(place) else { continue };
-        for_each_slot(height, &range, row_offsets, hash, |end| {
-            *end = end.wrapping_sub(1);
-            if let Some(reference) = references.get_mut(*end as usize) {
-                *reference = id;
+    Batch::each::<true>(spread, watch, [0.7, 1.0], |batch, places| {
+        batch.each_row::<true>(spread, places, |place, row, x, length| {
+            for end in slots(row_offsets, hash, row, x, length) {
+                *end = end.wrapping_sub(1);
+                if let Some(reference) = references.get_mut(*end as usize) {
+                    *reference = spread.id(place);
+                }
             }
         });
-    }
+        true
+    })?;
     Ok(())
 }
 
-/// Shows `visit` the rows that a range of cells touches.
+/// The slots that cells side by side have in the hash table.
 #[inline(always)]
-fn for_each_row(height: u32, range: &CellRange, mut visit: impl FnMut(usize)) {
-    for z in range.min[2]..=range.max[2] {
-        for y in range.min[1]..=range.max[1] {
-            visit(row(height, y, z));
-        }
-    }
+fn slots<'h>(
+    row_offsets: &[i32],
+    hash: &'h mut [u32],
+    row: usize,
+    x: u32,
+    length: u32,
+) -> &'h mut [u32] {
+    let start = row_offsets.get(row).and_then(|&offset| slot(offset, x));
+    let slots = start.and_then(|start| hash.get_mut(start..start + length as usize));
+    slots.unwrap_or_default()
 }
 
-/// Shows `visit` the slots of the hash table that a range of cells has.
-#[inline(always)]
-fn for_each_slot(
-    height: u32,
-    range: &CellRange,
-    row_offsets: &[i32],
-    hash: &mut [u32],
-    mut visit: impl FnMut(&mut u32),
-) {
-    let length = (range.max[0] - range.min[0]) as usize + 1;
-    for_each_row(height, range, |row| {
-        let Some(&offset) = row_offsets.get(row) else { return };
-        let Some(start) = slot(offset, range.min[0]) else { return };
-        let Some(slots) = hash.get_mut(start..start + length) else { return };
-        for slot in slots {
-            visit(slot);
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::bits::is_set;
+    use crate::one_level::{displace, row};
+
+    /// Primitives whose cells are written down.
+    struct Written {
+        resolution: [u32; 3],
+        ranges: Vec<Option<CellRange>>,
+    }
+
+    impl Spread for Written {
+        fn resolution(&self) -> [u32; 3] {
+            self.resolution
         }
-    });
+
+        fn count(&self) -> u32 {
+            u32::try_from(self.ranges.len()).unwrap()
+        }
+
+        fn id(&self, place: u32) -> u32 {
+            3 * place + 1
+        }
+
+        fn range(&self, place: u32) -> Option<CellRange> {
+            self.ranges[place as usize]
+        }
+    }
+
+    /// Primitives of up to four cells an axis, a few with none and one that has a whole row.
+    fn written(count: usize, resolution: [u32; 3]) -> Written {
+        let mut state = 1_u32;
+        let mut below = |end: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % end
+        };
+        let mut ranges = Vec::new();
+        for place in 0..count {
+            let min: [u32; 3] = resolution.map(&mut below);
+            let most = below(4) + 1;
+            let max =
+                core::array::from_fn(|axis| (min[axis] + below(most)).min(resolution[axis] - 1));
+            let all = CellRange { min: [0; 3], max: [resolution[0] - 1, 0, 0] };
+            ranges.push(match place % 50 {
+                7 => None,
+                49 => Some(all),
+                _ => Some(CellRange { min, max }),
+            });
+        }
+        Written { resolution, ranges }
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "hours of arithmetic")]
+    fn every_primitive_is_in_the_lists_of_its_cells_and_in_no_others() {
+        // A row of more cells than a batch can say, and a count on either side of a batch's end.
+        for resolution in [[5, 7, 6], [1, 1, 1], [1030, 3, 2]] {
+            for count in [0, 1, 50, 63, 64, 65, 300] {
+                let spread = written(count, resolution);
+                let [width, height, depth] = resolution.map(|cells| cells as usize);
+                let mut expected = vec![Vec::new(); width * height * depth];
+                for (place, range) in (0..).zip(&spread.ranges) {
+                    for [x, y, z] in range.iter().flat_map(|range| range.cells()) {
+                        let cell = row(resolution[1], y, z) * width + x as usize;
+                        expected[cell].push(spread.id(place));
+                    }
+                }
+                let sum: usize = expected.iter().map(Vec::len).sum();
+                let sum = u32::try_from(sum).unwrap();
+
+                let mut domain_bits = vec![u64::MAX; expected.len().div_ceil(64)];
+                let mut mark = |limit| mark(&spread, &mut domain_bits, limit, &Watch::none());
+                if sum > 0 {
+                    assert_eq!(mark(sum - 1), Ok(None));
+                }
+                assert_eq!(mark(sum), Ok(Some(sum)));
+                for (cell, ids) in expected.iter().enumerate() {
+                    assert_eq!(is_set(&domain_bits, cell), !ids.is_empty());
+                }
+
+                let mut offsets = vec![0; height * depth];
+                let mut occupied = vec![0; expected.len().div_ceil(64) + 1];
+                let slots = displace(&domain_bits, width, &mut offsets, &mut occupied).unwrap();
+                let mut hash = vec![7; slots as usize + 1];
+                let mut references = vec![0; sum as usize];
+                fill(&spread, &offsets, &mut hash, &mut references, &Watch::none()).unwrap();
+                for (cell, ids) in expected.iter().enumerate().filter(|(_, ids)| !ids.is_empty()) {
+                    let x = u32::try_from(cell % width).unwrap();
+                    let slot = slot(offsets[cell / width], x).unwrap();
+                    let list = hash[slot] as usize..hash[slot + 1] as usize;
+                    assert_eq!(references[list], **ids);
+                }
+            }
+        }
+    }
 }

@@ -13,8 +13,8 @@
 
 use glam::Vec3A;
 
-use super::build::MeshSpread;
 use super::spread::count_references;
+use super::triangles::MeshSpread;
 use super::{OneLevel, row, slot};
 use crate::aabb::Aabb;
 use crate::bits::{WORD_BITS, each_one, extent};
@@ -48,10 +48,10 @@ impl OneLevel<'_> {
 
         check_header(header, lattice, mesh)?;
         let expected = count_references(
-            &MeshSpread { mesh, lattice },
+            &MeshSpread::new(mesh, lattice),
             header.reference_count,
             &Watch::none(),
-            |_| {},
+            |_, _| {},
         )?;
         if expected != Some(header.reference_count) {
             return Err(corrupt(core::mem::offset_of!(Header, reference_count)));

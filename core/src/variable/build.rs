@@ -56,9 +56,14 @@ impl Spread for CellSpread<'_> {
     }
 
     #[inline(always)]
-    fn at(&self, place: u32) -> Option<(u32, CellRange)> {
+    fn id(&self, place: u32) -> u32 {
+        self.ids.get(place as usize).copied().unwrap_or(u32::MAX)
+    }
+
+    #[inline(always)]
+    fn range(&self, place: u32) -> Option<CellRange> {
         let id = *self.ids.get(place as usize)?;
-        Some((id, self.frame.range(self.cell, &self.reach(id)?)))
+        Some(self.frame.range(self.cell, &self.reach(id)?))
     }
 }
 
@@ -202,7 +207,7 @@ fn run(
     // Sort the triangles into the lists of the top, and find the longest.
     let lists = Lists::new(&plan.layout, rest).ok_or(too_small)?;
     let Lists { hash, references, owners, rest } = lists;
-    fill(&MeshSpread { mesh, lattice: &plan.lattice }, offsets, hash, references, &Watch::none())?;
+    fill(&MeshSpread::new(mesh, &plan.lattice), offsets, hash, references, &Watch::none())?;
     watch.at(0.5)?;
     let longest = pairs(hash).map(|(start, end)| end.wrapping_sub(start)).max().unwrap_or(0);
     let bench = Layout::bound(longest, plan.density, 0).scratch(rest).ok_or(too_small)?;

@@ -1,0 +1,178 @@
+//! Primitives whose cells are found before the first of them is spread.
+//!
+//! How many cells a primitive has is as good as random, and what depends on it is a mispredicted
+//! branch: what was loaded and computed for the primitives behind it would have to be done again. So
+//! a pass goes from batch to batch, and the branches of a batch depend on what is in the first cache.
+
+use core::ops::Range;
+
+use super::row;
+use super::spread::Spread;
+use crate::cell::CellRange;
+use crate::control::Watch;
+use crate::eight::LANES;
+use crate::error::Error;
+
+/// The cells of a primitive: the row and the place in it of the first, and how many more there are on
+/// each axis.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    row: usize,
+    x: u32,
+    more: u32,
+}
+
+/// Bits of the number of more cells on an axis; those of y stand above those of x, z's above these.
+pub(super) const MORE_BITS: u32 = 10;
+/// The most of them.
+pub(super) const MOST_MORE: u32 = (1 << MORE_BITS) - 1;
+
+/// One more cell on an axis, or on some.
+const X: u32 = 1;
+const Y: u32 = 1 << MORE_BITS;
+const Z: u32 = 1 << (2 * MORE_BITS);
+const XY: u32 = X | Y;
+const XZ: u32 = X | Z;
+const YZ: u32 = Y | Z;
+const XYZ: u32 = X | Y | Z;
+
+impl Placed {
+    /// More cells on each axis.
+    const fn more(self) -> [u32; 3] {
+        [self.more & MOST_MORE, self.more >> MORE_BITS & MOST_MORE, self.more >> (2 * MORE_BITS)]
+    }
+
+    /// The number of cells.
+    fn count(self) -> u64 {
+        let [x, y, z] = self.more().map(|more| u64::from(more) + 1);
+        x * y * z
+    }
+}
+
+/// The cells of primitives side by side, in eights.
+pub(crate) struct Batch {
+    pub(super) rows: [[u32; LANES]; Self::EIGHTS],
+    pub(super) xs: [[u32; LANES]; Self::EIGHTS],
+    pub(super) more: [[u32; LANES]; Self::EIGHTS],
+    /// Which of them are placed; of the others the places are not known here.
+    pub(super) placed: u64,
+}
+
+impl Batch {
+    /// As many as the bits that say which of them are placed.
+    const SIZE: u32 = u64::BITS;
+    const EIGHTS: usize = Self::SIZE as usize / LANES;
+
+    /// Goes over all batches of primitives, from the first or from the last on, until `visit` had
+    /// enough, and tells whether it had.
+    #[inline(always)]
+    pub(super) fn each<const REVERSE: bool>(
+        spread: &impl Spread,
+        watch: &Watch<'_>,
+        share: [f32; 2],
+        mut visit: impl FnMut(&Self, Range<u32>) -> bool,
+    ) -> Result<bool, Error> {
+        let mut batch = Self {
+            rows: Default::default(),
+            xs: Default::default(),
+            more: Default::default(),
+            placed: 0,
+        };
+        let count = spread.count();
+        for done in (0..count).step_by(Self::SIZE as usize) {
+            watch.step(done, count, share)?;
+            let first = if REVERSE { (count - 1 - done) / Self::SIZE * Self::SIZE } else { done };
+            let places = first..count.min(first.saturating_add(Self::SIZE));
+            spread.find(places.clone(), &mut batch);
+            if !visit(&batch, places) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The number of cells that primitives are in.
+    #[inline(always)]
+    pub(super) fn references(&self, spread: &impl Spread, places: Range<u32>) -> u64 {
+        let cells = |(lane, place)| match self.placed(lane) {
+            Some(placed) => placed.count(),
+            None => spread.range(place).map_or(0, |range| range.count()),
+        };
+        places.enumerate().map(cells).sum()
+    }
+
+    /// Shows `visit` the rows of cells that primitives are in: the place of the primitive, the row,
+    /// its first cell there and the number of cells.
+    #[inline(always)]
+    pub(super) fn each_row<const REVERSE: bool>(
+        &self,
+        spread: &impl Spread,
+        places: Range<u32>,
+        mut visit: impl FnMut(u32, usize, u32, u32),
+    ) {
+        let [_, height, _] = spread.resolution();
+        let (first, count) = (places.start, places.end - places.start);
+        for at in 0..count {
+            let lane = if REVERSE { count - 1 - at } else { at };
+            let place = first + lane;
+            let Some(placed) = self.placed(lane as usize) else {
+                let Some(CellRange { min, max }) = spread.range(place) else { continue };
+                for z in min[2]..=max[2] {
+                    for y in min[1]..=max[1] {
+                        visit(place, row(height, y, z), min[0], max[0] - min[0] + 1);
+                    }
+                }
+                continue;
+            };
+            let (row, x, height) = (placed.row, placed.x, height as usize);
+            let mut show = |behind: &[usize], length: u32| {
+                for behind in behind {
+                    visit(place, row + behind, x, length);
+                }
+            };
+            // For the common shapes a straight way: 5 % of a build less than loops alone.
+            match placed.more {
+                0 => show(&[0], 1),
+                X => show(&[0], 2),
+                Y => show(&[0, 1], 1),
+                Z => show(&[0, height], 1),
+                XY => show(&[0, 1], 2),
+                XZ => show(&[0, height], 2),
+                YZ => show(&[0, 1, height, height + 1], 1),
+                XYZ => show(&[0, 1, height, height + 1], 2),
+                _ => {
+                    let [wide, high, deep] = placed.more();
+                    for z in 0..=deep as usize {
+                        for y in 0..=high as usize {
+                            show(&[z * height + y], wide + 1);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn placed(&self, lane: usize) -> Option<Placed> {
+        let row = *self.rows.as_flattened().get(lane)? as usize;
+        let x = *self.xs.as_flattened().get(lane)?;
+        let more = *self.more.as_flattened().get(lane)?;
+        (self.placed >> lane & 1 == 1).then_some(Placed { row, x, more })
+    }
+
+    /// Finds the cells of one primitive after the other.
+    #[inline(always)]
+    pub(super) fn find(&mut self, spread: &impl Spread, places: Range<u32>) {
+        let [_, height, _] = spread.resolution();
+        self.placed = 0;
+        let xs_and_more = self.xs.as_flattened_mut().iter_mut().zip(self.more.as_flattened_mut());
+        let slots = self.rows.as_flattened_mut().iter_mut().zip(xs_and_more);
+        for ((lane, place), (row, (x, more))) in places.enumerate().zip(slots) {
+            let Some(CellRange { min, max }) = spread.range(place) else { continue };
+            let [wide, high, deep] = core::array::from_fn(|axis| max[axis] - min[axis]);
+            (*row, *x) = (min[2] * height + min[1], min[0]);
+            *more = wide | high << MORE_BITS | deep << (2 * MORE_BITS);
+            self.placed |= u64::from((wide | high | deep) <= MOST_MORE) << lane;
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! The cells of eight triangles at a time: what a pass over a mesh begins with.
+//!
+//! The same bits as [`Lattice::range`] of each of them, in vectors: a gather of corners, a box, an
+//! addition that rounds. Whoever spreads triangles over cells asks for the cells of many before the
+//! first is spread, because how many cells a triangle has is as good as random: the branch that
+//! depends on it is mispredicted, and then nothing of the next triangles should have to be done again.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
+
+use crate::aabb::MAX_COORDINATE;
+use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
+use crate::eight::{LANES, Row, corner, join, load};
+use crate::mesh::WideMesh;
+
+/// The first and the last cell of eight triangles on an axis.
+#[derive(Clone, Copy)]
+pub(crate) struct Span<S: Simd> {
+    pub(crate) first: u32x8<S>,
+    pub(crate) last: u32x8<S>,
+}
+
+/// What takes triangles to their cells.
+#[derive(Clone, Copy)]
+pub(crate) struct Spans<S: Simd> {
+    axes: [Axis<S>; 3],
+}
+
+impl<S: Simd> Spans<S> {
+    /// In cells of a lattice, or in parts of them, so many on each axis.
+    #[inline(always)]
+    pub(crate) fn new(simd: S, lattice: &Lattice, parts: u32) -> Self {
+        let axis = |axis| Axis::new(simd, lattice, axis, parts);
+        Self { axes: [axis(0), axis(1), axis(2)] }
+    }
+
+    /// The cells of the triangles `first..first + 8` on each axis, and which of the triangles have
+    /// any: those that have all their corners, and finite ones, unless the mesh cannot be read this way.
+    #[inline(always)]
+    pub(crate) fn of(
+        &self,
+        simd: S,
+        mesh: &WideMesh<'_>,
+        first: u32,
+    ) -> ([Span<S>; 3], mask32x8<S>) {
+        /// Of a triangle that is not there: no number.
+        const NONE: Row = [0xff; 16];
+        let row = |lane: u32| mesh.corners(first.wrapping_add(lane)).unwrap_or([&NONE; 3]);
+        let rows = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)];
+        let a = Corners::load(simd, &rows, 0);
+        let b = Corners::load(simd, &rows, 1);
+        let c = Corners::load(simd, &rows, 2);
+        let limit = u32x8::splat(simd, MAX_COORDINATE.to_bits());
+        let is_finite = a.largest().max(b.largest()).max(c.largest()).simd_le(limit);
+        let [x, y, z] = &self.axes;
+        let spans =
+            [x.span(simd, a.x, b.x, c.x), y.span(simd, a.y, b.y, c.y), z.span(simd, a.z, b.z, c.z)];
+        (spans, is_finite)
+    }
+}
+
+/// What takes coordinates on one axis to cells.
+#[derive(Clone, Copy)]
+struct Axis<S: Simd> {
+    origin: f32x8<S>,
+    cells_per_unit: f32x8<S>,
+    margin: f32x8<S>,
+    end: f32x8<S>,
+}
+
+impl<S: Simd> Axis<S> {
+    #[inline(always)]
+    fn new(simd: S, lattice: &Lattice, axis: usize, parts: u32) -> Self {
+        let splat = |value| f32x8::splat(simd, value);
+        Self {
+            origin: splat(lattice.min[axis]),
+            cells_per_unit: splat(as_f32(parts) * lattice.scale()[axis]),
+            margin: splat(as_f32(parts) * lattice.margin()[axis]),
+            end: splat(as_f32(parts * lattice.resolution[axis]) - 0.5),
+        }
+    }
+
+    #[inline(always)]
+    fn span(&self, simd: S, a: f32x8<S>, b: f32x8<S>, c: f32x8<S>) -> Span<S> {
+        let (min, max) = (a.min(b).min(c), a.max(b).max(c));
+        let min = (min - self.origin) * self.cells_per_unit - self.margin;
+        let max = (max - self.origin) * self.cells_per_unit + self.margin;
+        Span { first: self.whole(simd, min), last: self.whole(simd, max) }
+    }
+
+    #[inline(always)]
+    fn whole(&self, simd: S, position: f32x8<S>) -> u32x8<S> {
+        let clamped = position.max(f32x8::splat(simd, 0.0)).min(self.end);
+        (clamped - 0.5 + WHOLE_SHIFT).bitcast::<u32x8<S>>() & WHOLE_BITS
+    }
+}
+
+/// One corner of eight triangles.
+#[derive(Clone, Copy)]
+struct Corners<S: Simd> {
+    x: f32x8<S>,
+    y: f32x8<S>,
+    z: f32x8<S>,
+}
+
+impl<S: Simd> Corners<S> {
+    #[inline(always)]
+    fn load(simd: S, rows: &[[&Row; 3]; LANES], at: usize) -> Self {
+        let [a, b, c, d, e, f, g, h] = rows;
+        let low = [load(simd, a[at]), load(simd, b[at]), load(simd, c[at]), load(simd, d[at])];
+        let high = [load(simd, e[at]), load(simd, f[at]), load(simd, g[at]), load(simd, h[at])];
+        let [x, y, z] = join(corner(low), corner(high));
+        Self { x, y, z }
+    }
+
+    /// The largest magnitudes, as the bits that they have: those of what is not finite or no number
+    /// are larger than all others.
+    #[inline(always)]
+    fn largest(self) -> u32x8<S> {
+        let x = self.x.bitcast::<u32x8<S>>() & 0x7fff_ffff;
+        let y = self.y.bitcast::<u32x8<S>>() & 0x7fff_ffff;
+        let z = self.z.bitcast::<u32x8<S>>() & 0x7fff_ffff;
+        x.max(y).max(z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use glam::Vec3A;
+
+    use super::*;
+    use crate::aabb::Aabb;
+    use crate::cell::CellRange;
+    use crate::mesh::TriangleMesh;
+    use crate::simd::{Kernel, SimdLevel, dispatch};
+
+    struct Of<'a>(&'a TriangleMesh<'a>, &'a Lattice, u32);
+
+    impl Kernel for Of<'_> {
+        type Output = [Option<CellRange>; LANES];
+
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let Self(mesh, lattice, first) = self;
+            let (spans, is_finite) = Spans::new(simd, lattice, 1).of(simd, &mesh.wide(), first);
+            let [x, y, z] = spans.map(|span| [<[u32; LANES]>::from(span.first), span.last.into()]);
+            let bits = is_finite.to_bitmask();
+            core::array::from_fn(|lane| {
+                let [min, max] = [0, 1].map(|end| [x[end][lane], y[end][lane], z[end][lane]]);
+                (bits >> lane & 1 == 1).then_some(CellRange { min, max })
+            })
+        }
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "hours of arithmetic")]
+    fn every_level_finds_the_cells_that_one_triangle_after_the_other_has() {
+        // Corners on borders of cells, an ulp beside them, outside, at the ends, and no numbers.
+        let mut values = Vec::new();
+        for border in 0_u8..=8 {
+            let border = f32::from(border) * 0.75 - 3.0;
+            values.extend([border, border.next_up(), border.next_down(), border + 0.3]);
+        }
+        values.extend([
+            -0.0,
+            -9.0,
+            1e30,
+            MAX_COORDINATE,
+            -MAX_COORDINATE,
+            MAX_COORDINATE.next_up(),
+        ]);
+        values.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40]);
+        let mut state = 1_u32;
+        let mut value = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // Mostly those in the box: one in ten triangles has one that is no number.
+            let end = if state >> 29 == 0 { values.len() } else { 36 };
+            values[(state >> 8) as usize % end]
+        };
+        let positions: Vec<_> = (0..6000).map(|_| [value(), value(), value()]).collect();
+        let indices: Vec<_> =
+            (0..6000).map(|at| [at, (at * 7 + 1) % 6000, at * 11 % 6003]).collect();
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        let bounds = Aabb { min: Vec3A::splat(-3.0), max: Vec3A::splat(3.0) };
+        for bounds in [bounds, Lattice::pad(&bounds)] {
+            let lattice = Lattice::new(bounds, [8, 5, 1]);
+            let (mut some, mut none) = (0, 0);
+            for first in (0..6000).step_by(LANES) {
+                let found = dispatch(SimdLevel::Scalar, Of(&mesh, &lattice, first));
+                for level in SimdLevel::available() {
+                    assert_eq!(dispatch(level, Of(&mesh, &lattice, first)), found, "{level:?}");
+                }
+                for (id, found) in (first..).zip(found) {
+                    let corners = mesh.corners(id, Vec3A::new);
+                    let expected = corners.and_then(Aabb::of).map(|bounds| lattice.range(&bounds));
+                    // The mesh's last vertex has nothing behind it, and is not read this way.
+                    let is_last = mesh.indices(id).is_some_and(|vertices| vertices.contains(&5999));
+                    assert_eq!(found, expected.filter(|_| !is_last), "triangle {id}");
+                    *if found.is_some() { &mut some } else { &mut none } += 1;
+                }
+            }
+            assert!(some > 3000 && none > 300, "{some} {none}");
+        }
+    }
+}
