@@ -182,6 +182,10 @@ pub unsafe extern "C" fn hgrid_fit(
 /// report's `index_bytes` is exact (with brick maybe only enough), and with so many the same call
 /// succeeds.
 ///
+/// A build allocates nothing and needs at most 12 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
+/// `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8 KiB
+/// where it is called.
+///
 /// # A build on threads
 ///
 /// The library knows no threads. With `tasks` and `run` in the configuration, `HGRID_METHOD_BRICK` is cut

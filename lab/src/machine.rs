@@ -10,7 +10,8 @@ use serde::Serialize;
 /// The machine, the compiler, the day and the words that a measurement was started with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Machine {
-    /// The processor's name, if the system tells.
+    /// The processor's name, if the system tells, and on x86 its family and model: a virtual machine
+    /// may say no more than whose it is.
     pub cpu: Option<String>,
     /// Operating system and architecture.
     pub system: String,
@@ -30,7 +31,7 @@ impl Machine {
         let mut now = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
         now.truncate("YYYY-MM-DD".len());
         Self {
-            cpu: cpu.as_deref().and_then(cpu_name).map(str::to_owned),
+            cpu: cpu.as_deref().and_then(cpu_name),
             system: format!("{}, {}", env::consts::OS, env::consts::ARCH),
             rustc: rustc_version_runtime::version().to_string(),
             date: now,
@@ -47,10 +48,16 @@ impl Machine {
 }
 
 /// The name in the text of /proc/cpuinfo.
-fn cpu_name(text: &str) -> Option<&str> {
-    let is_name = |key: &str| matches!(key.trim(), "model name" | "Model" | "cpu model");
-    let mut lines = text.lines().filter_map(|line| line.split_once(':'));
-    lines.find(|(key, _)| is_name(key)).map(|(_, name)| name.trim())
+fn cpu_name(text: &str) -> Option<String> {
+    let value = |keys: &[&str]| {
+        let mut lines = text.lines().filter_map(|line| line.split_once(':'));
+        lines.find(|(key, _)| keys.contains(&key.trim())).map(|(_, value)| value.trim())
+    };
+    let name = value(&["model name", "Model", "cpu model"])?;
+    let Some((family, model)) = value(&["cpu family"]).zip(value(&["model"])) else {
+        return Some(name.to_owned());
+    };
+    Some(format!("{name}, family {family}, model {model}"))
 }
 
 /// The words of a command line, in quotes where a shell needs them.
@@ -81,7 +88,9 @@ mod tests {
     fn the_processor_is_found() {
         let text =
             "processor\t: 0\nvendor_id\t: X\nmodel name\t: Some CPU @ 3: GHz \nflags\t: a b\n";
-        assert_eq!(cpu_name(text), Some("Some CPU @ 3: GHz"));
+        assert_eq!(cpu_name(text).as_deref(), Some("Some CPU @ 3: GHz"));
+        let text = "cpu family\t: 25\nmodel\t\t: 1\nmodel name\t: AMD EPYC\n";
+        assert_eq!(cpu_name(text).as_deref(), Some("AMD EPYC, family 25, model 1"));
         assert_eq!(cpu_name("processor: 0\n"), None);
     }
 

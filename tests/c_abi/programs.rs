@@ -163,9 +163,10 @@ fn no_thread_gets_in_the_way_of_another() {
     }
 }
 
-/// The header promises 6 KiB for a ray or a point and 16 KiB for a batch.
+/// The header promises 6 KiB for a ray or a point, 16 KiB for a batch, 12 KiB for a build, 96 KiB for one
+/// with tasks and 8 KiB for a task.
 #[test]
-fn queries_take_little_stack() {
+fn queries_and_builds_take_little_stack() {
     let dir = TempDir::new().expect("a folder");
     let program = compile("stack", compiler("c99"), &[], &static_library(), dir.path());
     let printed = String::from_utf8(run(&mut Command::new(program)).stdout).expect("text");
@@ -178,6 +179,10 @@ fn queries_take_little_stack() {
     }
     // The buffers alone are 64 rays and 64 hits.
     assert!((64 * 48..16 << 10).contains(&most("many")), "many: {}", most("many"));
+    assert!((2000..12 << 10).contains(&most("build")), "build: {}", most("build"));
+    // Among the rest are 64 slices.
+    assert!((64 * 16..96 << 10).contains(&most("tasks")), "tasks: {}", most("tasks"));
+    assert!((500..8 << 10).contains(&most("task")), "task: {}", most("task"));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-/* Prints how much stack queries take, in bytes, one "name most" a line: the most of all methods and
+/* Prints how much stack queries and builds take, in bytes, one "name most" a line: the most of all methods and
  * meshes, on a stack that was filled before. Cells of a brick grid are divided up to twice, and
  * queries call themselves there: a sheet, then one with a crowd of small triangles on it, then one
  * with a crowd in the crowd. */
@@ -14,6 +14,17 @@ static const float CENTER[3] = {0.3f, 0.3f, 0.05f}, WIDTH[CROWDS] = {0.01f, 0.00
 
 static float positions[VERTICES + CROWDS * CROWD * 3][3];
 static uint32_t indices[TRIANGLES + CROWDS * CROWD][3];
+
+static hgrid_mesh mesh;
+
+/* A build, and memory for it that is there. */
+typedef struct {
+    hgrid_config config;
+    hgrid_report need;
+    void *index, *scratch;
+} job;
+
+static job by_one_task, by_many_tasks;
 
 static hgrid_grid grid;
 static hgrid_ray rays[RAYS];
@@ -75,22 +86,90 @@ static void many(void)
     }
 }
 
-/* Bytes of stack that a call takes. */
+/* Bytes of stack that a call takes: of two stacks the second where a call on the first asks. */
 static size_t stack_of(void (*call)(void))
 {
-    static unsigned char stack[STACK];
-    static ucontext_t here, there;
-    memset(stack, 0xc7, sizeof stack);
-    CHECK(getcontext(&there) == 0);
-    there.uc_stack.ss_sp = stack;
-    there.uc_stack.ss_size = sizeof stack;
-    there.uc_link = &here;
-    makecontext(&there, call, 0);
-    CHECK(swapcontext(&here, &there) == 0);
+    static unsigned char stacks[2][STACK];
+    static ucontext_t here[2], there[2];
+    static size_t depth = 0;
+    unsigned char *const stack = stacks[depth];
+    ucontext_t *const from = &here[depth], *const to = &there[depth];
+    memset(stack, 0xc7, STACK);
+    CHECK(getcontext(to) == 0);
+    to->uc_stack.ss_sp = stack;
+    to->uc_stack.ss_size = STACK;
+    to->uc_link = from;
+    makecontext(to, call, 0);
+    depth++;
+    CHECK(swapcontext(from, to) == 0);
+    depth--;
     size_t unused = 0;
-    while (unused < sizeof stack && stack[unused] == 0xc7)
+    while (unused < STACK && stack[unused] == 0xc7)
         unused++;
-    return sizeof stack - unused;
+    return STACK - unused;
+}
+
+static size_t most_of_a_task;
+static struct {
+    hgrid_task call;
+    void *context;
+    uint32_t index;
+} next_task;
+
+static void one_task(void)
+{
+    next_task.call(next_task.context, next_task.index);
+}
+
+/* Every task on a stack of its own, as a thread has. */
+static void run(void *context, uint32_t count, hgrid_task task, void *task_context)
+{
+    (void)context;
+    for (uint32_t i = 0; i < count; i++) {
+        next_task.call = task, next_task.context = task_context, next_task.index = i;
+        const size_t bytes = stack_of(one_task);
+        most_of_a_task = bytes > most_of_a_task ? bytes : most_of_a_task;
+    }
+}
+
+static job job_of(int method, uint32_t tasks)
+{
+    const hgrid_report fresh = HGRID_REPORT_INIT;
+    job made;
+    made.config = usual(method), made.need = fresh;
+    made.config.tasks = tasks, made.config.run = run;
+    CHECK(hgrid_sizes(&mesh, &made.config, NULL, 0, &made.need) == HGRID_OK);
+    made.index = guarded((size_t)made.need.index_bytes);
+    made.scratch = guarded((size_t)made.need.scratch_bytes);
+    return made;
+}
+
+/* All that looks at the mesh. */
+static void work(const job *all)
+{
+    hgrid_report report = HGRID_REPORT_INIT;
+    hgrid_config fitted = HGRID_CONFIG_INIT;
+    hgrid_statistics statistics = HGRID_STATISTICS_INIT;
+    const size_t index_bytes = (size_t)all->need.index_bytes;
+    const size_t scratch_bytes = (size_t)all->need.scratch_bytes;
+    CHECK(hgrid_sizes(&mesh, &all->config, NULL, 0, &report) == HGRID_OK);
+    CHECK(hgrid_sizes(&mesh, &all->config, all->scratch, scratch_bytes, &report) == HGRID_OK);
+    CHECK(hgrid_fit(&mesh, &all->config, index_bytes, all->scratch, scratch_bytes, &fitted,
+                    &report) == HGRID_OK);
+    CHECK(hgrid_build(&mesh, &all->config, all->index, index_bytes, all->scratch, scratch_bytes,
+                      &grid, &report) == HGRID_OK);
+    CHECK(hgrid_validate(&grid) == HGRID_OK);
+    CHECK(hgrid_inspect(&grid, &statistics) == HGRID_OK);
+}
+
+static void build(void)
+{
+    work(&by_one_task);
+}
+
+static void tasks(void)
+{
+    work(&by_many_tasks);
 }
 
 /* From -1 to 1. */
@@ -119,12 +198,12 @@ static hgrid_mesh crowded(uint32_t crowds)
                 positions[vertex][axis] = center[axis] + 0.03f * WIDTH[i / CROWD] * random_number();
         }
     }
-    hgrid_mesh mesh = mesh_of(&data);
-    mesh.positions = positions;
-    mesh.vertex_count = VERTICES + crowds * CROWD * 3;
-    mesh.indices = indices;
-    mesh.triangle_count = TRIANGLES + crowds * CROWD;
-    return mesh;
+    hgrid_mesh all = mesh_of(&data);
+    all.positions = positions;
+    all.vertex_count = VERTICES + crowds * CROWD * 3;
+    all.indices = indices;
+    all.triangle_count = TRIANGLES + crowds * CROWD;
+    return all;
 }
 
 int main(void)
@@ -147,26 +226,27 @@ int main(void)
         const char *name;
         void (*call)(void);
         size_t most;
-    } calls[] = {{"one", one, 0}, {"options", with_options, 0}, {"closest", closest, 0},
-                 {"many", many, 0}};
+    } calls[] = {{"build", build, 0}, {"tasks", tasks, 0}, {"one", one, 0},
+                 {"options", with_options, 0}, {"closest", closest, 0}, {"many", many, 0}};
     enum { CALLS = sizeof calls / sizeof *calls };
     size_t before[CALLS] = {0};
     for (uint32_t crowds = 0; crowds <= CROWDS; crowds++)
         for (int method = 0; method < METHODS; method++) {
-            const hgrid_mesh mesh = crowded(crowds);
-            const hgrid_config config = usual(method);
-            grid = build_exactly(&mesh, &config, NULL, NULL);
+            mesh = crowded(crowds);
+            by_one_task = job_of(method, 1), by_many_tasks = job_of(method, HGRID_MAX_TASKS);
             for (int i = 0; i < CALLS; i++) {
                 const size_t bytes = stack_of(calls[i].call);
                 calls[i].most = bytes > calls[i].most ? bytes : calls[i].most;
-                if (config.method != HGRID_METHOD_BRICK)
+                if (by_one_task.config.method != HGRID_METHOD_BRICK || calls[i].call == build ||
+                    calls[i].call == tasks)
                     continue;
-                /* Every division takes some more, or there was none. */
+                /* Every division takes a query some more, or there was none. */
                 CHECK(bytes > before[i]);
                 before[i] = bytes;
             }
         }
     for (int i = 0; i < CALLS; i++)
         printf("%s %zu\n", calls[i].name, calls[i].most);
+    printf("task %zu\n", most_of_a_task);
     return 0;
 }

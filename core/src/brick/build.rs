@@ -102,7 +102,8 @@ pub(crate) const fn scratch_bytes_at_most(resolution: [u32; 3], triangles: u32) 
     Layout::new(resolution, triangles).scratch_bytes(1)
 }
 
-/// Room for as many tasks as there may be, or for one: it is on the stack.
+/// Room for as many tasks as there may be, or for one: it is on the stack. What has it is out of line,
+/// so that who builds with one task does not have the room for all.
 macro_rules! for_tasks {
     ($parallel:expr, $function:ident($($argument:expr),*)) => {
         if $parallel.tasks > 1 {
@@ -123,6 +124,7 @@ pub(crate) fn sizes(
     for_tasks!(parallel, sizes_in(mesh, config, scratch))
 }
 
+#[inline(never)]
 fn sizes_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
     config: &Config,
@@ -175,6 +177,7 @@ pub(crate) fn build<'a>(
 }
 
 /// Fills the index and returns the header that belongs there.
+#[inline(never)]
 fn build_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
     config: &Config,

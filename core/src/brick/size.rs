@@ -135,7 +135,7 @@ pub(super) fn settle_in<const N: usize>(
         let limit = reference_limit(mesh.triangle_count());
         if settled.census.entries.max(settled.census.references) <= limit {
             if settled.is_counted {
-                settled.layout.fullest = fullest(&layout, shares.tasks, scratch);
+                settled.layout.fullest = fullest::<N>(&layout, shares.tasks, scratch);
             }
             return Ok((settled, shares));
         }
@@ -182,8 +182,8 @@ fn task_count<const N: usize>(triangles: u32, parallel: &Control<'_>) -> u32 {
 }
 
 /// The entries of the fullest block.
-fn fullest(layout: &Layout, tasks: u32, scratch: &mut [u8]) -> u32 {
-    let heads = layout.heads::<{ Control::MAX_TASKS as usize }>(scratch, tasks);
+fn fullest<const N: usize>(layout: &Layout, tasks: u32, scratch: &mut [u8]) -> u32 {
+    let heads = layout.heads::<N>(scratch, tasks);
     let Some((heads, _)) = heads else { return 0 };
     let sums = (0..layout.block_count() as usize)
         .map(|block| heads.iter().filter_map(|heads| heads.get(block)).sum());
