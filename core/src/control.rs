@@ -88,6 +88,9 @@ impl Control<'_> {
     };
 }
 
+/// At every so many places of a loop the caller is asked: a millisecond or two.
+pub(crate) const OFTEN: u32 = 1 << 16;
+
 /// Of so little nobody is told.
 const LEAST: f32 = 1.0 / 256.0;
 
@@ -127,8 +130,6 @@ impl<'c> Watch<'c> {
     /// Tells now and then how much of a part of the build is done, given the place in a loop.
     #[inline(always)]
     pub(crate) fn step(&self, place: u32, count: u32, [from, to]: [f32; 2]) -> Result<(), Error> {
-        /// A millisecond or two.
-        const OFTEN: u32 = 1 << 16;
         if place.is_multiple_of(OFTEN) { self.between(place, count, [from, to]) } else { Ok(()) }
     }
 

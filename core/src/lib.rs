@@ -25,8 +25,8 @@
 //! ```
 //!
 //! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `approach`, `triangle`,
-//! `simd`, `eight`, `spans`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`, `hash`,
-//! `cell`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure above them
+//! `simd`, `eight`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`, `hash`,
+//! `cell`, `spans`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure above them
 //! (`one_level`; `fixed` and `variable` on top of it; `recursive`; `brick`), and `grid`: the view that
 //! queries run on. Then the questions: `sizes`, `options`, `batch`, `closest`, `inspect`, `packed`.
 //! core/DESIGN.md tells how it all works and what was left out.

@@ -1,7 +1,7 @@
 //! The cells of eight triangles at a time: what a pass over a mesh begins with.
 //!
-//! The same bits as [`Lattice::range`] of each of them, in vectors: a gather of corners, a box, an
-//! addition that rounds. Whoever spreads triangles over cells asks for the cells of many before the
+//! In vectors, and the same bits as [`Lattice::range`] of each of them, or in halves of cells as brick's
+//! `range`: a gather of corners, a box, an addition that rounds. Whoever spreads triangles over cells asks for the cells of many before the
 //! first is spread, because how many cells a triangle has is as good as random: the branch that
 //! depends on it is mispredicted, and then nothing of the next triangles should have to be done again.
 
@@ -27,15 +27,19 @@ pub(crate) struct Spans<S: Simd> {
 }
 
 impl<S: Simd> Spans<S> {
-    /// In cells of a lattice, or in parts of them, so many on each axis.
+    /// In cells of a lattice, or in parts of them: a power of two on each axis, so that nothing rounds.
     #[inline(always)]
     pub(crate) fn new(simd: S, lattice: &Lattice, parts: u32) -> Self {
-        let axis = |axis| Axis::new(simd, lattice, axis, parts);
-        Self { axes: [axis(0), axis(1), axis(2)] }
+        debug_assert!(parts.is_power_of_two());
+        let x = Axis::new(simd, lattice, 0, parts);
+        let y = Axis::new(simd, lattice, 1, parts);
+        let z = Axis::new(simd, lattice, 2, parts);
+        Self { axes: [x, y, z] }
     }
 
-    /// The cells of the triangles `first..first + 8` on each axis, and which of the triangles have
-    /// any: those that have all their corners, and finite ones, unless the mesh cannot be read this way.
+    /// The cells of the triangles `first..first + 8` on each axis, and for which of the triangles this is
+    /// the answer: those with finite corners that can be read this way. Of the others, one with the
+    /// mesh's last vertex among them, nothing is known.
     #[inline(always)]
     pub(crate) fn of(
         &self,
@@ -43,7 +47,7 @@ impl<S: Simd> Spans<S> {
         mesh: &WideMesh<'_>,
         first: u32,
     ) -> ([Span<S>; 3], mask32x8<S>) {
-        /// Of a triangle that is not there: no number.
+        /// No number, for a triangle that is not there or cannot be read.
         const NONE: Row = [0xff; 16];
         let row = |lane: u32| mesh.corners(first.wrapping_add(lane)).unwrap_or([&NONE; 3]);
         let rows = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)];
@@ -71,12 +75,12 @@ struct Axis<S: Simd> {
 impl<S: Simd> Axis<S> {
     #[inline(always)]
     fn new(simd: S, lattice: &Lattice, axis: usize, parts: u32) -> Self {
-        let splat = |value| f32x8::splat(simd, value);
+        let end = as_f32(parts * lattice.resolution[axis]) - 0.5;
         Self {
-            origin: splat(lattice.min[axis]),
-            cells_per_unit: splat(as_f32(parts) * lattice.scale()[axis]),
-            margin: splat(as_f32(parts) * lattice.margin()[axis]),
-            end: splat(as_f32(parts * lattice.resolution[axis]) - 0.5),
+            origin: f32x8::splat(simd, lattice.min[axis]),
+            cells_per_unit: f32x8::splat(simd, as_f32(parts) * lattice.scale()[axis]),
+            margin: f32x8::splat(simd, as_f32(parts) * lattice.margin()[axis]),
+            end: f32x8::splat(simd, end),
         }
     }
 
@@ -128,6 +132,7 @@ impl<S: Simd> Corners<S> {
 mod tests {
     use alloc::vec::Vec;
 
+    use fearless_simd::Fallback;
     use glam::Vec3A;
 
     use super::*;
@@ -156,7 +161,7 @@ mod tests {
     #[test]
     #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn every_level_finds_the_cells_that_one_triangle_after_the_other_has() {
-        // Corners on borders of cells, an ulp beside them, outside, at the ends, and no numbers.
+        // Corners on and beside borders of cells, outside, at the ends, and no numbers.
         let mut values = Vec::new();
         for border in 0_u8..=8 {
             let border = f32::from(border) * 0.75 - 3.0;
@@ -187,7 +192,7 @@ mod tests {
             let lattice = Lattice::new(bounds, [8, 5, 1]);
             let (mut some, mut none) = (0, 0);
             for first in (0..6000).step_by(LANES) {
-                let found = dispatch(SimdLevel::Scalar, Of(&mesh, &lattice, first));
+                let found = Of(&mesh, &lattice, first).run(Fallback::new());
                 for level in SimdLevel::available() {
                     assert_eq!(dispatch(level, Of(&mesh, &lattice, first)), found, "{level:?}");
                 }

@@ -180,8 +180,8 @@ fn queries_and_builds_take_little_stack() {
     // The buffers alone are 64 rays and 64 hits.
     assert!((64 * 48..16 << 10).contains(&most("many")), "many: {}", most("many"));
     assert!((2000..12 << 10).contains(&most("build")), "build: {}", most("build"));
-    // Among the rest are 64 slices.
-    assert!((64 * 16..96 << 10).contains(&most("tasks")), "tasks: {}", most("tasks"));
+    // There is room for 64 of them.
+    assert!((20 << 10..96 << 10).contains(&most("tasks")), "tasks: {}", most("tasks"));
     assert!((500..8 << 10).contains(&most("task")), "task: {}", most("task"));
 }
 

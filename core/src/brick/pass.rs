@@ -245,10 +245,11 @@ fn visit<S: Simd, V: Visit, const HALVES: bool>(
         batch.simple = 0;
         let slots = batch.blocks.iter_mut().zip(&mut batch.cells);
         for (at, (blocks, cells)) in (0_u32..).step_by(LANES).zip(slots) {
-            let (simple, first) = (&mut batch.simple, first.wrapping_add(at));
-            let found = places::<S, HALVES>(simd, &spans, ground.blocks, &wide, first);
-            *simple |= found.2 << at;
-            (*blocks, *cells) = (found.0, found.1);
+            let first = first.wrapping_add(at);
+            let simple;
+            (*blocks, *cells, simple) =
+                places::<S, HALVES>(simd, &spans, ground.blocks, &wide, first);
+            batch.simple |= simple << at;
         }
 
         let count = (ids.end - first).min(BATCH as u32);

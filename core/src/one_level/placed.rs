@@ -9,7 +9,7 @@ use core::ops::Range;
 use super::row;
 use super::spread::Spread;
 use crate::cell::CellRange;
-use crate::control::Watch;
+use crate::control::{OFTEN, Watch};
 use crate::eight::LANES;
 use crate::error::Error;
 
@@ -54,14 +54,26 @@ pub(crate) struct Batch {
     pub(super) rows: [[u32; LANES]; Self::EIGHTS],
     pub(super) xs: [[u32; LANES]; Self::EIGHTS],
     pub(super) more: [[u32; LANES]; Self::EIGHTS],
-    /// Which of them are placed; of the others the places are not known here.
-    pub(super) placed: u64,
+    /// Which of them are placed; of the others the cells are not known here.
+    pub(super) is_placed: u64,
 }
 
 impl Batch {
     /// As many as the bits that say which of them are placed.
     const SIZE: u32 = u64::BITS;
     const EIGHTS: usize = Self::SIZE as usize / LANES;
+    /// Progress is told at some places: those of a batch's first primitive must be among them.
+    const IS_TOLD: () = assert!(OFTEN.is_multiple_of(Self::SIZE));
+
+    /// None is placed.
+    pub(super) fn empty() -> Self {
+        Self {
+            rows: Default::default(),
+            xs: Default::default(),
+            more: Default::default(),
+            is_placed: 0,
+        }
+    }
 
     /// Goes over all batches of primitives, from the first or from the last on, until `visit` had
     /// enough, and tells whether it had.
@@ -72,18 +84,14 @@ impl Batch {
         share: [f32; 2],
         mut visit: impl FnMut(&Self, Range<u32>) -> bool,
     ) -> Result<bool, Error> {
-        let mut batch = Self {
-            rows: Default::default(),
-            xs: Default::default(),
-            more: Default::default(),
-            placed: 0,
-        };
+        let mut batch = Self::empty();
+        const { Self::IS_TOLD };
         let count = spread.count();
         for done in (0..count).step_by(Self::SIZE as usize) {
             watch.step(done, count, share)?;
             let first = if REVERSE { (count - 1 - done) / Self::SIZE * Self::SIZE } else { done };
             let places = first..count.min(first.saturating_add(Self::SIZE));
-            spread.find(places.clone(), &mut batch);
+            spread.place(places.clone(), &mut batch);
             if !visit(&batch, places) {
                 return Ok(false);
             }
@@ -94,7 +102,7 @@ impl Batch {
     /// The number of cells that primitives are in.
     #[inline(always)]
     pub(super) fn references(&self, spread: &impl Spread, places: Range<u32>) -> u64 {
-        let cells = |(lane, place)| match self.placed(lane) {
+        let cells = |(lane, place)| match self.get(lane) {
             Some(placed) => placed.count(),
             None => spread.range(place).map_or(0, |range| range.count()),
         };
@@ -115,7 +123,7 @@ impl Batch {
         for at in 0..count {
             let lane = if REVERSE { count - 1 - at } else { at };
             let place = first + lane;
-            let Some(placed) = self.placed(lane as usize) else {
+            let Some(placed) = self.get(lane as usize) else {
                 let Some(CellRange { min, max }) = spread.range(place) else { continue };
                 for z in min[2]..=max[2] {
                     for y in min[1]..=max[1] {
@@ -153,18 +161,18 @@ impl Batch {
     }
 
     #[inline(always)]
-    fn placed(&self, lane: usize) -> Option<Placed> {
+    fn get(&self, lane: usize) -> Option<Placed> {
         let row = *self.rows.as_flattened().get(lane)? as usize;
         let x = *self.xs.as_flattened().get(lane)?;
         let more = *self.more.as_flattened().get(lane)?;
-        (self.placed >> lane & 1 == 1).then_some(Placed { row, x, more })
+        (self.is_placed >> lane & 1 == 1).then_some(Placed { row, x, more })
     }
 
-    /// Finds the cells of one primitive after the other.
+    /// Places one primitive after the other.
     #[inline(always)]
-    pub(super) fn find(&mut self, spread: &impl Spread, places: Range<u32>) {
+    pub(super) fn place_each(&mut self, spread: &impl Spread, places: Range<u32>) {
         let [_, height, _] = spread.resolution();
-        self.placed = 0;
+        self.is_placed = 0;
         let xs_and_more = self.xs.as_flattened_mut().iter_mut().zip(self.more.as_flattened_mut());
         let slots = self.rows.as_flattened_mut().iter_mut().zip(xs_and_more);
         for ((lane, place), (row, (x, more))) in places.enumerate().zip(slots) {
@@ -172,7 +180,7 @@ impl Batch {
             let [wide, high, deep] = core::array::from_fn(|axis| max[axis] - min[axis]);
             (*row, *x) = (min[2] * height + min[1], min[0]);
             *more = wide | high << MORE_BITS | deep << (2 * MORE_BITS);
-            self.placed |= u64::from((wide | high | deep) <= MOST_MORE) << lane;
+            self.is_placed |= u64::from((wide | high | deep) <= MOST_MORE) << lane;
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::control::Watch;
 use crate::error::Error;
 
 /// Primitives with the cells that each belongs into.
-pub(crate) trait Spread {
+pub(crate) trait Spread: Sized {
     /// Cells per axis.
     fn resolution(&self) -> [u32; 3];
 
@@ -28,13 +28,11 @@ pub(crate) trait Spread {
     /// The cells of the primitive at a place, if it has any. Every call answers the same.
     fn range(&self, place: u32) -> Option<CellRange>;
 
-    /// Finds the cells of the primitives at some places, as many as a batch has or fewer.
+    /// Places the primitives at some places, as many as a batch has or fewer: those that it can, at
+    /// the cells that [`range`](Self::range) says.
     #[inline(always)]
-    fn find(&self, places: Range<u32>, batch: &mut Batch)
-    where
-        Self: Sized,
-    {
-        batch.find(self, places);
+    fn place(&self, places: Range<u32>, batch: &mut Batch) {
+        batch.place_each(self, places);
     }
 }
 

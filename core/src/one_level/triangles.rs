@@ -50,23 +50,23 @@ impl Spread for MeshSpread<'_> {
     }
 
     #[inline(always)]
-    fn find(&self, places: Range<u32>, batch: &mut Batch) {
+    fn place(&self, places: Range<u32>, batch: &mut Batch) {
         if HAS_VECTORS && !self.wide.is_empty() {
-            dispatch(SimdLevel::detect(), Find { spread: self, first: places.start, batch });
+            dispatch(SimdLevel::detect(), Place { spread: self, first: places.start, batch });
         } else {
-            batch.find(self, places);
+            batch.place_each(self, places);
         }
     }
 }
 
-/// Finding the cells of a batch of triangles, eight at a time.
-struct Find<'f, 'm> {
+/// Placing a batch of triangles, eight at a time.
+struct Place<'f, 'm> {
     spread: &'f MeshSpread<'m>,
     first: u32,
     batch: &'f mut Batch,
 }
 
-impl Kernel for Find<'_, '_> {
+impl Kernel for Place<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -74,7 +74,7 @@ impl Kernel for Find<'_, '_> {
         let Self { spread, first, batch } = self;
         let spans = Spans::new(simd, spread.lattice, 1);
         let [_, height, _] = spread.lattice.resolution;
-        batch.placed = 0;
+        batch.is_placed = 0;
         let slots = batch.rows.iter_mut().zip(&mut batch.xs).zip(&mut batch.more);
         for (at, ((rows, xs), more)) in (0_u32..).step_by(LANES).zip(slots) {
             let ([x, y, z], is_finite) = spans.of(simd, &spread.wide, first.wrapping_add(at));
@@ -83,7 +83,97 @@ impl Kernel for Find<'_, '_> {
             *rows = (y.first + z.first * height).into();
             *xs = x.first.into();
             *more = (wide | (high << MORE_BITS) | (deep << (2 * MORE_BITS))).into();
-            batch.placed |= is_placed.to_bitmask() << at;
+            batch.is_placed |= is_placed.to_bitmask() << at;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use fearless_simd::Fallback;
+
+    use super::*;
+    use crate::cell::as_f32;
+    use crate::one_level::row;
+
+    /// The rows of cells of a batch's primitives, and their number of cells.
+    fn rows(batch: &Batch, spread: &MeshSpread<'_>, places: Range<u32>) -> (Vec<[usize; 4]>, u64) {
+        let mut rows = Vec::new();
+        batch.each_row::<false>(spread, places.clone(), |place, row, x, length| {
+            rows.push([place as usize, row, x as usize, length as usize]);
+        });
+        (rows, batch.references(spread, places))
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "hours of arithmetic")]
+    fn every_level_places_triangles_where_their_ranges_are() {
+        // Most triangles are small, some span the box, some are not finite or have no vertices; one has
+        // the last vertex, behind which nothing can be read.
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            state >> 8
+        };
+        let mut positions = Vec::new();
+        for at in 0..65 {
+            let mut coordinate = || as_f32(random() % 4096) / 4096.0;
+            let center = [coordinate(), coordinate(), coordinate()];
+            let size = if at % 9 == 4 { 2.0 } else { 0.1 };
+            for _ in 0..3 {
+                positions.push(center.map(|c| c + size * (coordinate() - 0.5)));
+            }
+        }
+        positions[30] = [f32::NAN; 3];
+        positions[60] = [0.5, f32::INFINITY, 0.5];
+        let mut indices: Vec<_> =
+            (0..65).map(|at| [0, 1, 2].map(|corner| 3 * at + corner)).collect();
+        indices[17] = [0, 1, 195];
+        let bounds = Aabb { min: Vec3A::ZERO, max: Vec3A::ONE };
+        for resolution in [[8, 5, 3], [4096, 1, 1], [1, 4096, 1], [1, 1, 4096]] {
+            let lattice = Lattice::new(bounds, resolution);
+            for count in [0, 1, 63, 64, 65] {
+                let mesh = TriangleMesh::new(&positions, &indices[..count]).unwrap();
+                let spread = MeshSpread::new(&mesh, &lattice);
+                for first in (0..spread.count()).step_by(64) {
+                    let places = first..spread.count().min(first + 64);
+                    let (mut expected, mut cells) = (Vec::new(), 0);
+                    for place in places.clone() {
+                        let Some(range) = spread.range(place) else { continue };
+                        let CellRange { min, max } = range;
+                        cells += range.count();
+                        for z in min[2]..=max[2] {
+                            for y in min[1]..=max[1] {
+                                let length = max[0] - min[0] + 1;
+                                let [x, length] = [min[0], length].map(|cells| cells as usize);
+                                expected.push([
+                                    place as usize,
+                                    row(resolution[1], y, z),
+                                    x,
+                                    length,
+                                ]);
+                            }
+                        }
+                    }
+                    let expected = (expected, cells);
+
+                    let mut batch = Batch::empty();
+                    for level in SimdLevel::available() {
+                        dispatch(level, Place { spread: &spread, first, batch: &mut batch });
+                        assert_eq!(rows(&batch, &spread, places.clone()), expected, "{level:?}");
+                    }
+                    let place = Place { spread: &spread, first, batch: &mut batch };
+                    place.run(Fallback::new());
+                    assert_eq!(rows(&batch, &spread, places.clone()), expected);
+                    let placed = batch.is_placed.count_ones();
+                    let is_expected = if count > 1 && first == 0 { 40..=62 } else { 0..=1 };
+                    assert!(is_expected.contains(&placed), "{placed} of {count}");
+                    batch.place_each(&spread, places.clone());
+                    assert_eq!(rows(&batch, &spread, places), expected);
+                }
+            }
         }
     }
 }

@@ -341,7 +341,10 @@ impl CellSpread<'_> {
 
         let [width, height, depth] = self.frame.resolution.map(|cells| cells as usize);
         let row_offsets = bench.row_offsets.get_mut(..height * depth)?;
-        let occupied = bench.occupied.get_mut(..cells.div_ceil(WORD_BITS) + 1)?;
+        // A few words more, if there are: the last ones are not read eight at a time.
+        let enough = cells.div_ceil(WORD_BITS) + 1;
+        let words = bench.occupied.len().min(enough + 8).max(enough);
+        let occupied = bench.occupied.get_mut(..words)?;
         occupied.fill(0);
         let hash_count = displace(bench.domain_bits, width, row_offsets, occupied)?;
         Some(SubLayout { frame: self.frame, hash_count, reference_count })
