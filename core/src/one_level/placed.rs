@@ -58,12 +58,13 @@ pub(crate) struct Batch {
     pub(super) is_placed: u64,
 }
 
+/// Progress is told at some places, all of which are a batch's first.
+const _: () = assert!(OFTEN.is_multiple_of(Batch::SIZE));
+
 impl Batch {
     /// As many as the bits that say which of them are placed.
     const SIZE: u32 = u64::BITS;
     const EIGHTS: usize = Self::SIZE as usize / LANES;
-    /// Progress is told at some places: those of a batch's first primitive must be among them.
-    const IS_TOLD: () = assert!(OFTEN.is_multiple_of(Self::SIZE));
 
     /// None is placed.
     pub(super) fn empty() -> Self {
@@ -85,7 +86,6 @@ impl Batch {
         mut visit: impl FnMut(&Self, Range<u32>) -> bool,
     ) -> Result<bool, Error> {
         let mut batch = Self::empty();
-        const { Self::IS_TOLD };
         let count = spread.count();
         for done in (0..count).step_by(Self::SIZE as usize) {
             watch.step(done, count, share)?;
