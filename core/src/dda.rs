@@ -10,7 +10,7 @@
 //! A [`Line`] is the ray in a lattice; a [`Walk`] goes along it through equal cells, those of the
 //! lattice or larger ones of a macrocell level.
 
-use glam::Vec3A;
+use glam::{BVec3A, Vec3A, Vec3Swizzles as _};
 
 use crate::aabb::{Aabb, greater};
 use crate::approach::Approach;
@@ -28,8 +28,8 @@ pub(crate) struct Line {
     delta: Vec3A,
     /// Distance of the border between no cells and cell 0; infinite if parallel.
     base: Vec3A,
-    /// What to add to the cell on each axis: 1 or, in wrapping arithmetic, -1; 0 if parallel.
-    step: [u32; 3],
+    /// What to add to the cell on each axis: 1 or -1; 0 if parallel.
+    step: Vec3A,
     /// How far off its cells a line may be, in cells.
     margin: Vec3A,
     /// Distance at which the ray ends.
@@ -43,26 +43,26 @@ pub(crate) struct Line {
 /// A walk along a line through cells of one size.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Walk {
-    /// The cell the walk is in.
-    pub(crate) cell: [u32; 3],
+    /// The cell the walk is in: whole numbers.
+    cell: Vec3A,
     /// Distance at which it was entered.
     pub(crate) entered: f32,
     /// Distance at which the ray leaves the cell through its border on each axis.
-    pub(crate) next: [f32; 3],
+    pub(crate) next: Vec3A,
     /// Distance at which the ray leaves the walk's last cell on each axis.
-    exits: [f32; 3],
+    exits: Vec3A,
     /// Distance from one border to the next, negative where the ray runs downwards.
-    delta: [f32; 3],
+    delta: Vec3A,
     /// Distance of the border through which the ray leaves cell 0; infinite if parallel.
-    base: [f32; 3],
-    /// What to add to the cell on each axis: 1 or, in wrapping arithmetic, -1.
-    step: [u32; 3],
+    base: Vec3A,
+    /// What to add to the cell on each axis: 1 or -1; 0 if parallel.
+    step: Vec3A,
     /// The last cell on each axis that the walk enters.
-    last: [u32; 3],
+    last: Vec3A,
 }
 
 /// The exits of a walk that only the end of the ray ends.
-pub(crate) const NEVER: [f32; 3] = [f32::INFINITY; 3];
+pub(crate) const NEVER: Vec3A = Vec3A::INFINITY;
 
 /// What became of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,7 +99,7 @@ impl Line {
 
         // Axis by axis as numbers, vectors at last: one that is filled number by number is slow to read.
         let (mut position, mut rate, mut delta) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-        let (mut base, mut step) = ([f32::INFINITY; 3], [0; 3]);
+        let (mut base, mut step) = ([f32::INFINITY; 3], [0.0; 3]);
         for axis in 0..3 {
             let direction = direction[axis];
             let point = f64::from(approach.anchor[axis]) + start * direction;
@@ -110,7 +110,7 @@ impl Line {
                 let fineness = finest / lattice.cells_per_unit(axis);
                 delta[axis] = round(longest * approach.inverse[axis] * fineness);
                 base[axis] = -position[axis] * delta[axis];
-                step[axis] = if direction > 0.0 { 1 } else { u32::MAX };
+                step[axis] = if direction > 0.0 { 1.0 } else { -1.0 };
             }
         }
         Some(Self {
@@ -118,7 +118,7 @@ impl Line {
             rate: Vec3A::from_array(rate),
             delta: Vec3A::from_array(delta),
             base: Vec3A::from_array(base),
-            step,
+            step: Vec3A::from_array(step),
             margin: lattice.margin(),
             end: round((end - start) * scale),
             start: approach.t + start,
@@ -130,6 +130,16 @@ impl Line {
     #[inline(always)]
     pub(crate) fn distance(&self, t: f32) -> f32 {
         round((f64::from(t.next_up()) - self.start) * self.scale)
+    }
+
+    /// What a step on each axis adds, in wrapping arithmetic, to the place of a cell in an array with these
+    /// strides.
+    #[inline(always)]
+    pub(crate) fn moves(&self, strides: [usize; 3]) -> [usize; 3] {
+        let step = self.step.to_array();
+        core::array::from_fn(|axis| {
+            if step[axis] < 0.0 { strides[axis].wrapping_neg() } else { strides[axis] }
+        })
     }
 
     /// The same line in the cells of a subgrid, whose corner lies at `origin` and which has `scale`
@@ -158,7 +168,7 @@ impl Line {
         let [near, far] = self.inside(&Aabb { min: Vec3A::ZERO, max: cells });
         let near = entered.max(near);
         let last = resolution.map(|cells| cells.saturating_sub(1));
-        (near <= far).then(|| self.walk(near, 1.0, [0; 3], last, [far; 3]))
+        (near <= far).then(|| self.walk(near, 1.0, [0; 3], last, Vec3A::splat(far)))
     }
 
     /// Whether the line comes to a box before a distance, or along its border: one that is given in
@@ -209,7 +219,7 @@ impl Line {
         size: f32,
         min: [u32; 3],
         max: [u32; 3],
-        exits: [f32; 3],
+        exits: Vec3A,
     ) -> Walk {
         // All axes at once: a ray begins many walks, and most are short.
         let position = (self.position + self.rate * from) / size;
@@ -218,61 +228,148 @@ impl Line {
         let delta = self.delta * size;
         let base = self.base + self.delta.max(Vec3A::ZERO) * size;
         let last = Vec3A::select(delta.cmpgt(Vec3A::ZERO), high, low);
-        let exit = Vec3A::from_array(exits);
-        let next = Vec3A::select(cell.cmpeq(last), exit, base + cell * delta);
-        let whole =
-            |cells: Vec3A| (cells + WHOLE_SHIFT).to_array().map(|cell| cell.to_bits() & WHOLE_BITS);
-        Walk {
-            cell: whole(cell),
-            entered: from,
-            next: next.to_array(),
-            exits,
-            delta: delta.to_array(),
-            base: base.to_array(),
-            step: self.step,
-            last: whole(last),
-        }
+        let next = Vec3A::select(cell.cmpeq(last), exits, base + cell * delta);
+        Walk { cell, entered: from, next, exits, delta, base, step: self.step, last }
     }
 }
 
 impl Walk {
+    /// The cell the walk is in.
+    #[inline(always)]
+    pub(crate) fn cell(&self) -> [u32; 3] {
+        (self.cell + WHOLE_SHIFT).to_array().map(|cell| cell.to_bits() & WHOLE_BITS)
+    }
+
     /// Enters the next cell, unless the walk leaves its cells or has `limit` behind it by then.
     ///
     /// Every call moves one axis towards its end, whatever the floats say: a walk takes at most as
     /// many steps as it has cells on the three axes together.
+    ///
+    /// All axes at once: which one is next is as good as random in a walk of a few cells.
     #[inline(always)]
     pub(crate) fn advance(&mut self, limit: f32) -> Step {
-        let [x, y, z] = self.next;
-        // One arm for each axis: an axis chosen at run time would keep the walk in memory.
+        /// The masks of a single axis, a bit for each.
+        const ONE_AXIS: u32 = 1 << 0b001 | 1 << 0b010 | 1 << 0b100;
+        let next = self.next;
+        let nearest = next.min(next.yzx()).min(next.zxy());
+        let mut axis = next.cmpeq(nearest);
+        let mut border = nearest.x;
+        if ONE_AXIS >> axis.bitmask() & 1 == 0 {
+            (axis, border) = nearest_of(next);
+        }
+        self.step_along(axis, border, limit)
+    }
+
+    /// The same with an arm for each axis, which is told to `along`.
+    ///
+    /// In a walk of dozens of cells the processor predicts the axis and does not wait for distances, which
+    /// [`advance`](Self::advance) always does.
+    #[inline(always)]
+    pub(crate) fn advance_far(&mut self, limit: f32, mut along: impl FnMut(usize)) -> Step {
+        let [x, y, z] = self.next.to_array();
         if x < y && x < z {
-            self.step_along::<0>(limit)
+            along(0);
+            self.step_along(BVec3A::new(true, false, false), x, limit)
         } else if y < z {
-            self.step_along::<1>(limit)
+            along(1);
+            self.step_along(BVec3A::new(false, true, false), y, limit)
         } else {
-            self.step_along::<2>(limit)
+            along(2);
+            self.step_along(BVec3A::new(false, false, true), z, limit)
         }
     }
 
+    /// Leaves the cell through a border.
     #[inline(always)]
-    fn step_along<const AXIS: usize>(&mut self, limit: f32) -> Step {
-        self.entered = self.next[AXIS];
+    fn step_along(&mut self, axis: BVec3A, border: f32, limit: f32) -> Step {
+        self.entered = border;
         // Damaged bytes make numbers that are none: whatever is not before the limit is behind it.
-        let is_before = self.entered < limit;
+        let is_before = border < limit;
         if !is_before {
             return Step::Ended;
         }
-        if self.cell[AXIS] == self.last[AXIS] {
+        if (axis & self.cell.cmpeq(self.last)).any() {
             return Step::Outside;
         }
-        self.cell[AXIS] = self.cell[AXIS].wrapping_add(self.step[AXIS]);
-        self.aim(AXIS);
+        self.cell += Vec3A::select(axis, self.step, Vec3A::ZERO);
+        let next = self.base + self.cell * self.delta;
+        self.next = Vec3A::select(self.cell.cmpeq(self.last), self.exits, next);
         Step::Inside
     }
+}
 
-    /// Computes the distance to the next border on an axis from the cell.
-    #[inline(always)]
-    fn aim(&mut self, axis: usize) {
-        let next = self.base[axis] + as_f32(self.cell[axis]) * self.delta[axis];
-        self.next[axis] = if self.cell[axis] == self.last[axis] { self.exits[axis] } else { next };
+/// The axis with the nearest border, and its distance, where two are in one point or where distances are no numbers.
+///
+/// Takes a copy: where the walk itself is handed on, it lives in memory.
+#[cold]
+fn nearest_of(next: Vec3A) -> (BVec3A, f32) {
+    let [x, y, z] = next.to_array();
+    if x < y && x < z {
+        (BVec3A::new(true, false, false), x)
+    } else if y < z {
+        (BVec3A::new(false, true, false), y)
+    } else {
+        (BVec3A::new(false, false, true), z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+
+    const LAST: Vec3A = Vec3A::new(4.0, 3.0, 5.0);
+
+    /// A walk from the first cell with these distances, those between borders and the last ones.
+    fn walk(base: [f32; 3], delta: [f32; 3], exits: [f32; 3]) -> Walk {
+        let [base, delta, exits] = [base, delta, exits].map(Vec3A::from_array);
+        // As a line has it on axes that it runs parallel to.
+        let is_parallel = delta.cmpeq(Vec3A::ZERO);
+        let base = Vec3A::select(is_parallel, Vec3A::INFINITY, base);
+        let step = Vec3A::select(is_parallel, Vec3A::ZERO, Vec3A::ONE);
+        let cell = Vec3A::ZERO;
+        Walk { cell, entered: 0.0, next: base, exits, delta, base, step, last: LAST }
+    }
+
+    /// What the steps of a walk come to.
+    fn steps(mut walk: Walk, mut step: impl FnMut(&mut Walk) -> Step) -> Vec<([u32; 3], u32)> {
+        let mut all = Vec::new();
+        while step(&mut walk) == Step::Inside {
+            all.push((walk.cell(), walk.entered.to_bits()));
+            assert!(all.len() <= 12, "a walk has an end: {walk:?}");
+        }
+        all
+    }
+
+    #[test]
+    fn all_axes_at_once_step_as_one_after_the_other() {
+        let values = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25];
+        let at = |number: usize, place: u32| values[number / 6_usize.pow(place) % 6];
+        let mut lengths = [0; 13];
+        for number in 0..6_usize.pow(6) {
+            let base = [0, 1, 2].map(|axis| at(number, axis));
+            let delta = [3, 4, 5].map(|axis| at(number, axis));
+            let walk = walk(base, delta, [2.5, 3.0, 3.0]);
+            let expected = steps(walk, |walk| walk.advance_far(3.0, |_| {}));
+            assert_eq!(steps(walk, |walk| walk.advance(3.0)), expected, "{walk:?}");
+            lengths[expected.len()] += 1;
+        }
+        assert!(lengths[2..].iter().all(|&count| count > 100), "{lengths:?}");
+    }
+
+    #[test]
+    fn walks_of_no_numbers_have_an_end() {
+        let values = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, 0.5];
+        let at = |number: usize, place: u32| values[number / 5_usize.pow(place) % 5];
+        for number in 0..5_usize.pow(7) {
+            let base = [0, 1, 2].map(|axis| at(number, axis));
+            let delta = [3, 4, 5].map(|axis| at(number, axis));
+            for limit in [f32::INFINITY, 3.0, f32::NAN] {
+                let walk = walk(base, delta, [at(number, 6); 3]);
+                steps(walk, |walk| walk.advance(limit));
+                steps(walk, |walk| walk.advance_far(limit, |_| {}));
+            }
+        }
     }
 }

@@ -2,6 +2,7 @@
 //! to cell.
 
 use fearless_simd::Simd;
+use glam::Vec3A;
 
 use super::halves::{Format, Halves};
 use super::layout::{BLOCK, mask, number};
@@ -50,7 +51,7 @@ struct Part<'a, 'l> {
     /// Its last one.
     last: [u32; 3],
     /// The distances at which the line leaves it.
-    exits: [f32; 3],
+    exits: Vec3A,
     /// How often it may be divided: damaged bytes may say for ever.
     depth: u32,
 }
@@ -82,13 +83,13 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
         let mut walk = line.walk(0.0, as_f32(BLOCK), [0; 3], last, NEVER);
         loop {
             self.tally.cell_step();
-            if let Some(chunk) = brick.block(walk.cell) {
+            if let Some(chunk) = brick.block(walk.cell()) {
                 if let Some(large) = chunk.large() {
-                    let corner = walk.cell.map(|block| as_f32(block * BLOCK));
+                    let corner = walk.cell().map(|block| as_f32(block * BLOCK));
                     self.test_large(simd, &large, line, corner);
                 }
                 if chunk.mask != 0 && !self.is_over() {
-                    let corner = walk.cell.map(|block| block * BLOCK);
+                    let corner = walk.cell().map(|block| block * BLOCK);
                     let last =
                         core::array::from_fn(|axis| (corner[axis] + 15).min(brick.last[axis]));
                     let part = Part { chunk, line, corner, last, exits: walk.next, depth: 2 };
@@ -109,7 +110,7 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
         let mut walk = line.walk(from, 4.0, corner.map(|c| c >> 2), last.map(|c| c >> 2), exits);
         loop {
             self.tally.cell_step();
-            let bit = number(walk.cell.map(|brick| (brick & 3) << 2)) >> 6;
+            let bit = number(walk.cell().map(|brick| (brick & 3) << 2)) >> 6;
             if chunk.mask >> bit & 1 != 0
                 && let Some(brick) = chunk.brick(bit)
             {
@@ -137,12 +138,12 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
     ) {
         let Part { chunk, line, last, depth, .. } = *part;
         self.tally.grid_step();
-        let min = around.cell.map(|at| at << 2);
+        let min = around.cell().map(|at| at << 2);
         let max = core::array::from_fn(|axis| (min[axis] + 3).min(last[axis]));
         let mut walk = line.walk(around.entered, 1.0, min, max, around.next);
         loop {
             self.tally.cell_step();
-            let bit = number(walk.cell.map(|cell| cell & 3));
+            let bit = number(walk.cell().map(|cell| cell & 3));
             if mask(brick.mask) >> bit & 1 != 0 {
                 match chunk.content(brick, bit) {
                     Some(Content::List(references)) => {
@@ -152,7 +153,7 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
                         self.test(simd, references, missed);
                     }
                     Some(Content::Chunk(chunk, cells)) if depth > 0 => {
-                        let line = line.zoom(walk.cell.map(as_f32), [as_f32(cells); 3]);
+                        let line = line.zoom(walk.cell().map(as_f32), [as_f32(cells); 3]);
                         let (corner, last, exits) = ([0; 3], [cells - 1; 3], walk.next);
                         let depth = depth - 1;
                         let part = Part { chunk, line: &line, corner, last, exits, depth };
@@ -195,9 +196,8 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
     /// The bits of references that the ray does not meet in the cell that a walk is in.
     #[inline(always)]
     fn missed(&self, line: &Line, walk: &Walk) -> u32 {
-        let [x, y, z] = walk.next;
-        let far = x.min(y).min(z).min(self.limit);
-        let [upper, lower] = line.halves(walk.cell, walk.entered, far);
+        let far = walk.next.min_element().min(self.limit);
+        let [upper, lower] = line.halves(walk.cell(), walk.entered, far);
         self.format.missed(Halves::new(upper, lower))
     }
 

@@ -108,10 +108,10 @@ impl<'a> Fixed<'a> {
         loop {
             tally.cell_step();
             if level == 0 {
-                if let Some(references) = self.cells.references(walk.cell) {
+                if let Some(references) = self.cells.references(walk.cell()) {
                     limit = leaf(references, tally);
                 }
-            } else if self.levels.is_full(words, level, walk.cell) {
+            } else if self.levels.is_full(words, level, walk.cell()) {
                 // Go down into the cells of this macrocell.
                 tally.grid_step();
                 if let Some(slot) = above.get_mut(level - 1) {
@@ -120,7 +120,7 @@ impl<'a> Fixed<'a> {
                 level -= 1;
                 size /= self.levels.factor();
                 let factor = self.levels.factor().get();
-                let min = walk.cell.map(|cell| cell * factor);
+                let min = walk.cell().map(|cell| cell * factor);
                 let last = self.last(level);
                 let max = core::array::from_fn(|axis| (min[axis] + factor - 1).min(last[axis]));
                 walk = line.walk(walk.entered, as_f32(size), min, max, walk.next);

@@ -141,10 +141,15 @@ impl<'a> OneLevel<'a> {
 
     /// Whether the domain bit of a cell is set.
     #[inline(always)]
-    pub(crate) fn is_marked(&self, [x, y, z]: [u32; 3]) -> bool {
+    pub(crate) fn is_marked(&self, cell: [u32; 3]) -> bool {
+        is_set(self.sections.domain_bits, self.bit(cell))
+    }
+
+    /// The bit of a cell among the domain bits.
+    #[inline(always)]
+    fn bit(&self, [x, y, z]: [u32; 3]) -> usize {
         let [width, height, _] = self.last.map(|last| last + 1);
-        let bit = row(height, y, z) * width as usize + x as usize;
-        is_set(self.sections.domain_bits, bit)
+        row(height, y, z) * width as usize + x as usize
     }
 
     /// The two words of the hash table that say where a cell's list lies; `None` if it is empty.
@@ -204,12 +209,17 @@ impl<'a> OneLevel<'a> {
     ) {
         let mut limit = line.end;
         let mut walk = line.walk(0.0, 1.0, [0; 3], self.last, NEVER);
+        let mut bit = self.bit(walk.cell());
+        let [width, height, _] = self.last.map(|last| last as usize + 1);
+        let moves = line.moves([1, width, width * height]);
         loop {
             tally.cell_step();
-            if let Some(references) = self.references(walk.cell) {
+            if is_set(self.sections.domain_bits, bit)
+                && let Some(references) = self.references(walk.cell())
+            {
                 limit = leaf(references, tally);
             }
-            if walk.advance(limit) != Step::Inside {
+            if walk.advance_far(limit, |axis| bit = bit.wrapping_add(moves[axis])) != Step::Inside {
                 return;
             }
         }

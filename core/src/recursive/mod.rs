@@ -97,7 +97,7 @@ impl<'a> Recursive<'a> {
         // without end, the walk ends with the entries.
         for _ in 0..self.pool.len() {
             tally.cell_step();
-            match node.content(self.pool, walk.cell) {
+            match node.content(self.pool, walk.cell()) {
                 None => {}
                 Some(Content::List(ids)) => limit = leaf(ids, tally),
                 Some(Content::Grid(at)) => {

@@ -94,8 +94,8 @@ impl<'a> Variable<'a> {
         loop {
             tally.cell_step();
             let content = match &inside {
-                None => self.content(walk.cell),
-                Some((subgrid, _)) => subgrid.references(walk.cell).map(Content::List),
+                None => self.content(walk.cell()),
+                Some((subgrid, _)) => subgrid.references(walk.cell()).map(Content::List),
             };
             match content {
                 None => {}
@@ -113,7 +113,11 @@ impl<'a> Variable<'a> {
             }
             // Take a step; where the subgrid ends, take it around the subgrid.
             loop {
-                match walk.advance(limit) {
+                let step = match &inside {
+                    Some(_) => walk.advance(limit),
+                    None => walk.advance_far(limit, |_| {}),
+                };
+                match step {
                     Step::Inside => break,
                     Step::Ended => return,
                     Step::Outside => match inside.take() {

@@ -178,7 +178,7 @@ impl<'a> Subgrid<'a> {
     /// The line of a ray in this subgrid and a walk along it, or `None` if the ray passes it.
     #[inline]
     pub(super) fn walk(&self, line: &Line, around: &Walk) -> Option<Walk> {
-        let (origin, scale) = self.frame.zoom(around.cell);
+        let (origin, scale) = self.frame.zoom(around.cell());
         let zoomed = line.zoom(origin.to_array(), scale.to_array());
         zoomed.walk_in(around.entered, self.frame.resolution)
     }
