@@ -9,9 +9,10 @@
 //! The levels end with the first that has at most [`FEW_CELLS`] cells, or with [`MAX_LEVELS`]. They follow each other in one
 //! section, each starting at a new word; where one lies follows from the resolution and the factor.
 
-use core::num::{NonZeroU32, NonZeroUsize};
+use core::num::NonZeroU32;
 
-use crate::bits::{WORD_BITS, each_one, extent, is_set};
+use crate::bits::{WORD_BITS, extent, is_set, load, low_bits, set_range};
+use crate::cell::MAX_RESOLUTION;
 
 /// A level of so few cells needs no coarser one above it.
 const FEW_CELLS: u64 = 10_000;
@@ -187,20 +188,39 @@ impl Levels {
 }
 
 /// Sets the bit of every macrocell that has a bit set below it.
+///
+/// All rows of a row of macrocells are laid over each other first, 64 cells at a time: bit by bit
+/// takes ten times as long.
 fn scale_down(below: &Level, from: &[u64], above: &Level, to: &mut [u64], factor: NonZeroU32) {
+    let factor = factor.get();
     let [width, height, depth] = below.resolution;
-    let step = NonZeroUsize::try_from(factor).unwrap_or(NonZeroUsize::MIN);
-    for z in 0..depth {
-        for y in 0..height {
-            let row = above.bit([0, y / factor, z / factor]);
-            each_one(from, below.bit([0, y, z]), width as usize, |x| {
-                let bit = row + x / step;
-                if let Some(word) = to.get_mut(bit / WORD_BITS) {
-                    *word |= 1 << (bit % WORD_BITS);
+    let [columns, rows, layers] = above.resolution;
+    let span = |at: u32, end: u32| at * factor..(at + 1).saturating_mul(factor).min(end);
+    for layer in 0..layers {
+        for row in 0..rows {
+            let mut any = [0; WIDEST];
+            for z in span(layer, depth) {
+                for y in span(row, height) {
+                    or_row(&mut any, from, below.bit([0, y, z]), width as usize);
                 }
-                true
-            });
+            }
+            for column in 0..columns {
+                let cells = span(column, width);
+                if extent(&any, cells.start as usize, cells.len()).is_some() {
+                    set_range(to, above.bit([column, row, layer]), 0);
+                }
+            }
         }
+    }
+}
+
+/// Words of the longest row.
+const WIDEST: usize = MAX_RESOLUTION as usize / WORD_BITS;
+
+/// Lays a row of bits over others.
+fn or_row(any: &mut [u64; WIDEST], words: &[u64], bit: usize, width: usize) {
+    for (word, from) in any.iter_mut().zip((0..width).step_by(WORD_BITS)) {
+        *word |= load(words, bit + from) & low_bits(width - from);
     }
 }
 

@@ -112,7 +112,6 @@ impl<'s> Plan<'s> {
         layout.hash_count = u32::try_from(layout.cells).unwrap_or(u32::MAX);
         let rows = match layout.scratch(scratch) {
             Some(Scratch { row_offsets, domain_bits, occupied, rest }) => {
-                occupied.fill(0);
                 let width = lattice.resolution[0] as usize;
                 let slots = displace(domain_bits, width, row_offsets, occupied)
                     .ok_or(Error::InvalidConfig(ConfigField::Density))?;

@@ -28,8 +28,9 @@ const WINDOW_SLOTS: usize = 2048;
 
 /// Finds an offset for every row and returns the number of slots, or `None` beyond `i32::MAX`.
 ///
-/// `domain_bits` holds the rows, `width` bits each; `occupied` must have one zero bit for every cell
-/// and a word more, and is left with the slots in use.
+/// `domain_bits` holds the rows, `width` bits each. `occupied` must have one bit for every cell and a word
+/// more, may hold anything, and is left with the slots in use. What lies far behind the table, most of it, is
+/// not touched.
 pub(crate) fn displace(
     domain_bits: &[u64],
     width: usize,
@@ -57,7 +58,7 @@ impl Kernel for Displace<'_> {
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let Self { domain_bits, width, row_offsets, occupied, has_vectors } = self;
         let mut slots = 0_usize;
-        let mut first_free_word = 0;
+        let (mut first_free_word, mut cleared) = (0, 0);
         for (row, offset) in row_offsets.iter_mut().enumerate() {
             let start = row * width;
             let Some((first, last)) = extent(domain_bits, start, width) else {
@@ -65,6 +66,14 @@ impl Kernel for Displace<'_> {
                 continue;
             };
             let row = Row { domain_bits, start: start + first, width: last - first + 1 };
+
+            // Clear what is read when it is tried, and some more, so that this is seldom.
+            let behind = slots / WORD_BITS + row.width.div_ceil(WORD_BITS) + WORDS + 1;
+            if cleared < behind {
+                let end = occupied.len().min(behind + CLEARED_WORDS);
+                occupied.get_mut(cleared..end).unwrap_or_default().fill(0);
+                cleared = end.max(behind);
+            }
 
             // Take the first hole in the window that the row fits into; behind the table it always does.
             let window = slots.saturating_sub(WINDOW_SLOTS) / WORD_BITS;
@@ -93,6 +102,8 @@ impl Kernel for Displace<'_> {
     }
 }
 
+/// Words that are cleared at a time.
+const CLEARED_WORDS: usize = 64;
 /// Words in a vector.
 const WORDS: usize = 8;
 
@@ -207,7 +218,7 @@ mod tests {
         for (count, width, sparsity) in [(1, 64, 2), (50, 33, 1), (300, 100, 9), (2000, 250, 50)] {
             let domain_bits = rows(count * width, sparsity);
             let mut offsets = vec![0; count];
-            let mut occupied = vec![0; domain_bits.len() + 1];
+            let mut occupied = vec![u64::MAX; domain_bits.len() + 1];
             let slots = displace(&domain_bits, width, &mut offsets, &mut occupied).unwrap();
             let mut owner = vec![None; slots as usize];
             for (row, &offset) in offsets.iter().enumerate() {
@@ -250,7 +261,7 @@ mod tests {
 
             let check = |run: &dyn Fn(Displace<'_>) -> Option<u32>, has_vectors| {
                 let mut row_offsets = vec![0; count];
-                let mut occupied = vec![0; domain_bits.len() + 1];
+                let mut occupied = vec![u64::MAX; domain_bits.len() + 1];
                 let found = run(Displace {
                     domain_bits: &domain_bits,
                     width,
@@ -260,7 +271,7 @@ mod tests {
                 });
                 assert_eq!(found, u32::try_from(slots).ok());
                 assert_eq!(row_offsets, expected);
-                for (slot, &is_taken) in taken.iter().enumerate() {
+                for (slot, &is_taken) in taken.iter().enumerate().take(slots) {
                     assert_eq!(is_set(&occupied, slot), is_taken);
                 }
             };
@@ -276,7 +287,7 @@ mod tests {
     #[test]
     fn empty_rows_take_no_slot() {
         let mut offsets = [7; 3];
-        assert_eq!(displace(&[0; 3], 64, &mut offsets, &mut [0; 4]), Some(0));
+        assert_eq!(displace(&[0; 3], 64, &mut offsets, &mut [7; 4]), Some(0));
         assert_eq!(offsets, [0; 3]);
     }
 }

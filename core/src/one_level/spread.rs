@@ -213,7 +213,7 @@ mod tests {
                 }
 
                 let mut offsets = vec![0; height * depth];
-                let mut occupied = vec![0; expected.len().div_ceil(64) + 1];
+                let mut occupied = vec![7; expected.len().div_ceil(64) + 1];
                 let slots = displace(&domain_bits, width, &mut offsets, &mut occupied).unwrap();
                 let mut hash = vec![7; slots as usize + 1];
                 let mut references = vec![0; sum as usize];

@@ -345,7 +345,6 @@ impl CellSpread<'_> {
         let enough = cells.div_ceil(WORD_BITS) + 1;
         let words = bench.occupied.len().min(enough + 8).max(enough);
         let occupied = bench.occupied.get_mut(..words)?;
-        occupied.fill(0);
         let hash_count = displace(bench.domain_bits, width, row_offsets, occupied)?;
         Some(SubLayout { frame: self.frame, hash_count, reference_count })
     }
