@@ -16,6 +16,7 @@ use crate::aabb::{Aabb, greater};
 use crate::approach::Approach;
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::ray::{Ray, round};
+use crate::simd::HAS_VECTORS;
 
 /// A ray in the cells of a lattice, from where it enters the box.
 #[derive(Debug, Clone, Copy)]
@@ -133,7 +134,7 @@ impl Line {
     }
 
     /// What a step on each axis adds, in wrapping arithmetic, to the place of a cell in an array with these
-    /// strides.
+    /// strides. No step is taken along an axis that the line runs parallel to.
     #[inline(always)]
     pub(crate) fn moves(&self, strides: [usize; 3]) -> [usize; 3] {
         let step = self.step.to_array();
@@ -248,19 +249,20 @@ impl Walk {
     /// All axes at once: which one is next is as good as random in a walk of a few cells.
     #[inline(always)]
     pub(crate) fn advance(&mut self, limit: f32) -> Step {
-        /// The masks of a single axis, a bit for each.
-        const ONE_AXIS: u32 = 1 << 0b001 | 1 << 0b010 | 1 << 0b100;
-        let next = self.next;
-        let nearest = next.min(next.yzx()).min(next.zxy());
-        let mut axis = next.cmpeq(nearest);
-        let mut border = nearest.x;
-        if ONE_AXIS >> axis.bitmask() & 1 == 0 {
+        if !HAS_VECTORS {
+            return self.advance_far(limit, |_| {});
+        }
+        let (next, yzx, zxy) = (self.next, self.next.yzx(), self.next.zxy());
+        let mut axis = next.cmplt(yzx) & next.cmplt(zxy);
+        let mut border = next.min(yzx).min(zxy).x;
+        // Two borders in one point, or distances that are no numbers.
+        if !axis.any() {
             (axis, border) = nearest_of(next);
         }
         self.step_along(axis, border, limit)
     }
 
-    /// The same with an arm for each axis, which is told to `along`.
+    /// The same with an arm for each axis, which is told to `along`, also when the step leaves the cells.
     ///
     /// In a walk of dozens of cells the processor predicts the axis and does not wait for distances, which
     /// [`advance`](Self::advance) always does.
@@ -298,9 +300,9 @@ impl Walk {
     }
 }
 
-/// The axis with the nearest border, and its distance, where two are in one point or where distances are no numbers.
+/// The axis with the nearest border, and its distance; of borders in one point the last axis'.
 ///
-/// Takes a copy: where the walk itself is handed on, it lives in memory.
+/// Takes a copy: where a walk itself is handed on, it lives in memory.
 #[cold]
 fn nearest_of(next: Vec3A) -> (BVec3A, f32) {
     let [x, y, z] = next.to_array();
@@ -319,46 +321,71 @@ mod tests {
 
     use super::*;
 
-    const LAST: Vec3A = Vec3A::new(4.0, 3.0, 5.0);
+    const END: Vec3A = Vec3A::new(4.0, 3.0, 5.0);
 
-    /// A walk from the first cell with these distances, those between borders and the last ones.
-    fn walk(base: [f32; 3], delta: [f32; 3], exits: [f32; 3]) -> Walk {
-        let [base, delta, exits] = [base, delta, exits].map(Vec3A::from_array);
+    /// A walk with these distances: to the first borders, between borders, and to the last ones. Up from the
+    /// first cell or, on some axes, down from the end.
+    fn walk(first: [f32; 3], delta: [f32; 3], exits: [f32; 3], is_down: BVec3A) -> Walk {
+        let [first, delta, exits] = [first, delta, exits].map(Vec3A::from_array);
         // As a line has it on axes that it runs parallel to.
         let is_parallel = delta.cmpeq(Vec3A::ZERO);
-        let base = Vec3A::select(is_parallel, Vec3A::INFINITY, base);
-        let step = Vec3A::select(is_parallel, Vec3A::ZERO, Vec3A::ONE);
-        let cell = Vec3A::ZERO;
-        Walk { cell, entered: 0.0, next: base, exits, delta, base, step, last: LAST }
+        let step = Vec3A::select(is_down, Vec3A::NEG_ONE, Vec3A::ONE);
+        let (cell, last) = (Vec3A::select(is_down, END, Vec3A::ZERO), END * step.max(Vec3A::ZERO));
+        let delta = delta * step;
+        let base = Vec3A::select(is_parallel, Vec3A::INFINITY, first - cell * delta);
+        let step = Vec3A::select(is_parallel, Vec3A::ZERO, step);
+        Walk {
+            cell,
+            entered: 0.0,
+            next: Vec3A::select(is_parallel, Vec3A::INFINITY, first),
+            exits,
+            delta,
+            base,
+            step,
+            last,
+        }
     }
 
-    /// What the steps of a walk come to.
-    fn steps(mut walk: Walk, mut step: impl FnMut(&mut Walk) -> Step) -> Vec<([u32; 3], u32)> {
+    /// The cells of a walk and the distances at which they are entered, then how it ends.
+    fn steps(mut walk: Walk, step: impl Fn(&mut Walk) -> Step) -> Vec<([u32; 3], u32, Step)> {
         let mut all = Vec::new();
-        while step(&mut walk) == Step::Inside {
-            all.push((walk.cell(), walk.entered.to_bits()));
+        loop {
+            let last = step(&mut walk);
+            all.push((walk.cell(), walk.entered.to_bits(), last));
+            if last != Step::Inside {
+                return all;
+            }
             assert!(all.len() <= 12, "a walk has an end: {walk:?}");
         }
-        all
+    }
+
+    fn is_down(axes: usize) -> BVec3A {
+        BVec3A::new(axes & 1 != 0, axes & 2 != 0, axes & 4 != 0)
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn all_axes_at_once_step_as_one_after_the_other() {
         let values = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25];
         let at = |number: usize, place: u32| values[number / 6_usize.pow(place) % 6];
-        let mut lengths = [0; 13];
+        let (mut lengths, mut ends) = ([0; 14], [0; 2]);
         for number in 0..6_usize.pow(6) {
-            let base = [0, 1, 2].map(|axis| at(number, axis));
+            let first = [0, 1, 2].map(|axis| at(number, axis));
             let delta = [3, 4, 5].map(|axis| at(number, axis));
-            let walk = walk(base, delta, [2.5, 3.0, 3.0]);
-            let expected = steps(walk, |walk| walk.advance_far(3.0, |_| {}));
-            assert_eq!(steps(walk, |walk| walk.advance(3.0)), expected, "{walk:?}");
-            lengths[expected.len()] += 1;
+            for exits in [[2.5, 3.0, 3.0], [2.0; 3]] {
+                let walk = walk(first, delta, exits, is_down(number % 8));
+                let expected = steps(walk, |walk| walk.advance_far(2.75, |_| {}));
+                assert_eq!(steps(walk, |walk| walk.advance(2.75)), expected, "{walk:?}");
+                lengths[expected.len()] += 1;
+                ends[usize::from(expected[expected.len() - 1].2 == Step::Ended)] += 1;
+            }
         }
-        assert!(lengths[2..].iter().all(|&count| count > 100), "{lengths:?}");
+        assert!(lengths[3..].iter().all(|&count| count > 100), "{lengths:?}");
+        assert!(ends.iter().all(|&count| count > 1000), "{ends:?}");
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn walks_of_no_numbers_have_an_end() {
         let values = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, 0.5];
         let at = |number: usize, place: u32| values[number / 5_usize.pow(place) % 5];
@@ -366,7 +393,7 @@ mod tests {
             let base = [0, 1, 2].map(|axis| at(number, axis));
             let delta = [3, 4, 5].map(|axis| at(number, axis));
             for limit in [f32::INFINITY, 3.0, f32::NAN] {
-                let walk = walk(base, delta, [at(number, 6); 3]);
+                let walk = walk(base, delta, [at(number, 6); 3], is_down(number % 8));
                 steps(walk, |walk| walk.advance(limit));
                 steps(walk, |walk| walk.advance_far(limit, |_| {}));
             }

@@ -10,6 +10,7 @@
 //! section, each starting at a new word; where one lies follows from the resolution and the factor.
 
 use core::num::NonZeroU32;
+use core::ops::Range;
 
 use crate::bits::{WORD_BITS, extent, is_set, load, low_bits, set_range};
 use crate::cell::MAX_RESOLUTION;
@@ -59,11 +60,15 @@ impl Level {
     /// Whether any cell of a macrocell on the level above is full.
     fn any_in(&self, words: &[u64], [x, y, z]: [u32; 3], factor: u32) -> bool {
         let [width, height, depth] = self.resolution;
-        let span = |cell: u32, end: u32| cell * factor..(cell + 1).saturating_mul(factor).min(end);
-        let xs = span(x, width);
+        let xs = span(x, factor, width);
         let row = |y, z| extent(words, self.bit([xs.start, y, z]), xs.len()).is_some();
-        span(z, depth).any(|z| span(y, height).any(|y| row(y, z)))
+        span(z, factor, depth).any(|z| span(y, factor, height).any(|y| row(y, z)))
     }
+}
+
+/// The cells below a macrocell on an axis that has so many.
+fn span(macrocell: u32, factor: u32, end: u32) -> Range<u32> {
+    macrocell * factor..(macrocell + 1).saturating_mul(factor).min(end)
 }
 
 /// The levels above a grid.
@@ -148,7 +153,7 @@ impl Levels {
                 return;
             };
             let from = if number == 1 { domain_bits } else { lower };
-            scale_down(&below, from, &Level { start: 0, ..level }, upper, self.factor);
+            scale_down(&below, from, &Level { start: 0, ..level }, upper, self.factor.get());
             below = level;
         }
     }
@@ -191,21 +196,19 @@ impl Levels {
 ///
 /// All rows of a row of macrocells are laid over each other first, 64 cells at a time: bit by bit
 /// takes ten times as long.
-fn scale_down(below: &Level, from: &[u64], above: &Level, to: &mut [u64], factor: NonZeroU32) {
-    let factor = factor.get();
+fn scale_down(below: &Level, from: &[u64], above: &Level, to: &mut [u64], factor: u32) {
     let [width, height, depth] = below.resolution;
     let [columns, rows, layers] = above.resolution;
-    let span = |at: u32, end: u32| at * factor..(at + 1).saturating_mul(factor).min(end);
     for layer in 0..layers {
         for row in 0..rows {
             let mut any = [0; WIDEST];
-            for z in span(layer, depth) {
-                for y in span(row, height) {
+            for z in span(layer, factor, depth) {
+                for y in span(row, factor, height) {
                     or_row(&mut any, from, below.bit([0, y, z]), width as usize);
                 }
             }
             for column in 0..columns {
-                let cells = span(column, width);
+                let cells = span(column, factor, width);
                 if extent(&any, cells.start as usize, cells.len()).is_some() {
                     set_range(to, above.bit([column, row, layer]), 0);
                 }
@@ -227,6 +230,7 @@ fn or_row(any: &mut [u64; WIDEST], words: &[u64], bit: usize, width: usize) {
 #[cfg(test)]
 mod tests {
     use alloc::vec;
+    use alloc::vec::Vec;
 
     use super::*;
 
@@ -248,36 +252,59 @@ mod tests {
         }
     }
 
+    /// The bits of some full cells, and whether a cell is full.
+    fn full_cells(resolution: [u32; 3]) -> (Vec<u64>, impl Fn([u32; 3]) -> bool) {
+        let full = |[x, y, z]: [u32; 3]| (x * 7 + y * 31 + z * 101).is_multiple_of(997);
+        let grid = Level { resolution, start: 0 };
+        let words = usize::try_from(grid.end()).unwrap();
+        let mut bits = vec![0; words];
+        for cell in cells(resolution) {
+            bits[grid.bit(cell) / 64] |= u64::from(full(cell)) << (grid.bit(cell) % 64);
+        }
+        (bits, full)
+    }
+
+    fn cells([width, height, depth]: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
+        let row = move |y, z| (0..width).map(move |x| [x, y, z]);
+        (0..depth).flat_map(move |z| (0..height).flat_map(move |y| row(y, z)))
+    }
+
     #[test]
     #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn a_macrocell_is_full_if_a_cell_below_it_is() {
+        for resolution in [[131, 37, 50], [128, 40, 7], [4096, 9, 5], [5, 300, 64]] {
+            let (domain_bits, full) = full_cells(resolution);
+            for factor in [2, 3, 6, 64, 65, 5000] {
+                let levels = Levels::new(resolution, factor);
+                let mut words = vec![u64::MAX; usize::try_from(levels.words()).unwrap()];
+                levels.fill(resolution, &domain_bits, &mut words);
+                for number in 1..=levels.count() {
+                    let size = factor.pow(u32::try_from(number).unwrap());
+                    let level = levels.level(number);
+                    let mut expected = vec![false; usize::try_from(level.cells()).unwrap()];
+                    let at = |cell: [u32; 3]| Level { start: 0, ..level }.bit(cell);
+                    for cell in cells(resolution).filter(|&cell| full(cell)) {
+                        expected[at(cell.map(|at| at / size))] = true;
+                    }
+                    for cell in cells(level.resolution) {
+                        let is_full = levels.is_full(&words, number, cell);
+                        assert_eq!(is_full, expected[at(cell)], "{factor}: {number}, {cell:?}");
+                    }
+                }
+                assert_eq!(levels.first_wrong_word(resolution, &domain_bits, &words), None);
+            }
+        }
+        assert!(Levels::new([131, 37, 50], 2).count() > 1);
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "hours of arithmetic")]
+    fn every_wrong_bit_is_found() {
         let resolution = [131, 37, 50];
-        let mut domain_bits = vec![0; (131 * 37 * 50_usize).div_ceil(64)];
-        let full = |x: u32, y: u32, z: u32| (x * 7 + y * 31 + z * 101).is_multiple_of(997);
-        let grid = Level { resolution, start: 0 };
-        let cells = |[w, h, d]: [u32; 3]| {
-            (0..d).flat_map(move |z| (0..h).flat_map(move |y| (0..w).map(move |x| [x, y, z])))
-        };
-        for cell @ [x, y, z] in cells(resolution) {
-            let bit = grid.bit(cell);
-            domain_bits[bit / 64] |= u64::from(full(x, y, z)) << (bit % 64);
-        }
+        let (domain_bits, _) = full_cells(resolution);
         let levels = Levels::new(resolution, 3);
-        let mut words = vec![u64::MAX; usize::try_from(levels.words()).unwrap()];
+        let mut words = vec![0; usize::try_from(levels.words()).unwrap()];
         levels.fill(resolution, &domain_bits, &mut words);
-        for number in 1..=levels.count() {
-            let size = 3_u32.pow(u32::try_from(number).unwrap());
-            let level = levels.level(number);
-            let mut expected = vec![false; usize::try_from(level.cells()).unwrap()];
-            let at = |[x, y, z]: [u32; 3]| Level { start: 0, ..level }.bit([x, y, z]);
-            for [x, y, z] in cells(resolution).filter(|&[x, y, z]| full(x, y, z)) {
-                expected[at([x / size, y / size, z / size])] = true;
-            }
-            for cell in cells(level.resolution) {
-                assert_eq!(levels.is_full(&words, number, cell), expected[at(cell)]);
-            }
-        }
-        assert_eq!(levels.first_wrong_word(resolution, &domain_bits, &words), None);
         for word in 0..words.len() {
             for bit in 0..64 {
                 words[word] ^= 1 << bit;

@@ -29,8 +29,7 @@ const WINDOW_SLOTS: usize = 2048;
 /// Finds an offset for every row and returns the number of slots, or `None` beyond `i32::MAX`.
 ///
 /// `domain_bits` holds the rows, `width` bits each. `occupied` must have one bit for every cell and a word
-/// more, may hold anything, and is left with the slots in use. What lies far behind the table, most of it, is
-/// not touched.
+/// more, may hold anything, and is left with the slots in use; bits behind the last one say nothing.
 pub(crate) fn displace(
     domain_bits: &[u64],
     width: usize,
@@ -67,8 +66,9 @@ impl Kernel for Displace<'_> {
             };
             let row = Row { domain_bits, start: start + first, width: last - first + 1 };
 
-            // Clear what is read when it is tried, and some more, so that this is seldom.
-            let behind = slots / WORD_BITS + row.width.div_ceil(WORD_BITS) + WORDS + 1;
+            // Clear what is read when it is tried at the end of the table, its words and a vector and, so that this is
+            // seldom, some more.
+            let behind = slots / WORD_BITS + row.width.div_ceil(WORD_BITS) + WORDS;
             if cleared < behind {
                 let end = occupied.len().min(behind + CLEARED_WORDS);
                 occupied.get_mut(cleared..end).unwrap_or_default().fill(0);
@@ -102,8 +102,9 @@ impl Kernel for Displace<'_> {
     }
 }
 
-/// Words that are cleared at a time.
+/// Words that are cleared at a time, and so more than is needed: as many as a page of memory hardly notices.
 const CLEARED_WORDS: usize = 64;
+
 /// Words in a vector.
 const WORDS: usize = 8;
 
@@ -238,7 +239,7 @@ mod tests {
     fn every_level_takes_the_first_hole() {
         // Tables of a few words, and of many.
         for (count, width, sparsity) in
-            [(1, 64, 2), (50, 33, 1), (300, 7, 3), (200, 100, 9), (2000, 250, 50)]
+            [(1, 64, 2), (50, 33, 1), (300, 7, 3), (200, 100, 9), (2000, 250, 50), (60, 3000, 40)]
         {
             let domain_bits = rows(count * width, sparsity);
 

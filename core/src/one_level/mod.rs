@@ -135,7 +135,12 @@ impl<'a> OneLevel<'a> {
     /// The primitive ids in a cell, ascending; `None` if it is empty.
     #[inline(always)]
     pub(crate) fn references(&self, cell: [u32; 3]) -> Option<&'a [u32]> {
-        let [start, end] = self.ends(cell)?;
+        self.between(self.ends(cell)?)
+    }
+
+    /// The primitive ids between two ends.
+    #[inline(always)]
+    fn between(&self, [start, end]: [u32; 2]) -> Option<&'a [u32]> {
         self.sections.references.get(start as usize..end as usize)
     }
 
@@ -155,10 +160,12 @@ impl<'a> OneLevel<'a> {
     /// The two words of the hash table that say where a cell's list lies; `None` if it is empty.
     #[inline(always)]
     pub(crate) fn ends(&self, cell: [u32; 3]) -> Option<[u32; 2]> {
-        if !self.is_marked(cell) {
-            return None;
-        }
-        let [x, y, z] = cell;
+        if self.is_marked(cell) { self.ends_of_marked(cell) } else { None }
+    }
+
+    /// The same for a cell whose domain bit is set.
+    #[inline(always)]
+    fn ends_of_marked(&self, [x, y, z]: [u32; 3]) -> Option<[u32; 2]> {
         let row = row(self.last[1] + 1, y, z);
         let slot = slot(*self.sections.row_offsets.get(row)?, x)?;
         self.sections.hash.get(slot..)?.first_chunk().copied()
@@ -215,7 +222,8 @@ impl<'a> OneLevel<'a> {
         loop {
             tally.cell_step();
             if is_set(self.sections.domain_bits, bit)
-                && let Some(references) = self.references(walk.cell())
+                && let Some(references) =
+                    self.ends_of_marked(walk.cell()).and_then(|ends| self.between(ends))
             {
                 limit = leaf(references, tally);
             }
