@@ -300,7 +300,8 @@ impl Walk {
     }
 }
 
-/// The axis with the nearest border, and its distance; of borders in one point the last axis'.
+/// The axis with the nearest border, and its distance; of borders in one point the last axis', as in
+/// [`Walk::advance_far`].
 ///
 /// Takes a copy: where a walk itself is handed on, it lives in memory.
 #[cold]

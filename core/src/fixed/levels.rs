@@ -194,8 +194,8 @@ impl Levels {
 
 /// Sets the bit of every macrocell that has a bit set below it.
 ///
-/// All rows of a row of macrocells are laid over each other first, 64 cells at a time: bit by bit
-/// takes ten times as long.
+/// All rows of a row of macrocells are laid over each other first, 64 cells at a time. With a division
+/// for each full cell a build took 1.05 times as long on bunny, 1.04 on dragon, 1.01 on sponza.
 fn scale_down(below: &Level, from: &[u64], above: &Level, to: &mut [u64], factor: u32) {
     let [width, height, depth] = below.resolution;
     let [columns, rows, layers] = above.resolution;

@@ -66,8 +66,7 @@ impl Kernel for Displace<'_> {
             };
             let row = Row { domain_bits, start: start + first, width: last - first + 1 };
 
-            // Clear what is read when it is tried at the end of the table, its words and a vector and, so that this is
-            // seldom, some more.
+            // Clear what is read when it is tried at the end of the table: its words and a vector.
             let behind = slots / WORD_BITS + row.width.div_ceil(WORD_BITS) + WORDS;
             if cleared < behind {
                 let end = occupied.len().min(behind + CLEARED_WORDS);
@@ -102,7 +101,7 @@ impl Kernel for Displace<'_> {
     }
 }
 
-/// Words that are cleared at a time, and so more than is needed: as many as a page of memory hardly notices.
+/// Words that are cleared beyond those that are needed, so that it is seldom done: 512 bytes, an eighth of a page.
 const CLEARED_WORDS: usize = 64;
 
 /// Words in a vector.

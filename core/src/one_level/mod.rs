@@ -222,8 +222,8 @@ impl<'a> OneLevel<'a> {
         loop {
             tally.cell_step();
             if is_set(self.sections.domain_bits, bit)
-                && let Some(references) =
-                    self.ends_of_marked(walk.cell()).and_then(|ends| self.between(ends))
+                && let Some(ends) = self.ends_of_marked(walk.cell())
+                && let Some(references) = self.between(ends)
             {
                 limit = leaf(references, tally);
             }
