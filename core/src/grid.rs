@@ -214,8 +214,8 @@ impl<'a> Grid<'a> {
         let test = TriangleTest::from(ray, &approach).culling(cull);
         if let Structure::Brick(brick) = &self.structure {
             let mesh = &self.mesh;
-            let ray = OneRay { brick, mesh, line: &line, test: &test, search, tally };
-            dispatch(self.simd, ray);
+            let mut ray = OneRay { brick, mesh, line: &line, test: &test, search, tally };
+            dispatch(self.simd, &mut ray);
         } else {
             self.traverse(&line, &test, search, tally);
         }
@@ -241,8 +241,10 @@ impl<'a> Grid<'a> {
             for &id in references {
                 tally.primitive_test();
                 let Some(triangle) = self.mesh.triangle(id) else { continue };
-                let Some(hit) = test.test(&triangle) else { continue };
-                match search.show(hit.on(id)) {
+                if !test.passes(&triangle) {
+                    continue;
+                }
+                match search.decide(test, &self.mesh, id) {
                     Outcome::Unchanged => {}
                     Outcome::EndsAt(t) => limit = line.distance(t),
                     Outcome::Done => return f32::NEG_INFINITY,

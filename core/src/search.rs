@@ -3,8 +3,10 @@
 //! A walk shows a search every hit that it finds: about from near to far, but not quite, and a
 //! triangle that lies in several cells more than once. The search answers where the ray now ends.
 
+use crate::mesh::TriangleMesh;
 use crate::options::Selection;
-use crate::ray::Hit;
+use crate::ray::{Hit, INVALID_ID};
+use crate::triangle::TriangleTest;
 
 /// What became of a hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +22,13 @@ pub(crate) enum Outcome {
 /// What a walk shows its hits to.
 pub(crate) trait Search {
     fn show(&mut self, hit: Hit) -> Outcome;
+
+    /// Shows the hit with a triangle that passed the filter, if it is one.
+    #[inline(always)]
+    fn decide(&mut self, test: &TriangleTest, mesh: &TriangleMesh<'_>, id: u32) -> Outcome {
+        let hit = test.decide(mesh, id);
+        if hit.primitive == INVALID_ID { Outcome::Unchanged } else { self.show(hit) }
+    }
 }
 
 /// The closest hit; where several are equally close, the one of the triangle with the lowest id.

@@ -20,7 +20,7 @@
 
 use crate::aabb::Aabb;
 use crate::approach::Approach;
-use crate::mesh::Triangle;
+use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Cull;
 use crate::ray::{Hit, Ray, round};
 
@@ -127,8 +127,26 @@ impl TriangleTest {
     #[inline(always)]
     #[must_use]
     pub fn test(&self, triangle: &Triangle) -> Option<TriangleHit> {
-        let sheared = self.sheared(triangle);
-        if is_dropped(sheared) { None } else { self.resolve_sheared(triangle, sheared) }
+        if self.passes(triangle) { self.resolve(triangle) } else { None }
+    }
+
+    /// Whether the filter lets a triangle through.
+    #[inline(always)]
+    pub(crate) fn passes(&self, triangle: &Triangle) -> bool {
+        !is_dropped(self.sheared(triangle))
+    }
+
+    /// The hit with a triangle that passed, or [`Hit::MISS`].
+    ///
+    /// Out of line: rare, and inside it would take the registers from the filter. The triangle is read anew and
+    /// the hit comes back in registers: what is stored number by number and loaded in pieces is waited for.
+    #[inline(never)]
+    pub(crate) fn decide(&self, mesh: &TriangleMesh<'_>, id: u32) -> Hit {
+        let hit = mesh.triangle(id).and_then(
+            #[inline(always)]
+            |triangle| self.resolve(&triangle),
+        );
+        hit.map_or(Hit::MISS, |hit| hit.on(id))
     }
 
     /// The corners as the filter sees them.
@@ -146,17 +164,11 @@ impl TriangleTest {
     }
 
     /// Decides in f64 what the filter let through.
-    #[inline]
-    pub(crate) fn resolve(&self, triangle: &Triangle) -> Option<TriangleHit> {
-        self.resolve_sheared(triangle, self.sheared(triangle))
-    }
-
-    /// The same for a triangle that was sheared.
-    #[inline]
-    fn resolve_sheared(&self, triangle: &Triangle, sheared: [[f32; 2]; 3]) -> Option<TriangleHit> {
+    #[inline(always)]
+    fn resolve(&self, triangle: &Triangle) -> Option<TriangleHit> {
         // Said for each: what is mapped over arrays is called, corner by corner.
         let wide = |[x, y]: [f32; 2]| [f64::from(x), f64::from(y)];
-        let [a, b, c] = sheared;
+        let [a, b, c] = self.sheared(triangle);
         let (a, b, c) = (wide(a), wide(b), wide(c));
 
         // Compute the edge functions again: exact products, so the signs are exact.
@@ -204,14 +216,6 @@ fn is_dropped([a, b, c]: [[f32; 2]; 3]) -> bool {
     let any_negative = (u < 0.0) | (v < 0.0) | (w < 0.0);
     let any_positive = (u > 0.0) | (v > 0.0) | (w > 0.0);
     any_negative & any_positive
-}
-
-#[cfg(test)]
-impl TriangleTest {
-    /// Whether the filter lets a triangle through.
-    pub(crate) fn passes(&self, triangle: &Triangle) -> bool {
-        !is_dropped(self.sheared(triangle))
-    }
 }
 
 #[cfg(test)]

@@ -178,8 +178,8 @@ impl Hits {
             while survivors != 0 {
                 let place = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
-                let hit = ids.get(place).and_then(|&id| test.decide(mesh, id));
-                let Some(hit) = hit else { continue };
+                let Some(&id) = ids.get(place) else { break };
+                let hit = test.decide(mesh, id);
                 let best =
                     Hit { t: bundle.t_max[lane], primitive: self.primitive[lane], ..Hit::MISS };
                 if hit.is_closer(&best) {

@@ -56,14 +56,23 @@ struct Part<'a, 'l> {
     depth: u32,
 }
 
-impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
+impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { brick, mesh, line, test, search, tally } = self;
-        let (format, limit, unread) = (brick.format, line.end, brick.list_words());
-        Way { mesh, line, test, search, tally, format, limit, unread }.blocks(simd, brick);
+        let OneRay { brick, mesh, line, test, .. } = *self;
+        let mut way = Way {
+            mesh,
+            line,
+            test,
+            search: self.search,
+            tally: self.tally,
+            format: brick.format,
+            limit: line.end,
+            unread: brick.list_words(),
+        };
+        way.blocks(simd, brick);
     }
 }
 
@@ -274,9 +283,8 @@ impl<F: Search, T: Tally> Way<'_, F, T> {
         while survivors != 0 {
             let lane = survivors.trailing_zeros() as usize;
             survivors &= survivors - 1;
-            let hit = ids.get(lane).and_then(|&id| self.test.decide(self.mesh, id));
-            let Some(hit) = hit else { continue };
-            match self.search.show(hit) {
+            let Some(&id) = ids.get(lane) else { break };
+            match self.search.decide(self.test, self.mesh, id) {
                 Outcome::Unchanged => {}
                 Outcome::EndsAt(t) => self.limit = self.line.distance(t),
                 Outcome::Done => {
