@@ -16,19 +16,10 @@ use crate::search::{Outcome, Search};
 use crate::simd::Kernel;
 use crate::triangle::TriangleTest;
 
-/// A ray, and what it is traced through.
+/// A ray on its way, and what it is traced through.
 #[derive(Debug)]
 pub(crate) struct OneRay<'q, F, T> {
-    pub(crate) brick: &'q Brick<'q>,
-    pub(crate) mesh: &'q TriangleMesh<'q>,
-    pub(crate) line: &'q Line,
-    pub(crate) test: &'q TriangleTest,
-    pub(crate) search: &'q mut F,
-    pub(crate) tally: &'q mut T,
-}
-
-/// A ray on its way.
-struct Way<'q, F, T> {
+    brick: &'q Brick<'q>,
     mesh: &'q TriangleMesh<'q>,
     line: &'q Line,
     test: &'q TriangleTest,
@@ -56,30 +47,33 @@ struct Part<'a, 'l> {
     depth: u32,
 }
 
+// By reference: a copy, written as it is put together and read in larger pieces, would be waited for.
 impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let OneRay { brick, mesh, line, test, .. } = *self;
-        let mut way = Way {
-            mesh,
-            line,
-            test,
-            search: self.search,
-            tally: self.tally,
-            format: brick.format,
-            limit: line.end,
-            unread: brick.list_words(),
-        };
-        way.blocks(simd, brick);
+        self.blocks(simd);
     }
 }
 
-impl<F: Search, T: Tally> Way<'_, F, T> {
+impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
+    /// A ray that was brought to the grid's box.
+    #[inline(always)]
+    pub(crate) const fn new(
+        (brick, mesh): (&'q Brick<'q>, &'q TriangleMesh<'q>),
+        (line, test): (&'q Line, &'q TriangleTest),
+        search: &'q mut F,
+        tally: &'q mut T,
+    ) -> Self {
+        let (format, limit, unread) = (brick.format, line.end, brick.list_words());
+        Self { brick, mesh, line, test, search, tally, format, limit, unread }
+    }
+
     /// Walks from block to block.
     #[inline(always)]
-    fn blocks<S: Simd>(&mut self, simd: S, brick: &Brick<'_>) {
+    fn blocks<S: Simd>(&mut self, simd: S) {
+        let brick = self.brick;
         let large = brick.large();
         if !large.is_empty() {
             self.test(simd, large, 0);
