@@ -5,6 +5,10 @@
 //! listed triangle belongs where it is listed and is there once; so there are as many of them as the
 //! triangles have cells, bricks and blocks if and only if none is missing: one sum against another.
 //!
+//! In a divided cell the same is said of the triangles that are in the first of the lists that they have there;
+//! and each of these counts as one that the cell lists. So none of them is missing either, as that would leave the
+//! sum around it too small.
+//!
 //! A list has no triangle twice if its ids ascend. They need to do so only among triangles of one
 //! shape, as sorting leaves them: a triangle that came twice would have the same shape both times.
 //!
@@ -17,7 +21,7 @@ use super::extent::{EXTENT_WORDS, Extent, LIST_WORDS, Owner};
 use super::frame::{Frame, Scene, classify, lists};
 use super::halves::{Format, Halves};
 use super::layout::{
-    BLOCK, Block, CHILD_WORDS, Class, Layout, MAX_CHILDREN, RECORD_WORDS, mask, number, place,
+    BLOCK, Block, CHILD_WORDS, Class, Layout, MAX_CHILDREN, RECORD_WORDS, mask, place,
 };
 use super::pass::Home;
 use super::size::{Settled, settle};
@@ -66,25 +70,27 @@ impl Brick<'_> {
             mesh,
             settled: &settled,
             last: [0; SHAPES * SHAPES * SHAPES],
-            listed: 0,
-            has_children: false,
+            listed: [0; DOMAINS],
+            expected: [0; DOMAINS],
         };
         check.pool()?;
-        let mut expected = 0;
         for id in 0..mesh.triangle_count() {
-            expected += check.expected(id);
-            if expected > check.listed {
+            check.expected[0] += check.lists_of(id);
+            if check.expected[0] > check.listed[0] {
                 break;
             }
         }
-        if check.listed == expected { Ok(()) } else { Err(check.wrong(0)) }
+        if check.listed == check.expected { Ok(()) } else { Err(check.wrong(0)) }
     }
 }
 
 /// Shapes of a triangle in a block: one or two cells on each axis, or more on any.
 const SHAPES: usize = 9;
 
-const _: () = assert!(MAX_CHILDREN == 2, "a triangle has a shape in each of three domains");
+/// A block, a cell of it that is divided, and a cell of that.
+const DOMAINS: usize = 1 + MAX_CHILDREN;
+
+const _: () = assert!(DOMAINS == 3, "a triangle has a shape in each of three domains");
 
 /// What a check runs over.
 struct Check<'a> {
@@ -93,10 +99,11 @@ struct Check<'a> {
     settled: &'a Settled,
     /// For each shape the last id of a list, plus 1.
     last: [u32; SHAPES * SHAPES * SHAPES],
-    /// Ids in all lists so far.
-    listed: u64,
-    /// Whether any cell is divided.
-    has_children: bool,
+    /// Ids in all lists of blocks so far, in those of divided cells, and of cells divided twice. A cell that is
+    /// divided lists what its own lists have.
+    listed: [u64; DOMAINS],
+    /// How many there must be.
+    expected: [u64; DOMAINS],
 }
 
 /// A block, or a cell that is divided like one.
@@ -143,30 +150,28 @@ impl Placed {
 
 impl Domain<'_> {
     /// A triangle in this domain, if it belongs to it.
+    #[inline(always)]
     fn place(&self, settled: &Settled, corners: [Vec3A; 3]) -> Option<Placed> {
-        match self.within {
-            Within::Lattice(block) => {
-                let home = Home::of(&settled.lattice, settled.most_blocks, corners)?;
-                let CellRange { min, max } = home.range;
-                let is_in = |k: usize| (min[k] / BLOCK..=max[k] / BLOCK).contains(&block[k]);
-                let class = home.class.filter(|_| (0..3).all(is_in))?;
-                Some(Placed::new(home.in_block(block), class, 0))
-            }
-            Within::Domain(around, cell) => {
-                let placed = around.place(settled, corners)?;
-                let reach = settled.lattice.reach(&Aabb::of(corners)?);
-                let (range, halves, class) = inside(&self.frame, &reach);
-                let is_in = placed.class == Class::Cells && placed.range.contains(cell);
-                is_in.then(|| Placed::new((range, halves), class, placed.shape))
-            }
-        }
+        let Within::Lattice(block) = self.within else {
+            return self.place_within(settled, corners);
+        };
+        let home = Home::of(&settled.lattice, settled.most_blocks, corners)?;
+        let CellRange { min, max } = home.range;
+        let is_in = |k: usize| (min[k] / BLOCK..=max[k] / BLOCK).contains(&block[k]);
+        let class = home.class.filter(|_| (0..3).all(is_in))?;
+        Some(Placed::new(home.in_block(block), class, 0))
     }
-}
 
-/// Where a triangle of a divided cell belongs in it.
-fn inside(frame: &Frame, reach: &Aabb) -> (CellRange, Halves, Class) {
-    let (range, halves) = frame.range(reach);
-    (range, halves, classify(range.min, range.max, 1).unwrap_or(Class::Blocks))
+    /// The same in a divided cell.
+    fn place_within(&self, settled: &Settled, corners: [Vec3A; 3]) -> Option<Placed> {
+        let Within::Domain(around, cell) = self.within else { return None };
+        let placed = around.place(settled, corners)?;
+        let reach = settled.lattice.reach(&Aabb::of(corners)?);
+        let (range, halves) = self.frame.range(&reach);
+        let class = classify(range.min, range.max, 1).unwrap_or(Class::Blocks);
+        let is_in = placed.class == Class::Cells && placed.range.contains(cell);
+        is_in.then(|| Placed::new((range, halves), class, placed.shape))
+    }
 }
 
 impl Check<'_> {
@@ -191,7 +196,7 @@ impl Check<'_> {
         if !ascends(large) || !large.iter().all(is_large) {
             return Err(wrong);
         }
-        self.listed += large.len() as u64;
+        self.listed[0] += large.len() as u64;
 
         let mut cursor = 1 + large.len();
         // Never 0, which the compiler cannot see.
@@ -291,7 +296,6 @@ impl Check<'_> {
         if !is_divided {
             return Ok(list_at);
         }
-        self.has_children = true;
         for bit in ones(chunk.mask) {
             let brick = chunk.brick(bit).ok_or(wrong)?;
             for cell in ones(mask(brick.mask)) {
@@ -346,62 +350,43 @@ impl Check<'_> {
                 return Err(wrong);
             }
             *last = id + 1;
+            if domain.depth > 0 {
+                self.count(domain, &placed, cell, corners);
+            }
         }
-        self.listed += words.len() as u64;
+        *self.listed.get_mut(domain.depth).ok_or(wrong)? += words.len() as u64;
         Ok(())
     }
 
-    /// How many lists must have a triangle.
-    fn expected(&self, id: u32) -> u64 {
+    /// Counts what a list of a divided cell says of the domains around it, if it is the first that the triangle
+    /// has there.
+    fn count(&mut self, domain: &Domain<'_>, placed: &Placed, cell: [u32; 3], corners: [Vec3A; 3]) {
+        let Within::Domain(around, of) = domain.within else { return };
+        let (CellRange { min, max }, shift) = (placed.range, placed.class.shift());
+        if (0..3).any(|k| min[k] >> shift != cell[k] >> shift) {
+            return;
+        }
+        if let Some(expected) = self.expected.get_mut(domain.depth) {
+            *expected += lists(min, max, shift);
+        }
+        if let Some(listed) = self.listed.get_mut(around.depth) {
+            *listed += 1;
+        }
+        if let Some(placed) = around.place(self.settled, corners) {
+            self.count(around, &placed, of, corners);
+        }
+    }
+
+    /// How many lists of cells, bricks, blocks and the grid must have a triangle.
+    fn lists_of(&self, id: u32) -> u64 {
         let Settled { lattice, most_blocks, .. } = self.settled;
         let corners = self.mesh.corners(id, Vec3A::new);
-        let home = corners.and_then(|corners| {
-            let reach = lattice.reach(&Aabb::of(corners)?);
-            let Home { range, class, .. } = Home::of(lattice, *most_blocks, corners)?;
-            Some((range, class, reach))
-        });
-        match home {
-            Some((range, Some(Class::Cells), reach)) if self.has_children => {
-                let parts = |cell: [u32; 3]| {
-                    let block = cell.map(|c| c / BLOCK);
-                    let chunk = self.grid.block(block);
-                    let frame = Frame::of_block(block);
-                    chunk.map_or(1, |chunk| {
-                        parts(&chunk, &frame, cell.map(|c| c % BLOCK), &reach, 0)
-                    })
-                };
-                range.cells().map(parts).sum()
+        match corners.and_then(|corners| Home::of(lattice, *most_blocks, corners)) {
+            Some(Home { range, class: Some(class), .. }) => {
+                lists(range.min, range.max, class.shift())
             }
-            Some((range, Some(class), _)) => lists(range.min, range.max, class.shift()),
-            Some((_, None, _)) => 1,
+            Some(_) => 1,
             None => 0,
         }
     }
-}
-
-/// How many lists of a cell must have a triangle that reaches it: one, or more if it is divided.
-fn parts(chunk: &Chunk<'_>, frame: &Frame, cell: [u32; 3], reach: &Aabb, depth: usize) -> u64 {
-    match content(chunk, cell) {
-        Some(Content::Chunk(child, count)) if depth < MAX_CHILDREN => {
-            let frame = frame.child(cell, count);
-            match inside(&frame, reach) {
-                (range, _, Class::Cells) => {
-                    range.cells().map(|cell| parts(&child, &frame, cell, reach, depth + 1)).sum()
-                }
-                (range, _, class) => lists(range.min, range.max, class.shift()),
-            }
-        }
-        _ => 1,
-    }
-}
-
-/// What a cell holds.
-fn content<'a>(chunk: &Chunk<'a>, cell: [u32; 3]) -> Option<Content<'a>> {
-    let number = number(cell);
-    let (brick, bit) = (number >> 6, number & 63);
-    if chunk.mask >> brick & 1 == 0 {
-        return None;
-    }
-    let brick = chunk.brick(brick)?;
-    if mask(brick.mask) >> bit & 1 == 0 { None } else { chunk.content(&brick, bit) }
 }
