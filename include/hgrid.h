@@ -1568,9 +1568,9 @@ hgrid_status hgrid_pack(const struct hgrid_grid *grid,
  * Proves that a blob is the grid of its mesh, and so that every answer will be right.
  *
  * Takes no memory, and at most about the time of a build with one level and fixed, two or three times
- * that with variable and recursive, four or five times with brick, whose builds are short; on damaged
- * bytes it may take much longer. A grid that was just built needs no proof; a blob from a file, a
- * network or another process may.
+ * that with variable, three to five times with recursive, and three times with brick, whose builds are
+ * short; on damaged bytes it may take much longer. A grid that was just built needs no proof; a blob
+ * from a file, a network or another process may.
  *
  * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
  * that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
