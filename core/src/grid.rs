@@ -213,7 +213,7 @@ impl<'a> Grid<'a> {
         let Some(line) = Line::new(&self.lattice, ray, &approach) else { return };
         let test = TriangleTest::from(ray, &approach).culling(cull);
         if let Structure::Brick(brick) = &self.structure {
-            let mut ray = OneRay::new((brick, &self.mesh), (&line, &test), search, tally);
+            let mut ray = OneRay::new(brick, &self.mesh, &line, &test, search, tally);
             dispatch(self.simd, &mut ray);
         } else {
             self.traverse(&line, &test, search, tally);

@@ -82,3 +82,20 @@ pub(crate) const fn round(x: f64) -> f32 {
 }
 
 const _: () = assert!(size_of::<Ray>() == 32 && size_of::<Hit>() == 16);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_miss_is_closer_than_nothing() {
+        for t in [0.0, 1.0, f32::MAX, f32::INFINITY, f32::NAN] {
+            for primitive in [0, INVALID_ID] {
+                assert!(
+                    !Hit::MISS.is_closer(&Hit { t, primitive, ..Hit::MISS }),
+                    "{t} {primitive}"
+                );
+            }
+        }
+    }
+}

@@ -1,4 +1,4 @@
-//! Vectors of three `f64`, for everything that is not a query: generating, framing, shading.
+//! Vectors of three `f64`, for everything that is not a query: generating, framing, normals.
 
 /// A vector or a point.
 pub(crate) type Vector = [f64; 3];

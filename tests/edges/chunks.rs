@@ -324,6 +324,67 @@ fn lists_of_different_places_cannot_be_exchanged() {
     damage.open().validate().unwrap();
 }
 
+/// A brick grid without one of its ids: what lies behind it moves up, and every place is said anew.
+fn without(blob: &[u8], id: usize) -> Copy {
+    let all = sites(blob);
+    let pool = all[0].at;
+    let start = |base: &Site| pool + 4 * word(blob, base.at) as usize;
+    let starts: Vec<usize> =
+        all.iter().filter(|site| site.kind == Kind::BlockBase).map(start).collect();
+    let mut copy = Copy::of(blob);
+    for site in &all {
+        let said = word(blob, site.at);
+        // From where places count. A block's list is said behind its base, in front of the pool.
+        let block = match site.kind {
+            Kind::BlockBase => pool,
+            Kind::BlockList => pool + 4 * word(blob, site.at - 4) as usize,
+            _ => starts.iter().copied().filter(|&start| start <= site.at).max().unwrap_or(pool),
+        };
+        let place = match site.kind {
+            Kind::BlockBase | Kind::Start | Kind::End | Kind::BrickCells | Kind::ChildBase => said,
+            Kind::BlockList | Kind::BrickList | Kind::ChildList if said != 0 => said - 1,
+            _ => continue,
+        };
+        if block <= id && block + 4 * (place & !(1 << 31)) as usize > id {
+            copy.set_word(site.at, said - 1);
+        }
+    }
+    let words = word(blob, 88) - 1;
+    copy.set_word(88, words);
+    let mut bytes = copy.bytes().to_vec();
+    bytes.drain(id..id + 4);
+    bytes.resize((pool + 4 * words as usize).next_multiple_of(64), 0);
+    let mut copy = Copy::of(&bytes);
+    copy.set(16, &(bytes.len() as u64).to_ne_bytes());
+    copy.sign();
+    copy
+}
+
+/// Nothing about the words that are left is wrong: only a sum tells.
+#[test]
+fn a_list_that_has_lost_a_triangle_is_refused() {
+    let damage = Damage::new();
+    for depth in 0..3 {
+        let ids = damage.sites.iter().filter(|s| (s.kind, s.depth) == (Kind::CellId, depth));
+        let ids: Vec<&Site> = ids.filter(|site| site.follows).collect();
+        for site in ids.iter().step_by(ids.len().div_ceil(24)) {
+            let copy = without(damage.copy.bytes(), site.at);
+            let mut kinds = [&damage.sites, &sites(copy.bytes())].map(|all| {
+                let mut kinds: Vec<Kind> = all.iter().map(|site| site.kind).collect();
+                kinds.sort_by_key(|kind| *kind as u32);
+                kinds
+            });
+            let lost = kinds[0].iter().rposition(|&kind| kind == Kind::CellId).unwrap();
+            kinds[0].remove(lost);
+            assert!(kinds[0] == kinds[1], "the rest is a grid");
+            let grid = Grid::open(copy.bytes(), damage.mesh.view()).unwrap();
+            query(&grid);
+            let result = grid.validate();
+            assert!(matches!(result, Err(Error::Corrupt { .. })), "{depth}: {result:?}");
+        }
+    }
+}
+
 /// Divided cells that lead to themselves, to those around them, or to anywhere.
 #[test]
 fn divided_cells_in_circles_end() {

@@ -98,13 +98,14 @@ impl Frusta {
         for (side, axis) in [u, v].into_iter().enumerate() {
             let at = [place(a, axis, side), place(b, axis, side), place(c, axis, side)];
             let (low, high) = (self.whole.low[side], self.whole.high[side]);
+            // Written out: what is mapped over an array is called, operation by operation.
             let low = |k| k * splat(low.slope) + splat(low.start) - margin;
             let high = |k| k * splat(high.slope) + splat(high.start) + margin;
-            // Written out: what is mapped over an array is called, operation by operation.
-            let is_below = |i: usize| at[i].simd_lt(low(ks[i]));
-            let is_above = |i: usize| at[i].simd_gt(high(ks[i]));
-            outside |= is_below(0) & is_below(1) & is_below(2);
-            outside |= is_above(0) & is_above(1) & is_above(2);
+            outside |=
+                at[0].simd_lt(low(ks[0])) & at[1].simd_lt(low(ks[1])) & at[2].simd_lt(low(ks[2]));
+            outside |= at[0].simd_gt(high(ks[0]))
+                & at[1].simd_gt(high(ks[1]))
+                & at[2].simd_gt(high(ks[2]));
         }
         #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
         let outside = outside.to_bitmask() as u32;

@@ -179,6 +179,7 @@ impl Hits {
                 let place = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
                 let Some(&id) = ids.get(place) else { break };
+                // A miss is closer than nothing.
                 let hit = test.decide(mesh, id);
                 let best =
                     Hit { t: bundle.t_max[lane], primitive: self.primitive[lane], ..Hit::MISS };

@@ -5,9 +5,10 @@
 //! listed triangle belongs where it is listed and is there once; so there are as many of them as the
 //! triangles have cells, bricks and blocks if and only if none is missing: one sum against another.
 //!
-//! In a divided cell the same is said of the triangles that are in the first of the lists that they have there;
-//! and each of these counts as one that the cell lists. So none of them is missing either, as that would leave the
-//! sum around it too small.
+//! In a divided cell, the first of the lists that a triangle has there stands for the triangle in the cell. So if
+//! the sum of the blocks is right, every triangle is in its first list in every divided cell. Then it is known what
+//! these cells must list, and their sum is right if and only if none is missing; and so on inward. Their own sum
+//! would not be proof: one list too few makes up for a triangle whose first is missing.
 //!
 //! A list has no triangle twice if its ids ascend. They need to do so only among triangles of one
 //! shape, as sorting leaves them: a triangle that came twice would have the same shape both times.
@@ -99,10 +100,10 @@ struct Check<'a> {
     settled: &'a Settled,
     /// For each shape the last id of a list, plus 1.
     last: [u32; SHAPES * SHAPES * SHAPES],
-    /// Ids in all lists of blocks so far, in those of divided cells, and of cells divided twice. A cell that is
-    /// divided lists what its own lists have.
+    /// Ids in the lists of the grid and of blocks so far, of their divided cells, and of the divided cells of these.
+    /// What is in its first list in a divided cell is one of those that the cell around lists.
     listed: [u64; DOMAINS],
-    /// How many there must be.
+    /// How many there must be: by the mesh, and in divided cells by what is in its first list there.
     expected: [u64; DOMAINS],
 }
 
@@ -162,7 +163,7 @@ impl Domain<'_> {
         Some(Placed::new(home.in_block(block), class, 0))
     }
 
-    /// The same in a divided cell.
+    /// The same in a divided cell; `None` in a block.
     fn place_within(&self, settled: &Settled, corners: [Vec3A; 3]) -> Option<Placed> {
         let Within::Domain(around, cell) = self.within else { return None };
         let placed = around.place(settled, corners)?;
@@ -342,11 +343,11 @@ impl Check<'_> {
             let is_in =
                 |k: usize| (min[k] >> shift..=max[k] >> shift).contains(&(cell[k] >> shift));
             let last = self.last.get_mut(placed.shape).ok_or(wrong)?;
-            let expected = match class {
+            let written = match class {
                 Class::Cells => format.word(id, placed.halves(cell)),
                 _ => id,
             };
-            if placed.class != class || !(0..3).all(is_in) || *last > id || word != expected {
+            if placed.class != class || !(0..3).all(is_in) || *last > id || word != written {
                 return Err(wrong);
             }
             *last = id + 1;
@@ -358,8 +359,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Counts what a list of a divided cell says of the domains around it, if it is the first that the triangle
-    /// has there.
+    /// Counts a triangle of a divided cell, if this is the first of the lists that it has there.
     fn count(&mut self, domain: &Domain<'_>, placed: &Placed, cell: [u32; 3], corners: [Vec3A; 3]) {
         let Within::Domain(around, of) = domain.within else { return };
         let (CellRange { min, max }, shift) = (placed.range, placed.class.shift());
@@ -372,7 +372,8 @@ impl Check<'_> {
         if let Some(listed) = self.listed.get_mut(around.depth) {
             *listed += 1;
         }
-        if let Some(placed) = around.place(self.settled, corners) {
+        // The cell may be one of a divided cell itself.
+        if let Some(placed) = around.place_within(self.settled, corners) {
             self.count(around, &placed, of, corners);
         }
     }

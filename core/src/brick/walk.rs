@@ -61,8 +61,10 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
     /// A ray that was brought to the grid's box.
     #[inline(always)]
     pub(crate) const fn new(
-        (brick, mesh): (&'q Brick<'q>, &'q TriangleMesh<'q>),
-        (line, test): (&'q Line, &'q TriangleTest),
+        brick: &'q Brick<'q>,
+        mesh: &'q TriangleMesh<'q>,
+        line: &'q Line,
+        test: &'q TriangleTest,
         search: &'q mut F,
         tally: &'q mut T,
     ) -> Self {
