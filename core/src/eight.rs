@@ -61,8 +61,8 @@ impl<S: Simd> Eight<S> {
 
 /// The first eight of some ids; where there are fewer, the last once more: it is read, too.
 ///
-/// Number by number, and so into registers: what is copied is waited for, a tenth of a ray's time where lists
-/// are short.
+/// Number by number, and so into registers: what is copied is waited for, up to a twelfth of a ray's time where
+/// lists are short.
 #[inline(always)]
 pub(crate) fn first_eight(ids: &[u32]) -> [u32; LANES] {
     let last = ids.len().saturating_sub(1);
