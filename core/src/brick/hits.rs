@@ -8,14 +8,14 @@
 //! Both do for every ray and triangle what [`TriangleTest`] does, so hits have the same bits.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x16};
+use fearless_simd::{Simd, f32x4, f32x8, f32x16, f64x4, mask32x8, mask64x4, u32x4, u32x8};
 
 use super::bundle::{Bundle, PerRay, RAYS, WIDTH, row_of};
 use super::frusta::Frusta;
-use crate::eight::{Eight, LANES, Row, load, transpose};
+use crate::eight::{Eight, LANES, transpose};
 use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Cull;
-use crate::ray::{Hit, INVALID_ID, round};
+use crate::ray::{Hit, INVALID_ID};
 use crate::triangle::{Axis, TriangleTest};
 
 /// From so many rays on they are tested side by side. A choice by the number of rows and triangles
@@ -26,7 +26,7 @@ const MANY: u32 = 8;
 const SLOTS: usize = 256;
 
 /// Rays resolved at once.
-const HALF: usize = WIDTH / 2;
+const PART: usize = WIDTH / 2;
 
 /// What the rays of a bundle have hit.
 #[derive(Debug)]
@@ -55,31 +55,28 @@ impl Hits {
     };
 
     /// Forgets the rays and what they hit.
-    pub(super) const fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         if self.is_surrounded {
             self.is_surrounded = false;
-            self.mailbox = Self::EMPTY.mailbox;
+            self.mailbox.fill(INVALID_ID);
         }
-        self.u = Self::EMPTY.u;
-        self.v = Self::EMPTY.v;
-        self.primitive = Self::EMPTY.primitive;
+        self.u.fill(0.0);
+        self.v.fill(0.0);
+        self.primitive.fill(INVALID_ID);
     }
 
     /// The closest hits of four rays, or [`Hit::MISS`].
     #[inline(always)]
     pub(super) fn four<S: Simd>(&self, simd: S, bundle: &Bundle, four: usize) -> [Hit; 4] {
-        let primitive: &PerRay = bytemuck::cast_ref(&self.primitive);
-        let row = |numbers: &PerRay| {
-            let rows: &[Row; RAYS / 4] = bytemuck::cast_ref(numbers);
-            load(simd, &rows[four % (RAYS / 4)])
-        };
-        let [a, b, c, d] =
-            transpose([row(&bundle.t_max), row(&self.u), row(&self.v), row(primitive)]);
-        let hit = |hit: f32x4<S>| {
-            let hit: Hit = bytemuck::cast(<[f32; 4]>::from(hit));
-            if hit.primitive == INVALID_ID { Hit::MISS } else { hit }
-        };
-        [hit(a), hit(b), hit(c), hit(d)]
+        let place = four % (RAYS / 4);
+        let primitive = self.primitive.as_chunks::<4>().0[place];
+        let is_miss = u32x4::simd_from(simd, primitive).simd_eq(INVALID_ID);
+        let row = |numbers: &PerRay| f32x4::simd_from(simd, numbers.as_chunks::<4>().0[place]);
+        // Who hits nothing has no u and v.
+        let t = is_miss.select(f32x4::splat(simd, Hit::MISS.t), row(&bundle.t_max));
+        let primitive = u32x4::simd_from(simd, primitive).bitcast();
+        let [a, b, c, d] = transpose([t, row(&self.u), row(&self.v), primitive]);
+        [a, b, c, d].map(|hit| bytemuck::cast(<[f32; 4]>::from(hit)))
     }
 
     /// Tests rays of a bundle against the triangles of a list; if they are many, all rays that are
@@ -243,16 +240,16 @@ impl Hits {
             }
             let corners: [[f32; WIDTH]; 6] =
                 [a[0].into(), a[1].into(), b[0].into(), b[1].into(), c[0].into(), c[1].into()];
-            let depths = [triangle[0][z], triangle[1][z], triangle[2][z]];
-            for half in 0..2 {
-                let survivors = (survivors >> (half * HALF) & 0xff) as u32;
+            let depths = [triangle[0][z], triangle[1][z], triangle[2][z]].map(f64::from);
+            for part in 0..WIDTH / PART {
+                let survivors = survivors >> (part * PART) & ((1 << PART) - 1);
                 if survivors != 0 {
-                    let first = first + half * HALF;
-                    let mut sheared = [[0.0; HALF]; 6];
-                    for (to, from) in sheared.iter_mut().zip(&corners) {
-                        to.copy_from_slice(&from[half * HALF..][..HALF]);
-                    }
-                    let taken = self.resolve(bundle, &sheared, &depths, z, id, first, survivors);
+                    let first = first + part * PART;
+                    let sheared = |at: usize| part_of(&corners[at], part);
+                    let corners =
+                        [sheared(0), sheared(1), sheared(2), sheared(3), sheared(4), sheared(5)];
+                    let taken =
+                        self.resolve(simd, bundle, &corners, &depths, z, id, first, survivors);
                     if ANY {
                         bundle.members &= !(taken << first);
                     }
@@ -261,70 +258,91 @@ impl Hits {
         }
     }
 
-    /// Does what [`TriangleTest::resolve`] does, for eight rays from `first` on; tells which of them now
+    /// Does what [`TriangleTest::decide`] does, for eight rays from `first` on; tells which of them now
     /// have this hit.
+    ///
+    /// Where an edge function or the area is no number, or infinite, or the area is 0, neither is t a number, and
+    /// no comparison with it holds.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "once, for three axes")]
-    fn resolve(
+    fn resolve<S: Simd>(
         &mut self,
+        simd: S,
         bundle: &mut Bundle,
-        [ax, ay, bx, by, cx, cy]: &[[f32; HALF]; 6],
-        depths: &[f32; 3],
+        corners: &[[f32; PART]; 6],
+        depths: &[f64; 3],
         z: usize,
         id: u32,
         first: usize,
-        survivors: u32,
+        survivors: u64,
     ) -> u64 {
-        let origin = eight_of(&bundle.origin[z], first);
-        let direction = eight_of(&bundle.direction_z, first);
-        let (t_min, best_t) = (eight_of(&bundle.t_min, first), eight_of(&bundle.t_max, first));
-        let (best_u, best_v) = (eight_of(&self.u, first), eight_of(&self.v, first));
-        let to = eight_of(&bundle.to, first);
-        let (zero, speed) = (eight_of(&bundle.zero, first), eight_of(&bundle.speed, first));
-        let best_id = eight_of(&self.primitive, first);
-        let depths = [f64::from(depths[0]), f64::from(depths[1]), f64::from(depths[2])];
-        let margin = bundle.margin;
-        let (mut new_t, mut new_u, mut new_v) = (best_t, best_u, best_v);
-        let (mut new_to, mut new_id, mut is_new) = (to, best_id, [0_u32; HALF]);
-        #[expect(clippy::needless_bitwise_bool, reason = "no branch: lanes side by side")]
-        for lane in 0..HALF {
-            let (ax, ay) = (f64::from(ax[lane]), f64::from(ay[lane]));
-            let (bx, by) = (f64::from(bx[lane]), f64::from(by[lane]));
-            let (cx, cy) = (f64::from(cx[lane]), f64::from(cy[lane]));
-            let u = cx * by - cy * bx;
-            let v = ax * cy - ay * cx;
-            let w = bx * ay - by * ax;
-            let any_negative = (u < 0.0) | (v < 0.0) | (w < 0.0);
-            let any_positive = (u > 0.0) | (v > 0.0) | (w > 0.0);
-            let area = u + v + w;
-            let is_area = (area.abs() > 0.0) & (area.abs() < f64::INFINITY);
-            let share = 1.0 / area;
-            let (u, v, w) = (u * share + 0.0, v * share + 0.0, w * share + 0.0);
-            let origin = f64::from(origin[lane]);
-            let depth =
-                u * (depths[0] - origin) + v * (depths[1] - origin) + w * (depths[2] - origin);
-            let t = round(depth / f64::from(direction[lane]));
-            let is_hit = !(any_negative & any_positive)
-                & is_area
-                & (t >= t_min[lane])
-                & (t.abs() < f32::INFINITY)
-                & (survivors >> lane & 1 == 1);
-            let is_closer = (t < best_t[lane]) | ((t <= best_t[lane]) & (id < best_id[lane]));
-            let is_taken = is_hit & is_closer;
-            new_t[lane] = if is_taken { t } else { best_t[lane] };
-            new_u[lane] = if is_taken { round(v) } else { best_u[lane] };
-            new_v[lane] = if is_taken { round(w) } else { best_v[lane] };
-            new_id[lane] = if is_taken { id } else { best_id[lane] };
-            let end = zero[lane] + speed[lane] * t + margin;
-            new_to[lane] = if is_taken { end } else { to[lane] };
-            is_new[lane] = u32::from(is_taken) << lane;
-        }
-        *eight_mut(&mut bundle.t_max, first) = new_t;
-        *eight_mut(&mut self.u, first) = new_u;
-        *eight_mut(&mut self.v, first) = new_v;
-        *eight_mut(&mut self.primitive, first) = new_id;
-        *eight_mut(&mut bundle.to, first) = new_to;
-        u64::from(is_new.iter().fold(0, |all, ray| all | ray))
+        let load = |numbers: &[f32; PART]| f32x8::simd_from(simd, *numbers);
+        let row = |array: &PerRay| load(&part_of(array, first / PART));
+        let [ax, ay, bx, by, cx, cy] = corners;
+        let (ax, ay) = (load(ax).widen(), load(ay).widen());
+        let (bx, by) = (load(bx).widen(), load(by).widen());
+        let (cx, cy) = (load(cx).widen(), load(cy).widen());
+        let origin = row(&bundle.origin[z]).widen();
+        let direction = row(&bundle.direction_z).widen();
+        let low = [ax.0, ay.0, bx.0, by.0, cx.0, cy.0];
+        let low = Four::of(simd, low, depths, origin.0, direction.0);
+        let high = [ax.1, ay.1, bx.1, by.1, cx.1, cy.1];
+        let high = Four::of(simd, high, depths, origin.1, direction.1);
+        let t = low.t.narrow(high.t);
+
+        // Take what is closer. Read all before anything is written, and write first what needs no choice: otherwise the
+        // compiler makes masked stores, which some processors take apart into dozens of steps.
+        let (best_t, best_u, best_v) = (row(&bundle.t_max), row(&self.u), row(&self.v));
+        let best_id = u32x8::simd_from(simd, part_of(&self.primitive, first / PART));
+        let new_id = u32x8::splat(simd, id);
+        let is_closer = t.simd_lt(best_t) | (t.simd_le(best_t) & new_id.simd_lt(best_id));
+        let is_hit = t.simd_ge(row(&bundle.t_min)) & t.abs().simd_lt(f32::INFINITY);
+        let taken = is_hit & is_closer & !low.outside.narrow(high.outside);
+        let taken = taken & mask32x8::from_bitmask(simd, survivors);
+        let t = taken.select(t, best_t);
+        let u = taken.select(low.v.narrow(high.v), best_u);
+        let v = taken.select(low.w.narrow(high.w), best_v);
+        let end = row(&bundle.zero) + row(&bundle.speed) * t + bundle.margin;
+        *part_mut(&mut bundle.to, first / PART) = end.into();
+        *part_mut(&mut bundle.t_max, first / PART) = t.into();
+        *part_mut(&mut self.u, first / PART) = u.into();
+        *part_mut(&mut self.v, first / PART) = v.into();
+        *part_mut(&mut self.primitive, first / PART) = taken.select(new_id, best_id).into();
+        taken.to_bitmask()
+    }
+}
+
+/// Where four rays meet a triangle.
+struct Four<S: Simd> {
+    /// Whether two edge functions have opposite signs.
+    outside: mask64x4<S>,
+    v: f64x4<S>,
+    w: f64x4<S>,
+    t: f64x4<S>,
+}
+
+impl<S: Simd> Four<S> {
+    #[inline(always)]
+    fn of(
+        simd: S,
+        [ax, ay, bx, by, cx, cy]: [f64x4<S>; 6],
+        depths: &[f64; 3],
+        origin: f64x4<S>,
+        direction: f64x4<S>,
+    ) -> Self {
+        // The edge functions again: exact products, so the signs are exact.
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let zero = f64x4::splat(simd, 0.0);
+        let outside = u.min(v).min(w).simd_lt(zero) & u.max(v).max(w).simd_gt(zero);
+
+        // Weights, and with them the depth.
+        let share = f64x4::splat(simd, 1.0) / (u + v + w);
+        let (u, v, w) = (u * share + zero, v * share + zero, w * share + zero);
+        let depth = |at: usize| f64x4::splat(simd, depths[at]) - origin;
+        let depth = u * depth(0) + v * depth(1) + w * depth(2);
+        Self { outside, v, w, t: depth / direction }
     }
 }
 
@@ -351,15 +369,15 @@ fn one(bundle: &Bundle, lane: usize) -> TriangleTest {
     }
 }
 
-/// Eight numbers from `first` on.
+/// A part of an array, as if they followed one another.
 #[inline(always)]
-fn eight_of<T: Copy>(array: &[T; RAYS], first: usize) -> [T; HALF] {
-    array.as_chunks().0[first / HALF % (RAYS / HALF)]
+fn part_of<T: Copy, const N: usize>(array: &[T; N], part: usize) -> [T; PART] {
+    array.as_chunks().0[part % (N / PART)]
 }
 
 #[inline(always)]
-fn eight_mut<T: Copy>(array: &mut [T; RAYS], first: usize) -> &mut [T; HALF] {
-    &mut array.as_chunks_mut().0[first / HALF % (RAYS / HALF)]
+fn part_mut<T>(array: &mut [T; RAYS], part: usize) -> &mut [T; PART] {
+    &mut array.as_chunks_mut().0[part % (RAYS / PART)]
 }
 
 /// A corner relative to sixteen rays, sheared so that each of them is the z axis.
