@@ -369,7 +369,8 @@ impl Bundle {
         below_three(self.axes)
     }
 
-    /// The first k of any member, and the last.
+    /// The first k of any member, and the last, before any has a hit: from then on the ends of who does
+    /// not belong mean nothing.
     #[inline(always)]
     pub(super) fn ends<S: Simd>(&self, simd: S) -> (f32, f32) {
         let rows = |array: &PerRay| {

@@ -72,11 +72,13 @@ impl Hits {
         let primitive = self.primitive.as_chunks::<4>().0[place];
         let is_miss = u32x4::simd_from(simd, primitive).simd_eq(INVALID_ID);
         let row = |numbers: &PerRay| f32x4::simd_from(simd, numbers.as_chunks::<4>().0[place]);
-        // Who hits nothing has no u and v.
+        // u and v of a miss are 0 already.
         let t = is_miss.select(f32x4::splat(simd, Hit::MISS.t), row(&bundle.t_max));
         let primitive = u32x4::simd_from(simd, primitive).bitcast();
         let [a, b, c, d] = transpose([t, row(&self.u), row(&self.v), primitive]);
-        [a, b, c, d].map(|hit| bytemuck::cast(<[f32; 4]>::from(hit)))
+        // Written out: arrays that are mapped live in memory.
+        let hit = |hit: f32x4<S>| bytemuck::cast(<[f32; 4]>::from(hit));
+        [hit(a), hit(b), hit(c), hit(d)]
     }
 
     /// Tests rays of a bundle against the triangles of a list; if they are many, all rays that are
@@ -249,7 +251,7 @@ impl Hits {
                     let corners =
                         [sheared(0), sheared(1), sheared(2), sheared(3), sheared(4), sheared(5)];
                     let taken =
-                        self.resolve(simd, bundle, &corners, &depths, z, id, first, survivors);
+                        self.resolve(simd, bundle, &corners, depths, z, id, first, survivors);
                     if ANY {
                         bundle.members &= !(taken << first);
                     }
@@ -258,11 +260,11 @@ impl Hits {
         }
     }
 
-    /// Does what [`TriangleTest::decide`] does, for eight rays from `first` on; tells which of them now
-    /// have this hit.
+    /// Does what [`TriangleTest::resolve`] does for eight rays from `first` on, and keeps the hits that
+    /// are closer; tells which of the rays now have this hit.
     ///
-    /// Where an edge function or the area is no number, or infinite, or the area is 0, neither is t a number, and
-    /// no comparison with it holds.
+    /// Where an edge function is infinite or no number, or all three are 0, t is no number, and no
+    /// comparison with it holds. Else the area is finite, and 0 only where two have opposite signs.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "once, for three axes")]
     fn resolve<S: Simd>(
@@ -270,7 +272,7 @@ impl Hits {
         simd: S,
         bundle: &mut Bundle,
         corners: &[[f32; PART]; 6],
-        depths: &[f64; 3],
+        depths: [f64; 3],
         z: usize,
         id: u32,
         first: usize,
@@ -285,13 +287,13 @@ impl Hits {
         let origin = row(&bundle.origin[z]).widen();
         let direction = row(&bundle.direction_z).widen();
         let low = [ax.0, ay.0, bx.0, by.0, cx.0, cy.0];
-        let low = Four::of(simd, low, depths, origin.0, direction.0);
+        let low = Four::of(low, depths, origin.0, direction.0);
         let high = [ax.1, ay.1, bx.1, by.1, cx.1, cy.1];
-        let high = Four::of(simd, high, depths, origin.1, direction.1);
+        let high = Four::of(high, depths, origin.1, direction.1);
         let t = low.t.narrow(high.t);
 
-        // Take what is closer. Read all before anything is written, and write first what needs no choice: otherwise the
-        // compiler makes masked stores, which some processors take apart into dozens of steps.
+        // Take what is closer. Read all before anything is written, and write first what needs no
+        // choice: or the compiler makes masked stores (core/DESIGN.md).
         let (best_t, best_u, best_v) = (row(&bundle.t_max), row(&self.u), row(&self.v));
         let best_id = u32x8::simd_from(simd, part_of(&self.primitive, first / PART));
         let new_id = u32x8::splat(simd, id);
@@ -300,8 +302,8 @@ impl Hits {
         let taken = is_hit & is_closer & !low.outside.narrow(high.outside);
         let taken = taken & mask32x8::from_bitmask(simd, survivors);
         let t = taken.select(t, best_t);
-        let u = taken.select(low.v.narrow(high.v), best_u);
-        let v = taken.select(low.w.narrow(high.w), best_v);
+        let u = taken.select(low.weights[0].narrow(high.weights[0]), best_u);
+        let v = taken.select(low.weights[1].narrow(high.weights[1]), best_v);
         let end = row(&bundle.zero) + row(&bundle.speed) * t + bundle.margin;
         *part_mut(&mut bundle.to, first / PART) = end.into();
         *part_mut(&mut bundle.t_max, first / PART) = t.into();
@@ -316,17 +318,16 @@ impl Hits {
 struct Four<S: Simd> {
     /// Whether two edge functions have opposite signs.
     outside: mask64x4<S>,
-    v: f64x4<S>,
-    w: f64x4<S>,
+    /// The weights of the second corner and of the third.
+    weights: [f64x4<S>; 2],
     t: f64x4<S>,
 }
 
 impl<S: Simd> Four<S> {
     #[inline(always)]
     fn of(
-        simd: S,
         [ax, ay, bx, by, cx, cy]: [f64x4<S>; 6],
-        depths: &[f64; 3],
+        [a, b, c]: [f64; 3],
         origin: f64x4<S>,
         direction: f64x4<S>,
     ) -> Self {
@@ -334,15 +335,13 @@ impl<S: Simd> Four<S> {
         let u = cx * by - cy * bx;
         let v = ax * cy - ay * cx;
         let w = bx * ay - by * ax;
-        let zero = f64x4::splat(simd, 0.0);
-        let outside = u.min(v).min(w).simd_lt(zero) & u.max(v).max(w).simd_gt(zero);
+        let outside = u.min(v).min(w).simd_lt(0.0) & u.max(v).max(w).simd_gt(0.0);
 
         // Weights, and with them the depth.
-        let share = f64x4::splat(simd, 1.0) / (u + v + w);
-        let (u, v, w) = (u * share + zero, v * share + zero, w * share + zero);
-        let depth = |at: usize| f64x4::splat(simd, depths[at]) - origin;
-        let depth = u * depth(0) + v * depth(1) + w * depth(2);
-        Self { outside, v, w, t: depth / direction }
+        let share = 1.0 / (u + v + w);
+        let (u, v, w) = (u * share + 0.0, v * share + 0.0, w * share + 0.0);
+        let depth = u * (a - origin) + v * (b - origin) + w * (c - origin);
+        Self { outside, weights: [v, w], t: depth / direction }
     }
 }
 
@@ -369,7 +368,7 @@ fn one(bundle: &Bundle, lane: usize) -> TriangleTest {
     }
 }
 
-/// A part of an array, as if they followed one another.
+/// Eight numbers of an array; behind its end it begins anew.
 #[inline(always)]
 fn part_of<T: Copy, const N: usize>(array: &[T; N], part: usize) -> [T; PART] {
     array.as_chunks().0[part % (N / PART)]

@@ -149,7 +149,7 @@ impl<F: FnMut(usize, &[Hit]), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
             let count = RAYS.min(self.rays.count - first);
             let members = tile.trace(simd, self.rays, first, count);
             for four in 0..count.div_ceil(4) {
-                // Asked for twice: what is only handed on never lies in memory in between.
+                // Said in both ways: hits that are handed on as they are need not go through memory.
                 if members >> (4 * four) & 0xf == 0xf {
                     (self.answer)(first + 4 * four, &tile.hits(simd, four));
                     continue;
