@@ -152,7 +152,7 @@ fn most<S: Simd>(numbers: f32x16<S>) -> f32 {
 }
 
 impl Bundle {
-    /// No rays.
+    /// No rays: zeros, which are written without being read from anywhere.
     pub(super) const EMPTY: Self = Self {
         origin: [[0.0; RAYS]; 3],
         shear: [[0.0; RAYS]; 2],
@@ -162,7 +162,7 @@ impl Bundle {
         t_max: [0.0; RAYS],
         members: 0,
         alive: 0,
-        axes: [0, 1, 2],
+        axes: [0; 3],
         is_mirrored: false,
         start: [[0.0; RAYS]; 2],
         slope: [[0.0; RAYS]; 2],

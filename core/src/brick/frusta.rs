@@ -40,7 +40,7 @@ pub(super) struct Frusta {
 impl Frusta {
     /// Around nothing.
     pub(super) const EMPTY: Self = Self {
-        axes: [0, 1, 2],
+        axes: [0; 3],
         corner: [0.0; 3],
         rate: [0.0; 3],
         offset: 0.0,

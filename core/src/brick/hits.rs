@@ -38,27 +38,27 @@ pub(super) struct Hits {
     frusta: Frusta,
     /// Whether these are around the bundle.
     is_surrounded: bool,
-    /// Triangles that were tested against all rays that may meet them. Who comes later takes the
-    /// place: a second test does no harm.
+    /// Triangles that were tested against all rays that may meet them, their ids with all bits
+    /// inverted: 0 is none. Who comes later takes the place: a second test does no harm.
     mailbox: [u32; SLOTS],
 }
 
 impl Hits {
-    /// Of no rays.
+    /// Of no rays: zeros, as in [`Bundle::EMPTY`]. Rays that hit nothing come by [`clear`](Self::clear).
     pub(super) const EMPTY: Self = Self {
         u: [0.0; RAYS],
         v: [0.0; RAYS],
-        primitive: [INVALID_ID; RAYS],
+        primitive: [0; RAYS],
         frusta: Frusta::EMPTY,
         is_surrounded: false,
-        mailbox: [INVALID_ID; SLOTS],
+        mailbox: [0; SLOTS],
     };
 
     /// Forgets the rays and what they hit.
     pub(super) fn clear(&mut self) {
         if self.is_surrounded {
             self.is_surrounded = false;
-            self.mailbox.fill(INVALID_ID);
+            self.mailbox.fill(0);
         }
         self.u.fill(0.0);
         self.v.fill(0.0);
@@ -113,8 +113,8 @@ impl Hits {
                 for (place, &id) in ids.iter().enumerate() {
                     let slot = &mut self.mailbox[id as usize % SLOTS];
                     fresh[count % LANES] = id;
-                    count += usize::from(*slot != id);
-                    *slot = id;
+                    count += usize::from(*slot != !id);
+                    *slot = !id;
                     if count == LANES || (count > 0 && place + 1 == ids.len()) {
                         self.many::<S, ANY>(simd, bundle, mesh, &fresh[..count.min(LANES)]);
                         count = 0;
