@@ -73,12 +73,12 @@ impl Aabb {
 
 /// The lesser of two numbers that are no NaN, in one instruction.
 #[inline(always)]
-const fn lesser(a: f64, b: f64) -> f64 {
+pub(crate) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
 }
 
 /// The greater of two numbers that are no NaN, in one instruction.
 #[inline(always)]
-pub(crate) const fn greater(a: f64, b: f64) -> f64 {
+pub(crate) fn greater<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }

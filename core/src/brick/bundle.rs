@@ -10,6 +10,7 @@ use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
 
 use super::Brick;
 use super::layout::BLOCK;
+use crate::aabb::{greater, lesser};
 use crate::approach::FAR_EXTENTS;
 use crate::cell::{Lattice, as_f32};
 use crate::eight::{Row, load, transpose};
@@ -139,7 +140,7 @@ fn least<S: Simd>(numbers: f32x16<S>) -> f32 {
     let (a, b) = numbers.split();
     let (a, b) = a.min(b).split();
     let [a, b, c, d]: [f32; 4] = a.min(b).into();
-    a.min(b).min(c.min(d))
+    lesser(lesser(a, b), lesser(c, d))
 }
 
 /// The greatest of sixteen numbers.
@@ -148,7 +149,7 @@ fn most<S: Simd>(numbers: f32x16<S>) -> f32 {
     let (a, b) = numbers.split();
     let (a, b) = a.max(b).split();
     let [a, b, c, d]: [f32; 4] = a.max(b).into();
-    a.max(b).max(c.max(d))
+    greater(greater(a, b), greater(c, d))
 }
 
 impl Bundle {
@@ -478,8 +479,8 @@ impl Bounds {
     ) -> Option<[u32; 2]> {
         let low = planes.map(|plane| self.low[axis].at(plane));
         let high = planes.map(|plane| self.high[axis].at(plane));
-        let low = (low[0].min(low[1]) - margin) / size;
-        let high = (high[0].max(high[1]) + margin) / size;
+        let low = (lesser(low[0], low[1]) - margin) / size;
+        let high = (greater(high[0], high[1]) + margin) / size;
         if high < 0.0 || low >= as_f32(count) {
             return None;
         }
