@@ -239,8 +239,8 @@
  * Rays cross empty space in large steps, and the small cells hold few triangles each. Choose it
  * where many rays are shot for each build. `macrocell_factor` belongs to it.
  *
- * Memory: one and a half to three times that of one level. The build plans every byte in the scratch before
- * it writes the index.
+ * Memory: one and a half to three times that of one level. The build plans every byte in the
+ * scratch before it writes the index.
  */
 #define HGRID_METHOD_FIXED 2
 
@@ -265,25 +265,28 @@
  * to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
  * it.
  *
- * Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch for each triangle.
- * How much index it takes shows only while it is written. `hgrid_sizes` without scratch answers
- * with a bound that no mesh comes near, up to 8 GiB: ask with scratch, which gives the exact size.
+ * Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch
+ * for each triangle. How much index it takes shows only while it is written. `hgrid_sizes`
+ * without scratch answers with a bound that no mesh comes near, up to 8 GiB: ask with
+ * scratch, which gives the exact size.
  */
 #define HGRID_METHOD_RECURSIVE 4
 
 /**
- * A grid of cells as large as triangles: 4 x 4 x 4 cells are a brick, 4 x 4 x 4 bricks a block, and
- * a bit for each says whether anything is in it. Not hashed.
+ * A grid of cells as large as triangles: 4 x 4 x 4 cells are a brick, 4 x 4 x 4 bricks a block,
+ * and a bit for each says whether anything is in it. Not hashed.
  *
  * Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
  * detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
- * It is the default: the shortest build, the first image, tiles of rays through `hgrid_intersect_n`, and
- * scenes of which nobody knows what is in them. `cell_size` belongs to it, `density` does not.
+ * It is the default: the shortest build, the first image, tiles of rays through
+ * `hgrid_intersect_n`, and scenes of which nobody knows what is in them. `cell_size`
+ * belongs to it, `density` does not.
  *
- * Memory: on scans about 9 bytes a triangle; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it.
- * How much index it takes shows only while it is written, and a build may need somewhat more than the
- * blob has in the end. `hgrid_sizes` without scratch answers with what is enough, seven times as much
- * for a scan, and with more scratch than a build takes; with scratch it gives the exact size.
+ * Memory: on scans about 9 bytes a triangle; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND`
+ * hold for it. How much index it takes shows only while it is written, and a build may need
+ * somewhat more than the blob has in the end. `hgrid_sizes` without scratch answers with what
+ * is enough, seven times as much for a scan, and with more scratch than a build takes; with
+ * scratch it gives the exact size.
  */
 #define HGRID_METHOD_BRICK 5
 
@@ -346,9 +349,9 @@ typedef int32_t hgrid_status;
 /**
  * A part of a build, as `run` of a `hgrid_config` gets it: a function of this library.
  *
- * It may be called on any thread, on several at once, with the `task_context` that came with it and
- * an `index` below the `count` that came with it. It starts no thread, waits for none, and never
- * jumps out.
+ * It may be called on any thread, on several at once, with the `task_context` that came
+ * with it and an `index` below the `count` that came with it. It starts no thread,
+ * waits for none, and never jumps out.
  */
 typedef void (*hgrid_task)(void *task_context, uint32_t index);
 
@@ -400,9 +403,9 @@ typedef struct hgrid_config {
      */
     uint32_t flags;
     /**
-     * For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores; each
-     * takes scratch of its own. With 0 and 1 nothing is parallel, and what is above `HGRID_MAX_TASKS`
-     * counts as that. The other methods build on the thread that calls.
+     * For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores;
+     * each takes scratch of its own. With 0 and 1 nothing is parallel, and what is above
+     * `HGRID_MAX_TASKS` counts as that. The other methods build on the thread that calls.
      */
     uint32_t tasks;
     /**
@@ -417,23 +420,23 @@ typedef struct hgrid_config {
      * Calls `task(task_context, index)` once for every `index` below `count`, in any order, on any
      * threads, and returns when all these calls have returned: after a join, or after any other
      * synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
-     * library calls it several times, one after the other, on the thread that builds, with counts up
-     * to `tasks`; where the processor has no atomic operations, it never does. NULL only with `tasks`
-     * 0 or 1. `hgrid_build` has an example.
+     * library calls it several times, one after the other, on the thread that builds, with counts
+     * up to `tasks`; where the processor has no atomic operations, it never does. NULL only with
+     * `tasks` 0 or 1. `hgrid_build` has an example.
      *
-     * A task that is called twice, even at the same time, one that is never called, and an index that
-     * is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`. Undefined
-     * behaviour, as nothing can detect it, is a call of `task` that is made or still running after
-     * `run` has returned, or with another `task_context`; a `run` that is left by `longjmp` or by a
-     * C++ exception; and one that changes what the build works on.
+     * A task that is called twice, even at the same time, one that is never called, and an index
+     * that is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`.
+     * Undefined behaviour, as nothing can detect it, is a call of `task` that is made or still
+     * running after `run` has returned, or with another `task_context`; a `run` that is left by
+     * `longjmp` or by a C++ exception; and one that changes what the build works on.
      */
     void (*run)(void *context, uint32_t count, hgrid_task task, void *task_context);
     /**
-     * Told how much of a build is `done`, from 0 to 1, and answers whether to go on; or NULL. It is
-     * called on the thread that builds, a few times to a few hundred times; `done` grows from call
-     * to call, and in the last call of a build that succeeds it is exactly 1, whatever the answer.
-     * After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass over the mesh
-     * is over. It may not be left by `longjmp` or by a C++ exception.
+     * Told how much of a build is `done`, from 0 to 1, and answers whether to go on; or NULL. It
+     * is called on the thread that builds, a few times to a few hundred times; `done` grows from
+     * call to call, and in the last call of a build that succeeds it is exactly 1, whatever the
+     * answer. After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass
+     * over the mesh is over. It may not be left by `longjmp` or by a C++ exception.
      */
     bool (*progress)(void *context, float done);
 } hgrid_config;
@@ -442,9 +445,9 @@ typedef struct hgrid_config {
  * What a build, or a question for sizes, found out. Initialise it with `HGRID_REPORT_INIT`.
  *
  * Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
- * what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another pass
- * over mesh and grid, `hgrid_inspect` tells: triangles with two equal corners, the first bad one, the longest
- * list, a hash of the content.
+ * what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another
+ * pass over mesh and grid, `hgrid_inspect` tells: triangles with two equal corners, the first bad
+ * one, the longest list, a hash of the content.
  */
 typedef struct hgrid_report {
     /**
@@ -471,8 +474,8 @@ typedef struct hgrid_report {
      */
     uint32_t triangle;
     /**
-     * Triangles left out because a coordinate is not finite, or beyond 2^120. Known after a build, as are all
-     * below.
+     * Triangles left out because a coordinate is not finite, or beyond 2^120. Known
+     * after a build, as are all below.
      */
     uint32_t skipped_count;
     /**
@@ -538,8 +541,8 @@ typedef struct hgrid_mesh {
      */
     size_t triangle_count;
     /**
-     * The first triangle's mask, a `uint32_t`, or NULL: queries with a mask of their own see a triangle
-     * if both have a bit in common. NULL means that every triangle has all bits.
+     * The first triangle's mask, a `uint32_t`, or NULL: queries with a mask of their own see a
+     * triangle if both have a bit in common. NULL means that every triangle has all bits.
      */
     const void *masks;
     /**
@@ -591,8 +594,8 @@ typedef struct hgrid_ray {
 } hgrid_ray;
 
 /**
- * What a filter says of a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`. Anything
- * else counts as `HGRID_REJECT`.
+ * What a filter says of a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`.
+ * Anything else counts as `HGRID_REJECT`.
  */
 typedef uint32_t hgrid_verdict;
 
@@ -643,9 +646,10 @@ typedef struct hgrid_counters {
 /**
  * What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
  *
- * A query with options that are not the defaults is somewhat slower than one without, and rays of a
- * batch are then traced one by one. Options that break the rules for structs make a query of one ray
- * answer as for a miss: `hgrid_intersect_all` with the same options returns what is wrong with them.
+ * A query with options that are not the defaults is somewhat slower than one without, and
+ * rays of a batch are then traced one by one. Options that break the rules for structs make
+ * a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
+ * returns what is wrong with them.
  */
 typedef struct hgrid_query_options {
     /**
@@ -653,8 +657,8 @@ typedef struct hgrid_query_options {
      */
     uint32_t struct_size;
     /**
-     * A triangle is seen if its mask and this have a bit in common; see `masks` of `hgrid_mesh`. With
-     * all bits, the default, every triangle is seen, even one whose mask is 0.
+     * A triangle is seen if its mask and this have a bit in common; see `masks` of `hgrid_mesh`.
+     * With all bits, the default, every triangle is seen, even one whose mask is 0.
      */
     uint32_t mask;
     /**
@@ -662,9 +666,10 @@ typedef struct hgrid_query_options {
      */
     uint32_t cull;
     /**
-     * A triangle that is not hit, usually the one that the ray leaves, which then cannot hit itself, without any
-     * epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge still may be hit, where the origin was rounded
-     * to just below it: where that matters, give a small `t_min`, too.
+     * A triangle that is not hit, usually the one that the ray leaves, which then cannot
+     * hit itself, without any epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge
+     * still may be hit, where the origin was rounded to just below it: where that
+     * matters, give a small `t_min`, too.
      */
     uint32_t skip;
     /**
@@ -672,13 +677,13 @@ typedef struct hgrid_query_options {
      */
     void *context;
     /**
-     * Says of a `hit` whether it counts; or NULL: all do. `ray` is the place of the ray in its batch,
-     * 0 for a single one.
+     * Says of a `hit` whether it counts; or NULL: all do. `ray` is the place of the ray in
+     * its batch, 0 for a single one.
      *
-     * Hits are offered from near to far, where `t` is equal by ascending triangle, and each triangle
-     * at most once for each ray. It is called on the thread that asks, may ask the same grid other
-     * questions, and may not be left by `longjmp` or by a C++ exception. Here is glass, which lets
-     * shadow rays pass and weakens them:
+     * Hits are offered from near to far, where `t` is equal by ascending triangle, and each
+     * triangle at most once for each ray. It is called on the thread that asks, may ask the same
+     * grid other questions, and may not be left by `longjmp` or by a C++ exception. Here is glass,
+     * which lets shadow rays pass and weakens them:
      *
      * ```c
      * typedef struct {
@@ -796,7 +801,8 @@ typedef struct hgrid_statistics {
      */
     uint32_t skipped_count;
     /**
-     * Triangles of which two corners are the same point. They are in the grid, and no ray hits them.
+     * Triangles of which two corners are the same point. They are in
+     * the grid, and no ray hits them.
      */
     uint32_t degenerate_count;
     /**
@@ -804,8 +810,8 @@ typedef struct hgrid_statistics {
      */
     uint32_t first_bad;
     /**
-     * Lists of triangles: one for each cell that has any, and for each brick or block that has some of
-     * its own.
+     * Lists of triangles: one for each cell that has any, and for each brick or
+     * block that has some of its own.
      */
     uint64_t list_count;
     /**
@@ -821,20 +827,21 @@ typedef struct hgrid_statistics {
      */
     uint32_t reserved;
     /**
-     * A hash of the grid's box, resolution and lists in order, not of which cell has which: the same for
-     * the same grid on every platform, whatever its byte order. No defence against forgery.
+     * A hash of the grid's box, resolution and lists in order, not of which cell
+     * has which: the same for the same grid on every platform, whatever its byte
+     * order. No defence against forgery.
      */
     uint64_t content_hash;
 } hgrid_statistics;
 
 #if defined(HGRID_STD)
 /**
- * Where `hgrid_create` gets its memory from. Initialise it with `HGRID_ALLOCATOR_INIT` and set both
- * functions.
+ * Where `hgrid_create` gets its memory from. Initialise it with
+ * `HGRID_ALLOCATOR_INIT` and set both functions.
  *
- * The struct itself is only read during the call, but `hgrid_destroy` calls `release` with the same
- * `context`, so both must last as long as the grid. Neither function may be left by `longjmp` or by
- * a C++ exception.
+ * The struct itself is only read during the call, but `hgrid_destroy` calls `release` with the
+ * same `context`, so both must last as long as the grid. Neither function may be left by
+ * `longjmp` or by a C++ exception.
  */
 typedef struct hgrid_allocator {
     /**
@@ -850,9 +857,9 @@ typedef struct hgrid_allocator {
      */
     void *context;
     /**
-     * Gives `bytes` bytes, never 0 of them, that start at a multiple of `alignment`, a power of two,
-     * and that nothing else uses until they are released. They may hold anything. NULL if there are
-     * no more. Called on the thread that calls `hgrid_create`. May not be NULL.
+     * Gives `bytes` bytes, never 0 of them, that start at a multiple of `alignment`, a power of
+     * two, and that nothing else uses until they are released. They may hold anything. NULL if
+     * there are no more. Called on the thread that calls `hgrid_create`. May not be NULL.
      */
     void *(*allocate)(void *context, size_t bytes, size_t alignment);
     /**
@@ -885,7 +892,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ACCEPT 1
 
 /**
- * The hit counts, and it is the last one: the same as `HGRID_ACCEPT`, but for `hgrid_intersect_all`.
+ * The hit counts, and it is the last one: the same as `HGRID_ACCEPT`,
+ * but for `hgrid_intersect_all`.
  */
 #define HGRID_ACCEPT_AND_STOP 2
 
@@ -900,9 +908,9 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_NULL_ARGUMENT -1
 
 /**
- * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct and what
- * is behind the known fields is not zero; or a `reserved` field is not 0. The usual cause is a struct
- * that was not initialised with its `_INIT` macro.
+ * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
+ * and what is behind the known fields is not zero; or a `reserved` field is not 0. The usual cause
+ * is a struct that was not initialised with its `_INIT` macro.
  */
 #define HGRID_ERROR_STRUCT_SIZE -2
 
@@ -913,13 +921,14 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_MISALIGNED -3
 
 /**
- * The index or the scratch overlaps the other one or the mesh; the room for a packed blob overlaps its
- * grid or its mesh; or answers of a batch overlap its rays.
+ * The index or the scratch overlaps the other one or the mesh; the room for a packed blob overlaps
+ * its grid or its mesh; or answers of a batch overlap its rays.
  */
 #define HGRID_ERROR_OVERLAP -4
 
 /**
- * The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `bytes` says it.
+ * The index is too small. The report says how many bytes it needs;
+ * with `hgrid_pack`, `bytes` says it.
  *
  * With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
  * methods the grid was written as far as it went, so the index may hold anything.
@@ -1075,15 +1084,16 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
- * is looked at.
+ * Tells how much memory is enough for any mesh with so many triangles, wherever they
+ * lie: O(1), nothing is looked at.
  *
- * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants,
- * rounded up a little. How much more than enough it is depends on the method: a scan takes a sixth of
- * it or less with one level, a thirteenth with brick; with recursive it is generous beyond use.
+ * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
+ * as constants, rounded up a little. How much more than enough it is depends on the method:
+ * a scan takes a sixth of it or less with one level, a thirteenth with brick; with
+ * recursive it is generous beyond use.
  *
- * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
- * `index_bytes` and `scratch_bytes`; or what is wrong:
+ * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
+ * has `index_bytes` and `scratch_bytes`; or what is wrong:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`,
  *   `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space;
  * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
@@ -1103,20 +1113,20 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * Tells how much memory a build of this mesh takes.
  *
  * Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
- * `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more than
- * enough the index is depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
- * with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
+ * `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more
+ * than enough the index is depends on the method: for a scan up to 2 times with one level, 4 with
+ * fixed, 6 with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
  *
  * With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
  * is 1. That takes about half the time of a build; with recursive and brick, which have to build
  * the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
  *
- * With `tasks` in the configuration the answer is for a build with so many at once: each takes scratch,
- * the index is filled by all of them and may be a little larger. `run` is called for the answer, too;
- * `progress` is not.
+ * With `tasks` in the configuration the answer is for a build with so many at once: each takes
+ * scratch, the index is filled by all of them and may be a little larger. `run` is called for
+ * the answer, too; `progress` is not.
  *
- * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL if its
- * size is 0; scratch that is too small is no error, and counts as none.
+ * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL
+ * if its size is 0; scratch that is too small is no error, and counts as none.
  *
  * Returns `HGRID_OK`; or what is wrong, with the triangle that is to blame in the report:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
@@ -1144,27 +1154,28 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  * Looks for the finest grid that fits into a budget.
  *
  * `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
- * (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no more than a
- * step too much: a step is a factor of 1.41 in the number of cells. It takes a dozen times as long as
- * `hgrid_sizes`, or less. A density, or cells, that would be too fine for a build count as too large here.
+ * (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no
+ * more than a step too much: a step is a factor of 1.41 in the number of cells. It takes a
+ * dozen times as long as `hgrid_sizes`, or less. A density, or cells, that would be too fine
+ * for a build count as too large here.
  *
  * Bring as much scratch as `hgrid_sizes` without scratch says: with `HGRID_METHOD_ONE_LEVEL` and
- * `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser than it had
- * to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
- * afterwards.
+ * `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser
+ * than it had to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch
+ * holds nothing of use afterwards.
  *
- * `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be the same as
- * `fitted`, which is initialised before in either case. `report` may be NULL, and so may `scratch` if its
- * size is 0.
+ * `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be
+ * the same as `fitted`, which is initialised before in either case. `report` may be NULL,
+ * and so may `scratch` if its size is 0.
  *
  * Returns `HGRID_OK`, and the report says what the fitted grid takes; or
  * `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or
  * `HGRID_ERROR_SCRATCH_TOO_SMALL`, and its `scratch_bytes` is what it takes; or what `hgrid_sizes`
- * returns. After an error `fitted` is as it was. `run` and `progress` are not called, and the sizes are
- * those of one task; all three are copied.
+ * returns. After an error `fitted` is as it was. `run` and `progress` are not called, and the
+ * sizes are those of one task; all three are copied.
  *
- * Threads: any number of calls at once, as long as each has a scratch, a configuration to write and a
- * report of its own.
+ * Threads: any number of calls at once, as long as each has a scratch, a configuration
+ * to write and a report of its own.
  *
  * # Safety
  * Pointers are as the head of this file says.
@@ -1192,8 +1203,8 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  *
  * Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `grid` as it
  * was: `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_CANCELLED`, or
- * what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region is
- * too small, what both need; or the triangle that is to blame.
+ * what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region
+ * is too small, what both need; or the triangle that is to blame.
  *
  * After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
  * anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
@@ -1204,15 +1215,15 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * succeeds.
  *
  * A build allocates nothing and needs at most 12 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
- * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8 KiB
- * where it is called; all beside what `run` and `progress` take (measured on x86-64).
+ * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8
+ * KiB where it is called; all beside what `run` and `progress` take (measured on x86-64).
  *
  * # A build on threads
  *
- * The library knows no threads. With `tasks` and `run` in the configuration, `HGRID_METHOD_BRICK` is cut
- * into tasks: the library calls `run`, on the thread that calls this function, and `run` calls the
- * tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte. With POSIX
- * threads, one for each task:
+ * The library knows no threads. With `tasks` and `run` in the configuration, `HGRID_METHOD_BRICK`
+ * is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
+ * calls the tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte.
+ * With POSIX threads, one for each task:
  *
  * ```c
  * typedef struct {
@@ -1254,10 +1265,10 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * }
  * ```
  *
- * `hgrid_sizes` with the same configuration tells how much memory so many tasks take. Where there is
- * less scratch, but enough for fewer tasks, there are fewer. `HGRID_ERROR_PARALLEL_FOR` says that `run`
- * ran a task twice or not at all; then the index may hold anything, and both regions can be used
- * again, as after `HGRID_ERROR_CANCELLED`.
+ * `hgrid_sizes` with the same configuration tells how much memory so many tasks take. Where there
+ * is less scratch, but enough for fewer tasks, there are fewer. `HGRID_ERROR_PARALLEL_FOR` says
+ * that `run` ran a task twice or not at all; then the index may hold anything, and both regions
+ * can be used again, as after `HGRID_ERROR_CANCELLED`.
  *
  * Threads: any number of calls at once, as long as each has regions, a view and a report of its
  * own. The call starts no thread; its tasks are called on those that `run` chooses.
@@ -1278,16 +1289,16 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * Finds the closest triangle that a ray hits.
  *
  * Returns true and writes `hit`; or returns false and writes nothing. Where several triangles are
- * hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count, unless
- * `cull` of the options says otherwise.
- * A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
- * without area, or one that is seen exactly edge-on, is not hit.
+ * hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle
+ * count, unless `cull` of the options says otherwise. A ray through an edge or a vertex
+ * that triangles share hits at least one of them. A triangle without area, or one that is
+ * seen exactly edge-on, is not hit.
  *
- * `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
- * opened, or with options that break the rules for structs, nothing is hit.
+ * `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built
+ * or opened, or with options that break the rules for structs, nothing is hit.
  *
- * A query allocates nothing, needs at most 6 KiB of stack, as all queries of one ray or point do, and
- * always ends: on one level after no more steps than the three resolutions sum up to.
+ * A query allocates nothing, needs at most 6 KiB of stack, as all queries of one ray or point do,
+ * and always ends: on one level after no more steps than the three resolutions sum up to.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -1305,8 +1316,8 @@ bool hgrid_intersect(const struct hgrid_grid *grid,
  * This is the query for shadows and visibility. It stops at the first triangle it finds in the
  * ray's range, which need not be the closest.
  *
- * `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
- * opened, or with options that break the rules for structs, the answer is false.
+ * `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built
+ * or opened, or with options that break the rules for structs, the answer is false.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -1320,12 +1331,12 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
 /**
  * Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
  *
- * Writes as many hits as there is room for, the nearest, and to `count` how many there are, which may
- * be more. With room for more than there are, the ray is walked once; otherwise, and with a filter, once
- * more for each sixteen hits, from where it got to: so nothing is allocated, whatever their number, but
- * thousands of hits in one cell take long, as the square of their number. Options as
- * with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what it accepts is
- * written and counted.
+ * Writes as many hits as there is room for, the nearest, and to `count` how many there are, which
+ * may be more. With room for more than there are, the ray is walked once; otherwise, and with a
+ * filter, once more for each sixteen hits, from where it got to: so nothing is allocated, whatever
+ * their number, but thousands of hits in one cell take long, as the square of their number.
+ * Options as with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what
+ * it accepts is written and counted.
  *
  * ```c
  * static double thickness_along(const hgrid_grid *grid, const hgrid_ray *ray)
@@ -1341,11 +1352,12 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
  * }
  * ```
  *
- * `hits` may be NULL if `capacity` is 0, and overlaps nothing else that the call uses; a filter may look
- * at those that it has accepted. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
- * returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
- * `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_ANSWERS`
- * (a capacity that is impossible). A ray that is none hits nothing: the count is 0.
+ * `hits` may be NULL if `capacity` is 0, and overlaps nothing else that the call uses; a
+ * filter may look at those that it has accepted. `options` may be NULL: the defaults.
+ * Returns `HGRID_OK`, or returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`,
+ * `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the
+ * options), `HGRID_ERROR_INVALID_ANSWERS` (a capacity that is impossible). A ray that is
+ * none hits nothing: the count is 0.
  *
  * Threads: any number of queries on the same grid at once; each thread with hits and counters of
  * its own.
@@ -1363,18 +1375,19 @@ hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
 /**
  * Finds the point of the mesh that is closest to a point, `max_distance` away at most.
  *
- * Returns true and writes `closest`; or returns false and writes nothing. Where several triangles are
- * equally close, the one with the lowest number is reported. `max_distance` may be `INFINITY`. `point`
- * is three floats; it and `closest` may not be NULL.
+ * Returns true and writes `closest`; or returns false and writes nothing. Where several triangles
+ * are equally close, the one with the lowest number is reported. `max_distance` may be `INFINITY`.
+ * `point` is three floats; it and `closest` may not be NULL.
  *
- * Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts the lists that
- * were looked at, `primitive_tests` the triangles in them. `options` may be NULL: the defaults. With
- * anything that is not as it should be (another NULL, a view of zeros, options that break the rules, a point that
- * is not finite, a distance that is NaN or negative) the answer is false.
+ * Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts
+ * the lists that were looked at, `primitive_tests` the triangles in them. `options` may be
+ * NULL: the defaults. With anything that is not as it should be (another NULL, a view of
+ * zeros, options that break the rules, a point that is not finite, a distance that is NaN
+ * or negative) the answer is false.
  *
  * The call allocates nothing and always ends. How long it takes grows with the triangles in a cube
- * around the point that reaches as far as the answer: it is short near the mesh, and far outside of it
- * that of a loop over a good part of all triangles.
+ * around the point that reaches as far as the answer: it is short near the mesh, and far outside
+ * of it that of a loop over a good part of all triangles.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -1391,9 +1404,9 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
  * each, bit for bit, but sooner.
  *
- * A ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of `hits`.
- * A miss writes a hit, too: with `primitive` equal to `HGRID_INVALID_ID`, `t` equal to `INFINITY`,
- * `u` and `v` equal to 0. Here is a tile of 8 x 8 pixels:
+ * A ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of
+ * `hits`. A miss writes a hit, too: with `primitive` equal to `HGRID_INVALID_ID`, `t` equal to
+ * `INFINITY`, `u` and `v` equal to 0. Here is a tile of 8 x 8 pixels:
  *
  * ```c
  * static size_t trace_tile(const hgrid_grid *grid, const hgrid_ray rays[64], float depth[64])
@@ -1416,17 +1429,18 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * No hit may overlap a ray, its own or another; where the two arrays reach into each other, their
  * strides are the same. Nor do hits overlap anything else that the call uses.
  *
- * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
- * the hits. With `count` 0 nothing is done. Up to 64 rays are read before the first hit is written.
+ * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has
+ * no influence on the hits. With `count` 0 nothing is done. Up to 64 rays are read
+ * before the first hit is written.
  *
- * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With others the
- * rays are traced one after the other, which is slower.
+ * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With others
+ * the rays are traced one after the other, which is slower.
  *
  * Returns `HGRID_OK` and has written all hits, or returns the reason and has written none:
  * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and
- * `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is
- * impossible), `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no
- * error: it misses.
+ * `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and
+ * `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`,
+ * `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no error: it misses.
  *
  * The call allocates nothing and needs at most 16 KiB of stack.
  *
@@ -1450,10 +1464,11 @@ hgrid_status hgrid_intersect_n(const struct hgrid_grid *grid,
  * but sooner.
  *
  * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
- * from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that hold a ray and
- * its byte, coherence, options, stack. `rays` and `occluded` may be NULL if `count` is 0, `options` may
- * be NULL. Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_n` returns and
- * has written none. For the shadow rays of a tile, towards one light:
+ * from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that
+ * hold a ray and its byte, coherence, options, stack. `rays` and `occluded` may be
+ * NULL if `count` is 0, `options` may be NULL. Returns `HGRID_OK` and has written all
+ * bytes, or returns what `hgrid_intersect_n` returns and has written none. For the
+ * shadow rays of a tile, towards one light:
  *
  * ```c
  * static size_t count_lit(const hgrid_grid *grid, const hgrid_ray *rays, size_t count)
@@ -1491,18 +1506,18 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
  * Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
  *
  * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
- * in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of `hgrid_pack`;
- * bytes behind it are ignored. It says itself which method built it and how. The mesh is the one it was built for,
- * of which only the counts are compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh`
- * may be NULL.
+ * in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of
+ * `hgrid_pack`; bytes behind it are ignored. It says itself which method built it and how. The
+ * mesh is the one it was built for, of which only the counts are compared. A blob that
+ * `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL.
  *
  * What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
  * nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
- * not change while the grid is in use: a file that others may write is not for mapping, read it into
- * memory of your own.
+ * not change while the grid is in use: a file that others may write is not for mapping,
+ * read it into memory of your own.
  *
- * `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`; or returns what is
- * wrong and leaves `grid` as it was:
+ * `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`; or returns
+ * what is wrong and leaves `grid` as it was:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`;
  * - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
  *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
@@ -1523,54 +1538,51 @@ hgrid_status hgrid_open(const void *blob,
 /**
  * Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
  *
- * The bytes may lie at any address. `info` may not be NULL, `blob` only if `blob_bytes` is 0. Returns
- * `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was: `HGRID_ERROR_NULL_ARGUMENT`,
- * `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`,
- * `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`.
+ * The bytes may lie at any address. `info` may not be NULL, `blob` only if `blob_bytes` is 0.
+ * Returns `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was:
+ * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`,
+ * `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
+ * `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`.
  *
  * Threads: any number of calls at once, each with an info of its own.
  *
  * # Safety
  * Pointers are as the head of this file says.
  */
-hgrid_status hgrid_peek(const void *blob,
-                        size_t blob_bytes,
-                        struct hgrid_blob_info *info);
+hgrid_status hgrid_peek(const void *blob, size_t blob_bytes, struct hgrid_blob_info *info);
 
 /**
- * Writes a grid and its mesh as one blob, for which `hgrid_open` needs no mesh: to be stored where the
- * mesh is not, or mapped by several processes.
+ * Writes a grid and its mesh as one blob, for which `hgrid_open` needs no mesh: to be stored where
+ * the mesh is not, or mapped by several processes.
  *
- * It holds the grid, then positions, indices (of 32 bits) and masks if there are any, tight, each at a
- * multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid. Nothing is
- * copied when it is opened.
+ * It holds the grid, then positions, indices (of 32 bits) and masks if there are any, tight, each
+ * at a multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid.
+ * Nothing is copied when it is opened.
  *
- * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh nor any argument of this
- * call. It may be NULL if
- * `capacity` is 0: to ask for the size. `grid` and `bytes` may not be NULL.
+ * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh nor
+ * any argument of this call. It may be NULL if `capacity` is 0: to ask for the size.
+ * `grid` and `bytes` may not be NULL.
  *
- * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of
- * it; in both cases `bytes` becomes its size. Or returns the reason and has written nothing:
- * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
- * `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged. More than is needed is not touched.
+ * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has
+ * written none of it; in both cases `bytes` becomes its size. Or returns the reason and has
+ * written nothing: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
+ * `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the
+ * mesh is damaged. More than is needed is not touched.
  *
  * Threads: any number of calls and queries on the same grid at once, each with memory of its own.
  *
  * # Safety
  * Pointers are as the head of this file says.
  */
-hgrid_status hgrid_pack(const struct hgrid_grid *grid,
-                        void *to,
-                        size_t capacity,
-                        uint64_t *bytes);
+hgrid_status hgrid_pack(const struct hgrid_grid *grid, void *to, size_t capacity, uint64_t *bytes);
 
 /**
  * Proves that a blob is the grid of its mesh, and so that every answer will be right.
  *
- * Takes no memory, and at most about the time of a build with one level and fixed, two or three times
- * that with variable, three to five times with recursive, and three times with brick, whose builds are
- * short; on damaged bytes it may take much longer. A grid that was just built needs no proof; a blob
- * from a file, a network or another process may.
+ * Takes no memory, and at most about the time of a build with one level and fixed, two or three
+ * times that with variable, three to five times with recursive, and three times with brick, whose
+ * builds are short; on damaged bytes it may take much longer. A grid that was just built needs no
+ * proof; a blob from a file, a network or another process may.
  *
  * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
  * that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
@@ -1587,25 +1599,25 @@ hgrid_status hgrid_validate(const struct hgrid_grid *grid);
  * Looks at all of a grid and its mesh: O(cells + ids + triangles), no memory.
  *
  * Neither argument may be NULL. Returns `HGRID_OK` and fills `statistics`; or
- * `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves it as it
- * was. On damaged bytes it counts what is there.
+ * `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
+ * it as it was. On damaged bytes it counts what is there.
  *
- * Threads: any number of calls and queries on the same grid at once, each with statistics of its own.
+ * Threads: any number of calls and queries on the same grid at once,
+ * each with statistics of its own.
  *
  * # Safety
  * Pointers are as the head of this file says.
  */
-hgrid_status hgrid_inspect(const struct hgrid_grid *grid,
-                           struct hgrid_statistics *statistics);
+hgrid_status hgrid_inspect(const struct hgrid_grid *grid, struct hgrid_statistics *statistics);
 
 #if defined(HGRID_STD)
 /**
- * Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and with, and
- * `hgrid_build`, in one call.
+ * Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and
+ * with, and `hgrid_build`, in one call.
  *
  * Only in libraries that were built with the feature `std`, and declared only where `HGRID_STD` is
- * defined. It takes as long as those three calls: who builds again for every frame brings the memory
- * and calls `hgrid_build`.
+ * defined. It takes as long as those three calls: who builds again for every frame brings
+ * the memory and calls `hgrid_build`.
  *
  * ```c
  * static size_t count_hits(const hgrid_mesh *mesh, const hgrid_ray *rays, size_t count)
@@ -1622,19 +1634,19 @@ hgrid_status hgrid_inspect(const struct hgrid_grid *grid,
  * }
  * ```
  *
- * `allocator` says where memory comes from; NULL means the C library, as with `malloc`. It is asked
- * twice: for the scratch, which is given back before the call returns, and for the grid, which takes
- * what `hgrid_sizes` tells, to the byte, and less than 1 KiB for the view. The mesh stays yours and
- * where it is, as after `hgrid_build`.
+ * `allocator` says where memory comes from; NULL means the C library, as with `malloc`. It is
+ * asked twice: for the scratch, which is given back before the call returns, and for the grid,
+ * which takes what `hgrid_sizes` tells, to the byte, and less than 1 KiB for the view. The mesh
+ * stays yours and where it is, as after `hgrid_build`.
  *
  * `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `allocator` may be NULL.
  * `report` may be NULL.
  *
- * Returns `HGRID_OK` and writes the address of the view to `grid`; or returns the reason, has given
- * back all memory, and leaves `grid` as it was. `HGRID_ERROR_OUT_OF_MEMORY` says that the allocator
- * had no more, and the report how much was needed; `HGRID_ERROR_MISALIGNED` that what it gave does
- * not start at a multiple of the alignment. All else is what `hgrid_build` returns. The report is
- * that of `hgrid_build`.
+ * Returns `HGRID_OK` and writes the address of the view to `grid`; or returns the reason, has
+ * given back all memory, and leaves `grid` as it was. `HGRID_ERROR_OUT_OF_MEMORY` says that the
+ * allocator had no more, and the report how much was needed; `HGRID_ERROR_MISALIGNED` that what it
+ * gave does not start at a multiple of the alignment. All else is what `hgrid_build` returns. The
+ * report is that of `hgrid_build`.
  *
  * Threads: any number of calls at once, if the allocator's functions allow it.
  *
@@ -1652,9 +1664,9 @@ hgrid_status hgrid_create(const struct hgrid_mesh *mesh,
 /**
  * Gives back all memory of a grid that `hgrid_create` made.
  *
- * `grid` may be NULL: nothing happens. It may be nothing else than what `hgrid_create` wrote, once:
- * not the view of a build or of an open, and no copy of a view. No query runs, and copies of the
- * view are good for nothing afterwards.
+ * `grid` may be NULL: nothing happens. It may be nothing else than what `hgrid_create` wrote,
+ * once: not the view of a build or of an open, and no copy of a view. No query runs, and copies of
+ * the view are good for nothing afterwards.
  *
  * Threads: any number of calls at once, each for a grid of its own, if the allocator's functions
  * allow it; on any thread, not only on the one that created the grid.

@@ -8,15 +8,16 @@ use crate::span::Region;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, hgrid_status};
 use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 
-/// Tells how much memory is enough for any mesh with so many triangles, wherever they lie: O(1), nothing
-/// is looked at.
+/// Tells how much memory is enough for any mesh with so many triangles, wherever they
+/// lie: O(1), nothing is looked at.
 ///
-/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants,
-/// rounded up a little. How much more than enough it is depends on the method: a scan takes a sixth of
-/// it or less with one level, a thirteenth with brick; with recursive it is generous beyond use.
+/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
+/// as constants, rounded up a little. How much more than enough it is depends on the method:
+/// a scan takes a sixth of it or less with one level, a thirteenth with brick; with
+/// recursive it is generous beyond use.
 ///
-/// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report has
-/// `index_bytes` and `scratch_bytes`; or what is wrong:
+/// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
+/// has `index_bytes` and `scratch_bytes`; or what is wrong:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`,
 ///   `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space;
 /// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
@@ -47,20 +48,20 @@ pub unsafe extern "C" fn hgrid_bound(
 /// Tells how much memory a build of this mesh takes.
 ///
 /// Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
-/// `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more than
-/// enough the index is depends on the method: for a scan up to 2 times with one level, 4 with fixed, 6
-/// with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
+/// `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more
+/// than enough the index is depends on the method: for a scan up to 2 times with one level, 4 with
+/// fixed, 6 with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
 ///
 /// With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
 /// is 1. That takes about half the time of a build; with recursive and brick, which have to build
 /// the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
 ///
-/// With `tasks` in the configuration the answer is for a build with so many at once: each takes scratch,
-/// the index is filled by all of them and may be a little larger. `run` is called for the answer, too;
-/// `progress` is not.
+/// With `tasks` in the configuration the answer is for a build with so many at once: each takes
+/// scratch, the index is filled by all of them and may be a little larger. `run` is called for
+/// the answer, too; `progress` is not.
 ///
-/// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL if its
-/// size is 0; scratch that is too small is no error, and counts as none.
+/// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL
+/// if its size is 0; scratch that is too small is no error, and counts as none.
 ///
 /// Returns `HGRID_OK`; or what is wrong, with the triangle that is to blame in the report:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
@@ -101,27 +102,28 @@ pub unsafe extern "C" fn hgrid_sizes(
 /// Looks for the finest grid that fits into a budget.
 ///
 /// `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
-/// (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no more than a
-/// step too much: a step is a factor of 1.41 in the number of cells. It takes a dozen times as long as
-/// `hgrid_sizes`, or less. A density, or cells, that would be too fine for a build count as too large here.
+/// (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no
+/// more than a step too much: a step is a factor of 1.41 in the number of cells. It takes a
+/// dozen times as long as `hgrid_sizes`, or less. A density, or cells, that would be too fine
+/// for a build count as too large here.
 ///
 /// Bring as much scratch as `hgrid_sizes` without scratch says: with `HGRID_METHOD_ONE_LEVEL` and
-/// `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser than it had
-/// to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
-/// afterwards.
+/// `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser
+/// than it had to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch
+/// holds nothing of use afterwards.
 ///
-/// `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be the same as
-/// `fitted`, which is initialised before in either case. `report` may be NULL, and so may `scratch` if its
-/// size is 0.
+/// `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be
+/// the same as `fitted`, which is initialised before in either case. `report` may be NULL,
+/// and so may `scratch` if its size is 0.
 ///
 /// Returns `HGRID_OK`, and the report says what the fitted grid takes; or
 /// `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or
 /// `HGRID_ERROR_SCRATCH_TOO_SMALL`, and its `scratch_bytes` is what it takes; or what `hgrid_sizes`
-/// returns. After an error `fitted` is as it was. `run` and `progress` are not called, and the sizes are
-/// those of one task; all three are copied.
+/// returns. After an error `fitted` is as it was. `run` and `progress` are not called, and the
+/// sizes are those of one task; all three are copied.
 ///
-/// Threads: any number of calls at once, as long as each has a scratch, a configuration to write and a
-/// report of its own.
+/// Threads: any number of calls at once, as long as each has a scratch, a configuration
+/// to write and a report of its own.
 ///
 /// # Safety
 /// Pointers are as the head of this file says.
@@ -171,8 +173,8 @@ pub unsafe extern "C" fn hgrid_fit(
 ///
 /// Returns `HGRID_OK` and writes the view to `grid`, or returns the reason and leaves `grid` as it
 /// was: `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_CANCELLED`, or
-/// what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region is
-/// too small, what both need; or the triangle that is to blame.
+/// what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region
+/// is too small, what both need; or the triangle that is to blame.
 ///
 /// After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
 /// anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
@@ -183,15 +185,15 @@ pub unsafe extern "C" fn hgrid_fit(
 /// succeeds.
 ///
 /// A build allocates nothing and needs at most 12 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
-/// `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8 KiB
-/// where it is called; all beside what `run` and `progress` take (measured on x86-64).
+/// `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8
+/// KiB where it is called; all beside what `run` and `progress` take (measured on x86-64).
 ///
 /// # A build on threads
 ///
-/// The library knows no threads. With `tasks` and `run` in the configuration, `HGRID_METHOD_BRICK` is cut
-/// into tasks: the library calls `run`, on the thread that calls this function, and `run` calls the
-/// tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte. With POSIX
-/// threads, one for each task:
+/// The library knows no threads. With `tasks` and `run` in the configuration, `HGRID_METHOD_BRICK`
+/// is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
+/// calls the tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte.
+/// With POSIX threads, one for each task:
 ///
 /// ```c
 /// typedef struct {
@@ -233,10 +235,10 @@ pub unsafe extern "C" fn hgrid_fit(
 /// }
 /// ```
 ///
-/// `hgrid_sizes` with the same configuration tells how much memory so many tasks take. Where there is
-/// less scratch, but enough for fewer tasks, there are fewer. `HGRID_ERROR_PARALLEL_FOR` says that `run`
-/// ran a task twice or not at all; then the index may hold anything, and both regions can be used
-/// again, as after `HGRID_ERROR_CANCELLED`.
+/// `hgrid_sizes` with the same configuration tells how much memory so many tasks take. Where there
+/// is less scratch, but enough for fewer tasks, there are fewer. `HGRID_ERROR_PARALLEL_FOR` says
+/// that `run` ran a task twice or not at all; then the index may hold anything, and both regions
+/// can be used again, as after `HGRID_ERROR_CANCELLED`.
 ///
 /// Threads: any number of calls at once, as long as each has regions, a view and a report of its
 /// own. The call starts no thread; its tasks are called on those that `run` chooses.

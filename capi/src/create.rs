@@ -27,12 +27,12 @@ use crate::status::{
 use crate::system;
 use crate::types::{HGRID_ALIGNMENT, hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 
-/// Where `hgrid_create` gets its memory from. Initialise it with `HGRID_ALLOCATOR_INIT` and set both
-/// functions.
+/// Where `hgrid_create` gets its memory from. Initialise it with
+/// `HGRID_ALLOCATOR_INIT` and set both functions.
 ///
-/// The struct itself is only read during the call, but `hgrid_destroy` calls `release` with the same
-/// `context`, so both must last as long as the grid. Neither function may be left by `longjmp` or by
-/// a C++ exception.
+/// The struct itself is only read during the call, but `hgrid_destroy` calls `release` with the
+/// same `context`, so both must last as long as the grid. Neither function may be left by
+/// `longjmp` or by a C++ exception.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_allocator {
@@ -42,9 +42,9 @@ pub struct hgrid_allocator {
     pub reserved: u32,
     /// Yours: passed on to both functions.
     pub context: *mut c_void,
-    /// Gives `bytes` bytes, never 0 of them, that start at a multiple of `alignment`, a power of two,
-    /// and that nothing else uses until they are released. They may hold anything. NULL if there are
-    /// no more. Called on the thread that calls `hgrid_create`. May not be NULL.
+    /// Gives `bytes` bytes, never 0 of them, that start at a multiple of `alignment`, a power of
+    /// two, and that nothing else uses until they are released. They may hold anything. NULL if
+    /// there are no more. Called on the thread that calls `hgrid_create`. May not be NULL.
     pub allocate: Option<
         unsafe extern "C" fn(context: *mut c_void, bytes: usize, alignment: usize) -> *mut c_void,
     >,
@@ -60,12 +60,12 @@ pub struct hgrid_allocator {
     >,
 }
 
-/// Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and with, and
-/// `hgrid_build`, in one call.
+/// Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and
+/// with, and `hgrid_build`, in one call.
 ///
 /// Only in libraries that were built with the feature `std`, and declared only where `HGRID_STD` is
-/// defined. It takes as long as those three calls: who builds again for every frame brings the memory
-/// and calls `hgrid_build`.
+/// defined. It takes as long as those three calls: who builds again for every frame brings
+/// the memory and calls `hgrid_build`.
 ///
 /// ```c
 /// static size_t count_hits(const hgrid_mesh *mesh, const hgrid_ray *rays, size_t count)
@@ -82,19 +82,19 @@ pub struct hgrid_allocator {
 /// }
 /// ```
 ///
-/// `allocator` says where memory comes from; NULL means the C library, as with `malloc`. It is asked
-/// twice: for the scratch, which is given back before the call returns, and for the grid, which takes
-/// what `hgrid_sizes` tells, to the byte, and less than 1 KiB for the view. The mesh stays yours and
-/// where it is, as after `hgrid_build`.
+/// `allocator` says where memory comes from; NULL means the C library, as with `malloc`. It is
+/// asked twice: for the scratch, which is given back before the call returns, and for the grid,
+/// which takes what `hgrid_sizes` tells, to the byte, and less than 1 KiB for the view. The mesh
+/// stays yours and where it is, as after `hgrid_build`.
 ///
 /// `mesh` and `grid` may not be NULL. `config` may be NULL: the defaults. `allocator` may be NULL.
 /// `report` may be NULL.
 ///
-/// Returns `HGRID_OK` and writes the address of the view to `grid`; or returns the reason, has given
-/// back all memory, and leaves `grid` as it was. `HGRID_ERROR_OUT_OF_MEMORY` says that the allocator
-/// had no more, and the report how much was needed; `HGRID_ERROR_MISALIGNED` that what it gave does
-/// not start at a multiple of the alignment. All else is what `hgrid_build` returns. The report is
-/// that of `hgrid_build`.
+/// Returns `HGRID_OK` and writes the address of the view to `grid`; or returns the reason, has
+/// given back all memory, and leaves `grid` as it was. `HGRID_ERROR_OUT_OF_MEMORY` says that the
+/// allocator had no more, and the report how much was needed; `HGRID_ERROR_MISALIGNED` that what it
+/// gave does not start at a multiple of the alignment. All else is what `hgrid_build` returns. The
+/// report is that of `hgrid_build`.
 ///
 /// Threads: any number of calls at once, if the allocator's functions allow it.
 ///
@@ -124,9 +124,9 @@ pub unsafe extern "C" fn hgrid_create(
 
 /// Gives back all memory of a grid that `hgrid_create` made.
 ///
-/// `grid` may be NULL: nothing happens. It may be nothing else than what `hgrid_create` wrote, once:
-/// not the view of a build or of an open, and no copy of a view. No query runs, and copies of the
-/// view are good for nothing afterwards.
+/// `grid` may be NULL: nothing happens. It may be nothing else than what `hgrid_create` wrote,
+/// once: not the view of a build or of an open, and no copy of a view. No query runs, and copies of
+/// the view are good for nothing afterwards.
 ///
 /// Threads: any number of calls at once, each for a grid of its own, if the allocator's functions
 /// allow it; on any thread, not only on the one that created the grid.
@@ -246,8 +246,8 @@ impl Memory {
 impl Drop for Memory {
     fn drop(&mut self) {
         let Self { allocator: Allocator { context, release, .. }, start, bytes } = *self;
-        // SAFETY: by the promise of the one who made the allocator: what its `allocate` gave, with the
-        // numbers that it got, and only here.
+        // SAFETY: by the promise of the one who made the allocator: what its `allocate` gave, with
+        // the numbers that it got, and only here.
         unsafe { release(context, start.as_ptr(), bytes, HGRID_ALIGNMENT) }
     }
 }

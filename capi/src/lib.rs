@@ -3,15 +3,15 @@
 //! Every function checks what it was given, calls core, and writes the answer. The docs of all that
 //! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
 //! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
-//! structs and threads that they rely on. `build`, `stored`, `query` and `many` hold the functions, `types`
-//! and `questions` the structs, and `raw` every use of a caller's pointer.
+//! structs and threads that they rely on. `build`, `stored`, `query` and `many` hold the functions,
+//! `types` and `questions` the structs, and `raw` every use of a caller's pointer.
 //!
 //! There is no allocation, no state and no thread here, and no panic that a caller could reach; a
 //! test looks for the symbols of all but the state in the library. Core remembers in one byte which
 //! vector instructions the processor has.
 //!
-//! That is the library without features. With `std` it also has `create`, which gets memory from the
-//! caller's allocator or the system's and looks after the pointers to it.
+//! That is the library without features. With `std` it also has `create`, which gets memory from
+//! the caller's allocator or the system's and looks after the pointers to it.
 #![no_std]
 
 // What C sees, in the order of the header.

@@ -11,9 +11,9 @@ use crate::types::hgrid_grid;
 /// Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
 /// each, bit for bit, but sooner.
 ///
-/// A ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of `hits`.
-/// A miss writes a hit, too: with `primitive` equal to `HGRID_INVALID_ID`, `t` equal to `INFINITY`,
-/// `u` and `v` equal to 0. Here is a tile of 8 x 8 pixels:
+/// A ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of
+/// `hits`. A miss writes a hit, too: with `primitive` equal to `HGRID_INVALID_ID`, `t` equal to
+/// `INFINITY`, `u` and `v` equal to 0. Here is a tile of 8 x 8 pixels:
 ///
 /// ```c
 /// static size_t trace_tile(const hgrid_grid *grid, const hgrid_ray rays[64], float depth[64])
@@ -36,17 +36,18 @@ use crate::types::hgrid_grid;
 /// No hit may overlap a ray, its own or another; where the two arrays reach into each other, their
 /// strides are the same. Nor do hits overlap anything else that the call uses.
 ///
-/// `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
-/// the hits. With `count` 0 nothing is done. Up to 64 rays are read before the first hit is written.
+/// `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has
+/// no influence on the hits. With `count` 0 nothing is done. Up to 64 rays are read
+/// before the first hit is written.
 ///
-/// `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With others the
-/// rays are traced one after the other, which is slower.
+/// `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With others
+/// the rays are traced one after the other, which is slower.
 ///
 /// Returns `HGRID_OK` and has written all hits, or returns the reason and has written none:
 /// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and
-/// `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is
-/// impossible), `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no
-/// error: it misses.
+/// `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and
+/// `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`,
+/// `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no error: it misses.
 ///
 /// The call allocates nothing and needs at most 16 KiB of stack.
 ///
@@ -85,10 +86,11 @@ pub unsafe extern "C" fn hgrid_intersect_n(
 /// but sooner.
 ///
 /// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
-/// from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that hold a ray and
-/// its byte, coherence, options, stack. `rays` and `occluded` may be NULL if `count` is 0, `options` may
-/// be NULL. Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_n` returns and
-/// has written none. For the shadow rays of a tile, towards one light:
+/// from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that
+/// hold a ray and its byte, coherence, options, stack. `rays` and `occluded` may be
+/// NULL if `count` is 0, `options` may be NULL. Returns `HGRID_OK` and has written all
+/// bytes, or returns what `hgrid_intersect_n` returns and has written none. For the
+/// shadow rays of a tile, towards one light:
 ///
 /// ```c
 /// static size_t count_lit(const hgrid_grid *grid, const hgrid_ray *rays, size_t count)

@@ -12,16 +12,16 @@ use crate::types::hgrid_grid;
 /// Finds the closest triangle that a ray hits.
 ///
 /// Returns true and writes `hit`; or returns false and writes nothing. Where several triangles are
-/// hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle count, unless
-/// `cull` of the options says otherwise.
-/// A ray through an edge or a vertex that triangles share hits at least one of them. A triangle
-/// without area, or one that is seen exactly edge-on, is not hit.
+/// hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle
+/// count, unless `cull` of the options says otherwise. A ray through an edge or a vertex
+/// that triangles share hits at least one of them. A triangle without area, or one that is
+/// seen exactly edge-on, is not hit.
 ///
-/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
-/// opened, or with options that break the rules for structs, nothing is hit.
+/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built
+/// or opened, or with options that break the rules for structs, nothing is hit.
 ///
-/// A query allocates nothing, needs at most 6 KiB of stack, as all queries of one ray or point do, and
-/// always ends: on one level after no more steps than the three resolutions sum up to.
+/// A query allocates nothing, needs at most 6 KiB of stack, as all queries of one ray or point do,
+/// and always ends: on one level after no more steps than the three resolutions sum up to.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///
@@ -53,8 +53,8 @@ pub unsafe extern "C" fn hgrid_intersect(
 /// This is the query for shadows and visibility. It stops at the first triangle it finds in the
 /// ray's range, which need not be the closest.
 ///
-/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built or
-/// opened, or with options that break the rules for structs, the answer is false.
+/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built
+/// or opened, or with options that break the rules for structs, the answer is false.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///
@@ -75,12 +75,12 @@ pub unsafe extern "C" fn hgrid_occluded(
 
 /// Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
 ///
-/// Writes as many hits as there is room for, the nearest, and to `count` how many there are, which may
-/// be more. With room for more than there are, the ray is walked once; otherwise, and with a filter, once
-/// more for each sixteen hits, from where it got to: so nothing is allocated, whatever their number, but
-/// thousands of hits in one cell take long, as the square of their number. Options as
-/// with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what it accepts is
-/// written and counted.
+/// Writes as many hits as there is room for, the nearest, and to `count` how many there are, which
+/// may be more. With room for more than there are, the ray is walked once; otherwise, and with a
+/// filter, once more for each sixteen hits, from where it got to: so nothing is allocated, whatever
+/// their number, but thousands of hits in one cell take long, as the square of their number.
+/// Options as with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what
+/// it accepts is written and counted.
 ///
 /// ```c
 /// static double thickness_along(const hgrid_grid *grid, const hgrid_ray *ray)
@@ -96,11 +96,12 @@ pub unsafe extern "C" fn hgrid_occluded(
 /// }
 /// ```
 ///
-/// `hits` may be NULL if `capacity` is 0, and overlaps nothing else that the call uses; a filter may look
-/// at those that it has accepted. `options` may be NULL: the defaults. Returns `HGRID_OK`, or
-/// returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
-/// `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_ANSWERS`
-/// (a capacity that is impossible). A ray that is none hits nothing: the count is 0.
+/// `hits` may be NULL if `capacity` is 0, and overlaps nothing else that the call uses; a
+/// filter may look at those that it has accepted. `options` may be NULL: the defaults.
+/// Returns `HGRID_OK`, or returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`,
+/// `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the
+/// options), `HGRID_ERROR_INVALID_ANSWERS` (a capacity that is impossible). A ray that is
+/// none hits nothing: the count is 0.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with hits and counters of
 /// its own.
@@ -129,18 +130,19 @@ pub unsafe extern "C" fn hgrid_intersect_all(
 
 /// Finds the point of the mesh that is closest to a point, `max_distance` away at most.
 ///
-/// Returns true and writes `closest`; or returns false and writes nothing. Where several triangles are
-/// equally close, the one with the lowest number is reported. `max_distance` may be `INFINITY`. `point`
-/// is three floats; it and `closest` may not be NULL.
+/// Returns true and writes `closest`; or returns false and writes nothing. Where several triangles
+/// are equally close, the one with the lowest number is reported. `max_distance` may be `INFINITY`.
+/// `point` is three floats; it and `closest` may not be NULL.
 ///
-/// Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts the lists that
-/// were looked at, `primitive_tests` the triangles in them. `options` may be NULL: the defaults. With
-/// anything that is not as it should be (another NULL, a view of zeros, options that break the rules, a point that
-/// is not finite, a distance that is NaN or negative) the answer is false.
+/// Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts
+/// the lists that were looked at, `primitive_tests` the triangles in them. `options` may be
+/// NULL: the defaults. With anything that is not as it should be (another NULL, a view of
+/// zeros, options that break the rules, a point that is not finite, a distance that is NaN
+/// or negative) the answer is false.
 ///
 /// The call allocates nothing and always ends. How long it takes grows with the triangles in a cube
-/// around the point that reaches as far as the answer: it is short near the mesh, and far outside of it
-/// that of a loop over a good part of all triangles.
+/// around the point that reaches as far as the answer: it is short near the mesh, and far outside
+/// of it that of a loop over a good part of all triangles.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///

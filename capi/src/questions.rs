@@ -1,5 +1,5 @@
-//! What queries ask and what they answer: the structs that cross the boundary, as C sees them, and what
-//! they mean to core.
+//! What queries ask and what they answer: the structs that cross the boundary, as C sees
+//! them, and what they mean to core.
 //!
 //! The docs here are the text of `hgrid.h`: they are written for C readers.
 
@@ -72,8 +72,8 @@ pub struct hgrid_counters {
     pub grid_steps: u64,
 }
 
-/// What a filter says of a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`. Anything
-/// else counts as `HGRID_REJECT`.
+/// What a filter says of a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`.
+/// Anything else counts as `HGRID_REJECT`.
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_verdict = u32;
 
@@ -83,7 +83,8 @@ pub const HGRID_REJECT: hgrid_verdict = 0;
 /// The hit counts.
 pub const HGRID_ACCEPT: hgrid_verdict = 1;
 
-/// The hit counts, and it is the last one: the same as `HGRID_ACCEPT`, but for `hgrid_intersect_all`.
+/// The hit counts, and it is the last one: the same as `HGRID_ACCEPT`,
+/// but for `hgrid_intersect_all`.
 pub const HGRID_ACCEPT_AND_STOP: hgrid_verdict = 2;
 
 /// Both sides of a triangle are hit: the default of `hgrid_query_options`.
@@ -98,32 +99,34 @@ pub const HGRID_CULL_FRONT: u32 = 2;
 
 /// What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
 ///
-/// A query with options that are not the defaults is somewhat slower than one without, and rays of a
-/// batch are then traced one by one. Options that break the rules for structs make a query of one ray
-/// answer as for a miss: `hgrid_intersect_all` with the same options returns what is wrong with them.
+/// A query with options that are not the defaults is somewhat slower than one without, and
+/// rays of a batch are then traced one by one. Options that break the rules for structs make
+/// a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
+/// returns what is wrong with them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_query_options {
     /// `sizeof(hgrid_query_options)`.
     pub struct_size: u32,
-    /// A triangle is seen if its mask and this have a bit in common; see `masks` of `hgrid_mesh`. With
-    /// all bits, the default, every triangle is seen, even one whose mask is 0.
+    /// A triangle is seen if its mask and this have a bit in common; see `masks` of `hgrid_mesh`.
+    /// With all bits, the default, every triangle is seen, even one whose mask is 0.
     pub mask: u32,
     /// Which sides are not hit: one of `HGRID_CULL_...`.
     pub cull: u32,
-    /// A triangle that is not hit, usually the one that the ray leaves, which then cannot hit itself, without any
-    /// epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge still may be hit, where the origin was rounded
-    /// to just below it: where that matters, give a small `t_min`, too.
+    /// A triangle that is not hit, usually the one that the ray leaves, which then cannot
+    /// hit itself, without any epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge
+    /// still may be hit, where the origin was rounded to just below it: where that
+    /// matters, give a small `t_min`, too.
     pub skip: u32,
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
-    /// Says of a `hit` whether it counts; or NULL: all do. `ray` is the place of the ray in its batch,
-    /// 0 for a single one.
+    /// Says of a `hit` whether it counts; or NULL: all do. `ray` is the place of the ray in
+    /// its batch, 0 for a single one.
     ///
-    /// Hits are offered from near to far, where `t` is equal by ascending triangle, and each triangle
-    /// at most once for each ray. It is called on the thread that asks, may ask the same grid other
-    /// questions, and may not be left by `longjmp` or by a C++ exception. Here is glass, which lets
-    /// shadow rays pass and weakens them:
+    /// Hits are offered from near to far, where `t` is equal by ascending triangle, and each
+    /// triangle at most once for each ray. It is called on the thread that asks, may ask the same
+    /// grid other questions, and may not be left by `longjmp` or by a C++ exception. Here is glass,
+    /// which lets shadow rays pass and weakens them:
     ///
     /// ```c
     /// typedef struct {
@@ -207,12 +210,13 @@ pub struct hgrid_statistics {
     pub struct_size: u32,
     /// Triangles left out because a coordinate is not finite, or beyond 2^120.
     pub skipped_count: u32,
-    /// Triangles of which two corners are the same point. They are in the grid, and no ray hits them.
+    /// Triangles of which two corners are the same point. They are in
+    /// the grid, and no ray hits them.
     pub degenerate_count: u32,
     /// The first triangle that is one or the other, or `HGRID_INVALID_ID`.
     pub first_bad: u32,
-    /// Lists of triangles: one for each cell that has any, and for each brick or block that has some of
-    /// its own.
+    /// Lists of triangles: one for each cell that has any, and for each brick or
+    /// block that has some of its own.
     pub list_count: u64,
     /// Triangle ids in all lists together.
     pub reference_count: u64,
@@ -220,8 +224,9 @@ pub struct hgrid_statistics {
     pub longest_list: u32,
     /// 0.
     pub reserved: u32,
-    /// A hash of the grid's box, resolution and lists in order, not of which cell has which: the same for
-    /// the same grid on every platform, whatever its byte order. No defence against forgery.
+    /// A hash of the grid's box, resolution and lists in order, not of which cell
+    /// has which: the same for the same grid on every platform, whatever its byte
+    /// order. No defence against forgery.
     pub content_hash: u64,
 }
 

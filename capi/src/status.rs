@@ -16,20 +16,21 @@ pub const HGRID_OK: hgrid_status = 0;
 /// A pointer is NULL that may not be.
 pub const HGRID_ERROR_NULL_ARGUMENT: hgrid_status = -1;
 
-/// A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct and what
-/// is behind the known fields is not zero; or a `reserved` field is not 0. The usual cause is a struct
-/// that was not initialised with its `_INIT` macro.
+/// A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
+/// and what is behind the known fields is not zero; or a `reserved` field is not 0. The usual cause
+/// is a struct that was not initialised with its `_INIT` macro.
 pub const HGRID_ERROR_STRUCT_SIZE: hgrid_status = -2;
 
 /// The index, the scratch, the blob or the room for one does not start at a multiple of
 /// `HGRID_ALIGNMENT`.
 pub const HGRID_ERROR_MISALIGNED: hgrid_status = -3;
 
-/// The index or the scratch overlaps the other one or the mesh; the room for a packed blob overlaps its
-/// grid or its mesh; or answers of a batch overlap its rays.
+/// The index or the scratch overlaps the other one or the mesh; the room for a packed blob overlaps
+/// its grid or its mesh; or answers of a batch overlap its rays.
 pub const HGRID_ERROR_OVERLAP: hgrid_status = -4;
 
-/// The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `bytes` says it.
+/// The index is too small. The report says how many bytes it needs;
+/// with `hgrid_pack`, `bytes` says it.
 ///
 /// With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
 /// methods the grid was written as far as it went, so the index may hold anything.

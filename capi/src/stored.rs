@@ -14,18 +14,18 @@ use crate::types::{hgrid_grid, hgrid_mesh};
 /// Opens a blob that was built earlier, in another process or on another machine: O(1), no copy.
 ///
 /// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`: in memory,
-/// in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of `hgrid_pack`;
-/// bytes behind it are ignored. It says itself which method built it and how. The mesh is the one it was built for,
-/// of which only the counts are compared. A blob that `hgrid_pack` wrote has its mesh in it: then `mesh`
-/// may be NULL.
+/// in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of
+/// `hgrid_pack`; bytes behind it are ignored. It says itself which method built it and how. The
+/// mesh is the one it was built for, of which only the counts are compared. A blob that
+/// `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL.
 ///
 /// What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
 /// nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
-/// not change while the grid is in use: a file that others may write is not for mapping, read it into
-/// memory of your own.
+/// not change while the grid is in use: a file that others may write is not for mapping,
+/// read it into memory of your own.
 ///
-/// `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`; or returns what is
-/// wrong and leaves `grid` as it was:
+/// `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`; or returns
+/// what is wrong and leaves `grid` as it was:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`;
 /// - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
 ///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
@@ -60,10 +60,11 @@ pub unsafe extern "C" fn hgrid_open(
 
 /// Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
 ///
-/// The bytes may lie at any address. `info` may not be NULL, `blob` only if `blob_bytes` is 0. Returns
-/// `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was: `HGRID_ERROR_NULL_ARGUMENT`,
-/// `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`,
-/// `HGRID_ERROR_WRONG_BYTE_ORDER`, `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`.
+/// The bytes may lie at any address. `info` may not be NULL, `blob` only if `blob_bytes` is 0.
+/// Returns `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was:
+/// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`,
+/// `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
+/// `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`.
 ///
 /// Threads: any number of calls at once, each with an info of its own.
 ///
@@ -84,21 +85,22 @@ pub unsafe extern "C" fn hgrid_peek(
     unsafe { raw::filling(info, call) }
 }
 
-/// Writes a grid and its mesh as one blob, for which `hgrid_open` needs no mesh: to be stored where the
-/// mesh is not, or mapped by several processes.
+/// Writes a grid and its mesh as one blob, for which `hgrid_open` needs no mesh: to be stored where
+/// the mesh is not, or mapped by several processes.
 ///
-/// It holds the grid, then positions, indices (of 32 bits) and masks if there are any, tight, each at a
-/// multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid. Nothing is
-/// copied when it is opened.
+/// It holds the grid, then positions, indices (of 32 bits) and masks if there are any, tight, each
+/// at a multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid.
+/// Nothing is copied when it is opened.
 ///
-/// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh nor any argument of this
-/// call. It may be NULL if
-/// `capacity` is 0: to ask for the size. `grid` and `bytes` may not be NULL.
+/// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh nor
+/// any argument of this call. It may be NULL if `capacity` is 0: to ask for the size.
+/// `grid` and `bytes` may not be NULL.
 ///
-/// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of
-/// it; in both cases `bytes` becomes its size. Or returns the reason and has written nothing:
-/// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
-/// `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged. More than is needed is not touched.
+/// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has
+/// written none of it; in both cases `bytes` becomes its size. Or returns the reason and has
+/// written nothing: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
+/// `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the
+/// mesh is damaged. More than is needed is not touched.
 ///
 /// Threads: any number of calls and queries on the same grid at once, each with memory of its own.
 ///
@@ -128,10 +130,10 @@ pub unsafe extern "C" fn hgrid_pack(
 
 /// Proves that a blob is the grid of its mesh, and so that every answer will be right.
 ///
-/// Takes no memory, and at most about the time of a build with one level and fixed, two or three times
-/// that with variable, three to five times with recursive, and three times with brick, whose builds are
-/// short; on damaged bytes it may take much longer. A grid that was just built needs no proof; a blob
-/// from a file, a network or another process may.
+/// Takes no memory, and at most about the time of a build with one level and fixed, two or three
+/// times that with variable, three to five times with recursive, and three times with brick, whose
+/// builds are short; on damaged bytes it may take much longer. A grid that was just built needs no
+/// proof; a blob from a file, a network or another process may.
 ///
 /// Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
 /// that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
@@ -153,10 +155,11 @@ pub unsafe extern "C" fn hgrid_validate(grid: *const hgrid_grid) -> hgrid_status
 /// Looks at all of a grid and its mesh: O(cells + ids + triangles), no memory.
 ///
 /// Neither argument may be NULL. Returns `HGRID_OK` and fills `statistics`; or
-/// `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves it as it
-/// was. On damaged bytes it counts what is there.
+/// `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
+/// it as it was. On damaged bytes it counts what is there.
 ///
-/// Threads: any number of calls and queries on the same grid at once, each with statistics of its own.
+/// Threads: any number of calls and queries on the same grid at once,
+/// each with statistics of its own.
 ///
 /// # Safety
 /// Pointers are as the head of this file says.

@@ -1,8 +1,8 @@
 //! The system's memory, by the C library that the program has anyway.
 //!
-//! Not by Rust's std: that would bring its panic handler, its thread-locals and a list of libraries to
-//! every program that links the archive, and two such archives do not link into one program. Nor by
-//! the package libc, for which rustc tells C programmers to add `-lm -lrt -lpthread`.
+//! Not by Rust's std: that would bring its panic handler, its thread-locals and a list of libraries
+//! to every program that links the archive, and two such archives do not link into one program. Nor
+//! by the package libc, for which rustc tells C programmers to add `-lm -lrt -lpthread`.
 
 use core::ffi::c_void;
 

@@ -47,8 +47,8 @@ pub const HGRID_METHOD_ONE_LEVEL: u32 = 1;
 /// Rays cross empty space in large steps, and the small cells hold few triangles each. Choose it
 /// where many rays are shot for each build. `macrocell_factor` belongs to it.
 ///
-/// Memory: one and a half to three times that of one level. The build plans every byte in the scratch before
-/// it writes the index.
+/// Memory: one and a half to three times that of one level. The build plans every byte in the
+/// scratch before it writes the index.
 pub const HGRID_METHOD_FIXED: u32 = 2;
 
 /// A hashed grid whose crowded cells hold hashed grids of their own: subgrids, cut to what is
@@ -69,23 +69,26 @@ pub const HGRID_METHOD_VARIABLE: u32 = 3;
 /// to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
 /// it.
 ///
-/// Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch for each triangle.
-/// How much index it takes shows only while it is written. `hgrid_sizes` without scratch answers
-/// with a bound that no mesh comes near, up to 8 GiB: ask with scratch, which gives the exact size.
+/// Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch
+/// for each triangle. How much index it takes shows only while it is written. `hgrid_sizes`
+/// without scratch answers with a bound that no mesh comes near, up to 8 GiB: ask with
+/// scratch, which gives the exact size.
 pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 
-/// A grid of cells as large as triangles: 4 x 4 x 4 cells are a brick, 4 x 4 x 4 bricks a block, and
-/// a bit for each says whether anything is in it. Not hashed.
+/// A grid of cells as large as triangles: 4 x 4 x 4 cells are a brick, 4 x 4 x 4 bricks a block,
+/// and a bit for each says whether anything is in it. Not hashed.
 ///
 /// Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
 /// detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
-/// It is the default: the shortest build, the first image, tiles of rays through `hgrid_intersect_n`, and
-/// scenes of which nobody knows what is in them. `cell_size` belongs to it, `density` does not.
+/// It is the default: the shortest build, the first image, tiles of rays through
+/// `hgrid_intersect_n`, and scenes of which nobody knows what is in them. `cell_size`
+/// belongs to it, `density` does not.
 ///
-/// Memory: on scans about 9 bytes a triangle; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it.
-/// How much index it takes shows only while it is written, and a build may need somewhat more than the
-/// blob has in the end. `hgrid_sizes` without scratch answers with what is enough, seven times as much
-/// for a scan, and with more scratch than a build takes; with scratch it gives the exact size.
+/// Memory: on scans about 9 bytes a triangle; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND`
+/// hold for it. How much index it takes shows only while it is written, and a build may need
+/// somewhat more than the blob has in the end. `hgrid_sizes` without scratch answers with what
+/// is enough, seven times as much for a scan, and with more scratch than a build takes; with
+/// scratch it gives the exact size.
 pub const HGRID_METHOD_BRICK: u32 = 5;
 
 /// The most levels of a recursive grid.
@@ -133,8 +136,8 @@ pub struct hgrid_mesh {
     pub index_stride: usize,
     /// Number of triangles, at most 4294967294.
     pub triangle_count: usize,
-    /// The first triangle's mask, a `uint32_t`, or NULL: queries with a mask of their own see a triangle
-    /// if both have a bit in common. NULL means that every triangle has all bits.
+    /// The first triangle's mask, a `uint32_t`, or NULL: queries with a mask of their own see a
+    /// triangle if both have a bit in common. NULL means that every triangle has all bits.
     pub masks: *const c_void,
     /// Bytes from one mask to the next, at least 4; 0 means 4.
     pub mask_stride: usize,
@@ -171,9 +174,9 @@ pub struct hgrid_config {
     pub cell_size: f32,
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
-    /// For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores; each
-    /// takes scratch of its own. With 0 and 1 nothing is parallel, and what is above `HGRID_MAX_TASKS`
-    /// counts as that. The other methods build on the thread that calls.
+    /// For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores;
+    /// each takes scratch of its own. With 0 and 1 nothing is parallel, and what is above
+    /// `HGRID_MAX_TASKS` counts as that. The other methods build on the thread that calls.
     pub tasks: u32,
     /// 0.
     pub reserved: u32,
@@ -182,15 +185,15 @@ pub struct hgrid_config {
     /// Calls `task(task_context, index)` once for every `index` below `count`, in any order, on any
     /// threads, and returns when all these calls have returned: after a join, or after any other
     /// synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
-    /// library calls it several times, one after the other, on the thread that builds, with counts up
-    /// to `tasks`; where the processor has no atomic operations, it never does. NULL only with `tasks`
-    /// 0 or 1. `hgrid_build` has an example.
+    /// library calls it several times, one after the other, on the thread that builds, with counts
+    /// up to `tasks`; where the processor has no atomic operations, it never does. NULL only with
+    /// `tasks` 0 or 1. `hgrid_build` has an example.
     ///
-    /// A task that is called twice, even at the same time, one that is never called, and an index that
-    /// is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`. Undefined
-    /// behaviour, as nothing can detect it, is a call of `task` that is made or still running after
-    /// `run` has returned, or with another `task_context`; a `run` that is left by `longjmp` or by a
-    /// C++ exception; and one that changes what the build works on.
+    /// A task that is called twice, even at the same time, one that is never called, and an index
+    /// that is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`.
+    /// Undefined behaviour, as nothing can detect it, is a call of `task` that is made or still
+    /// running after `run` has returned, or with another `task_context`; a `run` that is left by
+    /// `longjmp` or by a C++ exception; and one that changes what the build works on.
     pub run: Option<
         unsafe extern "C" fn(
             context: *mut c_void,
@@ -199,28 +202,28 @@ pub struct hgrid_config {
             task_context: *mut c_void,
         ),
     >,
-    /// Told how much of a build is `done`, from 0 to 1, and answers whether to go on; or NULL. It is
-    /// called on the thread that builds, a few times to a few hundred times; `done` grows from call
-    /// to call, and in the last call of a build that succeeds it is exactly 1, whatever the answer.
-    /// After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass over the mesh
-    /// is over. It may not be left by `longjmp` or by a C++ exception.
+    /// Told how much of a build is `done`, from 0 to 1, and answers whether to go on; or NULL. It
+    /// is called on the thread that builds, a few times to a few hundred times; `done` grows from
+    /// call to call, and in the last call of a build that succeeds it is exactly 1, whatever the
+    /// answer. After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass
+    /// over the mesh is over. It may not be left by `longjmp` or by a C++ exception.
     pub progress: Option<unsafe extern "C" fn(context: *mut c_void, done: f32) -> bool>,
 }
 
 /// A part of a build, as `run` of a `hgrid_config` gets it: a function of this library.
 ///
-/// It may be called on any thread, on several at once, with the `task_context` that came with it and
-/// an `index` below the `count` that came with it. It starts no thread, waits for none, and never
-/// jumps out.
+/// It may be called on any thread, on several at once, with the `task_context` that came
+/// with it and an `index` below the `count` that came with it. It starts no thread,
+/// waits for none, and never jumps out.
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_task = unsafe extern "C" fn(task_context: *mut c_void, index: u32);
 
 /// What a build, or a question for sizes, found out. Initialise it with `HGRID_REPORT_INIT`.
 ///
 /// Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
-/// what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another pass
-/// over mesh and grid, `hgrid_inspect` tells: triangles with two equal corners, the first bad one, the longest
-/// list, a hash of the content.
+/// what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another
+/// pass over mesh and grid, `hgrid_inspect` tells: triangles with two equal corners, the first bad
+/// one, the longest list, a hash of the content.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_report {
@@ -237,8 +240,8 @@ pub struct hgrid_report {
     pub scratch_bytes: u64,
     /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
     pub triangle: u32,
-    /// Triangles left out because a coordinate is not finite, or beyond 2^120. Known after a build, as are all
-    /// below.
+    /// Triangles left out because a coordinate is not finite, or beyond 2^120. Known
+    /// after a build, as are all below.
     pub skipped_count: u32,
     /// Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`
     /// and `HGRID_METHOD_BRICK` the words of 4 bytes that ids, subgrids and bricks take together.
@@ -311,8 +314,8 @@ impl hgrid_config {
         Ok(())
     }
 
-    /// How many tasks may run at once; more than one need someone who runs them. The other methods have
-    /// none, and a field of another method is not looked at.
+    /// How many tasks may run at once; more than one need someone who runs them. The other methods
+    /// have none, and a field of another method is not looked at.
     pub(crate) const fn task_count(&self) -> Result<u32, hgrid_status> {
         match (self.method, self.tasks, self.run) {
             (HGRID_METHOD_BRICK, 2.., None) => Err(HGRID_ERROR_NULL_ARGUMENT),

@@ -47,8 +47,8 @@ impl Aabb {
 
     /// The part `(near, far)` of a line inside the box, in multiples of its direction.
     ///
-    /// The line is given with the inverse of its direction, infinite where that is zero. The box is a
-    /// finite one, and so are the origin and every inverse that is used: no product is a NaN.
+    /// The line is given with the inverse of its direction, infinite where that is zero. The box is
+    /// a finite one, and so are the origin and every inverse that is used: no product is a NaN.
     #[inline]
     pub(crate) fn clip(&self, origin: [f32; 3], inverse: [f64; 3]) -> Option<(f64, f64)> {
         let (min, max) = (self.min.to_array(), self.max.to_array());

@@ -46,7 +46,8 @@ impl Block {
     }
 }
 
-/// Refuses a region that does not start at a multiple of [`ALIGNMENT`]; an empty one starts nowhere.
+/// Refuses a region that does not start at a multiple of
+/// [`ALIGNMENT`]; an empty one starts nowhere.
 pub(crate) fn check_alignment(bytes: &[u8], region: Region) -> Result<(), Error> {
     let is_aligned = bytes.is_empty() || bytes.as_ptr().addr().is_multiple_of(ALIGNMENT);
     if is_aligned { Ok(()) } else { Err(Error::Misaligned { region }) }

@@ -1,9 +1,9 @@
 //! Many rays at once: from the caller's own structs, into the caller's own structs.
 //!
-//! A batch answers each ray as [`Grid::intersect`] or [`Grid::occluded`] would, bit for bit. What the
-//! caller knows about the rays says how: neighbours, as those of a tile of pixels, share their way
-//! through the grid; rays without order go one after the other (several at a time in flight were
-//! slower: core/DESIGN.md).
+//! A batch answers each ray as [`Grid::intersect`] or [`Grid::occluded`] would, bit for bit. What
+//! the caller knows about the rays says how: neighbours, as those of a tile of pixels, share
+//! their way through the grid; rays without order go one after the other (several at a time in
+//! flight were slower: core/DESIGN.md).
 
 use bytemuck::{Pod, bytes_of, pod_read_unaligned};
 
@@ -19,8 +19,8 @@ pub enum Coherence {
     /// Nothing: rays after a bounce, random rays. Each is traced alone.
     #[default]
     Incoherent = 0,
-    /// Rays that follow one another are neighbours: best are runs of 64 from a tile of 8 x 8 pixels, each
-    /// sixteen of them a square of 4 x 4.
+    /// Rays that follow one another are neighbours: best are runs of 64 from a tile of 8 x 8
+    /// pixels, each sixteen of them a square of 4 x 4.
     Coherent = 1,
 }
 

@@ -231,8 +231,8 @@ impl Header {
         config
     }
 
-    /// Whether the header says what the mesh says: what was skipped, its box, and the resolution that
-    /// `rule` has for the box's size and so many triangles.
+    /// Whether the header says what the mesh says: what was skipped, its box, and the resolution
+    /// that `rule` has for the box's size and so many triangles.
     pub(crate) fn check(
         &self,
         lattice: &Lattice,

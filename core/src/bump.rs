@@ -12,7 +12,8 @@ use crate::arena::section_bytes;
 use crate::blob::{HEADER_BYTES, Header};
 use crate::error::{ConfigField, Error, Region};
 
-/// The bit of an offset into a pool that says "a grid lies there", not a list. The others say where.
+/// The bit of an offset into a pool that says "a grid lies there", not
+/// a list. The others say where.
 pub(crate) const GRID: u32 = 1 << 31;
 
 /// Words to give away, and how many were asked for.
@@ -47,8 +48,8 @@ impl<'a> Bump<'a> {
         }
     }
 
-    /// Where the pool goes on: the words asked for so far, given or not. An error if [`GRID`] leaves
-    /// no room to say so.
+    /// Where the pool goes on: the words asked for so far, given or not. An error if
+    /// [`GRID`] leaves no room to say so.
     pub(crate) fn offset(&self) -> Result<u32, Error> {
         let offset = u32::try_from(self.asked).ok().filter(|offset| offset & GRID == 0);
         offset.ok_or(Error::InvalidConfig(ConfigField::Density))

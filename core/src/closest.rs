@@ -1,7 +1,8 @@
 //! The point of a mesh that is closest to a point.
 //!
-//! A box around the point grows until it is sure that nothing outside is closer: from the cells next to
-//! the point on, twice as wide each time, and when something was found as wide as that is far.
+//! A box around the point grows until it is sure that nothing outside is closer:
+//! from the cells next to the point on, twice as wide each time, and when something
+//! was found as wide as that is far.
 //!
 //! ```text
 //! +-----------------------+
@@ -37,7 +38,8 @@ pub struct ClosestPoint {
 }
 
 impl ClosestPoint {
-    /// The point of one triangle that is closest to a point: what a loop over all triangles compares.
+    /// The point of one triangle that is closest to a point: what a
+    /// loop over all triangles compares.
     ///
     /// `None` if a coordinate is not finite. A triangle without area has points, too.
     #[must_use]
@@ -60,9 +62,9 @@ impl ClosestPoint {
     }
 }
 
-/// The weights of b and c in the point of a triangle that is closest to p: straight below p if that is
-/// inside (Ericson 2005, 5.1.5), or else on the closest of the edges. A triangle without area has only
-/// edges.
+/// The weights of b and c in the point of a triangle that is closest to p: straight below
+/// p if that is inside (Ericson 2005, 5.1.5), or else on the closest of the edges. A
+/// triangle without area has only edges.
 fn weights(a: DVec3, ab: DVec3, ac: DVec3, p: DVec3) -> [f64; 2] {
     let ap = p - a;
     let (bp, cp) = (ap - ab, ap - ac);
@@ -84,7 +86,8 @@ fn weights(a: DVec3, ab: DVec3, ac: DVec3, p: DVec3) -> [f64; 2] {
     closer(closer(first, second), third)
 }
 
-/// Where on an edge a point lies, from 0 to 1, that is this far behind its start and before its end.
+/// Where on an edge a point lies, from 0 to 1, that is this far behind
+/// its start and before its end.
 fn share(behind: f64, before: f64) -> f64 {
     if behind <= 0.0 {
         0.0
@@ -99,12 +102,13 @@ impl Grid<'_> {
     /// The point of the mesh that is closest to a point, and no farther than `max_distance`; where
     /// several triangles are equally close, that of the lowest id.
     ///
-    /// The time grows with the triangles in a cube around the point that reaches as far as the answer: it
-    /// is short near the mesh, and that of a good part of all triangles far outside of it.
+    /// The time grows with the triangles in a cube around the point that reaches
+    /// as far as the answer: it is short near the mesh, and that of a good part of
+    /// all triangles far outside of it.
     ///
-    /// Of the options, mask, the triangle to skip and counters mean something here: a cell step is a list that
-    /// was looked at. A point or a distance that is NaN, an infinite point and a negative distance find
-    /// nothing.
+    /// Of the options, mask, the triangle to skip and counters mean something here: a cell step is
+    /// a list that was looked at. A point or a distance that is NaN, an infinite point and a
+    /// negative distance find nothing.
     ///
     /// ```
     /// # use hgrid_core::*;

@@ -19,8 +19,8 @@ pub enum Method {
     Variable = 3,
     /// An uncompressed recursive grid, as in the Manta ray tracer: what the paper compares with.
     Recursive = 4,
-    /// Occupancy masks and ranks, cells as large as triangles: this project's own, with the shortest
-    /// build and the least trouble with triangles of all sizes.
+    /// Occupancy masks and ranks, cells as large as triangles: this project's own, with the
+    /// shortest build and the least trouble with triangles of all sizes.
     #[default]
     Brick = 5,
 }
@@ -108,8 +108,8 @@ pub struct Config {
     pub method: Method,
     /// Cells per primitive (the paper's rho): more cells mean fewer tests, more steps, more memory.
     pub density: f32,
-    /// For [`Method::Fixed`]: cells of a level in one macrocell of the level above, on each axis (the
-    /// paper's S), at least 2.
+    /// For [`Method::Fixed`]: cells of a level in one macrocell of the level above, on each
+    /// axis (the paper's S), at least 2.
     pub macrocell_factor: u32,
     /// For [`Method::Variable`]: a cell with more primitives than this gets a subgrid.
     pub subdivide_above: u32,

@@ -6,8 +6,8 @@ use core::fmt;
 use crate::error::Error;
 use crate::tasks::Task;
 
-/// How a build is run: by the caller's threads, under the caller's eyes. `Control::default()` is one
-/// task after the other, and silence.
+/// How a build is run: by the caller's threads, under the caller's eyes. `Control::default()` is
+/// one task after the other, and silence.
 ///
 /// The grid does not depend on it, to the bit.
 ///
@@ -42,16 +42,16 @@ pub struct Control<'c> {
     /// The most tasks that run at once, from 1 to [`MAX_TASKS`](Self::MAX_TASKS): what is outside
     /// counts as the nearest of both. Each takes scratch of its own.
     pub tasks: u32,
-    /// Calls the task with every number below the count exactly once, in any order, and returns when
-    /// all calls have returned. It is called several times in a build, with counts up to
-    /// [`tasks`](Self::tasks).
+    /// Calls the task with every number below the count exactly once, in any order, and
+    /// returns when all calls have returned. It is called several times in a build, with
+    /// counts up to [`tasks`](Self::tasks).
     ///
     /// On targets without atomic operations it is never called.
     pub run: &'c dyn for<'t> Fn(u32, &'t Task<'t>),
-    /// Told how much of a build is done, from 0 to 1, and answers whether to go on. It is called on the
-    /// thread that builds; what is done grows from call to call, and with the last call of a build
-    /// that succeeds it is exactly 1, whatever the answer to that. After the answer `false` the build
-    /// ends with [`Error::Cancelled`], at the latest when a pass over the mesh is over.
+    /// Told how much of a build is done, from 0 to 1, and answers whether to go on. It is called on
+    /// the thread that builds; what is done grows from call to call, and with the last call of a
+    /// build that succeeds it is exactly 1, whatever the answer to that. After the answer `false`
+    /// the build ends with [`Error::Cancelled`], at the latest when a pass over the mesh is over.
     ///
     /// Questions for sizes do not call it.
     pub progress: Option<&'c dyn Fn(f32) -> bool>,
@@ -117,7 +117,8 @@ impl<'c> Watch<'c> {
         if done >= 1.0 {
             return Ok(());
         }
-        // Not for nothing; and where a build starts anew, with coarser cells say, it does not go back.
+        // Not for nothing; and where a build starts anew, with coarser
+        // cells say, it does not go back.
         if done >= self.done.get() + LEAST {
             self.done.set(done);
             if !progress(done) {

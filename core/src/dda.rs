@@ -84,7 +84,8 @@ impl Line {
     /// The line of a ray that was brought to the lattice's box; `None` if it ends before.
     #[inline]
     pub(crate) fn new(lattice: &Lattice, ray: &Ray, approach: &Approach) -> Option<Self> {
-        // A `t` is rounded to f32 before it is compared: what it was before may lie half an ulp out.
+        // A `t` is rounded to f32 before it is compared: what it was
+        // before may lie half an ulp out.
         let start = approach.near.max(f64::from(ray.t_min.next_down()) - approach.t);
         let end = approach.far.min(f64::from(ray.t_max.next_up()) - approach.t);
         if start > end {
@@ -98,7 +99,8 @@ impl Line {
         let scale = longest * finest;
         let inverse_scale = 1.0 / scale;
 
-        // Axis by axis as numbers, vectors at last: one that is filled number by number is slow to read.
+        // Axis by axis as numbers, vectors at last: one that is filled
+        // number by number is slow to read.
         let (mut position, mut rate, mut delta) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         let (mut base, mut step) = ([f32::INFINITY; 3], [0.0; 3]);
         for axis in 0..3 {
@@ -133,8 +135,8 @@ impl Line {
         round((f64::from(t.next_up()) - self.start) * self.scale)
     }
 
-    /// What a step on each axis adds, in wrapping arithmetic, to the place of a cell in an array with these
-    /// strides. No step is taken along an axis that the line runs parallel to.
+    /// What a step on each axis adds, in wrapping arithmetic, to the place of a cell in an array
+    /// with these strides. No step is taken along an axis that the line runs parallel to.
     #[inline(always)]
     pub(crate) fn moves(&self, strides: [usize; 3]) -> [usize; 3] {
         let step = self.step.to_array();
@@ -181,8 +183,8 @@ impl Line {
         near.max(0.0) <= far.min(limit)
     }
 
-    /// On which axes a cell's lower half is not crossed between two distances, and on which its upper
-    /// half is not.
+    /// On which axes a cell's lower half is not crossed between two distances, and
+    /// on which its upper half is not.
     #[inline(always)]
     pub(crate) fn halves(&self, cell: [u32; 3], near: f32, far: f32) -> [u32; 2] {
         let middle = Vec3A::from_array(cell.map(as_f32)) + 0.5;
@@ -192,8 +194,8 @@ impl Line {
         [is_above.bitmask(), is_below.bitmask()]
     }
 
-    /// From where to where the line is inside a box given in cells, or along its border; the second is
-    /// less than the first if it passes the box.
+    /// From where to where the line is inside a box given in cells, or along its border; the second
+    /// is less than the first if it passes the box.
     #[inline(always)]
     fn inside(&self, reach: &Aabb) -> [f32; 2] {
         let low = reach.min - self.margin - self.position;
@@ -211,8 +213,9 @@ impl Line {
     /// A walk from a distance on through the cells `min..=max`, each `size` cells of the lattice
     /// wide, which ends where the ray passes `exits`.
     ///
-    /// They are those of the larger cell around these ([`Walk::next`]), not computed from these: along a
-    /// border that the ray hardly crosses the two differ by many cells, and between them would be a gap.
+    /// They are those of the larger cell around these ([`Walk::next`]), not computed from
+    /// these: along a border that the ray hardly crosses the two differ by many cells,
+    /// and between them would be a gap.
     #[inline(always)]
     pub(crate) fn walk(
         &self,
@@ -262,10 +265,11 @@ impl Walk {
         self.step_along(axis, border, limit)
     }
 
-    /// The same with an arm for each axis, which is told to `along`, also when the step leaves the cells.
+    /// The same with an arm for each axis, which is told to `along`, also
+    /// when the step leaves the cells.
     ///
-    /// In a walk of dozens of cells the processor predicts the axis and does not wait for distances, which
-    /// [`advance`](Self::advance) always does.
+    /// In a walk of dozens of cells the processor predicts the axis and does not wait for
+    /// distances, which [`advance`](Self::advance) always does.
     #[inline(always)]
     pub(crate) fn advance_far(&mut self, limit: f32, mut along: impl FnMut(usize)) -> Step {
         let [x, y, z] = self.next.to_array();
@@ -300,8 +304,8 @@ impl Walk {
     }
 }
 
-/// The axis with the nearest border, and its distance; of borders in one point the last axis', as in
-/// [`Walk::advance_far`].
+/// The axis with the nearest border, and its distance; of borders in one point the last
+/// axis', as in [`Walk::advance_far`].
 ///
 /// Takes a copy: where a walk itself is handed on, it lives in memory.
 #[cold]
@@ -324,8 +328,8 @@ mod tests {
 
     const END: Vec3A = Vec3A::new(4.0, 3.0, 5.0);
 
-    /// A walk with these distances: to the first borders, between borders, and to the last ones. Up from the
-    /// first cell or, on some axes, down from the end.
+    /// A walk with these distances: to the first borders, between borders, and to the last ones. Up
+    /// from the first cell or, on some axes, down from the end.
     fn walk(first: [f32; 3], delta: [f32; 3], exits: [f32; 3], is_down: BVec3A) -> Walk {
         let [first, delta, exits] = [first, delta, exits].map(Vec3A::from_array);
         // As a line has it on axes that it runs parallel to.

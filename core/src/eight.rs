@@ -5,14 +5,15 @@
 //!                                                                    y, z likewise
 //! ```
 //!
-//! The lanes do the same operations in the same order as [`TriangleTest::test`], none of them fused,
-//! so they drop exactly the triangles that it drops. What passes, about one triangle a ray, is
-//! resolved in f64 one by one.
+//! The lanes do the same operations in the same order as [`TriangleTest::test`], none of them
+//! fused, so they drop exactly the triangles that it drops. What passes, about one triangle a
+//! ray, is resolved in f64 one by one.
 //!
-//! What was measured (Zen 4, November 2026, one to eight triangles a call): rows transposed in registers
-//! beat floats written one by one to where the lanes want them (13 to 28 ns against 23 to 46 ns). Rows that
-//! went through memory on the way cost single rays a tenth of their time, and arrays of vectors that were
-//! mapped half of it: they are stored in pieces, and a load of the whole waits for the stores.
+//! What was measured (Zen 4, November 2026, one to eight triangles a call): rows transposed in
+//! registers beat floats written one by one to where the lanes want them (13 to 28 ns against
+//! 23 to 46 ns). Rows that went through memory on the way cost single rays a tenth of their
+//! time, and arrays of vectors that were mapped half of it: they are stored in pieces, and a
+//! load of the whole waits for the stores.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};
@@ -61,8 +62,8 @@ impl<S: Simd> Eight<S> {
 
 /// The first eight of some ids; where there are fewer, the last once more: it is read, too.
 ///
-/// Number by number, and so into registers: what is copied is waited for, up to a twelfth of a ray's time where
-/// lists are short.
+/// Number by number, and so into registers: what is copied is waited for, up to a twelfth of a
+/// ray's time where lists are short.
 #[inline(always)]
 pub(crate) fn first_eight(ids: &[u32]) -> [u32; LANES] {
     let last = ids.len().saturating_sub(1);

@@ -1,6 +1,8 @@
-//! What can go wrong, with the number that helps: one enum for build and open, no strings, no allocation.
+//! What can go wrong, with the number that helps: one enum for build and
+//! open, no strings, no allocation.
 //!
-//! A query of one ray has no error: a miss is not one, and a grid that was opened answers every ray.
+//! A query of one ray has no error: a miss is not one, and a grid that
+//! was opened answers every ray.
 
 use core::fmt;
 
@@ -20,8 +22,8 @@ pub enum MeshField {
     Positions,
     /// The indices: their bytes end before the last triangle, or the stride is below three indices.
     Indices,
-    /// The masks: there are not as many as triangles, their bytes end before the last, or the stride is
-    /// below four bytes.
+    /// The masks: there are not as many as triangles, their bytes end before the last, or
+    /// the stride is below four bytes.
     Masks,
 }
 
@@ -90,7 +92,8 @@ pub enum Error {
     /// The loop of a parallel build ran a task twice or not at all: see
     /// [`Control::run`](crate::Control::run). There is no grid.
     InvalidParallelFor,
-    /// The caller's [`Control::progress`](crate::Control::progress) asked to stop. There is no grid.
+    /// The caller's [`Control::progress`](crate::Control::progress)
+    /// asked to stop. There is no grid.
     Cancelled,
     /// An array of a batch of rays cannot be what it should: see the field.
     InvalidBatch(BatchField),

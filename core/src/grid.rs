@@ -28,9 +28,9 @@ use crate::visit::{Ids, Visitor};
 /// A built grid and the mesh it was built for, ready for queries.
 ///
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
-/// number of threads may query it at once. Queries never fail, never allocate and never panic; their
-/// steps are bounded by the resolutions (one level: by their sum). A single query's stack is below
-/// 6 KiB, a batch's below 16 KiB.
+/// number of threads may query it at once. Queries never fail, never allocate and never panic;
+/// their steps are bounded by the resolutions (one level: by their sum). A single query's stack is
+/// below 6 KiB, a batch's below 16 KiB.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,
@@ -55,16 +55,16 @@ impl<'a> Grid<'a> {
     /// `index` keeps the grid, `scratch` is free again when the build returns; both start at a
     /// multiple of [`ALIGNMENT`](crate::ALIGNMENT) and may hold anything. [`sizes`](crate::sizes)
     /// tells how large they must be; more is not used. The same mesh and configuration give the
-    /// same bits, on every machine of the same byte order. The stack of a build is below 12 KiB, with
-    /// more than one task ([`Control`]) below 96 KiB, that of a task below 8 KiB, beside what the
-    /// caller's own functions take.
+    /// same bits, on every machine of the same byte order. The stack of a build is below 12 KiB,
+    /// with more than one task ([`Control`]) below 96 KiB, that of a task below 8 KiB, beside what
+    /// the caller's own functions take.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] names the region and its need, [`Error::Misaligned`] the region;
     /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
     /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field. After an
-    /// error the index region is as it was, but for variable, recursive and brick grids, which fill it
-    /// as they go: there it holds nothing of use. Either way both regions can be used again.
+    /// error the index region is as it was, but for variable, recursive and brick grids, which fill
+    /// it as they go: there it holds nothing of use. Either way both regions can be used again.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
@@ -95,13 +95,13 @@ impl<'a> Grid<'a> {
     ///
     /// Only [`Method::Brick`] is cut into tasks; the other methods build on the thread that calls.
     /// [`sizes_with`](crate::sizes_with) and
-    /// [`Sizes::bound_parallel`](crate::Sizes::bound_parallel) tell how much memory so many tasks take;
-    /// where there is less, but enough for fewer, there are fewer.
+    /// [`Sizes::bound_parallel`](crate::Sizes::bound_parallel) tell how much memory so many tasks
+    /// take; where there is less, but enough for fewer, there are fewer.
     ///
     /// # Errors
-    /// Those of [`build`](Self::build), [`Error::InvalidParallelFor`] if a task was run twice or not at
-    /// all, and [`Error::Cancelled`] if the progress callback had enough; after these two the index holds
-    /// nothing of use.
+    /// Those of [`build`](Self::build), [`Error::InvalidParallelFor`] if a task was run twice or
+    /// not at all, and [`Error::Cancelled`] if the progress callback had enough; after these two
+    /// the index holds nothing of use.
     pub fn build_with(
         mesh: TriangleMesh<'a>,
         config: &Config,
@@ -128,7 +128,8 @@ impl<'a> Grid<'a> {
         Ok(grid)
     }
 
-    /// Opens a grid that was built earlier or elsewhere, in O(1); bytes behind the grid are ignored.
+    /// Opens a grid that was built earlier or elsewhere, in O(1);
+    /// bytes behind the grid are ignored.
     ///
     /// The mesh must be the one it was built for. What O(1) cannot see is not trusted: on damaged
     /// bytes queries may answer wrongly, but they stay inside the blob and end. Use
@@ -279,9 +280,9 @@ impl<'a> Grid<'a> {
         self.lattice.cell_size()
     }
 
-    /// Traces neighbouring rays together where the structure can; tells whether it does. `answer` gets
-    /// the place of a ray and its hit and perhaps those of the next ones, or no hit for a ray that must
-    /// be traced alone.
+    /// Traces neighbouring rays together where the structure can; tells whether it does. `answer`
+    /// gets the place of a ray and its hit and perhaps those of the next ones, or no hit for a
+    /// ray that must be traced alone.
     pub(crate) fn tiles<const ANY: bool>(
         &self,
         rays: &Strided<'_>,
@@ -320,8 +321,9 @@ impl<'a> Grid<'a> {
         &self.mesh
     }
 
-    /// The grid as bytes: what to copy, store or send in order to [`open`](Self::open) it again. Of a packed grid it is the
-    /// grid alone, to be opened with its mesh; [`pack`](Self::pack) makes a packed one again.
+    /// The grid as bytes: what to copy, store or send in order to [`open`](Self::open) it
+    /// again. Of a packed grid it is the grid alone, to be opened with its mesh;
+    /// [`pack`](Self::pack) makes a packed one again.
     #[must_use]
     pub const fn blob(&self) -> &'a [u8] {
         self.blob
@@ -333,7 +335,8 @@ impl<'a> Grid<'a> {
         self.blob.len()
     }
 
-    /// Bytes of scratch that the build of this grid took, or at most took where a bump allocator gave it.
+    /// Bytes of scratch that the build of this grid took, or at most took
+    /// where a bump allocator gave it.
     #[must_use]
     pub fn scratch_bytes(&self) -> u64 {
         let resolution = self.lattice.resolution;
@@ -374,7 +377,8 @@ impl<'a> Grid<'a> {
     }
 
     /// The density that the grid has: the configured one, or a half, a quarter, ... of it where the
-    /// mesh would have needed more than 16 references a triangle. It means nothing for a brick grid.
+    /// mesh would have needed more than 16 references a triangle. It
+    /// means nothing for a brick grid.
     #[must_use]
     pub fn density(&self) -> f32 {
         self.config().density
@@ -393,7 +397,8 @@ impl<'a> Grid<'a> {
         self.header().map_or(0, |header| header.skipped_count)
     }
 
-    /// Primitive ids in all cells together; words of the pool for a variable, recursive or brick grid.
+    /// Primitive ids in all cells together; words of the pool for a
+    /// variable, recursive or brick grid.
     #[must_use]
     pub fn reference_count(&self) -> u32 {
         self.header().map_or(0, |header| header.reference_count)

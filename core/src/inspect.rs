@@ -11,7 +11,8 @@ use crate::visit::EVERYWHERE;
 pub struct Statistics {
     /// Triangles left out because a coordinate is not finite.
     pub skipped_count: u32,
-    /// Triangles of which two corners are the same point. They are in the grid, and no ray hits them.
+    /// Triangles of which two corners are the same point. They are in
+    /// the grid, and no ray hits them.
     pub degenerate_count: u32,
     /// The first triangle that is one or the other, or [`INVALID_ID`].
     pub first_bad: u32,
@@ -22,8 +23,9 @@ pub struct Statistics {
     pub reference_count: u64,
     /// Ids in the longest list.
     pub longest_list: u32,
-    /// A hash of the box, the resolution and all lists in order, not of which cell has which: the same for
-    /// the same grid on every platform, whatever its byte order. Not a defence against forgery.
+    /// A hash of the box, the resolution and all lists in order, not of which cell has
+    /// which: the same for the same grid on every platform, whatever its byte order.
+    /// Not a defence against forgery.
     pub content_hash: u64,
 }
 

@@ -2,8 +2,9 @@
 //!
 //! hgrid builds a grid over a triangle mesh in O(n), in memory that the caller brings, and
 //! answers ray queries on it. It implements *Multi-Level Hashed Grid Construction Methods* (Costa,
-//! Pereira, Jorge, 2010). No allocation, no threads, no I/O, no panic. `unsafe` is denied but in one
-//! place: where `simd` asks the processor which vectors it has and hands out the tokens that say so.
+//! Pereira, Jorge, 2010). No allocation, no threads, no I/O, no panic. `unsafe` is
+//! denied but in one place: where `simd` asks the processor which vectors it has and
+//! hands out the tokens that say so.
 //!
 //! ```
 //! use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
@@ -25,11 +26,11 @@
 //! ```
 //!
 //! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `approach`, `triangle`,
-//! `simd`, `eight`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`, `hash`,
-//! `cell`, `spans`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure above them
-//! (`one_level`; `fixed` and `variable` on top of it; `recursive`; `brick`), and `grid`: the view that
-//! queries run on. Then the questions: `sizes`, `options`, `batch`, `closest`, `inspect`, `packed`.
-//! core/DESIGN.md tells how it all works and what was left out.
+//! `simd`, `eight`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`,
+//! `hash`, `cell`, `spans`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure
+//! above them (`one_level`; `fixed` and `variable` on top of it; `recursive`; `brick`), and `grid`:
+//! the view that queries run on. Then the questions: `sizes`, `options`, `batch`, `closest`,
+//! `inspect`, `packed`. core/DESIGN.md tells how it all works and what was left out.
 //!
 //! Keys used in these pages: **CP10** Costa, Pereira, Jorge 2010; **LD08** Lagae and Dutré,
 //! *Compact, Fast and Robust Grids for Ray Tracing*, 2008.

@@ -1,7 +1,7 @@
 //! Lists of ids cut out of one array by a table of ends.
 
-/// Each number with the one behind it. (`windows` and `is_sorted` of the standard library keep code to
-/// panic in a release build; this keeps none.)
+/// Each number with the one behind it. (`windows` and `is_sorted` of the standard library keep code
+/// to panic in a release build; this keeps none.)
 pub(crate) fn pairs(numbers: &[u32]) -> impl Iterator<Item = (u32, u32)> {
     numbers.iter().copied().zip(numbers.iter().skip(1).copied())
 }

@@ -50,7 +50,8 @@ pub struct Strided<'a> {
 }
 
 impl<'a> Strided<'a> {
-    /// The same elements of `size` bytes without the bytes after the last of them, if all lie inside.
+    /// The same elements of `size` bytes without the bytes after the
+    /// last of them, if all lie inside.
     pub(crate) fn cut(self, size: usize) -> Option<Self> {
         let Some(last) = self.count.checked_sub(1) else {
             return Some(Self { bytes: &[], ..self });
@@ -138,11 +139,12 @@ impl<'a> TriangleMesh<'a> {
     }
 
     /// The same mesh with a mask for each triangle, a `u32`, which queries that have one look at
-    /// ([`QueryOptions::mask`](crate::QueryOptions::mask)). Without masks every triangle has all bits.
+    /// ([`QueryOptions::mask`](crate::QueryOptions::mask)). Without
+    /// masks every triangle has all bits.
     ///
     /// # Errors
-    /// [`Error::InvalidMesh`] if there are not as many masks as triangles, the stride is below four or
-    /// the bytes end before the last mask.
+    /// [`Error::InvalidMesh`] if there are not as many masks as triangles, the stride is below four
+    /// or the bytes end before the last mask.
     ///
     /// ```
     /// use hgrid_core::{Strided, TriangleMesh};
@@ -230,8 +232,8 @@ impl<'a> TriangleMesh<'a> {
         Some([read(a)?, read(b)?, read(c)?])
     }
 
-    /// The box of all vertices whose coordinates are finite and no larger than `MAX_COORDINATE`, used
-    /// or not.
+    /// The box of all vertices whose coordinates are finite and no larger than
+    /// `MAX_COORDINATE`, used or not.
     pub(crate) fn vertex_bounds(&self) -> Aabb {
         let limit = Vec3A::splat(MAX_COORDINATE);
         let mut bounds = Aabb::EMPTY;

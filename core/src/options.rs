@@ -1,11 +1,11 @@
 //! What a query may be told beyond its ray, and the queries that take it.
 //!
-//! Masks, culling and the triangle to skip are looked up when a ray hits. A filter is asked about hits
-//! in order, from near to far and never twice about the same triangle, though a grid has neither
-//! order nor memory of what it has shown: a walk collects the few nearest hits in order, the filter
-//! is asked about those, and if it wants none of them the next walk starts where the last hit was.
-//! The first walk collects one hit, the next two, and so on: whoever accepts the first pays nothing
-//! for the order.
+//! Masks, culling and the triangle to skip are looked up when a ray hits. A filter is asked about
+//! hits in order, from near to far and never twice about the same triangle, though a grid has
+//! neither order nor memory of what it has shown: a walk collects the few nearest hits in order,
+//! the filter is asked about those, and if it wants none of them the next walk starts where the
+//! last hit was. The first walk collects one hit, the next two, and so on: whoever accepts the
+//! first pays nothing for the order.
 
 use core::fmt;
 
@@ -17,8 +17,8 @@ use crate::search::Nearest;
 
 /// Which sides of triangles a ray does not hit.
 ///
-/// The front is where a triangle's vertices appear counter-clockwise. A triangle seen exactly edge on
-/// shows neither side, and is never hit.
+/// The front is where a triangle's vertices appear counter-clockwise. A triangle seen exactly edge
+/// on shows neither side, and is never hit.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Cull {
@@ -65,9 +65,9 @@ pub struct QueryOptions<'q> {
     pub mask: u32,
     /// Which sides are not hit.
     pub cull: Cull,
-    /// A triangle that is not hit: the one that the ray leaves, which it cannot hit again, without any
-    /// epsilon. A neighbour across an edge still may be, where the origin was rounded to just below
-    /// it. At first [`INVALID_ID`].
+    /// A triangle that is not hit: the one that the ray leaves, which it cannot hit again, without
+    /// any epsilon. A neighbour across an edge still may be, where the origin was rounded to just
+    /// below it. At first [`INVALID_ID`].
     pub skip: u32,
     /// Says of a hit whether it counts. Asked about hits from near to far, where `t` is equal by
     /// ascending id, and about each triangle at most once for each ray.
@@ -168,10 +168,11 @@ impl Grid<'_> {
 
     /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.
     ///
-    /// Writes as many of them as `hits` has room for, the nearest, and returns how many there are. With
-    /// room for more than there are, the ray is walked once. Otherwise, and with a filter, it is walked
-    /// once more for each sixteen hits, from where it got to: so no memory is taken, whatever their number,
-    /// but thousands of hits in one cell take long, as the square of their number.
+    /// Writes as many of them as `hits` has room for, the nearest, and returns how many there
+    /// are. With room for more than there are, the ray is walked once. Otherwise, and with a
+    /// filter, it is walked once more for each sixteen hits, from where it got to: so no
+    /// memory is taken, whatever their number, but thousands of hits in one cell take long,
+    /// as the square of their number.
     ///
     /// ```
     /// # use hgrid_core::*;

@@ -6,9 +6,9 @@
 //!   says so           12 a vertex    12 a triangle  4 a triangle, if the mesh has any
 //! ```
 //!
-//! Every section starts at a multiple of 64, as in the grid, which is the one that was built but for its
-//! header. The mesh is tight and its indices have 32 bits, whatever the caller's had. Opening reads it
-//! where it lies, so there is still no copy and no allocation.
+//! Every section starts at a multiple of 64, as in the grid, which is the one that was built but
+//! for its header. The mesh is tight and its indices have 32 bits, whatever the caller's had.
+//! Opening reads it where it lies, so there is still no copy and no allocation.
 
 use core::mem::offset_of;
 
@@ -39,8 +39,8 @@ pub struct BlobInfo {
 }
 
 impl BlobInfo {
-    /// Reads the first 128 bytes of a blob, which may lie anywhere: in a buffer that is filled from a
-    /// file, before there is room for the rest.
+    /// Reads the first 128 bytes of a blob, which may lie anywhere: in a buffer that is filled from
+    /// a file, before there is room for the rest.
     ///
     /// # Errors
     /// [`Error::NotAGrid`], [`Error::WrongByteOrder`], [`Error::UnsupportedVersion`],
@@ -96,12 +96,13 @@ impl<'a> Grid<'a> {
         packed.map_or(0, |sections| sections.end)
     }
 
-    /// Writes grid and mesh as one blob, which [`open_packed`](Self::open_packed) needs nothing else
-    /// for, and returns the part of `to` that it takes.
+    /// Writes grid and mesh as one blob, which [`open_packed`](Self::open_packed) needs nothing
+    /// else for, and returns the part of `to` that it takes.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is no multiple of
-    /// [`ALIGNMENT`], [`Error::IndexOutOfRange`] a triangle without vertices. Nothing is written then.
+    /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is
+    /// no multiple of [`ALIGNMENT`], [`Error::IndexOutOfRange`] a triangle without
+    /// vertices. Nothing is written then.
     ///
     /// ```
     /// # use hgrid_core::*;
@@ -154,8 +155,9 @@ impl<'a> Grid<'a> {
 
     /// Opens a blob that [`pack`](Self::pack) wrote, in O(1): the mesh is its own.
     ///
-    /// What [`open`](Self::open) says of damaged bytes holds here, too; [`validate`](Self::validate)
-    /// proves that the grid is one of the mesh behind it, whatever mesh that is.
+    /// What [`open`](Self::open) says of damaged bytes holds here, too;
+    /// [`validate`](Self::validate) proves that the grid is one of the mesh
+    /// behind it, whatever mesh that is.
     ///
     /// # Errors
     /// Those of [`open`](Self::open), and [`Error::NoMesh`].

@@ -53,7 +53,8 @@ impl SimdLevel {
 
     /// The best level of this machine.
     ///
-    /// Asks the processor the first time, and whether the operating system keeps the wide registers.
+    /// Asks the processor the first time, and whether the operating
+    /// system keeps the wide registers.
     #[inline]
     #[must_use]
     pub fn detect() -> Self {
@@ -85,8 +86,8 @@ impl SimdLevel {
     }
 }
 
-/// Whether the target has vectors at all. Without them sixteen lanes one after the other are no gain,
-/// much code, and minutes of compilation.
+/// Whether the target has vectors at all. Without them sixteen lanes one after the other are no
+/// gain, much code, and minutes of compilation.
 pub(crate) const HAS_VECTORS: bool = cfg!(any(
     all(
         any(target_arch = "x86", target_arch = "x86_64"),
@@ -99,8 +100,8 @@ pub(crate) const HAS_VECTORS: bool = cfg!(any(
 
 /// Code for any vector instructions.
 ///
-/// What `run` calls on vectors must be `#[inline(always)]` down to the last function: only what ends
-/// up inside [`dispatch`] is compiled for the level.
+/// What `run` calls on vectors must be `#[inline(always)]` down to the last function: only what
+/// ends up inside [`dispatch`] is compiled for the level.
 pub(crate) trait Kernel {
     type Output;
 

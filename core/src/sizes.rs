@@ -18,17 +18,18 @@ pub struct Sizes {
     pub index_bytes: usize,
     /// For the region that only the build needs.
     pub scratch_bytes: usize,
-    /// Whether `index_bytes` is what the build needs, to the byte, or only no less than that; the blob of a
-    /// brick grid may be smaller. `scratch_bytes` is enough; for one-level and fixed grids it is exact.
+    /// Whether `index_bytes` is what the build needs, to the byte, or only no less than
+    /// that; the blob of a brick grid may be smaller. `scratch_bytes` is enough; for
+    /// one-level and fixed grids it is exact.
     pub is_exact: bool,
 }
 
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A one-level grid of a scan takes a sixth of it or less, a brick grid a thirteenth; for recursive grids
-    /// it is generous beyond use. `None` if no build takes the configuration, or the sizes do not fit the
-    /// machine's address space.
+    /// A one-level grid of a scan takes a sixth of it or less, a brick grid a thirteenth; for
+    /// recursive grids it is generous beyond use. `None` if no build takes the configuration, or
+    /// the sizes do not fit the machine's address space.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Method, Sizes};
@@ -67,8 +68,8 @@ impl Sizes {
         Some(Self { index_bytes, scratch_bytes, is_exact: false })
     }
 
-    /// Sizes from counts in 64 bits; an error if they do not fit the machine's address space. A bound
-    /// is never larger than the largest region that the machine can have.
+    /// Sizes from counts in 64 bits; an error if they do not fit the machine's address space. A
+    /// bound is never larger than the largest region that the machine can have.
     pub(crate) fn new(index_bytes: u64, scratch_bytes: u64, is_exact: bool) -> Result<Self, Error> {
         let largest = if is_exact { u64::MAX } else { isize::MAX.unsigned_abs() as u64 };
         let index_bytes = index_bytes.min(largest);
@@ -90,12 +91,12 @@ impl Sizes {
 
 /// The memory that a build of this mesh takes.
 ///
-/// With an empty `scratch` the answer takes two passes over the triangles, one more for each halving
-/// of the density, and `index_bytes` is enough: for a scan up to twice what one level takes, four
-/// times what a fixed grid takes, seven times what a brick grid takes, for the others a generous
-/// multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid is planned in
-/// it and `index_bytes` is exact, for about half the time of a build, up to all of it for the others. The
-/// scratch holds nothing of use afterwards.
+/// With an empty `scratch` the answer takes two passes over the triangles, one more for each
+/// halving of the density, and `index_bytes` is enough: for a scan up to twice what one level
+/// takes, four times what a fixed grid takes, seven times what a brick grid takes, for the others a
+/// generous multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid
+/// is planned in it and `index_bytes` is exact, for about half the time of a build, up to all of it
+/// for the others. The scratch holds nothing of use afterwards.
 ///
 /// # Errors
 /// Those of [`Grid::build`](crate::Grid::build), but for index memory.
@@ -117,8 +118,8 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
 /// The memory that a parallel build of this mesh takes: [`sizes`], by the caller's threads.
 ///
 /// More tasks take more scratch, each as much again as the first. The index is filled in parts, one
-/// for each task, and may take a few bytes more than the grid in it. Only [`Method::Brick`] builds in
-/// parallel; for the others this is [`sizes`].
+/// for each task, and may take a few bytes more than the grid in it. Only [`Method::Brick`] builds
+/// in parallel; for the others this is [`sizes`].
 ///
 /// # Errors
 /// Those of [`Grid::build_with`](crate::Grid::build_with), but for index memory.
@@ -139,18 +140,18 @@ pub fn sizes_with(
     }
 }
 
-/// The finest grid of a method that fits into so many bytes of index, and what it takes: a configuration
-/// that is the given one, or has a lower density (larger cells for [`Method::Brick`]), by no more than a
-/// step too much.
+/// The finest grid of a method that fits into so many bytes of index, and what it takes: a
+/// configuration that is the given one, or has a lower density (larger cells for
+/// [`Method::Brick`]), by no more than a step too much.
 ///
-/// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls of
-/// [`sizes`] at most. `scratch` is for them: with one-level and fixed grids there may be none, then a
-/// grid must fit by its bound and gets coarser than it had to be; the others need as much as [`sizes`]
-/// without scratch says.
+/// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls
+/// of [`sizes`] at most. `scratch` is for them: with one-level and fixed grids there may be none,
+/// then a grid must fit by its bound and gets coarser than it had to be; the others need as much
+/// as [`sizes`] without scratch says.
 ///
 /// # Errors
-/// [`Error::OutOfMemory`] with the bytes of index that the coarsest grid needs, or the scratch; those of
-/// [`sizes`].
+/// [`Error::OutOfMemory`] with the bytes of index that the coarsest grid needs, or
+/// the scratch; those of [`sizes`].
 ///
 /// ```
 /// use hgrid_core::{Block, Config, TriangleMesh, fit, sizes};

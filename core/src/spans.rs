@@ -1,9 +1,10 @@
 //! The cells of eight triangles at a time: what a pass over a mesh begins with.
 //!
-//! In vectors, and the same bits as [`Lattice::range`] of each of them, or in halves of cells as brick's
-//! `range`: a gather of corners, a box, an addition that rounds. Whoever spreads triangles over cells asks for the cells of many before the
-//! first is spread, because how many cells a triangle has is as good as random: the branch that
-//! depends on it is mispredicted, and then nothing of the next triangles should have to be done again.
+//! In vectors, and the same bits as [`Lattice::range`] of each of them, or in halves of cells as
+//! brick's `range`: a gather of corners, a box, an addition that rounds. Whoever spreads triangles
+//! over cells asks for the cells of many before the first is spread, because how many cells a
+//! triangle has is as good as random: the branch that depends on it is mispredicted, and then
+//! nothing of the next triangles should have to be done again.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
@@ -27,7 +28,8 @@ pub(crate) struct Spans<S: Simd> {
 }
 
 impl<S: Simd> Spans<S> {
-    /// In cells of a lattice, or in parts of them: a power of two on each axis, so that nothing rounds.
+    /// In cells of a lattice, or in parts of them: a power of two on
+    /// each axis, so that nothing rounds.
     #[inline(always)]
     pub(crate) fn new(simd: S, lattice: &Lattice, parts: u32) -> Self {
         debug_assert!(parts.is_power_of_two());
@@ -37,9 +39,9 @@ impl<S: Simd> Spans<S> {
         Self { axes: [x, y, z] }
     }
 
-    /// The cells of the triangles `first..first + 8` on each axis, and for which of the triangles this is
-    /// the answer: those with finite corners that can be read this way. Of the others, one with the
-    /// mesh's last vertex among them, nothing is known.
+    /// The cells of the triangles `first..first + 8` on each axis, and for which of the triangles
+    /// this is the answer: those with finite corners that can be read this way. Of the others, one
+    /// with the mesh's last vertex among them, nothing is known.
     #[inline(always)]
     pub(crate) fn of(
         &self,

@@ -80,7 +80,8 @@ impl Axis {
 }
 
 impl TriangleTest {
-    /// Prepares a ray for tests against triangles inside `bounds` (least and greatest corner, finite).
+    /// Prepares a ray for tests against triangles inside `bounds`
+    /// (least and greatest corner, finite).
     ///
     /// `None` if the ray cannot hit anything there: it is invalid or passes the box.
     #[must_use]
@@ -138,8 +139,9 @@ impl TriangleTest {
 
     /// The hit with a triangle that passed, or [`Hit::MISS`].
     ///
-    /// Out of line: rare, and inside it would take the registers from the filter. The triangle is read anew and
-    /// the hit comes back in registers: what is stored number by number and loaded in pieces is waited for.
+    /// Out of line: rare, and inside it would take the registers from the filter. The triangle
+    /// is read anew and the hit comes back in registers: what is stored number by number and
+    /// loaded in pieces is waited for.
     #[inline(never)]
     pub(crate) fn decide(&self, mesh: &TriangleMesh<'_>, id: u32) -> Hit {
         let hit = mesh.triangle(id).and_then(

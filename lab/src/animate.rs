@@ -2,8 +2,8 @@
 //!
 //! Every vertex swings along its normal, as far as a wave says that travels through the mesh and is
 //! back where it was after the last frame. Each frame is what a game does: move the vertices, build
-//! into the same memory, trace all rays in tiles. What a frame of the mesh needs is asked once, before
-//! the first one, and once more only if a later frame needs more.
+//! into the same memory, trace all rays in tiles. What a frame of the mesh needs is asked once,
+//! before the first one, and once more only if a later frame needs more.
 
 use core::f64::consts::TAU;
 use core::fmt;
@@ -30,8 +30,8 @@ use crate::shade::{Rgb, Shader, normal_of};
 use crate::threads::Threads;
 use crate::vector::{Vector, offset, round, unit};
 
-/// How far a vertex swings to either side, and how far it is from one crest of the wave to the next,
-/// as parts of the largest extent of the scene.
+/// How far a vertex swings to either side, and how far it is from one crest of the wave to the
+/// next, as parts of the largest extent of the scene.
 const AMPLITUDE: f64 = 0.01;
 const WAVELENGTH: f64 = 0.3;
 
@@ -118,7 +118,8 @@ pub struct Report {
     pub index_bytes: usize,
     /// The middle values of all frames.
     pub median: Frame,
-    /// One for each frame. The first is the slowest: the system gives its pages as they are written.
+    /// One for each frame. The first is the slowest: the system gives
+    /// its pages as they are written.
     pub frames: Vec<Frame>,
 }
 

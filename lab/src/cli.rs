@@ -337,7 +337,8 @@ pub struct Tuning {
     /// For `recursive`: levels of grids [default: the paper's, 3]
     #[arg(long, value_name = "LEVELS")]
     pub depth: Option<u32>,
-    /// For `brick`: the width of a cell in multiples of the one that suits the triangles [default: 1]
+    /// For `brick`: the width of a cell in multiples of the one that
+    /// suits the triangles [default: 1]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub cell_size: Option<f32>,
 }

@@ -10,8 +10,8 @@ use serde::Serialize;
 /// The machine, the compiler, the day and the words that a measurement was started with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Machine {
-    /// The processor's name, if the system tells, and on x86 its family and model: a virtual machine
-    /// may say no more than whose it is.
+    /// The processor's name, if the system tells, and on x86 its family and model: a virtual
+    /// machine may say no more than whose it is.
     pub cpu: Option<String>,
     /// Operating system and architecture.
     pub system: String,

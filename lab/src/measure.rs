@@ -9,9 +9,10 @@
 //! Taking turns lets a machine that warms up or that others use disturb all methods alike. Each
 //! build gets memory of its own from the system, which a page costs when it is first written: every
 //! method pays for the pages that it writes, in every build, and not for what it asked for and left
-//! alone. Asking for the sizes, getting the memory and building are all in the build time, because a
-//! first picture needs all of them. (A heap would hand pages of the build before to some methods and
-//! not to others, depending on their sizes, and would fill with zeros what the sizes only allow for.)
+//! alone. Asking for the sizes, getting the memory and building are all in the build
+//! time, because a first picture needs all of them. (A heap would hand pages of the build
+//! before to some methods and not to others, depending on their sizes, and would fill
+//! with zeros what the sizes only allow for.)
 //!
 //! Rendering is one thread, one ray per pixel, rows from the top; the timed pass traces and shades
 //! and, once a row, moves the progress bar; the work is counted in a pass of its own.
@@ -233,7 +234,8 @@ pub(crate) fn build(mesh: TriangleMesh<'_>, config: &Config) -> Result<Built> {
 
 /// The same on threads.
 fn build_with(mesh: TriangleMesh<'_>, config: &Config, parallel: &Control<'_>) -> Result<Built> {
-    // A brick grid's bound follows from the number of triangles, and what is not written costs nothing.
+    // A brick grid's bound follows from the number of triangles, and
+    // what is not written costs nothing.
     let bound = match config.method {
         Method::Brick => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
         _ => None,

@@ -1,8 +1,8 @@
 //! From hits to colours: a grey solid, or its normals.
 //!
-//! Normals come from the triangle alone, in `f64` until they are unit vectors, so that they are the same at
-//! every scene size; colours are `f32`. Every surface has two sides, because many files disagree with
-//! themselves about the front.
+//! Normals come from the triangle alone, in `f64` until they are unit vectors, so that they are the
+//! same at every scene size; colours are `f32`. Every surface has two sides, because many files
+//! disagree with themselves about the front.
 
 use glam::{DVec3, Vec3A};
 use hgrid_core::{Hit, Ray, Triangle, TriangleMesh};
@@ -88,8 +88,8 @@ pub(crate) fn normal_of(triangle: &Triangle) -> Option<Vector> {
 
 /// Linear light as a screen wants it; a square root is close to its curve.
 fn display(color: Vec3A) -> Rgb {
-    // Not glam's root: as core needs it, that is an old instruction said in assembly, and in programs
-    // compiled for newer ones all colours took two to five times as long.
+    // Not glam's root: as core needs it, that is an old instruction said in assembly, and in
+    // programs compiled for newer ones all colours took two to five times as long.
     bytes(Vec3A::from_array(color.to_array().map(f32::sqrt)))
 }
 

@@ -117,8 +117,9 @@ fn a_question_that_is_none_finds_nothing() {
     }
 }
 
-/// The point of a triangle that is closest, found without looking at corners and edges: on a line through
-/// a triangle the distance falls and then rises, so does the least distance of parallel lines.
+/// The point of a triangle that is closest, found without looking at corners and
+/// edges: on a line through a triangle the distance falls and then rises, so does the
+/// least distance of parallel lines.
 #[test]
 fn the_point_of_a_triangle_is_the_closest_one() {
     fn least(distance: impl Fn(f64) -> f64) -> f64 {

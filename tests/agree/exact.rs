@@ -74,8 +74,8 @@ fn clear_cases_are_right_and_exact() {
         let [a, b, c] = weights.map(|w| w as f64 / determinant as f64);
         let t = distance as f64 / determinant as f64;
         let least = a.min(b).min(c);
-        // The f32 shear moves the triangle's shadow by a few roundings of the corners' distance; the
-        // smaller the shadow, the more that moves the weights.
+        // The f32 shear moves the triangle's shadow by a few roundings of the corners' distance;
+        // the smaller the shadow, the more that moves the weights.
         let reach = corners.iter().flat_map(|&p| sub(p, origin)).map(i128::abs).max().unwrap();
         let along = direction.map(i128::abs).into_iter().max().unwrap();
         let error = 16.0 * f64::from(f32::EPSILON) * (reach * reach * along) as f64

@@ -43,9 +43,9 @@ fn agrees_on_a_picture(mesh: &Mesh, frame: Bounds) {
     assert!(upper + lower > 200, "the picture shows the scan: {upper} + {lower} pixels");
 }
 
-/// Aims rays at points of edges whose two triangles face the eye the same way, and not too flat, and
-/// at vertices all of whose edges are such: the surface covers them on all sides, so each ray must
-/// hit there or before.
+/// Aims rays at points of edges whose two triangles face the eye the same way, and not too
+/// flat, and at vertices all of whose edges are such: the surface covers them on all sides, so
+/// each ray must hit there or before.
 fn has_no_holes(mesh: &Mesh, rays: usize) {
     let view = mesh.view();
     let owned: Vec<Owned> =
@@ -71,7 +71,8 @@ fn has_no_holes(mesh: &Mesh, rays: usize) {
         let direction: [f32; 3] = std::array::from_fn(|k| (target[k] - eye[k]) * scale);
         let origin = std::array::from_fn(|k| target[k] - direction[k]);
         let hit = grids[i % grids.len()].intersect(&Ray::new(origin, direction));
-        // Rounding may carry a grazing ray a little behind its target, not to the scan's other side.
+        // Rounding may carry a grazing ray a little behind its target,
+        // not to the scan's other side.
         holes += usize::from(!hit.is_some_and(|hit| hit.t <= 1.0 + 2e-3));
     }
     assert_eq!(holes, 0, "holes among {rays} rays at {} edges", edges.len());

@@ -1,7 +1,9 @@
-//! What a call through the C ABI costs over the Rust call: the same grid, the same rays, one process.
+//! What a call through the C ABI costs over the Rust call: the same
+//! grid, the same rays, one process.
 //!
-//! Analysis: the C side checks a tag, three pointers and the ray's bytes, and cannot be inlined; that is
-//! a few nanoseconds on a query of some hundred. The library is `libhgrid.so` as C programs get it.
+//! Analysis: the C side checks a tag, three pointers and the ray's bytes, and cannot be
+//! inlined; that is a few nanoseconds on a query of some hundred. The library is
+//! `libhgrid.so` as C programs get it.
 
 #![expect(clippy::expect_used, reason = "a bench that cannot start has nobody to answer to")]
 
@@ -48,8 +50,8 @@ struct CGrid([u64; 64]);
 type Open = unsafe extern "C" fn(*const u8, usize, *const CMesh, *mut CGrid) -> i32;
 type Intersect = unsafe extern "C" fn(*const CGrid, *const Ray, *const c_void, *mut Hit) -> bool;
 
-/// How many times as long one thing takes as another: the median of pairs one after the other, which
-/// what else the machine does slows down alike.
+/// How many times as long one thing takes as another: the median of pairs one after the other,
+/// which what else the machine does slows down alike.
 fn ratio(one: impl Fn() -> usize, other: impl Fn() -> usize) -> f64 {
     let time = |what: &dyn Fn() -> usize| {
         let start = Instant::now();

@@ -1,5 +1,5 @@
-//! One table of questions with answers by brute force, for every language that asks them: meshes, and
-//! for each of them configurations, rays under options, and points.
+//! One table of questions with answers by brute force, for every language that asks them: meshes,
+//! and for each of them configurations, rays under options, and points.
 
 use hgrid_core::{
     ClosestPoint, Config, Cull, Grid, Hit, INVALID_ID, Method, Ray, Strided, TriangleMesh, Verdict,
@@ -181,8 +181,8 @@ fn points(mesh: &Mesh, random: &mut Random) -> Vec<([f32; 3], f32)> {
     (0..40).map(point).collect()
 }
 
-/// Sheets behind each other, each of them twice: more hits on a ray than a walk collects at once, two
-/// by two at the same `t`.
+/// Sheets behind each other, each of them twice: more hits on a ray than a walk collects at
+/// once, two by two at the same `t`.
 fn stack() -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..40 {
@@ -266,7 +266,8 @@ pub(crate) fn bytes(cases: &[Case], grid: impl Fn(&Case, &Config) -> Built) -> V
     out.0
 }
 
-/// A grid's bytes, and the work of finding the closest hits and any hits of all rays, for each group.
+/// A grid's bytes, and the work of finding the closest hits and any
+/// hits of all rays, for each group.
 pub(crate) struct Built {
     pub(crate) blob: Vec<u8>,
     pub(crate) counters: Vec<u64>,

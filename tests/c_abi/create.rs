@@ -1,4 +1,5 @@
-//! `hgrid_create`, which only one flavour of the library has: what `programs` does not ask about it.
+//! `hgrid_create`, which only one flavour of the library has: what
+//! `programs` does not ask about it.
 
 use std::fs;
 use std::process::Command;

@@ -17,8 +17,8 @@ pub(crate) fn committed() -> String {
     fs::read_to_string(root().join("include/hgrid.h")).expect("include/hgrid.h")
 }
 
-/// What a program sees of it that is compiled for a flavour: without `HGRID_STD`, the lines that need
-/// it are not there.
+/// What a program sees of it that is compiled for a flavour: without `HGRID_STD`, the
+/// lines that need it are not there.
 pub(crate) fn seen_by(flavour: Flavour) -> String {
     let (mut header, mut rest) = (String::new(), committed());
     while let Some((before, behind)) = rest.split_once("\n#if defined(HGRID_STD)\n") {

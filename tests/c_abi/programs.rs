@@ -1,7 +1,8 @@
 //! C programs that use the library as a stranger would: by the header and the archive alone.
 //!
-//! Each program ends at the first check that fails. They run with sanitizers, as C++, with the shared
-//! library, and under valgrind, which unlike the sanitizers also watches what the library does.
+//! Each program ends at the first check that fails. They run with sanitizers, as
+//! C++, with the shared library, and under valgrind, which unlike the sanitizers
+//! also watches what the library does.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,8 +15,8 @@ use hgrid_tests::artefact::{
 };
 use tempfile::TempDir;
 
-/// Programs that check for themselves and tell what they reached (see `promises`), and the flavour of
-/// the library that they need.
+/// Programs that check for themselves and tell what they reached (see `promises`), and the
+/// flavour of the library that they need.
 const PROGRAMS: [(&str, Flavour); 16] = [
     ("queries", Flavour::NoStd),
     ("options", Flavour::NoStd),
@@ -95,8 +96,8 @@ fn they_pass_as_cpp_by_clang_with_the_larger_flavour() {
     }
 }
 
-/// Compiled once: both flavours of the library have the same name, and the one that can do more does
-/// the rest the same.
+/// Compiled once: both flavours of the library have the same name, and the one that
+/// can do more does the rest the same.
 #[test]
 fn they_pass_with_the_shared_libraries() {
     let dir = TempDir::new().expect("a folder");
@@ -163,8 +164,8 @@ fn no_thread_gets_in_the_way_of_another() {
     }
 }
 
-/// The header promises 6 KiB for a ray or a point, 16 KiB for a batch, 12 KiB for a build, 96 KiB for one
-/// with tasks and 8 KiB for a task.
+/// The header promises 6 KiB for a ray or a point, 16 KiB for a batch, 12 KiB for a build, 96 KiB
+/// for one with tasks and 8 KiB for a task.
 #[test]
 fn queries_and_builds_take_little_stack() {
     let dir = TempDir::new().expect("a folder");

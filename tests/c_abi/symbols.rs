@@ -25,8 +25,8 @@ fn may_need(flavour: Flavour, name: &str) -> bool {
     MEMORY.contains(&name) || flavour == Flavour::Std && ALLOCATOR.contains(&name)
 }
 
-/// The committed list of what a flavour exports: `symbols.txt`, a name a line, and `std` behind what
-/// only that one has.
+/// The committed list of what a flavour exports: `symbols.txt`, a name a line, and
+/// `std` behind what only that one has.
 fn exports(flavour: Flavour) -> BTreeSet<String> {
     let lines = include_str!("symbols.txt").lines();
     let names = lines.filter_map(|line| match line.split_once(' ') {
@@ -118,16 +118,17 @@ fn nothing_panics_allocates_or_starts_threads() {
     has_none(&["panic", "_fail", "__rust_", "alloc", "pthread", "unwind"]);
 }
 
-/// A vector operation that is a function has its operands in memory: a closure that the compiler did not
-/// put where the vectors are. It once took a seventh to a fifth of a tile's time, and only where programs are
-/// compiled for any machine. (The word is in the names of fearless_simd's functions as of 1.2.)
+/// A vector operation that is a function has its operands in memory: a closure that the compiler
+/// did not put where the vectors are. It once took a seventh to a fifth of a tile's time, and
+/// only where programs are compiled for any machine. (The word is in the names of
+/// fearless_simd's functions as of 1.2.)
 #[test]
 fn no_vector_operation_is_a_function() {
     has_none(&["fearless_simd_kernel"]);
 }
 
-/// What rustc would tell a C programmer to add to the link line. It does not depend on the profile, so
-/// a quick one serves.
+/// What rustc would tell a C programmer to add to the link line. It does not depend on
+/// the profile, so a quick one serves.
 #[test]
 fn neither_flavour_asks_for_a_library() {
     let target = target_dir().join("link_line");
@@ -174,7 +175,8 @@ fn the_library_of_another_vendor_in_rust_does_not_clash() {
     let dir = TempDir::new().expect("a folder");
     let [vendor, program] = ["libvendor.a", "vendors"].map(|name| dir.path().join(name));
     let source = |name: &str| root().join("tests/c_abi").join(name);
-    // What is not used of core is left out, as it must be: it asks for unwinding, which no_std has not.
+    // What is not used of core is left out, as it must be: it asks for
+    // unwinding, which no_std has not.
     for level in ["3", "s"] {
         run(Command::new("rustc")
             .args(["--edition", "2024", "--crate-type", "staticlib", "-C", "panic=abort"])

@@ -1,5 +1,5 @@
-//! Another library for C written in Rust without std, as another vendor ships it: with a panic handler
-//! and with code that may panic. Not a part of these tests but compiled by one of them.
+//! Another library for C written in Rust without std, as another vendor ships it: with a panic
+//! handler and with code that may panic. Not a part of these tests but compiled by one of them.
 #![no_std]
 
 #[panic_handler]
@@ -7,7 +7,8 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     loop {}
 }
 
-/// The sum of some numbers over another number, in arithmetic that needs the compiler's own library.
+/// The sum of some numbers over another number, in arithmetic that
+/// needs the compiler's own library.
 ///
 /// # Safety
 /// There are `count` numbers.

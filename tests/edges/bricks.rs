@@ -1,5 +1,5 @@
-//! Brick grids of meshes that mix sizes: answers as brute force gives them, bytes in proportion to the
-//! triangles, and no ray that is shown most of the mesh.
+//! Brick grids of meshes that mix sizes: answers as brute force gives them, bytes in proportion to
+//! the triangles, and no ray that is shown most of the mesh.
 
 use hgrid_core::{
     Config, Counters, Grid, IndexType, MAX_RESOLUTION, Method, QueryOptions, Ray, Strided,
@@ -25,8 +25,8 @@ struct Cost {
     tests: u64,
 }
 
-/// Rays between points of the mesh's box, at vertices and along the axes: as brute force answers, at
-/// no more than this cost with cells as they come.
+/// Rays between points of the mesh's box, at vertices and along the axes: as brute force answers,
+/// at no more than this cost with cells as they come.
 fn agrees(mesh: &Mesh, cost: &Cost) {
     let view = mesh.view();
     for cell_size in [1.0, 0.3, 4.0] {

@@ -1,7 +1,8 @@
 //! Brick grids whose words are not what a build writes: refused by `validate`, each for its own
 //! reason, and harmless to queries.
 //!
-//! The words are found here from the format's description alone (core/src/brick/mod.rs and sort.rs).
+//! The words are found here from the format's description alone
+//! (core/src/brick/mod.rs and sort.rs).
 
 use std::collections::HashMap;
 
@@ -448,8 +449,8 @@ fn headers_of_other_grids_are_refused() {
     }
 }
 
-/// Random words anywhere in blocks and pool: whatever they say, queries end and answer with triangles
-/// that there are, and what `validate` lets pass answers right.
+/// Random words anywhere in blocks and pool: whatever they say, queries end and answer with
+/// triangles that there are, and what `validate` lets pass answers right.
 #[test]
 fn random_words_are_harmless() {
     let mesh = crowds();

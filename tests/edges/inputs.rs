@@ -39,8 +39,8 @@ fn triangles_that_are_not_finite_are_skipped_and_counted() {
                 triangle[corner][axis] = bad;
                 mesh.push(triangle);
                 let view = mesh.view();
-                // Its other coordinates do not stretch the box, but for brick, whose box is that of the
-                // vertices; its id is not used.
+                // Its other coordinates do not stretch the box, but for brick, whose box is that of
+                // the vertices; its id is not used.
                 let one_level = Config::new(Method::OneLevel);
                 let [owned, expected] =
                     [&mesh, &sound].map(|mesh| Owned::build(&mesh.view(), &one_level).unwrap());

@@ -66,8 +66,8 @@ fn a_build_can_be_cancelled_at_any_call_and_begun_again() {
     });
 }
 
-/// A region that held a grid holds that one or none after a build that came to nothing, however far it
-/// got: a header in front of the lists of another grid would let both be taken for one.
+/// A region that held a grid holds that one or none after a build that came to nothing, however far
+/// it got: a header in front of the lists of another grid would let both be taken for one.
 #[test]
 fn what_is_left_of_a_build_is_the_old_grid_or_none() {
     let old = ball(6, 1.0);

@@ -1,8 +1,8 @@
 //! How much work is done, in numbers that do not depend on the machine?
 //!
-//! Bytes and counters of every method on a few scenes, as a table in counters.txt. A slower algorithm
-//! or a larger blob shows as a difference there, in review and on any machine; `HGRID_BLESS=1` writes
-//! the table anew.
+//! Bytes and counters of every method on a few scenes, as a table in counters.txt. A slower
+//! algorithm or a larger blob shows as a difference there, in review and on any machine;
+//! `HGRID_BLESS=1` writes the table anew.
 
 use std::fmt::Write as _;
 use std::path::Path;

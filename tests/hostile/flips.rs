@@ -1,13 +1,13 @@
-//! Every single bit of a blob, flipped: queries end after bounded work, and `validate` refuses it, or
-//! the blob is what a build makes with other parameters, and right.
+//! Every single bit of a blob, flipped: queries end after bounded work, and `validate` refuses it,
+//! or the blob is what a build makes with other parameters, and right.
 
 use hgrid_core::{Error, Grid, Method};
 use hgrid_tests::copy::{CHECKSUM, Copy, MESH};
 use hgrid_tests::hostile::{Seed, agrees, ends, fixed_rays, seeds};
 use hgrid_tests::owned::Owned;
 
-/// Where the header has what a build was told: method, density, macrocell factor, what subgrids hold at
-/// least, depth, width of a cell. With others there may well be the same grid.
+/// Where the header has what a build was told: method, density, macrocell factor, what subgrids
+/// hold at least, depth, width of a cell. With others there may well be the same grid.
 const TOLD: [usize; 6] = [40, 44, 92, 96, 100, 104];
 
 /// Whether a valid blob with a bit of this byte flipped is one that somebody may have made.

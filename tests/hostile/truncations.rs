@@ -1,5 +1,5 @@
-//! A blob that ends anywhere: refused, whether its header knows of it or not; and where what is left is
-//! a whole blob of fewer words, queries end and `validate` finds what is missing.
+//! A blob that ends anywhere: refused, whether its header knows of it or not; and where what is
+//! left is a whole blob of fewer words, queries end and `validate` finds what is missing.
 
 use hgrid_core::{Error, Grid, Method};
 use hgrid_tests::copy::Copy;
@@ -34,8 +34,8 @@ fn every_truncation_is_refused() {
     }
 }
 
-/// A blob with its mesh that ends anywhere: whatever its header says of its length, nothing is opened that
-/// was not there.
+/// A blob with its mesh that ends anywhere: whatever its header says of its length,
+/// nothing is opened that was not there.
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn every_truncation_of_a_packed_blob_is_refused() {

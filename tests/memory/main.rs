@@ -54,8 +54,8 @@ fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
     }
 }
 
-/// The same for a brick grid, whose triangles wait in the index until they are sorted: it may take more
-/// than the blob, and what an error asks for may be more than would do.
+/// The same for a brick grid, whose triangles wait in the index until they are sorted: it may take
+/// more than the blob, and what an error asks for may be more than would do.
 fn every_size_of_bricks(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
     let expected = Owned::build(mesh, config).unwrap();
     let bound = sizes(mesh, config, &mut []).unwrap();

@@ -1,7 +1,7 @@
 //! Does it build where there is no operating system?
 //!
-//! A host build proves little: a crate without `std` may still lean on one. So core and the C library
-//! are built for machines that have none.
+//! A host build proves little: a crate without `std` may still lean on one. So core and the C
+//! library are built for machines that have none.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -43,8 +43,8 @@ fn is_fetched(target: &str) -> bool {
     false
 }
 
-/// Builds the C library, and core for it, and returns the folder it is in: one for each target, so that
-/// no build waits for the other.
+/// Builds the C library, and core for it, and returns the folder it is in: one for each target, so
+/// that no build waits for the other.
 fn build(target: &str) -> PathBuf {
     let dir = target_dir().join("no_std").join(target);
     run(cargo_in(&dir, "build").args(["--release", "-p", "hgrid-capi", "--target", target]));

@@ -54,8 +54,8 @@ fn a_project_links_what_cargo_c_installs() {
     assert!(!dynamic(&static_, "NEEDED").contains(&soname()));
 }
 
-/// Debian has a folder for each architecture, Fedora has lib64, most others lib; and packages are moved
-/// about before they come to rest.
+/// Debian has a folder for each architecture, Fedora has lib64, most others lib; and packages are
+/// moved about before they come to rest.
 #[test]
 fn a_project_finds_libraries_wherever_they_lie() {
     if !is_installed("cmake") {

@@ -44,8 +44,8 @@ pub(crate) fn installed(flavour: Flavour) -> Option<&'static Prefix> {
     }))
 }
 
-/// A folder laid out by the lists that cargo-c goes by, with the usual libraries in a folder of this
-/// name: enough for the CMake package, which knows no SONAME and no pkg-config.
+/// A folder laid out by the lists that cargo-c goes by, with the usual libraries in a folder of
+/// this name: enough for the CMake package, which knows no SONAME and no pkg-config.
 pub(crate) fn laid_out(lib: &str) -> (TempDir, Prefix) {
     let temporary = TempDir::new().expect("a folder");
     let dir = temporary.path().join("prefix");
@@ -102,8 +102,8 @@ pub(crate) fn files(dir: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// A program that finds shared libraries as strangers' programs do: by what they are told, and not by
-/// the folders that cargo names for tests.
+/// A program that finds shared libraries as strangers' programs do: by what they are told, and not
+/// by the folders that cargo names for tests.
 pub(crate) fn program(path: &Path) -> Command {
     let mut program = Command::new(path);
     program.env_remove("LD_LIBRARY_PATH");

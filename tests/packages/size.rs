@@ -1,5 +1,5 @@
-//! How large is a program with the library in it? The README says so, and a library that grows without
-//! anybody noticing does not stay one that a small machine can carry.
+//! How large is a program with the library in it? The README says so, and a library that grows
+//! without anybody noticing does not stay one that a small machine can carry.
 
 use std::fs;
 use std::path::Path;
@@ -51,8 +51,8 @@ fn measure() -> [u64; 2] {
     [fs::metadata(program).expect("the program").len(), bytes_of_the_library(&map)]
 }
 
-/// What the linker's map says was put into memory out of our archive. Its lines end with an address, a
-/// size and a file; what was thrown away is at address 0.
+/// What the linker's map says was put into memory out of our archive. Its lines end with an
+/// address, a size and a file; what was thrown away is at address 0.
 fn bytes_of_the_library(map: &Path) -> u64 {
     let map = fs::read_to_string(map).expect("a map");
     let number = |word: &str| u64::from_str_radix(word.strip_prefix("0x")?, 16).ok();

@@ -60,8 +60,8 @@ impl Copy {
         self.set(at, &word.to_ne_bytes());
     }
 
-    /// Makes the header's checksum right again: FNV-1a over its words, folded. What is too short for a
-    /// header stays as it is.
+    /// Makes the header's checksum right again: FNV-1a over its words, folded. What is too
+    /// short for a header stays as it is.
     pub fn sign(&mut self) {
         let Some((covered, behind)) = self.bytes_mut().split_at_mut_checked(CHECKSUM) else {
             return;

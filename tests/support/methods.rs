@@ -12,8 +12,8 @@ pub fn configs() -> impl Iterator<Item = Config> {
     })
 }
 
-/// The same with another density, or for a method that has none with cells as much smaller or larger
-/// as that makes them.
+/// The same with another density, or for a method that has none with cells as much
+/// smaller or larger as that makes them.
 pub fn configs_with(density: f32) -> impl Iterator<Item = Config> {
     configs().map(move |config| Config {
         density,

@@ -19,7 +19,8 @@ pub fn symbols(library: &Path, flags: &[&str]) -> BTreeSet<String> {
 /// library, from which the linker takes what a target lacks.
 ///
 /// # Panics
-/// If it cannot read the archive, or if ours is not one object: then nothing optimised it as a whole.
+/// If it cannot read the archive, or if ours is not one object: then
+/// nothing optimised it as a whole.
 #[must_use]
 pub fn symbols_of_ours(archive: &Path, flags: &[&str]) -> BTreeSet<String> {
     let heading = format!("{}:", ours(archive));

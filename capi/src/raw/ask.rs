@@ -36,8 +36,8 @@ struct Asked {
 }
 
 impl Asked {
-    /// Asks a question with the options as core knows them, about the ray at a place of its batch, and
-    /// adds the work to the caller's.
+    /// Asks a question with the options as core knows them, about the ray at a place of its batch,
+    /// and adds the work to the caller's.
     ///
     /// # Safety
     /// The caller's promise.
@@ -61,7 +61,8 @@ impl Asked {
         let mut offer = |hit: &Hit| {
             let hit = hgrid_hit::from(*hit);
             let Some(filter) = filter else { return Verdict::Accept };
-            // SAFETY: a function of this type by the caller's promise; the hit lives until it returns.
+            // SAFETY: a function of this type by the caller's promise;
+            // the hit lives until it returns.
             let verdict = verdict(unsafe { filter(context, ray, &raw const hit) });
             if verdict != Verdict::Reject {
                 see(hit);
@@ -147,8 +148,8 @@ pub(crate) unsafe fn query_all(
     }
     // SAFETY: the caller's promise; hits overlap nothing else that the call uses.
     let hits = unsafe { bytes_mut(hits.cast(), bytes) }?;
-    // SAFETY: any bytes are hits, and `Hit` is laid out as `hgrid_hit`; what is not aligned, which by the
-    // caller's promise nothing is, is left out.
+    // SAFETY: any bytes are hits, and `Hit` is laid out as `hgrid_hit`; what is not aligned, which
+    // by the caller's promise nothing is, is left out.
     let (_, hits, _) = unsafe { hits.align_to_mut::<Hit>() };
     let mut all = |options: &mut QueryOptions<'_>| grid.intersect_all(&ray, options, hits);
     match asked {
@@ -185,8 +186,8 @@ pub(crate) unsafe fn closest(
 /// are 3 KiB.
 const CHUNK: usize = 64;
 
-/// Runs a batch: `many` answers a chunk of rays, or with options `one` a single ray. `unanswered` is
-/// written nowhere.
+/// Runs a batch: `many` answers a chunk of rays, or with options `one` a single ray.
+/// `unanswered` is written nowhere.
 ///
 /// # Safety
 /// That of [`grid`]; and the elements of both arrays are the caller's to be read and written.

@@ -1,5 +1,5 @@
-//! The only place where a caller's pointer becomes a reference or a value: here for builds and blobs, in
-//! `ask` for queries.
+//! The only place where a caller's pointer becomes a reference or a value: here for builds
+//! and blobs, in `ask` for queries.
 //!
 //! # The contract with C
 //!

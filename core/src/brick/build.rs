@@ -10,9 +10,10 @@
 //! scratch | heads of a task | heads of a task | benches of a task | benches of a task |
 //! ```
 //!
-//! Each step is cut into tasks: the passes by triangles, the sorting by blocks. What a task writes is
-//! the same however many there are: a bin has the entries of the first triangles first, whoever brings
-//! them; a chunk is told where it starts but holds nothing of it; and parts end up side by side.
+//! Each step is cut into tasks: the passes by triangles, the sorting by blocks. What a
+//! task writes is the same however many there are: a bin has the entries of the first
+//! triangles first, whoever brings them; a chunk is told where it starts but holds nothing
+//! of it; and parts end up side by side.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -59,10 +60,10 @@ const fn likely_words(census: &Census) -> u64 {
 
 /// The most words that so many references of so many triangles in so many blocks can take.
 ///
-/// A reference takes two words if it is the only one of its list: one more for where the list starts, or
-/// how long it is. A brick has a record, a chunk the end of its cells, and either may have a list with an
-/// extent. A bin that was not read yet takes no more: two words an entry, which is a reference at least.
-/// Divided cells have words of their own.
+/// A reference takes two words if it is the only one of its list: one more for where the list
+/// starts, or how long it is. A brick has a record, a chunk the end of its cells, and either may
+/// have a list with an extent. A bin that was not read yet takes no more: two words an entry, which
+/// is a reference at least. Divided cells have words of their own.
 const fn words_for(triangles: u32, references: u64, blocks: u64, large: u64) -> u64 {
     let of_blocks = MASK_BITS as u64 * blocks;
     let bricks = if of_blocks < references { of_blocks } else { references };
@@ -102,8 +103,8 @@ pub(crate) const fn scratch_bytes_at_most(resolution: [u32; 3], triangles: u32) 
     Layout::new(resolution, triangles).scratch_bytes(1)
 }
 
-/// Room for as many tasks as there may be, or for one: it is on the stack. What has it is out of line,
-/// so that who builds with one task does not have the room for all.
+/// Room for as many tasks as there may be, or for one: it is on the stack. What has it is out of
+/// line, so that who builds with one task does not have the room for all.
 macro_rules! for_tasks {
     ($parallel:expr, $function:ident($($argument:expr),*)) => {
         if $parallel.tasks > 1 {
@@ -337,8 +338,8 @@ impl<'w, const N: usize> Work<'w, N> {
         self.filled.iter().map(|filled| filled.most).sum()
     }
 
-    /// Scatters and sorts into the words, and returns how many of them are the pool; `None` if there
-    /// were not enough for each part.
+    /// Scatters and sorts into the words, and returns how many of them are the pool; `None` if
+    /// there were not enough for each part.
     fn fill(
         &mut self,
         blocks: &mut [Block],
@@ -363,8 +364,8 @@ impl<'w, const N: usize> Work<'w, N> {
         taken.map(Some).ok_or(too_fine)
     }
 
-    /// Puts every triangle's entries into the bins of its blocks, and the largest triangles into the
-    /// list of the grid.
+    /// Puts every triangle's entries into the bins of its blocks, and the largest
+    /// triangles into the list of the grid.
     fn scatter(&mut self, words: &mut [u32]) -> Result<(), Error> {
         let tasks = self.shares.tasks;
         for part in self.parts.iter().take(self.part_count) {

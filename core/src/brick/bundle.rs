@@ -1,7 +1,8 @@
 //! The rays of a tile as arrays: one number of all of them side by side.
 //!
-//! Along one axis, k, all rays of a bundle run forward (it is mirrored if they run backward), at least
-//! half as fast as along any other. So they can be written as lines over k: `u = start + slope * k`.
+//! Along one axis, k, all rays of a bundle run forward (it is mirrored if they run
+//! backward), at least half as fast as along any other. So they can be written as lines
+//! over k: `u = start + slope * k`.
 
 use core::ops::Range;
 
@@ -32,8 +33,8 @@ pub(super) type PerRay = [f32; RAYS];
 pub(super) struct Bundle {
     /// By axis.
     pub(super) origin: [PerRay; 3],
-    /// What a [`TriangleTest`](crate::triangle::TriangleTest) needs of a direction, and the rays whose
-    /// longest axis is x, y, z.
+    /// What a [`TriangleTest`](crate::triangle::TriangleTest) needs of a direction, and the rays
+    /// whose longest axis is x, y, z.
     pub(super) shear: [PerRay; 2],
     pub(super) direction_z: PerRay,
     pub(super) longest: [u64; 3],
@@ -179,8 +180,8 @@ impl Bundle {
         bounds: Bounds::NONE,
     };
 
-    /// Replaces the rays by `count` of the caller's, and makes those that run along the same axis as
-    /// the first valid one the members.
+    /// Replaces the rays by `count` of the caller's, and makes those that run along the same axis
+    /// as the first valid one the members.
     ///
     /// Out of line, or its variables would be on the stack all the way; so it says once more what
     /// vectors it is compiled for.
@@ -298,7 +299,8 @@ impl Bundle {
             let t_max = row_of(simd, &self.t_max, first);
             let [x, y, z] = [dx.abs(), dy.abs(), dz.abs()];
 
-            // Who belongs to the bundle: runs along the axis, from nearby, with numbers that are some.
+            // Who belongs to the bundle: runs along the axis, from
+            // nearby, with numbers that are some.
             let along = [dx, dy, dz][K] * sign;
             let speed = along * splat(self.rate[K]);
             let is_near = (ox - splat(center[0])).abs().simd_le(reach)
@@ -332,8 +334,8 @@ impl Bundle {
         }
     }
 
-    /// Writes the members as lines in cells, k growing. Who does not belong stands where one does that
-    /// belongs: bounds need not ask.
+    /// Writes the members as lines in cells, k growing. Who does not belong stands where one does
+    /// that belongs: bounds need not ask.
     #[inline(always)]
     fn draw<const K: usize, S: Simd>(&mut self, simd: S, directions: &[PerRay; 3]) {
         let stand_in = self.members.trailing_zeros() as usize % RAYS;
@@ -370,8 +372,8 @@ impl Bundle {
         below_three(self.axes)
     }
 
-    /// The first k of any member, and the last, before any has a hit: from then on the ends of who does
-    /// not belong mean nothing.
+    /// The first k of any member, and the last, before any has a hit: from then on the ends of
+    /// who does not belong mean nothing.
     #[inline(always)]
     pub(super) fn ends<S: Simd>(&self, simd: S) -> (f32, f32) {
         let rows = |array: &PerRay| {
@@ -465,8 +467,8 @@ impl Bounds {
         Self { low: [none; 2], high: [none; 2] }
     };
 
-    /// The first and the last of `count` cells on an axis that rays may meet between two planes, each
-    /// cell `size` wide; `None` if they pass all of them.
+    /// The first and the last of `count` cells on an axis that rays may meet between two planes,
+    /// each cell `size` wide; `None` if they pass all of them.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     pub(super) fn cells(

@@ -1,9 +1,10 @@
 //! Whether a crowded cell is divided, and the entries that it then has.
 //!
-//! It is if its triangles are smaller than it, and its parts list fewer of them, or can be divided again.
-//! What it then takes is paid for: each reference of a cell brings a share of [`WORDS`] for each triangle
-//! of the mesh, of which the chunk of a divided cell takes its words, and its own crowded cells share the
-//! rest. A cell whose share is too small is cut into fewer parts, or not at all.
+//! It is if its triangles are smaller than it, and its parts list fewer of them, or can be
+//! divided again. What it then takes is paid for: each reference of a cell brings a share of
+//! [`WORDS`] for each triangle of the mesh, of which the chunk of a divided cell takes its
+//! words, and its own crowded cells share the rest. A cell whose share is too small is cut
+//! into fewer parts, or not at all.
 
 #![expect(clippy::cast_possible_truncation, reason = "numbers of cells")]
 
@@ -37,8 +38,8 @@ pub(super) struct Crowd {
     pub(super) share: u64,
 }
 
-/// How a cell is divided: its triangles are sorted into this frame, in these groups, and each reference
-/// has this share left.
+/// How a cell is divided: its triangles are sorted into this frame, in these groups, and
+/// each reference has this share left.
 pub(super) struct Plan {
     pub(super) frame: Frame,
     pub(super) groups: Groups,
@@ -107,8 +108,9 @@ pub(super) fn count_of_cell<S: Simd>(simd: S, entries: &[Entry], cell: usize) ->
     )
 }
 
-/// Puts the triangles of a cell on the next bench, if to divide the cell gains something and is paid for:
-/// the triangles are smaller than it, and its parts list fewer of them or can be divided again.
+/// Puts the triangles of a cell on the next bench, if to divide the cell gains
+/// something and is paid for: the triangles are smaller than it, and its parts list
+/// fewer of them or can be divided again.
 pub(super) fn plan<S: Simd>(
     simd: S,
     scene: &Scene<'_>,
@@ -159,8 +161,8 @@ const fn wholes(number: f64) -> u32 {
     number as u32
 }
 
-/// Puts the triangles of a cell on a bench, if they are small enough to divide it, into so many cells an
-/// axis at most; tells into how many they would.
+/// Puts the triangles of a cell on a bench, if they are small enough to divide it, into so many
+/// cells an axis at most; tells into how many they would.
 #[inline(always)]
 fn collect<S: Simd>(
     simd: S,
@@ -171,8 +173,8 @@ fn collect<S: Simd>(
     most: u32,
     bench: &mut Bench<'_>,
 ) -> Option<(Frame, Groups, u32)> {
-    // What the cell lists, and soon what its parts will, waits where cells will be counted, or behind the
-    // entries, if there is room.
+    // What the cell lists, and soon what its parts will, waits where cells will be counted, or
+    // behind the entries, if there is room.
     let length = listed as usize;
     let (sorted, behind) = bench.entries.split_at_mut_checked(length)?;
     let in_cells: &mut [Entry] = bytemuck::try_cast_slice_mut(bench.cells).ok()?;
@@ -187,7 +189,8 @@ fn collect<S: Simd>(
         }
     });
 
-    // As many cells as two of its mean triangles are wide, but none so small that the margin counts.
+    // As many cells as two of its mean triangles are wide, but none so
+    // small that the margin counts.
     let format = scene.format();
     let mut sum = 0.0;
     let mut add = |entry: Entry| {

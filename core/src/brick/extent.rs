@@ -1,7 +1,7 @@
 //! Where in its brick or chunk the triangles of a list lie.
 //!
-//! The list of a cell is for whoever crosses the cell. That of a brick or a chunk has triangles which
-//! many rays pass at a distance: along a wall, above the ground. So it begins with their box:
+//! The list of a cell is for whoever crosses the cell. That of a brick or a chunk has triangles
+//! which many rays pass at a distance: along a wall, above the ground. So it begins with their box:
 //!
 //! ```text
 //! list | first | last | count | ids |

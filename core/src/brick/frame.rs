@@ -61,14 +61,15 @@ impl Frame {
         Aabb { min: zoom(reach.min), max: zoom(reach.max) }
     }
 
-    /// The cells of the frame that a box in cells of the lattice overlaps, and the halves of the outermost.
+    /// The cells of the frame that a box in cells of the lattice overlaps,
+    /// and the halves of the outermost.
     pub(super) fn range(&self, reach: &Aabb) -> (CellRange, Halves) {
         range(self.zoom(reach), [self.cells; 3])
     }
 }
 
-/// The cells that a box overlaps which is given in cells; those at the border if it lies outside. And the
-/// halves: upper ones of its first cells, lower ones of its last cells.
+/// The cells that a box overlaps which is given in cells; those at the border if it lies outside.
+/// And the halves: upper ones of its first cells, lower ones of its last cells.
 #[inline(always)]
 pub(super) fn range(reach: Aabb, resolution: [u32; 3]) -> (CellRange, Halves) {
     let halves = Aabb { min: reach.min * 2.0, max: reach.max * 2.0 };
@@ -78,8 +79,8 @@ pub(super) fn range(reach: Aabb, resolution: [u32; 3]) -> (CellRange, Halves) {
     (CellRange { min: min.map(|half| half >> 1), max: max.map(|half| half >> 1) }, in_halves)
 }
 
-/// How many cells hold a triangle with these first and last cells, or with a shift of 2 bricks, of 4
-/// blocks.
+/// How many cells hold a triangle with these first and last cells, or with
+/// a shift of 2 bricks, of 4 blocks.
 #[inline(always)]
 pub(super) fn lists(min: [u32; 3], max: [u32; 3], shift: u32) -> u64 {
     let along = |axis: usize| u64::from((max[axis] >> shift) - (min[axis] >> shift)) + 1;

@@ -1,10 +1,10 @@
 //! What the rays of a tile cannot meet: triangles outside the planes around them.
 //!
 //! A cell is often wider than a tile, and most of its triangles lie beside it. All rays lie between
-//! chords on u and v ([`Bounds`]), each of which is a plane; a triangle whose corners all lie behind one
-//! of them meets no ray. Eight triangles are compared with the planes of the whole tile, and what is left
-//! with those of its four rows of sixteen rays, which are squares of 4 x 4 pixels if a tile is in Morton
-//! order: half of them are far from a small triangle.
+//! chords on u and v ([`Bounds`]), each of which is a plane; a triangle whose corners all lie
+//! behind one of them meets no ray. Eight triangles are compared with the planes of the whole tile,
+//! and what is left with those of its four rows of sixteen rays, which are squares of 4 x 4 pixels
+//! if a tile is in Morton order: half of them are far from a small triangle.
 //!
 //! Hits lie between the planes of k between which the chords hold, wherever the corners lie: behind
 //! means behind there, and a triangle is on one side of a plane if its corners are.

@@ -1,13 +1,14 @@
-//! Entries with the same number of cells together, so that going through their cells needs no branch.
+//! Entries with the same number of cells together, so that going
+//! through their cells needs no branch.
 
 use super::halves::Format;
 use super::layout::{AXES, Entry, OTHERS};
 
 /// Entries of a block, together those that have two cells on the same axes.
 ///
-/// How many cells an entry has is as good as random, and a loop over them, or a choice between eight
-/// ways, costs a mispredicted branch or two: more than all else together. Among equals there is
-/// nothing to predict, a third of the time with the grouping in it.
+/// How many cells an entry has is as good as random, and a loop over them, or a choice between
+/// eight ways, costs a mispredicted branch or two: more than all else together. Among equals there
+/// is nothing to predict, a third of the time with the grouping in it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Groups {
     /// Where each group starts, and the end.
@@ -15,7 +16,8 @@ pub(super) struct Groups {
 }
 
 impl Groups {
-    /// One for every set of axes, and one for entries that are in three cells on an axis or in none.
+    /// One for every set of axes, and one for entries that are in
+    /// three cells on an axis or in none.
     const COUNT: usize = 1 + Self::OTHERS;
     pub(super) const OTHERS: usize = OTHERS as usize;
 

@@ -1,9 +1,9 @@
 //! In which halves of its cell a triangle lies.
 //!
-//! A cell lists some eighteen triangles, and a ray that crosses it passes most of them at a distance. The
-//! ids of a mesh of up to 2^26 triangles leave six bits of a word free. They say on which axes the triangle's
-//! box is in one half of the cell only. A ray that crosses only the other half there is not tested against the
-//! triangle, and does not even load its corners.
+//! A cell lists some eighteen triangles, and a ray that crosses it passes most of them at a
+//! distance. The ids of a mesh of up to 2^26 triangles leave six bits of a word free. They say on
+//! which axes the triangle's box is in one half of the cell only. A ray that crosses only the other
+//! half there is not tested against the triangle, and does not even load its corners.
 //!
 //! ```text
 //! reference | in the lower half: z y x | in the upper half: z y x | id: 26 bits |
@@ -22,8 +22,8 @@ pub(super) struct Format {
     ids: u32,
 }
 
-/// The axes, a bit for each, on which something is in the upper half of a cell only, and those on which it is
-/// in the lower half only.
+/// The axes, a bit for each, on which something is in the upper half of a cell only, and those on
+/// which it is in the lower half only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Halves(u32);
 
@@ -34,7 +34,8 @@ impl Halves {
         Self(upper & 7 | (lower & 7) << 3)
     }
 
-    /// Of what is in the cell before this one on some axes, too, and in the one behind it on others.
+    /// Of what is in the cell before this one on some axes, too, and
+    /// in the one behind it on others.
     #[inline(always)]
     pub(super) const fn through(self, before: u32, behind: u32) -> Self {
         Self(self.0 & !Self::new(before, behind).0)
@@ -49,8 +50,8 @@ impl Format {
         Self { ids: if has_room { (1 << ID_BITS) - 1 } else { u32::MAX } }
     }
 
-    /// The most triangles whose ids leave room. The unit tests of this crate have few triangles, and see
-    /// both formats.
+    /// The most triangles whose ids leave room. The unit tests of this crate have few
+    /// triangles, and see both formats.
     const MOST_TRIANGLES: u32 = if cfg!(test) { 2048 } else { 1 << ID_BITS };
 
     /// The bits of a word that are the id.

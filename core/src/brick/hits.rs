@@ -44,7 +44,8 @@ pub(super) struct Hits {
 }
 
 impl Hits {
-    /// Of no rays: zeros, as in [`Bundle::EMPTY`]. Rays that hit nothing come by [`clear`](Self::clear).
+    /// Of no rays: zeros, as in [`Bundle::EMPTY`]. Rays that hit nothing
+    /// come by [`clear`](Self::clear).
     pub(super) const EMPTY: Self = Self {
         u: [0.0; RAYS],
         v: [0.0; RAYS],
@@ -84,8 +85,8 @@ impl Hits {
     /// Tests rays of a bundle against the triangles of a list; if they are many, all rays that are
     /// alive.
     ///
-    /// Out of line, or it would be on the stack once for each division of a cell; so it says once more
-    /// what vectors it is compiled for.
+    /// Out of line, or it would be on the stack once for each division of a cell; so it says once
+    /// more what vectors it is compiled for.
     #[inline(never)]
     pub(super) fn test<S: Simd, const ANY: bool>(
         &mut self,
@@ -224,7 +225,8 @@ impl Hits {
             let (shear_x, shear_y) =
                 (row_of(simd, &bundle.shear[0], first), row_of(simd, &bundle.shear[1], first));
 
-            // Shear the corners, and drop the triangle where two edge functions have opposite signs.
+            // Shear the corners, and drop the triangle where two edge
+            // functions have opposite signs.
             let (origin, shear) = ([ox, oy, oz], [shear_x, shear_y]);
             let [a, b, c] = triangle;
             let a = sheared::<S, AXIS>(simd, a, origin, shear);
@@ -260,8 +262,8 @@ impl Hits {
         }
     }
 
-    /// Does what [`TriangleTest::resolve`] does for eight rays from `first` on, and keeps the hits that
-    /// are closer; tells which of the rays now have this hit.
+    /// Does what [`TriangleTest::resolve`] does for eight rays from `first` on, and keeps the hits
+    /// that are closer; tells which of the rays now have this hit.
     ///
     /// Where an edge function is infinite or no number, or all three are 0, t is no number, and no
     /// comparison with it holds. Else the area is finite, and 0 only where two have opposite signs.

@@ -1,4 +1,5 @@
-//! Where everything lies: the blocks, bricks, cells and lists of a grid, and the scratch of a build.
+//! Where everything lies: the blocks, bricks, cells and lists of a
+//! grid, and the scratch of a build.
 //!
 //! A block is 16 cells wide, a brick 4. A cell's number in its block is its brick's number and its
 //! number in the brick, so that 64 numbers in a row are one occupancy mask:
@@ -34,8 +35,8 @@ pub(super) struct Block {
     pub(super) mask: [u32; 2],
     /// Where its words start: in the pool for a block, behind the start of its block for a cell.
     pub(super) base: u32,
-    /// Where the length of the list of primitives that belong to the whole block lies behind the start
-    /// of the block, plus 1; 0 if there is none.
+    /// Where the length of the list of primitives that belong to the whole block lies behind the
+    /// start of the block, plus 1; 0 if there is none.
     pub(super) list: u32,
 }
 
@@ -47,7 +48,8 @@ pub(super) struct Brick {
     pub(super) mask: [u32; 2],
     /// Where the starts of its cells' lists lie, behind the start of the block.
     pub(super) cells: u32,
-    /// Where the length of the list of primitives that belong to the whole brick lies, plus 1; 0 if none.
+    /// Where the length of the list of primitives that belong to the whole
+    /// brick lies, plus 1; 0 if none.
     pub(super) list: u32,
 }
 
@@ -117,8 +119,8 @@ impl Class {
 }
 
 impl Entry {
-    /// A triangle with its cells in a block, both ends included and below 16; above the id its halves,
-    /// if there is room.
+    /// A triangle with its cells in a block, both ends included and below 16; above the
+    /// id its halves, if there is room.
     #[inline(always)]
     pub(super) const fn new(id: u32, min: [u32; 3], max: [u32; 3], class: Class) -> Self {
         let [x, y, z] =
@@ -136,7 +138,8 @@ impl Entry {
     }
 
     /// The part in one of its blocks of an entry in two cells an axis: `straddles` are the axes on
-    /// which the second cell is the first of the next block, `far` those on which this is the block.
+    /// which the second cell is the first of the next block, `far`
+    /// those on which this is the block.
     #[inline(always)]
     pub(super) const fn beside(self, straddles: u32, far: u32, format: Format) -> Self {
         /// The bits of each set of axes at either end.
@@ -172,8 +175,8 @@ impl Entry {
         format.id(self.id)
     }
 
-    /// What a cell lists of it, if it is in the cell before that one on some axes, too, and in the one
-    /// behind it on others.
+    /// What a cell lists of it, if it is in the cell before that one on some axes, too, and
+    /// in the one behind it on others.
     #[inline(always)]
     pub(super) const fn reference(self, format: Format, before: u32, behind: u32) -> u32 {
         format.through(self.id, before, behind)
@@ -321,8 +324,8 @@ impl Layout {
         }
     }
 
-    /// Cuts the heads from the scratch: for every task and block how many entries it has, then where
-    /// the next one goes.
+    /// Cuts the heads from the scratch: for every task and block how many entries it
+    /// has, then where the next one goes.
     pub(super) fn heads<'s, const N: usize>(
         &self,
         mut scratch: &'s mut [u8],

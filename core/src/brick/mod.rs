@@ -1,9 +1,9 @@
 //! The brick grid: occupancy masks of 4^3 bits in blocks of 16^3 cells, ranks instead of a hash.
 //!
 //! What the paper's fixed grid does with macrocells and row displacement, done with the two
-//! instructions that machines have for it: a mask of 64 cells answers which of them hold anything, and
-//! the number of bits below a cell's bit is the place of its list. Nothing is searched for, and what
-//! belongs to a block lies together.
+//! instructions that machines have for it: a mask of 64 cells answers which of them hold anything,
+//! and the number of bits below a cell's bit is the place of its list. Nothing is searched for, and
+//! what belongs to a block lies together.
 //!
 //! ```text
 //! blob | header | blocks | pool |
@@ -14,9 +14,9 @@
 //!                                             (halves and ids)              (extent, count, ids)
 //! ```
 //!
-//! A cell is a few triangles wide, whatever their number ([`size`]). A triangle that would be in too
-//! many cells is in the lists of bricks, of blocks, or of the grid: large ones cost little memory. A
-//! crowded cell is divided like a block, up to 16 cells wide, twice at most ([`sort`]).
+//! A cell is a few triangles wide, whatever their number ([`size`]). A triangle that would be in
+//! too many cells is in the lists of bricks, of blocks, or of the grid: large ones cost little
+//! memory. A crowded cell is divided like a block, up to 16 cells wide, twice at most ([`sort`]).
 
 mod build;
 mod bundle;
@@ -100,8 +100,8 @@ impl<'a> Brick<'a> {
         Some(Chunk { words, bricks: 0, mask: layout::mask(block.mask), list: block.list })
     }
 
-    /// Shows the lists of all cells that a box meets, and of the bricks and blocks around them, given
-    /// in cells; `false` if that was enough.
+    /// Shows the lists of all cells that a box meets, and of the bricks and blocks around them,
+    /// given in cells; `false` if that was enough.
     pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
         let range = cells_between(*reach, self.last.map(|last| last + 1));
         let blocks = CellRange {
@@ -134,8 +134,8 @@ pub(crate) struct Tiles<'q, F, const ANY: bool> {
     pub(crate) lattice: &'q Lattice,
     pub(crate) mesh: &'q TriangleMesh<'q>,
     pub(crate) rays: &'q Strided<'q>,
-    /// Gets the place of a ray and its hit and perhaps those of the next ones, or no hit if the ray did
-    /// not go with its tile.
+    /// Gets the place of a ray and its hit and perhaps those of the next ones, or no hit if
+    /// the ray did not go with its tile.
     pub(crate) answer: F,
 }
 
@@ -149,7 +149,8 @@ impl<F: FnMut(usize, &[Hit]), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
             let count = RAYS.min(self.rays.count - first);
             let members = tile.trace(simd, self.rays, first, count);
             for four in 0..count.div_ceil(4) {
-                // Said in both ways: hits that are handed on as they are need not go through memory.
+                // Said in both ways: hits that are handed on as they are
+                // need not go through memory.
                 if members >> (4 * four) & 0xf == 0xf {
                     (self.answer)(first + 4 * four, &tile.hits(simd, four));
                     continue;
@@ -224,8 +225,8 @@ impl<'a> Chunk<'a> {
         Large::new(self.words, brick.list, Owner::Brick(bit))
     }
 
-    /// Shows the lists of all cells that a box meets, given in cells of the chunk, of which it has some
-    /// on each axis and which may be divided so often.
+    /// Shows the lists of all cells that a box meets, given in cells of the chunk, of which it has
+    /// some on each axis and which may be divided so often.
     fn visit(&self, reach: &Aabb, cells: u32, depth: u32, visitor: &mut Visitor<'_>) -> bool {
         let range = cells_between(*reach, [cells; 3]);
         let bricks = CellRange {

@@ -110,7 +110,8 @@ impl Home {
     }
 }
 
-/// The cells of a triangle in a block along an axis, and whether it has others before and behind them.
+/// The cells of a triangle in a block along an axis, and whether it
+/// has others before and behind them.
 #[derive(Clone, Copy)]
 struct Along {
     first: u32,
@@ -168,14 +169,15 @@ impl<S: Simd> Cells<S> {
         Self { halves, min: halves.first >> 1, max: halves.last >> 1 }
     }
 
-    /// Whether the second cell is in the next block: the lowest bit of the block's number then differs.
+    /// Whether the second cell is in the next block: the lowest bit of
+    /// the block's number then differs.
     #[inline(always)]
     fn straddles(self) -> u32x8<S> {
         ((self.min ^ self.max) >> 4) & 1
     }
 
-    /// What the axis adds to the cells of an entry, if it is x: at either end two bits for the brick
-    /// and two for the cell in it.
+    /// What the axis adds to the cells of an entry, if it is x: at either end two bits for the
+    /// brick and two for the cell in it.
     #[inline(always)]
     fn inside(self) -> u32x8<S> {
         let ends = (self.min & 15) | ((self.max & 15) << 12);
@@ -202,8 +204,8 @@ fn halves<S: Simd>([x, y, z]: [Cells<S>; 3]) -> u32x8<S> {
 
 /// The places of eight triangles: blocks, cells, and whether they are simple.
 ///
-/// What works on vectors is a function of its own, always inlined: closures and arrays' own functions
-/// are not, and what is not inlined is not compiled for the level.
+/// What works on vectors is a function of its own, always inlined: closures and arrays' own
+/// functions are not, and what is not inlined is not compiled for the level.
 #[inline(always)]
 fn places<S: Simd, const HALVES: bool>(
     simd: S,

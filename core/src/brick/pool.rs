@@ -1,12 +1,13 @@
-//! The pool while it is filled: a part for each task, with chunks from its start and bins at its end.
+//! The pool while it is filled: a part for each task, with chunks from
+//! its start and bins at its end.
 //!
 //! ```text
 //! part | chunk | chunk | ->      unread bins | bin | bin | bin |
 //! ```
 //!
-//! An entry has two words and a sorted one takes nearly three, so that the chunks end about where the
-//! bins began to. What a part needs is the largest sum of chunks written and bins unread; where it
-//! ends before that, it goes on counting and says so.
+//! An entry has two words and a sorted one takes nearly three, so that the chunks end about where
+//! the bins began to. What a part needs is the largest sum of chunks written and bins unread; where
+//! it ends before that, it goes on counting and says so.
 
 #![expect(clippy::cast_possible_truncation, reason = "words of a region")]
 

@@ -1,10 +1,11 @@
 //! How large a cell is: as large as the triangles make it, not as their number does.
 //!
-//! A box with extents `e` lies in `(1 + e.x/h) (1 + e.y/h) (1 + e.z/h)` cells of width `h`, wherever
-//! the cells begin. The width is the one with which a sample of the triangles lies in
-//! [`REFERENCES`] cells on average: so many references and bytes a triangle takes, whatever the mesh,
-//! and cells grow in number with the surface. (A number of cells proportional to the triangles, as in
-//! [`woo`](crate::cell::woo), fills cells of a surface more and more: as the cube root of N.)
+//! A box with extents `e` lies in `(1 + e.x/h) (1 + e.y/h) (1 + e.z/h)` cells of width `h`,
+//! wherever the cells begin. The width is the one with which a sample of the triangles lies
+//! in [`REFERENCES`] cells on average: so many references and bytes a triangle takes,
+//! whatever the mesh, and cells grow in number with the surface. (A number of cells
+//! proportional to the triangles, as in [`woo`](crate::cell::woo), fills cells of a surface
+//! more and more: as the cube root of N.)
 //!
 //! A triangle counts for no more than [`MOST`] cells: large ones are listed elsewhere and must not
 //! make the cells of all others coarse. Memory has the last word: cells are made larger until there
@@ -97,8 +98,8 @@ pub(super) fn settle(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Settled
     Ok(settle_in::<1>(mesh, config, &mut [], &Control::SERIAL)?.0)
 }
 
-/// Chooses the cells of a mesh and counts what they will hold. The heads of each task get the entries
-/// of every block if there is room for them; nothing else is written.
+/// Chooses the cells of a mesh and counts what they will hold. The heads of each task get the
+/// entries of every block if there is room for them; nothing else is written.
 pub(super) fn settle_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
     config: &Config,
@@ -233,8 +234,8 @@ impl Sample {
         Self { step, bounds: all }
     }
 
-    /// The width of cells that triangles of the sample lie in [`REFERENCES`] of, for a box with this
-    /// extent.
+    /// The width of cells that triangles of the sample lie in [`REFERENCES`]
+    /// of, for a box with this extent.
     fn cell(&self, mesh: &TriangleMesh<'_>, extent: f64) -> f64 {
         /// No cell is smaller: none could be.
         const LEAST: f64 = 1.0 / 16_384.0;

@@ -61,8 +61,8 @@ impl Measure {
     }
 }
 
-/// Sorts the entries of the first bench; what is crowded, on the benches behind it, if its share of words
-/// for each reference lets it.
+/// Sorts the entries of the first bench; what is crowded, on the benches behind it, if its share of
+/// words for each reference lets it.
 ///
 /// It calls itself, so it is not inlined and says once more what vectors it is compiled for.
 pub(super) fn sort<S: Simd>(

@@ -1,10 +1,10 @@
 //! A tile: up to 64 neighbouring rays that go through the grid together, slice by slice.
 //!
-//! The axis that the rays run along fastest becomes k. Between two planes of k, one cell apart, a ray
-//! stays in a rectangle of u and v; where a cell that lists something meets rectangles, its triangles
-//! are tested: against those rays if they are few, against all that may meet a triangle if they are many
-//! ([`hits`](super::hits)). Along k there is nothing to search and no order to keep but that of the
-//! slices: a ray is done when its closest hit lies before the next.
+//! The axis that the rays run along fastest becomes k. Between two planes of k, one cell apart, a
+//! ray stays in a rectangle of u and v; where a cell that lists something meets rectangles, its
+//! triangles are tested: against those rays if they are few, against all that may meet a triangle
+//! if they are many ([`hits`](super::hits)). Along k there is nothing to search and no order to
+//! keep but that of the slices: a ray is done when its closest hit lies before the next.
 //!
 //! ```text
 //! k ->   | block slice: 16 cells | ...        per slice, from the bounds of all rays: which blocks,
@@ -15,8 +15,8 @@
 //!    ----.    '----.____                     extremes on the first plane to those on the last
 //! ```
 //!
-//! Rays that turn off the axis of the others, and tiles that spread over too many cells, are left to
-//! the walk of single rays.
+//! Rays that turn off the axis of the others, and tiles that spread over too many cells, are
+//! left to the walk of single rays.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u8x64};
@@ -54,8 +54,8 @@ pub(super) struct Tile<'a, const ANY: bool> {
     hits: Hits,
     /// The cells that rays may meet in the slice at hand, on u and v.
     reach: [Reach; 2],
-    /// Work that may still be done, about a primitive for a ray: damaged bytes may list everything in
-    /// every cell.
+    /// Work that may still be done, about a primitive for a ray: damaged bytes may
+    /// list everything in every cell.
     unread: u64,
 }
 
@@ -113,7 +113,8 @@ impl Reach {
     }
 }
 
-/// For each axis and range of four places, the cells of a brick or bricks of a block that lie there.
+/// For each axis and range of four places, the cells of a brick or
+/// bricks of a block that lie there.
 const LAYERS: [[[u64; 4]; 4]; 3] = {
     let mut layers = [[[0; 4]; 4]; 3];
     let mut bit = 0;
@@ -416,8 +417,8 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         }
     }
 
-    /// Tests the triangles of a brick or of all of a part, for the rays that look for hits in the cells
-    /// where they lie.
+    /// Tests the triangles of a brick or of all of a part, for the rays that look for
+    /// hits in the cells where they lie.
     #[inline(always)]
     fn test_large<S: Simd>(&mut self, simd: S, view: &View<'a>, large: &Large<'a>) {
         let last = view.part.cells - 1;

@@ -1,20 +1,22 @@
 //! Proof that a foreign blob is a brick grid of its mesh in which every query answers right.
 //!
-//! Block by block, each chunk starts where the one before it ended, and all in it lies in the order in
-//! which [`sort`](super::sort) writes it: everything is read once and nothing is left over. Every
-//! listed triangle belongs where it is listed and is there once; so there are as many of them as the
-//! triangles have cells, bricks and blocks if and only if none is missing: one sum against another.
+//! Block by block, each chunk starts where the one before it ended, and all in it lies in the
+//! order in which [`sort`](super::sort) writes it: everything is read once and nothing is
+//! left over. Every listed triangle belongs where it is listed and is there once; so there
+//! are as many of them as the triangles have cells, bricks and blocks if and only if none is
+//! missing: one sum against another.
 //!
-//! In a divided cell, the first of the lists that a triangle has there stands for the triangle in the cell. So if
-//! the sum of the blocks is right, every triangle is in its first list in every divided cell. Then it is known what
-//! these cells must list, and their sum is right if and only if none is missing; and so on inward. Their own sum
-//! would not be proof: one list too few makes up for a triangle whose first is missing.
+//! In a divided cell, the first of the lists that a triangle has there stands for the triangle in
+//! the cell. So if the sum of the blocks is right, every triangle is in its first list in every
+//! divided cell. Then it is known what these cells must list, and their sum is right if and only if
+//! none is missing; and so on inward. Their own sum would not be proof: one list too few makes up
+//! for a triangle whose first is missing.
 //!
 //! A list has no triangle twice if its ids ascend. They need to do so only among triangles of one
 //! shape, as sorting leaves them: a triangle that came twice would have the same shape both times.
 //!
-//! Whether a build would have divided a crowded cell, and into as many cells, would take memory to prove:
-//! any division is a right one. Queries do not mind.
+//! Whether a build would have divided a crowded cell, and into as many cells, would take memory to
+//! prove: any division is a right one. Queries do not mind.
 
 use glam::Vec3A;
 
@@ -38,8 +40,8 @@ use crate::lists::ascends;
 use crate::mesh::TriangleMesh;
 
 impl Brick<'_> {
-    /// Whether this is a grid of the mesh in which every query answers right; the error names a byte
-    /// that no build writes so.
+    /// Whether this is a grid of the mesh in which every query answers right; the error names
+    /// a byte that no build writes so.
     pub(crate) fn validate(
         &self,
         header: &Header,
@@ -100,10 +102,12 @@ struct Check<'a> {
     settled: &'a Settled,
     /// For each shape the last id of a list, plus 1.
     last: [u32; SHAPES * SHAPES * SHAPES],
-    /// Ids in the lists of the grid and of blocks so far, of their divided cells, and of the divided cells of these.
-    /// What is in its first list in a divided cell is one of those that the cell around lists.
+    /// Ids in the lists of the grid and of blocks so far, of their divided cells, and of
+    /// the divided cells of these. What is in its first list in a divided cell is one of
+    /// those that the cell around lists.
     listed: [u64; DOMAINS],
-    /// How many there must be: by the mesh, and in divided cells by what is in its first list there.
+    /// How many there must be: by the mesh, and in divided cells by
+    /// what is in its first list there.
     expected: [u64; DOMAINS],
 }
 
@@ -217,8 +221,8 @@ impl Check<'_> {
         if cursor == pool.len() { Ok(()) } else { Err(self.wrong(cursor)) }
     }
 
-    /// Checks a chunk and those of its divided cells. All places in it count from `base`, the start of
-    /// the block; so does the answer, where they end.
+    /// Checks a chunk and those of its divided cells. All places in it count from `base`, the start
+    /// of the block; so does the answer, where they end.
     fn chunk(
         &mut self,
         base: usize,

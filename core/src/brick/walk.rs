@@ -1,5 +1,5 @@
-//! The walk of one ray: from block to block, in full ones from brick to brick, in full ones from cell
-//! to cell.
+//! The walk of one ray: from block to block, in full ones from brick to
+//! brick, in full ones from cell to cell.
 
 use fearless_simd::Simd;
 use glam::Vec3A;
@@ -47,7 +47,8 @@ struct Part<'a, 'l> {
     depth: u32,
 }
 
-// By reference: a copy, written as it is put together and read in larger pieces, would be waited for.
+// By reference: a copy, written as it is put together and read in
+// larger pieces, would be waited for.
 impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
     type Output = ();
 
@@ -173,8 +174,8 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
         }
     }
 
-    /// Walks through a divided cell. It is one of [`cells`](Self::cells) that calls it, so it is not
-    /// inlined and says once more what vectors it is compiled for.
+    /// Walks through a divided cell. It is one of [`cells`](Self::cells) that calls it, so it is
+    /// not inlined and says once more what vectors it is compiled for.
     fn divided<S: Simd>(&mut self, simd: S, part: &Part<'_, '_>, from: f32) {
         simd.vectorize(
             #[inline(always)]
@@ -189,8 +190,8 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
         );
     }
 
-    /// Tests the ray against the triangles of a brick or a chunk that begins at a corner, if it comes
-    /// near them.
+    /// Tests the ray against the triangles of a brick or a chunk that begins at a
+    /// corner, if it comes near them.
     #[inline(always)]
     fn test_large<S: Simd>(&mut self, simd: S, large: &Large<'_>, line: &Line, corner: [f32; 3]) {
         if line.meets(&large.extent.reach(large.owner), corner, self.limit) {
@@ -206,11 +207,11 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
         self.format.missed(Halves::new(upper, lower))
     }
 
-    /// Tests the ray against the triangles of a list, but for those of which a reference has any of the
-    /// bits `missed`.
+    /// Tests the ray against the triangles of a list, but for those of which a
+    /// reference has any of the bits `missed`.
     ///
-    /// Out of line, or it would be several times in the walk; so it says once more what vectors it is
-    /// compiled for.
+    /// Out of line, or it would be several times in the walk; so it says once more
+    /// what vectors it is compiled for.
     fn test<S: Simd>(&mut self, simd: S, references: &[u32], missed: u32) {
         simd.vectorize(
             #[inline(always)]

@@ -1,4 +1,5 @@
-//! Macrocell levels: bit arrays that overlay coarser and coarser grids (CP10 §3.2, Wald et al. 2006).
+//! Macrocell levels: bit arrays that overlay coarser and coarser grids
+//! (CP10 §3.2, Wald et al. 2006).
 //!
 //! ```text
 //! level 0   the cells of the hashed grid, one domain bit each         303 x 213 x 135
@@ -6,8 +7,9 @@
 //! level 2   one bit for factor^3 bits of level 1                        9 x   6 x   4
 //! ```
 //!
-//! The levels end with the first that has at most [`FEW_CELLS`] cells, or with [`MAX_LEVELS`]. They follow each other in one
-//! section, each starting at a new word; where one lies follows from the resolution and the factor.
+//! The levels end with the first that has at most [`FEW_CELLS`] cells, or with [`MAX_LEVELS`].
+//! They follow each other in one section, each starting at a new word; where one lies follows
+//! from the resolution and the factor.
 
 use core::num::NonZeroU32;
 use core::ops::Range;
@@ -139,8 +141,8 @@ impl Levels {
         is_set(words, self.level(level).bit(cell))
     }
 
-    /// Writes all levels, the finest from the domain bits of the grid, each other one from the level
-    /// below it: the paper's bitmap scaling.
+    /// Writes all levels, the finest from the domain bits of the grid, each other one from the
+    /// level below it: the paper's bitmap scaling.
     pub(super) fn fill(&self, resolution: [u32; 3], domain_bits: &[u64], words: &mut [u64]) {
         words.fill(0);
         let mut below = Level { resolution, start: 0 };
@@ -194,8 +196,9 @@ impl Levels {
 
 /// Sets the bit of every macrocell that has a bit set below it.
 ///
-/// All rows of a row of macrocells are laid over each other first, 64 cells at a time. With a division
-/// for each full cell a build took 1.05 times as long on bunny, 1.04 on dragon, 1.01 on sponza.
+/// All rows of a row of macrocells are laid over each other first, 64 cells at a
+/// time. With a division for each full cell a build took 1.05 times as long on
+/// bunny, 1.04 on dragon, 1.01 on sponza.
 fn scale_down(below: &Level, from: &[u64], above: &Level, to: &mut [u64], factor: u32) {
     let [width, height, depth] = below.resolution;
     let [columns, rows, layers] = above.resolution;

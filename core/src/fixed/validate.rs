@@ -1,5 +1,5 @@
-//! Proof that a foreign blob is a fixed grid of its mesh: the one-level grid is, and each macrocell is
-//! full exactly where something below it is.
+//! Proof that a foreign blob is a fixed grid of its mesh: the one-level grid is, and each macrocell
+//! is full exactly where something below it is.
 
 use super::Fixed;
 use crate::blob::{Header, corrupt};

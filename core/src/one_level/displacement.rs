@@ -11,8 +11,9 @@
 //! ```
 //!
 //! Plain first fit tries every slot from the first free one: quadratic, minutes where the rest of a
-//! build takes a second. It is linear because the search starts at most [`WINDOW_SLOTS`] before the end
-//! of the table, and fast because many offsets are tried at once: 64 for each word, and with vectors
+//! build takes a second. It is linear because the search starts at most
+//! [`WINDOW_SLOTS`] before the end of the table, and fast because many offsets are
+//! tried at once: 64 for each word, and with vectors
 //! 512. Rows keep their natural order: sorting them by length gains about 1 % of the table.
 
 use fearless_simd::prelude::*;
@@ -28,8 +29,9 @@ const WINDOW_SLOTS: usize = 2048;
 
 /// Finds an offset for every row and returns the number of slots, or `None` beyond `i32::MAX`.
 ///
-/// `domain_bits` holds the rows, `width` bits each. `occupied` must have one bit for every cell and a word
-/// more, may hold anything, and is left with the slots in use; bits behind the last one say nothing.
+/// `domain_bits` holds the rows, `width` bits each. `occupied` must have one bit for
+/// every cell and a word more, may hold anything, and is left with the slots in use; bits
+/// behind the last one say nothing.
 pub(crate) fn displace(
     domain_bits: &[u64],
     width: usize,
@@ -74,7 +76,8 @@ impl Kernel for Displace<'_> {
                 cleared = end.max(behind);
             }
 
-            // Take the first hole in the window that the row fits into; behind the table it always does.
+            // Take the first hole in the window that the row fits into;
+            // behind the table it always does.
             let window = slots.saturating_sub(WINDOW_SLOTS) / WORD_BITS;
             let mut word = window.max(first_free_word);
             let slot = loop {
@@ -101,7 +104,8 @@ impl Kernel for Displace<'_> {
     }
 }
 
-/// Words that are cleared beyond those that are needed, so that it is seldom done: 512 bytes, an eighth of a page.
+/// Words that are cleared beyond those that are needed, so that it is seldom
+/// done: 512 bytes, an eighth of a page.
 const CLEARED_WORDS: usize = 64;
 
 /// Words in a vector.

@@ -1,8 +1,9 @@
 //! Primitives whose cells are found before the first of them is spread.
 //!
 //! How many cells a primitive has is as good as random, and what depends on it is a mispredicted
-//! branch: what was loaded and computed for the primitives behind it would have to be done again. So
-//! a pass goes from batch to batch, and the branches of a batch depend on what is in the first cache.
+//! branch: what was loaded and computed for the primitives behind it would have to
+//! be done again. So a pass goes from batch to batch, and the branches of a batch
+//! depend on what is in the first cache.
 
 use core::ops::Range;
 
@@ -13,8 +14,8 @@ use crate::control::{OFTEN, Watch};
 use crate::eight::LANES;
 use crate::error::Error;
 
-/// The cells of a primitive: the row and the place in it of the first, and how many more there are on
-/// each axis.
+/// The cells of a primitive: the row and the place in it of the first, and how
+/// many more there are on each axis.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     row: usize,

@@ -110,8 +110,8 @@ mod tests {
     #[test]
     #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn every_level_places_triangles_where_their_ranges_are() {
-        // Most triangles are small, some span the box, some are not finite or have no vertices; one has
-        // the last vertex, behind which nothing can be read.
+        // Most triangles are small, some span the box, some are not finite or have no vertices; one
+        // has the last vertex, behind which nothing can be read.
         let mut state = 1_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

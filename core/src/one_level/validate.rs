@@ -8,8 +8,8 @@
 //!
 //! Two cells with equal lists could still share a slot while another slot stays orphaned: right
 //! answers, but no build's work. A sum of scrambled slot numbers over the cells and one over the
-//! slots with lists tell that apart. Where among the free slots a row came to lie is all that is left
-//! to whoever wrote the blob.
+//! slots with lists tell that apart. Where among the free slots a row came to lie is all that
+//! is left to whoever wrote the blob.
 
 use glam::Vec3A;
 
@@ -135,8 +135,8 @@ impl OneLevel<'_> {
     }
 }
 
-/// Whether a table is as displaced rows leave it: a row without marked cells has offset 0, every marked
-/// cell has a slot of its own, and of the slots those are full.
+/// Whether a table is as displaced rows leave it: a row without marked cells has offset 0, every
+/// marked cell has a slot of its own, and of the slots those are full.
 pub(crate) fn slots_are_sound(
     [width, height, depth]: [u32; 3],
     offset: impl Fn(usize) -> Option<i32>,

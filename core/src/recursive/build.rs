@@ -5,9 +5,9 @@
 //! index   | header | pool, a bump allocator ->
 //! ```
 //!
-//! The lists of a grid are made in the scratch, then moved into the pool cell by cell; a crowded cell
-//! becomes a grid, whose own lists stack up behind. When the pool runs out the build goes on and
-//! counts: at the end it knows, exactly, what index it would have needed.
+//! The lists of a grid are made in the scratch, then moved into the pool cell by cell; a crowded
+//! cell becomes a grid, whose own lists stack up behind. When the pool runs out the build goes on
+//! and counts: at the end it knows, exactly, what index it would have needed.
 //!
 //! Resolution as in Manta: with n primitives at depth d of D, `m = (8 n)^(1 / (2 D + 1 - 2 d))` and
 //! `m * size / cbrt(volume)` cells on each axis, rounded; at least 8 cells.
@@ -32,8 +32,8 @@ use crate::survey::{Survey, boxes};
 
 /// Words of scratch for one grid of so many primitives: where lists start, and their ids.
 ///
-/// The rule asks for at most `density * n` cells; rounding makes at most 1.5 times as many of them on
-/// each of three axes, and no grid has fewer than 8.
+/// The rule asks for at most `density * n` cells; rounding makes at most 1.5 times as many of them
+/// on each of three axes, and no grid has fewer than 8.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bound, rounded up")]
 const fn scratch_words(primitives: u32, density: f32) -> u64 {
     let cells = (3.5 * density as f64 * primitives as f64) as u64;
@@ -51,8 +51,8 @@ pub(crate) const fn scratch_bytes(triangles: u32, config: &Config) -> u64 {
 
 /// The most memory that a mesh with so many triangles can need, or all that a pool can address.
 ///
-/// Grids on one level that share n references, at least 5 each, have at most `(3.5 * density + 44) n`
-/// words and hand down at most `29 n` references.
+/// Grids on one level that share n references, at least 5 each, have at most
+/// `(3.5 * density + 44) n` words and hand down at most `29 n` references.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bound, rounded up")]
 pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
     let mut references = triangles as f64 + 5.0;
@@ -183,8 +183,8 @@ pub(super) struct Rule {
 }
 
 impl Rule {
-    /// Manta's resolution for a box of this size with so many primitives at this depth; `None` if an
-    /// axis would need more cells than a grid can have.
+    /// Manta's resolution for a box of this size with so many primitives at this depth; `None` if
+    /// an axis would need more cells than a grid can have.
     pub(super) fn resolution(
         &self,
         size: [f64; 3],
@@ -288,8 +288,9 @@ impl Placed {
         Some(Self { reach, overlap, margin: lattice.margin() })
     }
 
-    /// Shows `visit` the cells of a grid that the triangle overlaps, with their numbers: one at least, so
-    /// that a triangle which only touches a cell is not lost in the grid that the cell holds.
+    /// Shows `visit` the cells of a grid that the triangle overlaps, with their
+    /// numbers: one at least, so that a triangle which only touches a cell is not lost
+    /// in the grid that the cell holds.
     pub(super) fn each_cell(&self, node: &Node, mut visit: impl FnMut(usize, [u32; 3])) {
         let (origin, scale) = (Vec3A::from_array(node.origin), Vec3A::from_array(node.scale));
         let [width, height, _] = node.resolution;
@@ -333,9 +334,9 @@ impl Builder<'_, '_> {
 
     /// Puts a grid of these primitives in this box into the pool, and all grids in it.
     ///
-    /// Answers `false`, and puts nothing, where a grid separates too little: if the lists of its cells
-    /// hold on average more than three quarters of the primitives, as in a pile of equal triangles.
-    /// The root is always put.
+    /// Answers `false`, and puts nothing, where a grid separates too little: if the lists of its
+    /// cells hold on average more than three quarters of the primitives, as in a pile of equal
+    /// triangles. The root is always put.
     fn grid(
         &mut self,
         ids: &[u32],

@@ -1,10 +1,10 @@
 //! The recursive grid that the paper compares with: Manta's (Bigler 2006; resolution after Ize,
 //! Shirley, Parker 2007), uncompressed, depth 3.
 //!
-//! Every cell of a grid has an entry. A cell with more than [`FEW`] primitives holds a grid of its own,
-//! around the part of the cell that they reach, until the depth is used up. Primitives are listed
-//! only in cells that they really overlap. The best traversal of the paper's methods, the longest
-//! build and several times the memory.
+//! Every cell of a grid has an entry. A cell with more than [`FEW`] primitives holds a grid of its
+//! own, around the part of the cell that they reach, until the depth is used up. Primitives are
+//! listed only in cells that they really overlap. The best traversal of the paper's methods, the
+//! longest build and several times the memory.
 //!
 //! ```text
 //! blob | header | pool |
@@ -93,8 +93,8 @@ impl<'a> Recursive<'a> {
         let mut limit = line.end;
         let mut around = [(node, walk); MAX_DEPTH as usize];
         let mut depth = 0;
-        // A ray meets a cell at most once, and every cell has an entry; where damaged bytes nest grids
-        // without end, the walk ends with the entries.
+        // A ray meets a cell at most once, and every cell has an entry; where damaged bytes nest
+        // grids without end, the walk ends with the entries.
         for _ in 0..self.pool.len() {
             tally.cell_step();
             match node.content(self.pool, walk.cell()) {

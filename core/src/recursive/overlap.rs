@@ -1,7 +1,8 @@
 //! Exact triangle-box overlap: the thirteen separating axes of Akenine-Möller (2001).
 //!
-//! In the coordinates of the root's cells, in which every length is of the order of one whatever the
-//! scene's scale; a box may be cut and scaled along the axes without changing what overlaps what.
+//! In the coordinates of the root's cells, in which every length is of the order of
+//! one whatever the scene's scale; a box may be cut and scaled along the axes
+//! without changing what overlaps what.
 
 use glam::Vec3A;
 

@@ -1,13 +1,13 @@
 //! Proof that a foreign blob is a recursive grid of its mesh.
 //!
-//! Grid by grid from the root: each cell's part of the pool starts where the part before it ends, so
-//! everything is read once. Every listed triangle overlaps its cell and the cells around that, and no
-//! list has it twice; so there are as many of them as the triangles have cells if and only if none is
-//! missing: one sum against another. A grid in a cell has the box and the resolution that a build gives
-//! to the triangles in it, and so many of them that it was worth it.
+//! Grid by grid from the root: each cell's part of the pool starts where the part before it ends,
+//! so everything is read once. Every listed triangle overlaps its cell and the cells around that,
+//! and no list has it twice; so there are as many of them as the triangles have cells if and only
+//! if none is missing: one sum against another. A grid in a cell has the box and the resolution
+//! that a build gives to the triangles in it, and so many of them that it was worth it.
 //!
-//! Whether a list is long because nothing would separate its triangles would take memory to prove: a
-//! list may have any length. Queries do not mind.
+//! Whether a list is long because nothing would separate its triangles would take memory to prove:
+//! a list may have any length. Queries do not mind.
 
 use super::build::{Placed, Rule, inside};
 use super::node::{Content, HEAD_WORDS, Node};
@@ -160,8 +160,8 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Whether a triangle overlaps all of the cells around a list, down to a depth. Counts it in each of
-    /// their grids where this is the first list that has it.
+    /// Whether a triangle overlaps all of the cells around a list, down to a depth. Counts it in
+    /// each of their grids where this is the first list that has it.
     fn count(&mut self, id: u32, depth: usize) -> bool {
         let Some(placed) = Placed::new(self.mesh, self.lattice, id) else { return false };
         let mut is_first = true;

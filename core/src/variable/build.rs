@@ -341,8 +341,8 @@ impl CellSpread<'_> {
 
         let [width, height, depth] = self.frame.resolution.map(|cells| cells as usize);
         let row_offsets = bench.row_offsets.get_mut(..height * depth)?;
-        // A few words more, if there are: the last ones are not read eight at a time. And no more, which
-        // first fit would clear.
+        // A few words more, if there are: the last ones are not read eight at a time. And no
+        // more, which first fit would clear.
         let enough = cells.div_ceil(WORD_BITS) + 1;
         let words = bench.occupied.len().min(enough + 8).max(enough);
         let occupied = bench.occupied.get_mut(..words)?;

@@ -1,8 +1,9 @@
 //! The multi-level variable hashed grid (CP10 §3.1): crowded cells hold grids of their own.
 //!
 //! The top is a one-level grid at density 4. A cell with more primitives than
-//! `Config::subdivide_above` does not list them: it holds a subgrid, built by the same algorithm from
-//! the cell's primitives, cut to the part of the cell that they reach. Two levels, as in the paper.
+//! `Config::subdivide_above` does not list them: it holds a subgrid, built by the
+//! same algorithm from the cell's primitives, cut to the part of the cell that they
+//! reach. Two levels, as in the paper.
 //!
 //! ```text
 //! blob | header | row_offsets | domain_bits | hash | pool |
@@ -12,9 +13,9 @@
 //!   top bit set                     a subgrid, see subgrid.rs
 //! ```
 //!
-//! The paper names no threshold. 16 is the largest number that divides cells of every scan, with the
-//! tests per ray that the paper reports; no number makes a single picture sooner than no subgrids
-//! (lab/results/subdivision.md has the sweep).
+//! The paper names no threshold. 16 is the largest number that divides cells of every scan, with
+//! the tests per ray that the paper reports; no number makes a single picture sooner than no
+//! subgrids (lab/results/subdivision.md has the sweep).
 
 mod build;
 mod subgrid;

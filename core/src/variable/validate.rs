@@ -2,13 +2,13 @@
 //!
 //! The table of the top cuts the pool into the parts of its cells, so everything is read once and
 //! nothing is left over. Then the same sum as for one level, over the cells of the top and of the
-//! subgrids: every listed triangle covers the cell that lists it and none is listed twice, so there are
-//! as many of them as the triangles have cells if and only if none is missing. A subgrid has the frame
-//! and the resolution that a build gives to the primitives in it, and so many of them that it was worth
-//! it.
+//! subgrids: every listed triangle covers the cell that lists it and none is listed twice, so
+//! there are as many of them as the triangles have cells if and only if none is missing. A
+//! subgrid has the frame and the resolution that a build gives to the primitives in it, and so
+//! many of them that it was worth it.
 //!
-//! Whether a list is long because nothing would separate its primitives would take memory to prove: a
-//! list may have any length. Queries do not mind.
+//! Whether a list is long because nothing would separate its primitives would take memory to prove:
+//! a list may have any length. Queries do not mind.
 
 use glam::Vec3A;
 

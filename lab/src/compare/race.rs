@@ -5,9 +5,9 @@
 //! repetition 2:  build A, primary, ao, random with A | build B, ... | ...    medians of each
 //! ```
 //!
-//! As in [`measure`](crate::measure), taking turns lets a machine that others use disturb all alike.
-//! A structure is dropped before the next is built. Arrays for answers and pixels are written once
-//! before the clock runs, so that their pages are in nobody's time.
+//! As in [`measure`](crate::measure), taking turns lets a machine that others use disturb all
+//! alike. A structure is dropped before the next is built. Arrays for answers and pixels are
+//! written once before the clock runs, so that their pages are in nobody's time.
 
 use core::hint::black_box;
 use std::time::Instant;

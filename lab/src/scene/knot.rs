@@ -31,7 +31,8 @@ const BUMP_HEIGHT: f64 = 0.08;
 const BUMP_OCTAVES: u32 = 6;
 const BUMP_GAIN: f64 = 0.45;
 
-/// Rows and columns of the mesh with `2 * rows * columns` closest to `triangles`, quads near-square.
+/// Rows and columns of the mesh with `2 * rows * columns` closest to
+/// `triangles`, quads near-square.
 pub(super) fn size(triangles: u32) -> (u32, u32) {
     let quads = (triangles / 2).max(1);
     let square = (quads / ROWS_PER_COLUMN).isqrt().max(3);

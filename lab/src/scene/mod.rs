@@ -31,9 +31,9 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Loads a `.ply` or `.obj` file, or makes a scene from `procedural:NAME[:TRIANGLES]`, or puts one of
-    /// them into another: `bunny.ply+stadium.ply` is the bunny, as large as it is, in the middle of the
-    /// stadium, and pictures are of the bunny.
+    /// Loads a `.ply` or `.obj` file, or makes a scene from `procedural:NAME[:TRIANGLES]`, or puts
+    /// one of them into another: `bunny.ply+stadium.ply` is the bunny, as large as it is, in the
+    /// middle of the stadium, and pictures are of the bunny.
     ///
     /// # Errors
     /// If the words name no scene or the file cannot be read; the message says what to do.

@@ -179,7 +179,8 @@ impl PropertyAccess for Vertex {
 struct Face(Vec<i32>);
 
 impl Face {
-    /// Appends the triangles that fan out from the first corner; fewer than three corners give none.
+    /// Appends the triangles that fan out from the first corner; fewer
+    /// than three corners give none.
     fn fan(&self, triangles: &mut Vec<[u32; 3]>) -> Result<()> {
         let mut corners = self.0.iter().map(|&corner| {
             u32::try_from(corner).with_context(|| format!("vertex {corner} does not exist"))

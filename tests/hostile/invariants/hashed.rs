@@ -50,7 +50,8 @@ pub(super) fn table(seed: &Seed) -> Vec<Case<'static>> {
         }),
         case("the last list ends late", in_hash, move |b| add(b, s.hash + 4 * s.slots, 1)),
     ];
-    // The place behind the last slot is free in this blob: a slot more fits without moving anything.
+    // The place behind the last slot is free in this blob: a slot more
+    // fits without moving anything.
     assert!(!(s.slots + 1).is_multiple_of(16), "no room for a slot");
     cases.push(case("a slot without a list at the end", HASH_COUNT..HASH_COUNT + 4, move |b| {
         add(b, HASH_COUNT, 1);
@@ -143,7 +144,8 @@ fn a_missing_triangle_is_missed() {
     }
 }
 
-/// Every cell of one triangle's box has the same list: rows can share slots, and all lists are right.
+/// Every cell of one triangle's box has the same list: rows can share
+/// slots, and all lists are right.
 #[test]
 fn slots_are_not_shared() {
     for method in [Method::OneLevel, Method::Fixed, Method::Variable] {

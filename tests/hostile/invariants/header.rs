@@ -107,7 +107,8 @@ fn parameters_that_no_build_takes_are_refused() {
 fn what_fills_up_sections_is_zero() {
     let mut found = 0;
     for seed in seeds().filter(|seed| !seed.mesh.indices.is_empty()) {
-        // The last section ends with what fills it up, if anything does; macrocells fill their words.
+        // The last section ends with what fills it up, if anything
+        // does; macrocells fill their words.
         let words = Copy::of(&seed.blob).word(REFERENCE_COUNT) as usize;
         let is_full = words.is_multiple_of(16) || seed.config.method == Method::Fixed;
         for back in (1..=(16 - words % 16) * 4).take(if is_full { 0 } else { 64 }) {

@@ -1,4 +1,5 @@
-//! Where things lie in a blob, from the format's description (core/src/one_level/mod.rs and others).
+//! Where things lie in a blob, from the format's description
+//! (core/src/one_level/mod.rs and others).
 
 use hgrid_tests::copy::Copy;
 

@@ -1,5 +1,5 @@
-//! Every question that a grid answers: about any grid, that it ends with something possible; about one
-//! that is right, that it says what brute force says.
+//! Every question that a grid answers: about any grid, that it ends with something possible; about
+//! one that is right, that it says what brute force says.
 
 use hgrid_core::{
     BlobInfo, ClosestPoint, Coherence, Counters, Cull, Error, Grid, Hit, INVALID_ID, Method,
@@ -46,8 +46,8 @@ fn batch(grid: &Grid<'_>, rays: &[Ray], coherence: Coherence) -> (Vec<Hit>, Vec<
     (hits, occluded)
 }
 
-/// Asks a grid, whatever its bytes say: it answers with triangles that there are and that the ray hits,
-/// after bounded work.
+/// Asks a grid, whatever its bytes say: it answers with triangles that there are and that
+/// the ray hits, after bounded work.
 ///
 /// # Panics
 /// If not.
@@ -82,7 +82,8 @@ pub fn ends(grid: &Grid<'_>, rays: &[Ray]) {
         let (hits, occluded) = batch(grid, rays, coherence);
         for (ray, (hit, occluded)) in rays.iter().zip(hits.iter().zip(occluded)) {
             let is_miss = bits(hit) == bits(&Hit::MISS);
-            // Tiles do not ask whether a ray meets the box: a damaged one may lie beside its triangles.
+            // Tiles do not ask whether a ray meets the box: a damaged one
+            // may lie beside its triangles.
             let is_hit = hit.primitive < grid.mesh().triangle_count()
                 && (ray.t_min..=ray.t_max).contains(&hit.t);
             assert!(is_miss || is_hit, "{coherence:?} {hit:?} {ray:?}");

@@ -1,5 +1,5 @@
-//! Any bytes as a mesh and a configuration: the build takes the memory that was said, or says why not;
-//! what it makes opens, is valid, and answers as brute force does.
+//! Any bytes as a mesh and a configuration: the build takes the memory that was said, or says why
+//! not; what it makes opens, is valid, and answers as brute force does.
 
 use std::cell::Cell;
 

@@ -1,7 +1,7 @@
-//! Any calls of the C entry points, with any numbers in their structs, as far as the header's rules on
-//! pointers allow: every answer has a status that is known, an error leaves the outputs alone, and what
-//! succeeds answers as the same call in Rust does. Here is what builds; `c_stored` and `c_queries` have
-//! the rest.
+//! Any calls of the C entry points, with any numbers in their structs, as far as the header's
+//! rules on pointers allow: every answer has a status that is known, an error leaves the outputs
+//! alone, and what succeeds answers as the same call in Rust does. Here is what builds;
+//! `c_stored` and `c_queries` have the rest.
 
 use std::cell::Cell;
 use std::ffi::{CStr, c_void};

@@ -1,5 +1,5 @@
-//! The queries of the C entry points: what they answer is what Rust answers on the same bytes, bit for
-//! bit, and nothing but the answer is written.
+//! The queries of the C entry points: what they answer is what Rust answers on the same bytes, bit
+//! for bit, and nothing but the answer is written.
 
 use std::ptr::{from_mut, from_ref, null, null_mut};
 
@@ -137,7 +137,8 @@ impl Caller<'_> {
                 options
                     .ask(&mut told, 0, |options| grid.intersect_all(&ray, options, &mut expected))
             });
-            // SAFETY: all pointers are NULL or point to what they should; no memory holds so many hits.
+            // SAFETY: all pointers are NULL or point to what they should;
+            // no memory holds so many hits.
             let status = known(unsafe {
                 hgrid_intersect_all(grid, to_ray, options.as_ptr(), to_hits, capacity, to_count)
             });

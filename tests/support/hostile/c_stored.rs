@@ -1,5 +1,5 @@
-//! Stored grids by the C entry points: opening, packing, peeking, proving, and grids with memory of their
-//! own.
+//! Stored grids by the C entry points: opening, packing, peeking, proving,
+//! and grids with memory of their own.
 
 use std::cell::RefCell;
 use std::ffi::c_void;

@@ -4,9 +4,9 @@ use hgrid_core::{Counters, Grid, Method};
 
 /// The most that a query of one ray may count.
 ///
-/// A walk moves one axis towards its end at every step, so it has no more steps than the cells on the
-/// three axes of its box sum up to. Boxes within boxes multiply that; where bytes say how deep, there
-/// is a last depth.
+/// A walk moves one axis towards its end at every step, so it has no more steps than the cells
+/// on the three axes of its box sum up to. Boxes within boxes multiply that; where bytes say
+/// how deep, there is a last depth.
 #[must_use]
 pub fn most(grid: &Grid<'_>) -> Counters {
     let sum = |cells: [u32; 3]| cells.iter().map(|&c| u64::from(c)).sum::<u64>();

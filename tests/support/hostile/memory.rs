@@ -63,7 +63,8 @@ impl Drop for Memory {
     }
 }
 
-/// What a program lends to the library by its address and looks at itself, too: a box that may be moved.
+/// What a program lends to the library by its address and looks at
+/// itself, too: a box that may be moved.
 pub(super) struct Lent<T>(NonNull<T>);
 
 impl<T> Lent<T> {

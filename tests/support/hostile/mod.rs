@@ -1,8 +1,8 @@
 //! What fuzzing runs: functions of any bytes that panic where the library breaks a promise.
 //!
-//! `tests/fuzz` gives them the bytes that a fuzzer invents, `tests/hostile` those that were kept. What
-//! the bytes mean is said by the types of each target, through `arbitrary`: most bytes mean something,
-//! and what is missing at the end is zero.
+//! `tests/fuzz` gives them the bytes that a fuzzer invents, `tests/hostile` those that were kept.
+//! What the bytes mean is said by the types of each target, through `arbitrary`: most bytes mean
+//! something, and what is missing at the end is zero.
 //!
 //! A new entry point of the library belongs into `ask`, where every target that has a grid asks it,
 //! and into `c_abi`, where C does.

@@ -127,8 +127,8 @@ fn corners(mesh: &TriangleMesh<'_>, triangle: u16) -> [[f32; 3]; 3] {
     mesh.triangle(u32::from(triangle) % count).unwrap_or_default()
 }
 
-/// Rays that are always asked about: across the box, at the mesh, along axes, and no rays at all; half
-/// of them neighbours.
+/// Rays that are always asked about: across the box, at the mesh, along axes, and no rays
+/// at all; half of them neighbours.
 #[must_use]
 pub fn fixed_rays(bounds: ([f32; 3], [f32; 3]), count: usize) -> Vec<Ray> {
     let (min, max) = bounds;

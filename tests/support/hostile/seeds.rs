@@ -81,7 +81,8 @@ fn odd() -> Mesh {
     mesh
 }
 
-/// A few triangles, some in a tenth of the place, and some in a hundredth: grids in grids of few bytes.
+/// A few triangles, some in a tenth of the place, and some in a
+/// hundredth: grids in grids of few bytes.
 pub fn nested() -> Mesh {
     let mut mesh = soup(10, 0.1, 3);
     for (count, size) in [(30, 0.1), (12, 0.004)] {

@@ -1,5 +1,5 @@
-//! Meshes and configurations, as a fuzzer chooses them: of any bytes, at any stride, and of few enough
-//! triangles that brute force takes no time.
+//! Meshes and configurations, as a fuzzer chooses them: of any bytes, at any stride, and of few
+//! enough triangles that brute force takes no time.
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_core::{

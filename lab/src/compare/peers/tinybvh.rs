@@ -1,4 +1,5 @@
-//! tinybvh: binned SAH or spatial splits; traced two-wide as built, or eight-wide after a conversion.
+//! tinybvh: binned SAH or spatial splits; traced two-wide as built, or
+//! eight-wide after a conversion.
 //!
 //! The wrapper tinybvh-rs has no query for any hit: a closest hit answers. It has no smallest `t`
 //! either; all rays of the workloads start at 0. Large builds start threads, which share one core
