@@ -1,6 +1,6 @@
-//! Is every promise of the header kept somewhere? The C programs print what they saw: `reached -2
-//! hgrid_open`, `null hgrid_open.blob`, `sized hgrid_open.mesh`, `described
-//! -2`; here it is compared with what the header says.
+//! Is every promise of the header kept somewhere? The C programs print what they saw, as in
+//! `reached -2 hgrid_open`, `null hgrid_open.blob`, `sized hgrid_open.mesh` and `described -2`; here
+//! it is compared with what the header says.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;

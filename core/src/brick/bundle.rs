@@ -468,7 +468,7 @@ impl Bounds {
     };
 
     /// The first and the last of `count` cells on an axis that rays may meet between two planes,
-    /// each cell `size` wide; `None` if they pass all of them.
+    /// each cell `size` wide; `None` if they pass all of them. Chords are numbers.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     pub(super) fn cells(

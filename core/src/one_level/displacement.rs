@@ -11,10 +11,9 @@
 //! ```
 //!
 //! Plain first fit tries every slot from the first free one: quadratic, minutes where the rest of a
-//! build takes a second. It is linear because the search starts at most
-//! [`WINDOW_SLOTS`] before the end of the table, and fast because many offsets are
-//! tried at once: 64 for each word, and with vectors
-//! 512. Rows keep their natural order: sorting them by length gains about 1 % of the table.
+//! build takes a second. It is linear because the search starts at most [`WINDOW_SLOTS`] before the
+//! end of the table, and fast because many offsets are tried at once: 64 for each word, 512 with
+//! vectors. Rows keep their natural order: sorting them by length gains about 1 % of the table.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u64x8};
