@@ -88,9 +88,7 @@ pub(crate) fn normal_of(triangle: &Triangle) -> Option<Vector> {
 
 /// Linear light as a screen wants it; a square root is close to its curve.
 fn display(color: Vec3A) -> Rgb {
-    // Not glam's root: as core needs it, that is an old instruction said in assembly, and in
-    // programs compiled for newer ones all colours took two to eight times as long.
-    bytes(Vec3A::from_array(color.to_array().map(f32::sqrt)))
+    bytes(color.sqrt())
 }
 
 /// From 0 to 1 as 0 to 255.

@@ -249,9 +249,6 @@ impl Hits {
                 let survivors = survivors >> (part * PART) & ((1 << PART) - 1);
                 if survivors != 0 {
                     let first = first + part * PART;
-                    let sheared = |at: usize| part_of(&corners[at], part);
-                    let corners =
-                        [sheared(0), sheared(1), sheared(2), sheared(3), sheared(4), sheared(5)];
                     let taken =
                         self.resolve(simd, bundle, &corners, depths, z, id, first, survivors);
                     if ANY {
@@ -262,8 +259,8 @@ impl Hits {
         }
     }
 
-    /// Does what [`TriangleTest::resolve`] does for eight rays from `first` on, and keeps the hits
-    /// that are closer; tells which of the rays now have this hit.
+    /// Does what [`TriangleTest::resolve`] does for eight rays from `first` on, of whose row the
+    /// corners are, and keeps the hits that are closer; tells which of the rays now have this hit.
     ///
     /// Where an edge function is infinite or no number, or all three are 0, t is no number, and no
     /// comparison with it holds. Else the area is finite, and 0 only where two have opposite signs.
@@ -273,19 +270,18 @@ impl Hits {
         &mut self,
         simd: S,
         bundle: &mut Bundle,
-        corners: &[[f32; PART]; 6],
+        corners: &[[f32; WIDTH]; 6],
         depths: [f64; 3],
         z: usize,
         id: u32,
         first: usize,
         survivors: u64,
     ) -> u64 {
-        let load = |numbers: &[f32; PART]| f32x8::simd_from(simd, *numbers);
-        let row = |array: &PerRay| load(&part_of(array, first / PART));
-        let [ax, ay, bx, by, cx, cy] = corners;
-        let (ax, ay) = (load(ax).widen(), load(ay).widen());
-        let (bx, by) = (load(bx).widen(), load(by).widen());
-        let (cx, cy) = (load(cx).widen(), load(cy).widen());
+        let row = |array: &PerRay| f32x8::simd_from(simd, part_of(array, first / PART));
+        let corner = |at: usize| f32x8::simd_from(simd, part_of(&corners[at], first / PART));
+        let (ax, ay) = (corner(0).widen(), corner(1).widen());
+        let (bx, by) = (corner(2).widen(), corner(3).widen());
+        let (cx, cy) = (corner(4).widen(), corner(5).widen());
         let origin = row(&bundle.origin[z]).widen();
         let direction = row(&bundle.direction_z).widen();
         let low = [ax.0, ay.0, bx.0, by.0, cx.0, cy.0];
