@@ -16,6 +16,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::crowds::HEAD_WORDS;
 use super::halves::Format;
 use crate::arena::{section_bytes, split_mut};
 use crate::blob::HEADER_BYTES;
@@ -182,9 +183,6 @@ impl Entry {
         format.through(self.id, before, behind)
     }
 
-    /// The bits of the class.
-    pub(super) const CLASS: u32 = 3 << 24;
-
     #[inline(always)]
     pub(super) const fn class(self) -> Class {
         match self.cells >> 24 & 3 {
@@ -250,22 +248,26 @@ pub(super) struct Bench<'s> {
     pub(super) divided: &'s mut [u64],
     /// The triangles.
     pub(super) entries: &'s mut [Entry],
+    /// On the bench of a divided cell what the crowded cells around it list.
+    pub(super) ids: &'s mut [u32],
 }
 
 impl<'s> Bench<'s> {
-    fn take(scratch: &'s mut [u8], entries: u64) -> Option<(Self, &'s mut [u8])> {
+    fn take(scratch: &'s mut [u8], entries: u64, ids: u64) -> Option<(Self, &'s mut [u8])> {
         let (cells, rest) = split_mut(scratch, BLOCK_CELLS as u64)?;
         let (bricks, rest) = split_mut(rest, MASK_BITS as u64)?;
         let (divided, rest) = split_mut(rest, MASK_BITS as u64)?;
         let (entries, rest) = split_mut(rest, entries)?;
-        Some((Self { cells, bricks, divided, entries }, rest))
+        let (ids, rest) = split_mut(rest, ids)?;
+        Some((Self { cells, bricks, divided, entries, ids }, rest))
     }
 
-    const fn bytes(entries: u64) -> u64 {
+    const fn bytes(entries: u64, ids: u64) -> u64 {
         section_bytes::<u32>(BLOCK_CELLS as u64)
             + section_bytes::<u32>(MASK_BITS as u64)
             + section_bytes::<u64>(MASK_BITS as u64)
             + section_bytes::<Entry>(entries)
+            + section_bytes::<u32>(ids)
     }
 }
 
@@ -298,17 +300,31 @@ impl Layout {
         self.head_bytes() + section_bytes::<u32>(words)
     }
 
-    /// Whether a cell can be crowded.
-    const fn has_children(&self) -> bool {
-        self.fullest > CROWDED
-    }
-
     /// Bytes of scratch for so many tasks: each has heads and benches.
     pub(super) const fn scratch_bytes(&self, tasks: u32) -> u64 {
+        (tasks as u64).saturating_mul(self.heads_bytes() + self.benches_bytes())
+    }
+
+    /// How deep blocks of this grid may be divided, and the block itself.
+    const fn depth(&self) -> usize {
+        if self.fullest > CROWDED { 1 + MAX_CHILDREN } else { 1 }
+    }
+
+    /// Entries and ids of a bench: no cell lists more than the fullest block.
+    const fn bench(&self, depth: usize) -> [u64; 2] {
         let entries = self.fullest as u64;
-        let child = if self.has_children() { Bench::bytes(entries) } else { 0 };
-        let task = self.heads_bytes() + Bench::bytes(entries) + MAX_CHILDREN as u64 * child;
-        (tasks as u64).saturating_mul(task)
+        [entries, if depth == 0 { 0 } else { entries + HEAD_WORDS as u64 }]
+    }
+
+    /// Bytes of the benches of one task.
+    const fn benches_bytes(&self) -> u64 {
+        let (mut bytes, mut depth) = (0, 0);
+        while depth < self.depth() {
+            let [entries, ids] = self.bench(depth);
+            bytes += Bench::bytes(entries, ids);
+            depth += 1;
+        }
+        bytes
     }
 
     /// Bytes of the heads of one task.
@@ -344,9 +360,7 @@ impl Layout {
         mut rest: &'s mut [u8],
         tasks: u32,
     ) -> ([Option<Benches<'s>>; N], &'s mut [u8]) {
-        let entries = u64::from(self.fullest);
-        let depth = if self.has_children() { 1 + MAX_CHILDREN } else { 1 };
-        let bytes = usize::try_from(Bench::bytes(entries) * depth as u64).unwrap_or(usize::MAX);
+        let bytes = usize::try_from(self.benches_bytes()).unwrap_or(usize::MAX);
         let mut all = [const { None }; N];
         for benches in all.iter_mut().take(tasks as usize) {
             if rest.len() < bytes {
@@ -356,8 +370,9 @@ impl Layout {
                 core::mem::take(&mut rest).split_at_mut_checked(bytes).unwrap_or_default();
             rest = behind;
             let mut taken = Benches::default();
-            for bench in taken.iter_mut().take(depth) {
-                let Some((cut, behind)) = Bench::take(part, entries) else { break };
+            for (depth, bench) in taken.iter_mut().enumerate().take(self.depth()) {
+                let [entries, ids] = self.bench(depth);
+                let Some((cut, behind)) = Bench::take(part, entries, ids) else { break };
                 (*bench, part) = (cut, behind);
             }
             *benches = Some(taken);

@@ -20,6 +20,7 @@
 
 mod build;
 mod bundle;
+mod crowds;
 mod divide;
 mod extent;
 mod frame;

@@ -20,7 +20,8 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x8};
 
-use super::divide::{Crowd, Plan, count_of_cell, plan};
+use super::crowds::Crowds;
+use super::divide::{Plan, plan};
 use super::extent::{EXTENT_WORDS, Extent, LIST_WORDS, Owner};
 use super::frame::{Frame, Scene};
 use super::groups::Groups;
@@ -98,28 +99,21 @@ fn chunk<S: Simd>(
     let mut measure = measure(simd, cells, bench.bricks, block_count);
 
     // Decide which cells are divided.
+    let room = deeper.first_mut().map(|child| core::mem::take(&mut child.ids));
+    let mut crowds = Crowds::new(entries, groups, format, room.unwrap_or_default());
     let is_crowded = measure.longest > CROWDED && !deeper.is_empty();
     if is_crowded {
-        bench.divided.fill(0);
-        for (eighth, eight) in cells.as_chunks::<8>().0.iter().enumerate() {
-            let mut crowded = crowded(simd, *eight);
-            while crowded != 0 {
-                let bit = crowded.trailing_zeros() as usize;
-                crowded &= crowded - 1;
-                let (cell, listed) = (8 * eighth + bit, eight.get(bit).copied().unwrap_or(0));
-                let crowd = Crowd { cell, listed, share };
-                if plan(simd, scene, frame, entries, &crowd, deeper).is_none() {
-                    continue;
-                }
-                measure.lists -= listed;
+        mark_crowded(simd, cells, bench.divided);
+        crowds.each(bench.divided, Some(&*cells), deeper, |crowd, benches| {
+            let gains = plan(simd, scene, frame, crowd, share, benches).is_some();
+            if gains {
+                measure.lists -= crowd.ids.len() as u32;
                 measure.lists += CHILD_WORDS as u32;
-                if let Some(divided) = bench.divided.get_mut(cell / MASK_BITS) {
-                    *divided |= 1 << (cell % MASK_BITS);
-                }
             }
-        }
+            gains
+        });
     }
-    let divided: &[u64] = if is_crowded { bench.divided } else { &[] };
+    let divided: &mut [u64] = if is_crowded { bench.divided } else { &mut [] };
 
     let base = pool.position();
     if let Some(words) = pool.take(measure.words()) {
@@ -127,34 +121,37 @@ fn chunk<S: Simd>(
         surround(scene, frame, words, &measure);
     }
     // The records of divided cells lie where the tally left the cursors of their cells.
-    for (brick, &rest) in divided.iter().enumerate() {
-        let mut rest = rest;
-        while rest != 0 {
-            let number = brick * MASK_BITS + rest.trailing_zeros() as usize;
-            rest &= rest - 1;
-            let Some(cell) = cells.get(number) else { continue };
-            let at = base + cell;
-            let listed = count_of_cell(simd, entries, number);
-            let crowd = Crowd { cell: number, listed, share };
-            let Some(Plan { frame, groups, share }) =
-                plan(simd, scene, frame, entries, &crowd, deeper)
-            else {
-                continue;
-            };
-            let block = sort(simd, scene, &frame, deeper, &groups, share, pool)?;
-            let [low, high] = block.mask;
-            pool.set(at, &[low, high, block.base, block.list, frame.cells]);
-        }
+    if is_crowded {
+        crowds.each(divided, None, deeper, |crowd, benches| {
+            let at = cells.get(crowd.cell as usize).map(|cell| base + cell);
+            let plan = plan(simd, scene, frame, crowd, share, benches);
+            if let Some((at, Plan { frame, groups, share })) = at.zip(plan)
+                && let Some(block) = sort(simd, scene, &frame, benches, &groups, share, pool)
+            {
+                let [low, high] = block.mask;
+                pool.set(at, &[low, high, block.base, block.list, frame.cells]);
+            }
+            true
+        });
+    }
+    if let Some(child) = deeper.first_mut() {
+        child.ids = crowds.into_room();
     }
     let mask = halves(measure.mask);
     let list = if measure.block > 0 { base + measure.words() as u32 - measure.block } else { 0 };
     Some(Block { mask, base, list })
 }
 
-/// Which of eight cells are crowded.
+/// Sets the bits of crowded cells.
 #[inline(always)]
-fn crowded<S: Simd>(simd: S, cells: [u32; 8]) -> u64 {
-    u32x8::simd_from(simd, cells).simd_gt(u32x8::splat(simd, CROWDED)).to_bitmask()
+fn mark_crowded<S: Simd>(simd: S, cells: &[u32; BLOCK_CELLS], bits: &mut [u64]) {
+    for (bits, cells) in bits.iter_mut().zip(cells.chunks_exact(MASK_BITS)) {
+        let eights = cells.as_chunks::<8>().0.iter().enumerate();
+        *bits = eights.fold(0, |bits, (row, &eight)| {
+            let eight = u32x8::simd_from(simd, eight);
+            bits | eight.simd_gt(u32x8::splat(simd, CROWDED)).to_bitmask() << (8 * row)
+        });
+    }
 }
 
 /// Counts how many triangles each cell and brick lists, and the block itself.
@@ -190,6 +187,22 @@ pub(super) fn tally(
         }
     }
     block
+}
+
+/// Shows every cell of all entries that are listed by cells, and what it lists of them.
+#[inline(always)]
+pub(super) fn each_listed(
+    groups: &Groups,
+    entries: &[Entry],
+    format: Format,
+    mut visit: impl FnMut(usize, u32),
+) {
+    groups.each_small(entries, format, &mut visit);
+    for &entry in groups.group(Groups::OTHERS, entries) {
+        if entry.class() == Class::Cells {
+            each_cell(entry, format, &mut visit);
+        }
+    }
 }
 
 /// Shows every cell of an entry, and what it lists of it.
