@@ -207,7 +207,9 @@ impl Header {
         if !self.resolution.iter().all(|r| (1..=MAX_RESOLUTION).contains(r)) {
             return Err(corrupt(core::mem::offset_of!(Self, resolution)));
         }
-        Ok(Lattice::new(bounds, self.resolution))
+        let lattice = Lattice::new(bounds, self.resolution);
+        let has_cubes = Method::from_u32(self.method) == Some(Method::Brick);
+        Ok(if has_cubes { lattice.with_cubes() } else { lattice })
     }
 
     /// The configuration that the grid was built with, where the method has such parameters.

@@ -132,6 +132,19 @@ impl Lattice {
         }
     }
 
+    /// The same box, where it is a single cell thick in a cell as thick as the others are wide: one
+    /// that reaches beyond the box.
+    ///
+    /// A cell that is divided alike on all axes must not be a slab: its parts would be slabs, too,
+    /// as thin as triangles long before they hold only a few.
+    pub(crate) fn with_cubes(self) -> Self {
+        let widest = Vec3A::splat(self.scale().min_element());
+        let is_single = Vec3A::from_array(self.resolution.map(as_f32)).cmplt(Vec3A::splat(1.5));
+        let cells_per_unit = Vec3A::select(is_single, widest, self.scale());
+        let margin = cells_per_unit * margin(&self.bounds());
+        Self { cells_per_unit: cells_per_unit.to_array(), margin: margin.to_array(), ..self }
+    }
+
     /// The box, pad included.
     #[inline(always)]
     pub(crate) fn bounds(&self) -> Aabb {

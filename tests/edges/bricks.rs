@@ -223,6 +223,22 @@ fn flat_scenes() {
     }
 }
 
+/// The cells of a flat scene are cubes; as slabs they could not be divided (5400 tests).
+#[test]
+fn a_crowd_in_a_flat_scene() {
+    for axis in 0..3 {
+        let mut mesh = soup(2000, 0.05, 3);
+        mesh.append(&soup(6000, 0.05, 5).scaled(2e-3));
+        let flat = mesh.map(|mut p| {
+            p[axis] = 0.0;
+            p
+        });
+        agrees(&flat, &Cost { bytes: 60, tests: 2500 });
+        let owned = Owned::build(&flat.view(), &config(1.0)).unwrap();
+        assert!(divided(&owned)[0] > 0);
+    }
+}
+
 #[test]
 fn a_single_triangle() {
     agrees(&one_triangle(), &Cost { bytes: 0, tests: 1 });

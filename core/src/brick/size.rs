@@ -118,7 +118,7 @@ pub(super) fn settle_in<const N: usize>(
             cell *= LARGER;
             continue;
         }
-        let lattice = Lattice::new(bounds, resolution);
+        let lattice = Lattice::new(bounds, resolution).with_cubes();
         let mut ground = Ground {
             mesh,
             lattice: &lattice,
