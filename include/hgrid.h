@@ -177,7 +177,7 @@
  * default configuration: a constant expression.
  */
 #define HGRID_SCRATCH_BOUND(triangles) \
-    ((triangles) < 129 ? (size_t)41 * (triangles) + 18944 : (size_t)57 * (triangles) + 53376)
+    ((triangles) < 129 ? (size_t)41 * (triangles) + 18944 : (size_t)65 * (triangles) + 53568)
 
 /**
  * The same with `HGRID_CONFIG_INIT_ONE_LEVEL`, which wants less for arrays of a fixed size: bytes of

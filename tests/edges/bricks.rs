@@ -223,7 +223,7 @@ fn flat_scenes() {
     }
 }
 
-/// The cells of a flat scene are cubes; as slabs they could not be divided (5400 tests).
+/// The cells of a flat scene are cubes. As slabs they would list thousands: none could be divided.
 #[test]
 fn a_crowd_in_a_flat_scene() {
     for axis in 0..3 {
@@ -233,9 +233,12 @@ fn a_crowd_in_a_flat_scene() {
             p[axis] = 0.0;
             p
         });
-        agrees(&flat, &Cost { bytes: 60, tests: 2500 });
+        // Rays in the plane meet most of the crowd.
+        agrees(&flat, &Cost { bytes: 60, tests: 8000 });
         let owned = Owned::build(&flat.view(), &config(1.0)).unwrap();
-        assert!(divided(&owned)[0] > 0);
+        let view = flat.view();
+        let longest = owned.open(&view).unwrap().inspect().longest_list;
+        assert!(longest <= 256, "{longest} ids in a list");
     }
 }
 

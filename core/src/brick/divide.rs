@@ -97,16 +97,10 @@ fn collect(
     most: u32,
     bench: &mut Bench<'_>,
 ) -> Option<(Frame, Groups, u32)> {
-    // As many cells as two of its mean triangles are wide, but none so
+    // As many cells as two of its usual triangles are wide, but none so
     // small that the margin counts.
-    let mut sum = 0.0;
-    for &id in ids {
-        if let Some(reach) = scene.reach(id) {
-            sum += f64::from(reach.size().max_element());
-        }
-    }
-    let mean = sum / f64::from(ids.len() as u32);
-    let width = (2.0 * mean).max(4.0 * f64::from(scene.lattice.margin().max_element()));
+    let usual = usual_size(scene, ids);
+    let width = (2.0 * usual).max(4.0 * f64::from(scene.lattice.margin().max_element()));
     let count = wholes(1.0 / (width * f64::from(frame.scale)));
     let frame = frame.child(place(cell), count.min(most));
     if count.min(most) < 2 {
@@ -130,6 +124,34 @@ fn collect(
         Groups::collect(|| waiting.iter().copied(), sorted)
     };
     Some((frame, groups?, count))
+}
+
+/// The mean size of a sample of triangles, in cells of the lattice.
+///
+/// A few that are much larger do not count: they would keep a crowd of tiny ones together.
+#[inline(always)]
+fn usual_size(scene: &Scene<'_>, ids: &[u32]) -> f64 {
+    const SAMPLE: usize = 128;
+    /// In means of all.
+    const LARGE: f64 = 16.0;
+    let (mut sizes, mut count) = ([0.0; SAMPLE], 0);
+    let sample = ids.iter().step_by(ids.len().div_ceil(SAMPLE) | 1);
+    for reach in sample.filter_map(|&id| scene.reach(id)) {
+        if let Some(slot) = sizes.get_mut(count) {
+            *slot = f64::from(reach.size().max_element());
+            count += 1;
+        }
+    }
+    let sizes = sizes.get(..count).unwrap_or_default();
+    let mean_below = |limit: f64| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for &size in sizes {
+            let counts = f64::from(u8::from(size <= limit));
+            (sum, count) = (sum + size * counts, count + counts);
+        }
+        sum / count
+    };
+    mean_below(LARGE * mean_below(f64::INFINITY))
 }
 
 /// The entry of a triangle in a divided cell.
