@@ -1,7 +1,7 @@
 //! From scene units to cells and back: how many cells, which ones a triangle overlaps.
 //!
-//! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis. A
-//! triangle is inserted into every cell that its own box, grown by a margin, overlaps. The margin
+//! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis (the
+//! only cell of a brick grid on an axis may be thicker than the box). A triangle is inserted into every cell that its own box, grown by a margin, overlaps. The margin
 //! is what makes float error harmless everywhere else: the walk may be a few roundings off at a
 //! border, and the hit a few roundings off the triangle, and still the cell lists the triangle.
 //!
@@ -64,7 +64,7 @@ impl CellRange {
     }
 }
 
-/// A box cut into equal cells. Plain arrays, so that views of grids need no special alignment.
+/// A box cut into equal cells, or in one that reaches beyond it. Plain arrays, so that views of grids need no special alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lattice {
     /// The box's least corner, pad included.
@@ -132,8 +132,8 @@ impl Lattice {
         }
     }
 
-    /// The same box, where it is a single cell thick in a cell as thick as the others are wide: one
-    /// that reaches beyond the box.
+    /// The same box; where it is a single cell thick, in one that is no thinner than the widest on
+    /// any axis: it may reach beyond the box.
     ///
     /// A cell that is divided alike on all axes must not be a slab: its parts would be slabs, too,
     /// as thin as triangles long before they hold only a few.

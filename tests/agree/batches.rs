@@ -193,6 +193,43 @@ fn rays_of_any_speed_agree_at_any_scale() {
     }
 }
 
+/// The one cell of a flat scene on an axis is thicker than its box.
+#[test]
+fn tiles_through_a_flat_scene_agree() {
+    for (axis, thick) in [(0, 0.0), (1, 0.0), (2, 0.0), (2, 1e-3)] {
+        let mut mesh = soup(2000, 0.05, 3);
+        mesh.append(&soup(2000, 0.05, 5).scaled(2e-3));
+        let mesh = mesh.map(|mut p| {
+            p[axis] *= thick;
+            p
+        });
+        let view = mesh.view();
+        let owned = Owned::build(&view, &Config::new(Method::Brick)).unwrap();
+        let grid = owned.open(&view).unwrap();
+        assert_eq!(grid.resolution()[axis], 1);
+        let (mut hits, mut count) = ([Hit::MISS; 64], 0);
+        for (i, target) in mesh.positions.iter().step_by(97).enumerate() {
+            let along = [1.0, -1.0][i % 2];
+            let mut direction = [0.0; 3];
+            direction[axis] = along;
+            direction[(axis + 1) % 3] = [0.0, 0.7, -1.9, 1.99][i / 2 % 4];
+            let ray = |i: u16| {
+                let mut origin = *target;
+                origin[(axis + 1) % 3] += f32::from(i % 8) * 3e-4;
+                origin[(axis + 2) % 3] += f32::from(i / 8) * 3e-4;
+                Ray::new(std::array::from_fn(|k| origin[k] - 2.25 * direction[k]), direction)
+            };
+            let rays: Vec<_> = (0..64).map(ray).collect();
+            let answers = &mut StridedMut::new(&mut hits);
+            grid.intersect_n(&Strided::new(&rays), answers, Coherence::Coherent).unwrap();
+            assert_eq!(hits.as_slice(), alone(&grid, &rays), "axis {axis}: {direction:?}");
+            oracle::check(&grid, &rays[0]);
+            count += hits.iter().filter(|hit| **hit != Hit::MISS).count();
+        }
+        assert!(count > 1000, "{count} hits");
+    }
+}
+
 /// One ray at a time, too, gives the same bits with all vectors.
 #[test]
 fn single_rays_agree_at_every_level() {

@@ -237,7 +237,9 @@ fn a_crowd_in_a_flat_scene() {
         agrees(&flat, &Cost { bytes: 60, tests: 8000 });
         let owned = Owned::build(&flat.view(), &config(1.0)).unwrap();
         let view = flat.view();
-        let longest = owned.open(&view).unwrap().inspect().longest_list;
+        let grid = owned.open(&view).unwrap();
+        assert_eq!(grid.resolution()[axis], 1);
+        let longest = grid.inspect().longest_list;
         assert!(longest <= 256, "{longest} ids in a list");
     }
 }

@@ -47,10 +47,14 @@ fn line(name: &str, mesh: &Mesh, method: Method) -> String {
 #[test]
 fn work_is_what_it_was() {
     let Scene { positions, indices, .. } = Scene::load("procedural:knot:5000").unwrap();
+    // On a plane, and small enough to be divided again.
+    let mut crowd = soup(500, 0.05, 3);
+    crowd.append(&soup(1500, 0.05, 5).scaled(2e-3));
     let scenes = [
         ("knot", Mesh { positions, indices }),
         ("ball", ball(16, 1.0)),
         ("soup", soup(3000, 0.05, 1)),
+        ("crowd", crowd.map(|[x, _, z]| [x, 0.0, z])),
     ];
     let mut table = String::from(
         "scene    method     resolution    bytes  hits   tests   steps  grids longest content\n",

@@ -60,7 +60,8 @@ impl<'e, 's> Crowds<'e, 's> {
 
     /// Shows the cells whose bits are set, in order, and leaves the bits of those that `visit` says
     /// yes to. It gets the benches, of which the first one is used in between. How much each cell
-    /// lists is counted again if `counts` does not say it.
+    /// lists is counted again if `counts` does not say it. Later calls may ask for fewer cells, not
+    /// for others.
     pub(super) fn each(
         &mut self,
         cells: &mut [u64],

@@ -6,8 +6,6 @@
 //! words, and its own crowded cells share the rest. A cell whose share is too small is cut
 //! into fewer parts, or not at all.
 
-#![expect(clippy::cast_possible_truncation, reason = "numbers of cells")]
-
 use fearless_simd::Simd;
 
 use super::crowds::Crowd;
@@ -15,6 +13,7 @@ use super::frame::{Frame, Scene, classify};
 use super::groups::Groups;
 use super::layout::{BLOCK, Bench, Class, Entry, place};
 use super::sort::{measure, tally};
+use crate::cell::whole;
 
 /// Words that all divided cells may take for each triangle of the mesh.
 pub(super) const WORDS: u64 = 12;
@@ -52,9 +51,10 @@ pub(super) fn plan<S: Simd>(
             let (bench, deeper) = benches.split_first_mut()?;
             let listed = crowd.ids.len() as u64;
             let room = share * listed;
-            let mut most = BLOCK;
+            let wanted = wanted(scene, frame, crowd.ids);
+            let mut most = BLOCK.min(wanted);
             loop {
-                let (inner, groups, wanted) = collect(scene, frame, crowd, most, bench)?;
+                let (inner, groups) = collect(scene, frame, crowd, most, bench)?;
                 let sorted = bench.entries.get(..groups.count())?;
                 let block = tally(
                     &groups,
@@ -81,31 +81,19 @@ pub(super) fn plan<S: Simd>(
     )
 }
 
-/// The whole part of a number; 0 if it is none.
-#[expect(clippy::cast_sign_loss, reason = "saturates")]
-const fn wholes(number: f64) -> u32 {
-    number as u32
-}
-
-/// Puts the triangles of a cell on a bench, if they are small enough to divide it, into so many
-/// cells an axis at most; tells into how many they would.
+/// Puts the triangles of a cell on a bench that is cut into so many cells an axis.
 #[inline(always)]
 fn collect(
     scene: &Scene<'_>,
     frame: &Frame,
     Crowd { cell, ids }: Crowd<'_>,
-    most: u32,
+    cells: u32,
     bench: &mut Bench<'_>,
-) -> Option<(Frame, Groups, u32)> {
-    // As many cells as two of its usual triangles are wide, but none so
-    // small that the margin counts.
-    let usual = usual_size(scene, ids);
-    let width = (2.0 * usual).max(4.0 * f64::from(scene.lattice.margin().max_element()));
-    let count = wholes(1.0 / (width * f64::from(frame.scale)));
-    let frame = frame.child(place(cell), count.min(most));
-    if count.min(most) < 2 {
+) -> Option<(Frame, Groups)> {
+    if cells < 2 {
         return None;
     }
+    let frame = frame.child(place(cell), cells);
 
     // They wait where cells will be counted, or behind those that are sorted; if there is
     // no room, each is made twice.
@@ -123,35 +111,42 @@ fn collect(
         }
         Groups::collect(|| waiting.iter().copied(), sorted)
     };
-    Some((frame, groups?, count))
+    Some((frame, groups?))
+}
+
+/// Into how many cells an axis the triangles of a cell would divide it: as many as two of its usual
+/// triangles are wide, but none so small that the margin counts.
+fn wanted(scene: &Scene<'_>, frame: &Frame, ids: &[u32]) -> u32 {
+    let margin = scene.lattice.margin().max_element();
+    let width = (2.0 * usual_size(scene, ids)).max(4.0 * margin);
+    whole(1.0 / (width * frame.scale))
 }
 
 /// The mean size of a sample of triangles, in cells of the lattice.
 ///
 /// A few that are much larger do not count: they would keep a crowd of tiny ones together.
-#[inline(always)]
-fn usual_size(scene: &Scene<'_>, ids: &[u32]) -> f64 {
+fn usual_size(scene: &Scene<'_>, ids: &[u32]) -> f32 {
     const SAMPLE: usize = 128;
-    /// In means of all.
-    const LARGE: f64 = 16.0;
+    /// In means of all: up to an eighth of them may be as large as that.
+    const LARGE: f32 = 8.0;
     let (mut sizes, mut count) = ([0.0; SAMPLE], 0);
     let sample = ids.iter().step_by(ids.len().div_ceil(SAMPLE) | 1);
     for reach in sample.filter_map(|&id| scene.reach(id)) {
         if let Some(slot) = sizes.get_mut(count) {
-            *slot = f64::from(reach.size().max_element());
+            *slot = reach.size().max_element();
             count += 1;
         }
     }
     let sizes = sizes.get(..count).unwrap_or_default();
-    let mean_below = |limit: f64| {
+    let mean_below = |limit: f32| {
         let (mut sum, mut count) = (0.0, 0.0);
         for &size in sizes {
-            let counts = f64::from(u8::from(size <= limit));
+            let counts = f32::from(u8::from(size <= limit));
             (sum, count) = (sum + size * counts, count + counts);
         }
         sum / count
     };
-    mean_below(LARGE * mean_below(f64::INFINITY))
+    mean_below(LARGE * mean_below(f32::INFINITY))
 }
 
 /// The entry of a triangle in a divided cell.

@@ -120,7 +120,7 @@ fn chunk<S: Simd>(
         write(simd, words, base, &measure, groups, entries, format, cells, bench.bricks, divided);
         surround(scene, frame, words, &measure);
     }
-    // The records of divided cells lie where the tally left the cursors of their cells.
+    // The cursor of a divided cell stays where its record goes, so the cells tell no counts any more.
     if is_crowded {
         crowds.each(divided, None, deeper, |crowd, benches| {
             let at = cells.get(crowd.cell as usize).map(|cell| base + cell);
