@@ -1,9 +1,10 @@
 //! From scene units to cells and back: how many cells, which ones a triangle overlaps.
 //!
 //! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis (the
-//! only cell of a brick grid on an axis may be thicker than the box). A triangle is inserted into every cell that its own box, grown by a margin, overlaps. The margin
-//! is what makes float error harmless everywhere else: the walk may be a few roundings off at a
-//! border, and the hit a few roundings off the triangle, and still the cell lists the triangle.
+//! only cell of a brick grid on an axis may be thicker than the box). A triangle is inserted into
+//! every cell that its own box, grown by a margin, overlaps. The margin is what makes float error
+//! harmless everywhere else: the walk may be a few roundings off at a border, and the hit a few
+//! roundings off the triangle, and still the cell lists the triangle.
 //!
 //! ```text
 //! error of             bound, in box extents E        why
@@ -64,7 +65,8 @@ impl CellRange {
     }
 }
 
-/// A box cut into equal cells, or in one that reaches beyond it. Plain arrays, so that views of grids need no special alignment.
+/// A box cut into equal cells, or in one that reaches beyond it. Plain arrays, so that views of
+/// grids need no special alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lattice {
     /// The box's least corner, pad included.

@@ -120,7 +120,7 @@ fn chunk<S: Simd>(
         write(simd, words, base, &measure, groups, entries, format, cells, bench.bricks, divided);
         surround(scene, frame, words, &measure);
     }
-    // The cursor of a divided cell stays where its record goes, so the cells tell no counts any more.
+    // The cursor of a divided cell stays where its record goes: the cells tell no counts any more.
     if is_crowded {
         crowds.each(divided, None, deeper, |crowd, benches| {
             let at = cells.get(crowd.cell as usize).map(|cell| base + cell);
