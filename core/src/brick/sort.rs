@@ -3,7 +3,8 @@
 //! ```text
 //! collect  entries with the same number of cells together
 //! tally    for each cell, brick and the block: how many triangles it lists
-//! measure  the masks; which cells are crowded and gain by being divided; how many words it takes
+//! measure  the masks; how many words it takes
+//! gather   what crowded cells list (crowds.rs); which of them gain by being divided (divide.rs)
 //! write    bricks, starts of cells, and from the entries once more the lists; where they lie
 //! divide   each crowded cell like a block of its own, up to 16 cells wide
 //!
