@@ -298,6 +298,10 @@ fn write<S: Simd>(
     bricks: &mut [u32],
     divided: &[u64],
 ) {
+    // All of it in a row: lists are written here and there, and a store that waits for its part of
+    // memory holds up those behind it.
+    words.fill(0);
+
     let mut brick_at = 0;
     let mut cell_at = RECORD_WORDS as u32 * measure.bricks;
     let mut list_at = cell_at + measure.cells + u32::from(measure.cells > 0);
