@@ -266,6 +266,7 @@ fn render_row(grid: &Grid<'_>, plan: &Plan<'_>, shader: &Shader<'_>, top: usize,
     let height = rows.len() / width;
     let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE * TILE];
     let mut hits = [Hit::MISS; TILE * TILE];
+    let mut colors = [[0; 3]; TILE * TILE];
     for left in (0..width).step_by(TILE) {
         let columns = TILE.min(width - left);
         let places =
@@ -279,9 +280,9 @@ fn render_row(grid: &Grid<'_>, plan: &Plan<'_>, shader: &Shader<'_>, top: usize,
         if grid.intersect_n(&Strided::new(rays), answers, Coherence::Coherent).is_err() {
             continue;
         }
-        for ((ray, hit), (column, row)) in rays.iter().zip(&*hits).zip(places()) {
-            let hit = (hit.primitive != hgrid_core::INVALID_ID).then_some(*hit);
-            rows[row * width + column] = shader.diffuse(ray, hit);
+        shader.diffuse(rays, hits, &mut colors);
+        for (&color, (column, row)) in colors.iter().zip(places()) {
+            rows[row * width + column] = color;
         }
     }
 }

@@ -12,10 +12,11 @@
 //! alone. Asking for the sizes, getting the memory and building are all in the build
 //! time, because a first picture needs all of them. (A heap would hand pages of the build
 //! before to some methods and not to others, depending on their sizes, and would fill
-//! with zeros what the sizes only allow for.)
+//! with zeros what the sizes only allow for.) The threads that build are awake when the clock starts.
 //!
 //! Rendering is one thread, one ray per pixel, rows from the top; the timed pass traces and shades
-//! and, once a row, moves the progress bar; the work is counted in a pass of its own.
+//! row by row and moves the progress bar; the work is counted in a pass of its own, and so is the
+//! memory that was written, in pages as small as the system has.
 
 use std::time::Instant;
 
@@ -24,6 +25,8 @@ use hgrid_core::{
     Config, Control, Counters, Grid, Hit, Method, QueryOptions, Ray, Sizes, TriangleMesh,
     sizes_with,
 };
+#[cfg(target_os = "linux")]
+use memmap2::Advice;
 use memmap2::{MmapMut, MmapOptions};
 use serde::Serialize;
 
@@ -31,7 +34,7 @@ use crate::camera::Camera;
 use crate::progress::Progress;
 use crate::resident::resident_bytes;
 use crate::scene::Scene;
-use crate::shade::{Rgb, Shader};
+use crate::shade::{Rgb, Shade, Shader};
 use crate::threads::Threads;
 
 /// A scene as the paper's Table 1 describes it.
@@ -85,8 +88,8 @@ pub struct Measurement {
     pub scratch_bytes: usize,
     /// Bytes for the grid that were asked for, because its size is known only after the build.
     pub allocated_index_bytes: usize,
-    /// Bytes of index and scratch that the build wrote, in whole pages; where the system does not
-    /// tell, the bytes of the grid and of all scratch.
+    /// Bytes of index and scratch that the build wrote, in whole small pages; where the system does
+    /// not tell, the bytes of the grid and of all scratch.
     pub peak_bytes: usize,
     /// Pixels on each side of the picture.
     pub size: u16,
@@ -176,7 +179,7 @@ pub fn measure(
     subject: &Subject<'_>,
     configs: &[Config],
     repeat: u32,
-    shade: impl Fn(&Shader<'_>, &Ray, Option<Hit>) -> Rgb,
+    shade: Shade,
     cost: impl Fn(&Counters) -> u64,
     progress: &mut Progress,
 ) -> Result<Outcome> {
@@ -184,29 +187,37 @@ pub fn measure(
     let shader = Shader::new(mesh, &camera);
     let mut samples = vec![(Vec::new(), Vec::new()); configs.len()];
     let mut outcome = Outcome { measurements: Vec::new(), pixels: Vec::new(), costs: Vec::new() };
+    let mut hits = Vec::with_capacity(size.into());
     for repetition in 1..=repeat {
         for (config, (builds, renders)) in configs.iter().zip(&mut samples) {
             let name = config.method.name();
             let turn = format!("{name}, {repetition} of {repeat}:");
             progress.set_message(&format!("{turn} building"));
+            threads.wake();
             let start = Instant::now();
             let built = threads
-                .parallel(|parallel| build_with(mesh, config, parallel))
+                .parallel(|parallel| build_with(mesh, config, parallel, memory))
                 .with_context(|| format!("cannot build the {name} grid"))?;
             builds.push(start.elapsed().as_secs_f64());
             let Built { index, scratch } = built;
-            let memory = Memory::of(&index, &scratch, repetition == repeat);
+            let asked = [index.len(), scratch.len()];
             drop(scratch);
             let grid = Grid::open(&index, mesh)?;
 
             progress.set_message(&format!("{turn} rendering"));
             let start = Instant::now();
-            let pixels =
-                trace(&camera, size, progress, |ray| shade(&shader, ray, grid.intersect(ray)));
+            let pixels = trace(&camera, size, progress, [0; 3], |rays, pixels| {
+                hits.clear();
+                hits.extend(rays.iter().map(|ray| grid.intersect(ray).unwrap_or(Hit::MISS)));
+                shade(&shader, rays, &hits, pixels);
+            });
             renders.push(start.elapsed().as_secs_f64());
 
             if repetition == repeat {
                 progress.set_message(&format!("{turn} counting"));
+                let [index, scratch] = asked;
+                let peak = threads.parallel(|parallel| peak_bytes(mesh, config, parallel))?;
+                let memory = Memory { index, scratch, peak };
                 let work = count(&grid, &camera, size, &cost, progress);
                 if let Some(first) = outcome.measurements.first() {
                     let differ = outcome.pixels.iter().zip(&pixels).filter(|(a, b)| a != b).count();
@@ -229,11 +240,30 @@ pub(crate) struct Built {
 
 /// Builds as a user does who has nothing but the mesh: ask for sizes, get memory, build.
 pub(crate) fn build(mesh: TriangleMesh<'_>, config: &Config) -> Result<Built> {
-    Threads::new(1)?.parallel(|parallel| build_with(mesh, config, parallel))
+    Threads::new(1)?.parallel(|parallel| build_with(mesh, config, parallel, memory))
 }
 
-/// The same on threads.
-fn build_with(mesh: TriangleMesh<'_>, config: &Config, parallel: &Control<'_>) -> Result<Built> {
+/// Bytes of index and scratch that a build writes, in whole small pages; where the system does not
+/// tell, the bytes of the grid and of all scratch.
+pub(crate) fn peak_bytes(
+    mesh: TriangleMesh<'_>,
+    config: &Config,
+    parallel: &Control<'_>,
+) -> Result<usize> {
+    let Built { index, scratch } = build_with(mesh, config, parallel, small_pages)?;
+    match resident_bytes(&index).zip(resident_bytes(&scratch)) {
+        Some((index, scratch)) => Ok(index + scratch),
+        None => Ok(Grid::open(&index, mesh)?.blob_bytes() + scratch.len()),
+    }
+}
+
+/// The same on threads, in memory from where the caller says.
+fn build_with(
+    mesh: TriangleMesh<'_>,
+    config: &Config,
+    parallel: &Control<'_>,
+    memory: fn(usize) -> Result<MmapMut>,
+) -> Result<Built> {
     // A brick grid's bound follows from the number of triangles, and
     // what is not written costs nothing.
     let bound = match config.method {
@@ -249,8 +279,18 @@ fn build_with(mesh: TriangleMesh<'_>, config: &Config, parallel: &Control<'_>) -
     Ok(Built { index, scratch })
 }
 
-/// Pages that the system provides when they are first written.
+/// Pages that the system provides when they are first written, large ones if it has them. A build
+/// of millions of triangles is sooner done with those, and other ray tracers ask for them, too.
 pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
+    let memory = small_pages(bytes)?;
+    // Who cannot give them gives small ones.
+    #[cfg(target_os = "linux")]
+    let _ = memory.advise(Advice::HugePage);
+    Ok(memory)
+}
+
+/// Pages of the usual size.
+fn small_pages(bytes: usize) -> Result<MmapMut> {
     let mut options = MmapOptions::new();
     options
         .len(bytes.max(1))
@@ -259,24 +299,12 @@ pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
         .with_context(|| format!("cannot get {bytes} bytes of memory"))
 }
 
-/// Bytes that a build asked for and used.
+/// Bytes that a build asked for, and the most that it used.
 #[derive(Clone, Copy)]
 struct Memory {
     index: usize,
     scratch: usize,
-    resident: Option<usize>,
-}
-
-impl Memory {
-    /// What is known of two regions after a build; counting pages takes a while.
-    fn of(index: &[u8], scratch: &[u8], is_counted: bool) -> Self {
-        let resident = |region| if is_counted { resident_bytes(region) } else { None };
-        Self {
-            index: index.len(),
-            scratch: scratch.len(),
-            resident: resident(index).zip(resident(scratch)).map(|(a, b)| a + b),
-        }
-    }
+    peak: usize,
 }
 
 /// Whether a method's count of references is one: the others keep ids and grids in one pool.
@@ -284,16 +312,21 @@ const fn has_references(method: Method) -> bool {
     matches!(method, Method::OneLevel | Method::Fixed)
 }
 
-/// What becomes of the ray of every pixel, row by row from the upper left.
-fn trace<T>(
+/// What becomes of the rays of all pixels, row by row from the upper left.
+fn trace<T: Clone>(
     camera: &Camera,
     size: u16,
     progress: &mut Progress,
-    mut pixel: impl FnMut(&Ray) -> T,
+    blank: T,
+    mut row: impl FnMut(&[Ray], &mut [T]),
 ) -> Vec<T> {
-    let mut pixels = Vec::with_capacity(usize::from(size) * usize::from(size));
-    for row in 0..size {
-        pixels.extend((0..size).map(|column| pixel(&camera.ray(column, row, size))));
+    let width = usize::from(size);
+    let mut pixels = vec![blank; width * width];
+    let mut rays = Vec::with_capacity(width);
+    for (number, pixels) in (0..size).zip(pixels.chunks_mut(width.max(1))) {
+        rays.clear();
+        rays.extend((0..size).map(|column| camera.ray(column, number, size)));
+        row(&rays, pixels);
         progress.advance(1);
     }
     pixels
@@ -316,17 +349,18 @@ fn count(
     progress: &mut Progress,
 ) -> Work {
     let (mut total, mut hits, mut largest) = (Counters::default(), 0, 0);
-    let costs = trace(camera, size, progress, |ray| {
-        let mut counters = Counters::default();
-        hits += u64::from(
-            grid.intersect_with(ray, &mut QueryOptions::counting(&mut counters)).is_some(),
-        );
-        let Counters { primitive_tests, cell_steps, grid_steps } = counters;
-        total.primitive_tests += primitive_tests;
-        total.cell_steps += cell_steps;
-        total.grid_steps += grid_steps;
-        largest = largest.max(primitive_tests + cell_steps + grid_steps);
-        u32::try_from(cost(&counters)).unwrap_or(u32::MAX)
+    let costs = trace(camera, size, progress, 0, |rays, costs| {
+        for (ray, slot) in rays.iter().zip(costs) {
+            let mut counters = Counters::default();
+            let hit = grid.intersect_with(ray, &mut QueryOptions::counting(&mut counters));
+            hits += u64::from(hit.is_some());
+            let Counters { primitive_tests, cell_steps, grid_steps } = counters;
+            total.primitive_tests += primitive_tests;
+            total.cell_steps += cell_steps;
+            total.grid_steps += grid_steps;
+            largest = largest.max(primitive_tests + cell_steps + grid_steps);
+            *slot = u32::try_from(cost(&counters)).unwrap_or(u32::MAX);
+        }
     });
     Work { counters: total, hits, largest, costs }
 }
@@ -355,7 +389,7 @@ fn numbers(
         index_bytes_per_triangle: ratio(index_bytes as u64, grid.mesh().triangle_count().into()),
         scratch_bytes: memory.scratch,
         allocated_index_bytes: memory.index,
-        peak_bytes: memory.resident.unwrap_or(index_bytes + memory.scratch),
+        peak_bytes: memory.peak,
         size,
         rays,
         hits: work.hits,
@@ -400,7 +434,11 @@ mod tests {
         let subject = Subject { mesh, camera, size: 40, threads: &threads };
         let cost = |work: &Counters| work.primitive_tests + work.cell_steps + work.grid_steps;
         let mut progress = Progress::new("", 0);
-        let is_hit = |_: &Shader<'_>, _: &Ray, hit: Option<Hit>| [u8::from(hit.is_some()); 3];
+        let is_hit: Shade = |_, _, hits, pixels| {
+            for (hit, pixel) in hits.iter().zip(pixels) {
+                *pixel = [u8::from(*hit != Hit::MISS); 3];
+            }
+        };
         measure(&subject, configs, repeat, is_hit, cost, &mut progress).unwrap()
     }
 

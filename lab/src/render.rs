@@ -4,7 +4,7 @@ use std::io::{self, Write as _};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{Counters, Hit, Ray, TriangleMesh};
+use hgrid_core::{Counters, TriangleMesh};
 
 use crate::cli::{RenderArgs, Shading};
 use crate::heat::{self, Counter, Picture};
@@ -13,7 +13,7 @@ use crate::measure::{SceneFacts, Subject, measure, rows};
 use crate::progress::Progress;
 use crate::report::Report;
 use crate::scene::Scene;
-use crate::shade::Shader;
+use crate::shade::Shade;
 use crate::threads::Threads;
 
 /// Renders, writes the picture and prints the numbers.
@@ -34,9 +34,11 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
     let threads = Threads::new(args.builders.threads)?;
     let subject = Subject { mesh, camera: args.camera(&scene), size, threads: &threads };
-    let shade = |shader: &Shader<'_>, ray: &Ray, hit: Option<Hit>| match args.shading {
-        Shading::Normals => shader.normals(ray, hit),
-        Shading::Diffuse | Shading::Heat => shader.diffuse(ray, hit),
+    let shade: Shade = match args.shading {
+        Shading::Normals => |shader, rays, hits, colors| shader.normals(rays, hits, colors),
+        Shading::Diffuse | Shading::Heat => {
+            |shader, rays, hits, colors| shader.diffuse(rays, hits, colors)
+        }
     };
     let counter = args.counter.unwrap_or(Counter::Cost);
     let cost = |work: &Counters| counter.of(work);

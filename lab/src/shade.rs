@@ -3,12 +3,15 @@
 //! Normals come from the triangle alone, in `f64` until they are unit vectors, so that they are the
 //! same at every scene size; colours are `f32`. Every surface has two sides, because many files
 //! disagree with themselves about the front.
+//!
+//! Pixels are shaded [`GROUP`] at a time, number by number instead of vector by vector, which the
+//! compiler turns into vectors of several pixels: what is not tracing should be little of a picture.
 
-use glam::{DVec3, Vec3A};
-use hgrid_core::{Hit, Ray, Triangle, TriangleMesh};
+use glam::Vec3A;
+use hgrid_core::{Hit, INVALID_ID, Ray, Triangle, TriangleMesh};
 
 use crate::camera::Camera;
-use crate::vector::{Vector, cross, offset, unit};
+use crate::vector::{Vector, cross, offset, round, unit};
 
 /// A colour as a PNG holds it.
 pub type Rgb = [u8; 3];
@@ -17,66 +20,166 @@ pub type Rgb = [u8; 3];
 const LIGHT: [f32; 3] = [-0.7, 0.8, 1.0];
 
 /// The three lights on a surface, as linear red, green and blue.
-const KEY: Vec3A = Vec3A::new(0.62, 0.60, 0.56);
-const SKY: Vec3A = Vec3A::new(0.09, 0.11, 0.14);
-const GROUND: Vec3A = Vec3A::new(0.03, 0.027, 0.024);
+const KEY: [f32; 3] = [0.62, 0.60, 0.56];
+const SKY: [f32; 3] = [0.09, 0.11, 0.14];
+const GROUND: [f32; 3] = [0.03, 0.027, 0.024];
 
 /// The background at the upper and the lower edge, linear.
-const ZENITH: Vec3A = Vec3A::new(0.008, 0.018, 0.055);
-const HORIZON: Vec3A = Vec3A::new(0.22, 0.31, 0.44);
+const ZENITH: [f32; 3] = [0.008, 0.018, 0.055];
+const HORIZON: [f32; 3] = [0.22, 0.31, 0.44];
+
+/// One of the two ways to give rays with their hits colours.
+pub type Shade = fn(&Shader<'_>, &[Ray], &[Hit], &mut [Rgb]);
+
+/// Pixels that are shaded at once.
+const GROUP: usize = 64;
+
+/// A number of each pixel of a group.
+type Lanes<T> = [T; GROUP];
 
 /// What surfaces look like in a picture that a camera takes.
 #[derive(Debug, Clone, Copy)]
 pub struct Shader<'a> {
     mesh: TriangleMesh<'a>,
     /// Unit vectors.
-    axes: [Vec3A; 3],
-    light: Vec3A,
+    axes: [[f32; 3]; 3],
+    light: [f32; 3],
 }
 
 impl<'a> Shader<'a> {
     /// A shader for the hits that the camera's rays have on a mesh.
     #[must_use]
     pub fn new(mesh: TriangleMesh<'a>, camera: &Camera) -> Self {
-        let axes = camera.axes().map(Vec3A::from_array);
-        let [right, up, toward] = axes;
+        let axes = camera.axes();
+        let [right, up, toward] = axes.map(Vec3A::from_array);
         let light = right * LIGHT[0] + up * LIGHT[1] + toward * LIGHT[2];
-        Self { mesh, axes, light: light.normalize() }
+        Self { mesh, axes, light: light.normalize().to_array() }
     }
 
-    /// A grey solid in a lit room.
-    #[must_use]
-    pub fn diffuse(&self, ray: &Ray, hit: Option<Hit>) -> Rgb {
-        let Some(normal) = hit.and_then(|hit| self.normal(ray, hit)) else {
-            return self.background(ray);
-        };
-        let key = normal.dot(self.light).max(0.0);
-        let sky = 0.5 + 0.5 * normal.dot(self.axes[1]);
-        display(KEY * key + SKY * sky + GROUND * (1.0 - sky))
+    /// A grey solid in a lit room: the colours of rays with these hits, [`Hit::MISS`] for none. All
+    /// three are equally long.
+    pub fn diffuse(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
+        let [_, up, _] = self.axes;
+        self.shade(rays, hits, colors, |normal| {
+            let key = dot(normal, self.light).max(0.0);
+            let sky = 0.5 + 0.5 * dot(normal, up);
+            [0, 1, 2].map(|c| KEY[c] * key + SKY[c] * sky + GROUND[c] * (1.0 - sky))
+        });
     }
 
-    /// The normal as a colour: red to the right, green up, blue toward the viewer.
-    #[must_use]
-    pub fn normals(&self, ray: &Ray, hit: Option<Hit>) -> Rgb {
-        let Some(normal) = hit.and_then(|hit| self.normal(ray, hit)) else {
-            return self.background(ray);
-        };
-        let along = Vec3A::from_array(self.axes.map(|axis| normal.dot(axis)));
-        bytes(0.5 + 0.5 * along)
+    /// The normals as colours: red to the right, green up, blue toward the viewer.
+    pub fn normals(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
+        self.shade(rays, hits, colors, |normal| {
+            let along = self.axes.map(|axis| 0.5 + 0.5 * dot(normal, axis));
+            // What a screen takes the root of.
+            along.map(|part| part * part)
+        });
     }
 
-    /// The unit normal on the viewer's side.
-    fn normal(&self, ray: &Ray, hit: Hit) -> Option<Vec3A> {
-        let normal = normal_of(&self.mesh.triangle(hit.primitive)?);
-        let normal = normal.map_or(self.axes[2], |normal| DVec3::from_array(normal).as_vec3a());
-        let is_away = normal.dot(Vec3A::from_array(ray.direction)) > 0.0;
-        Some(if is_away { -normal } else { normal })
+    /// Shades by the light that a surface with a normal on the viewer's side sends there.
+    #[inline(always)]
+    fn shade(
+        &self,
+        rays: &[Ray],
+        hits: &[Hit],
+        colors: &mut [Rgb],
+        surface: impl Fn([f32; 3]) -> [f32; 3],
+    ) {
+        let groups = rays.chunks(GROUP).zip(hits.chunks(GROUP)).zip(colors.chunks_mut(GROUP));
+        for ((rays, hits), colors) in groups {
+            let seen = Seen::by(&self.mesh, rays, hits);
+            let normals = seen.normals(self.axes[2]);
+            let mut light = [[0.0; GROUP]; 3];
+            for lane in 0..GROUP {
+                let (direction, normal) = (at(&seen.directions, lane), at(&normals, lane));
+                let is_away = dot(normal, direction) > 0.0;
+                let lit = surface(normal.map(|c| if is_away { -c } else { c }));
+                let sky = self.background(direction);
+                put(&mut light, lane, if seen.is_hit[lane] { lit } else { sky });
+            }
+            display(&light, colors);
+        }
     }
 
-    fn background(&self, ray: &Ray) -> Rgb {
+    /// The light from where there is nothing.
+    #[inline(always)]
+    fn background(&self, direction: [f32; 3]) -> [f32; 3] {
         // The picture's edges are at about a third of the direction's length.
-        let height = Vec3A::from_array(ray.direction).dot(self.axes[1]);
-        display(HORIZON.lerp(ZENITH, (0.5 + 1.4 * height).clamp(0.0, 1.0)))
+        let height = (0.5 + 1.4 * dot(direction, self.axes[1])).clamp(0.0, 1.0);
+        [0, 1, 2].map(|c| HORIZON[c] * (1.0 - height) + ZENITH[c] * height)
+    }
+}
+
+/// What the rays of a group see.
+struct Seen {
+    /// The corners of triangles; 0 for a miss.
+    corners: [[Lanes<f32>; 3]; 3],
+    directions: [Lanes<f32>; 3],
+    is_hit: Lanes<bool>,
+}
+
+impl Seen {
+    fn by(mesh: &TriangleMesh<'_>, rays: &[Ray], hits: &[Hit]) -> Self {
+        let mut seen = Self {
+            corners: [[[0.0; GROUP]; 3]; 3],
+            directions: [[0.0; GROUP]; 3],
+            is_hit: [false; GROUP],
+        };
+        for (lane, (ray, hit)) in (0..GROUP).zip(rays.iter().zip(hits)) {
+            put(&mut seen.directions, lane, ray.direction);
+            if hit.primitive == INVALID_ID {
+                continue;
+            }
+            let Some(triangle) = mesh.triangle(hit.primitive) else { continue };
+            seen.is_hit[lane] = true;
+            for (corners, corner) in seen.corners.iter_mut().zip(triangle) {
+                put(corners, lane, corner);
+            }
+        }
+        seen
+    }
+
+    /// The unit normals on either side, or another vector where a triangle has no area.
+    fn normals(&self, instead: [f32; 3]) -> [Lanes<f32>; 3] {
+        let mut normals = [[0.0; GROUP]; 3];
+        for lane in 0..GROUP {
+            let triangle = self.corners.each_ref().map(|corners| at(corners, lane));
+            put(&mut normals, lane, normal_of(&triangle).map_or(instead, round));
+        }
+        normals
+    }
+}
+
+/// A vector of a pixel.
+#[inline(always)]
+fn at(lanes: &[Lanes<f32>; 3], lane: usize) -> [f32; 3] {
+    lanes.each_ref().map(|numbers| numbers[lane])
+}
+
+#[inline(always)]
+fn put(lanes: &mut [Lanes<f32>; 3], lane: usize, vector: [f32; 3]) {
+    for (numbers, number) in lanes.iter_mut().zip(vector) {
+        numbers[lane] = number;
+    }
+}
+
+#[inline(always)]
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Linear light as a screen wants it, which may be beyond black and white; a square root is close
+/// to a screen's curve.
+fn display(light: &[Lanes<f32>; 3], colors: &mut [Rgb]) {
+    /// From here on a float has no bits for fractions, and ends with those of its integer.
+    const INTEGERS: f32 = 8_388_608.0; // 2^23
+    let mut bytes = [[0; GROUP]; 3];
+    for (byte, light) in bytes.as_flattened_mut().iter_mut().zip(light.as_flattened()) {
+        let rounded = light.clamp(0.0, 1.0).sqrt() * 255.0 + INTEGERS;
+        *byte = rounded.to_bits().to_le_bytes()[0];
+    }
+    for (lane, color) in colors.iter_mut().enumerate().take(GROUP) {
+        *color = bytes.each_ref().map(|bytes| bytes[lane]);
     }
 }
 
@@ -86,32 +189,28 @@ pub(crate) fn normal_of(triangle: &Triangle) -> Option<Vector> {
     unit(cross(offset(b, -1.0, a), offset(c, -1.0, a)))
 }
 
-/// Linear light as a screen wants it; a square root is close to its curve.
-fn display(color: Vec3A) -> Rgb {
-    bytes(color.sqrt())
-}
-
-/// From 0 to 1 as 0 to 255.
-fn bytes(color: Vec3A) -> Rgb {
-    /// From here on a float has no bits for fractions, and ends with those of its integer.
-    const INTEGERS: f32 = 8_388_608.0; // 2^23
-    let rounded = color.clamp(Vec3A::ZERO, Vec3A::ONE) * 255.0 + INTEGERS;
-    rounded.to_array().map(|c| c.to_bits().to_le_bytes()[0])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::{Up, View};
+    use crate::scene::Scene;
     use crate::vector::dot;
 
     #[test]
     fn bytes_are_rounded_and_end_at_black_and_white() {
-        assert_eq!(bytes(Vec3A::new(0.0, 0.5, 1.0)), [0, 128, 255]);
-        assert_eq!(bytes(Vec3A::new(-0.1, 1.1, f32::INFINITY)), [0, 255, 255]);
+        let shown = |light: f32| {
+            let mut colors = [[1; 3]; 2];
+            display(&[[light; GROUP]; 3], &mut colors);
+            assert!(colors.as_flattened().iter().all(|&byte| byte == colors[0][0]));
+            colors[0][0]
+        };
+        assert_eq!([0.0, 0.25, 1.0].map(shown), [0, 128, 255]);
+        assert_eq!([-0.1, 1.1, f32::INFINITY].map(shown), [0, 255, 255]);
         for byte in 0..=255_u8 {
-            let near = [-0.49, 0.0, 0.49].map(|off| (f32::from(byte) + off) / 255.0);
-            assert_eq!(bytes(Vec3A::from_array(near)), [byte; 3]);
+            for off in [-0.49, 0.0, 0.49] {
+                let near = ((f32::from(byte) + off) / 255.0).max(0.0);
+                assert_eq!(shown(near * near), byte);
+            }
         }
     }
 
@@ -131,14 +230,43 @@ mod tests {
         let positions = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
         let camera = Camera::framing((positions[0], [1.0, 1.0, 0.0]), View::Front, Up::Y);
         let ray = camera.ray(0, 0, 1);
-        let colors = [[0, 1, 2], [0, 2, 1], [0, 0, 0]].map(|triangle| {
+        let color = |shade: Shade, triangle: [u32; 3], hit: Hit| {
             let indices = [triangle];
             let shader = Shader::new(TriangleMesh::new(&positions, &indices).unwrap(), &camera);
-            let hit = Some(Hit { t: 1.0, u: 0.2, v: 0.2, primitive: 0 });
-            assert_eq!(shader.normals(&ray, hit), [128, 128, 255]);
-            assert_ne!(shader.diffuse(&ray, hit), shader.diffuse(&ray, None));
-            shader.diffuse(&ray, hit)
+            let mut colors = [[1; 3]];
+            shade(&shader, &[ray], &[hit], &mut colors);
+            colors[0]
+        };
+        let hit = Hit { t: 1.0, u: 0.2, v: 0.2, primitive: 0 };
+        let (diffuse, normals): (Shade, Shade) = (
+            |shader, rays, hits, colors| shader.diffuse(rays, hits, colors),
+            |shader, rays, hits, colors| shader.normals(rays, hits, colors),
+        );
+        let colors = [[0, 1, 2], [0, 2, 1], [0, 0, 0]].map(|triangle| {
+            assert_eq!(color(normals, triangle, hit), [128, 128, 255]);
+            assert_ne!(color(diffuse, triangle, hit), color(diffuse, triangle, Hit::MISS));
+            color(diffuse, triangle, hit)
         });
         assert!(colors[0] == colors[1] && colors[1] == colors[2]);
+    }
+
+    #[test]
+    fn every_pixel_has_the_colour_that_it_has_alone() {
+        let scene = Scene::load("procedural:knot:2000").unwrap();
+        let mesh = TriangleMesh::new(&scene.positions, &scene.indices).unwrap();
+        let camera = Camera::framing(scene.framed_bounds(), View::ThreeQuarter, Up::Y);
+        let shader = Shader::new(mesh, &camera);
+        let rays: Vec<_> = (0..150).map(|column| camera.ray(column, 70, 150)).collect();
+        let hit = |primitive| Hit { primitive, ..Hit::MISS };
+        let hits: Vec<_> =
+            (0..150).map(|at| hit(if at % 3 == 0 { INVALID_ID } else { at })).collect();
+        let mut together = vec![[1; 3]; 150];
+        shader.diffuse(&rays, &hits, &mut together);
+        for ((ray, hit), color) in rays.iter().zip(&hits).zip(&together) {
+            let mut alone = [[1; 3]];
+            shader.diffuse(&[*ray], &[*hit], &mut alone);
+            assert_eq!(alone[0], *color);
+        }
+        assert!(together.iter().any(|color| *color != together[1]));
     }
 }

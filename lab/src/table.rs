@@ -7,7 +7,7 @@ use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Result, ensure};
 use comfy_table::{CellAlignment, Table, presets};
-use hgrid_core::{Config, Counters, Ray, TriangleMesh};
+use hgrid_core::{Config, Counters, TriangleMesh};
 use serde::Serialize;
 
 use crate::cli::{Race, TableArgs};
@@ -15,7 +15,7 @@ use crate::machine::Machine;
 use crate::measure::{Measurement, SceneFacts, Subject, measure, ratio, rows};
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::shade::Shader;
+use crate::shade::Shade;
 use crate::threads::Threads;
 
 /// Measures and prints.
@@ -145,7 +145,7 @@ impl Results {
         let Self { size, repeats, .. } = self;
         let mut notes = vec![
             format!("{size} x {size} pixels, one ray each, diffuse shading; {}.", times(*repeats)),
-            "Peak is what the build wrote: index and scratch. 1 MiB is 2^20 bytes, the paper's MB."
+            "Peak is what the build wrote: index and scratch, in small pages. 1 MiB is 2^20 bytes, the paper's MB."
                 .to_owned(),
         ];
         if self.threads > 1 {
@@ -174,8 +174,8 @@ pub(crate) fn measure_diffuse(
     let threads = Threads::new(race.builders.threads)?;
     let (camera, size) = (race.picture.camera(scene), race.picture.size);
     let subject = Subject { mesh, camera, size, threads: &threads };
-    let shade = |shader: &Shader<'_>, ray: &Ray, hit| shader.diffuse(ray, hit);
     let cost = |_: &Counters| 0;
+    let shade: Shade = |shader, rays, hits, colors| shader.diffuse(rays, hits, colors);
     Ok(measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements)
 }
 

@@ -1,5 +1,7 @@
 //! Threads for the work that can use them.
 
+use std::sync::Barrier;
+
 use anyhow::{Context as _, Result};
 use hgrid_core::Control;
 use rayon::prelude::*;
@@ -40,6 +42,15 @@ impl Threads {
         build(&Control { tasks: self.count, run: &run, progress: None })
     }
 
+    /// Returns when all of them are awake. A processor that has slept for a while may take
+    /// milliseconds, on a virtual machine above all: as long as a build.
+    pub fn wake(&self) {
+        let all = Barrier::new(self.count as usize);
+        self.each(self.count, |_| {
+            all.wait();
+        });
+    }
+
     /// Does a task for every number below a count.
     pub fn each(&self, count: u32, task: impl Fn(u32) + Sync) {
         let task = &task;
@@ -63,6 +74,7 @@ mod tests {
         for count in [0, 1, 2, 5] {
             let threads = Threads::new(count).unwrap();
             assert_eq!(threads.count(), count.max(1));
+            threads.wake();
             let done: [_; 100] = core::array::from_fn(|_| AtomicU32::new(0));
             threads.each(100, |index| {
                 done[index as usize].fetch_add(1, Ordering::Relaxed);

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use hgrid_core::{Config, Method, TriangleMesh};
+use hgrid_core::{Config, Hit, Method, TriangleMesh};
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_lab::scene::Scene;
 use hgrid_lab::shade::Shader;
@@ -36,7 +36,9 @@ fn expected_at(scene: &Scene, size: u16) -> (Vec<u8>, usize) {
         let ray = camera.ray(column, row, size);
         let hit = grid.intersect(&ray);
         hits += usize::from(hit.is_some());
-        picture.extend(shader.diffuse(&ray, hit));
+        let mut color = [[0; 3]];
+        shader.diffuse(&[ray], &[hit.unwrap_or(Hit::MISS)], &mut color);
+        picture.extend(color[0]);
     }
     (picture, hits)
 }

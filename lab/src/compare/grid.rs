@@ -1,13 +1,12 @@
 //! hgrid itself.
 
 use anyhow::Result;
-use hgrid_core::{Coherence, Config, Grid, Hit, Method, Ray, Strided, StridedMut};
+use hgrid_core::{Coherence, Config, Control, Grid, Hit, Method, Ray, Strided, StridedMut};
 
 use super::input::Input;
 use super::system::{Bytes, MISS, Mode, System, Tracer, Use, each};
 use super::workloads::Workload;
-use crate::measure::{self, Built};
-use crate::resident::resident_bytes;
+use crate::measure;
 
 /// One method.
 pub(super) struct GridSystem {
@@ -42,7 +41,7 @@ impl System for GridSystem {
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
         let mesh = input.mesh()?;
         let memory = measure::build(mesh, &self.config)?;
-        then(&GridTracer { grid: Grid::open(&memory.index, mesh)?, memory: &memory })
+        then(&GridTracer { grid: Grid::open(&memory.index, mesh)?, config: &self.config })
     }
 }
 
@@ -60,7 +59,7 @@ const fn coherence(mode: Mode) -> Option<Coherence> {
 
 struct GridTracer<'a> {
     grid: Grid<'a>,
-    memory: &'a Built,
+    config: &'a Config,
 }
 
 impl Tracer for GridTracer<'_> {
@@ -89,10 +88,7 @@ impl Tracer for GridTracer<'_> {
     }
 
     fn bytes(&self) -> Option<Bytes> {
-        let Built { index: asked, scratch } = self.memory;
-        let index = self.grid.blob_bytes();
-        let written = resident_bytes(asked).zip(resident_bytes(scratch));
-        let peak = written.map_or(index + scratch.len(), |(index, scratch)| index + scratch);
-        Some(Bytes { index, peak })
+        let peak = measure::peak_bytes(*self.grid.mesh(), self.config, &Control::default()).ok()?;
+        Some(Bytes { index: self.grid.blob_bytes(), peak })
     }
 }

@@ -13,14 +13,14 @@ use core::hint::black_box;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{Hit, Ray};
+use hgrid_core::Hit;
 
 use super::agreement::{differing_hits, hits, unequal};
 use super::input::Input;
 use super::numbers::{Run, SystemNumbers};
 use super::process::page_faults;
-use super::system::{Bytes, MISS, Mode, System, Tracer, is_hit};
-use super::workloads::{Rays, Workload};
+use super::system::{Bytes, MISS, Mode, System, Tracer};
+use super::workloads::{Rays, TILE_RAYS, Workload};
 use crate::measure::median;
 use crate::progress::Progress;
 use crate::shade::{Rgb, Shader};
@@ -231,9 +231,12 @@ impl<'a> Stage<'a> {
         let watch = Watch::start();
         match run.workload {
             Workload::Primary => {
-                rays.picture.trace(tracer, run.mode, |pixel, ray: &Ray, hit| {
-                    let hit = is_hit(hit).then_some(*hit);
-                    pixels[pixel] = shader.diffuse(ray, hit);
+                let mut colors = [[0; 3]; TILE_RAYS];
+                rays.picture.trace(tracer, run.mode, |places, rays, hits| {
+                    shader.diffuse(rays, hits, &mut colors);
+                    for (&place, &color) in places.iter().zip(&colors) {
+                        pixels[place] = color;
+                    }
                 });
                 black_box(&*pixels);
             }
@@ -251,7 +254,11 @@ impl<'a> Stage<'a> {
         let Self { rays, hits: found, occluded, .. } = self;
         let expected = match run.workload {
             Workload::Primary => {
-                rays.picture.trace(tracer, run.mode, |pixel, _, hit| found[pixel] = *hit);
+                rays.picture.trace(tracer, run.mode, |places, _, hits| {
+                    for (&place, &hit) in places.iter().zip(hits) {
+                        found[place] = hit;
+                    }
+                });
                 &rays.primary_hits
             }
             Workload::Ao => {
@@ -289,6 +296,8 @@ fn heap_since(before: usize) -> Bytes {
 
 #[cfg(test)]
 mod tests {
+    use hgrid_core::Ray;
+
     use super::*;
     use crate::camera::{Camera, Up, View};
     use crate::compare::methods;

@@ -27,7 +27,7 @@ const AO_START: f64 = 1e-5;
 const TILE: u16 = 8;
 
 /// Rays in a tile.
-const TILE_RAYS: usize = TILE as usize * TILE as usize;
+pub(super) const TILE_RAYS: usize = TILE as usize * TILE as usize;
 
 /// What is asked of a system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
@@ -127,15 +127,18 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Traces every ray and gives it, with its answer, to the pixel that it belongs to.
-    pub fn trace(&self, tracer: &dyn Tracer, mode: Mode, mut pixel: impl FnMut(usize, &Ray, &Hit)) {
+    /// Traces tile after tile and gives the rays and their answers to the pixels that they belong to.
+    pub fn trace(
+        &self,
+        tracer: &dyn Tracer,
+        mode: Mode,
+        mut tile: impl FnMut(&[usize], &[Ray], &[Hit]),
+    ) {
         let mut hits = [MISS; TILE_RAYS];
         self.for_each_tile(|rays, pixels| {
             let hits = &mut hits[..rays.len()];
             tracer.intersect(mode, rays, hits);
-            for ((ray, hit), &place) in rays.iter().zip(&*hits).zip(pixels) {
-                pixel(place, ray, hit);
-            }
+            tile(pixels, rays, hits);
         });
     }
 
