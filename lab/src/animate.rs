@@ -280,7 +280,7 @@ fn render_row(grid: &Grid<'_>, plan: &Plan<'_>, shader: &Shader<'_>, top: usize,
         if grid.intersect_n(&Strided::new(rays), answers, Coherence::Coherent).is_err() {
             continue;
         }
-        shader.diffuse(rays, hits, &mut colors);
+        shader.diffuse(rays, hits, &mut colors[..count]);
         for (&color, (column, row)) in colors.iter().zip(places()) {
             rows[row * width + column] = color;
         }

@@ -6,17 +6,17 @@
 //! last one:      build A, render A, count A | build B, ...
 //! ```
 //!
-//! Taking turns lets a machine that warms up or that others use disturb all methods alike. Each
-//! build gets memory of its own from the system, which a page costs when it is first written: every
-//! method pays for the pages that it writes, in every build, and not for what it asked for and left
-//! alone. Asking for the sizes, getting the memory and building are all in the build
+//! Taking turns lets a machine that warms up or that others use disturb all methods alike; threads
+//! are awake before a clock starts. Each build gets memory of its own from the system, which a page
+//! costs when it is first written: every method pays for the pages that it writes, in every build,
+//! and not for what it asked for and left alone. Asking for the sizes, getting the memory and building are all in the build
 //! time, because a first picture needs all of them. (A heap would hand pages of the build
 //! before to some methods and not to others, depending on their sizes, and would fill
-//! with zeros what the sizes only allow for.) The threads that build are awake when the clock starts.
+//! with zeros what the sizes only allow for.) Pages are large where the system has such; how much
+//! memory a build writes is counted in one more build, in small ones.
 //!
 //! Rendering is one thread, one ray per pixel, rows from the top; the timed pass traces and shades
-//! row by row and moves the progress bar; the work is counted in a pass of its own, and so is the
-//! memory that was written, in pages as small as the system has.
+//! row by row and moves the progress bar; the work is counted in a pass of its own.
 
 use std::time::Instant;
 
@@ -214,10 +214,11 @@ pub fn measure(
             renders.push(start.elapsed().as_secs_f64());
 
             if repetition == repeat {
-                progress.set_message(&format!("{turn} counting"));
+                progress.set_message(&format!("{turn} building again, to count its memory"));
                 let [index, scratch] = asked;
                 let peak = threads.parallel(|parallel| peak_bytes(mesh, config, parallel))?;
                 let memory = Memory { index, scratch, peak };
+                progress.set_message(&format!("{turn} counting"));
                 let work = count(&grid, &camera, size, &cost, progress);
                 if let Some(first) = outcome.measurements.first() {
                     let differ = outcome.pixels.iter().zip(&pixels).filter(|(a, b)| a != b).count();
@@ -262,7 +263,7 @@ fn build_with(
     mesh: TriangleMesh<'_>,
     config: &Config,
     parallel: &Control<'_>,
-    memory: fn(usize) -> Result<MmapMut>,
+    pages: fn(usize) -> Result<MmapMut>,
 ) -> Result<Built> {
     // A brick grid's bound follows from the number of triangles, and
     // what is not written costs nothing.
@@ -274,23 +275,30 @@ fn build_with(
         Some(bound) => bound,
         None => sizes_with(&mesh, config, &mut [], parallel)?,
     };
-    let (mut index, mut scratch) = (memory(sizes.index_bytes)?, memory(sizes.scratch_bytes)?);
+    let (mut index, mut scratch) = (pages(sizes.index_bytes)?, pages(sizes.scratch_bytes)?);
     Grid::build_with(mesh, config, &mut index, &mut scratch, parallel)?;
     Ok(Built { index, scratch })
 }
 
-/// Pages that the system provides when they are first written, large ones if it has them. A build
-/// of millions of triangles is sooner done with those, and other ray tracers ask for them, too.
+/// Pages that the system provides when they are first written, large ones if it has them: a build
+/// of a million triangles is sooner done with those, and Embree asks for them, too.
 pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
-    let memory = small_pages(bytes)?;
+    let memory = map(bytes)?;
     // Who cannot give them gives small ones.
     #[cfg(target_os = "linux")]
     let _ = memory.advise(Advice::HugePage);
     Ok(memory)
 }
 
-/// Pages of the usual size.
+/// The same in pages of the usual size: as many bytes as are written, and few more.
 fn small_pages(bytes: usize) -> Result<MmapMut> {
+    let memory = map(bytes)?;
+    #[cfg(target_os = "linux")]
+    let _ = memory.advise(Advice::NoHugePage);
+    Ok(memory)
+}
+
+fn map(bytes: usize) -> Result<MmapMut> {
     let mut options = MmapOptions::new();
     options
         .len(bytes.max(1))
@@ -425,6 +433,18 @@ mod tests {
 
     use super::*;
     use crate::camera::{Up, View};
+
+    #[test]
+    fn small_pages_are_small() {
+        const LARGE: usize = 1 << 21;
+        let mut memory = small_pages(32 * LARGE).unwrap();
+        for byte in memory.iter_mut().step_by(LARGE) {
+            *byte = 1;
+        }
+        if let Some(bytes) = resident_bytes(&memory) {
+            assert!((32..=32 * LARGE / 8).contains(&bytes), "{bytes}");
+        }
+    }
 
     fn race(configs: &[Config], repeat: u32) -> Outcome {
         let scene = Scene::load("procedural:knot:2000").unwrap();

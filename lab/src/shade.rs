@@ -5,9 +5,8 @@
 //! disagree with themselves about the front.
 //!
 //! Pixels are shaded [`GROUP`] at a time, number by number instead of vector by vector, which the
-//! compiler turns into vectors of several pixels: what is not tracing should be little of a picture.
+//! compiler turns into vectors of several pixels: tracing should be what a picture takes.
 
-use glam::Vec3A;
 use hgrid_core::{Hit, INVALID_ID, Ray, Triangle, TriangleMesh};
 
 use crate::camera::Camera;
@@ -28,7 +27,7 @@ const GROUND: [f32; 3] = [0.03, 0.027, 0.024];
 const ZENITH: [f32; 3] = [0.008, 0.018, 0.055];
 const HORIZON: [f32; 3] = [0.22, 0.31, 0.44];
 
-/// One of the two ways to give rays with their hits colours.
+/// A way to give rays with their hits colours.
 pub type Shade = fn(&Shader<'_>, &[Ray], &[Hit], &mut [Rgb]);
 
 /// Pixels that are shaded at once.
@@ -51,9 +50,11 @@ impl<'a> Shader<'a> {
     #[must_use]
     pub fn new(mesh: TriangleMesh<'a>, camera: &Camera) -> Self {
         let axes = camera.axes();
-        let [right, up, toward] = axes.map(Vec3A::from_array);
-        let light = right * LIGHT[0] + up * LIGHT[1] + toward * LIGHT[2];
-        Self { mesh, axes, light: light.normalize().to_array() }
+        let [right, up, toward] = axes;
+        let along = |c: usize| right[c] * LIGHT[0] + up[c] * LIGHT[1] + toward[c] * LIGHT[2];
+        let light = [0, 1, 2].map(along);
+        let length = dot(light, light).sqrt();
+        Self { mesh, axes, light: light.map(|c| c / length) }
     }
 
     /// A grey solid in a lit room: the colours of rays with these hits, [`Hit::MISS`] for none. All
@@ -85,6 +86,7 @@ impl<'a> Shader<'a> {
         colors: &mut [Rgb],
         surface: impl Fn([f32; 3]) -> [f32; 3],
     ) {
+        debug_assert!(rays.len() == hits.len() && hits.len() == colors.len());
         let groups = rays.chunks(GROUP).zip(hits.chunks(GROUP)).zip(colors.chunks_mut(GROUP));
         for ((rays, hits), colors) in groups {
             let seen = Seen::by(&self.mesh, rays, hits);
@@ -267,6 +269,7 @@ mod tests {
             shader.diffuse(&[*ray], &[*hit], &mut alone);
             assert_eq!(alone[0], *color);
         }
-        assert!(together.iter().any(|color| *color != together[1]));
+        let surfaces: Vec<_> = together.chunks_exact(3).map(|three| three[1]).collect();
+        assert!(surfaces.iter().any(|color| *color != surfaces[0]));
     }
 }

@@ -145,7 +145,8 @@ impl Results {
         let Self { size, repeats, .. } = self;
         let mut notes = vec![
             format!("{size} x {size} pixels, one ray each, diffuse shading; {}.", times(*repeats)),
-            "Peak is what the build wrote: index and scratch, in small pages. 1 MiB is 2^20 bytes, the paper's MB."
+            "Peak is what a build in small pages wrote: index and scratch. 1 MiB is 2^20 bytes, the \
+             paper's MB."
                 .to_owned(),
         ];
         if self.threads > 1 {

@@ -1,7 +1,5 @@
 //! Threads for the work that can use them.
 
-use std::sync::Barrier;
-
 use anyhow::{Context as _, Result};
 use hgrid_core::Control;
 use rayon::prelude::*;
@@ -45,10 +43,9 @@ impl Threads {
     /// Returns when all of them are awake. A processor that has slept for a while may take
     /// milliseconds, on a virtual machine above all: as long as a build.
     pub fn wake(&self) {
-        let all = Barrier::new(self.count as usize);
-        self.each(self.count, |_| {
-            all.wait();
-        });
+        if let Some(pool) = &self.pool {
+            pool.broadcast(|_| ());
+        }
     }
 
     /// Does a task for every number below a count.

@@ -46,14 +46,13 @@ fn count<T>(items: impl Iterator<Item = T>, is_counted: impl Fn(T) -> bool) -> u
 
 #[cfg(test)]
 mod tests {
-    use super::super::system::MISS;
     use super::*;
 
     #[test]
     fn misses_and_other_places_differ() {
         let hit = |t| Hit { t, u: 0.1, v: 0.1, primitive: 3 };
-        let expected = [hit(1.0), hit(1.0), hit(1.0), MISS, MISS];
-        let found = [hit(1.000_01), hit(1.1), MISS, hit(1.0), MISS];
+        let expected = [hit(1.0), hit(1.0), hit(1.0), Hit::MISS, Hit::MISS];
+        let found = [hit(1.000_01), hit(1.1), Hit::MISS, hit(1.0), Hit::MISS];
         assert_eq!(differing_hits(&expected, &found, 1.0), 3);
         assert_eq!(differing_hits(&expected, &found, 2000.0), 2);
         assert_eq!(hits(&expected), 3);

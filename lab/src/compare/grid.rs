@@ -4,7 +4,7 @@ use anyhow::Result;
 use hgrid_core::{Coherence, Config, Control, Grid, Hit, Method, Ray, Strided, StridedMut};
 
 use super::input::Input;
-use super::system::{Bytes, MISS, Mode, System, Tracer, Use, each};
+use super::system::{Bytes, Mode, System, Tracer, Use, each};
 use super::workloads::Workload;
 use crate::measure;
 
@@ -70,7 +70,7 @@ impl Tracer for GridTracer<'_> {
                 return;
             }
         }
-        each(rays, hits, |ray| self.grid.intersect(ray).unwrap_or(MISS));
+        each(rays, hits, |ray| self.grid.intersect(ray).unwrap_or(Hit::MISS));
     }
 
     fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [bool]) {
@@ -87,8 +87,8 @@ impl Tracer for GridTracer<'_> {
         }
     }
 
-    fn bytes(&self) -> Option<Bytes> {
-        let peak = measure::peak_bytes(*self.grid.mesh(), self.config, &Control::default()).ok()?;
-        Some(Bytes { index: self.grid.blob_bytes(), peak })
+    fn bytes(&self) -> Result<Option<Bytes>> {
+        let peak = measure::peak_bytes(*self.grid.mesh(), self.config, &Control::default())?;
+        Ok(Some(Bytes { index: self.grid.blob_bytes(), peak }))
     }
 }

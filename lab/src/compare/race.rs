@@ -19,7 +19,7 @@ use super::agreement::{differing_hits, hits, unequal};
 use super::input::Input;
 use super::numbers::{Run, SystemNumbers};
 use super::process::page_faults;
-use super::system::{Bytes, MISS, Mode, System, Tracer};
+use super::system::{Bytes, Mode, System, Tracer};
 use super::workloads::{Rays, TILE_RAYS, Workload};
 use crate::measure::median;
 use crate::progress::Progress;
@@ -185,7 +185,7 @@ impl<'a> Stage<'a> {
             shader,
             // Not zero: zeros may come as pages that nobody has touched.
             pixels: vec![[1; 3]; pixels],
-            hits: vec![MISS; pixels.max(rays.random.len())],
+            hits: vec![Hit::MISS; pixels.max(rays.random.len())],
             occluded: vec![true; rays.ao.len()],
         })
     }
@@ -205,9 +205,7 @@ impl<'a> Stage<'a> {
             if let Some(watch) = watch.take() {
                 watch.stop(build);
             }
-            if is_last {
-                *bytes = tracer.bytes().unwrap_or_else(|| heap_since(before));
-            }
+            let heap = is_last.then(|| heap_since(before));
             for run in &mut *runs {
                 self.trace(tracer, run);
                 if is_first {
@@ -221,6 +219,9 @@ impl<'a> Stage<'a> {
                     );
                 }
             }
+            if let Some(heap) = heap {
+                *bytes = tracer.bytes()?.unwrap_or(heap);
+            }
             Ok(())
         })
     }
@@ -233,7 +234,7 @@ impl<'a> Stage<'a> {
             Workload::Primary => {
                 let mut colors = [[0; 3]; TILE_RAYS];
                 rays.picture.trace(tracer, run.mode, |places, rays, hits| {
-                    shader.diffuse(rays, hits, &mut colors);
+                    shader.diffuse(rays, hits, &mut colors[..rays.len()]);
                     for (&place, &color) in places.iter().zip(&colors) {
                         pixels[place] = color;
                     }
@@ -335,7 +336,7 @@ mod tests {
 
     impl Tracer for Blind {
         fn intersect(&self, _: Mode, rays: &[Ray], hits: &mut [Hit]) {
-            each(rays, hits, |_| MISS);
+            each(rays, hits, |_| Hit::MISS);
         }
 
         fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [bool]) {

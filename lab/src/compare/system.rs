@@ -10,9 +10,6 @@ use serde::Serialize;
 use super::input::Input;
 use super::workloads::Workload;
 
-/// The answer to a ray that hits nothing.
-pub const MISS: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: INVALID_ID };
-
 /// Whether an answer is a hit.
 #[must_use]
 pub const fn is_hit(hit: &Hit) -> bool {
@@ -79,15 +76,18 @@ pub trait System {
 
 /// A structure that is built.
 pub trait Tracer {
-    /// Closest hits; [`MISS`] where there is none. Both slices are equally long.
+    /// Closest hits; [`Hit::MISS`] where there is none. Both slices are equally long.
     fn intersect(&self, mode: Mode, rays: &[Ray], hits: &mut [Hit]);
 
     /// Whether there is any hit. Both slices are equally long.
     fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [bool]);
 
     /// Its bytes, unless they are all on the heap that the program counts.
-    fn bytes(&self) -> Option<Bytes> {
-        None
+    ///
+    /// # Errors
+    /// If they cannot be counted.
+    fn bytes(&self) -> Result<Option<Bytes>> {
+        Ok(None)
     }
 }
 

@@ -53,7 +53,8 @@ impl Comparison {
                 "ao: a ray from every primary hit, {AO_REACH} of the scene's diagonal long, any \
                  hit; random: rays between points of the scene's box, closest hit."
             ),
-            "Bytes per triangle are without the mesh; faults are pages that were first touched."
+            "Bytes per triangle are without the mesh; faults are pages that were first touched, small \
+             or large."
                 .to_owned(),
             format!(
                 "Differing rays have another answer than hgrid;{MARK} marks times where more than \

@@ -10,7 +10,7 @@ use hgrid_core::{Config, Grid, Hit, Method, Ray, TriangleMesh};
 use serde::Serialize;
 
 use super::input::Input;
-use super::system::{MISS, Mode, Tracer, is_hit};
+use super::system::{Mode, Tracer, is_hit};
 use crate::camera::Camera;
 use crate::measure;
 use crate::scene::Bounds;
@@ -85,13 +85,13 @@ impl Rays {
         let memory =
             measure::build(mesh, &Config::new(Method::Brick)).context("no grid for the rays")?;
         let grid = Grid::open(&memory.index, mesh)?;
-        let closest = |ray: &Ray| grid.intersect(ray).unwrap_or(MISS);
+        let closest = |ray: &Ray| grid.intersect(ray).unwrap_or(Hit::MISS);
 
         let (min, max) = bounds;
         let extent = [0, 1, 2].map(|axis| f64::from(max[axis]) - f64::from(min[axis]));
         let diagonal = dot(extent, extent).sqrt();
         let size = usize::from(picture.size);
-        let mut primary_hits = vec![MISS; size * size];
+        let mut primary_hits = vec![Hit::MISS; size * size];
         let mut ao = Vec::new();
         picture.for_each_tile(|rays, pixels| {
             for (ray, &pixel) in rays.iter().zip(pixels) {
@@ -127,14 +127,14 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Traces tile after tile and gives the rays and their answers to the pixels that they belong to.
+    /// Traces tile after tile and hands on the places of its pixels, its rays and their answers.
     pub fn trace(
         &self,
         tracer: &dyn Tracer,
         mode: Mode,
         mut tile: impl FnMut(&[usize], &[Ray], &[Hit]),
     ) {
-        let mut hits = [MISS; TILE_RAYS];
+        let mut hits = [Hit::MISS; TILE_RAYS];
         self.for_each_tile(|rays, pixels| {
             let hits = &mut hits[..rays.len()];
             tracer.intersect(mode, rays, hits);

@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::Peer;
 use crate::compare::input::Input;
-use crate::compare::system::{MISS, Mode, System, Tracer, Use, each};
+use crate::compare::system::{Mode, System, Tracer, Use, each};
 
 /// Its only builder.
 pub(super) struct BvhSystem(pub(super) Peer);
@@ -83,11 +83,11 @@ struct Built {
 impl Built {
     /// The closest hit up to `t_max`, or the first that is found.
     fn search(&self, ray: &BvhRay<f32, 3>, t_max: f32, is_any: bool) -> Option<Hit> {
-        let mut closest = Hit { t: t_max, ..MISS };
+        let mut closest = Hit { t: t_max, ..Hit::MISS };
         let mut is_found = false;
         for shape in self.bvh.nearest_traverse_iterator(ray, &self.shapes) {
             if let Some(t) = shape.intersect(ray).filter(|&t| t <= closest.t) {
-                closest = Hit { t, primitive: shape.id, ..MISS };
+                closest = Hit { t, primitive: shape.id, ..Hit::MISS };
                 is_found = true;
                 if is_any {
                     break;
@@ -105,7 +105,7 @@ impl Built {
 
 impl Tracer for Built {
     fn intersect(&self, _: Mode, rays: &[Ray], hits: &mut [Hit]) {
-        each(rays, hits, |ray| self.search(&to_bvh(ray), ray.t_max, false).unwrap_or(MISS));
+        each(rays, hits, |ray| self.search(&to_bvh(ray), ray.t_max, false).unwrap_or(Hit::MISS));
     }
 
     fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [bool]) {

@@ -17,7 +17,7 @@ use hgrid_core::{Hit, Ray};
 
 use super::Peer;
 use crate::compare::input::Input;
-use crate::compare::system::{MISS, Mode, System, Tracer, Use, each};
+use crate::compare::system::{Mode, System, Tracer, Use, each};
 
 /// A preset of its builder.
 pub(super) struct Obvhs {
@@ -70,12 +70,12 @@ impl Tracer for Built {
                 .bvh
                 .ray_traverse(to_obvhs(ray), &mut hit, |ray, at| self.leaves[at].intersect(ray));
             if !is_hit {
-                return MISS;
+                return Hit::MISS;
             }
             Hit {
                 t: hit.t,
                 primitive: self.bvh.primitive_indices[hit.primitive_id as usize],
-                ..MISS
+                ..Hit::MISS
             }
         });
     }

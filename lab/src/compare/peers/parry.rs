@@ -13,7 +13,7 @@ use parry3d::shape::Triangle;
 
 use super::Peer;
 use crate::compare::input::Input;
-use crate::compare::system::{MISS, Mode, System, Tracer, Use, each};
+use crate::compare::system::{Mode, System, Tracer, Use, each};
 
 /// One of its builders.
 pub(super) struct Parry {
@@ -71,7 +71,7 @@ impl Tracer for Built<'_> {
             let hit = self.bvh.cast_ray(&ray, t_max, |id, closest| {
                 self.triangle(id).cast_local_ray(&ray, closest, false)
             });
-            hit.map_or(MISS, |(primitive, t)| Hit { t, primitive, ..MISS })
+            hit.map_or(Hit::MISS, |(primitive, t)| Hit { t, primitive, ..Hit::MISS })
         });
     }
 

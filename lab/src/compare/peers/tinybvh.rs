@@ -12,7 +12,7 @@ use tinybvh_rs::{INFINITE, Intersection, Intersector, Ray as TinyRay, bvh};
 use super::Peer;
 use crate::compare::heap;
 use crate::compare::input::Input;
-use crate::compare::system::{Bytes, MISS, Mode, System, Tracer, Use, each};
+use crate::compare::system::{Bytes, Mode, System, Tracer, Use, each};
 
 /// Two nodes below each node, over positions that stay where they are.
 pub(super) struct Tinybvh2(pub(super) Peer);
@@ -84,7 +84,7 @@ impl<T: Intersector> Tracer for Built<T> {
             if found.t < ray.t_max.min(INFINITE) {
                 Hit { t: found.t, u: found.u, v: found.v, primitive: found.prim }
             } else {
-                MISS
+                Hit::MISS
             }
         });
     }
@@ -93,8 +93,8 @@ impl<T: Intersector> Tracer for Built<T> {
         each(rays, occluded, |ray| closest(&self.bvh, ray).t < ray.t_max.min(INFINITE));
     }
 
-    fn bytes(&self) -> Option<Bytes> {
-        Some(self.bytes)
+    fn bytes(&self) -> Result<Option<Bytes>> {
+        Ok(Some(self.bytes))
     }
 }
 

@@ -71,7 +71,7 @@ impl Tracer for Scene<'_> {
         }
     }
 
-    fn bytes(&self) -> Option<Bytes> {
-        Some(self.memory())
+    fn bytes(&self) -> Result<Option<Bytes>> {
+        Ok(Some(self.memory()))
     }
 }

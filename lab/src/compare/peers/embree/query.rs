@@ -6,7 +6,7 @@ use hgrid_core::{Hit, Ray};
 
 use super::device::Scene;
 use super::ffi::{self, Context, Hit1, Hit16, LANES, Ray1, Ray16, RayHit1, RayHit16, Valid};
-use crate::compare::system::{MISS, each};
+use crate::compare::system::each;
 
 fn context(flags: u32) -> Context {
     Context { flags, filter: None, inst_id: [ffi::INVALID_ID] }
@@ -30,7 +30,7 @@ impl Scene<'_> {
             unsafe { ffi::rtcIntersect1(self.handle(), &raw mut context, &raw mut both) };
             let RayHit1 { ray, hit } = both;
             if hit.geometry == ffi::INVALID_ID {
-                MISS
+                Hit::MISS
             } else {
                 Hit { t: ray.far, u: hit.u, v: hit.v, primitive: hit.primitive }
             }
@@ -74,7 +74,7 @@ impl Scene<'_> {
             let RayHit16 { ray, hit } = both;
             for (lane, place) in hits.iter_mut().enumerate() {
                 *place = if hit.geometry[lane] == ffi::INVALID_ID {
-                    MISS
+                    Hit::MISS
                 } else {
                     let (u, v) = (hit.u[lane], hit.v[lane]);
                     Hit { t: ray.far[lane], u, v, primitive: hit.primitive[lane] }
