@@ -9,11 +9,11 @@
 //! Taking turns lets a machine that warms up or that others use disturb all methods alike; threads
 //! are awake before a clock starts. Each build gets memory of its own from the system, which a page
 //! costs when it is first written: every method pays for the pages that it writes, in every build,
-//! and not for what it asked for and left alone. Asking for the sizes, getting the memory and building are all in the build
-//! time, because a first picture needs all of them. (A heap would hand pages of the build
-//! before to some methods and not to others, depending on their sizes, and would fill
-//! with zeros what the sizes only allow for.) Pages are large where the system has such; how much
-//! memory a build writes is counted in one more build, in small ones.
+//! and not for what it asked for and left alone. Asking for the sizes, getting the memory and
+//! building are all in the build time, because a first picture needs all of them. (A heap would
+//! hand pages of the build before to some methods and not to others, depending on their sizes, and
+//! would fill with zeros what the sizes only allow for.) Pages are large where the system has such;
+//! how much memory a build writes is counted in one more build, in small ones.
 //!
 //! Rendering is one thread, one ray per pixel, rows from the top; the timed pass traces and shades
 //! row by row and moves the progress bar; the work is counted in a pass of its own.
