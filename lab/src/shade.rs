@@ -4,7 +4,7 @@
 //! same at every scene size; colours are `f32`. Every surface has two sides, because many files
 //! disagree with themselves about the front.
 //!
-//! Pixels are shaded [`GROUP`] at a time, number by number instead of vector by vector, which the
+//! Pixels are shaded 64 at a time, number by number instead of vector by vector, which the
 //! compiler turns into vectors of several pixels: tracing should be what a picture takes.
 
 use hgrid_core::{Hit, INVALID_ID, Ray, Triangle, TriangleMesh};
