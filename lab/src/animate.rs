@@ -15,12 +15,11 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result};
 use hgrid_core::{
-    Coherence, Config, Error, Grid, Hit, Ray, Region, Strided, StridedMut, TriangleMesh, sizes_with,
+    Coherence, Config, Error, Grid, Hit, Region, Strided, StridedMut, TriangleMesh, sizes_with,
 };
 use memmap2::MmapMut;
 use serde::Serialize;
 
-use crate::camera::Camera;
 use crate::cli::AnimateArgs;
 use crate::image;
 use crate::measure::{median, memory};
@@ -28,15 +27,13 @@ use crate::progress::Progress;
 use crate::scene::{Bounds, Scene};
 use crate::shade::{Rgb, Shader, normal_of};
 use crate::threads::Threads;
+use crate::tiles::{TILE_RAYS, Tiles};
 use crate::vector::{Vector, offset, round, unit};
 
 /// How far a vertex swings to either side, and how far it is from one crest of the wave to the
 /// next, as parts of the largest extent of the scene.
 const AMPLITUDE: f64 = 0.01;
 const WAVELENGTH: f64 = 0.3;
-
-/// Pixels on each side of a tile: its rays are traced together.
-const TILE: usize = 8;
 
 /// Animates and prints.
 ///
@@ -48,7 +45,7 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
             .with_context(|| format!("cannot write into `{}`", folder.display()))?;
     }
     let scene = Scene::load(&args.scene)?;
-    let camera = args.picture.camera(&scene);
+    let tiles = args.picture.tiles(&scene);
     let config = args.tuning.config(args.method);
     let threads = Threads::new(args.threads)?;
     let mut progress = Progress::new("frames", args.frames.into());
@@ -56,8 +53,7 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
         Some(folder) => write_frame(folder, frame, args.picture.size, pixels),
         None => Ok(()),
     };
-    let size = args.picture.size;
-    let plan = Plan { frames: args.frames, config, camera, size, threads: &threads };
+    let plan = Plan { frames: args.frames, config, tiles, threads: &threads };
     let report = animate(&scene, &plan, write, &mut progress)
         .with_context(|| format!("cannot animate `{}`", args.scene))?;
     drop(progress);
@@ -83,8 +79,7 @@ fn write_frame(folder: &Path, frame: u32, size: u16, pixels: &[Rgb]) -> Result<(
 struct Plan<'a> {
     frames: u32,
     config: Config,
-    camera: Camera,
-    size: u16,
+    tiles: Tiles,
     threads: &'a Threads,
 }
 
@@ -162,7 +157,7 @@ fn animate(
 ) -> Result<Report> {
     let wave = Wave::new(scene);
     let mut positions = scene.positions.clone();
-    let mut pixels = vec![[0; 3]; usize::from(plan.size) * usize::from(plan.size)];
+    let mut pixels = vec![[0; 3]; plan.tiles.pixels()];
     let mut arena = None;
     let (mut frames, mut index_bytes, mut grown) = (Vec::new(), 0, 0);
     for number in 0..plan.frames {
@@ -197,7 +192,7 @@ fn animate(
         triangles: scene.indices.len(),
         method: plan.config.method.name(),
         threads: plan.threads.count(),
-        size: plan.size,
+        size: plan.tiles.size,
         grown,
         index_bytes,
         median: Frame {
@@ -250,41 +245,20 @@ impl Memory {
 /// Traces and shades all pixels, a row of tiles at a time.
 #[expect(clippy::cast_possible_truncation, reason = "no more rows than pixels of a side")]
 fn render(grid: &Grid<'_>, plan: &Plan<'_>, pixels: &mut [Rgb]) {
-    let shader = Shader::new(*grid.mesh(), &plan.camera);
-    let width = usize::from(plan.size);
-    let rows: Vec<_> = pixels.chunks_mut(width * TILE).map(Mutex::new).collect();
-    plan.threads.each(rows.len() as u32, |at| {
-        let Some(Ok(mut row)) = rows.get(at as usize).map(|row| row.lock()) else { return };
-        render_row(grid, plan, &shader, at as usize * TILE, &mut row);
+    let Plan { tiles, threads, .. } = plan;
+    let shader = Shader::new(*grid.mesh(), &tiles.camera);
+    let rows: Vec<_> = tiles.rows_of(pixels).map(Mutex::new).collect();
+    threads.each(rows.len() as u32, |at| {
+        let Some(Ok(mut pixels)) = rows.get(at as usize).map(|row| row.lock()) else { return };
+        let mut hits = [Hit::MISS; TILE_RAYS];
+        tiles.fill_row(at as u16, &mut pixels, |rays, colors| {
+            let hits = &mut hits[..rays.len()];
+            let answers = &mut StridedMut::new(&mut *hits);
+            if grid.intersect_n(&Strided::new(rays), answers, Coherence::Coherent).is_ok() {
+                shader.diffuse(rays, hits, colors);
+            }
+        });
     });
-}
-
-/// Traces and shades a row of tiles.
-#[expect(clippy::cast_possible_truncation, reason = "pixels of a picture")]
-fn render_row(grid: &Grid<'_>, plan: &Plan<'_>, shader: &Shader<'_>, top: usize, rows: &mut [Rgb]) {
-    let width = usize::from(plan.size);
-    let height = rows.len() / width;
-    let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE * TILE];
-    let mut hits = [Hit::MISS; TILE * TILE];
-    let mut colors = [[0; 3]; TILE * TILE];
-    for left in (0..width).step_by(TILE) {
-        let columns = TILE.min(width - left);
-        let places =
-            || (0..height).flat_map(|row| (0..columns).map(move |column| (left + column, row)));
-        for (ray, (column, row)) in rays.iter_mut().zip(places()) {
-            *ray = plan.camera.ray(column as u16, (top + row) as u16, plan.size);
-        }
-        let count = height * columns;
-        let (rays, hits) = (&rays[..count], &mut hits[..count]);
-        let answers = &mut StridedMut::new(hits);
-        if grid.intersect_n(&Strided::new(rays), answers, Coherence::Coherent).is_err() {
-            continue;
-        }
-        shader.diffuse(rays, hits, &mut colors[..count]);
-        for (&color, (column, row)) in colors.iter().zip(places()) {
-            rows[row * width + column] = color;
-        }
-    }
 }
 
 /// How the vertices of a scene swing.
@@ -341,14 +315,14 @@ mod tests {
     use hgrid_core::Method;
 
     use super::*;
-    use crate::camera::{Up, View};
+    use crate::camera::{Camera, Up, View};
 
     fn film(method: Method, threads: u32, frames: u32) -> (Report, Vec<Vec<Rgb>>) {
         let scene = Scene::load("procedural:knot:3000").unwrap();
         let camera = Camera::framing(scene.framed_bounds(), View::Front, Up::Y);
         let threads = Threads::new(threads).unwrap();
         let config = Config::new(method);
-        let plan = Plan { frames, config, camera, size: 37, threads: &threads };
+        let plan = Plan { frames, config, tiles: Tiles { camera, size: 37 }, threads: &threads };
         let mut pictures = Vec::new();
         let show = |number: u32, pixels: &[Rgb]| {
             assert_eq!(number as usize, pictures.len());
@@ -413,7 +387,7 @@ mod tests {
         let camera = Camera::framing(scene.framed_bounds(), View::Front, Up::Y);
         let threads = Threads::new(1).unwrap();
         let config = Config::new(Method::Brick);
-        let plan = Plan { frames: 2, config, camera, size: 3, threads: &threads };
+        let plan = Plan { frames: 2, config, tiles: Tiles { camera, size: 3 }, threads: &threads };
         let report = animate(&scene, &plan, |_, _| Ok(()), &mut Progress::new("", 0)).unwrap();
         assert_eq!(report.frames.len(), 2);
     }

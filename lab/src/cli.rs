@@ -10,6 +10,7 @@ use crate::camera::{Camera, Point, Up, View};
 use crate::compare::peers::Peer;
 use crate::heat::Counter;
 use crate::scene::Scene;
+use crate::tiles::Tiles;
 
 /// The picture that is written when nobody names one.
 pub const DEFAULT_OUTPUT: &str = "hgrid.png";
@@ -379,6 +380,12 @@ impl Picture {
     pub fn camera(&self, scene: &Scene) -> Camera {
         let bounds = scene.framed_bounds();
         Camera::framing(bounds, self.view.unwrap_or_else(|| View::of(bounds, self.up)), self.up)
+    }
+
+    /// Its pixels as that camera sees them.
+    #[must_use]
+    pub fn tiles(&self, scene: &Scene) -> Tiles {
+        Tiles { camera: self.camera(scene), size: self.size }
     }
 }
 

@@ -31,4 +31,5 @@ pub mod scene;
 pub mod shade;
 pub mod table;
 pub mod threads;
+pub mod tiles;
 mod vector;

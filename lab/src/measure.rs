@@ -15,27 +15,28 @@
 //! would fill with zeros what the sizes only allow for.) Pages are large where the system has such;
 //! how much memory a build writes is counted in one more build, in small ones.
 //!
-//! Rendering is one thread, one ray per pixel, rows from the top; the timed pass traces and shades
-//! row by row and moves the progress bar; the work is counted in a pass of its own.
+//! Rendering is one thread, one ray per pixel, tile by tile: the timed pass hands the rays of a tile
+//! to the grid, as a renderer does, shades them, and moves the progress bar. Brick grids trace them
+//! together, the others one by one. The work is counted in a pass of its own, ray by ray.
 
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{
-    Config, Control, Counters, Grid, Hit, Method, QueryOptions, Ray, Sizes, TriangleMesh,
-    sizes_with,
+    Coherence, Config, Control, Counters, Grid, Hit, Method, QueryOptions, Ray, Sizes, Strided,
+    StridedMut, TriangleMesh, sizes_with,
 };
 #[cfg(target_os = "linux")]
 use memmap2::Advice;
 use memmap2::{MmapMut, MmapOptions};
 use serde::Serialize;
 
-use crate::camera::Camera;
 use crate::progress::Progress;
 use crate::resident::resident_bytes;
 use crate::scene::Scene;
 use crate::shade::{Rgb, Shade, Shader};
 use crate::threads::Threads;
+use crate::tiles::{TILE_RAYS, Tiles};
 
 /// A scene as the paper's Table 1 describes it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -97,7 +98,7 @@ pub struct Measurement {
     pub rays: u64,
     /// Rays that hit something.
     pub hits: u64,
-    /// Work of all rays divided by their number.
+    /// Work of all rays, each traced alone, divided by their number.
     pub primitive_tests_per_ray: f64,
     /// Cells entered, likewise.
     pub cell_steps_per_ray: f64,
@@ -144,10 +145,8 @@ impl Measurement {
 pub struct Subject<'a> {
     /// What the grids are built for.
     pub mesh: TriangleMesh<'a>,
-    /// From where it is seen.
-    pub camera: Camera,
-    /// Pixels on each side of the picture.
-    pub size: u16,
+    /// The picture's pixels.
+    pub tiles: Tiles,
     /// Who builds.
     pub threads: &'a Threads,
 }
@@ -183,11 +182,11 @@ pub fn measure(
     cost: impl Fn(&Counters) -> u64,
     progress: &mut Progress,
 ) -> Result<Outcome> {
-    let Subject { mesh, camera, size, threads } = *subject;
-    let shader = Shader::new(mesh, &camera);
+    let Subject { mesh, tiles, threads } = *subject;
+    let shader = Shader::new(mesh, &tiles.camera);
     let mut samples = vec![(Vec::new(), Vec::new()); configs.len()];
     let mut outcome = Outcome { measurements: Vec::new(), pixels: Vec::new(), costs: Vec::new() };
-    let mut hits = Vec::with_capacity(size.into());
+    let mut hits = [Hit::MISS; TILE_RAYS];
     for repetition in 1..=repeat {
         for (config, (builds, renders)) in configs.iter().zip(&mut samples) {
             let name = config.method.name();
@@ -206,11 +205,15 @@ pub fn measure(
 
             progress.set_message(&format!("{turn} rendering"));
             let start = Instant::now();
-            let pixels = trace(&camera, size, progress, [0; 3], |rays, pixels| {
-                hits.clear();
-                hits.extend(rays.iter().map(|ray| grid.intersect(ray).unwrap_or(Hit::MISS)));
-                shade(&shader, rays, &hits, pixels);
+            let mut traced = Ok(());
+            let pixels = trace(&tiles, progress, [0; 3], |rays, pixels| {
+                let hits = &mut hits[..rays.len()];
+                let answers = &mut StridedMut::new(&mut *hits);
+                let done = grid.intersect_n(&Strided::new(rays), answers, Coherence::Coherent);
+                traced = traced.and(done);
+                shade(&shader, rays, hits, pixels);
             });
+            traced?;
             renders.push(start.elapsed().as_secs_f64());
 
             if repetition == repeat {
@@ -219,13 +222,15 @@ pub fn measure(
                 let peak = threads.parallel(|parallel| peak_bytes(mesh, config, parallel))?;
                 let memory = Memory { index, scratch, peak };
                 progress.set_message(&format!("{turn} counting"));
-                let work = count(&grid, &camera, size, &cost, progress);
+                let work = count(&grid, &tiles, &cost, progress);
                 if let Some(first) = outcome.measurements.first() {
                     let differ = outcome.pixels.iter().zip(&pixels).filter(|(a, b)| a != b).count();
                     ensure!(differ == 0, "{} and {name} differ in {differ} pixels", first.method);
                 }
                 let samples = [&**builds, renders];
-                outcome.measurements.push(numbers(&grid, config, memory, &work, size, samples));
+                outcome
+                    .measurements
+                    .push(numbers(&grid, config, memory, &work, tiles.size, samples));
                 (outcome.pixels, outcome.costs) = (pixels, work.costs);
             }
         }
@@ -320,22 +325,17 @@ const fn has_references(method: Method) -> bool {
     matches!(method, Method::OneLevel | Method::Fixed)
 }
 
-/// What becomes of the rays of all pixels, row by row from the upper left.
-fn trace<T: Clone>(
-    camera: &Camera,
-    size: u16,
+/// What becomes of the rays of all pixels, tile by tile; row by row from the upper left.
+fn trace<T: Copy>(
+    tiles: &Tiles,
     progress: &mut Progress,
     blank: T,
-    mut row: impl FnMut(&[Ray], &mut [T]),
+    mut tile: impl FnMut(&[Ray], &mut [T]),
 ) -> Vec<T> {
-    let width = usize::from(size);
-    let mut pixels = vec![blank; width * width];
-    let mut rays = Vec::with_capacity(width);
-    for (number, pixels) in (0..size).zip(pixels.chunks_mut(width.max(1))) {
-        rays.clear();
-        rays.extend((0..size).map(|column| camera.ray(column, number, size)));
-        row(&rays, pixels);
-        progress.advance(1);
+    let mut pixels = vec![blank; tiles.pixels()];
+    for (row, pixels) in (0..).zip(tiles.rows_of(&mut pixels)) {
+        tiles.fill_row(row, pixels, &mut tile);
+        progress.advance(tiles.height(row).into());
     }
     pixels
 }
@@ -351,13 +351,12 @@ struct Work {
 /// Traces a picture again and counts.
 fn count(
     grid: &Grid<'_>,
-    camera: &Camera,
-    size: u16,
+    tiles: &Tiles,
     cost: impl Fn(&Counters) -> u64,
     progress: &mut Progress,
 ) -> Work {
     let (mut total, mut hits, mut largest) = (Counters::default(), 0, 0);
-    let costs = trace(camera, size, progress, 0, |rays, costs| {
+    let costs = trace(tiles, progress, 0, |rays, costs| {
         for (ray, slot) in rays.iter().zip(costs) {
             let mut counters = Counters::default();
             let hit = grid.intersect_with(ray, &mut QueryOptions::counting(&mut counters));
@@ -432,7 +431,7 @@ mod tests {
     use hgrid_core::Method;
 
     use super::*;
-    use crate::camera::{Up, View};
+    use crate::camera::{Camera, Up, View};
 
     #[test]
     fn small_pages_are_small() {
@@ -451,7 +450,7 @@ mod tests {
         let mesh = TriangleMesh::new(&scene.positions, &scene.indices).unwrap();
         let camera = Camera::framing(scene.framed_bounds(), View::ThreeQuarter, Up::Y);
         let threads = Threads::new(2).unwrap();
-        let subject = Subject { mesh, camera, size: 40, threads: &threads };
+        let subject = Subject { mesh, tiles: Tiles { camera, size: 40 }, threads: &threads };
         let cost = |work: &Counters| work.primitive_tests + work.cell_steps + work.grid_steps;
         let mut progress = Progress::new("", 0);
         let is_hit: Shade = |_, _, hits, pixels| {

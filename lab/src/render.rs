@@ -15,6 +15,7 @@ use crate::report::Report;
 use crate::scene::Scene;
 use crate::shade::Shade;
 use crate::threads::Threads;
+use crate::tiles::Tiles;
 
 /// Renders, writes the picture and prints the numbers.
 ///
@@ -33,7 +34,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let size = args.picture.size;
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
     let threads = Threads::new(args.builders.threads)?;
-    let subject = Subject { mesh, camera: args.camera(&scene), size, threads: &threads };
+    let tiles = Tiles { camera: args.camera(&scene), size };
+    let subject = Subject { mesh, tiles, threads: &threads };
     let shade: Shade = match args.shading {
         Shading::Normals => |shader, rays, hits, colors| shader.normals(rays, hits, colors),
         Shading::Diffuse | Shading::Heat => {

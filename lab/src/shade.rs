@@ -10,7 +10,7 @@
 use hgrid_core::{Hit, INVALID_ID, Ray, Triangle, TriangleMesh};
 
 use crate::camera::Camera;
-use crate::vector::{Vector, cross, offset, round, unit};
+use crate::vector::{Vector, cross, length, offset, round, unit};
 
 /// A colour as a PNG holds it.
 pub type Rgb = [u8; 3];
@@ -146,7 +146,12 @@ impl Seen {
         let mut normals = [[0.0; GROUP]; 3];
         for lane in 0..GROUP {
             let triangle = self.corners.each_ref().map(|corners| at(corners, lane));
-            put(&mut normals, lane, normal_of(&triangle).map_or(instead, round));
+            let along = cross_of(&triangle);
+            let length = length(along);
+            // One division instead of three: the same bytes.
+            let share = 1.0 / length;
+            let normal = round(along.map(|c| c * share));
+            put(&mut normals, lane, if length > 0.0 { normal } else { instead });
         }
         normals
     }
@@ -187,8 +192,13 @@ fn display(light: &[Lanes<f32>; 3], colors: &mut [Rgb]) {
 
 /// The unit normal of a triangle, unless it has no area.
 pub(crate) fn normal_of(triangle: &Triangle) -> Option<Vector> {
+    unit(cross_of(triangle))
+}
+
+/// The cross product of two edges, in `f64`: no area is too small or too large.
+fn cross_of(triangle: &Triangle) -> Vector {
     let [a, b, c] = triangle.map(|corner| corner.map(f64::from));
-    unit(cross(offset(b, -1.0, a), offset(c, -1.0, a)))
+    cross(offset(b, -1.0, a), offset(c, -1.0, a))
 }
 
 #[cfg(test)]

@@ -145,8 +145,9 @@ impl Results {
         let Self { size, repeats, .. } = self;
         let mut notes = vec![
             format!("{size} x {size} pixels, one ray each, diffuse shading; {}.", times(*repeats)),
-            "Peak is what a build in small pages wrote: index and scratch. 1 MiB is 2^20 bytes, the \
-             paper's MB."
+            "Brick traces tiles of 8 x 8 pixels, the others ray by ray; tests and steps are those of \
+             each ray alone. Peak is what a build in small pages wrote: index and scratch. 1 MiB is \
+             2^20 bytes, the paper's MB."
                 .to_owned(),
         ];
         if self.threads > 1 {
@@ -173,8 +174,7 @@ pub(crate) fn measure_diffuse(
 ) -> Result<Vec<Measurement>> {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
     let threads = Threads::new(race.builders.threads)?;
-    let (camera, size) = (race.picture.camera(scene), race.picture.size);
-    let subject = Subject { mesh, camera, size, threads: &threads };
+    let subject = Subject { mesh, tiles: race.picture.tiles(scene), threads: &threads };
     let cost = |_: &Counters| 0;
     let shade: Shade = |shader, rays, hits, colors| shader.diffuse(rays, hits, colors);
     Ok(measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements)

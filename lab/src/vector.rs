@@ -16,9 +16,13 @@ pub(crate) fn offset(from: Vector, amount: f64, along: Vector) -> Vector {
     [0, 1, 2].map(|axis| from[axis] + amount * along[axis])
 }
 
+pub(crate) fn length(v: Vector) -> f64 {
+    dot(v, v).sqrt()
+}
+
 /// The vector at length 1, unless it has none. No `f32` coordinates are too small or too large.
 pub(crate) fn unit(v: Vector) -> Option<Vector> {
-    let length = dot(v, v).sqrt();
+    let length = length(v);
     (length > 0.0).then(|| v.map(|c| c / length))
 }
 

@@ -11,7 +11,7 @@ use super::process::target;
 use super::race::{Plan, race};
 use super::ratios::Ratio;
 use super::system::{Mode, System};
-use super::workloads::{self, Rays, Workload};
+use super::workloads::{Rays, Workload};
 use super::{charts, tables};
 use crate::cli::Picture;
 use crate::machine::Machine;
@@ -189,9 +189,9 @@ impl SceneNumbers {
         ensure!(!scene.indices.is_empty(), "no triangles: nothing to measure");
         let bounds = scene.bounds().context("no vertex with finite coordinates")?;
         let facts = SceneFacts::of(&scene);
-        let picture = workloads::Picture { camera: picture.camera(&scene), size: picture.size };
+        let tiles = picture.tiles(&scene);
         let input = Input::new(scene);
-        let rays = Rays::new(&input, bounds, picture, plan.random_rays)?;
+        let rays = Rays::new(&input, bounds, tiles, plan.random_rays)?;
         let systems = race(&input, &rays, systems, plan.repeat, progress)?;
         let ratios = Ratio::all(&systems);
         Ok(Self { facts, systems, ratios })

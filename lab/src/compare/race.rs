@@ -20,10 +20,11 @@ use super::input::Input;
 use super::numbers::{Run, SystemNumbers};
 use super::process::page_faults;
 use super::system::{Bytes, Mode, System, Tracer};
-use super::workloads::{Rays, TILE_RAYS, Workload};
+use super::workloads::{Rays, Workload};
 use crate::measure::median;
 use crate::progress::Progress;
 use crate::shade::{Rgb, Shader};
+use crate::tiles::TILE_RAYS;
 
 /// How often, and how many random rays.
 #[derive(Debug, Clone, Copy)]
@@ -177,7 +178,7 @@ struct Stage<'a> {
 
 impl<'a> Stage<'a> {
     fn new(input: &'a Input, rays: &'a Rays) -> Result<Self> {
-        let shader = Shader::new(input.mesh()?, &rays.picture.camera);
+        let shader = Shader::new(input.mesh()?, &rays.tiles.camera);
         let pixels = rays.primary_hits.len();
         Ok(Self {
             input,
@@ -232,12 +233,11 @@ impl<'a> Stage<'a> {
         let watch = Watch::start();
         match run.workload {
             Workload::Primary => {
-                let mut colors = [[0; 3]; TILE_RAYS];
-                rays.picture.trace(tracer, run.mode, |places, rays, hits| {
-                    shader.diffuse(rays, hits, &mut colors[..rays.len()]);
-                    for (&place, &color) in places.iter().zip(&colors) {
-                        pixels[place] = color;
-                    }
+                let mut hits = [Hit::MISS; TILE_RAYS];
+                rays.tiles.fill(pixels, |rays, colors| {
+                    let hits = &mut hits[..rays.len()];
+                    tracer.intersect(run.mode, rays, hits);
+                    shader.diffuse(rays, hits, colors);
                 });
                 black_box(&*pixels);
             }
@@ -255,11 +255,8 @@ impl<'a> Stage<'a> {
         let Self { rays, hits: found, occluded, .. } = self;
         let expected = match run.workload {
             Workload::Primary => {
-                rays.picture.trace(tracer, run.mode, |places, _, hits| {
-                    for (&place, &hit) in places.iter().zip(hits) {
-                        found[place] = hit;
-                    }
-                });
+                let found = &mut found[..rays.primary_hits.len()];
+                rays.tiles.fill(found, |rays, hits| tracer.intersect(run.mode, rays, hits));
                 &rays.primary_hits
             }
             Workload::Ao => {
@@ -303,15 +300,15 @@ mod tests {
     use crate::camera::{Camera, Up, View};
     use crate::compare::methods;
     use crate::compare::system::{Use, each};
-    use crate::compare::workloads::Picture;
     use crate::scene::Scene;
+    use crate::tiles::Tiles;
 
     fn numbers(systems: &[Box<dyn System>]) -> Result<Vec<SystemNumbers>> {
         let scene = Scene::load("procedural:knot:2000").unwrap();
         let bounds = scene.bounds().unwrap();
         let camera = Camera::framing(bounds, View::ThreeQuarter, Up::Y);
         let input = Input::new(scene);
-        let rays = Rays::new(&input, bounds, Picture { camera, size: 40 }, 1000).unwrap();
+        let rays = Rays::new(&input, bounds, Tiles { camera, size: 40 }, 1000).unwrap();
         race(&input, &rays, systems, 3, &mut Progress::new("", 0))
     }
 

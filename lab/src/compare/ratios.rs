@@ -1,13 +1,18 @@
 //! hgrid divided by a peer: the numbers that decide whether it is worth its place.
 //!
 //! Less than one is better in every row. Runs whose answers are off take no part.
+//!
+//! A ratio is the median of those of the single turns: what two systems took within seconds of each
+//! other. A machine that others slow down for a while slows down both, where the medians of all
+//! times may come from different whiles.
 
 use serde::Serialize;
 
-use super::numbers::SystemNumbers;
+use super::numbers::{Run, SystemNumbers};
 use super::peers::Peer;
 use super::system::Mode;
 use super::workloads::Workload;
+use crate::measure::median;
 
 /// One number of hgrid against one of a peer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -16,22 +21,28 @@ pub struct Ratio {
     pub what: &'static str,
     /// The method and mode of hgrid.
     pub hgrid: String,
-    /// Its number: seconds, or bytes for each triangle.
+    /// Its number: seconds, the median; or bytes for each triangle.
     pub value: f64,
     /// The peer and its mode.
     pub peer: String,
     /// Its number.
     pub peer_value: f64,
-    /// The first divided by the second.
+    /// The first divided by the second, turn by turn: the median.
     pub ratio: f64,
+    /// The least of these.
+    pub least: f64,
+    /// The most.
+    pub most: f64,
 }
 
 /// A number and whose it is.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct Entry<'a> {
     system: &'a SystemNumbers,
     mode: Option<Mode>,
     value: f64,
+    /// What every turn gave.
+    turns: Vec<f64>,
 }
 
 impl Entry<'_> {
@@ -41,8 +52,9 @@ impl Entry<'_> {
     }
 
     /// Another number of the same system.
-    fn with(self, value: fn(&SystemNumbers) -> f64) -> Self {
-        Self { mode: None, value: value(self.system), ..self }
+    fn with(&self, value: fn(&SystemNumbers) -> f64) -> Self {
+        let value = value(self.system);
+        Self { system: self.system, mode: None, value, turns: vec![value] }
     }
 }
 
@@ -56,15 +68,18 @@ impl Ratio {
         };
         let (low, medium) = (of(Peer::EmbreeLow), of(Peer::EmbreeMedium));
         let fastest = [&hgrid, &peers].map(|systems| least(systems, time_to_image));
-        let bytes = |value| fastest.map(|entry| entry.map(|entry| entry.with(value)));
+        let bytes =
+            |value| fastest.each_ref().map(|entry| entry.as_ref().map(|entry| entry.with(value)));
         let primary = |system| best(system, Workload::Primary);
         let single_primary = |system| single(system, Workload::Primary);
         let random = |system| best(system, Workload::Random);
         let single_random = |system| single(system, Workload::Random);
+        let index = bytes(SystemNumbers::index_bytes_per_triangle);
+        let peak = bytes(SystemNumbers::peak_bytes_per_triangle);
         let rows = [
             ("time to image / best peer", fastest),
-            ("index bytes per triangle of these", bytes(SystemNumbers::index_bytes_per_triangle)),
-            ("peak bytes per triangle of these", bytes(SystemNumbers::peak_bytes_per_triangle)),
+            ("index bytes per triangle of these", index),
+            ("peak bytes per triangle of these", peak),
             (
                 "coherent render / Embree MEDIUM, best",
                 [least(&hgrid, primary), least(&medium, primary)],
@@ -79,31 +94,47 @@ impl Ratio {
             ),
         ];
         rows.into_iter()
-            .filter_map(|(what, [ours, theirs])| Self::new(what, ours?, theirs?))
+            .filter_map(|(what, [ours, theirs])| Self::new(what, &ours?, &theirs?))
             .collect()
     }
 
-    fn new(what: &'static str, ours: Entry<'_>, theirs: Entry<'_>) -> Option<Self> {
-        let (value, peer_value) = (ours.value, theirs.value);
-        let ratio = value / peer_value;
+    fn new(what: &'static str, ours: &Entry<'_>, theirs: &Entry<'_>) -> Option<Self> {
+        let turns = ours.turns.iter().zip(&theirs.turns).map(|(ours, theirs)| ours / theirs);
+        let mut turns: Vec<_> = turns.collect();
+        turns.sort_by(f64::total_cmp);
+        let (&least, &most) = turns.first().zip(turns.last())?;
         let (hgrid, peer) = (ours.name(), theirs.name());
-        ratio.is_finite().then_some(Self { what, hgrid, value, peer, peer_value, ratio })
+        most.is_finite().then_some(Self {
+            what,
+            hgrid,
+            value: ours.value,
+            peer,
+            peer_value: theirs.value,
+            ratio: median(&turns),
+            least,
+            most,
+        })
     }
 }
 
 fn time_to_image(system: &SystemNumbers) -> Option<Entry<'_>> {
-    let mode = Some(system.best(Workload::Primary)?.mode);
-    Some(Entry { system, mode, value: system.time_to_image()? })
+    let run = system.best(Workload::Primary)?;
+    let turns = system.build_samples.iter().zip(&run.samples).map(|(build, run)| build + run);
+    let (mode, value) = (Some(run.mode), system.time_to_image()?);
+    Some(Entry { system, mode, value, turns: turns.collect() })
 }
 
 fn best(system: &SystemNumbers, workload: Workload) -> Option<Entry<'_>> {
-    let run = system.best(workload)?;
-    Some(Entry { system, mode: Some(run.mode), value: run.seconds })
+    system.best(workload).map(|run| of_run(system, run))
 }
 
 fn single(system: &SystemNumbers, workload: Workload) -> Option<Entry<'_>> {
-    let run = system.run(workload, Mode::Single).filter(|run| !run.is_off())?;
-    Some(Entry { system, mode: Some(run.mode), value: run.seconds })
+    let run = system.run(workload, Mode::Single).filter(|run| !run.is_off());
+    run.map(|run| of_run(system, run))
+}
+
+fn of_run<'a>(system: &'a SystemNumbers, run: &Run) -> Entry<'a> {
+    Entry { system, mode: Some(run.mode), value: run.seconds, turns: run.samples.clone() }
 }
 
 /// The least value of all systems that have one.
@@ -117,7 +148,6 @@ fn least<'a>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::numbers::Run;
     use super::*;
 
     fn system(
@@ -147,6 +177,25 @@ mod tests {
             peak_bytes: 10_000,
             runs: primary.iter().map(run).collect(),
         }
+    }
+
+    #[test]
+    fn turns_are_compared_with_each_other() {
+        // A machine that is twice as slow in the second turn, and for the peer alone in the third.
+        let with = |name, is_peer, builds: [f64; 3], renders: [f64; 3]| {
+            let mut system = system(name, is_peer, builds[1], &[(Mode::Single, renders[1], 0)]);
+            system.build_samples = builds.to_vec();
+            system.runs[0].samples = renders.to_vec();
+            system
+        };
+        let systems = [
+            with("brick", false, [1.0, 2.0, 1.0], [2.0, 4.0, 2.0]),
+            with("embree-low", true, [2.0, 4.0, 6.0], [2.0, 4.0, 6.0]),
+        ];
+        let ratios = Ratio::all(&systems);
+        let Ratio { ratio, least, most, .. } = ratios[0];
+        let expected = [0.25, 0.75, 0.75];
+        assert_eq!([least, ratio, most].map(f64::to_bits), expected.map(f64::to_bits));
     }
 
     #[test]

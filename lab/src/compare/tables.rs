@@ -58,7 +58,8 @@ impl Comparison {
                 .to_owned(),
             format!(
                 "Differing rays have another answer than hgrid;{MARK} marks times where more than \
-                 one ray in a thousand does: they count for no ratio."
+                 one ray in a thousand does: they count for no ratio. A ratio is the median of those \
+                 of the single turns, its range that of all of them."
             ),
         ]
     }
@@ -173,8 +174,8 @@ impl SceneNumbers {
 }
 
 fn ratios(ratios: &[Ratio]) -> Table {
-    let mut table = table(&["hgrid / peer", "which", "hgrid", "peer", "ratio"]);
-    for Ratio { what, hgrid, value, peer, peer_value, ratio } in ratios {
+    let mut table = table(&["hgrid / peer", "which", "hgrid", "peer", "ratio", "of all turns"]);
+    for Ratio { what, hgrid, value, peer, peer_value, ratio, least, most } in ratios {
         let number = |value: &f64| {
             if what.contains("bytes") { format!("{value:.1}") } else { seconds(*value) }
         };
@@ -184,6 +185,7 @@ fn ratios(ratios: &[Ratio]) -> Table {
             number(value),
             number(peer_value),
             format!("{ratio:.2}"),
+            format!("{least:.2} to {most:.2}"),
         ]);
     }
     table

@@ -10,11 +10,11 @@ use hgrid_core::{Config, Grid, Hit, Method, Ray, TriangleMesh};
 use serde::Serialize;
 
 use super::input::Input;
-use super::system::{Mode, Tracer, is_hit};
-use crate::camera::Camera;
+use super::system::is_hit;
 use crate::measure;
 use crate::scene::Bounds;
 use crate::shade::normal_of;
+use crate::tiles::Tiles;
 use crate::vector::{Vector, cross, dot, offset, round, unit};
 
 /// The length of an ambient occlusion ray, as a part of the diagonal of the scene's box.
@@ -22,12 +22,6 @@ pub const AO_REACH: f64 = 0.1;
 
 /// How far from its surface such a ray starts, likewise: far above rounding, far below triangles.
 const AO_START: f64 = 1e-5;
-
-/// Pixels on each side of a tile.
-const TILE: u16 = 8;
-
-/// Rays in a tile.
-pub(super) const TILE_RAYS: usize = TILE as usize * TILE as usize;
 
 /// What is asked of a system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
@@ -60,7 +54,7 @@ impl Workload {
 #[derive(Debug)]
 pub struct Rays {
     /// The primary rays.
-    pub picture: Picture,
+    pub tiles: Tiles,
     /// One from every primary hit.
     pub ao: Vec<Ray>,
     /// From points toward points.
@@ -80,7 +74,7 @@ impl Rays {
     ///
     /// # Errors
     /// If the grid cannot be built, or the scene has no finite vertex.
-    pub fn new(input: &Input, bounds: Bounds, picture: Picture, count: usize) -> Result<Self> {
+    pub fn new(input: &Input, bounds: Bounds, tiles: Tiles, count: usize) -> Result<Self> {
         let mesh = input.mesh()?;
         let memory =
             measure::build(mesh, &Config::new(Method::Brick)).context("no grid for the rays")?;
@@ -90,10 +84,9 @@ impl Rays {
         let (min, max) = bounds;
         let extent = [0, 1, 2].map(|axis| f64::from(max[axis]) - f64::from(min[axis]));
         let diagonal = dot(extent, extent).sqrt();
-        let size = usize::from(picture.size);
-        let mut primary_hits = vec![Hit::MISS; size * size];
+        let mut primary_hits = vec![Hit::MISS; tiles.pixels()];
         let mut ao = Vec::new();
-        picture.for_each_tile(|rays, pixels| {
+        tiles.each(|rays, pixels| {
             for (ray, &pixel) in rays.iter().zip(pixels) {
                 let hit = closest(ray);
                 primary_hits[pixel] = hit;
@@ -103,7 +96,7 @@ impl Rays {
         let random = random_rays(bounds, count);
         let ao_occluded = ao.iter().map(|ray| grid.occluded(ray)).collect();
         let random_hits = random.iter().map(closest).collect();
-        Ok(Self { picture, ao, random, primary_hits, ao_occluded, random_hits, diagonal })
+        Ok(Self { tiles, ao, random, primary_hits, ao_occluded, random_hits, diagonal })
     }
 
     /// How many rays a workload has.
@@ -115,61 +108,6 @@ impl Rays {
             Workload::Random => self.random.len(),
         }
     }
-}
-
-/// A picture in tiles.
-#[derive(Debug, Clone, Copy)]
-pub struct Picture {
-    /// From where it is seen.
-    pub camera: Camera,
-    /// Pixels on each side.
-    pub size: u16,
-}
-
-impl Picture {
-    /// Traces tile after tile and hands on the places of its pixels, its rays and their answers.
-    pub fn trace(
-        &self,
-        tracer: &dyn Tracer,
-        mode: Mode,
-        mut tile: impl FnMut(&[usize], &[Ray], &[Hit]),
-    ) {
-        let mut hits = [Hit::MISS; TILE_RAYS];
-        self.for_each_tile(|rays, pixels| {
-            let hits = &mut hits[..rays.len()];
-            tracer.intersect(mode, rays, hits);
-            tile(pixels, rays, hits);
-        });
-    }
-
-    /// Calls `tile` with the rays of one tile after the other and the places of their pixels.
-    ///
-    /// Tiles come row by row; rays of a tile in Morton order, so that any sixteen in a row are a
-    /// square of four by four pixels.
-    fn for_each_tile(&self, mut tile: impl FnMut(&[Ray], &[usize])) {
-        let Self { camera, size } = *self;
-        let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE_RAYS];
-        let mut pixels = [0; TILE_RAYS];
-        for top in (0..size).step_by(TILE.into()) {
-            for left in (0..size).step_by(TILE.into()) {
-                let mut count = 0;
-                for at in 0..TILE * TILE {
-                    let (column, row) = (left + even_bits(at), top + even_bits(at >> 1));
-                    if column < size && row < size {
-                        rays[count] = camera.ray(column, row, size);
-                        pixels[count] = usize::from(row) * usize::from(size) + usize::from(column);
-                        count += 1;
-                    }
-                }
-                tile(&rays[..count], &pixels[..count]);
-            }
-        }
-    }
-}
-
-/// The three lowest bits in even places, side by side.
-const fn even_bits(at: u16) -> u16 {
-    at & 1 | at >> 1 & 2 | at >> 2 & 4
 }
 
 /// A ray from a hit into the half space above its surface, by the cosine of the angle.
@@ -239,14 +177,14 @@ fn narrow(length: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Up, View};
+    use crate::camera::{Camera, Up, View};
     use crate::scene::Scene;
 
     fn rays(size: u16, count: usize) -> (Rays, Bounds) {
         let scene = Scene::load("procedural:knot:2000").unwrap();
         let bounds = scene.bounds().unwrap();
-        let picture = Picture { camera: Camera::framing(bounds, View::ThreeQuarter, Up::Y), size };
-        (Rays::new(&Input::new(scene), bounds, picture, count).unwrap(), bounds)
+        let tiles = Tiles { camera: Camera::framing(bounds, View::ThreeQuarter, Up::Y), size };
+        (Rays::new(&Input::new(scene), bounds, tiles, count).unwrap(), bounds)
     }
 
     #[test]
@@ -267,30 +205,6 @@ mod tests {
         assert_eq!((rays.ao_occluded.len(), rays.random_hits.len()), (hits, 100));
         let occluded = rays.ao_occluded.iter().filter(|&&is| is).count();
         assert!((hits / 50..hits).contains(&occluded), "{occluded} of {hits}");
-    }
-
-    #[test]
-    fn every_pixel_has_its_own_ray_once() {
-        let camera = Camera::framing(([0.0; 3], [1.0; 3]), View::Front, Up::Y);
-        for size in [1, 7, 8, 20] {
-            let mut seen = vec![0; usize::from(size) * usize::from(size)];
-            Picture { camera, size }.for_each_tile(|rays, pixels| {
-                for (ray, &pixel) in rays.iter().zip(pixels) {
-                    let at = |place: usize| u16::try_from(place).unwrap();
-                    let (column, row) = (pixel % usize::from(size), pixel / usize::from(size));
-                    assert_eq!(*ray, camera.ray(at(column), at(row), size));
-                    seen[pixel] += 1;
-                }
-            });
-            assert!(seen.iter().all(|&count| count == 1), "{size}");
-        }
-    }
-
-    #[test]
-    fn sixteen_rays_in_a_row_are_a_square() {
-        let places: Vec<_> = (0..16).map(|at| (even_bits(at), even_bits(at >> 1))).collect();
-        assert!(places.iter().all(|&(column, row)| column < 4 && row < 4));
-        assert_eq!((even_bits(63), even_bits(63 >> 1)), (7, 7));
     }
 
     #[test]
