@@ -14,9 +14,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result};
-use hgrid_core::{
-    Coherence, Config, Error, Grid, Hit, Region, Strided, StridedMut, TriangleMesh, sizes_with,
-};
+use hgrid_core::{Config, Error, Grid, Hit, Region, TriangleMesh, sizes_with};
 use memmap2::MmapMut;
 use serde::Serialize;
 
@@ -27,7 +25,7 @@ use crate::progress::Progress;
 use crate::scene::{Bounds, Scene};
 use crate::shade::{Rgb, Shader, normal_of};
 use crate::threads::Threads;
-use crate::tiles::{TILE_RAYS, Tiles};
+use crate::tiles::{TILE_RAYS, Tiles, intersect};
 use crate::vector::{Vector, offset, round, unit};
 
 /// How far a vertex swings to either side, and how far it is from one crest of the wave to the
@@ -242,21 +240,18 @@ impl Memory {
     }
 }
 
-/// Traces and shades all pixels, a row of tiles at a time.
-#[expect(clippy::cast_possible_truncation, reason = "no more rows than pixels of a side")]
+/// Traces and shades all pixels, a band of tiles at a time.
+#[expect(clippy::cast_possible_truncation, reason = "fewer bands than pixels of a side")]
 fn render(grid: &Grid<'_>, plan: &Plan<'_>, pixels: &mut [Rgb]) {
-    let Plan { tiles, threads, .. } = plan;
-    let shader = Shader::new(*grid.mesh(), &tiles.camera);
-    let rows: Vec<_> = tiles.rows_of(pixels).map(Mutex::new).collect();
-    threads.each(rows.len() as u32, |at| {
-        let Some(Ok(mut pixels)) = rows.get(at as usize).map(|row| row.lock()) else { return };
+    let shader = Shader::new(*grid.mesh(), &plan.tiles.camera);
+    let bands: Vec<_> = plan.tiles.bands(pixels).map(Mutex::new).collect();
+    plan.threads.each(bands.len() as u32, |at| {
+        let Some(Ok(mut band)) = bands.get(at as usize).map(|band| band.lock()) else { return };
         let mut hits = [Hit::MISS; TILE_RAYS];
-        tiles.fill_row(at as u16, &mut pixels, |rays, colors| {
+        band.fill(|rays, colors| {
             let hits = &mut hits[..rays.len()];
-            let answers = &mut StridedMut::new(&mut *hits);
-            if grid.intersect_n(&Strided::new(rays), answers, Coherence::Coherent).is_ok() {
-                shader.diffuse(rays, hits, colors);
-            }
+            intersect(grid, rays, hits);
+            shader.diffuse(rays, hits, colors);
         });
     });
 }

@@ -181,12 +181,12 @@ impl RenderArgs {
         Config { density: self.density.unwrap_or(config.density), ..config }
     }
 
-    /// The camera that the words ask for.
+    /// The picture that the words ask for.
     #[must_use]
-    pub fn camera(&self, scene: &Scene) -> Camera {
-        let Some(eye) = self.eye else { return self.picture.camera(scene) };
+    pub fn tiles(&self, scene: &Scene) -> Tiles {
+        let Some(eye) = self.eye else { return self.picture.tiles(scene) };
         let target = self.target.unwrap_or_else(|| Point::centre_of(scene.framed_bounds()));
-        Camera::between(eye, target, self.picture.up)
+        Tiles { camera: Camera::between(eye, target, self.picture.up), size: self.picture.size }
     }
 }
 
@@ -375,17 +375,12 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The camera that frames a scene.
-    #[must_use]
-    pub fn camera(&self, scene: &Scene) -> Camera {
-        let bounds = scene.framed_bounds();
-        Camera::framing(bounds, self.view.unwrap_or_else(|| View::of(bounds, self.up)), self.up)
-    }
-
-    /// Its pixels as that camera sees them.
+    /// The picture of a whole scene.
     #[must_use]
     pub fn tiles(&self, scene: &Scene) -> Tiles {
-        Tiles { camera: self.camera(scene), size: self.size }
+        let bounds = scene.framed_bounds();
+        let view = self.view.unwrap_or_else(|| View::of(bounds, self.up));
+        Tiles { camera: Camera::framing(bounds, view, self.up), size: self.size }
     }
 }
 

@@ -4,9 +4,9 @@
 //! and the same camera, so that a number and a picture always speak of the same rays.
 //!
 //! ```text
-//! scene -> measure (hgrid_core::Grid, camera, shade) -> render: a picture and a report
-//!                                                    |-> table: the paper's Table 1
-//!                                                    '-> figures: its charts, by plot
+//! scene -> measure (hgrid_core::Grid, tiles, shade) -> render: a picture and a report
+//!                                                   |-> table: the paper's Table 1
+//!                                                   '-> figures: its charts, by plot
 //!       -> animate: the mesh deformed, built and rendered frame after frame
 //!       -> compare: hgrid and other structures, over the same rays
 //! ```

@@ -12,8 +12,9 @@
 //! and not for what it asked for and left alone. Asking for the sizes, getting the memory and
 //! building are all in the build time, because a first picture needs all of them. (A heap would
 //! hand pages of the build before to some methods and not to others, depending on their sizes, and
-//! would fill with zeros what the sizes only allow for.) Pages are large where the system has such;
-//! how much memory a build writes is counted in one more build, in small ones.
+//! would fill with zeros what the sizes only allow for.) Pages are large where a build asks for
+//! many and the system has such; how much memory a build writes is counted in one more build, in
+//! small ones.
 //!
 //! Rendering is one thread, one ray per pixel, tile by tile: the timed pass hands the rays of a tile
 //! to the grid, as a renderer does, shades them, and moves the progress bar. Brick grids trace them
@@ -23,8 +24,8 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{
-    Coherence, Config, Control, Counters, Grid, Hit, Method, QueryOptions, Ray, Sizes, Strided,
-    StridedMut, TriangleMesh, sizes_with,
+    Config, Control, Counters, Grid, Hit, Method, QueryOptions, Ray, Sizes, TriangleMesh,
+    sizes_with,
 };
 #[cfg(target_os = "linux")]
 use memmap2::Advice;
@@ -36,7 +37,7 @@ use crate::resident::resident_bytes;
 use crate::scene::Scene;
 use crate::shade::{Rgb, Shade, Shader};
 use crate::threads::Threads;
-use crate::tiles::{TILE_RAYS, Tiles};
+use crate::tiles::{TILE_RAYS, Tiles, intersect};
 
 /// A scene as the paper's Table 1 describes it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -112,7 +113,7 @@ pub struct Measurement {
     pub render_seconds: f64,
     /// Build and render: from a mesh in memory to a picture.
     pub time_to_image_seconds: f64,
-    /// The builds that the time is the median of, in the order of time.
+    /// The builds that the time is the median of, one after the other.
     pub build_samples: Vec<f64>,
     /// The renderings, likewise.
     pub render_samples: Vec<f64>,
@@ -145,7 +146,7 @@ impl Measurement {
 pub struct Subject<'a> {
     /// What the grids are built for.
     pub mesh: TriangleMesh<'a>,
-    /// The picture's pixels.
+    /// The picture.
     pub tiles: Tiles,
     /// Who builds.
     pub threads: &'a Threads,
@@ -205,15 +206,11 @@ pub fn measure(
 
             progress.set_message(&format!("{turn} rendering"));
             let start = Instant::now();
-            let mut traced = Ok(());
             let pixels = trace(&tiles, progress, [0; 3], |rays, pixels| {
                 let hits = &mut hits[..rays.len()];
-                let answers = &mut StridedMut::new(&mut *hits);
-                let done = grid.intersect_n(&Strided::new(rays), answers, Coherence::Coherent);
-                traced = traced.and(done);
+                intersect(&grid, rays, hits);
                 shade(&shader, rays, hits, pixels);
             });
-            traced?;
             renders.push(start.elapsed().as_secs_f64());
 
             if repetition == repeat {
@@ -285,13 +282,20 @@ fn build_with(
     Ok(Built { index, scratch })
 }
 
+/// From here on large pages are asked for: eight of 2 MiB.
+#[cfg(target_os = "linux")]
+const MANY_BYTES: usize = 16 << 20;
+
 /// Pages that the system provides when they are first written, large ones if it has them: a build
-/// of a million triangles is sooner done with those, and Embree asks for them, too.
+/// of a million triangles is sooner done with those, and Embree asks for them, too. A small build
+/// would write little of each, and wait until the system has cleared all of it.
 pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
     let memory = map(bytes)?;
     // Who cannot give them gives small ones.
     #[cfg(target_os = "linux")]
-    let _ = memory.advise(Advice::HugePage);
+    if bytes >= MANY_BYTES {
+        let _ = memory.advise(Advice::HugePage);
+    }
     Ok(memory)
 }
 
@@ -325,7 +329,7 @@ const fn has_references(method: Method) -> bool {
     matches!(method, Method::OneLevel | Method::Fixed)
 }
 
-/// What becomes of the rays of all pixels, tile by tile; row by row from the upper left.
+/// What becomes of the rays of all pixels, which lie row by row; the progress moves on.
 fn trace<T: Copy>(
     tiles: &Tiles,
     progress: &mut Progress,
@@ -333,9 +337,9 @@ fn trace<T: Copy>(
     mut tile: impl FnMut(&[Ray], &mut [T]),
 ) -> Vec<T> {
     let mut pixels = vec![blank; tiles.pixels()];
-    for (row, pixels) in (0..).zip(tiles.rows_of(&mut pixels)) {
-        tiles.fill_row(row, pixels, &mut tile);
-        progress.advance(tiles.height(row).into());
+    for mut band in tiles.bands(&mut pixels) {
+        band.fill(&mut tile);
+        progress.advance(band.height().into());
     }
     pixels
 }
@@ -419,11 +423,12 @@ pub fn ratio(a: u64, b: u64) -> f64 {
     if b == 0 { 0.0 } else { a as f64 / b as f64 }
 }
 
-/// The middle value, the upper one of two.
+/// The middle value, the mean of the two if there are two.
 pub(crate) fn median(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    let middle = |at: usize| values.get(at).copied().unwrap_or(0.0);
+    0.5 * (middle(values.len().saturating_sub(1) / 2) + middle(values.len() / 2))
 }
 
 #[cfg(test)]
@@ -499,6 +504,7 @@ mod tests {
     fn medians_and_ratios_of_nothing_are_zero() {
         assert!(median(&[]).abs() < 1e-9 && ratio(3, 0).abs() < 1e-9);
         assert!((median(&[3.0, 1.0, 2.0]) - 2.0).abs() < 1e-9);
+        assert!((median(&[4.0, 1.0, 3.0, 2.0]) - 2.5).abs() < 1e-9);
     }
 
     #[test]

@@ -15,7 +15,6 @@ use crate::report::Report;
 use crate::scene::Scene;
 use crate::shade::Shade;
 use crate::threads::Threads;
-use crate::tiles::Tiles;
 
 /// Renders, writes the picture and prints the numbers.
 ///
@@ -34,8 +33,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let size = args.picture.size;
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
     let threads = Threads::new(args.builders.threads)?;
-    let tiles = Tiles { camera: args.camera(&scene), size };
-    let subject = Subject { mesh, tiles, threads: &threads };
+    let subject = Subject { mesh, tiles: args.tiles(&scene), threads: &threads };
     let shade: Shade = match args.shading {
         Shading::Normals => |shader, rays, hits, colors| shader.normals(rays, hits, colors),
         Shading::Diffuse | Shading::Heat => {

@@ -7,7 +7,7 @@ use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Result, ensure};
 use comfy_table::{CellAlignment, Table, presets};
-use hgrid_core::{Config, Counters, TriangleMesh};
+use hgrid_core::{Config, Counters, Method, TriangleMesh};
 use serde::Serialize;
 
 use crate::cli::{Race, TableArgs};
@@ -145,11 +145,14 @@ impl Results {
         let Self { size, repeats, .. } = self;
         let mut notes = vec![
             format!("{size} x {size} pixels, one ray each, diffuse shading; {}.", times(*repeats)),
-            "Brick traces tiles of 8 x 8 pixels, the others ray by ray; tests and steps are those of \
-             each ray alone. Peak is what a build in small pages wrote: index and scratch. 1 MiB is \
-             2^20 bytes, the paper's MB."
+            "Peak is what a build in small pages wrote: index and scratch. 1 MiB is 2^20 bytes, the \
+             paper's MB."
                 .to_owned(),
         ];
+        let mut methods = self.scenes.iter().flat_map(|scene| &scene.methods);
+        if methods.any(|measurement| measurement.method == Method::Brick.name()) {
+            notes.push(format!("Brick grids {IN_TILES}."));
+        }
         if self.threads > 1 {
             notes.push(format!("Brick grids were built by {} threads.", self.threads));
         }
@@ -190,6 +193,10 @@ pub(crate) fn markdown(table: &mut Table, words: usize) -> String {
     }
     lines.join("\n")
 }
+
+/// What is special about brick grids, as part of a sentence.
+pub(crate) const IN_TILES: &str =
+    "trace tiles of 8 x 8 rays together; their tests and steps are those of each ray alone";
 
 /// What times are, as part of a sentence.
 pub(crate) fn times(repeats: u32) -> String {

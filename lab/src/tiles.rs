@@ -1,28 +1,27 @@
-//! A square picture in tiles of 8 x 8 pixels: every rendering goes through it.
+//! A square picture in tiles of 8 x 8 pixels: all that the lab renders.
 //!
 //! ```text
-//! +------------+---   Tiles come row by row. The rays of one are in Morton order, so that any
-//! |  0  1  4 .. |     sixteen in a row are a square of 4 x 4 pixels, as
-//! |  2  3  6 .. |     [`Grid::intersect_n`](hgrid_core::Grid::intersect_n) and the packets of
-//! |  8  9 12 .. |     other structures like them best.
+//! +-------------+---   Tiles come row by row from the upper left. The rays of one are in Morton
+//! |  0  1  4 .. |      order: each sixteen of a whole tile are a square of 4 x 4 pixels.
+//! |  2  3  6 .. |
+//! |  8  9 12 .. |
 //! ```
 //!
-//! The rays of a tile are made when it is its turn, as a renderer does.
+//! That is what [`Grid::intersect_n`] and the packets of other structures like best. The rays of a
+//! tile are made when it is its turn, as a renderer does.
 
-use core::slice::ChunksMut;
-
-use hgrid_core::Ray;
+use hgrid_core::{Coherence, Grid, Hit, Ray, Strided, StridedMut};
 
 use crate::camera::Camera;
 
 /// Pixels on each side of a tile.
-pub const TILE: u16 = 8;
+const TILE: u16 = 8;
 
 /// Rays in a tile.
 pub const TILE_RAYS: usize = TILE as usize * TILE as usize;
 
 /// Column and row of each ray of a tile.
-const MORTON: [[u16; 2]; TILE_RAYS] = {
+static MORTON: [[u16; 2]; TILE_RAYS] = {
     let mut places = [[0; 2]; TILE_RAYS];
     let mut at = 0;
     while at < TILE * TILE {
@@ -37,13 +36,21 @@ const fn even_bits(at: u16) -> u16 {
     at & 1 | at >> 1 & 2 | at >> 2 & 4
 }
 
-/// A picture in tiles.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A picture and the camera that takes it.
+#[derive(Debug, Clone, Copy)]
 pub struct Tiles {
     /// From where it is seen.
     pub camera: Camera,
     /// Pixels on each side.
     pub size: u16,
+}
+
+/// The pixels of a row of tiles.
+#[derive(Debug)]
+pub struct Band<'p, T> {
+    tiles: Tiles,
+    row: u16,
+    pixels: &'p mut [T],
 }
 
 impl Tiles {
@@ -53,64 +60,32 @@ impl Tiles {
         self.size as usize * self.size as usize
     }
 
-    /// How many rows of tiles there are.
-    #[must_use]
-    pub const fn rows(&self) -> u16 {
-        self.size.div_ceil(TILE)
+    /// The bands of a picture's pixels, which lie row by row.
+    pub fn bands<'p, T>(&self, pixels: &'p mut [T]) -> impl Iterator<Item = Band<'p, T>> {
+        debug_assert_eq!(pixels.len(), self.pixels(), "another picture");
+        let tiles = *self;
+        let bands = (0..).step_by(TILE.into()).zip(pixels.chunks_mut(self.band_pixels().max(1)));
+        bands.map(move |(row, pixels)| Band { tiles, row, pixels })
     }
 
-    /// The pixels of a picture, as many as [`fill_row`](Self::fill_row) takes at a time.
-    pub fn rows_of<'p, T>(&self, pixels: &'p mut [T]) -> ChunksMut<'p, T> {
-        pixels.chunks_mut(self.row_pixels().max(1))
-    }
-
-    /// Pixels from the upper to the lower edge of a row of tiles.
-    #[must_use]
-    pub fn height(&self, row: u16) -> u16 {
-        self.size.saturating_sub(row.saturating_mul(TILE)).min(TILE)
-    }
-
-    /// Gives every pixel a value, row by row from the upper left: `tile` gets the rays of one tile
-    /// after the other, and writes what becomes of each.
+    /// Fills a picture, tile by tile; see [`Band::fill`].
     pub fn fill<T: Copy>(&self, pixels: &mut [T], mut tile: impl FnMut(&[Ray], &mut [T])) {
-        for (row, pixels) in (0..).zip(self.rows_of(pixels)) {
-            self.fill_row(row, pixels, &mut tile);
-        }
-    }
-
-    /// The same for the pixels of one row of tiles.
-    pub fn fill_row<T: Copy>(
-        &self,
-        row: u16,
-        pixels: &mut [T],
-        mut tile: impl FnMut(&[Ray], &mut [T]),
-    ) {
-        let Some(&any) = pixels.first() else { return };
-        let mut values = [any; TILE_RAYS];
-        let before = usize::from(row) * self.row_pixels();
-        self.each_in(row, |rays, places| {
-            let values = &mut values[..rays.len()];
-            tile(rays, values);
-            for (&place, &value) in places.iter().zip(&*values) {
-                pixels[place - before] = value;
-            }
-        });
+        self.bands(pixels).for_each(|mut band| band.fill(&mut tile));
     }
 
     /// Shows the rays of tile after tile and the places of their pixels.
     pub fn each(&self, mut tile: impl FnMut(&[Ray], &[usize])) {
-        (0..self.rows()).for_each(|row| self.each_in(row, &mut tile));
+        (0..self.size).step_by(TILE.into()).for_each(|row| self.each_in(row, &mut tile));
     }
 
-    /// The same for one row of tiles.
-    fn each_in(&self, row: u16, mut tile: impl FnMut(&[Ray], &[usize])) {
+    /// The same for the tiles from a row of pixels on.
+    fn each_in(&self, top: u16, mut tile: impl FnMut(&[Ray], &[usize])) {
         let Self { camera, size } = *self;
-        let top = row.saturating_mul(TILE);
         let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE_RAYS];
         let mut places = [0; TILE_RAYS];
         for left in (0..size).step_by(TILE.into()) {
             let mut count = 0;
-            for [column, row] in MORTON {
+            for [column, row] in &MORTON {
                 let (column, row) = (left + column, top + row);
                 // Some pixels of a tile at an edge are outside.
                 if column < size && row < size {
@@ -123,9 +98,41 @@ impl Tiles {
         }
     }
 
-    /// Pixels of a row of tiles.
-    const fn row_pixels(&self) -> usize {
+    /// Pixels of a whole band.
+    const fn band_pixels(&self) -> usize {
         self.size as usize * TILE as usize
+    }
+}
+
+impl<T: Copy> Band<'_, T> {
+    /// Pixels from its upper to its lower edge.
+    #[must_use]
+    pub fn height(&self) -> u16 {
+        (self.tiles.size - self.row).min(TILE)
+    }
+
+    /// Fills the band: `tile` gets the rays of one tile after the other and writes what becomes of
+    /// each, over what it wrote for the tile before.
+    pub fn fill(&mut self, mut tile: impl FnMut(&[Ray], &mut [T])) {
+        let Some(&blank) = self.pixels.first() else { return };
+        let mut values = [blank; TILE_RAYS];
+        let above = usize::from(self.row) * usize::from(self.tiles.size);
+        self.tiles.each_in(self.row, |rays, places| {
+            let values = &mut values[..rays.len()];
+            tile(rays, values);
+            for (&place, &value) in places.iter().zip(&*values) {
+                self.pixels[place - above] = value;
+            }
+        });
+    }
+}
+
+/// The closest hits of the rays of a tile, as many as there are rays: together where the grid can.
+pub fn intersect(grid: &Grid<'_>, rays: &[Ray], hits: &mut [Hit]) {
+    debug_assert_eq!(rays.len(), hits.len());
+    let answers = &mut StridedMut::new(&mut *hits);
+    if grid.intersect_n(&Strided::new(rays), answers, Coherence::Coherent).is_err() {
+        hits.fill(Hit::MISS);
     }
 }
 
@@ -137,20 +144,30 @@ mod tests {
     #[test]
     fn every_pixel_has_its_own_ray_once() {
         let camera = Camera::framing(([0.0; 3], [1.0; 3]), View::ThreeQuarter, Up::Y);
-        for size in [1, 7, 8, 20] {
+        for size in [0, 1, 7, 8, 9, 20] {
             let tiles = Tiles { camera, size };
+            let rays = |row| (0..size).map(move |column| camera.ray(column, row, size));
+            let expected: Vec<_> = (0..size).flat_map(rays).collect();
+            let none = Ray::new([0.0; 3], [0.0; 3]);
+
             let mut seen = vec![0; tiles.pixels()];
             tiles.each(|rays, places| {
                 for (ray, &place) in rays.iter().zip(places) {
-                    let at = |place: usize| u16::try_from(place).unwrap();
-                    let (column, row) = (place % usize::from(size), place / usize::from(size));
-                    assert_eq!(*ray, camera.ray(at(column), at(row), size));
+                    assert_eq!(*ray, expected[place]);
                     seen[place] += 1;
                 }
             });
             assert!(seen.iter().all(|&count| count == 1), "{size}");
-            let heights: Vec<_> = (0..tiles.rows()).map(|row| tiles.height(row)).collect();
-            assert_eq!(heights.iter().sum::<u16>(), size);
+
+            let mut filled = vec![none; tiles.pixels()];
+            tiles.fill(&mut filled, |rays, values| values.copy_from_slice(rays));
+            assert_eq!(filled, expected);
+
+            let mut filled = vec![none; tiles.pixels()];
+            let mut bands: Vec<_> = tiles.bands(&mut filled).collect();
+            assert_eq!(bands.iter().map(Band::height).sum::<u16>(), size);
+            bands.iter_mut().rev().for_each(|band| band.fill(|rays, to| to.copy_from_slice(rays)));
+            assert_eq!(filled, expected);
         }
     }
 

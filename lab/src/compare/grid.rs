@@ -7,6 +7,7 @@ use super::input::Input;
 use super::system::{Bytes, Mode, System, Tracer, Use, each};
 use super::workloads::Workload;
 use crate::measure;
+use crate::tiles::{TILE_RAYS, intersect};
 
 /// One method.
 pub(super) struct GridSystem {
@@ -45,18 +46,6 @@ impl System for GridSystem {
     }
 }
 
-/// Rays in a call: a tile.
-const CHUNK: usize = 64;
-
-/// What a batch is told; `None` for rays that come one by one.
-const fn coherence(mode: Mode) -> Option<Coherence> {
-    match mode {
-        Mode::Single => None,
-        Mode::Coherent => Some(Coherence::Coherent),
-        Mode::Incoherent => Some(Coherence::Incoherent),
-    }
-}
-
 struct GridTracer<'a> {
     grid: Grid<'a>,
     config: &'a Config,
@@ -64,23 +53,20 @@ struct GridTracer<'a> {
 
 impl Tracer for GridTracer<'_> {
     fn intersect(&self, mode: Mode, rays: &[Ray], hits: &mut [Hit]) {
-        if let Some(coherence) = coherence(mode) {
-            let answers = &mut StridedMut::new(&mut *hits);
-            if self.grid.intersect_n(&Strided::new(rays), answers, coherence).is_ok() {
-                return;
-            }
+        if mode == Mode::Coherent {
+            return intersect(&self.grid, rays, hits);
         }
         each(rays, hits, |ray| self.grid.intersect(ray).unwrap_or(Hit::MISS));
     }
 
     fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [bool]) {
-        let Some(coherence) = coherence(mode) else {
+        if mode != Mode::Coherent {
             return each(rays, occluded, |ray| self.grid.occluded(ray));
-        };
-        let mut bytes = [0_u8; CHUNK];
-        for (rays, occluded) in rays.chunks(CHUNK).zip(occluded.chunks_mut(CHUNK)) {
+        }
+        let mut bytes = [0_u8; TILE_RAYS];
+        for (rays, occluded) in rays.chunks(TILE_RAYS).zip(occluded.chunks_mut(TILE_RAYS)) {
             let answers = &mut StridedMut::new(&mut bytes[..rays.len()]);
-            match self.grid.occluded_n(&Strided::new(rays), answers, coherence) {
+            match self.grid.occluded_n(&Strided::new(rays), answers, Coherence::Coherent) {
                 Ok(()) => occluded.iter_mut().zip(&bytes).for_each(|(to, &byte)| *to = byte != 0),
                 Err(_) => each(rays, occluded, |ray| self.grid.occluded(ray)),
             }

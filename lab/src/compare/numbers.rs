@@ -56,7 +56,7 @@ pub struct SystemNumbers {
     pub is_peer: bool,
     /// From the mesh to a structure that answers.
     pub build_seconds: f64,
-    /// The builds that the time is the median of, in the order of time.
+    /// The builds that the time is the median of, one for each repetition.
     pub build_samples: Vec<f64>,
     /// Pages that were first touched meanwhile: the median.
     pub build_page_faults: Option<u64>,
@@ -79,7 +79,7 @@ pub struct Run {
     pub mode: Mode,
     /// The median.
     pub seconds: f64,
-    /// What it is the median of, in the order of time.
+    /// What it is the median of, one for each repetition.
     pub samples: Vec<f64>,
     /// Pages that were first touched meanwhile: the median.
     pub page_faults: Option<u64>,

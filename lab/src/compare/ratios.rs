@@ -2,9 +2,9 @@
 //!
 //! Less than one is better in every row. Runs whose answers are off take no part.
 //!
-//! A ratio is the median of those of the single turns: what two systems took within seconds of each
-//! other. A machine that others slow down for a while slows down both, where the medians of all
-//! times may come from different whiles.
+//! Every repetition has a ratio of its own; the median of these is shown. A machine that others slow
+//! down for a while slows down both sides of it, where medians of the times may come from different
+//! whiles.
 
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ pub struct Ratio {
     pub peer: String,
     /// Its number.
     pub peer_value: f64,
-    /// The first divided by the second, turn by turn: the median.
+    /// The first divided by the second in each repetition: the median.
     pub ratio: f64,
     /// The least of these.
     pub least: f64,
@@ -41,8 +41,8 @@ struct Entry<'a> {
     system: &'a SystemNumbers,
     mode: Option<Mode>,
     value: f64,
-    /// What every turn gave.
-    turns: Vec<f64>,
+    /// The numbers of the repetitions; a single one where all have the same.
+    samples: Vec<f64>,
 }
 
 impl Entry<'_> {
@@ -54,7 +54,7 @@ impl Entry<'_> {
     /// Another number of the same system.
     fn with(&self, value: fn(&SystemNumbers) -> f64) -> Self {
         let value = value(self.system);
-        Self { system: self.system, mode: None, value, turns: vec![value] }
+        Self { system: self.system, mode: None, value, samples: vec![value] }
     }
 }
 
@@ -99,18 +99,18 @@ impl Ratio {
     }
 
     fn new(what: &'static str, ours: &Entry<'_>, theirs: &Entry<'_>) -> Option<Self> {
-        let turns = ours.turns.iter().zip(&theirs.turns).map(|(ours, theirs)| ours / theirs);
-        let mut turns: Vec<_> = turns.collect();
-        turns.sort_by(f64::total_cmp);
-        let (&least, &most) = turns.first().zip(turns.last())?;
+        let samples = ours.samples.iter().zip(&theirs.samples);
+        let mut ratios: Vec<_> = samples.map(|(ours, theirs)| ours / theirs).collect();
+        ratios.sort_by(f64::total_cmp);
+        let (&least, &most) = ratios.first().zip(ratios.last())?;
         let (hgrid, peer) = (ours.name(), theirs.name());
-        most.is_finite().then_some(Self {
+        ratios.iter().all(|ratio| ratio.is_finite()).then_some(Self {
             what,
             hgrid,
             value: ours.value,
             peer,
             peer_value: theirs.value,
-            ratio: median(&turns),
+            ratio: median(&ratios),
             least,
             most,
         })
@@ -119,9 +119,9 @@ impl Ratio {
 
 fn time_to_image(system: &SystemNumbers) -> Option<Entry<'_>> {
     let run = system.best(Workload::Primary)?;
-    let turns = system.build_samples.iter().zip(&run.samples).map(|(build, run)| build + run);
+    let samples = system.build_samples.iter().zip(&run.samples).map(|(build, run)| build + run);
     let (mode, value) = (Some(run.mode), system.time_to_image()?);
-    Some(Entry { system, mode, value, turns: turns.collect() })
+    Some(Entry { system, mode, value, samples: samples.collect() })
 }
 
 fn best(system: &SystemNumbers, workload: Workload) -> Option<Entry<'_>> {
@@ -134,7 +134,7 @@ fn single(system: &SystemNumbers, workload: Workload) -> Option<Entry<'_>> {
 }
 
 fn of_run<'a>(system: &'a SystemNumbers, run: &Run) -> Entry<'a> {
-    Entry { system, mode: Some(run.mode), value: run.seconds, turns: run.samples.clone() }
+    Entry { system, mode: Some(run.mode), value: run.seconds, samples: run.samples.clone() }
 }
 
 /// The least value of all systems that have one.
@@ -180,10 +180,11 @@ mod tests {
     }
 
     #[test]
-    fn turns_are_compared_with_each_other() {
-        // A machine that is twice as slow in the second turn, and for the peer alone in the third.
+    fn repetitions_are_compared_with_each_other() {
+        // A machine that is twice as slow in the second one, and three times for the peer in the third.
         let with = |name, is_peer, builds: [f64; 3], renders: [f64; 3]| {
-            let mut system = system(name, is_peer, builds[1], &[(Mode::Single, renders[1], 0)]);
+            let primary = [(Mode::Single, median(&renders), 0)];
+            let mut system = system(name, is_peer, median(&builds), &primary);
             system.build_samples = builds.to_vec();
             system.runs[0].samples = renders.to_vec();
             system
@@ -193,7 +194,8 @@ mod tests {
             with("embree-low", true, [2.0, 4.0, 6.0], [2.0, 4.0, 6.0]),
         ];
         let ratios = Ratio::all(&systems);
-        let Ratio { ratio, least, most, .. } = ratios[0];
+        let Ratio { value, peer_value, ratio, least, most, .. } = ratios[0];
+        assert_eq!([value, peer_value].map(f64::to_bits), [3.0f64, 8.0].map(f64::to_bits));
         let expected = [0.25, 0.75, 0.75];
         assert_eq!([least, ratio, most].map(f64::to_bits), expected.map(f64::to_bits));
     }

@@ -15,7 +15,7 @@ use crate::measure;
 use crate::scene::Bounds;
 use crate::shade::normal_of;
 use crate::tiles::Tiles;
-use crate::vector::{Vector, cross, dot, offset, round, unit};
+use crate::vector::{Vector, cross, dot, length, offset, round, unit};
 
 /// The length of an ambient occlusion ray, as a part of the diagonal of the scene's box.
 pub const AO_REACH: f64 = 0.1;
@@ -53,7 +53,7 @@ impl Workload {
 /// The rays of a scene, and the answers that hgrid gives.
 #[derive(Debug)]
 pub struct Rays {
-    /// The primary rays.
+    /// The picture of the primary rays.
     pub tiles: Tiles,
     /// One from every primary hit.
     pub ao: Vec<Ray>,
@@ -83,7 +83,7 @@ impl Rays {
 
         let (min, max) = bounds;
         let extent = [0, 1, 2].map(|axis| f64::from(max[axis]) - f64::from(min[axis]));
-        let diagonal = dot(extent, extent).sqrt();
+        let diagonal = length(extent);
         let mut primary_hits = vec![Hit::MISS; tiles.pixels()];
         let mut ao = Vec::new();
         tiles.each(|rays, pixels| {
