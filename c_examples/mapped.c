@@ -76,7 +76,7 @@ static mapped_options parse(int count, char **words)
 
 /* --- the grid's file ------------------------------------------------------------------------- */
 
-/* What is to be removed when this process ends, however it ends. */
+/* What is to be removed when this process ends, unless a signal ends it. */
 static const char *stored;
 static pid_t owner;
 

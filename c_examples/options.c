@@ -53,10 +53,10 @@ int parse_count(const char *option, const char *value, int least, int most)
     return (int)number;
 }
 
-static double parse_number(const char *option, const char *value)
+static float parse_number(const char *option, const char *value)
 {
     char *end;
-    const double number = strtod(value, &end);
+    const float number = strtof(value, &end);
     if (!(number > 0) || *end != '\0')
         fail("%s is a number above 0, not `%s`", option, value);
     return number;

@@ -35,9 +35,9 @@ static hgrid_config config_of(const options *o)
 {
     hgrid_config config = METHODS[o->method].config;
     if (o->density > 0)
-        config.density = (float)o->density;
+        config.density = o->density;
     if (o->cell_size > 0)
-        config.cell_size = (float)o->cell_size;
+        config.cell_size = o->cell_size;
     return config;
 }
 

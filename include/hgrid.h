@@ -47,8 +47,8 @@
  *   cc program.c -Iinclude -Ltarget/release -lhgrid -Wl,-rpath,"$PWD/target/release"
  *
  * The linker prefers libhgrid.so, which the program then looks for when it starts: the rpath says
- * where (or LD_LIBRARY_PATH does). With target/release/libhgrid.a instead of -L and -l the program
- * is static. Neither needs any other library or flag.
+ * where (or LD_LIBRARY_PATH does). With target/release/libhgrid.a instead of -L and -l hgrid becomes
+ * a part of the program. Neither needs any other library or flag.
  *
  * Memory
  * ------
@@ -56,8 +56,8 @@
  * start at a multiple of HGRID_ALIGNMENT (64) bytes and overlap nothing else that the call uses.
  * They may hold anything before. The library allocates nothing, keeps nothing, touches nothing
  * outside the regions, and there is nothing to free. Programs that would rather not think of memory
- * link a library with the feature std, define HGRID_STD before they include this file, and have
- * hgrid_create and hgrid_destroy as well.
+ * link a library with the feature std, are compiled with -DHGRID_STD (or define it before anything
+ * includes this file), and have hgrid_create and hgrid_destroy as well.
  *
  * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are enough for every mesh with so many
  * triangles, with the default configuration, and fit into an array declaration; hgrid_sizes knows
@@ -93,8 +93,9 @@
  * Pointers
  * --------
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
- * valid during the call. Regions, blobs, positions and indices point to as many bytes as the sizes
- * next to them say. Each function says which of its pointers may be NULL; any other NULL is answered
+ * valid during the call. What lies in arrays of yours needs no alignment: positions, indices, masks,
+ * rays and hits of a batch, and the bytes that hgrid_peek looks at. Regions, blobs, positions, indices and masks
+ * point to as many bytes as the sizes next to them say. Each function says which of its pointers may be NULL; any other NULL is answered
  * with HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of
  * a batch right after its rays. They are written when a call succeeds and not touched when it
  * fails, except for the report, which is written in both cases, for the size that hgrid_pack wants,
@@ -108,9 +109,10 @@
  *   hgrid_config config = HGRID_CONFIG_INIT;
  *   config.cell_size = 0.5f;
  *
- * A later version may add fields at the end, where 0 means what was before. A larger struct from a
- * program that was compiled with a later header is accepted as long as all that this version does
- * not know is 0. A value that this version does not know is an error, never ignored.
+ * A later version may add fields at the end, where 0 means what was before. A library with the same
+ * SONAME takes the smaller structs of programs that were compiled with an earlier header. A larger
+ * struct from a program that was compiled with a later one is accepted as long as all that this
+ * version does not know is 0. A value that this version does not know is an error, never ignored.
  *
  * Errors
  * ------
@@ -130,7 +132,7 @@
  * Results
  * -------
  * Meshes and hits are in your units; t is in multiples of the ray's direction, whatever its length.
- * There is no epsilon, so the scale of a mesh does not matter. Only IEEE + - * / and square
+ * There is no epsilon, so the scale of a mesh does not matter, from 1e-30 to 1e30. Only IEEE + - * / and square
  * roots are used, in a fixed order: the same input gives the same bits on every machine.
  *
  * Versions
@@ -404,8 +406,10 @@ typedef struct hgrid_config {
     uint32_t flags;
     /**
      * For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores;
-     * each takes scratch of its own. With 0 and 1 nothing is parallel, and what is above
-     * `HGRID_MAX_TASKS` counts as that. The other methods build on the thread that calls.
+     * each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
+     * `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer. With 0 and 1 nothing is parallel,
+     * and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL, not even where
+     * it is not called: `HGRID_ERROR_NULL_ARGUMENT`. The other methods build on the thread that calls.
      */
     uint32_t tasks;
     /**
@@ -455,12 +459,13 @@ typedef struct hgrid_report {
      */
     uint32_t struct_size;
     /**
-     * 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough.
+     * 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough. 1 after
+     * a build, when it is the size of the blob.
      */
     uint32_t is_exact;
     /**
-     * Bytes that the index region needs; after a build, the size of the blob, which for
-     * `HGRID_METHOD_BRICK` may be smaller than the index had to be.
+     * Bytes that the index region needs; after a build, the size of the blob: with
+     * `HGRID_METHOD_BRICK` the same mesh may need a larger index to be built again.
      */
     uint64_t index_bytes;
     /**
@@ -503,7 +508,7 @@ typedef struct hgrid_report {
  * A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
  *
  * The arrays are read where they lie, never copied and never changed, and not one byte behind the
- * last element's own bytes. They need no alignment, so both may be fields of the caller's structs.
+ * last element's own bytes. They need no alignment, so all may be fields of the caller's structs.
  * Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
  * struct itself is only read during the call.
  */
@@ -625,7 +630,8 @@ typedef struct hgrid_hit {
 } hgrid_hit;
 
 /**
- * Work done by queries. A query adds to it, so one struct can sum up a whole picture.
+ * Work done by queries. A query adds to it, so one struct can sum up a whole picture: begin with
+ * `hgrid_counters work = {0, 0, 0}`.
  */
 typedef struct hgrid_counters {
     /**
@@ -908,8 +914,9 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_NULL_ARGUMENT -1
 
 /**
- * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
- * and what is behind the known fields is not zero; or a `reserved` field is not 0. The usual cause
+ * A struct's `struct_size` is smaller than the struct ever was, or above 4096, or larger than the
+ * struct and what is behind the known fields is not zero; or a `reserved` field of a configuration
+ * or an allocator is not 0. The usual cause
  * is a struct that was not initialised with its `_INIT` macro.
  */
 #define HGRID_ERROR_STRUCT_SIZE -2
@@ -1088,7 +1095,7 @@ extern "C" {
  * lie: O(1), nothing is looked at.
  *
  * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
- * as constants, rounded up a little. How much more than enough it is depends on the method:
+ * as constants, rounded up a little; with `tasks` above 1 the scratch is larger. How much more than enough it is depends on the method:
  * a scan takes a sixth of it or less with one level, a thirteenth with brick; with
  * recursive it is generous beyond use.
  *
@@ -1172,7 +1179,8 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  * `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or
  * `HGRID_ERROR_SCRATCH_TOO_SMALL`, and its `scratch_bytes` is what it takes; or what `hgrid_sizes`
  * returns. After an error `fitted` is as it was. `run` and `progress` are not called, and the
- * sizes are those of one task; all three are copied.
+ * sizes are those of one task. `fitted` has `tasks`, `run`, `progress` and `context` of `config`;
+ * before a build with several tasks ask `hgrid_sizes` what these take.
  *
  * Threads: any number of calls at once, as long as each has a scratch, a configuration
  * to write and a report of its own.
@@ -1294,8 +1302,9 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * that triangles share hits at least one of them. A triangle without area, or one that is
  * seen exactly edge-on, is not hit.
  *
- * `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built
- * or opened, or with options that break the rules for structs, nothing is hit.
+ * `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
+ * or with options that break the rules for structs, nothing is hit. A view that nobody initialised,
+ * and one whose blob or mesh is gone, is undefined behaviour.
  *
  * A query allocates nothing, needs at most 6 KiB of stack, as all queries of one ray or point do,
  * and always ends: on one level after no more steps than the three resolutions sum up to.
@@ -1316,8 +1325,8 @@ bool hgrid_intersect(const struct hgrid_grid *grid,
  * This is the query for shadows and visibility. It stops at the first triangle it finds in the
  * ray's range, which need not be the closest.
  *
- * `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built
- * or opened, or with options that break the rules for structs, the answer is false.
+ * `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
+ * or with options that break the rules for structs, the answer is false.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -1338,17 +1347,19 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
  * Options as with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what
  * it accepts is written and counted.
  *
+ * What is left of a light behind panes, each of which lets a share of it through:
+ *
  * ```c
- * static double thickness_along(const hgrid_grid *grid, const hgrid_ray *ray)
+ * static float light_behind(const hgrid_grid *grid, const hgrid_ray *ray, const float *share)
  * {
- *     hgrid_hit hits[64];
+ *     hgrid_hit panes[64];
  *     size_t count;
- *     double inside = 0;
- *     if (hgrid_intersect_all(grid, ray, NULL, hits, 64, &count) != HGRID_OK)
- *         return -1;
- *     for (size_t i = 0; i + 1 < count && i + 1 < 64; i += 2)
- *         inside += hits[i + 1].t - hits[i].t;
- *     return inside;
+ *     float light = 1;
+ *     if (hgrid_intersect_all(grid, ray, NULL, panes, 64, &count) != HGRID_OK || count > 64)
+ *         return 0;
+ *     for (size_t i = 0; i < count; i++)
+ *         light *= share[panes[i].primitive];
+ *     return light;
  * }
  * ```
  *
@@ -1538,7 +1549,8 @@ hgrid_status hgrid_open(const void *blob,
 /**
  * Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
  *
- * The bytes may lie at any address. `info` may not be NULL, `blob` only if `blob_bytes` is 0.
+ * The bytes may lie at any address. `info` may not be NULL; `blob` may be NULL if
+ * `blob_bytes` is 0.
  * Returns `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was:
  * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`,
  * `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,

@@ -75,9 +75,9 @@ using ray = ::hgrid_ray;
 using hit = ::hgrid_hit;
 /// The nearest point of a mesh. See `hgrid_closest`.
 using closest = ::hgrid_closest;
-/// Work done by queries. See `hgrid_counters`.
+/// Work done by queries. See `hgrid_counters`: it begins as `{}`.
 using counters = ::hgrid_counters;
-/// What a build found out. See `hgrid_report`.
+/// What a build found out. See `hgrid_report`: it begins as `HGRID_REPORT_INIT`.
 using report = ::hgrid_report;
 /// What a look at a whole grid found out. See `hgrid_statistics`.
 using statistics = ::hgrid_statistics;
@@ -497,12 +497,14 @@ public:
     /// A mesh that was described in C.
     explicit mesh(const ::hgrid_mesh &raw) noexcept : raw_(raw) {}
 
-    /// Adds a visibility mask for each triangle, as many as there are triangles.
+    /// Adds a visibility mask for each triangle. A build of a mesh that has not as many masks as
+    /// triangles answers `invalid_masks`.
     mesh &masks(strided<const std::uint32_t> masks) noexcept
     {
-        assert(masks.size() == raw_.triangle_count);
-        raw_.masks = masks.first();
-        raw_.mask_stride = masks.stride();
+        const bool is_one_each = masks.size() == raw_.triangle_count;
+        raw_.masks = is_one_each ? masks.first() : &invalid_id;
+        // No masks lie closer to each other than their four bytes: that is what is refused.
+        raw_.mask_stride = is_one_each ? masks.stride() : 1;
         return *this;
     }
 
@@ -995,18 +997,18 @@ public:
 
     /// Builds, in memory that `operator new` gives.
     ///
-    /// The grid keeps exactly the bytes it takes; the scratch is freed. Errors are those of
+    /// The grid keeps the bytes it takes, or all if it cannot get a copy; the scratch is freed. Errors are those of
     /// `hgrid_build`, and `out_of_memory`. `details` says which triangle is to blame.
     static result<grid> build(const mesh &of, const config &how = {},
                               report *details = nullptr) noexcept;
 
-    /// Opens a blob that was built for this mesh, and takes over its memory.
+    /// Opens a blob that was built for this mesh, and takes over its memory; if that fails it is freed.
     static result<grid> adopt(memory blob, const mesh &of) noexcept
     {
         const auto opened = view::open(blob, of);
         return opened ? result<grid>(grid(*opened, std::move(blob))) : opened.error();
     }
-    /// Opens a blob that brings its mesh, and takes over its memory.
+    /// Opens a blob that brings its mesh, and takes over its memory; if that fails it is freed.
     static result<grid> adopt(memory blob) noexcept
     {
         const auto opened = view::open(blob);

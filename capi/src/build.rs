@@ -12,7 +12,7 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 /// lie: O(1), nothing is looked at.
 ///
 /// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
-/// as constants, rounded up a little. How much more than enough it is depends on the method:
+/// as constants, rounded up a little; with `tasks` above 1 the scratch is larger. How much more than enough it is depends on the method:
 /// a scan takes a sixth of it or less with one level, a thirteenth with brick; with
 /// recursive it is generous beyond use.
 ///
@@ -120,7 +120,8 @@ pub unsafe extern "C" fn hgrid_sizes(
 /// `HGRID_ERROR_INDEX_TOO_SMALL`, and its `index_bytes` is what the coarsest grid takes; or
 /// `HGRID_ERROR_SCRATCH_TOO_SMALL`, and its `scratch_bytes` is what it takes; or what `hgrid_sizes`
 /// returns. After an error `fitted` is as it was. `run` and `progress` are not called, and the
-/// sizes are those of one task; all three are copied.
+/// sizes are those of one task. `fitted` has `tasks`, `run`, `progress` and `context` of `config`;
+/// before a build with several tasks ask `hgrid_sizes` what these take.
 ///
 /// Threads: any number of calls at once, as long as each has a scratch, a configuration
 /// to write and a report of its own.

@@ -17,8 +17,9 @@ use crate::types::hgrid_grid;
 /// that triangles share hits at least one of them. A triangle without area, or one that is
 /// seen exactly edge-on, is not hit.
 ///
-/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built
-/// or opened, or with options that break the rules for structs, nothing is hit.
+/// `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
+/// or with options that break the rules for structs, nothing is hit. A view that nobody initialised,
+/// and one whose blob or mesh is gone, is undefined behaviour.
 ///
 /// A query allocates nothing, needs at most 6 KiB of stack, as all queries of one ray or point do,
 /// and always ends: on one level after no more steps than the three resolutions sum up to.
@@ -53,8 +54,8 @@ pub unsafe extern "C" fn hgrid_intersect(
 /// This is the query for shadows and visibility. It stops at the first triangle it finds in the
 /// ray's range, which need not be the closest.
 ///
-/// `options` may be NULL: the defaults. With another NULL, with a view of zeros, or one never built
-/// or opened, or with options that break the rules for structs, the answer is false.
+/// `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
+/// or with options that break the rules for structs, the answer is false.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///
@@ -82,17 +83,19 @@ pub unsafe extern "C" fn hgrid_occluded(
 /// Options as with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what
 /// it accepts is written and counted.
 ///
+/// What is left of a light behind panes, each of which lets a share of it through:
+///
 /// ```c
-/// static double thickness_along(const hgrid_grid *grid, const hgrid_ray *ray)
+/// static float light_behind(const hgrid_grid *grid, const hgrid_ray *ray, const float *share)
 /// {
-///     hgrid_hit hits[64];
+///     hgrid_hit panes[64];
 ///     size_t count;
-///     double inside = 0;
-///     if (hgrid_intersect_all(grid, ray, NULL, hits, 64, &count) != HGRID_OK)
-///         return -1;
-///     for (size_t i = 0; i + 1 < count && i + 1 < 64; i += 2)
-///         inside += hits[i + 1].t - hits[i].t;
-///     return inside;
+///     float light = 1;
+///     if (hgrid_intersect_all(grid, ray, NULL, panes, 64, &count) != HGRID_OK || count > 64)
+///         return 0;
+///     for (size_t i = 0; i < count; i++)
+///         light *= share[panes[i].primitive];
+///     return light;
 /// }
 /// ```
 ///

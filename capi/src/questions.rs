@@ -59,7 +59,8 @@ pub struct hgrid_hit {
     pub primitive: u32,
 }
 
-/// Work done by queries. A query adds to it, so one struct can sum up a whole picture.
+/// Work done by queries. A query adds to it, so one struct can sum up a whole picture: begin with
+/// `hgrid_counters work = {0, 0, 0}`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_counters {

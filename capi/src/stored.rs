@@ -60,7 +60,8 @@ pub unsafe extern "C" fn hgrid_open(
 
 /// Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
 ///
-/// The bytes may lie at any address. `info` may not be NULL, `blob` only if `blob_bytes` is 0.
+/// The bytes may lie at any address. `info` may not be NULL; `blob` may be NULL if
+/// `blob_bytes` is 0.
 /// Returns `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was:
 /// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`,
 /// `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,

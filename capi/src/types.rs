@@ -114,7 +114,7 @@ const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
 /// A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
 ///
 /// The arrays are read where they lie, never copied and never changed, and not one byte behind the
-/// last element's own bytes. They need no alignment, so both may be fields of the caller's structs.
+/// last element's own bytes. They need no alignment, so all may be fields of the caller's structs.
 /// Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
 /// struct itself is only read during the call.
 #[repr(C)]
@@ -175,8 +175,10 @@ pub struct hgrid_config {
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
     /// For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores;
-    /// each takes scratch of its own. With 0 and 1 nothing is parallel, and what is above
-    /// `HGRID_MAX_TASKS` counts as that. The other methods build on the thread that calls.
+    /// each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
+    /// `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer. With 0 and 1 nothing is parallel,
+    /// and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL, not even where
+    /// it is not called: `HGRID_ERROR_NULL_ARGUMENT`. The other methods build on the thread that calls.
     pub tasks: u32,
     /// 0.
     pub reserved: u32,
@@ -229,10 +231,11 @@ pub type hgrid_task = unsafe extern "C" fn(task_context: *mut c_void, index: u32
 pub struct hgrid_report {
     /// `sizeof(hgrid_report)`.
     pub struct_size: u32,
-    /// 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough.
+    /// 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough. 1 after
+    /// a build, when it is the size of the blob.
     pub is_exact: u32,
-    /// Bytes that the index region needs; after a build, the size of the blob, which for
-    /// `HGRID_METHOD_BRICK` may be smaller than the index had to be.
+    /// Bytes that the index region needs; after a build, the size of the blob: with
+    /// `HGRID_METHOD_BRICK` the same mesh may need a larger index to be built again.
     pub index_bytes: u64,
     /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_BRICK` it
     /// is enough, but not exact, and after a build an upper bound of that. After a build with

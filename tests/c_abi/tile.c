@@ -35,7 +35,8 @@ int main(void)
             return 3;
     if (count_lit(&grid, rays, 100) != 100 - 36)
         return 4;
-    if (thickness_along(&grid, &rays[0]) != 2 || thickness_along(&grid, &rays[63]) != 0)
+    const float half[] = {0.5f, 0.5f};
+    if (light_behind(&grid, &rays[0], half) != 0.25f || light_behind(&grid, &rays[63], half) != 1)
         return 7;
     const unsigned char none[] = {0, 0}, first[] = {1, 0}, both[] = {1, 1};
     if (light_along(&grid, &rays[0], none) != 0 || light_along(&grid, &rays[0], first) != 0 ||

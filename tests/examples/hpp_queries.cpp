@@ -71,6 +71,11 @@ static void check_options()
     const auto material = [&](const std::optional<hgrid::hit> &hit) {
         return hit ? s.faces[hit->primitive].material : -1;
     };
+    for (masks.pop_back();; masks.clear()) {
+        CHECK(hgrid::grid::build(s.mesh().masks(masks)).error() == hgrid::status::invalid_masks);
+        if (masks.empty())
+            break;
+    }
     CHECK(material(grid->intersect(down(), hgrid::options())) == 4);
     CHECK(material(grid->intersect(down(), hgrid::options().mask(0x6))) == 2);
     CHECK(material(grid->intersect(down(), hgrid::options().mask(0x40))) == -1);

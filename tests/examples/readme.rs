@@ -33,7 +33,7 @@ fn its_c_program_prints_the_hit() {
     let ["cargo build --release -p hgrid-capi", compile, start, _] = commands[..] else {
         panic!("{commands:?}")
     };
-    assert_eq!(compile, "cc prog.c -Iinclude -Ltarget/release -lhgrid");
+    assert_eq!([compile, start], ["cc prog.c -Iinclude target/release/libhgrid.a", "./a.out"]);
 
     let dir = TempDir::new().expect("a folder");
     fs::write(dir.path().join("prog.c"), program).expect("a file");
