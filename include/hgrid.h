@@ -47,8 +47,8 @@
  *   cc program.c -Iinclude -Ltarget/release -lhgrid -Wl,-rpath,"$PWD/target/release"
  *
  * The linker prefers libhgrid.so, which the program then looks for when it starts: the rpath says
- * where (or LD_LIBRARY_PATH does). With target/release/libhgrid.a instead of -L and -l hgrid becomes
- * a part of the program. Neither needs any other library or flag.
+ * where (or LD_LIBRARY_PATH does). In place of -L and -l, name target/release/libhgrid.a: then hgrid
+ * becomes part of the program. Neither needs any other library or linker flag.
  *
  * Memory
  * ------
@@ -77,7 +77,7 @@
  * same, hit for hit and bit for bit.
  *
  *   HGRID_METHOD_BRICK       the default: cells as large as triangles, a bit for each: the shortest
- *                            build, and little memory whatever the scene
+ *                            build of scans, and little memory whatever the scene
  *   HGRID_METHOD_ONE_LEVEL   one hashed grid; the least memory for large scans, and for arrays of a
  *                            fixed size
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
@@ -93,8 +93,8 @@
  * Pointers
  * --------
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
- * valid during the call. What lies in arrays of yours needs no alignment: positions, indices, masks,
- * rays and hits of a batch, and the bytes that hgrid_peek looks at. Regions, blobs, positions, indices and masks
+ * valid during the call. Positions, indices and masks, the rays and answers of hgrid_intersect_n and
+ * hgrid_occluded_n, and the bytes that hgrid_peek looks at need no alignment; all else does. Regions, blobs, positions, indices and masks
  * point to as many bytes as the sizes next to them say. Each function says which of its pointers may be NULL; any other NULL is answered
  * with HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of
  * a batch right after its rays. They are written when a call succeeds and not touched when it
@@ -109,10 +109,9 @@
  *   hgrid_config config = HGRID_CONFIG_INIT;
  *   config.cell_size = 0.5f;
  *
- * A later version may add fields at the end, where 0 means what was before. A library with the same
- * SONAME takes the smaller structs of programs that were compiled with an earlier header. A larger
- * struct from a program that was compiled with a later one is accepted as long as all that this
- * version does not know is 0. A value that this version does not know is an error, never ignored.
+ * Structs do not change within 0.1.x. A later version may add fields at the end, where 0 means what
+ * was before. A larger struct from a program that was compiled with a later header is accepted as
+ * long as all that this version does not know is 0. A value that this version does not know is an error, never ignored.
  *
  * Errors
  * ------
@@ -280,7 +279,7 @@
  *
  * Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
  * detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
- * It is the default: the shortest build, the first image, tiles of rays through
+ * It is the default: the shortest build of scans, the first image, tiles of rays through
  * `hgrid_intersect_n`, and scenes of which nobody knows what is in them. `cell_size`
  * belongs to it, `density` does not.
  *
@@ -407,9 +406,10 @@ typedef struct hgrid_config {
     /**
      * For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores;
      * each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
-     * `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer. With 0 and 1 nothing is parallel,
-     * and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL, not even where
-     * it is not called: `HGRID_ERROR_NULL_ARGUMENT`. The other methods build on the thread that calls.
+     * `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer, down to one. With 0 and 1 nothing
+     * is parallel, and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL,
+     * not even for `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the
+     * thread that calls, and look at neither.
      */
     uint32_t tasks;
     /**
@@ -425,8 +425,8 @@ typedef struct hgrid_config {
      * threads, and returns when all these calls have returned: after a join, or after any other
      * synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
      * library calls it several times, one after the other, on the thread that builds, with counts
-     * up to `tasks`; where the processor has no atomic operations, it never does. NULL only with
-     * `tasks` 0 or 1. `hgrid_build` has an example.
+     * up to `tasks`; where the processor has no atomic operations, it never does. May be
+     * NULL with `tasks` 0 or 1, and with other methods. `hgrid_build` has an example.
      *
      * A task that is called twice, even at the same time, one that is never called, and an index
      * that is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`.
@@ -459,8 +459,8 @@ typedef struct hgrid_report {
      */
     uint32_t struct_size;
     /**
-     * 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough. 1 after
-     * a build, when it is the size of the blob.
+     * 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough. After a
+     * build it is 1, and `index_bytes` is the size of the blob.
      */
     uint32_t is_exact;
     /**
@@ -914,7 +914,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_NULL_ARGUMENT -1
 
 /**
- * A struct's `struct_size` is smaller than the struct ever was, or above 4096, or larger than the
+ * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the
  * struct and what is behind the known fields is not zero; or a `reserved` field of a configuration
  * or an allocator is not 0. The usual cause
  * is a struct that was not initialised with its `_INIT` macro.
@@ -1095,9 +1095,9 @@ extern "C" {
  * lie: O(1), nothing is looked at.
  *
  * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
- * as constants, rounded up a little; with `tasks` above 1 the scratch is larger. How much more than enough it is depends on the method:
- * a scan takes a sixth of it or less with one level, a thirteenth with brick; with
- * recursive it is generous beyond use.
+ * as constants, rounded up a little; with brick and `tasks` above 1 the scratch is larger. How much
+ * more than enough it is depends on the method: a scan takes a sixth of it or less with one level, a
+ * thirteenth with brick; with recursive it is generous beyond use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
  * has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -1347,7 +1347,8 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
  * Options as with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what
  * it accepts is written and counted.
  *
- * What is left of a light behind panes, each of which lets a share of it through:
+ * What is left of a light at the end of a ray (`t_max`), behind panes of one triangle each. More than
+ * 64 count as a wall. (Where two share an edge, a ray through it meets both.)
  *
  * ```c
  * static float light_behind(const hgrid_grid *grid, const hgrid_ray *ray, const float *share)

@@ -497,8 +497,8 @@ public:
     /// A mesh that was described in C.
     explicit mesh(const ::hgrid_mesh &raw) noexcept : raw_(raw) {}
 
-    /// Adds a visibility mask for each triangle. A build of a mesh that has not as many masks as
-    /// triangles answers `invalid_masks`.
+    /// Adds a visibility mask for each triangle. If there are not as many masks as triangles, every call
+    /// with this mesh answers `invalid_masks` (one without triangles ignores them).
     mesh &masks(strided<const std::uint32_t> masks) noexcept
     {
         const bool is_one_each = masks.size() == raw_.triangle_count;
@@ -997,7 +997,8 @@ public:
 
     /// Builds, in memory that `operator new` gives.
     ///
-    /// The grid keeps the bytes it takes, or all if it cannot get a copy; the scratch is freed. Errors are those of
+    /// The grid keeps a copy of just the bytes it takes, or, without memory for one, the whole region
+    /// it was built in; the scratch is freed. Errors are those of
     /// `hgrid_build`, and `out_of_memory`. `details` says which triangle is to blame.
     static result<grid> build(const mesh &of, const config &how = {},
                               report *details = nullptr) noexcept;

@@ -12,9 +12,9 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 /// lie: O(1), nothing is looked at.
 ///
 /// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
-/// as constants, rounded up a little; with `tasks` above 1 the scratch is larger. How much more than enough it is depends on the method:
-/// a scan takes a sixth of it or less with one level, a thirteenth with brick; with
-/// recursive it is generous beyond use.
+/// as constants, rounded up a little; with brick and `tasks` above 1 the scratch is larger. How much
+/// more than enough it is depends on the method: a scan takes a sixth of it or less with one level, a
+/// thirteenth with brick; with recursive it is generous beyond use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
 /// has `index_bytes` and `scratch_bytes`; or what is wrong:

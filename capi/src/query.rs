@@ -83,7 +83,8 @@ pub unsafe extern "C" fn hgrid_occluded(
 /// Options as with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what
 /// it accepts is written and counted.
 ///
-/// What is left of a light behind panes, each of which lets a share of it through:
+/// What is left of a light at the end of a ray (`t_max`), behind panes of one triangle each. More than
+/// 64 count as a wall. (Where two share an edge, a ray through it meets both.)
 ///
 /// ```c
 /// static float light_behind(const hgrid_grid *grid, const hgrid_ray *ray, const float *share)

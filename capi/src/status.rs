@@ -16,7 +16,7 @@ pub const HGRID_OK: hgrid_status = 0;
 /// A pointer is NULL that may not be.
 pub const HGRID_ERROR_NULL_ARGUMENT: hgrid_status = -1;
 
-/// A struct's `struct_size` is smaller than the struct ever was, or above 4096, or larger than the
+/// A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the
 /// struct and what is behind the known fields is not zero; or a `reserved` field of a configuration
 /// or an allocator is not 0. The usual cause
 /// is a struct that was not initialised with its `_INIT` macro.
@@ -194,7 +194,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
             c"a coordinate is not finite: repair the report's triangle, or build without \
               HGRID_BUILD_STRICT to leave it out"
         }
-        HGRID_ERROR_INVALID_MASKS => c"invalid masks: check mask_stride (0, or 4 and more)",
+        HGRID_ERROR_INVALID_MASKS => c"invalid masks: one for each triangle, and mask_stride 0, or 4 and more",
         HGRID_ERROR_INVALID_METHOD => c"unknown method: use one of HGRID_METHOD_...",
         HGRID_ERROR_INVALID_DENSITY => {
             c"invalid density: above 0, and lower if the grid would become too fine or too large"

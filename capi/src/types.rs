@@ -80,7 +80,7 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 ///
 /// Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
 /// detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
-/// It is the default: the shortest build, the first image, tiles of rays through
+/// It is the default: the shortest build of scans, the first image, tiles of rays through
 /// `hgrid_intersect_n`, and scenes of which nobody knows what is in them. `cell_size`
 /// belongs to it, `density` does not.
 ///
@@ -176,9 +176,10 @@ pub struct hgrid_config {
     pub flags: u32,
     /// For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores;
     /// each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
-    /// `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer. With 0 and 1 nothing is parallel,
-    /// and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL, not even where
-    /// it is not called: `HGRID_ERROR_NULL_ARGUMENT`. The other methods build on the thread that calls.
+    /// `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer, down to one. With 0 and 1 nothing
+    /// is parallel, and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL,
+    /// not even for `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the
+    /// thread that calls, and look at neither.
     pub tasks: u32,
     /// 0.
     pub reserved: u32,
@@ -188,8 +189,8 @@ pub struct hgrid_config {
     /// threads, and returns when all these calls have returned: after a join, or after any other
     /// synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
     /// library calls it several times, one after the other, on the thread that builds, with counts
-    /// up to `tasks`; where the processor has no atomic operations, it never does. NULL only with
-    /// `tasks` 0 or 1. `hgrid_build` has an example.
+    /// up to `tasks`; where the processor has no atomic operations, it never does. May be
+    /// NULL with `tasks` 0 or 1, and with other methods. `hgrid_build` has an example.
     ///
     /// A task that is called twice, even at the same time, one that is never called, and an index
     /// that is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`.
@@ -231,8 +232,8 @@ pub type hgrid_task = unsafe extern "C" fn(task_context: *mut c_void, index: u32
 pub struct hgrid_report {
     /// `sizeof(hgrid_report)`.
     pub struct_size: u32,
-    /// 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough. 1 after
-    /// a build, when it is the size of the blob.
+    /// 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough. After a
+    /// build it is 1, and `index_bytes` is the size of the blob.
     pub is_exact: u32,
     /// Bytes that the index region needs; after a build, the size of the blob: with
     /// `HGRID_METHOD_BRICK` the same mesh may need a larger index to be built again.
