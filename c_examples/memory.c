@@ -8,12 +8,13 @@
 
 void fail(const char *format, ...)
 {
+    /* Written in one piece: other processes may write to the same terminal. */
+    static char message[8192];
     va_list arguments;
     va_start(arguments, format);
-    fprintf(stderr, "%s: ", program_name);
-    vfprintf(stderr, format, arguments);
-    fputc('\n', stderr);
+    vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
+    fprintf(stderr, "%s: %s\n", program_name, message);
     exit(1);
 }
 
