@@ -93,13 +93,14 @@
  * Pointers
  * --------
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
- * valid during the call. Positions, indices and masks, the rays and answers of hgrid_intersect_n and
- * hgrid_occluded_n, and the bytes that hgrid_peek looks at need no alignment; all else does. Regions, blobs, positions, indices and masks
- * point to as many bytes as the sizes next to them say. Each function says which of its pointers may be NULL; any other NULL is answered
- * with HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of
- * a batch right after its rays. They are written when a call succeeds and not touched when it
- * fails, except for the report, which is written in both cases, for the size that hgrid_pack wants,
- * and for an index in the cases that hgrid_build names.
+ * valid during the call. Positions, indices and masks, the rays and answers of hgrid_intersect_n
+ * and hgrid_occluded_n, and the bytes that hgrid_peek looks at need no alignment; all else does.
+ * Regions, blobs, positions, indices and masks point to as many bytes as the sizes next to them
+ * say. Each function says which of its pointers may be NULL; any other NULL is answered with
+ * HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of a
+ * batch right after its rays. They are written when a call succeeds and not touched when it fails,
+ * except for the report, which is written in both cases, for the size that hgrid_pack wants, and
+ * for an index in the cases that hgrid_build names.
  *
  * Structs
  * -------
@@ -111,7 +112,8 @@
  *
  * Structs do not change within 0.1.x. A later version may add fields at the end, where 0 means what
  * was before. A larger struct from a program that was compiled with a later header is accepted as
- * long as all that this version does not know is 0. A value that this version does not know is an error, never ignored.
+ * long as all that this version does not know is 0. A value that this version does not know is an
+ * error, never ignored.
  *
  * Errors
  * ------
@@ -131,8 +133,9 @@
  * Results
  * -------
  * Meshes and hits are in your units; t is in multiples of the ray's direction, whatever its length.
- * There is no epsilon, so the scale of a mesh does not matter, from 1e-30 to 1e30. Only IEEE + - * / and square
- * roots are used, in a fixed order: the same input gives the same bits on every machine.
+ * There is no epsilon, so the scale of a mesh does not matter, from 1e-30 to 1e30. Only IEEE
+ * + - * / and square roots are used, in a fixed order: the same input gives the same bits on every
+ * machine.
  *
  * Versions
  * --------
@@ -914,10 +917,9 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_NULL_ARGUMENT -1
 
 /**
- * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the
- * struct and what is behind the known fields is not zero; or a `reserved` field of a configuration
- * or an allocator is not 0. The usual cause
- * is a struct that was not initialised with its `_INIT` macro.
+ * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
+ * and what is behind the known fields is not zero; or a `reserved` field of a configuration or an
+ * allocator is not 0. The usual cause is a struct that was not initialised with its `_INIT` macro.
  */
 #define HGRID_ERROR_STRUCT_SIZE -2
 

@@ -132,6 +132,12 @@ impl Measurement {
         self.titled(self.density)
     }
 
+    /// Whether the time is that of tiles whose rays were traced together; the work never is.
+    #[must_use]
+    pub fn is_in_tiles(&self) -> bool {
+        self.method == Method::Brick.name()
+    }
+
     fn titled(&self, density: Option<f32>) -> String {
         match (density, self.cell_size) {
             (Some(density), _) => format!("{}, density {density}", self.method),

@@ -7,7 +7,6 @@
 use core::fmt;
 
 use comfy_table::{Table, presets};
-use hgrid_core::Method;
 use indicatif::HumanCount;
 use serde::Serialize;
 
@@ -38,7 +37,7 @@ impl fmt::Display for Report {
             0 | 1 => String::new(),
             count => format!(" (median of {count})"),
         };
-        let tiles = if m.method == Method::Brick.name() { ", in tiles of 8 x 8" } else { "" };
+        let tiles = if m.is_in_tiles() { ", in tiles of 8 x 8" } else { "" };
         let references = m.references.map(|count| HumanCount(count.into()).to_string());
         let (index, peak) = (HumanCount(m.index_bytes as u64), HumanCount(m.peak_bytes as u64));
         let peak_per_triangle = ratio(m.peak_bytes as u64, scene.triangles as u64);

@@ -7,7 +7,7 @@ use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Result, ensure};
 use comfy_table::{CellAlignment, Table, presets};
-use hgrid_core::{Config, Counters, Method, TriangleMesh};
+use hgrid_core::{Config, Counters, TriangleMesh};
 use serde::Serialize;
 
 use crate::cli::{Race, TableArgs};
@@ -150,7 +150,7 @@ impl Results {
                 .to_owned(),
         ];
         let mut methods = self.scenes.iter().flat_map(|scene| &scene.methods);
-        if methods.any(|measurement| measurement.method == Method::Brick.name()) {
+        if methods.any(Measurement::is_in_tiles) {
             notes.push(format!("Brick grids {IN_TILES}."));
         }
         if self.threads > 1 {

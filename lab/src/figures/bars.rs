@@ -1,6 +1,5 @@
 //! Figure 2: what every method takes on every scene, as bars: memory, build, render, time to image.
 
-use hgrid_core::Method;
 use plotters::coord::ranged1d::Ranged as _;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -96,8 +95,8 @@ impl Drawing for Figure<'_> {
             0 | 1 => String::new(),
             threads => format!("; brick grids built by {threads} threads"),
         };
-        let is_brick = |m: &Measurement| m.method == Method::Brick.name();
-        let tiles = if methods.iter().any(is_brick) { "; brick traces tiles" } else { "" };
+        let tiles =
+            if methods.iter().any(Measurement::is_in_tiles) { "; brick traces tiles" } else { "" };
         let source = format!("{}; {}{tiles}{built}", machine.summary(), times(*repeats));
         heading(area, pen, [&title, &source], &legend)?;
 
