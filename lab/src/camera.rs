@@ -212,13 +212,33 @@ impl Camera {
     #[inline]
     #[must_use]
     pub fn ray(&self, column: u16, row: u16, size: u16) -> Ray {
-        let step = HALF_VIEW_TANGENT / f32::from(size);
-        let x = (2.0 * f32::from(column) + 1.0 - f32::from(size)) * step;
-        let y = (f32::from(size) - 2.0 * f32::from(row) - 1.0) * step;
-        let direction =
-            [0, 1, 2].map(|axis| self.forward[axis] + x * self.right[axis] + y * self.up[axis]);
-        Ray::new(self.eye, direction)
+        self.ray_at(self.across(column, size), self.down(row, size))
     }
+
+    /// What the rays of a column of pixels have in common.
+    #[inline]
+    pub(crate) fn across(&self, column: u16, size: u16) -> [f32; 3] {
+        let x = (2.0 * f32::from(column) + 1.0 - f32::from(size)) * pixel(size);
+        [0, 1, 2].map(|axis| self.forward[axis] + x * self.right[axis])
+    }
+
+    /// What the rays of a row of pixels have in common.
+    #[inline]
+    pub(crate) fn down(&self, row: u16, size: u16) -> [f32; 3] {
+        let y = (f32::from(size) - 2.0 * f32::from(row) - 1.0) * pixel(size);
+        self.up.map(|c| y * c)
+    }
+
+    /// The ray of a column and a row.
+    #[inline]
+    pub(crate) fn ray_at(&self, across: [f32; 3], down: [f32; 3]) -> Ray {
+        Ray::new(self.eye, [0, 1, 2].map(|axis| across[axis] + down[axis]))
+    }
+}
+
+/// Half of a pixel's size on the plane at distance 1 from the eye.
+fn pixel(size: u16) -> f32 {
+    HALF_VIEW_TANGENT / f32::from(size)
 }
 
 /// A right-handed frame of unit vectors.

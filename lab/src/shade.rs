@@ -89,15 +89,25 @@ impl<'a> Shader<'a> {
         debug_assert!(rays.len() == hits.len() && hits.len() == colors.len());
         let groups = rays.chunks(GROUP).zip(hits.chunks(GROUP)).zip(colors.chunks_mut(GROUP));
         for ((rays, hits), colors) in groups {
-            let seen = Seen::by(&self.mesh, rays, hits);
-            let normals = seen.normals(self.axes[2]);
+            let mut directions = [[0.0; GROUP]; 3];
+            for (lane, ray) in (0..GROUP).zip(rays) {
+                put(&mut directions, lane, ray.direction);
+            }
             let mut light = [[0.0; GROUP]; 3];
             for lane in 0..GROUP {
-                let (direction, normal) = (at(&seen.directions, lane), at(&normals, lane));
-                let is_away = dot(normal, direction) > 0.0;
-                let lit = surface(normal.map(|c| if is_away { -c } else { c }));
-                let sky = self.background(direction);
-                put(&mut light, lane, if seen.is_hit[lane] { lit } else { sky });
+                put(&mut light, lane, self.background(at(&directions, lane)));
+            }
+            // Many groups see nothing else.
+            if hits.iter().any(|hit| hit.primitive != INVALID_ID) {
+                let seen = Seen::by(&self.mesh, hits);
+                let normals = seen.normals(self.axes[2]);
+                for lane in 0..GROUP {
+                    let (direction, normal) = (at(&directions, lane), at(&normals, lane));
+                    let is_away = dot(normal, direction) > 0.0;
+                    let lit = surface(normal.map(|c| if is_away { -c } else { c }));
+                    let sky = at(&light, lane);
+                    put(&mut light, lane, if seen.is_hit[lane] { lit } else { sky });
+                }
             }
             display(&light, colors);
         }
@@ -112,23 +122,17 @@ impl<'a> Shader<'a> {
     }
 }
 
-/// What the rays of a group see.
+/// The triangles that the rays of a group see.
 struct Seen {
-    /// The corners of triangles; 0 for a miss.
+    /// Their corners; 0 for a miss.
     corners: [[Lanes<f32>; 3]; 3],
-    directions: [Lanes<f32>; 3],
     is_hit: Lanes<bool>,
 }
 
 impl Seen {
-    fn by(mesh: &TriangleMesh<'_>, rays: &[Ray], hits: &[Hit]) -> Self {
-        let mut seen = Self {
-            corners: [[[0.0; GROUP]; 3]; 3],
-            directions: [[0.0; GROUP]; 3],
-            is_hit: [false; GROUP],
-        };
-        for (lane, (ray, hit)) in (0..GROUP).zip(rays.iter().zip(hits)) {
-            put(&mut seen.directions, lane, ray.direction);
+    fn by(mesh: &TriangleMesh<'_>, hits: &[Hit]) -> Self {
+        let mut seen = Self { corners: [[[0.0; GROUP]; 3]; 3], is_hit: [false; GROUP] };
+        for (lane, hit) in (0..GROUP).zip(hits) {
             if hit.primitive == INVALID_ID {
                 continue;
             }
@@ -244,9 +248,8 @@ mod tests {
             let positions = corners.map(|corner| corner.map(|c| c * scale));
             let indices = [[0, 1, 2], [0, 1, 1]];
             let mesh = TriangleMesh::new(&positions, &indices).unwrap();
-            let rays = [Ray::new([0.0; 3], [0.0, 0.0, 1.0]); 2];
             let hits = [0, 1].map(|primitive| Hit { primitive, ..Hit::MISS });
-            let normals = Seen::by(&mesh, &rays, &hits).normals([1.0, 2.0, 3.0]);
+            let normals = Seen::by(&mesh, &hits).normals([1.0, 2.0, 3.0]);
             let expected = round(normal_of(&positions).unwrap());
             let is_near = |(a, b): (f32, f32)| (a - b).abs() <= f32::EPSILON * b.abs();
             assert!(at(&normals, 0).into_iter().zip(expected).all(is_near), "{scale}");

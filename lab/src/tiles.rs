@@ -1,21 +1,23 @@
-//! A square picture in tiles of 8 x 8 pixels: all that the lab renders.
+//! A square picture in tiles of 16 x 16 pixels: all that the lab renders.
 //!
 //! ```text
 //! +-------------+---   Tiles come row by row from the upper left. The rays of one are in Morton
-//! |  0  1  4 .. |      order: each sixteen of a whole tile are a square of 4 x 4 pixels.
-//! |  2  3  6 .. |
+//! |  0  1  4 .. |      order: each sixteen of a whole tile are a square of 4 x 4 pixels, each 64
+//! |  2  3  6 .. |      one of 8 x 8.
 //! |  8  9 12 .. |
 //! ```
 //!
-//! That is what [`Grid::intersect_n`] and the packets of other structures like best. The rays of a
-//! tile are made when it is its turn, as a renderer does.
+//! That is what [`Grid::intersect_n`] and the packets of other structures like best: four tiles of
+//! its own in a call. The rays of a tile are made when it is its turn, as a renderer does.
+
+use core::array::from_fn;
 
 use hgrid_core::{Coherence, Grid, Hit, Ray, Strided, StridedMut};
 
 use crate::camera::Camera;
 
 /// Pixels on each side of a tile.
-const TILE: u16 = 8;
+const TILE: u16 = 16;
 
 /// Rays in a tile.
 pub const TILE_RAYS: usize = TILE as usize * TILE as usize;
@@ -31,9 +33,9 @@ static MORTON: [[u16; 2]; TILE_RAYS] = {
     places
 };
 
-/// The three lowest bits in even places, side by side.
+/// The four lowest bits in even places, side by side.
 const fn even_bits(at: u16) -> u16 {
-    at & 1 | at >> 1 & 2 | at >> 2 & 4
+    at & 1 | at >> 1 & 2 | at >> 2 & 4 | at >> 3 & 8
 }
 
 /// A picture and the camera that takes it.
@@ -81,17 +83,30 @@ impl Tiles {
     /// The same for the tiles from a row of pixels on.
     fn each_in(&self, top: u16, mut tile: impl FnMut(&[Ray], &[usize])) {
         let Self { camera, size } = *self;
+        let in_row = usize::from(size);
+        let offsets = MORTON.map(|[column, row]| usize::from(row) * in_row + usize::from(column));
+        let down: [_; TILE as usize] = from_fn(|row| camera.down(top + row as u16, size));
         let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE_RAYS];
         let mut places = [0; TILE_RAYS];
         for left in (0..size).step_by(TILE.into()) {
-            let mut count = 0;
-            for [column, row] in &MORTON {
-                let (column, row) = (left + column, top + row);
-                // Some pixels of a tile at an edge are outside.
-                if column < size && row < size {
-                    rays[count] = camera.ray(column, row, size);
-                    places[count] = usize::from(row) * usize::from(size) + usize::from(column);
-                    count += 1;
+            let across: [_; TILE as usize] =
+                from_fn(|column| camera.across(left + column as u16, size));
+            for (ray, [column, row]) in rays.iter_mut().zip(&MORTON) {
+                *ray = camera
+                    .ray_at(across[usize::from(column % TILE)], down[usize::from(row % TILE)]);
+            }
+            let first = usize::from(top) * in_row + usize::from(left);
+            for (place, offset) in places.iter_mut().zip(&offsets) {
+                *place = first + offset;
+            }
+            // Some pixels of a tile at an edge are outside.
+            let (width, height) = (size - left, size - top);
+            let mut count = TILE_RAYS;
+            if width.min(height) < TILE {
+                count = 0;
+                for (at, [column, row]) in MORTON.iter().enumerate() {
+                    (rays[count], places[count]) = (rays[at], places[at]);
+                    count += usize::from(*column < width && *row < height);
                 }
             }
             tile(&rays[..count], &places[..count]);
