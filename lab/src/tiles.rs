@@ -10,14 +10,15 @@
 //! That is what [`Grid::intersect_n`] and the packets of other structures like best: four tiles of
 //! its own in a call. The rays of a tile are made when it is its turn, as a renderer does.
 
-use core::array::from_fn;
-
 use hgrid_core::{Coherence, Grid, Hit, Ray, Strided, StridedMut};
 
 use crate::camera::Camera;
 
 /// Pixels on each side of a tile.
 const TILE: u16 = 16;
+
+/// The columns of a tile, and its rows.
+const ALONG: [u16; TILE as usize] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Rays in a tile.
 pub const TILE_RAYS: usize = TILE as usize * TILE as usize;
@@ -85,15 +86,14 @@ impl Tiles {
         let Self { camera, size } = *self;
         let in_row = usize::from(size);
         let offsets = MORTON.map(|[column, row]| usize::from(row) * in_row + usize::from(column));
-        let down: [_; TILE as usize] = from_fn(|row| camera.down(top + row as u16, size));
+        let down = ALONG.map(|row| camera.down(top + row, size));
         let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE_RAYS];
         let mut places = [0; TILE_RAYS];
         for left in (0..size).step_by(TILE.into()) {
-            let across: [_; TILE as usize] =
-                from_fn(|column| camera.across(left + column as u16, size));
+            let across = ALONG.map(|column| camera.across(left + column, size));
             for (ray, [column, row]) in rays.iter_mut().zip(&MORTON) {
-                *ray = camera
-                    .ray_at(across[usize::from(column % TILE)], down[usize::from(row % TILE)]);
+                let [column, row] = [column, row].map(|at| usize::from(at % TILE));
+                *ray = camera.ray_at(across[column], down[row]);
             }
             let first = usize::from(top) * in_row + usize::from(left);
             for (place, offset) in places.iter_mut().zip(&offsets) {

@@ -33,10 +33,10 @@ pub(super) type PerRay = [f32; RAYS];
 pub(super) struct Bundle {
     /// By axis.
     pub(super) origin: [PerRay; 3],
-    /// What a [`TriangleTest`](crate::triangle::TriangleTest) needs of a direction, and the rays
-    /// whose longest axis is x, y, z.
-    pub(super) shear: [PerRay; 2],
-    pub(super) direction_z: PerRay,
+    /// By axis the directions; from [`aim`](Self::aim) on what a
+    /// [`TriangleTest`](crate::triangle::TriangleTest) needs of them, shear x, shear y and z.
+    pub(super) aim: [PerRay; 3],
+    /// The rays whose longest axis is x, y, z, from then on.
     pub(super) longest: [u64; 3],
     pub(super) t_min: PerRay,
     /// Where a ray ends: closer with every hit.
@@ -157,8 +157,7 @@ impl Bundle {
     /// No rays: zeros, which are written without being read from anywhere.
     pub(super) const EMPTY: Self = Self {
         origin: [[0.0; RAYS]; 3],
-        shear: [[0.0; RAYS]; 2],
-        direction_z: [0.0; RAYS],
+        aim: [[0.0; RAYS]; 3],
         longest: [0; 3],
         t_min: [0.0; RAYS],
         t_max: [0.0; RAYS],
@@ -199,14 +198,12 @@ impl Bundle {
             #[inline(always)]
             || {
                 self.members = 0;
-                let mut directions = [[0.0; RAYS]; 3];
-                let leader = self.read(simd, &mut directions, rays, first, count);
-                let Some(leader) = leader else { return };
+                let Some(leader) = self.read(simd, rays, first, count) else { return };
                 let [x, y, z] = [leader[0].abs(), leader[1].abs(), leader[2].abs()];
                 match (x >= y && x >= z, y >= z) {
-                    (true, _) => self.along::<0, S>(simd, brick, lattice, &directions, leader),
-                    (_, true) => self.along::<1, S>(simd, brick, lattice, &directions, leader),
-                    _ => self.along::<2, S>(simd, brick, lattice, &directions, leader),
+                    (true, _) => self.along::<0, S>(simd, brick, lattice, leader),
+                    (_, true) => self.along::<1, S>(simd, brick, lattice, leader),
+                    _ => self.along::<2, S>(simd, brick, lattice, leader),
                 }
             },
         );
@@ -217,14 +214,13 @@ impl Bundle {
     fn read<S: Simd>(
         &mut self,
         simd: S,
-        directions: &mut [PerRay; 3],
         rays: &Strided<'_>,
         first: usize,
         count: usize,
     ) -> Option<[f32; 3]> {
         let mut leader = None;
         let tight = rays.tight(first, count).as_chunks::<4>().0;
-        for four in 0..count.div_ceil(4) {
+        for four in 0..RAYS / 4 {
             let at = 4 * four;
             let four_rays = if let Some([a, b, c, d]) = tight.get(four) {
                 [a, b, c, d]
@@ -254,9 +250,9 @@ impl Bundle {
             set(&mut self.origin[2], z);
             set(&mut self.t_min, t_min);
             let [x, y, z, t_max] = transpose(row(1));
-            set(&mut directions[0], x);
-            set(&mut directions[1], y);
-            set(&mut directions[2], z);
+            set(&mut self.aim[0], x);
+            set(&mut self.aim[1], y);
+            set(&mut self.aim[2], z);
             set(&mut self.t_max, t_max);
         }
         leader
@@ -269,7 +265,6 @@ impl Bundle {
         simd: S,
         brick: &Brick<'_>,
         lattice: &Lattice,
-        directions: &[PerRay; 3],
         leader: [f32; 3],
     ) {
         self.axes = match K {
@@ -287,14 +282,13 @@ impl Bundle {
         let splat = |number: f32| f32x16::splat(simd, number);
         let (reach, zero) = (splat(FAR_EXTENTS * bounds.size().max_element()), splat(0.0));
         let sign = splat(if self.is_mirrored { -1.0 } else { 1.0 });
-        self.longest = [0; 3];
         for first in (0..RAYS).step_by(WIDTH) {
             let ox = row_of(simd, &self.origin[0], first);
             let oy = row_of(simd, &self.origin[1], first);
             let oz = row_of(simd, &self.origin[2], first);
-            let dx = row_of(simd, &directions[0], first);
-            let dy = row_of(simd, &directions[1], first);
-            let dz = row_of(simd, &directions[2], first);
+            let dx = row_of(simd, &self.aim[0], first);
+            let dy = row_of(simd, &self.aim[1], first);
+            let dz = row_of(simd, &self.aim[2], first);
             let t_min = row_of(simd, &self.t_min, first);
             let t_max = row_of(simd, &self.t_max, first);
             let [x, y, z] = [dx.abs(), dy.abs(), dz.abs()];
@@ -315,29 +309,16 @@ impl Bundle {
             let is_member = is_near & is_along & is_ray;
             self.members |= rays_of(is_member, first);
             *row_mut(&mut self.speed, first) = is_member.select(speed, zero).into();
-
-            // What tests of triangles need.
-            let is_x = x.simd_gt(y) & x.simd_gt(z);
-            let is_y = !is_x & y.simd_gt(z);
-            let longest = is_x.select(dx, is_y.select(dy, dz));
-            let shear_x = is_x.select(dy, is_y.select(dz, dx)) / longest;
-            let shear_y = is_x.select(dz, is_y.select(dx, dy)) / longest;
-            *row_mut(&mut self.shear[0], first) = shear_x.into();
-            *row_mut(&mut self.shear[1], first) = shear_y.into();
-            *row_mut(&mut self.direction_z, first) = longest.into();
-            self.longest[0] |= rays_of(is_x, first);
-            self.longest[1] |= rays_of(is_y, first);
         }
-        self.longest[2] = !(self.longest[0] | self.longest[1]);
         if self.members != 0 {
-            self.draw::<K, S>(simd, directions);
+            self.draw::<K, S>(simd);
         }
     }
 
     /// Writes the members as lines in cells, k growing. Who does not belong stands where one does
     /// that belongs: bounds need not ask.
     #[inline(always)]
-    fn draw<const K: usize, S: Simd>(&mut self, simd: S, directions: &[PerRay; 3]) {
+    fn draw<const K: usize, S: Simd>(&mut self, simd: S) {
         let stand_in = self.members.trailing_zeros() as usize % RAYS;
         let splat = |number: f32| f32x16::splat(simd, number);
         let (corner, rate, speed) = (&self.corner, &self.rate, self.speed[stand_in]);
@@ -351,8 +332,8 @@ impl Bundle {
             let inverse = splat(1.0) / speed;
             let from = zero + speed * rays.of(simd, &self.t_min) - splat(self.margin);
             let to = zero + speed * rays.of(simd, &self.t_max) + splat(self.margin);
-            let slope_u = rays.of(simd, &directions[u]) * splat(rate[u]) * inverse;
-            let slope_v = rays.of(simd, &directions[v]) * splat(rate[v]) * inverse;
+            let slope_u = rays.of(simd, &self.aim[u]) * splat(rate[u]) * inverse;
+            let slope_v = rays.of(simd, &self.aim[v]) * splat(rate[v]) * inverse;
             let at_u = (rays.of(simd, &self.origin[u]) - splat(corner[u])) * splat(rate[u]);
             let at_v = (rays.of(simd, &self.origin[v]) - splat(corner[v])) * splat(rate[v]);
             let (start_u, start_v) = (at_u - slope_u * zero, at_v - slope_v * zero);
@@ -364,6 +345,30 @@ impl Bundle {
             *row_mut(&mut self.start[0], first) = start_u.into();
             *row_mut(&mut self.start[1], first) = start_v.into();
         }
+    }
+
+    /// Makes of directions what tests of triangles need, which most tiles of an empty part of a
+    /// picture never ask for; once after the rays were loaded.
+    #[inline(always)]
+    pub(super) fn aim<S: Simd>(&mut self, simd: S) {
+        self.longest = [0; 3];
+        for first in (0..RAYS).step_by(WIDTH) {
+            let dx = row_of(simd, &self.aim[0], first);
+            let dy = row_of(simd, &self.aim[1], first);
+            let dz = row_of(simd, &self.aim[2], first);
+            let [x, y, z] = [dx.abs(), dy.abs(), dz.abs()];
+            let is_x = x.simd_gt(y) & x.simd_gt(z);
+            let is_y = !is_x & y.simd_gt(z);
+            let longest = is_x.select(dx, is_y.select(dy, dz));
+            let shear_x = is_x.select(dy, is_y.select(dz, dx)) / longest;
+            let shear_y = is_x.select(dz, is_y.select(dx, dy)) / longest;
+            *row_mut(&mut self.aim[0], first) = shear_x.into();
+            *row_mut(&mut self.aim[1], first) = shear_y.into();
+            *row_mut(&mut self.aim[2], first) = longest.into();
+            self.longest[0] |= rays_of(is_x, first);
+            self.longest[1] |= rays_of(is_y, first);
+        }
+        self.longest[2] = !(self.longest[0] | self.longest[1]);
     }
 
     /// The axes u, v and k.

@@ -35,6 +35,8 @@ pub(super) struct Hits {
     u: PerRay,
     v: PerRay,
     primitive: [u32; RAYS],
+    /// Whether there are any: not before the first triangle.
+    is_begun: bool,
     frusta: Frusta,
     /// Whether these are around the bundle.
     is_surrounded: bool,
@@ -44,12 +46,12 @@ pub(super) struct Hits {
 }
 
 impl Hits {
-    /// Of no rays: zeros, as in [`Bundle::EMPTY`]. Rays that hit nothing
-    /// come by [`clear`](Self::clear).
+    /// Of no rays: zeros, as in [`Bundle::EMPTY`].
     pub(super) const EMPTY: Self = Self {
         u: [0.0; RAYS],
         v: [0.0; RAYS],
         primitive: [0; RAYS],
+        is_begun: false,
         frusta: Frusta::EMPTY,
         is_surrounded: false,
         mailbox: [0; SLOTS],
@@ -57,6 +59,18 @@ impl Hits {
 
     /// Forgets the rays and what they hit.
     pub(super) fn clear(&mut self) {
+        self.is_begun = false;
+    }
+
+    /// Whether no ray was tested against any triangle.
+    pub(super) const fn is_idle(&self) -> bool {
+        !self.is_begun
+    }
+
+    /// Makes ready for the first triangle: no ray has hit anything.
+    #[inline(always)]
+    fn begin<S: Simd>(&mut self, simd: S, bundle: &mut Bundle) {
+        self.is_begun = true;
         if self.is_surrounded {
             self.is_surrounded = false;
             self.mailbox.fill(0);
@@ -64,11 +78,15 @@ impl Hits {
         self.u.fill(0.0);
         self.v.fill(0.0);
         self.primitive.fill(INVALID_ID);
+        bundle.aim(simd);
     }
 
     /// The closest hits of four rays, or [`Hit::MISS`].
     #[inline(always)]
     pub(super) fn four<S: Simd>(&self, simd: S, bundle: &Bundle, four: usize) -> [Hit; 4] {
+        if !self.is_begun {
+            return [Hit::MISS; 4];
+        }
         let place = four % (RAYS / 4);
         let primitive = self.primitive.as_chunks::<4>().0[place];
         let is_miss = u32x4::simd_from(simd, primitive).simd_eq(INVALID_ID);
@@ -99,6 +117,9 @@ impl Hits {
         simd.vectorize(
             #[inline(always)]
             || {
+                if !self.is_begun {
+                    self.begin(simd, bundle);
+                }
                 if rays.count_ones() < MANY {
                     for ids in ids.chunks(LANES) {
                         self.few::<S, ANY>(simd, bundle, mesh, ids, rays);
@@ -223,7 +244,7 @@ impl Hits {
                 row_of(simd, &bundle.origin[z], first),
             );
             let (shear_x, shear_y) =
-                (row_of(simd, &bundle.shear[0], first), row_of(simd, &bundle.shear[1], first));
+                (row_of(simd, &bundle.aim[0], first), row_of(simd, &bundle.aim[1], first));
 
             // Shear the corners, and drop the triangle where two edge
             // functions have opposite signs.
@@ -283,7 +304,7 @@ impl Hits {
         let (bx, by) = (corner(2).widen(), corner(3).widen());
         let (cx, cy) = (corner(4).widen(), corner(5).widen());
         let origin = row(&bundle.origin[z]).widen();
-        let direction = row(&bundle.direction_z).widen();
+        let direction = row(&bundle.aim[2]).widen();
         let low = [ax.0, ay.0, bx.0, by.0, cx.0, cy.0];
         let low = Four::of(low, depths, origin.0, direction.0);
         let high = [ax.1, ay.1, bx.1, by.1, cx.1, cy.1];
@@ -357,9 +378,9 @@ fn one(bundle: &Bundle, lane: usize) -> TriangleTest {
     TriangleTest {
         axis,
         anchor: [bundle.origin[x][lane], bundle.origin[y][lane], bundle.origin[z][lane]],
-        shear: [bundle.shear[0][lane], bundle.shear[1][lane]],
+        shear: [bundle.aim[0][lane], bundle.aim[1][lane]],
         origin_z: f64::from(bundle.origin[z][lane]),
-        direction_z: f64::from(bundle.direction_z[lane]),
+        direction_z: f64::from(bundle.aim[2][lane]),
         t_min: bundle.t_min[lane],
         t_max: bundle.t_max[lane],
         cull: Cull::None,

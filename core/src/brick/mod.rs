@@ -128,6 +128,9 @@ impl<'a> Brick<'a> {
     }
 }
 
+/// The hits of a tile that sees nothing.
+static MISSES: [Hit; RAYS] = [Hit::MISS; RAYS];
+
 /// Neighbouring rays on their way through a grid, 64 at a time.
 #[derive(Debug)]
 pub(crate) struct Tiles<'q, F, const ANY: bool> {
@@ -149,6 +152,10 @@ impl<F: FnMut(usize, &[Hit]), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
         for first in (0..self.rays.count).step_by(RAYS) {
             let count = RAYS.min(self.rays.count - first);
             let members = tile.trace(simd, self.rays, first, count);
+            if tile.is_idle() && members.count_ones() as usize == count {
+                (self.answer)(first, MISSES.get(..count).unwrap_or_default());
+                continue;
+            }
             for four in 0..count.div_ceil(4) {
                 // Said in both ways: hits that are handed on as they are
                 // need not go through memory.

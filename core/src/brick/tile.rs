@@ -258,6 +258,11 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         if members != 0 && self.go(simd) { members } else { 0 }
     }
 
+    /// Whether the rays that were traced met no triangle.
+    pub(super) const fn is_idle(&self) -> bool {
+        self.hits.is_idle()
+    }
+
     /// The hits of four rays that were traced, or [`Hit::MISS`].
     #[inline(always)]
     pub(super) fn hits<S: Simd>(&self, simd: S, four: usize) -> [Hit; 4] {
