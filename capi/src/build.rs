@@ -183,7 +183,8 @@ pub unsafe extern "C" fn hgrid_fit(
 /// `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BRICK` may have left anything in it, so a grid that
 /// lay there before is gone. They write as far as the index reaches and then go on counting: the
 /// report's `index_bytes` is exact (with brick maybe only enough), and with so many the same call
-/// succeeds.
+/// succeeds. A view of a grid that is gone, `grid` itself where a build is repeated, can be asked
+/// without harm, but answers anything: set it to `HGRID_GRID_INIT`.
 ///
 /// A build allocates nothing and needs at most 12 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
 /// `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8

@@ -15,6 +15,8 @@ pub struct Machine {
     pub cpu: Option<String>,
     /// Operating system and architecture.
     pub system: String,
+    /// When the system gives large pages, if it tells: a build of much memory asks for them.
+    pub large_pages: Option<String>,
     /// The compiler that this program was built with.
     pub rustc: String,
     /// The day, in UTC, as YYYY-MM-DD.
@@ -33,6 +35,9 @@ impl Machine {
         Self {
             cpu: cpu.as_deref().and_then(cpu_name),
             system: format!("{}, {}", env::consts::OS, env::consts::ARCH),
+            large_pages: fs::read_to_string("/sys/kernel/mm/transparent_hugepage/enabled")
+                .ok()
+                .and_then(|text| chosen(&text)),
             rustc: rustc_version_runtime::version().to_string(),
             date: now,
             command: command(env::args()),
@@ -43,8 +48,16 @@ impl Machine {
     #[must_use]
     pub fn summary(&self) -> String {
         let cpu = self.cpu.as_deref().unwrap_or("unknown processor");
-        format!("{cpu} (one thread), {}, rustc {}, {}", self.system, self.rustc, self.date)
+        let pages = self.large_pages.as_deref().unwrap_or("unknown");
+        let Self { system, rustc, date, .. } = self;
+        format!("{cpu} (one thread), {system}, large pages: {pages}, rustc {rustc}, {date}")
     }
+}
+
+/// The word in brackets among those of a kernel's setting.
+fn chosen(text: &str) -> Option<String> {
+    let (_, rest) = text.split_once('[')?;
+    rest.split_once(']').map(|(word, _)| word.to_owned())
 }
 
 /// The name in the text of /proc/cpuinfo.
@@ -92,6 +105,12 @@ mod tests {
         let text = "cpu family\t: 25\nmodel\t\t: 1\nmodel name\t: AMD EPYC\n";
         assert_eq!(cpu_name(text).as_deref(), Some("AMD EPYC, family 25, model 1"));
         assert_eq!(cpu_name("processor: 0\n"), None);
+    }
+
+    #[test]
+    fn the_setting_is_the_word_in_brackets() {
+        assert_eq!(chosen("always [madvise] never\n").as_deref(), Some("madvise"));
+        assert_eq!((chosen("always"), chosen("[always")), (None, None));
     }
 
     #[test]
