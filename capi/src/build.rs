@@ -181,10 +181,10 @@ pub unsafe extern "C" fn hgrid_fit(
 /// anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
 /// `HGRID_ERROR_INVALID_CELL_SIZE` and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`,
 /// `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BRICK` may have left anything in it, so a grid that
-/// lay there before is gone. They write as far as the index reaches and then go on counting: the
-/// report's `index_bytes` is exact (with brick maybe only enough), and with so many the same call
-/// succeeds. A view of a grid that is gone, `grid` itself where a build is repeated, can be asked
-/// without harm, but answers anything: set it to `HGRID_GRID_INIT`.
+/// lay there before is gone. A view of it (`grid` itself, where a build is repeated) can be asked
+/// without harm, but answers anything: set it to `HGRID_GRID_INIT`. These methods write as far as the
+/// index reaches and then go on counting: the report's `index_bytes` is exact (with brick maybe only
+/// enough), and with so many the same call succeeds.
 ///
 /// A build allocates nothing and needs at most 12 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
 /// `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8

@@ -215,17 +215,17 @@ impl Camera {
         self.ray_at(self.across(column, size), self.down(row, size))
     }
 
-    /// What the rays of a column of pixels have in common.
+    /// What the rays of a column of pixels have in common: forward, and to the right.
     #[inline]
     pub(crate) fn across(&self, column: u16, size: u16) -> [f32; 3] {
-        let x = (2.0 * f32::from(column) + 1.0 - f32::from(size)) * pixel(size);
+        let x = (2.0 * f32::from(column) + 1.0 - f32::from(size)) * half_pixel(size);
         [0, 1, 2].map(|axis| self.forward[axis] + x * self.right[axis])
     }
 
-    /// What the rays of a row of pixels have in common.
+    /// What the rays of a row of pixels have in common: upward.
     #[inline]
     pub(crate) fn down(&self, row: u16, size: u16) -> [f32; 3] {
-        let y = (f32::from(size) - 2.0 * f32::from(row) - 1.0) * pixel(size);
+        let y = (f32::from(size) - 2.0 * f32::from(row) - 1.0) * half_pixel(size);
         self.up.map(|c| y * c)
     }
 
@@ -237,7 +237,7 @@ impl Camera {
 }
 
 /// Half of a pixel's size on the plane at distance 1 from the eye.
-fn pixel(size: u16) -> f32 {
+fn half_pixel(size: u16) -> f32 {
     HALF_VIEW_TANGENT / f32::from(size)
 }
 

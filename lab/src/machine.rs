@@ -95,6 +95,7 @@ mod tests {
         assert!(machine.rustc.starts_with("1.") && machine.date.starts_with("20"), "{machine:?}");
         assert_eq!(machine.date.len(), 10);
         assert!(machine.summary().contains("one thread"));
+        assert!(machine.summary().contains("large pages: "));
     }
 
     #[test]

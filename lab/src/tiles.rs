@@ -7,8 +7,9 @@
 //! |  8  9 12 .. |
 //! ```
 //!
-//! That is what [`Grid::intersect_n`] and the packets of other structures like best: four tiles of
-//! its own in a call. The rays of a tile are made when it is its turn, as a renderer does.
+//! That is what the packets of other structures and [`Grid::intersect_n`] like best: a call has four
+//! of the tiles that the grid traces together. The rays of a tile are made when it is its turn, as
+//! a renderer does.
 
 use hgrid_core::{Coherence, Grid, Hit, Ray, Strided, StridedMut};
 
@@ -67,7 +68,8 @@ impl Tiles {
     pub fn bands<'p, T>(&self, pixels: &'p mut [T]) -> impl Iterator<Item = Band<'p, T>> {
         debug_assert_eq!(pixels.len(), self.pixels(), "another picture");
         let tiles = *self;
-        let bands = (0..).step_by(TILE.into()).zip(pixels.chunks_mut(self.band_pixels().max(1)));
+        let bands =
+            (0..self.size).step_by(TILE.into()).zip(pixels.chunks_mut(self.band_pixels().max(1)));
         bands.map(move |(row, pixels)| Band { tiles, row, pixels })
     }
 
@@ -85,6 +87,7 @@ impl Tiles {
     fn each_in(&self, top: u16, mut tile: impl FnMut(&[Ray], &[usize])) {
         let Self { camera, size } = *self;
         let in_row = usize::from(size);
+        // Known for all tiles of a band.
         let offsets = MORTON.map(|[column, row]| usize::from(row) * in_row + usize::from(column));
         let down = ALONG.map(|row| camera.down(top + row, size));
         let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE_RAYS];
@@ -92,6 +95,7 @@ impl Tiles {
         for left in (0..size).step_by(TILE.into()) {
             let across = ALONG.map(|column| camera.across(left + column, size));
             for (ray, [column, row]) in rays.iter_mut().zip(&MORTON) {
+                // Less than a tile: said so that nothing is checked.
                 let [column, row] = [column, row].map(|at| usize::from(at % TILE));
                 *ray = camera.ray_at(across[column], down[row]);
             }
@@ -159,7 +163,7 @@ mod tests {
     #[test]
     fn every_pixel_has_its_own_ray_once() {
         let camera = Camera::framing(([0.0; 3], [1.0; 3]), View::ThreeQuarter, Up::Y);
-        for size in [0, 1, 7, 8, 9, 20] {
+        for size in [0, 1, 7, 15, 16, 17, 32, 40] {
             let tiles = Tiles { camera, size };
             let rays = |row| (0..size).map(move |column| camera.ray(column, row, size));
             let expected: Vec<_> = (0..size).flat_map(rays).collect();
@@ -187,11 +191,27 @@ mod tests {
     }
 
     #[test]
-    fn sixteen_rays_in_a_row_are_a_square() {
-        for sixteen in MORTON.chunks(16) {
-            let square = sixteen[0].map(|at| at / 4);
-            assert!(sixteen.iter().all(|place| place.map(|at| at / 4) == square));
+    fn the_last_tiles_of_the_largest_picture_are_cut() {
+        let camera = Camera::framing(([0.0; 3], [1.0; 3]), View::Front, Up::Y);
+        let tiles = Tiles { camera, size: u16::MAX };
+        let (mut count, mut pixels, mut last) = (0, 0, (0, 0));
+        tiles.each_in(u16::MAX - 15, |rays, places| {
+            (count, pixels) = (count + 1, pixels + rays.len());
+            last = (rays.len(), places[places.len() - 1]);
+        });
+        let size = usize::from(u16::MAX);
+        assert_eq!((count, pixels), (4096, 15 * size));
+        assert_eq!(last, (15 * 15, size * size - 1));
+    }
+
+    #[test]
+    fn runs_of_rays_are_squares() {
+        for (rays, side) in [(16, 4), (64, 8), (256, 16)] {
+            for run in MORTON.chunks(rays) {
+                let square = run[0].map(|at| at / side);
+                assert!(run.iter().all(|place| place.map(|at| at / side) == square));
+            }
         }
-        assert_eq!((MORTON[0], MORTON[63]), ([0, 0], [7, 7]));
+        assert_eq!((MORTON[0], MORTON[255]), ([0, 0], [15, 15]));
     }
 }

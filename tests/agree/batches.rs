@@ -71,6 +71,10 @@ fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
             rays.extend(tile(bounds, view, corner));
         }
     }
+    // Behind a tile that hits one that meets nothing, with a ray that is none.
+    rays.extend(tile(bounds, View::Front, [24, 24]));
+    rays.extend(tile(bounds, View::Front, [0, 0]));
+    rays[600].direction = [0.0; 3];
     // One origin and all directions; one direction and all origins; ends before and behind.
     rays.extend((0..64).map(|_| Ray::new([0.1, 0.2, 0.3], random.point())));
     rays.extend((0..64).map(|_| Ray::new(random.point().map(|c| 2.0 * c), [0.3, -0.5, 0.7])));

@@ -33,8 +33,8 @@ pub(super) type PerRay = [f32; RAYS];
 pub(super) struct Bundle {
     /// By axis.
     pub(super) origin: [PerRay; 3],
-    /// By axis the directions; from [`aim`](Self::aim) on what a
-    /// [`TriangleTest`](crate::triangle::TriangleTest) needs of them, shear x, shear y and z.
+    /// By axis the directions; from [`shear`](Self::shear) on what a
+    /// [`TriangleTest`](crate::triangle::TriangleTest) needs of them: shear x, shear y and z.
     pub(super) aim: [PerRay; 3],
     /// The rays whose longest axis is x, y, z, from then on.
     pub(super) longest: [u64; 3],
@@ -225,7 +225,8 @@ impl Bundle {
             let four_rays = if let Some([a, b, c, d]) = tight.get(four) {
                 [a, b, c, d]
             } else {
-                // Zeros where there are no more: such a ray is none.
+                // Zeros where there are no more: such a ray is none, and what an earlier tile left
+                // is gone.
                 let ray = |lane: usize| -> &[u8; 32] {
                     let place = (at + lane < count).then_some(first + at + lane);
                     place.and_then(|place| rays.element(place)).unwrap_or(&[0; 32])
@@ -350,7 +351,7 @@ impl Bundle {
     /// Makes of directions what tests of triangles need, which most tiles of an empty part of a
     /// picture never ask for; once after the rays were loaded.
     #[inline(always)]
-    pub(super) fn aim<S: Simd>(&mut self, simd: S) {
+    pub(super) fn shear<S: Simd>(&mut self, simd: S) {
         self.longest = [0; 3];
         for first in (0..RAYS).step_by(WIDTH) {
             let dx = row_of(simd, &self.aim[0], first);

@@ -35,10 +35,11 @@ pub(super) struct Hits {
     u: PerRay,
     v: PerRay,
     primitive: [u32; RAYS],
-    /// Whether there are any: not before the first triangle.
+    /// Whether a triangle was tested. Until then the others are those of an earlier tile, and the
+    /// bundle has directions.
     is_begun: bool,
     frusta: Frusta,
-    /// Whether these are around the bundle.
+    /// Whether these are around the bundle; until a triangle is tested, around an earlier one.
     is_surrounded: bool,
     /// Triangles that were tested against all rays that may meet them, their ids with all bits
     /// inverted: 0 is none. Who comes later takes the place: a second test does no harm.
@@ -62,9 +63,9 @@ impl Hits {
         self.is_begun = false;
     }
 
-    /// Whether no ray was tested against any triangle.
-    pub(super) const fn is_idle(&self) -> bool {
-        !self.is_begun
+    /// Whether any ray was tested against a triangle.
+    pub(super) const fn is_begun(&self) -> bool {
+        self.is_begun
     }
 
     /// Makes ready for the first triangle: no ray has hit anything.
@@ -78,7 +79,7 @@ impl Hits {
         self.u.fill(0.0);
         self.v.fill(0.0);
         self.primitive.fill(INVALID_ID);
-        bundle.aim(simd);
+        bundle.shear(simd);
     }
 
     /// The closest hits of four rays, or [`Hit::MISS`].

@@ -138,8 +138,8 @@ pub(crate) struct Tiles<'q, F, const ANY: bool> {
     pub(crate) lattice: &'q Lattice,
     pub(crate) mesh: &'q TriangleMesh<'q>,
     pub(crate) rays: &'q Strided<'q>,
-    /// Gets the place of a ray and its hit and perhaps those of the next ones, or no hit if
-    /// the ray did not go with its tile.
+    /// Gets the place of a ray and its hit and perhaps those of some next ones, up to all of a
+    /// tile, or no hit if the ray did not go with its tile.
     pub(crate) answer: F,
 }
 
@@ -152,7 +152,8 @@ impl<F: FnMut(usize, &[Hit]), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
         for first in (0..self.rays.count).step_by(RAYS) {
             let count = RAYS.min(self.rays.count - first);
             let members = tile.trace(simd, self.rays, first, count);
-            if tile.is_idle() && members.count_ones() as usize == count {
+            // As in an empty part of a picture: one answer, not sixteen.
+            if !tile.is_begun() && members.count_ones() as usize == count {
                 (self.answer)(first, MISSES.get(..count).unwrap_or_default());
                 continue;
             }

@@ -10,8 +10,9 @@ use crate::config::{BuildFlags, Config, Method};
 use crate::control::Control;
 use crate::error::{Error, Region};
 use crate::grid::Grid;
-use crate::mesh::TriangleMesh;
-use crate::ray::Ray;
+use crate::mesh::{Strided, TriangleMesh};
+use crate::ray::{Hit, Ray};
+use crate::simd::HAS_VECTORS;
 use crate::sizes::{Sizes, sizes_with};
 
 type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
@@ -109,6 +110,51 @@ fn bits_do_not_depend_on_the_tasks_nor_on_their_order() {
             }
         }
     }
+}
+
+/// Tiles of 64 rays on a mesh, beside it, on it from another side, and a part of one beside it.
+#[test]
+#[cfg_attr(miri, ignore = "hours")]
+fn tiles_that_test_nothing_are_answered_at_once() {
+    let (positions, indices) = soup(3000);
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    let sizes = sizes_with(&mesh, &config(), &mut [], &Control::SERIAL).unwrap();
+    let [mut index, mut scratch] = regions(sizes.index_bytes, sizes.scratch_bytes);
+    let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
+    let grid = Grid::build(mesh, &config(), index, scratch).unwrap();
+
+    let tile = |side: f32, axis: usize| {
+        (0..64_u8).map(move |ray| {
+            let [u, v] = [ray % 8, ray / 8].map(|at| side + 0.05 * f32::from(at));
+            let (mut origin, mut direction) = ([u, v, -2.0], [0.01, 0.02, 1.0]);
+            origin.rotate_left(axis);
+            direction.rotate_left(axis);
+            Ray::new(origin, direction)
+        })
+    };
+    let rays = tile(0.3, 0).chain(tile(3.0, 0)).chain(tile(0.3, 1)).chain(tile(3.0, 0).take(40));
+    let rays: Vec<_> = rays.collect();
+    let (mut lengths, mut hits) = (Vec::new(), Vec::new());
+    let is_done = grid.tiles::<false>(&Strided::new(&rays), |first, found| {
+        assert_eq!(first, hits.len());
+        lengths.push((first, found.len()));
+        hits.extend_from_slice(found);
+    });
+    assert_eq!(is_done, HAS_VECTORS);
+    if !HAS_VECTORS {
+        return;
+    }
+    let alone: Vec<_> = rays.iter().map(|ray| grid.intersect(ray).unwrap_or(Hit::MISS)).collect();
+    assert_eq!(hits, alone);
+    assert!(alone[..64] != [Hit::MISS; 64] && alone[128..192] != [Hit::MISS; 64]);
+    assert!(lengths.contains(&(64, 64)) && lengths.contains(&(192, 40)), "{lengths:?}");
+    assert!(!lengths.contains(&(0, 64)) && !lengths.contains(&(128, 64)));
+
+    let mut occluded = Vec::new();
+    grid.tiles::<true>(&Strided::new(&rays), |_, found| {
+        occluded.extend(found.iter().map(|hit| *hit != Hit::MISS));
+    });
+    assert!(rays.iter().map(|ray| grid.occluded(ray)).eq(occluded));
 }
 
 /// With few triangles and with many: what ids have room for differs ([`halves`](super::halves)).

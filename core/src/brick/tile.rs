@@ -34,6 +34,8 @@ use crate::ray::Hit;
 #[derive(Debug, Clone, Copy)]
 struct Part<'a> {
     chunk: Chunk<'a>,
+    /// Its bricks that have anything, but for some that no ray meets.
+    bricks: u64,
     /// Its corner on u, v and k, in cells of the lattice.
     corner: [f32; 3],
     /// Its cells in one of the lattice.
@@ -258,9 +260,9 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         if members != 0 && self.go(simd) { members } else { 0 }
     }
 
-    /// Whether the rays that were traced met no triangle.
-    pub(super) const fn is_idle(&self) -> bool {
-        self.hits.is_idle()
+    /// Whether any ray was tested against a triangle; if not, all that were traced are misses.
+    pub(super) const fn is_begun(&self) -> bool {
+        self.hits.is_begun()
     }
 
     /// The hits of four rays that were traced, or [`Hit::MISS`].
@@ -302,24 +304,27 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
             if self.bundle.members == 0 {
                 return true;
             }
-            let cells = |side: usize, axis: usize| {
-                bounds.cells(side, planes, as_f32(BLOCK), brick.width[axis], self.bundle.margin)
+            // Which bricks of which blocks lie beside each other on u and v.
+            let bricks = |side: usize, axis: usize| {
+                let (size, count) = (as_f32(BLOCK / 4), 4 * brick.width[axis]);
+                bounds.cells(side, planes, size, count, self.bundle.margin)
             };
-            let (Some([u0, u1]), Some([v0, v1])) = (cells(0, u), cells(1, v)) else { continue };
+            let (Some(us), Some(vs)) = (bricks(0, u), bricks(1, v)) else { continue };
             self.bundle.outlive(simd, planes[0]);
-            for at_v in v0..=v1 {
-                for at_u in u0..=u1 {
+            for at_v in vs[0] / 4..=vs[1] / 4 {
+                for at_u in us[0] / 4..=us[1] / 4 {
                     let mut block = [0; 3];
                     block[u] = at_u;
                     block[v] = at_v;
                     block[k] =
                         if self.bundle.is_mirrored { brick.width[k] - 1 - step } else { step };
                     let Some(chunk) = brick.block(block) else { continue };
-                    if chunk.mask == 0 && chunk.list == 0 {
+                    let bricks = chunk.mask & layer(u, 4 * at_u, us) & layer(v, 4 * at_v, vs);
+                    if bricks == 0 && chunk.list == 0 {
                         continue;
                     }
                     let corner = [as_f32(at_u * BLOCK), as_f32(at_v * BLOCK), corner];
-                    let part = Part { chunk, corner, scale: 1.0, cells: BLOCK, depth: 2 };
+                    let part = Part { chunk, bricks, corner, scale: 1.0, cells: BLOCK, depth: 2 };
                     self.through(simd, &part);
                 }
             }
@@ -349,12 +354,15 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
     /// Goes through a slice of bricks.
     #[inline(always)]
     fn bricks<S: Simd>(&mut self, simd: S, view: &View<'a>, slice: u32) {
-        let Part { chunk, cells, .. } = view.part;
+        let Part { chunk, bricks, cells, .. } = view.part;
         let [u, v, k] = view.axes();
+        let in_slice = bricks & LAYERS[k][slice as usize & 3][slice as usize & 3];
+        if in_slice == 0 {
+            return;
+        }
         let run = [4 * slice, (4 * slice + 4).min(cells)];
         let Some([us, vs]) = view.cells(run) else { return };
-        let bricks = chunk.mask
-            & LAYERS[k][slice as usize & 3][slice as usize & 3]
+        let bricks = in_slice
             & layer(u, 0, us.map(|cell| cell >> 2))
             & layer(v, 0, vs.map(|cell| cell >> 2));
         if bricks == 0 || view.between(simd, &self.bundle, run) == 0 {
@@ -413,7 +421,8 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
                         let (scale, depth) = (view.part.scale * as_f32(cells), depth - 1);
                         // Entering costs, too: damaged bytes may divide every cell.
                         self.spend(RAYS as u64 * u64::from(1 + chunk.mask.count_ones()));
-                        self.through(simd, &Part { chunk, corner, scale, cells, depth });
+                        let bricks = chunk.mask;
+                        self.through(simd, &Part { chunk, bricks, corner, scale, cells, depth });
                         is_reach_known = false;
                     }
                     _ => {}

@@ -75,7 +75,12 @@ pub(crate) fn heading<B: DrawingBackend>(
         area.draw(&Text::new(text.to_owned(), (pen.at(16), pen.at(y)), style))
     };
     line(title, 22, pen.title(TITLE))?;
-    line(source, 45, pen.text(WORDS, MUTED))?;
+    // Letters are about 7/15 as wide as the font is high: smaller ones where they are many.
+    let (width, _) = area.dim_in_pixel();
+    let room = (width / pen.scale).saturating_sub(32);
+    let letters = u32::try_from(source.len()).unwrap_or(u32::MAX).max(1);
+    let fitting = room.saturating_mul(15) / letters.saturating_mul(7);
+    line(source, 45, pen.text(WORDS.min(fitting), MUTED))?;
 
     let mut left = 16;
     for (name, color) in legend {
