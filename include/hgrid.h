@@ -173,22 +173,24 @@
  * Bytes of index that are enough for any mesh with so many triangles, wherever they lie, with the
  * default configuration: a constant expression. A scan takes a thirteenth of it.
  *
- * The argument is evaluated twice. Where `size_t` has 32 bits, use it for up to 33 million triangles:
- * beyond, the result wraps. `hgrid_bound` answers with an error there.
+ * The argument is evaluated twice. Where `size_t` has 32 bits the result wraps beyond 33 million
+ * triangles; `hgrid_bound` answers with an error there.
  */
 #define HGRID_INDEX_BOUND(triangles) \
     ((triangles) < 224 ? (size_t)177 * (triangles) + 3584 : (size_t)129 * (triangles) + 14336)
 
 /**
  * Bytes of scratch that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. What is said of `HGRID_INDEX_BOUND` holds here, too.
+ * default configuration: a constant expression. The argument is evaluated twice here, too; with 32
+ * bits the result wraps beyond 66 million triangles.
  */
 #define HGRID_SCRATCH_BOUND(triangles) \
     ((triangles) < 129 ? (size_t)41 * (triangles) + 18944 : (size_t)65 * (triangles) + 53568)
 
 /**
  * The same with `HGRID_CONFIG_INIT_ONE_LEVEL`, which wants less for arrays of a fixed size: bytes of
- * index. A scan takes a sixth of it or less.
+ * index. A scan takes a sixth of it or less. With 32 bits the result wraps beyond 50 million
+ * triangles.
  */
 #define HGRID_INDEX_BOUND_ONE_LEVEL(triangles) ((size_t)85 * (triangles) + 1280)
 
@@ -1223,10 +1225,10 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
  * `HGRID_ERROR_INVALID_CELL_SIZE` and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`,
  * `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BRICK` may have left anything in it, so a grid that
- * lay there before is gone. They write as far as the index reaches and then go on counting: the
- * report's `index_bytes` is exact (with brick maybe only enough), and with so many the same call
- * succeeds. A view of a grid that is gone, `grid` itself where a build is repeated, can be asked
- * without harm, but answers anything: set it to `HGRID_GRID_INIT`.
+ * lay there before is gone. A view of it (`grid` itself, where a build is repeated) can be asked
+ * without harm, but answers anything: set it to `HGRID_GRID_INIT`. These methods write as far as the
+ * index reaches and then go on counting: the report's `index_bytes` is exact (with brick maybe only
+ * enough), and with so many the same call succeeds.
  *
  * A build allocates nothing and needs at most 12 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
  * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8
