@@ -48,9 +48,10 @@ impl Machine {
     #[must_use]
     pub fn summary(&self) -> String {
         let cpu = self.cpu.as_deref().unwrap_or("unknown processor");
-        let pages = self.large_pages.as_deref().unwrap_or("unknown");
+        let pages = self.large_pages.as_ref().map(|when| format!(", large pages: {when}"));
+        let pages = pages.unwrap_or_default();
         let Self { system, rustc, date, .. } = self;
-        format!("{cpu} (one thread), {system}, large pages: {pages}, rustc {rustc}, {date}")
+        format!("{cpu} (one thread), {system}{pages}, rustc {rustc}, {date}")
     }
 }
 
@@ -95,7 +96,10 @@ mod tests {
         assert!(machine.rustc.starts_with("1.") && machine.date.starts_with("20"), "{machine:?}");
         assert_eq!(machine.date.len(), 10);
         assert!(machine.summary().contains("one thread"));
-        assert!(machine.summary().contains("large pages: "));
+        let machine = Machine { large_pages: Some("never".to_owned()), ..machine };
+        assert!(machine.summary().contains(", large pages: never, rustc"));
+        let machine = Machine { large_pages: None, ..machine };
+        assert!(!machine.summary().contains("large pages"));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use plotters::prelude::*;
 
 use super::{color, find, names};
 use crate::compare::numbers::Comparison;
+use crate::machine::Machine;
 use crate::plot::{
     Area, AreaResult, Drawing, HEADING, INK, Pen, Scale, Stops, WORDS, Words, centred, chart,
     heading,
@@ -30,7 +31,8 @@ impl Drawing for Figure<'_> {
 
     fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B> {
         let Comparison { machine, scenes, .. } = self.0;
-        let source = machine.summary();
+        // Bytes do not depend on large pages: those of grids are counted in small ones.
+        let source = Machine { large_pages: None, ..machine.clone() }.summary();
         let legend = scenes.iter().zip(0..);
         let legend: Vec<_> =
             legend.map(|(scene, place)| (display_name(&scene.facts.scene), color(place))).collect();
