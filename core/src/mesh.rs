@@ -8,7 +8,7 @@
 //! The last element needs only its own bytes, not its stride. Nothing has to be aligned: every
 //! read goes through bytes, which costs nothing on the machines that matter and removes a rule.
 
-use glam::Vec3A;
+use glam::{Vec3A, Vec4};
 
 use crate::aabb::{Aabb, MAX_COORDINATE};
 use crate::error::{Error, MeshField};
@@ -235,15 +235,42 @@ impl<'a> TriangleMesh<'a> {
     /// The box of all vertices whose coordinates are finite and no larger than
     /// `MAX_COORDINATE`, used or not.
     pub(crate) fn vertex_bounds(&self) -> Aabb {
-        let limit = Vec3A::splat(MAX_COORDINATE);
+        // Four vertices that lie side by side are three vectors: x y z x | y z x y | z x y z.
+        let fours = match self.positions.stride {
+            12 => self.positions.bytes.as_chunks::<48>().0,
+            _ => &[],
+        };
+        let mut low = [Vec4::INFINITY; 3];
+        let mut high = [Vec4::NEG_INFINITY; 3];
         let mut bounds = Aabb::EMPTY;
-        for vertex in 0..self.positions.count {
-            let Some(at) = self.vertex(vertex).map(|[x, y, z]| Vec3A::new(x, y, z)) else { break };
-            if at.abs().cmple(limit).all() {
+        let mut add = |vertex: usize| {
+            let limit = Vec3A::splat(MAX_COORDINATE);
+            let at = self.vertex(vertex).map(|[x, y, z]| Vec3A::new(x, y, z));
+            if let Some(at) = at.filter(|at| at.abs().cmple(limit).all()) {
                 bounds.min = bounds.min.min(at);
                 bounds.max = bounds.max.max(at);
             }
+        };
+        for (four, bytes) in fours.iter().enumerate() {
+            let [a, b, c] = bytemuck::cast::<_, [[f32; 4]; 3]>(*bytes).map(Vec4::from_array);
+            let limit = Vec4::splat(MAX_COORDINATE);
+            let is_inside = a.abs().cmple(limit) & b.abs().cmple(limit) & c.abs().cmple(limit);
+            if is_inside.all() {
+                low = [low[0].min(a), low[1].min(b), low[2].min(c)];
+                high = [high[0].max(a), high[1].max(b), high[2].max(c)];
+            } else {
+                (4 * four..4 * four + 4).for_each(&mut add);
+            }
         }
+        (4 * fours.len()..self.positions.count).for_each(&mut add);
+        let axes = |[a, b, c]: [Vec4; 3]| {
+            let [a, b, c] = [a, b, c].map(|row| row.to_array());
+            let xyz =
+                [[a[0], a[1], a[2]], [a[3], b[0], b[1]], [b[2], b[3], c[0]], [c[1], c[2], c[3]]];
+            xyz.map(Vec3A::from_array)
+        };
+        bounds.min = axes(low).into_iter().fold(bounds.min, Vec3A::min);
+        bounds.max = axes(high).into_iter().fold(bounds.max, Vec3A::max);
         bounds
     }
 
@@ -313,7 +340,26 @@ impl<'a> WideMesh<'a> {
     #[inline(always)]
     pub(crate) fn corners(&self, triangle: u32) -> Option<[&'a [u8; 16]; 3]> {
         let indices: &[u8; 12] = element(self.indices, self.index_stride, triangle)?;
-        let [a, b, c]: [u32; 3] = bytemuck::cast(*indices);
+        self.at(bytemuck::cast(*indices))
+    }
+
+    /// Those of four triangles that follow one another, if all of them can be read this way.
+    #[inline(always)]
+    pub(crate) fn four(&self, first: u32) -> Option<[[&'a [u8; 16]; 3]; 4]> {
+        if self.index_stride == 12 && self.position_stride == 12 {
+            let [a, b, c, d]: [[u32; 3]; 4] =
+                bytemuck::cast(*element::<48>(self.indices, 12, first)?);
+            let vertex = |index| element(self.positions, 12, index);
+            let at = |[a, b, c]: [u32; 3]| Some([vertex(a)?, vertex(b)?, vertex(c)?]);
+            return Some([at(a)?, at(b)?, at(c)?, at(d)?]);
+        }
+        let at = |place| self.corners(first.checked_add(place)?);
+        Some([at(0)?, at(1)?, at(2)?, at(3)?])
+    }
+
+    /// Vertices, each with the four bytes behind it.
+    #[inline(always)]
+    fn at(&self, [a, b, c]: [u32; 3]) -> Option<[&'a [u8; 16]; 3]> {
         let vertex = |index| element(self.positions, self.position_stride, index);
         Some([vertex(a)?, vertex(b)?, vertex(c)?])
     }
@@ -326,4 +372,45 @@ fn element<const N: usize>(bytes: &[u8], stride: u16, index: u32) -> Option<&[u8
     let start = (index as usize).checked_mul(usize::from(stride))?;
     let end = start.checked_add(N)?;
     bytes.get(start..end)?.first_chunk()
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::ray::round;
+
+    #[test]
+    fn the_box_of_vertices_is_that_of_one_after_the_other() {
+        let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, MAX_COORDINATE.next_up()];
+        for count in 0..14_u8 {
+            // All are good, or one coordinate of one is not; the extremes are at any of them.
+            for bad in 0..=3 * usize::from(count) {
+                let mut positions: Vec<[f32; 3]> = (0..count)
+                    .map(|at| [7, 5, 11].map(|step| round(f64::from(at * step % 13) - 6.0)))
+                    .collect();
+                if let Some(number) = positions.as_flattened_mut().get_mut(bad) {
+                    *number = odd[bad % 4];
+                }
+                let is_good = |p: &&[f32; 3]| p.iter().all(|c| c.abs() <= MAX_COORDINATE);
+                let expected = positions.iter().filter(is_good).fold(Aabb::EMPTY, |bounds, &p| {
+                    let at = Vec3A::from_array(p);
+                    bounds.union(&Aabb { min: at, max: at })
+                });
+
+                for stride in [12, 16, 20] {
+                    let mut bytes = Vec::new();
+                    for (at, position) in positions.iter().enumerate() {
+                        bytes.resize(at * stride, 0xff);
+                        bytes.extend_from_slice(bytemuck::bytes_of(position));
+                    }
+                    let vertices = Strided { bytes: &bytes, stride, count: positions.len() };
+                    let none = Strided { bytes: &[], stride: 12, count: 0 };
+                    let mesh = TriangleMesh::strided(vertices, none, IndexType::U32).unwrap();
+                    assert_eq!(mesh.vertex_bounds(), expected, "{stride} {positions:?}");
+                }
+            }
+        }
+    }
 }

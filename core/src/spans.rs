@@ -7,11 +7,11 @@
 //! nothing of the next triangles should have to be done again.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
+use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 
 use crate::aabb::MAX_COORDINATE;
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
-use crate::eight::{LANES, Row, corner, join, load};
+use crate::eight::{Row, corner, join, load};
 use crate::mesh::WideMesh;
 
 /// The first and the last cell of eight triangles on an axis.
@@ -49,13 +49,11 @@ impl<S: Simd> Spans<S> {
         mesh: &WideMesh<'_>,
         first: u32,
     ) -> ([Span<S>; 3], mask32x8<S>) {
-        /// No number, for a triangle that is not there or cannot be read.
-        const NONE: Row = [0xff; 16];
-        let row = |lane: u32| mesh.corners(first.wrapping_add(lane)).unwrap_or([&NONE; 3]);
-        let rows = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)];
-        let a = Corners::load(simd, &rows, 0);
-        let b = Corners::load(simd, &rows, 1);
-        let c = Corners::load(simd, &rows, 2);
+        let low = four(simd, mesh, first);
+        let high = four(simd, mesh, first.wrapping_add(4));
+        let a = Corners::join(low[0], high[0]);
+        let b = Corners::join(low[1], high[1]);
+        let c = Corners::join(low[2], high[2]);
         let limit = u32x8::splat(simd, MAX_COORDINATE.to_bits());
         let is_finite = a.largest().max(b.largest()).max(c.largest()).simd_le(limit);
         let [x, y, z] = &self.axes;
@@ -63,6 +61,40 @@ impl<S: Simd> Spans<S> {
             [x.span(simd, a.x, b.x, c.x), y.span(simd, a.y, b.y, c.y), z.span(simd, a.z, b.z, c.z)];
         (spans, is_finite)
     }
+}
+
+/// The corners of four triangles that follow one another, by corner and axis.
+#[inline(always)]
+fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4<S>; 3]; 3] {
+    if let Some([a, b, c, d]) = mesh.four(first) {
+        let row = |row: &Row| load(simd, row);
+        return [
+            corner([row(a[0]), row(b[0]), row(c[0]), row(d[0])]),
+            corner([row(a[1]), row(b[1]), row(c[1]), row(d[1])]),
+            corner([row(a[2]), row(b[2]), row(c[2]), row(d[2])]),
+        ];
+    }
+    let rows = read(mesh, first);
+    let row = |at: usize, lane: usize| load(simd, &rows[at][lane]);
+    [
+        corner([row(0, 0), row(0, 1), row(0, 2), row(0, 3)]),
+        corner([row(1, 0), row(1, 1), row(1, 2), row(1, 3)]),
+        corner([row(2, 0), row(2, 1), row(2, 2), row(2, 3)]),
+    ]
+}
+
+/// No numbers for those of four triangles that are not there or cannot be read.
+#[cold]
+#[inline(never)]
+fn read(mesh: &WideMesh<'_>, first: u32) -> [[Row; 4]; 3] {
+    let mut rows = [[[0xff; 16]; 4]; 3];
+    for (lane, place) in (0..4).enumerate() {
+        let Some(corners) = mesh.corners(first.wrapping_add(place)) else { continue };
+        for (rows, corner) in rows.iter_mut().zip(corners) {
+            rows[lane] = *corner;
+        }
+    }
+    rows
 }
 
 /// What takes coordinates on one axis to cells.
@@ -111,11 +143,8 @@ struct Corners<S: Simd> {
 
 impl<S: Simd> Corners<S> {
     #[inline(always)]
-    fn load(simd: S, rows: &[[&Row; 3]; LANES], at: usize) -> Self {
-        let [a, b, c, d, e, f, g, h] = rows;
-        let low = [load(simd, a[at]), load(simd, b[at]), load(simd, c[at]), load(simd, d[at])];
-        let high = [load(simd, e[at]), load(simd, f[at]), load(simd, g[at]), load(simd, h[at])];
-        let [x, y, z] = join(corner(low), corner(high));
+    fn join(low: [f32x4<S>; 3], high: [f32x4<S>; 3]) -> Self {
+        let [x, y, z] = join(low, high);
         Self { x, y, z }
     }
 
@@ -140,6 +169,7 @@ mod tests {
     use super::*;
     use crate::aabb::Aabb;
     use crate::cell::CellRange;
+    use crate::eight::LANES;
     use crate::mesh::TriangleMesh;
     use crate::simd::{Kernel, SimdLevel, dispatch};
 

@@ -110,7 +110,8 @@ mod with_atomics {
         /// Writes words that lie there, if they do.
         #[inline(always)]
         pub(crate) fn set<const N: usize>(&self, at: u32, words: [u32; N]) {
-            let slots = self.0.get(at as usize..).and_then(<[_]>::first_chunk::<N>);
+            let end = (at as usize).checked_add(N);
+            let slots = end.and_then(|end| self.0.get(at as usize..end));
             for (slot, word) in slots.into_iter().flatten().zip(words) {
                 slot.store(word, Ordering::Relaxed);
             }
@@ -169,7 +170,8 @@ mod without_atomics {
         /// Writes words that lie there, if they do.
         #[inline(always)]
         pub(crate) fn set<const N: usize>(&self, at: u32, words: [u32; N]) {
-            let slots = self.0.get(at as usize..).and_then(<[_]>::first_chunk::<N>);
+            let end = (at as usize).checked_add(N);
+            let slots = end.and_then(|end| self.0.get(at as usize..end));
             for (slot, word) in slots.into_iter().flatten().zip(words) {
                 slot.set(word);
             }

@@ -199,6 +199,12 @@ impl Entry {
         self.cells >> GROUP
     }
 
+    /// How many lists it is in, if its group says so.
+    #[inline(always)]
+    pub(super) const fn lists(self) -> u64 {
+        1 << (self.group() & 7).count_ones()
+    }
+
     /// The number of the first cell.
     #[inline(always)]
     pub(super) const fn min(self) -> u32 {

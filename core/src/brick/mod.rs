@@ -30,6 +30,7 @@ mod halves;
 mod hits;
 mod layout;
 mod pass;
+mod places;
 mod pool;
 mod size;
 mod sort;

@@ -1,30 +1,31 @@
 //! The pass over the triangles, twice: once to count the entries of each block, once to write them.
 //!
 //! Almost all triangles lie in at most two cells an axis, and most of these in one block. For them
-//! everything is done in vectors; what is larger, or has no number, is looked at once more.
+//! everything is done in vectors ([`places`](super::places)); what is larger, or has no number, is
+//! looked at once more.
 
 #![expect(
     clippy::cast_possible_truncation,
-    reason = "the few triangles of a batch, the two words of an entry"
+    reason = "the few triangles of a batch, the words of entries"
 )]
 
 use core::ops::Range;
 
-use fearless_simd::prelude::*;
-use fearless_simd::{Simd, u32x8};
+use fearless_simd::Simd;
 use glam::{Vec3A, Vec4};
 
 use super::frame::{classify, lists, range};
-use super::halves::{Format, Halves, ID_BITS};
-use super::layout::{BLOCK, Class, Entry, GROUP};
+use super::halves::{Format, Halves};
+use super::layout::{BLOCK, Class, Entry};
+use super::places::{BATCH, Places, straddling};
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, Lattice};
 use crate::config::BuildFlags;
 use crate::eight::LANES;
 use crate::error::Error;
-use crate::mesh::{TriangleMesh, WideMesh};
+use crate::mesh::TriangleMesh;
 use crate::simd::{Kernel, SimdLevel, dispatch};
-use crate::spans::{Span, Spans};
+use crate::spans::Spans;
 use crate::tasks::Shared;
 
 /// What the mesh will be in its blocks.
@@ -125,8 +126,11 @@ trait Visit {
     /// An entry of a block.
     fn entry(&mut self, block: usize, entry: Entry);
 
-    /// All entries of a triangle that so many lists take.
-    fn listed(&mut self, references: u64);
+    /// Eight entries of one block.
+    fn run(&mut self, block: usize, entries: [Entry; LANES]);
+
+    /// So many entries, and in how many lists their triangles will be.
+    fn listed(&mut self, entries: u64, references: u64);
 
     /// A triangle for the list of the grid.
     fn large(&mut self, id: u32);
@@ -135,102 +139,9 @@ trait Visit {
     fn skipped(&mut self, id: u32) -> Result<(), Error>;
 }
 
-/// Triangles whose places are found before any of them is visited.
-///
-/// In between nothing is called, so that all constants stay in vector registers.
-const BATCH: usize = 64;
-/// The first of three bits above the group of simple triangles.
-const STRADDLES: u32 = GROUP + 3;
-/// The bits of a block's number, above which there is room.
-const BLOCK_BITS: u32 = (1 << 24) - 1;
-
-/// Where the triangles of a batch lie.
-struct Places {
-    /// The number of the first block, and above it the halves.
-    blocks: [[u32; LANES]; BATCH / LANES],
-    /// The cells, as an entry has them, and above them the axes on which the second one is in the
-    /// next block.
-    cells: [[u32; LANES]; BATCH / LANES],
-    /// Which of them are in at most two cells an axis. The others are not found.
-    simple: u64,
-}
-
-/// First and last halves of cells on an axis, and the cells.
-#[derive(Clone, Copy)]
-struct Cells<S: Simd> {
-    halves: Span<S>,
-    min: u32x8<S>,
-    max: u32x8<S>,
-}
-
-impl<S: Simd> Cells<S> {
-    #[inline(always)]
-    fn of(halves: Span<S>) -> Self {
-        Self { halves, min: halves.first >> 1, max: halves.last >> 1 }
-    }
-
-    /// Whether the second cell is in the next block: the lowest bit of
-    /// the block's number then differs.
-    #[inline(always)]
-    fn straddles(self) -> u32x8<S> {
-        ((self.min ^ self.max) >> 4) & 1
-    }
-
-    /// What the axis adds to the cells of an entry, if it is x: at either end two bits for the
-    /// brick and two for the cell in it.
-    #[inline(always)]
-    fn inside(self) -> u32x8<S> {
-        let ends = (self.min & 15) | ((self.max & 15) << 12);
-        (ends & 0x3003) | ((ends & 0xc00c) << 4)
-    }
-
-    /// What the axis adds to the group of an entry, if it is x.
-    #[inline(always)]
-    fn group(self) -> u32x8<S> {
-        (self.max - self.min) << GROUP
-    }
-}
-
-/// The bits of [`Halves`], from the last one to the first.
-#[inline(always)]
-fn halves<S: Simd>([x, y, z]: [Cells<S>; 3]) -> u32x8<S> {
-    let [x, y, z] = [x.halves, y.halves, z.halves];
-    let mut bits = !z.last & 1;
-    for half in [!y.last, !x.last, z.first, y.first, x.first] {
-        bits = (bits << 1) | (half & 1);
-    }
-    bits
-}
-
-/// The places of eight triangles: blocks, cells, and whether they are simple.
-///
-/// What works on vectors is a function of its own, always inlined: closures and arrays' own
-/// functions are not, and what is not inlined is not compiled for the level.
-#[inline(always)]
-fn places<S: Simd, const HALVES: bool>(
-    simd: S,
-    spans: &Spans<S>,
-    [width, height, _]: [u32; 3],
-    mesh: &WideMesh<'_>,
-    first: u32,
-) -> ([u32; LANES], [u32; LANES], u64) {
-    let ([x, y, z], is_finite) = spans.of(simd, mesh, first);
-    let [x, y, z] = [Cells::of(x), Cells::of(y), Cells::of(z)];
-    let steps = (x.max - x.min) | (y.max - y.min) | (z.max - z.min);
-    let is_simple = steps.simd_le(u32x8::splat(simd, 1)) & is_finite;
-
-    let block = (x.min >> 4) + ((y.min >> 4) + (z.min >> 4) * height) * width;
-    let block = if HALVES { block | (halves([x, y, z]) << ID_BITS) } else { block };
-    let ends = x.inside() | (y.inside() << 2) | (z.inside() << 4);
-    let group = x.group() | (y.group() << 1) | (z.group() << 2);
-    let straddles = x.straddles() | (y.straddles() << 1) | (z.straddles() << 2);
-    let cells = ends | group | (straddles << STRADDLES);
-    (block.into(), cells.into(), is_simple.to_bitmask())
-}
-
 /// Visits the entries of triangles.
 #[inline(always)]
-fn visit<S: Simd, V: Visit, const HALVES: bool>(
+fn visit<S: Simd, V: Visit, const ENTRIES: bool>(
     simd: S,
     ground: &Ground<'_>,
     ids: Range<u32>,
@@ -241,40 +152,40 @@ fn visit<S: Simd, V: Visit, const HALVES: bool>(
     let wide = ground.mesh.wide();
     let [x, y, z] = [1, ground.blocks[0], ground.blocks[0] * ground.blocks[1]];
     let offsets = [0, x, y, x + y, z, x + z, y + z, x + y + z];
-    let mut batch = Places { blocks: Default::default(), cells: Default::default(), simple: 0 };
+    let mut batch = Places::NONE;
     let mut first = ids.start;
     while first < ids.end {
-        batch.simple = 0;
-        let slots = batch.blocks.iter_mut().zip(&mut batch.cells);
-        for (at, (blocks, cells)) in (0_u32..).step_by(LANES).zip(slots) {
-            let first = first.wrapping_add(at);
-            let simple;
-            (*blocks, *cells, simple) =
-                places::<S, HALVES>(simd, &spans, ground.blocks, &wide, first);
-            batch.simple |= simple << at;
-        }
+        let count = (ids.end - first).min(BATCH);
+        batch.find::<S, ENTRIES>(simd, &spans, ground.blocks, &wide, first, count);
+        batch.find_runs(simd);
+        visitor.listed(batch.plain.count_ones().into(), batch.lists.into());
 
-        let count = (ids.end - first).min(BATCH as u32);
-        let found = batch.blocks.as_flattened().iter().zip(batch.cells.as_flattened());
-        for (at, (&block, &cells)) in (0..count).zip(found) {
+        let mut at = 0;
+        while at < count {
             let id = first + at;
-            if batch.simple >> at & 1 == 0 {
+            if batch.runs >> at & 1 == 1 {
+                visitor.run(batch.block(at), batch.eight(at, id, format));
+                at += LANES as u32;
+                continue;
+            }
+            let (block, entry) = (batch.block(at), batch.entry(at, id, format));
+            let (is_plain, is_simple) = (batch.plain >> at & 1 == 1, batch.simple >> at & 1 == 1);
+            at += 1;
+            if is_plain {
+                visitor.entry(block, entry);
+                continue;
+            }
+            if !is_simple {
                 visit_any(simd, ground, id, visitor)?;
                 continue;
             }
-            let straddles = cells >> STRADDLES;
-            visitor.listed(1 << (cells >> GROUP & 7).count_ones());
-            let (word, block) = (id | block & format.halves(), block & BLOCK_BITS);
-            if straddles == 0 {
-                visitor.entry(block as usize, Entry::of(word, cells));
-                continue;
-            }
             // Each of its blocks: those on the far side of the axes of every subset.
-            let entry = Entry::of(word, cells & !(7 << STRADDLES));
+            let (entry, straddles) = straddling(entry);
+            visitor.listed(1 << straddles.count_ones(), entry.lists());
             let mut far = 0;
             loop {
-                let offset = offsets.get(far as usize).copied().unwrap_or(0);
-                visitor.entry((block + offset) as usize, entry.beside(straddles, far, format));
+                let offset = offsets.get(far as usize).copied().unwrap_or(0) as usize;
+                visitor.entry(block + offset, entry.beside(straddles, far, format));
                 if far == straddles {
                     break;
                 }
@@ -313,8 +224,9 @@ fn visit_any<S: Simd>(
                 visitor.large(id);
                 return Ok(());
             };
-            visitor.listed(lists(min, max, class.shift()));
             let (low, high) = (min.map(|cell| cell / BLOCK), max.map(|cell| cell / BLOCK));
+            let blocks = CellRange { min: low, max: high };
+            visitor.listed(blocks.count(), lists(min, max, class.shift()));
             for z in low[2]..=high[2] {
                 let on_z = home.along(2, z);
                 for y in low[1]..=high[1] {
@@ -368,14 +280,21 @@ struct Counting<'h> {
 impl Visit for Counting<'_> {
     #[inline(always)]
     fn entry(&mut self, block: usize, _: Entry) {
-        self.census.entries += 1;
         if let Some(count) = self.heads.get_mut(block) {
             *count += 1;
         }
     }
 
     #[inline(always)]
-    fn listed(&mut self, references: u64) {
+    fn run(&mut self, block: usize, _: [Entry; LANES]) {
+        if let Some(count) = self.heads.get_mut(block) {
+            *count += LANES as u32;
+        }
+    }
+
+    #[inline(always)]
+    fn listed(&mut self, entries: u64, references: u64) {
+        self.census.entries += entries;
         self.census.references += references;
     }
 
@@ -427,14 +346,26 @@ impl Visit for Scatter<'_, '_> {
     #[inline(always)]
     fn entry(&mut self, block: usize, entry: Entry) {
         if let Some(head) = self.heads.get_mut(block) {
-            let words = entry.words();
-            self.words.set(*head, words);
-            *head = head.wrapping_add(words.len() as u32);
+            let (at, words) = (*head, entry.words());
+            *head = at.wrapping_add(words.len() as u32);
+            self.words.set(at, words);
         }
     }
 
     #[inline(always)]
-    fn listed(&mut self, _: u64) {}
+    fn run(&mut self, block: usize, [a, b, c, d, e, f, g, h]: [Entry; LANES]) {
+        if let Some(head) = self.heads.get_mut(block) {
+            let ([a, i], [b, j], [c, k], [d, l]) = (a.words(), b.words(), c.words(), d.words());
+            let ([e, m], [f, n], [g, o], [h, p]) = (e.words(), f.words(), g.words(), h.words());
+            let words = [a, i, b, j, c, k, d, l, e, m, f, n, g, o, h, p];
+            let at = *head;
+            *head = at.wrapping_add(words.len() as u32);
+            self.words.set(at, words);
+        }
+    }
+
+    #[inline(always)]
+    fn listed(&mut self, _: u64, _: u64) {}
 
     fn large(&mut self, id: u32) {
         self.words.set(self.large, [id]);

@@ -1,0 +1,196 @@
+//! Where the triangles of a batch lie: what a pass finds before it visits any of them.
+//!
+//! ```text
+//! block  | the halves of the first and the last cell | number of the block of the first cell |
+//! cells  | straddles: on which axes the last cell is in the next block | cells, as an entry has them |
+//! ```
+//!
+//! In between nothing is called, so that all constants stay in vector registers, and nothing is
+//! decided: how many cells and blocks a triangle has is as good as random.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, u32x8};
+
+use super::halves::{Format, ID_BITS};
+use super::layout::{Entry, GROUP};
+use crate::eight::LANES;
+use crate::mesh::WideMesh;
+use crate::spans::{Span, Spans};
+
+/// Triangles of a batch.
+pub(super) const BATCH: u32 = 64;
+const ROWS: usize = BATCH as usize / LANES;
+/// The first of three bits above the group of simple triangles.
+const STRADDLES: u32 = GROUP + 3;
+/// The bits of a block's number, above which there is room.
+const BLOCK_BITS: u32 = (1 << 24) - 1;
+
+/// Where the triangles of a batch lie.
+pub(super) struct Places {
+    blocks: [[u32; LANES]; ROWS],
+    cells: [[u32; LANES]; ROWS],
+    /// Which of them are in at most two cells an axis. The others are not found.
+    pub(super) simple: u64,
+    /// Which of these are in one block; none in a batch that is not full.
+    pub(super) plain: u64,
+    /// Which eights are plain and in the same block: bits of their first triangles.
+    pub(super) runs: u64,
+    /// How many lists the plain ones will be in.
+    pub(super) lists: u32,
+}
+
+/// First and last halves of cells on an axis, and the cells.
+#[derive(Clone, Copy)]
+struct Cells<S: Simd> {
+    halves: Span<S>,
+    min: u32x8<S>,
+    max: u32x8<S>,
+}
+
+impl<S: Simd> Cells<S> {
+    #[inline(always)]
+    fn of(halves: Span<S>) -> Self {
+        Self { halves, min: halves.first >> 1, max: halves.last >> 1 }
+    }
+
+    /// Whether the second cell is in the next block: the lowest bit of
+    /// the block's number then differs.
+    #[inline(always)]
+    fn straddles(self) -> u32x8<S> {
+        ((self.min ^ self.max) >> 4) & 1
+    }
+
+    /// What the axis adds to the cells of an entry, if it is x: at either end two bits for the
+    /// brick and two for the cell in it.
+    #[inline(always)]
+    fn inside(self) -> u32x8<S> {
+        let ends = (self.min & 15) | ((self.max & 15) << 12);
+        (ends & 0x3003) | ((ends & 0xc00c) << 4)
+    }
+}
+
+/// The bits of [`Halves`](super::halves::Halves), from the last one to the first.
+#[inline(always)]
+fn halves<S: Simd>([x, y, z]: [Cells<S>; 3]) -> u32x8<S> {
+    let [x, y, z] = [x.halves, y.halves, z.halves];
+    let mut bits = !z.last & 1;
+    for half in [!y.last, !x.last, z.first, y.first, x.first] {
+        bits = (bits << 1) | (half & 1);
+    }
+    bits
+}
+
+/// An entry of a straddling triangle for all of its blocks, and the axes on which it straddles.
+#[inline(always)]
+pub(super) const fn straddling(entry: Entry) -> (Entry, u32) {
+    let [id, cells] = entry.words();
+    (Entry::of(id, cells & !(7 << STRADDLES)), cells >> STRADDLES)
+}
+
+impl Places {
+    /// Of no triangles.
+    pub(super) const NONE: Self = Self {
+        blocks: [[0; LANES]; ROWS],
+        cells: [[0; LANES]; ROWS],
+        simple: 0,
+        plain: 0,
+        runs: 0,
+        lists: 0,
+    };
+
+    /// Finds the places of `count` triangles from `first` on; who only counts `ENTRIES`
+    /// learns nothing of the cells inside their blocks.
+    ///
+    /// What works on vectors is a function, always inlined: closures and arrays' own
+    /// functions are not, and what is not inlined is not compiled for the level.
+    #[inline(always)]
+    pub(super) fn find<S: Simd, const ENTRIES: bool>(
+        &mut self,
+        simd: S,
+        spans: &Spans<S>,
+        [width, height, _]: [u32; 3],
+        mesh: &WideMesh<'_>,
+        first: u32,
+        count: u32,
+    ) {
+        (self.simple, self.plain) = (0, 0);
+        let none = u32x8::splat(simd, 0);
+        let mut sum = none;
+        let rows = self.blocks.iter_mut().zip(&mut self.cells);
+        for (at, (blocks, cells)) in (0_u32..).step_by(LANES).zip(rows) {
+            let ([x, y, z], is_finite) = spans.of(simd, mesh, first.wrapping_add(at));
+            let [x, y, z] = [Cells::of(x), Cells::of(y), Cells::of(z)];
+            let [two_x, two_y, two_z] = [x.max - x.min, y.max - y.min, z.max - z.min];
+            let is_simple = (two_x | two_y | two_z).simd_le(u32x8::splat(simd, 1)) & is_finite;
+            let straddles = x.straddles() | (y.straddles() << 1) | (z.straddles() << 2);
+            let is_plain = straddles.simd_eq(none) & is_simple;
+
+            let block = (x.min >> 4) + ((y.min >> 4) + (z.min >> 4) * height) * width;
+            let group = two_x | (two_y << 1) | (two_z << 2);
+            let place = (group << GROUP) | (straddles << STRADDLES);
+            if ENTRIES {
+                let ends = x.inside() | (y.inside() << 2) | (z.inside() << 4);
+                *blocks = (block | (halves([x, y, z]) << ID_BITS)).into();
+                *cells = (place | ends).into();
+            } else {
+                (*blocks, *cells) = (block.into(), place.into());
+            }
+
+            // Twice as many lists for each axis with two cells.
+            let lists = two_x + 1;
+            let lists = lists + (lists & (none - two_y));
+            let lists = lists + (lists & (none - two_z));
+            sum += is_plain.select(lists, none);
+            self.simple |= is_simple.to_bitmask() << at;
+            self.plain |= is_plain.to_bitmask() << at;
+        }
+        let sum: [u32; LANES] = sum.into();
+        self.lists = sum.iter().sum();
+        if count < BATCH {
+            // Those behind the last one are in the sum.
+            (self.plain, self.lists) = (0, 0);
+        }
+    }
+
+    /// Finds runs, where there are many: elsewhere, a branch for them costs more than they save.
+    ///
+    /// Triangles that follow one another are often in the same block, and each waits for the count
+    /// of the one before it.
+    #[inline(always)]
+    pub(super) fn find_runs<S: Simd>(&mut self, simd: S) {
+        const MANY: usize = ROWS * 3 / 4;
+        self.runs = 0;
+        let is_likely = |row: &&[u32; LANES]| (row[0] ^ row[LANES - 1]) & BLOCK_BITS == 0;
+        if self.blocks.iter().filter(is_likely).count() < MANY {
+            return;
+        }
+        for (at, row) in (0_u32..).step_by(LANES).zip(&self.blocks) {
+            let blocks = u32x8::simd_from(simd, *row) & BLOCK_BITS;
+            let is_same = blocks.simd_eq(u32x8::splat(simd, row[0] & BLOCK_BITS));
+            let is_run = is_same.to_bitmask() & self.plain >> at & 0xff == 0xff;
+            self.runs |= u64::from(is_run) << at;
+        }
+    }
+
+    /// The first block of a triangle.
+    #[inline(always)]
+    pub(super) fn block(&self, at: u32) -> usize {
+        let block = self.blocks.as_flattened()[(at % BATCH) as usize];
+        (block & BLOCK_BITS) as usize
+    }
+
+    /// The entry of a triangle, if it is in one block.
+    #[inline(always)]
+    pub(super) fn entry(&self, at: u32, id: u32, format: Format) -> Entry {
+        let at = (at % BATCH) as usize;
+        let (block, cells) = (self.blocks.as_flattened()[at], self.cells.as_flattened()[at]);
+        Entry::of(id | block & format.halves(), cells)
+    }
+
+    /// The entries of a run.
+    #[inline(always)]
+    pub(super) fn eight(&self, at: u32, id: u32, format: Format) -> [Entry; LANES] {
+        let entry = |lane| self.entry(at + lane, id + lane, format);
+        [entry(0), entry(1), entry(2), entry(3), entry(4), entry(5), entry(6), entry(7)]
+    }
+}
