@@ -8,7 +8,7 @@
 //! Both do for every ray and triangle what [`TriangleTest`] does, so hits have the same bits.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, f32x16, f64x4, mask32x8, mask64x4, u32x4, u32x8};
+use fearless_simd::{Simd, f32x4, f32x8, f32x16, f64x8, mask32x8, mask64x8, u32x4, u32x8};
 
 use super::bundle::{Bundle, PerRay, RAYS, WIDTH, row_of};
 use super::frusta::Frusta;
@@ -300,17 +300,22 @@ impl Hits {
         survivors: u64,
     ) -> u64 {
         let row = |array: &PerRay| f32x8::simd_from(simd, part_of(array, first / PART));
-        let corner = |at: usize| f32x8::simd_from(simd, part_of(&corners[at], first / PART));
-        let (ax, ay) = (corner(0).widen(), corner(1).widen());
-        let (bx, by) = (corner(2).widen(), corner(3).widen());
-        let (cx, cy) = (corner(4).widen(), corner(5).widen());
-        let origin = row(&bundle.origin[z]).widen();
-        let direction = row(&bundle.aim[2]).widen();
-        let low = [ax.0, ay.0, bx.0, by.0, cx.0, cy.0];
-        let low = Four::of(low, depths, origin.0, direction.0);
-        let high = [ax.1, ay.1, bx.1, by.1, cx.1, cy.1];
-        let high = Four::of(high, depths, origin.1, direction.1);
-        let t = low.t.narrow(high.t);
+        let wide = |row: f32x8<S>| {
+            let (low, high) = row.widen();
+            low.combine(high)
+        };
+        let corner = |at: usize| wide(f32x8::simd_from(simd, part_of(&corners[at], first / PART)));
+        let corners = [corner(0), corner(1), corner(2), corner(3), corner(4), corner(5)];
+        let origin = wide(row(&bundle.origin[z]));
+        let direction = wide(row(&bundle.aim[2]));
+        let Sides { outside, weights: [second, third], t } =
+            Sides::of(corners, depths, origin, direction);
+        let narrow = |wide: f64x8<S>| {
+            let (low, high) = wide.split();
+            low.narrow(high)
+        };
+        let t = narrow(t);
+        let survivors = survivors & !outside.to_bitmask();
 
         // Take what is closer. Read all before anything is written, and write first what needs no
         // choice: or the compiler makes masked stores (core/DESIGN.md).
@@ -319,11 +324,11 @@ impl Hits {
         let new_id = u32x8::splat(simd, id);
         let is_closer = t.simd_lt(best_t) | (t.simd_le(best_t) & new_id.simd_lt(best_id));
         let is_hit = t.simd_ge(row(&bundle.t_min)) & t.abs().simd_lt(f32::INFINITY);
-        let taken = is_hit & is_closer & !low.outside.narrow(high.outside);
+        let taken = is_hit & is_closer;
         let taken = taken & mask32x8::from_bitmask(simd, survivors);
         let t = taken.select(t, best_t);
-        let u = taken.select(low.weights[0].narrow(high.weights[0]), best_u);
-        let v = taken.select(low.weights[1].narrow(high.weights[1]), best_v);
+        let u = taken.select(narrow(second), best_u);
+        let v = taken.select(narrow(third), best_v);
         let end = row(&bundle.zero) + row(&bundle.speed) * t + bundle.margin;
         *part_mut(&mut bundle.to, first / PART) = end.into();
         *part_mut(&mut bundle.t_max, first / PART) = t.into();
@@ -334,22 +339,22 @@ impl Hits {
     }
 }
 
-/// Where four rays meet a triangle.
-struct Four<S: Simd> {
+/// Where eight rays meet a triangle.
+struct Sides<S: Simd> {
     /// Whether two edge functions have opposite signs.
-    outside: mask64x4<S>,
+    outside: mask64x8<S>,
     /// The weights of the second corner and of the third.
-    weights: [f64x4<S>; 2],
-    t: f64x4<S>,
+    weights: [f64x8<S>; 2],
+    t: f64x8<S>,
 }
 
-impl<S: Simd> Four<S> {
+impl<S: Simd> Sides<S> {
     #[inline(always)]
     fn of(
-        [ax, ay, bx, by, cx, cy]: [f64x4<S>; 6],
+        [ax, ay, bx, by, cx, cy]: [f64x8<S>; 6],
         [a, b, c]: [f64; 3],
-        origin: f64x4<S>,
-        direction: f64x4<S>,
+        origin: f64x8<S>,
+        direction: f64x8<S>,
     ) -> Self {
         // The edge functions again: exact products, so the signs are exact.
         let u = cx * by - cy * bx;
