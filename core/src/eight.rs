@@ -94,13 +94,18 @@ fn four<S: Simd>(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; 4]) -> ([[f32x4<S>
         return (corners, 0xf);
     }
     let (rows, used) = read(mesh, ids);
-    let row = |corner: usize, lane: usize| load(simd, &rows[corner][lane]);
-    let corners = [
+    (corners_of(simd, &rows), used)
+}
+
+/// The corners of four triangles, by corner and axis, from their rows.
+#[inline(always)]
+pub(crate) fn corners_of<S: Simd>(simd: S, rows: &[[Row; 4]; 3]) -> [[f32x4<S>; 3]; 3] {
+    let row = |at: usize, lane: usize| load(simd, &rows[at][lane]);
+    [
         corner([row(0, 0), row(0, 1), row(0, 2), row(0, 3)]),
         corner([row(1, 0), row(1, 1), row(1, 2), row(1, 3)]),
         corner([row(2, 0), row(2, 1), row(2, 2), row(2, 3)]),
-    ];
-    (corners, used)
+    ]
 }
 
 /// x, y and z of four vertices.

@@ -340,32 +340,32 @@ impl<'a> WideMesh<'a> {
     #[inline(always)]
     pub(crate) fn corners(&self, triangle: u32) -> Option<[&'a [u8; 16]; 3]> {
         let indices: &[u8; 12] = element(self.indices, self.index_stride, triangle)?;
-        self.at(bytemuck::cast(*indices))
+        self.vertices(self.position_stride, bytemuck::cast(*indices))
     }
 
     /// Those of four triangles that follow one another, if all of them can be read this way.
     #[inline(always)]
     pub(crate) fn four(&self, first: u32) -> Option<[[&'a [u8; 16]; 3]; 4]> {
-        if self.index_stride == 12 && self.position_stride == 12 {
-            let [a, b, c, d]: [[u32; 3]; 4] =
-                bytemuck::cast(*element::<48>(self.indices, 12, first)?);
-            let vertex = |index| element(self.positions, 12, index);
-            let at = |[a, b, c]: [u32; 3]| Some([vertex(a)?, vertex(b)?, vertex(c)?]);
-            return Some([at(a)?, at(b)?, at(c)?, at(d)?]);
+        // What most meshes have: one load of indices, and products that the compiler knows.
+        if (self.index_stride, self.position_stride) == (12, 12) {
+            let indices: &[u8; 48] = element(self.indices, 12, first)?;
+            let [a, b, c, d]: [[u32; 3]; 4] = bytemuck::cast(*indices);
+            let corners = |vertices| self.vertices(12, vertices);
+            return Some([corners(a)?, corners(b)?, corners(c)?, corners(d)?]);
         }
-        let at = |place| self.corners(first.checked_add(place)?);
-        Some([at(0)?, at(1)?, at(2)?, at(3)?])
+        let corners = |place| self.corners(first.wrapping_add(place));
+        Some([corners(0)?, corners(1)?, corners(2)?, corners(3)?])
     }
 
     /// Vertices, each with the four bytes behind it.
     #[inline(always)]
-    fn at(&self, [a, b, c]: [u32; 3]) -> Option<[&'a [u8; 16]; 3]> {
-        let vertex = |index| element(self.positions, self.position_stride, index);
+    fn vertices(&self, stride: u16, [a, b, c]: [u32; 3]) -> Option<[&'a [u8; 16]; 3]> {
+        let vertex = |index| element(self.positions, stride, index);
         Some([vertex(a)?, vertex(b)?, vertex(c)?])
     }
 }
 
-/// The first `N` bytes of an element, at most 2^16.
+/// `N` bytes from where an element starts, if all of them are there.
 #[inline(always)]
 fn element<const N: usize>(bytes: &[u8], stride: u16, index: u32) -> Option<&[u8; N]> {
     // Not checked where pointers have 64 bits: the compiler sees that these two cannot overflow.

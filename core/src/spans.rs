@@ -11,7 +11,7 @@ use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 
 use crate::aabb::MAX_COORDINATE;
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
-use crate::eight::{Row, corner, join, load};
+use crate::eight::{Row, corner, corners_of, join, load};
 use crate::mesh::WideMesh;
 
 /// The first and the last cell of eight triangles on an axis.
@@ -74,24 +74,18 @@ fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4<S>; 3]; 3]
             corner([row(a[2]), row(b[2]), row(c[2]), row(d[2])]),
         ];
     }
-    let rows = read(mesh, first);
-    let row = |at: usize, lane: usize| load(simd, &rows[at][lane]);
-    [
-        corner([row(0, 0), row(0, 1), row(0, 2), row(0, 3)]),
-        corner([row(1, 0), row(1, 1), row(1, 2), row(1, 3)]),
-        corner([row(2, 0), row(2, 1), row(2, 2), row(2, 3)]),
-    ]
+    corners_of(simd, &read(mesh, first))
 }
 
-/// No numbers for those of four triangles that are not there or cannot be read.
+/// The corners of four triangles; no numbers for those that are not there or cannot be read.
 #[cold]
 #[inline(never)]
 fn read(mesh: &WideMesh<'_>, first: u32) -> [[Row; 4]; 3] {
     let mut rows = [[[0xff; 16]; 4]; 3];
-    for (lane, place) in (0..4).enumerate() {
-        let Some(corners) = mesh.corners(first.wrapping_add(place)) else { continue };
-        for (rows, corner) in rows.iter_mut().zip(corners) {
-            rows[lane] = *corner;
+    let [a, b, c] = &mut rows;
+    for (place, ((a, b), c)) in (0..4).zip(a.iter_mut().zip(b).zip(c)) {
+        if let Some(corners) = mesh.corners(first.wrapping_add(place)) {
+            [*a, *b, *c] = corners.map(|corner| *corner);
         }
     }
     rows
@@ -223,12 +217,15 @@ mod tests {
         for bounds in [bounds, Lattice::pad(&bounds)] {
             let lattice = Lattice::new(bounds, [8, 5, 1]);
             let (mut some, mut none) = (0, 0);
-            for first in (0..6000).step_by(LANES) {
+            // Behind the last one there is none, nor before the first.
+            let ends = [5993, 5997, 5999, 6000, u32::MAX - 5];
+            for first in (0..6000).step_by(LANES).chain(ends) {
                 let found = Of(&mesh, &lattice, first).run(Fallback::new());
                 for level in SimdLevel::available() {
                     assert_eq!(dispatch(level, Of(&mesh, &lattice, first)), found, "{level:?}");
                 }
-                for (id, found) in (first..).zip(found) {
+                for (lane, found) in (0..).zip(found) {
+                    let id = u32::wrapping_add(first, lane);
                     let corners = mesh.corners(id, Vec3A::new);
                     let expected = corners.and_then(Aabb::of).map(|bounds| lattice.range(&bounds));
                     // The mesh's last vertex has nothing behind it, and is not read this way.

@@ -354,7 +354,9 @@ fn meshes_in_any_form() {
     let mesh = crowds();
     let tight = mesh.view();
     let expected = Owned::build(&tight, &config(1.0)).unwrap();
-    for (position_stride, index_stride) in [(12, 6), (16, 8), (29, 7)] {
+    let short = [(12, 6), (16, 8), (29, 7)].map(|strides| (IndexType::U16, strides));
+    let long = [(12, 12), (12, 16), (16, 12), (29, 13)].map(|strides| (IndexType::U32, strides));
+    for (index_type, (position_stride, index_stride)) in short.into_iter().chain(long) {
         let mut positions = vec![0xa5; 1];
         for (i, position) in mesh.positions.iter().enumerate() {
             positions.resize(1 + i * position_stride, 0xa5);
@@ -363,13 +365,18 @@ fn meshes_in_any_form() {
         let mut indices = vec![0xa5; 1];
         for (i, triangle) in mesh.indices.iter().enumerate() {
             indices.resize(1 + i * index_stride, 0xa5);
-            indices.extend(triangle.iter().flat_map(|&i| u16::try_from(i).unwrap().to_ne_bytes()));
+            for &vertex in triangle {
+                match index_type {
+                    IndexType::U16 => indices.extend(u16::try_from(vertex).unwrap().to_ne_bytes()),
+                    IndexType::U32 => indices.extend(vertex.to_ne_bytes()),
+                }
+            }
         }
         let strided = |bytes, stride, count| Strided { bytes, stride, count };
         let view = TriangleMesh::strided(
             strided(&positions[1..], position_stride, mesh.positions.len()),
             strided(&indices[1..], index_stride, mesh.indices.len()),
-            IndexType::U16,
+            index_type,
         )
         .unwrap();
         let owned = Owned::build(&view, &config(1.0)).unwrap();

@@ -1,8 +1,8 @@
 //! Building a brick grid: two passes over the triangles, then block after block in cache.
 //!
 //! ```text
-//! settle    box, cell size; a census: entries per block                       (size.rs, pass.rs)
-//! scatter   every triangle's entry to the bins of its blocks                  (pass.rs)
+//! settle    box, cell size; a census: entries per block            (size.rs, pass.rs, places.rs)
+//! scatter   every triangle's entry to the bins of its blocks                (pass.rs, places.rs)
 //! sort      each block's bin into its chunk of the pool                       (sort.rs, pool.rs)
 //! close     the parts of the pool moved together
 //!

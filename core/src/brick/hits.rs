@@ -300,22 +300,14 @@ impl Hits {
         survivors: u64,
     ) -> u64 {
         let row = |array: &PerRay| f32x8::simd_from(simd, part_of(array, first / PART));
-        let wide = |row: f32x8<S>| {
-            let (low, high) = row.widen();
-            low.combine(high)
-        };
-        let corner = |at: usize| wide(f32x8::simd_from(simd, part_of(&corners[at], first / PART)));
+        let corner =
+            |at: usize| widened(f32x8::simd_from(simd, part_of(&corners[at], first / PART)));
         let corners = [corner(0), corner(1), corner(2), corner(3), corner(4), corner(5)];
-        let origin = wide(row(&bundle.origin[z]));
-        let direction = wide(row(&bundle.aim[2]));
-        let Sides { outside, weights: [second, third], t } =
-            Sides::of(corners, depths, origin, direction);
-        let narrow = |wide: f64x8<S>| {
-            let (low, high) = wide.split();
-            low.narrow(high)
-        };
-        let t = narrow(t);
-        let survivors = survivors & !outside.to_bitmask();
+        let origin = widened(row(&bundle.origin[z]));
+        let direction = widened(row(&bundle.aim[2]));
+        let met = Met::of(corners, depths, origin, direction);
+        let t = narrowed(met.t);
+        let survivors = survivors & !met.outside.to_bitmask();
 
         // Take what is closer. Read all before anything is written, and write first what needs no
         // choice: or the compiler makes masked stores (core/DESIGN.md).
@@ -327,8 +319,8 @@ impl Hits {
         let taken = is_hit & is_closer;
         let taken = taken & mask32x8::from_bitmask(simd, survivors);
         let t = taken.select(t, best_t);
-        let u = taken.select(narrow(second), best_u);
-        let v = taken.select(narrow(third), best_v);
+        let u = taken.select(narrowed(met.weights[0]), best_u);
+        let v = taken.select(narrowed(met.weights[1]), best_v);
         let end = row(&bundle.zero) + row(&bundle.speed) * t + bundle.margin;
         *part_mut(&mut bundle.to, first / PART) = end.into();
         *part_mut(&mut bundle.t_max, first / PART) = t.into();
@@ -339,8 +331,22 @@ impl Hits {
     }
 }
 
+/// Eight numbers with twice the digits.
+#[inline(always)]
+fn widened<S: Simd>(row: f32x8<S>) -> f64x8<S> {
+    let (low, high) = row.widen();
+    low.combine(high)
+}
+
+/// Eight numbers rounded to half of the digits.
+#[inline(always)]
+fn narrowed<S: Simd>(row: f64x8<S>) -> f32x8<S> {
+    let (low, high) = row.split();
+    low.narrow(high)
+}
+
 /// Where eight rays meet a triangle.
-struct Sides<S: Simd> {
+struct Met<S: Simd> {
     /// Whether two edge functions have opposite signs.
     outside: mask64x8<S>,
     /// The weights of the second corner and of the third.
@@ -348,7 +354,7 @@ struct Sides<S: Simd> {
     t: f64x8<S>,
 }
 
-impl<S: Simd> Sides<S> {
+impl<S: Simd> Met<S> {
     #[inline(always)]
     fn of(
         [ax, ay, bx, by, cx, cy]: [f64x8<S>; 6],

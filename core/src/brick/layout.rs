@@ -199,7 +199,7 @@ impl Entry {
         self.cells >> GROUP
     }
 
-    /// How many lists it is in, if its group says so.
+    /// How many lists it is in, if its group is not [`OTHERS`].
     #[inline(always)]
     pub(super) const fn lists(self) -> u64 {
         1 << (self.group() & 7).count_ones()

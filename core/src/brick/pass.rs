@@ -4,10 +4,7 @@
 //! everything is done in vectors ([`places`](super::places)); what is larger, or has no number, is
 //! looked at once more.
 
-#![expect(
-    clippy::cast_possible_truncation,
-    reason = "the few triangles of a batch, the words of entries"
-)]
+#![expect(clippy::cast_possible_truncation, reason = "eight triangles, the words of entries")]
 
 use core::ops::Range;
 
@@ -16,7 +13,7 @@ use glam::{Vec3A, Vec4};
 
 use super::frame::{classify, lists, range};
 use super::halves::{Format, Halves};
-use super::layout::{BLOCK, Class, Entry};
+use super::layout::{BLOCK, Class, ENTRY_WORDS, Entry};
 use super::places::{BATCH, Places, straddling};
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, Lattice};
@@ -130,7 +127,7 @@ trait Visit {
     fn run(&mut self, block: usize, entries: [Entry; LANES]);
 
     /// So many entries, and in how many lists their triangles will be.
-    fn listed(&mut self, entries: u64, references: u64);
+    fn counted(&mut self, entries: u64, references: u64);
 
     /// A triangle for the list of the grid.
     fn large(&mut self, id: u32);
@@ -152,13 +149,18 @@ fn visit<S: Simd, V: Visit, const ENTRIES: bool>(
     let wide = ground.mesh.wide();
     let [x, y, z] = [1, ground.blocks[0], ground.blocks[0] * ground.blocks[1]];
     let offsets = [0, x, y, x + y, z, x + z, y + z, x + y + z];
+    if wide.is_empty() {
+        for id in ids {
+            visit_any(simd, ground, id, visitor)?;
+        }
+        return Ok(());
+    }
     let mut batch = Places::NONE;
     let mut first = ids.start;
     while first < ids.end {
         let count = (ids.end - first).min(BATCH);
         batch.find::<S, ENTRIES>(simd, &spans, ground.blocks, &wide, first, count);
-        batch.find_runs(simd);
-        visitor.listed(batch.plain.count_ones().into(), batch.lists.into());
+        visitor.counted(batch.plain.count_ones().into(), batch.lists.into());
 
         let mut at = 0;
         while at < count {
@@ -179,9 +181,10 @@ fn visit<S: Simd, V: Visit, const ENTRIES: bool>(
                 visit_any(simd, ground, id, visitor)?;
                 continue;
             }
-            // Each of its blocks: those on the far side of the axes of every subset.
+            // Each of its blocks: those on the far side of the axes of every subset. A plain one
+            // of a batch that is not full has no axes, and one block.
             let (entry, straddles) = straddling(entry);
-            visitor.listed(1 << straddles.count_ones(), entry.lists());
+            visitor.counted(1 << straddles.count_ones(), entry.lists());
             let mut far = 0;
             loop {
                 let offset = offsets.get(far as usize).copied().unwrap_or(0) as usize;
@@ -226,7 +229,7 @@ fn visit_any<S: Simd>(
             };
             let (low, high) = (min.map(|cell| cell / BLOCK), max.map(|cell| cell / BLOCK));
             let blocks = CellRange { min: low, max: high };
-            visitor.listed(blocks.count(), lists(min, max, class.shift()));
+            visitor.counted(blocks.count(), lists(min, max, class.shift()));
             for z in low[2]..=high[2] {
                 let on_z = home.along(2, z);
                 for y in low[1]..=high[1] {
@@ -293,7 +296,7 @@ impl Visit for Counting<'_> {
     }
 
     #[inline(always)]
-    fn listed(&mut self, entries: u64, references: u64) {
+    fn counted(&mut self, entries: u64, references: u64) {
         self.census.entries += entries;
         self.census.references += references;
     }
@@ -353,11 +356,9 @@ impl Visit for Scatter<'_, '_> {
     }
 
     #[inline(always)]
-    fn run(&mut self, block: usize, [a, b, c, d, e, f, g, h]: [Entry; LANES]) {
+    fn run(&mut self, block: usize, entries: [Entry; LANES]) {
         if let Some(head) = self.heads.get_mut(block) {
-            let ([a, i], [b, j], [c, k], [d, l]) = (a.words(), b.words(), c.words(), d.words());
-            let ([e, m], [f, n], [g, o], [h, p]) = (e.words(), f.words(), g.words(), h.words());
-            let words = [a, i, b, j, c, k, d, l, e, m, f, n, g, o, h, p];
+            let words: [u32; LANES * ENTRY_WORDS] = bytemuck::cast(entries);
             let at = *head;
             *head = at.wrapping_add(words.len() as u32);
             self.words.set(at, words);
@@ -365,7 +366,7 @@ impl Visit for Scatter<'_, '_> {
     }
 
     #[inline(always)]
-    fn listed(&mut self, _: u64, _: u64) {}
+    fn counted(&mut self, _: u64, _: u64) {}
 
     fn large(&mut self, id: u32) {
         self.words.set(self.large, [id]);
@@ -384,5 +385,148 @@ impl Kernel for Pass<'_, Scatter<'_, '_>> {
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let mut scatter = self.work;
         visit::<S, _, true>(simd, self.ground, scatter.ids.clone(), &mut scatter)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+    use alloc::{format, vec};
+
+    use fearless_simd::Fallback;
+
+    use super::*;
+    use crate::cell::as_f32;
+    use crate::mesh::{IndexType, Strided};
+
+    /// At a level, or in scalar lanes.
+    fn at<K: Kernel>(level: Option<SimdLevel>, kernel: K) -> K::Output {
+        match level {
+            Some(level) => dispatch(level, kernel),
+            None => kernel.run(Fallback::new()),
+        }
+    }
+
+    /// Triangles one behind the other in rows through 3 x 2 x 2 blocks, three vertices each: most
+    /// are small, some reach into several blocks or all, some have no number.
+    fn positions(triangles: u32) -> Vec<[f32; 3]> {
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            as_f32(state >> 8) / 16_777_216.0
+        };
+        let mut positions = Vec::new();
+        for id in 0..triangles {
+            let (row, place) = (id / 700, as_f32(id % 700));
+            let center = [place * (48.0 / 700.0), 15.7 + 0.2 * as_f32(row), 9.0 * as_f32(row)];
+            let size = match id % 89 {
+                88 => 100.0,
+                80 => 20.0,
+                70..76 => 3.0,
+                _ => 0.5,
+            };
+            for _ in 0..3 {
+                positions.push(center.map(|at| at + size * (random() - 0.5)));
+            }
+            if id % 131 == 130 {
+                positions[3 * id as usize + 1][id as usize % 3] = f32::NAN;
+            }
+        }
+        positions
+    }
+
+    /// A census, what each task counted, and the words that were scattered.
+    type Answer = ([u64; 4], Vec<Vec<u32>>, Vec<u32>);
+
+    /// Both passes, by tasks that end at these triangles.
+    fn answer(level: Option<SimdLevel>, ground: &Ground<'_>, ends: &[u32]) -> Answer {
+        let blocks = ground.blocks.iter().product::<u32>() as usize;
+        let mut census = Census::default();
+        let (mut counts, mut start) = (Vec::new(), 0);
+        for &end in ends {
+            let mut heads = vec![0; blocks];
+            let work = Count { ids: start..end, heads: &mut heads };
+            let counted = at(level, Pass { ground, work }).unwrap();
+            assert_eq!(heads.iter().map(|&count| u64::from(count)).sum::<u64>(), counted.entries);
+            census = census.plus(counted);
+            counts.push(heads);
+            start = end;
+        }
+
+        let mut heads = counts.clone();
+        let mut next = census.large;
+        for block in 0..blocks {
+            for heads in &mut heads {
+                next += core::mem::replace(&mut heads[block], next) * ENTRY_WORDS as u32;
+            }
+        }
+        let mut words = vec![0; next as usize];
+        let shared = Shared::new(&mut words);
+        let (mut start, mut large) = (0, 0);
+        for (&end, heads) in ends.iter().zip(&mut heads) {
+            let work = Scatter { ids: start..end, heads, large, words: shared };
+            at(level, Pass { ground, work }).unwrap();
+            let task = Count { ids: start..end, heads: &mut [] };
+            large += at(level, Pass { ground, work: task }).unwrap().large;
+            start = end;
+        }
+        let Census { entries, references, large, skipped } = census;
+        ([entries, references, large.into(), skipped.into()], counts, words)
+    }
+
+    /// Triangles, from a mesh read one by one, have the same entries at every level, wherever batches
+    /// and tasks end.
+    #[test]
+    #[cfg_attr(miri, ignore = "hours")]
+    fn every_level_counts_and_writes_what_one_triangle_after_the_other_does() {
+        let bounds = Aabb { min: Vec3A::ZERO, max: Vec3A::new(48.0, 32.0, 32.0) };
+        let lattice = Lattice::new(bounds, [48, 32, 32]);
+        // From 2049 triangles on, ids leave no room for halves.
+        for count in [0, 1, 63, 64, 65, 200, 2048, 2100] {
+            let positions = positions(count);
+            let indices: Vec<_> = (0..count).map(|id| [3 * id, 3 * id + 1, 3 * id + 2]).collect();
+            let short: Vec<[u16; 3]> = indices
+                .iter()
+                .map(|triangle| triangle.map(|vertex| u16::try_from(vertex).unwrap()))
+                .collect();
+            let tight = TriangleMesh::new(&positions, &indices).unwrap();
+            let (vertices, short) = (tight.positions(), Strided::new(&short));
+            let one_by_one = TriangleMesh::strided(vertices, short, IndexType::U16).unwrap();
+            assert!(one_by_one.wide().is_empty());
+
+            let ground = |mesh| Ground {
+                mesh,
+                lattice: &lattice,
+                blocks: [3, 2, 2],
+                most_blocks: 8,
+                flags: BuildFlags::empty(),
+            };
+            for ends in [&[count][..], &[1, 64, 101, count][..]] {
+                let ends: Vec<_> = ends.iter().map(|&end| end.min(count)).collect();
+                let expected = answer(None, &ground(&one_by_one), &ends);
+                for level in [None].into_iter().chain(SimdLevel::available().map(Some)) {
+                    let found = answer(level, &ground(&tight), &ends);
+                    assert!(found == expected, "{level:?}, {count} triangles to {ends:?}");
+                }
+            }
+            if count < 2000 {
+                continue;
+            }
+            // All kinds were there.
+            let ([_, _, large, skipped], ..) = answer(None, &ground(&tight), &[count]);
+            assert!(large > 5 && skipped > 10, "{large} {skipped}");
+            let simd = Fallback::new();
+            let (spans, mut batch) = (Spans::new(simd, &lattice, 2), Places::NONE);
+            let (mut runs, mut straddling, mut others) = (0, 0, 0);
+            for first in (0..count - BATCH).step_by(BATCH as usize) {
+                let mesh = tight.wide();
+                batch.find::<_, true>(simd, &spans, [3, 2, 2], &mesh, first, BATCH);
+                runs += batch.runs.count_ones();
+                straddling += (batch.simple & !batch.plain).count_ones();
+                others += batch.simple.count_zeros();
+            }
+            let kinds = format!("{runs} {straddling} {others}");
+            assert!(runs > 20 && straddling > 100 && others > 100, "{kinds}");
+        }
     }
 }

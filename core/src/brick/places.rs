@@ -1,12 +1,13 @@
 //! Where the triangles of a batch lie: what a pass finds before it visits any of them.
 //!
 //! ```text
-//! block  | the halves of the first and the last cell | number of the block of the first cell |
-//! cells  | straddles: on which axes the last cell is in the next block | cells, as an entry has them |
+//! blocks | halves of the first cell and the last | number of the first cell's block |
+//! cells  | axes on which the last cell is in the next block | cells, as an entry has them |
 //! ```
 //!
-//! In between nothing is called, so that all constants stay in vector registers, and nothing is
-//! decided: how many cells and blocks a triangle has is as good as random.
+//! While places are found nothing is called but for triangles that cannot be read, so that all
+//! constants stay in vector registers, and nothing depends on how many cells and blocks a triangle
+//! has: that is as good as random.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x8};
@@ -29,7 +30,8 @@ const BLOCK_BITS: u32 = (1 << 24) - 1;
 pub(super) struct Places {
     blocks: [[u32; LANES]; ROWS],
     cells: [[u32; LANES]; ROWS],
-    /// Which of them are in at most two cells an axis. The others are not found.
+    /// Which of them are in at most two cells an axis. The others are not found. Bits behind the
+    /// last triangle mean nothing.
     pub(super) simple: u64,
     /// Which of these are in one block; none in a batch that is not full.
     pub(super) plain: u64,
@@ -80,7 +82,7 @@ fn halves<S: Simd>([x, y, z]: [Cells<S>; 3]) -> u32x8<S> {
     bits
 }
 
-/// An entry of a straddling triangle for all of its blocks, and the axes on which it straddles.
+/// What the entries of a triangle have in common, and the axes on which it straddles.
 #[inline(always)]
 pub(super) const fn straddling(entry: Entry) -> (Entry, u32) {
     let [id, cells] = entry.words();
@@ -98,8 +100,8 @@ impl Places {
         lists: 0,
     };
 
-    /// Finds the places of `count` triangles from `first` on; who only counts `ENTRIES`
-    /// learns nothing of the cells inside their blocks.
+    /// Finds the places of `count` triangles from `first` on. Without `ENTRIES`, for who only
+    /// counts, halves and the cells inside their blocks are left out.
     ///
     /// What works on vectors is a function, always inlined: closures and arrays' own
     /// functions are not, and what is not inlined is not compiled for the level.
@@ -146,9 +148,12 @@ impl Places {
         }
         let sum: [u32; LANES] = sum.into();
         self.lists = sum.iter().sum();
+        self.runs = 0;
         if count < BATCH {
             // Those behind the last one are in the sum.
             (self.plain, self.lists) = (0, 0);
+        } else {
+            self.find_runs(simd);
         }
     }
 
@@ -157,9 +162,8 @@ impl Places {
     /// Triangles that follow one another are often in the same block, and each waits for the count
     /// of the one before it.
     #[inline(always)]
-    pub(super) fn find_runs<S: Simd>(&mut self, simd: S) {
+    fn find_runs<S: Simd>(&mut self, simd: S) {
         const MANY: usize = ROWS * 3 / 4;
-        self.runs = 0;
         let is_likely = |row: &&[u32; LANES]| (row[0] ^ row[LANES - 1]) & BLOCK_BITS == 0;
         if self.blocks.iter().filter(is_likely).count() < MANY {
             return;
@@ -179,7 +183,8 @@ impl Places {
         (block & BLOCK_BITS) as usize
     }
 
-    /// The entry of a triangle, if it is in one block.
+    /// The entry of a plain triangle; of a straddling one what [`straddling`] takes, of one that is
+    /// not simple nothing of use.
     #[inline(always)]
     pub(super) fn entry(&self, at: u32, id: u32, format: Format) -> Entry {
         let at = (at % BATCH) as usize;
