@@ -144,17 +144,18 @@ fn visit<S: Simd, V: Visit, const ENTRIES: bool>(
     ids: Range<u32>,
     visitor: &mut V,
 ) -> Result<(), Error> {
-    let spans = Spans::new(simd, ground.lattice, 2);
-    let format = Format::of(ground.mesh.triangle_count());
     let wide = ground.mesh.wide();
-    let [x, y, z] = [1, ground.blocks[0], ground.blocks[0] * ground.blocks[1]];
-    let offsets = [0, x, y, x + y, z, x + z, y + z, x + y + z];
     if wide.is_empty() {
         for id in ids {
             visit_any(simd, ground, id, visitor)?;
         }
         return Ok(());
     }
+
+    let spans = Spans::new(simd, ground.lattice, 2);
+    let format = Format::of(ground.mesh.triangle_count());
+    let [x, y, z] = [1, ground.blocks[0], ground.blocks[0] * ground.blocks[1]];
+    let offsets = [0, x, y, x + y, z, x + z, y + z, x + y + z];
     let mut batch = Places::NONE;
     let mut first = ids.start;
     while first < ids.end {
