@@ -23,8 +23,8 @@ use glam::Vec3A;
 use super::frame::MOST_BLOCKS;
 use super::layout::Layout;
 use super::pass::{Census, Count, Ground};
-use crate::aabb::Aabb;
-use crate::cell::{Lattice, MAX_RESOLUTION};
+use crate::aabb::{Aabb, greater, lesser};
+use crate::cell::{Lattice, MAX_RESOLUTION, as_f32};
 use crate::config::{BuildFlags, Config};
 use crate::control::{Control, Watch};
 use crate::error::Error;
@@ -109,7 +109,7 @@ pub(super) fn settle_in<const N: usize>(
     let sample = Sample::of(mesh);
     let bounds = Lattice::pad(&bounds(mesh, &sample, config.flags)?);
     let size = bounds.size();
-    let mut cell = f64::from(config.cell_size) * sample.cell(mesh, f64::from(size.max_element()));
+    let mut cell = f64::from(config.cell_size) * sample.cell(mesh, size.max_element());
     loop {
         let resolution = size.to_array().map(|extent| cells(extent, cell));
         let layout = Layout::new(resolution, mesh.triangle_count());
@@ -214,9 +214,11 @@ fn bounds(mesh: &TriangleMesh<'_>, sample: &Sample, flags: BuildFlags) -> Result
 }
 
 /// Cells in which a triangle lies on average.
-const REFERENCES: f64 = 2.2;
+const REFERENCES: f32 = 2.2;
 /// Cells in which a triangle lies at most, for the average.
-const MOST: f64 = 8.0;
+const MOST: f32 = 8.0;
+/// Widths that are compared at once.
+const WIDTHS: usize = 16;
 
 /// Some triangles of the mesh, evenly spread over their ids.
 struct Sample {
@@ -234,35 +236,48 @@ impl Sample {
         Self { step, bounds: all }
     }
 
-    /// The width of cells that triangles of the sample lie in [`REFERENCES`]
-    /// of, for a box with this extent.
-    fn cell(&self, mesh: &TriangleMesh<'_>, extent: f64) -> f64 {
-        /// No cell is smaller: none could be.
-        const LEAST: f64 = 1.0 / 16_384.0;
-        /// To 3 percent.
-        const BITS: u32 = 4;
-        let is_enough = |cell: f64| self.references(mesh, cell) <= REFERENCES;
-        let mut high = extent;
-        while high > extent * LEAST && is_enough(0.5 * high) {
-            high *= 0.5;
-        }
-        let mut low = 0.5 * high;
-        for _ in 0..BITS {
-            let middle = 0.5 * (low + high);
-            *(if is_enough(middle) { &mut high } else { &mut low }) = middle;
-        }
-        high
+    /// The width of cells, to 3 percent, with which triangles of the sample lie in [`REFERENCES`]
+    /// of them, for a box with this extent.
+    fn cell(&self, mesh: &TriangleMesh<'_>, extent: f32) -> f64 {
+        /// Of an extent, as a power of two: no cell is smaller, none could be.
+        const LEAST: u32 = 14;
+        let halved = core::array::from_fn(|step| 1.0 / as_f32(1 << (step as u32).min(LEAST)));
+        let octave = self.finest(mesh, extent, halved);
+        let parts = core::array::from_fn(|step| octave * as_f32(32 - step as u32) / 32.0);
+        f64::from(extent) * f64::from(self.finest(mesh, extent, parts))
     }
 
-    /// The mean number of cells of a width in which a triangle lies.
-    fn references(&self, mesh: &TriangleMesh<'_>, cell: f64) -> f64 {
-        let (mut sum, mut count) = (0.0, 0.0);
+    /// The last of some widths before triangles lie in too many cells: parts of an extent, from
+    /// the coarsest, which is taken unasked, to the finest.
+    fn finest(&self, mesh: &TriangleMesh<'_>, extent: f32, widths: [f32; WIDTHS]) -> f32 {
+        let [coarsest, ..] = widths;
+        let references = self.references(mesh, extent, widths);
+        let finer = widths.into_iter().zip(references).skip(1);
+        finer
+            .take_while(|&(_, mean)| mean <= REFERENCES)
+            .last()
+            .map_or(coarsest, |(width, _)| width)
+    }
+
+    /// The mean number of cells of each width in which a triangle lies: for all in one pass, because
+    /// to read the sample takes longer.
+    fn references(
+        &self,
+        mesh: &TriangleMesh<'_>,
+        extent: f32,
+        widths: [f32; WIDTHS],
+    ) -> [f32; WIDTHS] {
+        let cells = widths.map(|width| 1.0 / width);
+        let (mut sums, mut count) = ([0.0; WIDTHS], 0.0);
         for bounds in boxes(mesh, self.step) {
-            let [x, y, z] = bounds.size().to_array().map(|e| 1.0 + f64::from(e) / cell);
-            sum += (x * y * z).min(MOST);
+            let [x, y, z] = (bounds.size() / extent).to_array();
+            for (sum, cells) in sums.iter_mut().zip(cells) {
+                let lies_in = (1.0 + x * cells) * (1.0 + y * cells) * (1.0 + z * cells);
+                *sum += lesser(lies_in, MOST);
+            }
             count += 1.0;
         }
-        sum / f64::max(count, 1.0)
+        sums.map(|sum| sum / greater(count, 1.0))
     }
 }
 
@@ -270,4 +285,74 @@ impl Sample {
 fn boxes(mesh: &TriangleMesh<'_>, step: u32) -> impl Iterator<Item = Aabb> {
     let ids = (0..mesh.triangle_count()).step_by(step.max(1) as usize);
     ids.filter_map(|id| mesh.corners(id, Vec3A::new).and_then(Aabb::of))
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+
+    /// One width after the other, all numbers with twice the digits.
+    fn cell(mesh: &TriangleMesh<'_>, step: u32, extent: f64) -> f64 {
+        let is_enough = |cell: f64| {
+            let too_many = boxes(mesh, step).map(|bounds| {
+                let [x, y, z] = bounds.size().to_array().map(|e| 1.0 + f64::from(e) / cell);
+                (x * y * z).min(MOST.into()) - f64::from(REFERENCES)
+            });
+            too_many.sum::<f64>() <= 0.0
+        };
+        let mut high = extent;
+        while high > extent / 16_384.0 && is_enough(0.5 * high) {
+            high *= 0.5;
+        }
+        let mut low = 0.5 * high;
+        for _ in 0..4 {
+            let middle = 0.5 * (low + high);
+            *(if is_enough(middle) { &mut high } else { &mut low }) = middle;
+        }
+        high
+    }
+
+    #[test]
+    fn widths_compared_at_once_give_the_cell_that_one_after_the_other_does() {
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            as_f32(state >> 8) / 16_777_216.0
+        };
+        let mut cells = Vec::new();
+        for scale in [1e-30, 1.0, 1e30] {
+            for (count, size, large) in [
+                (0, 0.1, 0.0),
+                (1, 1.0, 0.0),
+                (300, 0.3, 0.0),
+                (900, 0.02, 0.1),
+                (5000, 1e-3, 0.02),
+                (2500, 0.0, 0.0),
+            ] {
+                let mut positions = Vec::new();
+                for _ in 0..count {
+                    let at = [random(), random(), random()];
+                    // Some are as large as the scene.
+                    let size = if random() < large { 1.0 } else { size * random() };
+                    let mut corner = || at.map(|at| scale * (at + size * random()));
+                    positions.extend([corner(), corner(), corner()]);
+                }
+                let indices: Vec<_> =
+                    (0..count).map(|id| [3 * id, 3 * id + 1, 3 * id + 2]).collect();
+                let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+                let sample = Sample::of(&mesh);
+                let extent = 2.0 * scale;
+                let found = sample.cell(&mesh, extent);
+                let expected = cell(&mesh, sample.step, extent.into());
+                assert_eq!(found.to_bits(), expected.to_bits(), "{count} {size} {scale}");
+                cells.push(found / f64::from(extent));
+            }
+        }
+        // From all of the extent to the least.
+        let (least, most) =
+            (cells.iter().copied().fold(1.0, f64::min), cells.iter().copied().fold(0.0, f64::max));
+        assert!(least < 1e-4 && most > 0.3, "{cells:?}");
+    }
 }
