@@ -235,9 +235,9 @@ fn margin(bounds: &Aabb) -> f32 {
     (extent * EXTENT_SHARE + coordinate * f32::EPSILON).max(LEAST_MARGIN)
 }
 
-/// A cell number as f32: exact, because it is below 2^24.
+/// A whole number below 2^24, as that of a cell, as f32: exact.
 #[inline(always)]
-#[expect(clippy::cast_precision_loss, reason = "at most MAX_RESOLUTION")]
+#[expect(clippy::cast_precision_loss, reason = "below 2^24")]
 pub(crate) const fn as_f32(cell: u32) -> f32 {
     cell as f32
 }

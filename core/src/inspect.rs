@@ -57,7 +57,7 @@ impl Grid<'_> {
             content_hash: 0,
         };
         for id in 0..self.mesh().triangle_count() {
-            let Some([a, b, c]) = self.mesh().corners(id, glam::Vec3A::new) else { continue };
+            let Some([a, b, c]) = self.mesh().corners(id) else { continue };
             if Aabb::of([a, b, c]).is_none() {
                 found.skipped_count += 1;
             } else if a == b || b == c || c == a {

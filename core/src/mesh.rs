@@ -182,7 +182,8 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     #[must_use]
     pub fn triangle(&self, triangle: u32) -> Option<Triangle> {
-        self.corners(triangle, |x, y, z| [x, y, z])
+        let [a, b, c] = self.vertices_of(triangle)?;
+        Some([self.vertex(a)?, self.vertex(b)?, self.vertex(c)?])
     }
 
     /// The vertices, where the caller has them.
@@ -219,16 +220,15 @@ impl<'a> TriangleMesh<'a> {
         Some(self.vertices_of(triangle)?.map(|vertex| vertex as u32))
     }
 
-    /// The corners of a triangle as any type: an array that becomes a vector costs a detour
-    /// through memory.
+    /// The corners of a triangle as vectors.
     #[inline(always)]
-    pub(crate) fn corners<T>(
-        &self,
-        triangle: u32,
-        corner: impl Fn(f32, f32, f32) -> T,
-    ) -> Option<[T; 3]> {
+    pub(crate) fn corners(&self, triangle: u32) -> Option<[Vec3A; 3]> {
+        if let Some([a, b, c]) = self.wide().corners(triangle) {
+            return Some([vector(a), vector(b), vector(c)]);
+        }
+        // Number by number: an array that becomes a vector costs a detour through memory.
         let [a, b, c] = self.vertices_of(triangle)?;
-        let read = |vertex| self.vertex(vertex).map(|[x, y, z]| corner(x, y, z));
+        let read = |vertex| self.vertex(vertex).map(|[x, y, z]| Vec3A::new(x, y, z));
         Some([read(a)?, read(b)?, read(c)?])
     }
 
@@ -363,6 +363,13 @@ impl<'a> WideMesh<'a> {
         let vertex = |index| element(self.positions, stride, index);
         Some([vertex(a)?, vertex(b)?, vertex(c)?])
     }
+}
+
+/// A corner from its bytes and those behind it.
+#[inline(always)]
+fn vector(bytes: &[u8; 16]) -> Vec3A {
+    let row: [f32; 4] = bytemuck::cast(*bytes);
+    Vec3A::from_vec4(Vec4::from_array(row))
 }
 
 /// `N` bytes from where an element starts, if all of them are there.

@@ -1,7 +1,5 @@
 //! The first look at a mesh: is it sound, how many triangles count, what box holds them.
 
-use glam::Vec3A;
-
 use crate::aabb::Aabb;
 use crate::config::BuildFlags;
 use crate::control::Watch;
@@ -33,7 +31,7 @@ impl Survey {
         let count = mesh.triangle_count();
         for id in 0..count {
             watch.step(id, count, SHARE)?;
-            let Some(corners) = mesh.corners(id, Vec3A::new) else {
+            let Some(corners) = mesh.corners(id) else {
                 return Err(Error::IndexOutOfRange { triangle: id });
             };
             match Aabb::of(corners) {
@@ -52,5 +50,5 @@ impl Survey {
 /// The finite triangles of a mesh with their boxes, in the order of their ids.
 #[inline(always)]
 pub(crate) fn boxes<'m>(mesh: &'m TriangleMesh<'_>) -> impl Iterator<Item = (u32, Aabb)> + 'm {
-    (0..mesh.triangle_count()).filter_map(|id| Some((id, Aabb::of(mesh.corners(id, Vec3A::new)?)?)))
+    (0..mesh.triangle_count()).filter_map(|id| Some((id, Aabb::of(mesh.corners(id)?)?)))
 }

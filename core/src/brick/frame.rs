@@ -26,7 +26,7 @@ impl Scene<'_> {
     /// The box of a triangle in cells of the lattice, grown by the margin.
     #[inline(always)]
     pub(super) fn reach(&self, id: u32) -> Option<Aabb> {
-        let bounds = self.mesh.corners(id, Vec3A::new).and_then(Aabb::of)?;
+        let bounds = self.mesh.corners(id).and_then(Aabb::of)?;
         Some(self.lattice.reach(&bounds))
     }
 }

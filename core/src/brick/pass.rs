@@ -9,7 +9,7 @@
 use core::ops::Range;
 
 use fearless_simd::Simd;
-use glam::{Vec3A, Vec4};
+use glam::Vec3A;
 
 use super::frame::{classify, lists, range};
 use super::halves::{Format, Halves};
@@ -213,11 +213,7 @@ fn visit_any<S: Simd>(
         #[inline(always)]
         || {
             let format = Format::of(ground.mesh.triangle_count());
-            let corners = match ground.mesh.wide().corners(id) {
-                Some([a, b, c]) => Some([vector(a), vector(b), vector(c)]),
-                None => ground.mesh.corners(id, Vec3A::new),
-            };
-            let Some(corners) = corners else {
+            let Some(corners) = ground.mesh.corners(id) else {
                 return Err(Error::IndexOutOfRange { triangle: id });
             };
             let Some(home) = Home::of(ground.lattice, ground.most_blocks, corners) else {
@@ -247,13 +243,6 @@ fn visit_any<S: Simd>(
             Ok(())
         },
     )
-}
-
-/// A corner from its bytes and those behind it.
-#[inline(always)]
-fn vector(bytes: &[u8; 16]) -> Vec3A {
-    let row: [f32; 4] = bytemuck::cast(*bytes);
-    Vec3A::from_vec4(Vec4::from_array(row))
 }
 
 /// Counts the entries of every block, in `heads` if there is room.

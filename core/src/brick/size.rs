@@ -18,8 +18,6 @@
 
 use core::ops::Range;
 
-use glam::Vec3A;
-
 use super::frame::MOST_BLOCKS;
 use super::layout::Layout;
 use super::pass::{Census, Count, Ground};
@@ -239,12 +237,15 @@ impl Sample {
     /// The width of cells, to 3 percent, with which triangles of the sample lie in [`REFERENCES`]
     /// of them, for a box with this extent.
     fn cell(&self, mesh: &TriangleMesh<'_>, extent: f32) -> f64 {
-        /// Of an extent, as a power of two: no cell is smaller, none could be.
-        const LEAST: u32 = 14;
-        let halved = core::array::from_fn(|step| 1.0 / as_f32(1 << (step as u32).min(LEAST)));
+        /// How often an extent is halved at most: finer cells than that there could not be.
+        const HALVINGS: u32 = 14;
+        const { assert!(WIDTHS > HALVINGS as usize) };
+        let halved = core::array::from_fn(|step| 1.0 / as_f32(1 << HALVINGS.min(step as u32)));
         let octave = self.finest(mesh, extent, halved);
-        let parts = core::array::from_fn(|step| octave * as_f32(32 - step as u32) / 32.0);
-        f64::from(extent) * f64::from(self.finest(mesh, extent, parts))
+        // From all of it to a little more than half.
+        let parts = |step| as_f32((2 * WIDTHS - step) as u32) / as_f32(2 * WIDTHS as u32);
+        let width = self.finest(mesh, extent, core::array::from_fn(|step| octave * parts(step)));
+        f64::from(extent) * f64::from(width)
     }
 
     /// The last of some widths before triangles lie in too many cells: parts of an extent, from
@@ -259,8 +260,8 @@ impl Sample {
             .map_or(coarsest, |(width, _)| width)
     }
 
-    /// The mean number of cells of each width in which a triangle lies: for all in one pass, because
-    /// to read the sample takes longer.
+    /// The mean number of cells of each width in which a triangle lies. The sample is read once for
+    /// all of them.
     fn references(
         &self,
         mesh: &TriangleMesh<'_>,
@@ -284,7 +285,7 @@ impl Sample {
 /// The boxes of every `step`-th triangle that has one.
 fn boxes(mesh: &TriangleMesh<'_>, step: u32) -> impl Iterator<Item = Aabb> {
     let ids = (0..mesh.triangle_count()).step_by(step.max(1) as usize);
-    ids.filter_map(|id| mesh.corners(id, Vec3A::new).and_then(Aabb::of))
+    ids.filter_map(|id| mesh.corners(id).and_then(Aabb::of))
 }
 
 #[cfg(test)]
@@ -296,11 +297,13 @@ mod tests {
     /// One width after the other, all numbers with twice the digits.
     fn cell(mesh: &TriangleMesh<'_>, step: u32, extent: f64) -> f64 {
         let is_enough = |cell: f64| {
-            let too_many = boxes(mesh, step).map(|bounds| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for bounds in boxes(mesh, step) {
                 let [x, y, z] = bounds.size().to_array().map(|e| 1.0 + f64::from(e) / cell);
-                (x * y * z).min(MOST.into()) - f64::from(REFERENCES)
-            });
-            too_many.sum::<f64>() <= 0.0
+                sum += (x * y * z).min(8.0);
+                count += 1.0;
+            }
+            sum / f64::max(count, 1.0) <= 2.2
         };
         let mut high = extent;
         while high > extent / 16_384.0 && is_enough(0.5 * high) {
@@ -328,8 +331,8 @@ mod tests {
                 (1, 1.0, 0.0),
                 (300, 0.3, 0.0),
                 (900, 0.02, 0.1),
-                (5000, 1e-3, 0.02),
-                (2500, 0.0, 0.0),
+                (if cfg!(miri) { 1100 } else { 5000 }, 1e-3, 0.02),
+                (if cfg!(miri) { 100 } else { 2500 }, 0.0, 0.0),
             ] {
                 let mut positions = Vec::new();
                 for _ in 0..count {
@@ -350,9 +353,9 @@ mod tests {
                 cells.push(found / f64::from(extent));
             }
         }
-        // From all of the extent to the least.
+        // From most of the extent to the least.
         let (least, most) =
             (cells.iter().copied().fold(1.0, f64::min), cells.iter().copied().fold(0.0, f64::max));
-        assert!(least < 1e-4 && most > 0.3, "{cells:?}");
+        assert!(least < 1e-4 && most > 0.7, "{cells:?}");
     }
 }

@@ -194,7 +194,7 @@ impl Check<'_> {
         let large = list(pool, 1).ok_or(wrong)?;
         let Settled { lattice, most_blocks, .. } = self.settled;
         let is_large = |&id: &u32| {
-            let corners = self.mesh.corners(id, Vec3A::new);
+            let corners = self.mesh.corners(id);
             let home = corners.and_then(|corners| Home::of(lattice, *most_blocks, corners));
             home.is_some_and(|home| home.class.is_none())
         };
@@ -341,7 +341,7 @@ impl Check<'_> {
         let format = Format::of(self.mesh.triangle_count());
         for &word in words {
             let id = format.id(word);
-            let corners = self.mesh.corners(id, Vec3A::new).ok_or(wrong)?;
+            let corners = self.mesh.corners(id).ok_or(wrong)?;
             let placed = domain.place(self.settled, corners).ok_or(wrong)?;
             let CellRange { min, max } = placed.range;
             let is_in =
@@ -385,7 +385,7 @@ impl Check<'_> {
     /// How many lists of cells, bricks, blocks and the grid must have a triangle.
     fn lists_of(&self, id: u32) -> u64 {
         let Settled { lattice, most_blocks, .. } = self.settled;
-        let corners = self.mesh.corners(id, Vec3A::new);
+        let corners = self.mesh.corners(id);
         match corners.and_then(|corners| Home::of(lattice, *most_blocks, corners)) {
             Some(Home { range, class: Some(class), .. }) => {
                 lists(range.min, range.max, class.shift())

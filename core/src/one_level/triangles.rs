@@ -4,7 +4,6 @@ use core::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x8};
-use glam::Vec3A;
 
 use super::placed::{Batch, MORE_BITS, MOST_MORE};
 use super::spread::Spread;
@@ -45,7 +44,7 @@ impl Spread for MeshSpread<'_> {
 
     #[inline(always)]
     fn range(&self, place: u32) -> Option<CellRange> {
-        let bounds = self.mesh.corners(place, Vec3A::new).and_then(Aabb::of)?;
+        let bounds = self.mesh.corners(place).and_then(Aabb::of)?;
         Some(self.lattice.range(&bounds))
     }
 
@@ -93,6 +92,7 @@ mod tests {
     use alloc::vec::Vec;
 
     use fearless_simd::Fallback;
+    use glam::Vec3A;
 
     use super::*;
     use crate::cell::as_f32;

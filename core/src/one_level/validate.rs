@@ -11,8 +11,6 @@
 //! slots with lists tell that apart. Where among the free slots a row came to lie is all that
 //! is left to whoever wrote the blob.
 
-use glam::Vec3A;
-
 use super::spread::count_references;
 use super::triangles::MeshSpread;
 use super::{OneLevel, row, slot};
@@ -128,7 +126,7 @@ impl OneLevel<'_> {
         let cell = cell.ok_or(None)?;
         let list = self.references(cell).filter(|list| !list.is_empty()).ok_or(None)?;
         let covers = |&id: &u32| {
-            let bounds = mesh.corners(id, Vec3A::new).and_then(Aabb::of);
+            let bounds = mesh.corners(id).and_then(Aabb::of);
             bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
         };
         if ascends(list) && list.iter().all(covers) { Ok(list) } else { Err(Some(list)) }

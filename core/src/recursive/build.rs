@@ -282,7 +282,7 @@ pub(super) struct Placed {
 
 impl Placed {
     pub(super) fn new(mesh: &TriangleMesh<'_>, lattice: &Lattice, id: u32) -> Option<Self> {
-        let corners = mesh.corners(id, Vec3A::new)?;
+        let corners = mesh.corners(id)?;
         let reach = lattice.reach(&Aabb::of(corners)?);
         let overlap = Overlap::new(corners.map(|corner| lattice.place(corner)));
         Some(Self { reach, overlap, margin: lattice.margin() })

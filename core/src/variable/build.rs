@@ -10,8 +10,6 @@
 //! nothing is moved. When the pool runs out the build goes on planning subgrids and counting words:
 //! at the end it knows, exactly, what index it would have needed. That is also how `sizes` answers.
 
-use glam::Vec3A;
-
 use super::subgrid::{Frame, SubLayout};
 use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split_mut};
@@ -41,7 +39,7 @@ struct CellSpread<'m> {
 impl CellSpread<'_> {
     /// What a primitive reaches, in cells of the top.
     fn reach(&self, id: u32) -> Option<Aabb> {
-        let bounds = self.mesh.corners(id, Vec3A::new).and_then(Aabb::of)?;
+        let bounds = self.mesh.corners(id).and_then(Aabb::of)?;
         Some(self.lattice.reach(&bounds))
     }
 }

@@ -10,8 +10,6 @@
 //! Whether a list is long because nothing would separate its primitives would take memory to prove:
 //! a list may have any length. Queries do not mind.
 
-use glam::Vec3A;
-
 use super::subgrid::Subgrid;
 use super::{Content, Variable};
 use crate::aabb::Aabb;
@@ -47,7 +45,7 @@ impl Variable<'_> {
                 None => {}
                 Some(Content::List(ids)) => {
                     let covers = |&id: &u32| {
-                        let bounds = mesh.corners(id, Vec3A::new).and_then(Aabb::of);
+                        let bounds = mesh.corners(id).and_then(Aabb::of);
                         bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
                     };
                     if ids.is_empty() || !ascends(ids) || !ids.iter().all(covers) {
@@ -137,7 +135,7 @@ impl Inside<'_> {
 
     /// The cells of the top that a triangle covers, and its reach.
     fn reach(&self, id: u32) -> Option<(CellRange, Aabb)> {
-        let bounds = self.mesh.corners(id, Vec3A::new).and_then(Aabb::of)?;
+        let bounds = self.mesh.corners(id).and_then(Aabb::of)?;
         Some((self.lattice.range(&bounds), self.lattice.reach(&bounds)))
     }
 
