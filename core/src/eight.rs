@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn lanes_hold_the_triangles_of_every_layout() {
+    fn lanes_and_corners_are_the_triangles_of_every_layout() {
         let mut random = Random(0x2545_f491_4f6c_dd1d);
         let positions = triangles(&mut random, 1.0, 9);
         let count = positions.len();
@@ -400,7 +400,7 @@ mod tests {
                             array(&bytes, index_stride, indices.len()),
                             index_type,
                         );
-                        check_lanes(&mesh.unwrap());
+                        check_reading(&mesh.unwrap());
                     }
                 }
             }
@@ -424,9 +424,12 @@ mod tests {
         }
     }
 
-    fn check_lanes(mesh: &TriangleMesh<'_>) {
+    fn check_reading(mesh: &TriangleMesh<'_>) {
         let step = if cfg!(miri) { 19 } else { 1 };
         for first in (0..48).step_by(step) {
+            let corners =
+                mesh.corners(first).map(|corners| corners.map(|corner| corner.to_array()));
+            assert_eq!(corners.map(bits), mesh.triangle(first).map(bits), "{first}");
             for length in 0..=8 {
                 let ids: Vec<u32> = (first..first + length).collect();
                 let expected = core::array::from_fn(|lane| {

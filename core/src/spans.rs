@@ -226,7 +226,7 @@ mod tests {
                 }
                 for (lane, found) in (0..).zip(found) {
                     let id = u32::wrapping_add(first, lane);
-                    let corners = mesh.corners(id);
+                    let corners = mesh.triangle(id).map(|corners| corners.map(Vec3A::from_array));
                     let expected = corners.and_then(Aabb::of).map(|bounds| lattice.range(&bounds));
                     // The mesh's last vertex has nothing behind it, and is not read this way.
                     let is_last = mesh.indices(id).is_some_and(|vertices| vertices.contains(&5999));
