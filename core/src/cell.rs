@@ -76,6 +76,8 @@ pub(crate) struct Lattice {
     /// Cells per axis, 1 to [`MAX_RESOLUTION`].
     pub(crate) resolution: [u32; 3],
     cells_per_unit: [f32; 3],
+    /// The inverse of each, which every ray asks for.
+    units_per_cell: [f64; 3],
     /// The margin, in cells.
     margin: [f32; 3],
 }
@@ -125,12 +127,17 @@ impl Lattice {
     /// Cuts a padded box into cells. The same box and resolution give the same bits.
     pub(crate) fn new(bounds: Aabb, resolution: [u32; 3]) -> Self {
         let cells_per_unit = Vec3A::from_array(resolution.map(as_f32)) / bounds.size();
+        Self::of_cells(&bounds, resolution, cells_per_unit)
+    }
+
+    fn of_cells(bounds: &Aabb, resolution: [u32; 3], cells_per_unit: Vec3A) -> Self {
         Self {
             min: bounds.min.to_array(),
             max: bounds.max.to_array(),
             resolution,
             cells_per_unit: cells_per_unit.to_array(),
-            margin: (cells_per_unit * margin(&bounds)).to_array(),
+            units_per_cell: cells_per_unit.to_array().map(|cells| 1.0 / f64::from(cells)),
+            margin: (cells_per_unit * margin(bounds)).to_array(),
         }
     }
 
@@ -143,8 +150,7 @@ impl Lattice {
         let widest = Vec3A::splat(self.scale().min_element());
         let is_single = Vec3A::from_array(self.resolution.map(as_f32)).cmplt(Vec3A::splat(1.5));
         let cells_per_unit = Vec3A::select(is_single, widest, self.scale());
-        let margin = cells_per_unit * margin(&self.bounds());
-        Self { cells_per_unit: cells_per_unit.to_array(), margin: margin.to_array(), ..self }
+        Self::of_cells(&self.bounds(), self.resolution, cells_per_unit)
     }
 
     /// The box, pad included.
@@ -209,6 +215,11 @@ impl Lattice {
     #[inline(always)]
     pub(crate) fn cells_per_unit(&self, axis: usize) -> f64 {
         f64::from(self.cells_per_unit[axis])
+    }
+
+    #[inline(always)]
+    pub(crate) const fn units_per_cell(&self, axis: usize) -> f64 {
+        self.units_per_cell[axis]
     }
 
     /// The most cells per unit on any axis.

@@ -12,7 +12,7 @@
 
 use glam::{BVec3A, Vec3A, Vec3Swizzles as _};
 
-use crate::aabb::{Aabb, greater};
+use crate::aabb::{Aabb, greater, lesser};
 use crate::approach::Approach;
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::ray::{Ray, round};
@@ -95,9 +95,11 @@ impl Line {
         let direction = [f64::from(x), f64::from(y), f64::from(z)];
         let [x, y, z] = direction;
         let longest = greater(x.abs(), greater(y.abs(), z.abs()));
-        let finest = lattice.finest();
-        let scale = longest * finest;
-        let inverse_scale = 1.0 / scale;
+        let scale = longest * lattice.finest();
+        // Its inverse from those that are there: a division is slow.
+        let least = |[x, y, z]: [f64; 3]| lesser(x, lesser(y, z));
+        let inverse_scale = least(approach.inverse.map(f64::abs))
+            * least([0, 1, 2].map(|axis| lattice.units_per_cell(axis)));
 
         // Axis by axis as numbers, vectors at last: one that is filled
         // number by number is slow to read.
@@ -110,8 +112,7 @@ impl Line {
             if direction.abs() >= longest * PARALLEL {
                 let speed = direction * lattice.cells_per_unit(axis);
                 rate[axis] = round(speed * inverse_scale);
-                let fineness = finest / lattice.cells_per_unit(axis);
-                delta[axis] = round(longest * approach.inverse[axis] * fineness);
+                delta[axis] = round(scale * approach.inverse[axis] * lattice.units_per_cell(axis));
                 base[axis] = -position[axis] * delta[axis];
                 step[axis] = if direction > 0.0 { 1.0 } else { -1.0 };
             }
