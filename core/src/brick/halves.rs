@@ -10,9 +10,10 @@
 //! ray       | in the upper half: z y x | in the lower half: z y x |                  a common bit: they do not meet
 //! ```
 //!
-//! A larger mesh has ids of 32 bits, and its triangles are in both halves of everything.
+//! Each bit is good alone. The longer ids of a larger mesh take them one after the other, from the
+//! right, and leave none beyond 2^31 triangles.
 
-/// Bits of an id beside halves.
+/// Bits of an id beside all halves.
 pub(super) const ID_BITS: u32 = 26;
 
 /// How words are read that have an id and perhaps halves.
@@ -46,13 +47,14 @@ impl Format {
     /// That of a mesh with so many triangles.
     #[inline(always)]
     pub(super) const fn of(triangles: u32) -> Self {
-        let has_room = triangles <= Self::MOST_TRIANGLES;
-        Self { ids: if has_room { (1 << ID_BITS) - 1 } else { u32::MAX } }
+        let bits = u32::BITS - triangles.saturating_sub(1).leading_zeros() + Self::MORE_BITS;
+        let bits = if bits < ID_BITS { ID_BITS } else { bits };
+        Self { ids: if bits < u32::BITS { (1 << bits) - 1 } else { u32::MAX } }
     }
 
-    /// The most triangles whose ids leave room. The unit tests of this crate have few
-    /// triangles, and see both formats.
-    const MOST_TRIANGLES: u32 = if cfg!(test) { 2048 } else { 1 << ID_BITS };
+    /// Ids are this much longer than they need be: the unit tests of this crate have few triangles,
+    /// and see all formats, from 2048 triangles on.
+    const MORE_BITS: u32 = if cfg!(test) { 15 } else { 0 };
 
     /// The bits of a word that are the id.
     pub(super) const fn ids(self) -> u32 {
@@ -117,11 +119,26 @@ mod tests {
     }
 
     #[test]
-    fn ids_of_large_meshes_have_all_bits() {
-        let format = Format::of(u32::MAX);
-        let (nowhere, id) = (Halves::new(7, 7), u32::MAX - 1);
-        assert_eq!(format.word(id, nowhere), id);
-        assert_eq!((format.id(id), format.through(id, 7, 7)), (id, id));
-        assert_eq!(id & format.missed(nowhere), 0);
+    fn longer_ids_take_bits_from_the_right() {
+        let everything = Halves::new(7, 7);
+        let mut triangles = 2048_u32;
+        for taken in 0..=6 {
+            let format = Format::of(triangles);
+            assert_eq!(format.halves().count_ones(), 6 - taken, "{triangles} triangles");
+            assert_eq!(format.halves().leading_ones(), 6 - taken);
+            assert_eq!(Format::of(triangles / 2 + 1).ids(), format.ids());
+
+            // The longest id stays what it is beside all halves, and those of which there is no
+            // word left miss nothing.
+            let id = format.ids();
+            let word = format.word(id, everything);
+            assert_eq!((format.id(word), format.through(word, 7, 7)), (id, id));
+            for bit in 0..6 {
+                let ray = Halves::new((1 << bit) >> 3, (1 << bit) & 7);
+                assert_eq!(word & format.missed(ray) != 0, bit >= taken, "{taken}, {bit}");
+            }
+            triangles *= 2;
+        }
+        assert_eq!(Format::of(u32::MAX - 1).ids(), u32::MAX);
     }
 }

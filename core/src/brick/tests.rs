@@ -165,7 +165,8 @@ fn tiles_that_test_nothing_are_answered_at_once() {
     assert!(rays.iter().map(|ray| grid.occluded(ray)).eq(occluded));
 }
 
-/// With few triangles and with many: what ids have room for differs ([`halves`](super::halves)).
+/// With few triangles and with many: ids leave room for all halves, five, four, two or none
+/// ([`halves`](super::halves)).
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn rays_find_what_a_hashed_grid_finds() {
@@ -175,7 +176,7 @@ fn rays_find_what_a_hashed_grid_finds() {
         state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
         (state >> 40) as f32 / 16_777_216.0
     };
-    for triangles in [2048, 2049, 6000] {
+    for triangles in [2048, 2049, 6000, 20_000, 132_000] {
         let (positions, indices) = soup(triangles);
         let mesh = TriangleMesh::new(&positions, &indices).unwrap();
         let [hashed, brick] = [Config::new(Method::OneLevel), config()].map(|config| {
