@@ -433,7 +433,7 @@ typedef struct hgrid_config {
      * threads, and returns when all these calls have returned: after a join, or after any other
      * synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
      * library calls it several times, one after the other, on the thread that builds, with counts
-     * up to `tasks`; where the processor has no atomic operations, it never does. May be
+     * from 2 to `tasks`; where the processor has no atomic operations, it never does. May be
      * NULL with `tasks` 0 or 1, and with other methods. `hgrid_build` has an example.
      *
      * A task that is called twice, even at the same time, one that is never called, and an index

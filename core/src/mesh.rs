@@ -8,6 +8,8 @@
 //! The last element needs only its own bytes, not its stride. Nothing has to be aligned: every
 //! read goes through bytes, which costs nothing on the machines that matter and removes a rule.
 
+use core::ops::Range;
+
 use glam::{Vec3A, Vec4};
 
 use crate::aabb::{Aabb, MAX_COORDINATE};
@@ -232,14 +234,11 @@ impl<'a> TriangleMesh<'a> {
         Some([read(a)?, read(b)?, read(c)?])
     }
 
-    /// The box of all vertices whose coordinates are finite and no larger than
-    /// `MAX_COORDINATE`, used or not.
-    pub(crate) fn vertex_bounds(&self) -> Aabb {
+    /// The box of some vertices, used or not: of those whose coordinates are finite and no larger
+    /// than `MAX_COORDINATE`.
+    pub(crate) fn vertex_bounds(&self, vertices: Range<usize>) -> Aabb {
         // Four vertices that lie side by side are three vectors: x y z x | y z x y | z x y z.
-        let fours = match self.positions.stride {
-            12 => self.positions.bytes.as_chunks::<48>().0,
-            _ => &[],
-        };
+        let fours = self.positions.tight::<12>(vertices.start, vertices.len()).as_chunks::<4>().0;
         let mut low = [Vec4::INFINITY; 3];
         let mut high = [Vec4::NEG_INFINITY; 3];
         let mut bounds = Aabb::EMPTY;
@@ -251,7 +250,8 @@ impl<'a> TriangleMesh<'a> {
                 bounds.max = bounds.max.max(at);
             }
         };
-        for (four, bytes) in fours.iter().enumerate() {
+        let mut first = vertices.start;
+        for bytes in fours {
             let [a, b, c] = bytemuck::cast::<_, [[f32; 4]; 3]>(*bytes).map(Vec4::from_array);
             let limit = Vec4::splat(MAX_COORDINATE);
             let is_inside = a.abs().cmple(limit) & b.abs().cmple(limit) & c.abs().cmple(limit);
@@ -259,10 +259,11 @@ impl<'a> TriangleMesh<'a> {
                 low = [low[0].min(a), low[1].min(b), low[2].min(c)];
                 high = [high[0].max(a), high[1].max(b), high[2].max(c)];
             } else {
-                (4 * four..4 * four + 4).for_each(&mut add);
+                (first..first + 4).for_each(&mut add);
             }
+            first += 4;
         }
-        (4 * fours.len()..self.positions.count).for_each(&mut add);
+        (first..vertices.end).for_each(&mut add);
         let axes = |[a, b, c]: [Vec4; 3]| {
             let [a, b, c] = [a, b, c].map(|row| row.to_array());
             let xyz =
@@ -415,7 +416,14 @@ mod tests {
                     let vertices = Strided { bytes: &bytes, stride, count: positions.len() };
                     let none = Strided { bytes: &[], stride: 12, count: 0 };
                     let mesh = TriangleMesh::strided(vertices, none, IndexType::U32).unwrap();
-                    assert_eq!(mesh.vertex_bounds(), expected, "{stride} {positions:?}");
+                    for cut in [0, 3, 6] {
+                        let cut = positions.len().min(cut);
+                        let [before, behind] = [0..cut, cut..positions.len()];
+                        let [before, behind] =
+                            [before, behind].map(|part| mesh.vertex_bounds(part));
+                        let found = before.union(&behind);
+                        assert_eq!(found, expected, "{stride}, {cut} {positions:?}");
+                    }
                 }
             }
         }

@@ -23,7 +23,7 @@ enum State<T, R> {
 }
 
 /// Runs tasks and returns what each of them returns, in their order. An error if the caller's loop
-/// did not run each of them once.
+/// did not run each of them once; a single one needs no loop.
 pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
     parallel: &Control<'_>,
     tasks: impl Iterator<Item = T>,
@@ -52,7 +52,11 @@ pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
             _ => is_broken.store(true, Ordering::Relaxed),
         }
     };
-    each(parallel, count, &step);
+    if count == 1 {
+        step(0);
+    } else {
+        each(parallel, count, &step);
+    }
     let results = slots.map(|slot| match slot.into_inner() {
         State::Result(result) => Some(result),
         _ => None,

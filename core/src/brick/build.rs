@@ -4,7 +4,7 @@
 //! settle    box, cell size; a census: entries per block            (size.rs, pass.rs, places.rs)
 //! scatter   every triangle's entry to the bins of its blocks                (pass.rs, places.rs)
 //! sort      each block's bin into its chunk of the pool                       (sort.rs, pool.rs)
-//! close     the parts of the pool moved together
+//! close     the parts of the pool moved together                             (close.rs)
 //!
 //! index   | header | blocks | pool: large list | part of a task | part of a task |
 //! scratch | heads of a task | heads of a task | benches of a task | benches of a task |
@@ -22,6 +22,7 @@
 
 use fearless_simd::Simd;
 
+use super::close::close;
 use super::divide::{self, share};
 use super::extent::EXTENT_WORDS;
 use super::frame::{Frame, Scene};
@@ -284,6 +285,7 @@ impl<'w, const N: usize> Work<'w, N> {
     fn cut(&mut self, count: usize) {
         self.part_count = count;
         let all = self.settled.census.entries;
+        let heads = self.heads.get(..self.shares.tasks as usize).unwrap_or_default();
         let (mut block, mut before) = (0, 0);
         for (number, part) in (1_u64..).zip(self.parts.iter_mut().take(count)) {
             let (first, start) = (block, before);
@@ -291,7 +293,7 @@ impl<'w, const N: usize> Work<'w, N> {
             while block < self.settled.layout.block_count() as usize
                 && (before < goal || number == count as u64)
             {
-                before += entries(&self.heads, block);
+                before += entries(heads, block);
                 block += 1;
             }
             *part = Part { blocks: [first, block], entries: before - start, ..Part::default() };
@@ -359,7 +361,8 @@ impl<'w, const N: usize> Work<'w, N> {
         if self.filled.iter().any(|filled| filled.is_exhausted) {
             return Ok(None);
         }
-        let taken = self.close(blocks, words);
+        let parts = self.parts.iter().zip(&self.filled).take(self.part_count);
+        let taken = close::<N>(parts, blocks, words, self.parallel)?;
         let taken = u32::try_from(taken).ok().filter(|taken| taken & GRID == 0);
         taken.map(Some).ok_or(too_fine)
     }
@@ -368,10 +371,11 @@ impl<'w, const N: usize> Work<'w, N> {
     /// triangles into the list of the grid.
     fn scatter(&mut self, words: &mut [u32]) -> Result<(), Error> {
         let tasks = self.shares.tasks;
+        let heads = self.heads.get_mut(..tasks as usize).unwrap_or_default();
         for part in self.parts.iter().take(self.part_count) {
             let mut next = part.bins as u32;
             for block in part.blocks[0]..part.blocks[1] {
-                for head in self.heads.iter_mut().filter_map(|heads| heads.get_mut(block)) {
+                for head in heads.iter_mut().filter_map(|heads| heads.get_mut(block)) {
                     next += core::mem::replace(head, next) * ENTRY_WORDS as u32;
                 }
             }
@@ -381,7 +385,7 @@ impl<'w, const N: usize> Work<'w, N> {
         }
         let words = Shared::new(words);
         let mut large = 1;
-        let heads = self.heads.iter_mut().zip(&self.shares.censuses);
+        let heads = heads.iter_mut().zip(&self.shares.censuses);
         let scatters = (0..tasks).zip(heads).map(|(task, (heads, census))| {
             let ids = Shares::<N>::ids(self.ground.mesh.triangle_count(), task, tasks);
             let first = large;
@@ -433,42 +437,16 @@ impl<'w, const N: usize> Work<'w, N> {
         if self.part_count < 2 {
             return;
         }
+        let heads = self.heads.get_mut(..self.shares.tasks as usize).unwrap_or_default();
         for part in self.parts.iter().take(self.part_count) {
             let mut start = part.bins as u32;
             for block in part.blocks[0]..part.blocks[1] {
-                for head in self.heads.iter_mut().filter_map(|heads| heads.get_mut(block)) {
+                for head in heads.iter_mut().filter_map(|heads| heads.get_mut(block)) {
                     let count = (*head - start) / ENTRY_WORDS as u32;
                     start = core::mem::replace(head, count);
                 }
             }
         }
-    }
-
-    /// Moves the chunks of all parts together and returns where they end.
-    fn close(&self, blocks: &mut [Block], words: &mut [u32]) -> u64 {
-        let mut end = 0;
-        for (part, filled) in self.parts.iter().zip(&self.filled).take(self.part_count) {
-            if part.start > end {
-                shift(words, part.start as usize, end as usize, filled.taken as usize);
-            }
-            if end > 0 {
-                let blocks = blocks.get_mut(part.blocks[0]..part.blocks[1]).unwrap_or_default();
-                for block in blocks.iter_mut().filter(|block| **block != Block::default()) {
-                    block.base += end as u32;
-                }
-            }
-            end += filled.taken;
-        }
-        end
-    }
-}
-
-/// Moves words down, or none if they are not there.
-fn shift(words: &mut [u32], from: usize, to: usize, count: usize) {
-    let gap = from.saturating_sub(to);
-    let window = from.checked_add(count).and_then(|end| words.get_mut(to..end));
-    if let Some(window) = window.filter(|window| gap <= window.len()) {
-        window.copy_within(gap.., 0);
     }
 }
 

@@ -20,6 +20,7 @@
 
 mod build;
 mod bundle;
+mod close;
 mod crowds;
 mod divide;
 mod extent;

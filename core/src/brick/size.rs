@@ -105,7 +105,7 @@ pub(super) fn settle_in<const N: usize>(
     parallel: &Control<'_>,
 ) -> Result<(Settled, Shares<N>), Error> {
     let sample = Sample::of(mesh);
-    let bounds = Lattice::pad(&bounds(mesh, &sample, config.flags)?);
+    let bounds = Lattice::pad(&bounds::<N>(mesh, &sample, config.flags, parallel)?);
     let size = bounds.size();
     let mut cell = f64::from(config.cell_size) * sample.cell(mesh, size.max_element());
     loop {
@@ -185,7 +185,7 @@ fn fullest<const N: usize>(layout: &Layout, tasks: u32, scratch: &mut [u8]) -> u
     let heads = layout.heads::<N>(scratch, tasks);
     let Some((heads, _)) = heads else { return 0 };
     let sums = (0..layout.block_count() as usize)
-        .map(|block| heads.iter().filter_map(|heads| heads.get(block)).sum());
+        .map(|block| heads.iter().take(tasks as usize).filter_map(|heads| heads.get(block)).sum());
     sums.max().unwrap_or(0)
 }
 
@@ -200,9 +200,20 @@ fn cells(extent: f32, cell: f64) -> u32 {
 ///
 /// That of all finite vertices takes a tenth of the time of that of all triangles. It is too large
 /// where vertices lie about that no triangle uses: the sample tells.
-fn bounds(mesh: &TriangleMesh<'_>, sample: &Sample, flags: BuildFlags) -> Result<Aabb, Error> {
+fn bounds<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    sample: &Sample,
+    flags: BuildFlags,
+    parallel: &Control<'_>,
+) -> Result<Aabb, Error> {
     const SUSPICIOUS: f32 = 2.0;
-    let all = mesh.vertex_bounds();
+    /// Fewer would not be worth the caller's thread.
+    const LEAST_VERTICES: usize = 128 * 1024;
+    let count = mesh.vertex_count();
+    let piece = count.div_ceil(N.min(parallel.tasks as usize).max(1)).max(LEAST_VERTICES);
+    let pieces = (0..count).step_by(piece).map(|first| first..count.min(first + piece));
+    let boxes: [_; N] = run(parallel, pieces, |vertices| mesh.vertex_bounds(vertices))?;
+    let all = boxes.iter().flatten().fold(Aabb::EMPTY, |all, bounds| all.union(bounds));
     let (size, sampled) = (all.size().max_element(), sample.bounds.size().max_element());
     if size <= SUSPICIOUS * sampled {
         Ok(all)
@@ -358,5 +369,39 @@ mod tests {
         let (least, most) =
             (cells.iter().copied().fold(1.0, f64::min), cells.iter().copied().fold(0.0, f64::max));
         assert!(least < 1e-4 && most > 0.7, "{cells:?}");
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "hours")]
+    fn any_number_of_tasks_finds_the_box_of_the_vertices() {
+        let mut state = 1_u32;
+        let mut coordinate = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            as_f32(state >> 8) - 8_388_608.0
+        };
+        let positions: Vec<_> =
+            (0..300_001).map(|_| [coordinate(), coordinate(), coordinate()]).collect();
+        let extremes = [0, 1, 2].map(|axis| {
+            let of_axis = positions.iter().map(|position| position[axis]);
+            (of_axis.clone().fold(f32::MAX, f32::min), of_axis.fold(f32::MIN, f32::max))
+        });
+        let expected = Aabb {
+            min: extremes.map(|(min, _)| min).into(),
+            max: extremes.map(|(_, max)| max).into(),
+        };
+        let mesh = TriangleMesh::new(&positions, &[]).unwrap();
+        let sample = Sample { step: 1, bounds: expected };
+        let found =
+            |parallel: &Control<'_>| bounds::<4>(&mesh, &sample, BuildFlags::empty(), parallel);
+        let backward = |count: u32, task: &(dyn Fn(u32) + Sync)| {
+            assert!(count == 2 || count == 3);
+            (0..count).rev().for_each(task);
+        };
+        for tasks in 1..=4 {
+            assert_eq!(found(&Control { tasks, run: &backward, progress: None }), Ok(expected));
+        }
+        let half = |count: u32, task: &(dyn Fn(u32) + Sync)| (1..count).for_each(task);
+        let found = found(&Control { tasks: 2, run: &half, progress: None });
+        assert_eq!(found, Err(Error::InvalidParallelFor));
     }
 }
