@@ -29,14 +29,13 @@ pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
     tasks: impl Iterator<Item = T>,
     work: impl Fn(T) -> R + Sync,
 ) -> Result<[Option<R>; N], Error> {
-    let mut tasks = tasks.fuse();
+    // Loops, not functions of arrays: these do everything once for each of many slots in a row.
+    let mut slots = [const { Slot::new(State::Nothing) }; N];
     let mut count = 0;
-    let slots: [Slot<State<T, R>>; N] = core::array::from_fn(|_| {
-        Slot::new(tasks.next().map_or(State::Nothing, |task| {
-            count += 1;
-            State::Task(task)
-        }))
-    });
+    for (slot, task) in slots.iter_mut().zip(tasks) {
+        *slot = Slot::new(State::Task(task));
+        count += 1;
+    }
     let is_broken = AtomicBool::new(false);
     let step = |index: u32| {
         let slot = slots.get(index as usize);
@@ -57,12 +56,14 @@ pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
     } else {
         each(parallel, count, &step);
     }
-    let results = slots.map(|slot| match slot.into_inner() {
-        State::Result(result) => Some(result),
-        _ => None,
-    });
-    let done = results.iter().filter(|result| result.is_some()).count();
-    if is_broken.into_inner() || done != count as usize {
+    let (mut results, mut done) = ([const { None }; N], 0);
+    for (result, slot) in results.iter_mut().zip(slots) {
+        if let State::Result(returned) = slot.into_inner() {
+            *result = Some(returned);
+            done += 1;
+        }
+    }
+    if is_broken.into_inner() || done != count {
         return Err(Error::InvalidParallelFor);
     }
     Ok(results)
