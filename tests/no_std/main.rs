@@ -1,7 +1,7 @@
 //! Does it build where there is no operating system?
 //!
 //! A host build proves little: a crate without `std` may still lean on one. So core and the C
-//! library are built for machines that have none.
+//! library are built for machines that have none, and what a small one keeps of it is measured.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,15 +10,26 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hgrid_tests::artefact::{cargo_in, run, target_dir};
+use hgrid_tests::readme::check_sizes;
+use tempfile::TempDir;
 
 /// How long `rustup` may take to fetch a target.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// What rustc says about itself.
+fn rustc(what: &str) -> String {
+    let said = run(Command::new("rustc").args(["--print", what])).stdout;
+    String::from_utf8(said).expect("text").trim().to_owned()
+}
+
+/// Where Rust keeps what belongs to a target.
+fn rustlib(target: &str) -> PathBuf {
+    Path::new(&rustc("sysroot")).join("lib/rustlib").join(target)
+}
+
 /// Whether Rust can build for a target. If it cannot, the test says so and ends.
 fn is_available(target: &str) -> bool {
-    let sysroot = run(Command::new("rustc").args(["--print", "sysroot"])).stdout;
-    let sysroot = String::from_utf8(sysroot).expect("text");
-    let libraries = Path::new(sysroot.trim()).join("lib/rustlib").join(target).join("lib");
+    let libraries = rustlib(target).join("lib");
     if !libraries.is_dir() && !is_fetched(target) {
         println!("skipped: no Rust libraries for {target}, and rustup did not bring them");
         return false;
@@ -56,9 +67,38 @@ fn a_microcontroller_gets_a_static_library() {
     let target = "thumbv7em-none-eabihf";
     if is_available(target) {
         let dir = build(target);
-        let archive = fs::read(dir.join("libhgrid.a")).expect("the C library");
-        assert!(archive.starts_with(b"!<arch>\n"));
+        let archive = dir.join("libhgrid.a");
+        let bytes = fs::read(&archive).expect("the C library");
+        assert!(bytes.starts_with(b"!<arch>\n"));
+        check_flash(&archive);
     }
+}
+
+/// Links what programs need of the archive, and of nothing else, as the linker would for them.
+fn check_flash(archive: &Path) {
+    let host = rustc("host-tuple");
+    let linker = rustlib(&host).join("bin/rust-lld");
+    if !linker.is_file() {
+        println!("skipped: no linker comes with Rust for {host}");
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    let image = dir.path().join("image");
+    let flash = |functions: &[&str]| {
+        let mut linker = Command::new(&linker);
+        linker.args(["-flavor", "gnu", "--gc-sections", "--oformat=binary", "-e", functions[0]]);
+        for function in functions {
+            linker.args(["-u", function]);
+        }
+        run(linker.arg(archive).arg("-o").arg(&image));
+        fs::metadata(&image).expect("an image").len()
+    };
+    let traces = flash(&["hgrid_open", "hgrid_intersect"]);
+    let builds = flash(&["hgrid_open", "hgrid_intersect", "hgrid_build"]);
+    check_sizes(
+        ["`hgrid_open` and `hgrid_intersect` take ", " bytes, with `hgrid_build` "],
+        [traces, builds],
+    );
 }
 
 #[test]

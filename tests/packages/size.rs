@@ -1,14 +1,11 @@
-//! How large is a program with the library in it? The README says so, and a library that grows
-//! without anybody noticing does not stay one that a small machine can carry.
+//! How large is a program with the library in it? The README says so.
 
 use std::fs;
 use std::path::Path;
 
 use hgrid_tests::artefact::{compiler, root, run, static_library};
+use hgrid_tests::readme::check_sizes;
 use tempfile::TempDir;
-
-/// What the README says in front of the size of the program, and of the library's part in it.
-const WORDS: [&str; 2] = ["stripped: ", " bytes, of which "];
 
 #[test]
 fn minimal_is_as_small_as_the_readme_says() {
@@ -16,28 +13,7 @@ fn minimal_is_as_small_as_the_readme_says() {
         println!("skipped: the README has the size for x86-64 Linux");
         return;
     }
-    let readme = fs::read_to_string(root().join("README.md")).expect("README.md");
-    let (before, behind) = readme.split_once(WORDS[0]).expect("a size");
-    let (program, behind) = behind.split_once(WORDS[1]).expect("another size");
-    let end = behind.find(' ').expect("an end");
-    let (library, behind) = behind.split_at(end);
-
-    let sizes = measure();
-    if std::env::var_os("HGRID_BLESS").is_some() {
-        let [program, library] = sizes;
-        let [stripped, of_which] = WORDS;
-        let readme = format!("{before}{stripped}{program}{of_which}{library}{behind}");
-        fs::write(root().join("README.md"), readme).expect("README.md can be written");
-        return;
-    }
-    for (said, is) in [program, library].into_iter().zip(sizes) {
-        let said: u64 = said.parse().expect("a number");
-        let slack = said / 10;
-        assert!(
-            is.abs_diff(said) <= slack,
-            "{said} bytes in the README, now {is}: HGRID_BLESS=1 writes it anew"
-        );
-    }
+    check_sizes(["stripped: ", " bytes, of which "], measure());
 }
 
 /// The size of the stripped program, and the bytes in it that come from the library.

@@ -11,6 +11,8 @@ pub mod oracle;
 pub mod owned;
 pub mod random;
 #[cfg(feature = "full")]
+pub mod readme;
+#[cfg(feature = "full")]
 pub mod scans;
 #[cfg(feature = "full")]
 pub mod symbols;
