@@ -188,9 +188,10 @@ pub struct hgrid_config {
     /// Calls `task(task_context, index)` once for every `index` below `count`, in any order, on any
     /// threads, and returns when all these calls have returned: after a join, or after any other
     /// synchronisation by which the thread that leaves `run` sees what the other ones wrote. The
-    /// library calls it several times, one after the other, on the thread that builds, with counts
-    /// from 2 to `tasks`; where the processor has no atomic operations, it never does. May be
-    /// NULL with `tasks` 0 or 1, and with other methods. `hgrid_build` has an example.
+    /// library calls it on the thread that builds, with counts from 2 to `tasks`: several times, one
+    /// after the other, or never, as where the mesh or the scratch is small or the processor has no
+    /// atomic operations. May be NULL with `tasks` 0 or 1, and with other methods. `hgrid_build` has
+    /// an example.
     ///
     /// A task that is called twice, even at the same time, one that is never called, and an index
     /// that is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`.

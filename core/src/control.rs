@@ -43,8 +43,8 @@ pub struct Control<'c> {
     /// counts as the nearest of both. Each takes scratch of its own.
     pub tasks: u32,
     /// Calls the task with every number below the count exactly once, in any order, and
-    /// returns when all calls have returned. It is called several times in a build, with
-    /// counts up to [`tasks`](Self::tasks).
+    /// returns when all calls have returned. A build calls it with counts from 2 to
+    /// [`tasks`](Self::tasks), several times or, where the mesh or the scratch is small, never.
     ///
     /// On targets without atomic operations it is never called.
     pub run: &'c dyn for<'t> Fn(u32, &'t Task<'t>),

@@ -23,7 +23,7 @@ enum State<T, R> {
 }
 
 /// Runs tasks and returns what each of them returns, in their order. An error if the caller's loop
-/// did not run each of them once; a single one needs no loop.
+/// did not run each of them once; a single one needs no loop, and is not handed to it.
 pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
     parallel: &Control<'_>,
     tasks: impl Iterator<Item = T>,
@@ -51,10 +51,10 @@ pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
             _ => is_broken.store(true, Ordering::Relaxed),
         }
     };
-    if count == 1 {
-        step(0);
-    } else {
-        each(parallel, count, &step);
+    match count {
+        0 => {}
+        1 => step(0),
+        _ => each(parallel, count, &step),
     }
     let (mut results, mut done) = ([const { None }; N], 0);
     for (result, slot) in results.iter_mut().zip(slots) {

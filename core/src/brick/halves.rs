@@ -10,11 +10,20 @@
 //! ray       | in the upper half: z y x | in the lower half: z y x |                  a common bit: they do not meet
 //! ```
 //!
-//! Each bit is good alone. The longer ids of a larger mesh take them one after the other, from the
+//! Each bit is of use without the others. The longer ids of a larger mesh take them one after the other, from the
 //! right, and leave none beyond 2^31 triangles.
 
 /// Bits of an id beside all halves.
 pub(super) const ID_BITS: u32 = 26;
+
+/// Bits without which so many ids are not different.
+#[inline(always)]
+const fn id_bits(triangles: u32) -> u32 {
+    u32::BITS - triangles.saturating_sub(1).leading_zeros()
+}
+
+const _: () = assert!(id_bits(1 << 26) == 26 && id_bits((1 << 26) + 1) == 27);
+const _: () = assert!(id_bits(1 << 31) == 31 && id_bits((1 << 31) + 1) == 32);
 
 /// How words are read that have an id and perhaps halves.
 #[derive(Debug, Clone, Copy)]
@@ -47,14 +56,13 @@ impl Format {
     /// That of a mesh with so many triangles.
     #[inline(always)]
     pub(super) const fn of(triangles: u32) -> Self {
-        let bits = u32::BITS - triangles.saturating_sub(1).leading_zeros() + Self::MORE_BITS;
+        /// Ids are this much longer than they need be: the unit tests of this crate have few
+        /// triangles, and see all formats, from 2048 triangles on.
+        const MORE_BITS: u32 = if cfg!(test) { 15 } else { 0 };
+        let bits = id_bits(triangles) + MORE_BITS;
         let bits = if bits < ID_BITS { ID_BITS } else { bits };
         Self { ids: if bits < u32::BITS { (1 << bits) - 1 } else { u32::MAX } }
     }
-
-    /// Ids are this much longer than they need be: the unit tests of this crate have few triangles,
-    /// and see all formats, from 2048 triangles on.
-    const MORE_BITS: u32 = if cfg!(test) { 15 } else { 0 };
 
     /// The bits of a word that are the id.
     pub(super) const fn ids(self) -> u32 {

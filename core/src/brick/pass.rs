@@ -471,8 +471,8 @@ mod tests {
     fn every_level_counts_and_writes_what_one_triangle_after_the_other_does() {
         let bounds = Aabb { min: Vec3A::ZERO, max: Vec3A::new(48.0, 32.0, 32.0) };
         let lattice = Lattice::new(bounds, [48, 32, 32]);
-        // From 2049 triangles on, ids leave no room for all halves.
-        for count in [0, 1, 63, 64, 65, 200, 2048, 2100] {
+        // Ids of up to 2048 triangles leave room for all halves, of 2100 for five, of 20 000 for two.
+        for count in [0, 1, 63, 64, 65, 200, 2048, 2100, 20_000] {
             let positions = positions(count);
             let indices: Vec<_> = (0..count).map(|id| [3 * id, 3 * id + 1, 3 * id + 2]).collect();
             let short: Vec<[u16; 3]> = indices

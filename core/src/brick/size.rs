@@ -403,5 +403,11 @@ mod tests {
         let half = |count: u32, task: &(dyn Fn(u32) + Sync)| (1..count).for_each(task);
         let found = found(&Control { tasks: 2, run: &half, progress: None });
         assert_eq!(found, Err(Error::InvalidParallelFor));
+
+        // No vertices, no tasks.
+        let nothing = TriangleMesh::new(&[], &[]).unwrap();
+        let none = |_: u32, _: &(dyn Fn(u32) + Sync)| panic!("there is nothing to do");
+        let parallel = Control { tasks: 4, run: &none, progress: None };
+        settle_in::<4>(&nothing, &Config::default(), &mut [], &parallel).unwrap();
     }
 }
