@@ -22,6 +22,13 @@ enum State<T, R> {
     Result(R),
 }
 
+/// Into how many tasks work is cut, of which no more than `most` would be worth the caller's thread.
+#[expect(clippy::cast_possible_truncation, reason = "N is MAX_TASKS at most")]
+pub(crate) fn task_count<const N: usize>(parallel: &Control<'_>, most: usize) -> u32 {
+    let most = u32::try_from(most).unwrap_or(u32::MAX);
+    parallel.tasks.min(most).clamp(1, N as u32)
+}
+
 /// Runs tasks and returns what each of them returns, in their order. An error if the caller's loop
 /// did not run each of them once; a single one needs no loop, and is not handed to it.
 pub(crate) fn run<const N: usize, T: Portable, R: Portable>(

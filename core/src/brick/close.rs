@@ -4,7 +4,7 @@ use super::layout::Block;
 use super::pool::{Filled, Part};
 use crate::control::Control;
 use crate::error::Error;
-use crate::tasks::run;
+use crate::tasks::{run, task_count};
 
 /// Moves the chunks of all parts together and returns where they end.
 #[expect(clippy::cast_possible_truncation, reason = "numbers of words in a region")]
@@ -46,7 +46,7 @@ fn shift<const N: usize>(
     let end = from.checked_add(count);
     let mut window = end.and_then(|end| words.get_mut(to..end)).unwrap_or_default();
     // As many words as the gap is wide go to where nothing is left, so they may go in any order.
-    let tasks = N.min(parallel.tasks as usize).min(gap / LEAST_WORDS);
+    let tasks = task_count::<N>(parallel, gap / LEAST_WORDS) as usize;
     while tasks > 1 && window.len().saturating_sub(gap) > LEAST_WORDS {
         let (free, rest) =
             core::mem::take(&mut window).split_at_mut_checked(gap).unwrap_or_default();

@@ -10,8 +10,8 @@
 //! ray       | in the upper half: z y x | in the lower half: z y x |                  a common bit: they do not meet
 //! ```
 //!
-//! Each bit is of use without the others. The longer ids of a larger mesh take them one after the other, from the
-//! right, and leave none beyond 2^31 triangles.
+//! Each bit is of use without the others. The longer ids of a larger mesh take them one after the
+//! other, from the right, and leave none beyond 2^31 triangles.
 
 /// Bits of an id beside all halves.
 pub(super) const ID_BITS: u32 = 26;

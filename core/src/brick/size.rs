@@ -28,7 +28,7 @@ use crate::control::{Control, Watch};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
-use crate::tasks::run;
+use crate::tasks::{run, task_count};
 
 /// The most references of a mesh with so many triangles.
 pub(super) const fn reference_limit(triangles: u32) -> u64 {
@@ -149,8 +149,10 @@ fn census<const N: usize>(
     scratch: &mut [u8],
     parallel: &Control<'_>,
 ) -> Result<(Settled, Shares<N>), Error> {
+    /// Fewer would not be worth the caller's thread.
+    const LEAST_TRIANGLES: u32 = 256;
     let triangles = ground.mesh.triangle_count();
-    let wanted = task_count::<N>(triangles, parallel);
+    let wanted = task_count::<N>(parallel, (triangles / LEAST_TRIANGLES) as usize);
     let room = layout.tasks_in(scratch, wanted);
     let (is_counted, tasks) = (room > 0, if room > 0 { room } else { wanted });
     let heads = if is_counted { layout.heads::<N>(scratch, tasks) } else { None };
@@ -171,13 +173,6 @@ fn census<const N: usize>(
     let (lattice, most_blocks) = (*ground.lattice, ground.most_blocks);
     let settled = Settled { lattice, layout, census, most_blocks, is_counted };
     Ok((settled, Shares { tasks, wanted, censuses }))
-}
-
-/// Into how many tasks the work is cut.
-fn task_count<const N: usize>(triangles: u32, parallel: &Control<'_>) -> u32 {
-    /// Fewer would not be worth the caller's thread.
-    const LEAST_TRIANGLES: u32 = 256;
-    parallel.tasks.min(triangles / LEAST_TRIANGLES).clamp(1, N as u32)
 }
 
 /// The entries of the fullest block.
@@ -210,7 +205,7 @@ fn bounds<const N: usize>(
     /// Fewer would not be worth the caller's thread.
     const LEAST_VERTICES: usize = 128 * 1024;
     let count = mesh.vertex_count();
-    let piece = count.div_ceil(N.min(parallel.tasks as usize).max(1)).max(LEAST_VERTICES);
+    let piece = count.div_ceil(task_count::<N>(parallel, count / LEAST_VERTICES) as usize).max(1);
     let pieces = (0..count).step_by(piece).map(|first| first..count.min(first + piece));
     let boxes: [_; N] = run(parallel, pieces, |vertices| mesh.vertex_bounds(vertices))?;
     let all = boxes.iter().flatten().fold(Aabb::EMPTY, |all, bounds| all.union(bounds));
@@ -305,6 +300,15 @@ mod tests {
 
     use super::*;
 
+    /// Whole numbers of 24 bits.
+    fn random() -> impl FnMut() -> f32 {
+        let mut state = 1_u32;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            as_f32(state >> 8)
+        }
+    }
+
     /// One width after the other, all numbers with twice the digits.
     fn cell(mesh: &TriangleMesh<'_>, step: u32, extent: f64) -> f64 {
         let is_enough = |cell: f64| {
@@ -331,11 +335,8 @@ mod tests {
     #[test]
     #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn widths_compared_at_once_give_the_cell_that_one_after_the_other_does() {
-        let mut state = 1_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            as_f32(state >> 8) / 16_777_216.0
-        };
+        let mut whole = random();
+        let mut random = || whole() / 16_777_216.0;
         let mut cells = Vec::new();
         for scale in [1e-30, 1.0, 1e30] {
             for (count, size, large) in [
@@ -374,13 +375,10 @@ mod tests {
     #[test]
     #[cfg_attr(miri, ignore = "hours")]
     fn any_number_of_tasks_finds_the_box_of_the_vertices() {
-        let mut state = 1_u32;
-        let mut coordinate = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            as_f32(state >> 8) - 8_388_608.0
-        };
+        let mut whole = random();
+        let mut coordinate = || whole() - 8_388_608.0;
         let positions: Vec<_> =
-            (0..300_001).map(|_| [coordinate(), coordinate(), coordinate()]).collect();
+            (0..400_001).map(|_| [coordinate(), coordinate(), coordinate()]).collect();
         let extremes = [0, 1, 2].map(|axis| {
             let of_axis = positions.iter().map(|position| position[axis]);
             (of_axis.clone().fold(f32::MAX, f32::min), of_axis.fold(f32::MIN, f32::max))
