@@ -205,7 +205,8 @@ fn bounds<const N: usize>(
     /// Fewer would not be worth the caller's thread.
     const LEAST_VERTICES: usize = 128 * 1024;
     let count = mesh.vertex_count();
-    let piece = count.div_ceil(task_count::<N>(parallel, count / LEAST_VERTICES) as usize).max(1);
+    let tasks = task_count::<N>(parallel, count / LEAST_VERTICES) as usize;
+    let piece = count.div_ceil(tasks.max(1)).max(1);
     let pieces = (0..count).step_by(piece).map(|first| first..count.min(first + piece));
     let boxes: [_; N] = run(parallel, pieces, |vertices| mesh.vertex_bounds(vertices))?;
     let all = boxes.iter().flatten().fold(Aabb::EMPTY, |all, bounds| all.union(bounds));
