@@ -218,7 +218,7 @@
  * The version of the blob format, the same for all methods. A blob of another version is refused:
  * build it again.
  */
-#define HGRID_BLOB_VERSION 2
+#define HGRID_BLOB_VERSION 3
 
 /**
  * Indices of 32 bits: the default of `hgrid_mesh`.

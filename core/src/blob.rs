@@ -26,7 +26,7 @@ use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
 
 /// The version of the blob format. A blob of another version is refused.
-pub const BLOB_VERSION: u32 = 2;
+pub const BLOB_VERSION: u32 = 3;
 
 /// Bytes before the first section.
 pub(crate) const HEADER_BYTES: usize = size_of::<Header>();

@@ -11,7 +11,7 @@
 //! spreading             4 * 2^-24                     v - min, * cells per unit, + margin
 //! the triangle test    25 * 2^-24                     vertex - origin at up to 5 extents, shear
 //! the walk              4 * 2^-24                     base, cell * delta, their sum
-//! halves of a cell      4 * 2^-24                     position + rate * t (two margins: a line's, a
+//! quarters of a cell    4 * 2^-24                     position + rate * t (two margins: a line's, a
 //!                                                     triangle's)
 //! a tile's lines       60 * 2^-24                     start - slope * zero, origin 4.5 extents off (two
 //!                                                     margins: a line's, a triangle's)
@@ -260,7 +260,7 @@ pub(crate) const fn whole(position: f32) -> u32 {
     position as u32
 }
 
-/// The whole parts of positions between 0 and twice [`MAX_RESOLUTION`] (halves of cells); an odd
+/// The whole parts of positions between 0 and four times [`MAX_RESOLUTION`] (quarters of cells); an odd
 /// whole number may count as the end of the cell before it, which the margin allows.
 ///
 /// Adding 1.5 * 2^23 rounds to whole numbers and leaves them in the low bits: 5 to 10 % of a build

@@ -184,15 +184,22 @@ impl Line {
         near.max(0.0) <= far.min(limit)
     }
 
-    /// On which axes a cell's lower half is not crossed between two distances, and
-    /// on which its upper half is not.
+    /// On which axes the line between two distances does not reach the second quarter of a cell, on
+    /// which it does not reach the third, and the fourth. Likewise, three bits above these, from the
+    /// other side: on which it begins behind the third quarter, the second, the first.
     #[inline(always)]
-    pub(crate) fn halves(&self, cell: [u32; 3], near: f32, far: f32) -> [u32; 2] {
+    pub(crate) fn quarters(&self, cell: [u32; 3], near: f32, far: f32) -> [u32; 3] {
         let middle = Vec3A::from_array(cell.map(as_f32)) + 0.5;
         let (from, near, far) = (self.position - middle, self.rate * near, self.rate * far);
-        let is_above = (from + near.min(far)).cmpgt(self.margin);
-        let is_below = (from + near.max(far)).cmplt(-self.margin);
-        [is_above.bitmask(), is_below.bitmask()]
+        let end = from + near.max(far) + self.margin;
+        let start = -(from + near.min(far)) + self.margin;
+        [-0.25, 0.0, 0.25].map(
+            #[inline(always)]
+            |border| {
+                let border = Vec3A::splat(border);
+                end.cmplt(border).bitmask() | start.cmplt(border).bitmask() << 3
+            },
+        )
     }
 
     /// From where to where the line is inside a box given in cells, or along its border; the second

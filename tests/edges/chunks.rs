@@ -260,8 +260,8 @@ fn every_kind_of_word_counts() {
     for kind in KINDS {
         for Site { at, .. } in damage.some(&[kind], false) {
             let word = damage.word(at);
-            // The upper six bits of a cell's ids say in which halves of the cell triangles lie.
-            let flipped = [0, 26, 29, 31].map(|bit| word ^ 1 << bit);
+            // The upper twelve bits of a cell's ids say in which quarters of the cell triangles lie.
+            let flipped = [0, 20, 25, 26, 31].map(|bit| word ^ 1 << bit);
             let moved = [word.wrapping_add(1), word.wrapping_sub(1), !word];
             for value in flipped.into_iter().chain(moved) {
                 damage.is_refused(&[(at, value)], &format!("{kind:?}"));

@@ -10,8 +10,8 @@
 #![expect(clippy::cast_possible_truncation, reason = "numbers of cells")]
 
 use super::groups::Groups;
-use super::halves::Format;
 use super::layout::{BLOCK_CELLS, Bench, Entry, MASK_BITS};
+use super::quarters::Format;
 use super::sort::each_listed;
 use crate::bits::{is_set, ones};
 

@@ -152,8 +152,8 @@ fn usual_size(scene: &Scene<'_>, ids: &[u32]) -> f32 {
 /// The entry of a triangle in a divided cell.
 #[inline(always)]
 fn entry(scene: &Scene<'_>, frame: &Frame, id: u32) -> Option<Entry> {
-    let (range, halves) = frame.range(&scene.reach(id)?);
+    let (range, quarters) = frame.range(&scene.reach(id)?);
     // No list of the lattice's blocks takes it: at most it is in the list of all of the cell.
     let class = classify(range.min, range.max, 1).unwrap_or(Class::Blocks);
-    Some(Entry::new(scene.format().word(id, halves), range.min, range.max, class))
+    Some(Entry::new(scene.format().word(id, quarters), range.min, range.max, class))
 }

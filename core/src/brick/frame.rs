@@ -1,10 +1,10 @@
-//! Where a triangle belongs: its cells in a block or a divided cell, the halves of them, and which
+//! Where a triangle belongs: its cells in a block or a divided cell, the quarters of them, and which
 //! lists take it.
 
 use glam::Vec3A;
 
-use super::halves::{Format, Halves};
 use super::layout::{BLOCK, Class};
+use super::quarters::{Format, Quarters};
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, Lattice, as_f32, cells_between};
 use crate::mesh::TriangleMesh;
@@ -62,21 +62,20 @@ impl Frame {
     }
 
     /// The cells of the frame that a box in cells of the lattice overlaps,
-    /// and the halves of the outermost.
-    pub(super) fn range(&self, reach: &Aabb) -> (CellRange, Halves) {
+    /// and the quarters of the outermost.
+    pub(super) fn range(&self, reach: &Aabb) -> (CellRange, Quarters) {
         range(self.zoom(reach), [self.cells; 3])
     }
 }
 
 /// The cells that a box overlaps which is given in cells; those at the border if it lies outside.
-/// And the halves: upper ones of its first cells, lower ones of its last cells.
+/// And the quarters in which it begins and ends.
 #[inline(always)]
-pub(super) fn range(reach: Aabb, resolution: [u32; 3]) -> (CellRange, Halves) {
-    let halves = Aabb { min: reach.min * 2.0, max: reach.max * 2.0 };
-    let CellRange { min, max } = cells_between(halves, resolution.map(|cells| 2 * cells));
-    let axes = |[x, y, z]: [u32; 3]| x & 1 | (y & 1) << 1 | (z & 1) << 2;
-    let in_halves = Halves::new(axes(min), !axes(max));
-    (CellRange { min: min.map(|half| half >> 1), max: max.map(|half| half >> 1) }, in_halves)
+pub(super) fn range(reach: Aabb, resolution: [u32; 3]) -> (CellRange, Quarters) {
+    let quarters = Aabb { min: reach.min * 4.0, max: reach.max * 4.0 };
+    let CellRange { min, max } = cells_between(quarters, resolution.map(|cells| 4 * cells));
+    let range = CellRange { min: min.map(|first| first >> 2), max: max.map(|last| last >> 2) };
+    (range, Quarters::new(min, max))
 }
 
 /// How many cells hold a triangle with these first and last cells, or with

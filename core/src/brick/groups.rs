@@ -1,8 +1,8 @@
 //! Entries with the same number of cells together, so that going
 //! through their cells needs no branch.
 
-use super::halves::Format;
 use super::layout::{AXES, Entry, OTHERS};
+use super::quarters::Format;
 
 /// Entries of a block, together those that have two cells on the same axes.
 ///

@@ -17,7 +17,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::crowds::HEAD_WORDS;
-use super::halves::Format;
+use super::quarters::Format;
 use crate::arena::{section_bytes, split_mut};
 use crate::blob::HEADER_BYTES;
 
@@ -91,7 +91,7 @@ pub(super) const fn place(number: u32) -> [u32; 3] {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 pub(super) struct Entry {
-    /// And above it, if there is room, the halves of its first and its last cell.
+    /// And above it, if there is room, the quarters of its first and its last cell.
     id: u32,
     /// First and last cell in twelve bits each, then the class, then the group.
     cells: u32,
@@ -121,7 +121,7 @@ impl Class {
 
 impl Entry {
     /// A triangle with its cells in a block, both ends included and below 16; above the
-    /// id its halves, if there is room.
+    /// id its quarters, if there is room.
     #[inline(always)]
     pub(super) const fn new(id: u32, min: [u32; 3], max: [u32; 3], class: Class) -> Self {
         let [x, y, z] =

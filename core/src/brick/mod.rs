@@ -11,7 +11,7 @@
 //! blocks   for each block of 16^3 cells: mask of its bricks, where its chunk lies, its list
 //! pool     list of the grid, and the chunk of each block:
 //!          | bricks: mask, cells, list | starts of cells, end | lists of cells | of bricks | of the block |
-//!                                             (halves and ids)              (extent, count, ids)
+//!                                             (quarters and ids)              (extent, count, ids)
 //! ```
 //!
 //! A cell is a few triangles wide, whatever their number ([`size`]). A triangle that would be in
@@ -27,12 +27,12 @@ mod extent;
 mod frame;
 mod frusta;
 mod groups;
-mod halves;
 mod hits;
 mod layout;
 mod pass;
 mod places;
 mod pool;
+mod quarters;
 mod size;
 mod sort;
 #[cfg(test)]
@@ -58,8 +58,8 @@ use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
 use bundle::RAYS;
 use extent::{EXTENT_WORDS, Extent, Owner};
-use halves::Format;
 use layout::{Block, Layout};
+use quarters::Format;
 pub(crate) use walk::OneRay;
 
 /// A view of a built brick grid.
@@ -217,7 +217,7 @@ impl<'a> Large<'a> {
 /// What a cell holds.
 #[derive(Debug, Clone, Copy)]
 enum Content<'a> {
-    /// Ids, and above them the [`halves`].
+    /// Ids, and above them the [`quarters`].
     List(&'a [u32]),
     /// A divided cell, and how many cells it has on each axis.
     Chunk(Chunk<'a>, u32),

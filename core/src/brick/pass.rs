@@ -12,9 +12,9 @@ use fearless_simd::Simd;
 use glam::Vec3A;
 
 use super::frame::{classify, lists, range};
-use super::halves::{Format, Halves};
 use super::layout::{BLOCK, Class, ENTRY_WORDS, Entry};
 use super::places::{BATCH, Places, straddling};
+use super::quarters::{Format, Quarters};
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, Lattice};
 use crate::config::BuildFlags;
@@ -64,9 +64,9 @@ pub(super) struct Ground<'g> {
 
 /// Where a triangle belongs.
 pub(super) struct Home {
-    /// Its cells, and the halves of the outermost.
+    /// Its cells, and the quarters of the outermost.
     pub(super) range: CellRange,
-    pub(super) halves: Halves,
+    pub(super) quarters: Quarters,
     /// What lists it, if not the whole grid.
     pub(super) class: Option<Class>,
 }
@@ -76,22 +76,22 @@ impl Home {
     #[inline(always)]
     pub(super) fn of(lattice: &Lattice, most_blocks: u64, corners: [Vec3A; 3]) -> Option<Self> {
         let reach = lattice.reach(&Aabb::of(corners)?);
-        let (range, halves) = range(reach, lattice.resolution);
-        Some(Self { range, halves, class: classify(range.min, range.max, most_blocks) })
+        let (range, quarters) = range(reach, lattice.resolution);
+        Some(Self { range, quarters, class: classify(range.min, range.max, most_blocks) })
     }
 
-    /// The part of it in a block that it reaches: its cells there, and the halves.
+    /// The part of it in a block that it reaches: its cells there, and the quarters.
     #[inline(always)]
-    pub(super) fn in_block(&self, [x, y, z]: [u32; 3]) -> (CellRange, Halves) {
+    pub(super) fn in_block(&self, [x, y, z]: [u32; 3]) -> (CellRange, Quarters) {
         self.part([self.along(0, x), self.along(1, y), self.along(2, z)])
     }
 
     #[inline(always)]
-    fn part(&self, [x, y, z]: [Along; 3]) -> (CellRange, Halves) {
+    fn part(&self, [x, y, z]: [Along; 3]) -> (CellRange, Quarters) {
         let before = x.before | y.before << 1 | z.before << 2;
         let behind = x.behind | y.behind << 1 | z.behind << 2;
         let range = CellRange { min: [x.first, y.first, z.first], max: [x.last, y.last, z.last] };
-        (range, self.halves.through(before, behind))
+        (range, self.quarters.through(before, behind))
     }
 
     /// An axis of the part in a block.
@@ -152,11 +152,11 @@ fn visit<S: Simd, V: Visit, const ENTRIES: bool>(
         return Ok(());
     }
 
-    let spans = Spans::new(simd, ground.lattice, 2);
+    let spans = Spans::new(simd, ground.lattice, 4);
     let format = Format::of(ground.mesh.triangle_count());
     let [x, y, z] = [1, ground.blocks[0], ground.blocks[0] * ground.blocks[1]];
     let offsets = [0, x, y, x + y, z, x + z, y + z, x + y + z];
-    let mut batch = Places::NONE;
+    let mut batch = Places::new(format);
     let mut first = ids.start;
     while first < ids.end {
         let count = (ids.end - first).min(BATCH);
@@ -167,11 +167,11 @@ fn visit<S: Simd, V: Visit, const ENTRIES: bool>(
         while at < count {
             let id = first + at;
             if batch.runs >> at & 1 == 1 {
-                visitor.run(batch.block(at), batch.eight(at, id, format));
+                visitor.run(batch.block(at), batch.eight(at, id));
                 at += LANES as u32;
                 continue;
             }
-            let (block, entry) = (batch.block(at), batch.entry(at, id, format));
+            let (block, entry) = (batch.block(at), batch.entry(at, id));
             let (is_plain, is_simple) = (batch.plain >> at & 1 == 1, batch.simple >> at & 1 == 1);
             at += 1;
             if is_plain {
@@ -233,8 +233,8 @@ fn visit_any<S: Simd>(
                     let on_y = home.along(1, y);
                     for x in low[0]..=high[0] {
                         let block = x + ground.blocks[0] * (y + ground.blocks[1] * z);
-                        let (part, halves) = home.part([home.along(0, x), on_y, on_z]);
-                        let word = format.word(id, halves);
+                        let (part, quarters) = home.part([home.along(0, x), on_y, on_z]);
+                        let word = format.word(id, quarters);
                         let entry = Entry::new(word, part.min, part.max, class);
                         visitor.entry(block as usize, entry);
                     }
@@ -471,7 +471,7 @@ mod tests {
     fn every_level_counts_and_writes_what_one_triangle_after_the_other_does() {
         let bounds = Aabb { min: Vec3A::ZERO, max: Vec3A::new(48.0, 32.0, 32.0) };
         let lattice = Lattice::new(bounds, [48, 32, 32]);
-        // Ids of up to 2048 triangles leave room for all halves, of 2100 for five, of 20 000 for two.
+        // Ids of up to 256 triangles leave room for all quarters, of 2048 for some, of 20 000 for halves.
         for count in [0, 1, 63, 64, 65, 200, 2048, 2100, 20_000] {
             let positions = positions(count);
             let indices: Vec<_> = (0..count).map(|id| [3 * id, 3 * id + 1, 3 * id + 2]).collect();
@@ -506,7 +506,8 @@ mod tests {
             let ([_, _, large, skipped], ..) = answer(None, &ground(&tight), &[count]);
             assert!(large > 5 && skipped > 10, "{large} {skipped}");
             let simd = Fallback::new();
-            let (spans, mut batch) = (Spans::new(simd, &lattice, 2), Places::NONE);
+            let spans = Spans::new(simd, &lattice, 4);
+            let mut batch = Places::new(Format::of(count));
             let (mut runs, mut straddling, mut others) = (0, 0, 0);
             for first in (0..count - BATCH).step_by(BATCH as usize) {
                 let mesh = tight.wide();

@@ -1,9 +1,11 @@
 //! Where the triangles of a batch lie: what a pass finds before it visits any of them.
 //!
 //! ```text
-//! blocks | halves of the first cell and the last | number of the first cell's block |
+//! blocks | quarters of the first cell and the last | number of the first cell's block |
 //! cells  | axes on which the last cell is in the next block | cells, as an entry has them |
 //! ```
+//!
+//! The number of a block is shorter than an id: there are fewer blocks than that.
 //!
 //! While places are found nothing is called but for triangles that cannot be read, so that all
 //! constants stay in vector registers, and nothing depends on how many cells and blocks a triangle
@@ -12,8 +14,8 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x8};
 
-use super::halves::{Format, ID_BITS};
 use super::layout::{Entry, GROUP};
+use super::quarters::{Format, LAST, quarters};
 use crate::eight::LANES;
 use crate::mesh::WideMesh;
 use crate::spans::{Span, Spans};
@@ -23,11 +25,10 @@ pub(super) const BATCH: u32 = 64;
 const ROWS: usize = BATCH as usize / LANES;
 /// The first of three bits above the group of simple triangles.
 const STRADDLES: u32 = GROUP + 3;
-/// The bits of a block's number, above which there is room.
-const BLOCK_BITS: u32 = (1 << 24) - 1;
 
 /// Where the triangles of a batch lie.
 pub(super) struct Places {
+    format: Format,
     blocks: [[u32; LANES]; ROWS],
     cells: [[u32; LANES]; ROWS],
     /// Which of them are in at most two cells an axis. The others are not found. Bits behind the
@@ -41,18 +42,18 @@ pub(super) struct Places {
     pub(super) lists: u32,
 }
 
-/// First and last halves of cells on an axis, and the cells.
+/// First and last quarters of cells on an axis, and the cells.
 #[derive(Clone, Copy)]
 struct Cells<S: Simd> {
-    halves: Span<S>,
+    quarters: Span<S>,
     min: u32x8<S>,
     max: u32x8<S>,
 }
 
 impl<S: Simd> Cells<S> {
     #[inline(always)]
-    fn of(halves: Span<S>) -> Self {
-        Self { halves, min: halves.first >> 1, max: halves.last >> 1 }
+    fn of(quarters: Span<S>) -> Self {
+        Self { quarters, min: quarters.first >> 2, max: quarters.last >> 2 }
     }
 
     /// Whether the second cell is in the next block: the lowest bit of
@@ -62,24 +63,19 @@ impl<S: Simd> Cells<S> {
         ((self.min ^ self.max) >> 4) & 1
     }
 
-    /// What the axis adds to the cells of an entry, if it is x: at either end two bits for the
-    /// brick and two for the cell in it.
+    /// The first quarter and the last in a block, [`LAST`] bits apart: at either end two bits for
+    /// the brick, two for the cell in it, two for the quarter.
     #[inline(always)]
-    fn inside(self) -> u32x8<S> {
-        let ends = (self.min & 15) | ((self.max & 15) << 12);
-        (ends & 0x3003) | ((ends & 0xc00c) << 4)
+    fn ends(self) -> u32x8<S> {
+        (self.quarters.first & 63) | ((self.quarters.last & 63) << LAST)
     }
 }
 
-/// The bits of [`Halves`](super::halves::Halves), from the last one to the first.
+/// What an axis adds to the cells of an entry, if it is x: the bits for the cell and, apart from
+/// them, those for the brick.
 #[inline(always)]
-fn halves<S: Simd>([x, y, z]: [Cells<S>; 3]) -> u32x8<S> {
-    let [x, y, z] = [x.halves, y.halves, z.halves];
-    let mut bits = !z.last & 1;
-    for half in [!y.last, !x.last, z.first, y.first, x.first] {
-        bits = (bits << 1) | (half & 1);
-    }
-    bits
+fn inside<S: Simd>(ends: u32x8<S>) -> u32x8<S> {
+    ((ends >> 2) & 0x3003) | ((ends & 0x3_0030) << 2)
 }
 
 /// What the entries of a triangle have in common, and the axes on which it straddles.
@@ -90,18 +86,15 @@ pub(super) const fn straddling(entry: Entry) -> (Entry, u32) {
 }
 
 impl Places {
-    /// Of no triangles.
-    pub(super) const NONE: Self = Self {
-        blocks: [[0; LANES]; ROWS],
-        cells: [[0; LANES]; ROWS],
-        simple: 0,
-        plain: 0,
-        runs: 0,
-        lists: 0,
-    };
+    /// Of no triangles yet, for a mesh whose ids are written so.
+    #[inline(always)]
+    pub(super) const fn new(format: Format) -> Self {
+        let none = [[0; LANES]; ROWS];
+        Self { format, blocks: none, cells: none, simple: 0, plain: 0, runs: 0, lists: 0 }
+    }
 
     /// Finds the places of `count` triangles from `first` on. Without `ENTRIES`, for who only
-    /// counts, halves and the cells inside their blocks are left out.
+    /// counts, quarters and the cells inside their blocks are left out.
     ///
     /// What works on vectors is a function, always inlined: closures and arrays' own
     /// functions are not, and what is not inlined is not compiled for the level.
@@ -131,9 +124,11 @@ impl Places {
             let group = two_x | (two_y << 1) | (two_z << 2);
             let place = (group << GROUP) | (straddles << STRADDLES);
             if ENTRIES {
-                let ends = x.inside() | (y.inside() << 2) | (z.inside() << 4);
-                *blocks = (block | (halves([x, y, z]) << ID_BITS)).into();
-                *cells = (place | ends).into();
+                let ends = [x.ends(), y.ends(), z.ends()];
+                let [x, y, z] = ends;
+                let inside = inside(x) | (inside(y) << 2) | (inside(z) << 4);
+                *blocks = (block | quarters(self.format, ends)).into();
+                *cells = (place | inside).into();
             } else {
                 (*blocks, *cells) = (block.into(), place.into());
             }
@@ -164,13 +159,14 @@ impl Places {
     #[inline(always)]
     fn find_runs<S: Simd>(&mut self, simd: S) {
         const MANY: usize = ROWS * 3 / 4;
-        let is_likely = |row: &&[u32; LANES]| (row[0] ^ row[LANES - 1]) & BLOCK_BITS == 0;
+        let format = self.format;
+        let is_likely = |row: &&[u32; LANES]| (row[0] ^ row[LANES - 1]) & format.ids() == 0;
         if self.blocks.iter().filter(is_likely).count() < MANY {
             return;
         }
         for (at, row) in (0_u32..).step_by(LANES).zip(&self.blocks) {
-            let blocks = u32x8::simd_from(simd, *row) & BLOCK_BITS;
-            let is_same = blocks.simd_eq(u32x8::splat(simd, row[0] & BLOCK_BITS));
+            let blocks = u32x8::simd_from(simd, *row) & format.ids();
+            let is_same = blocks.simd_eq(u32x8::splat(simd, format.id(row[0])));
             let is_run = is_same.to_bitmask() & self.plain >> at & 0xff == 0xff;
             self.runs |= u64::from(is_run) << at;
         }
@@ -179,23 +175,22 @@ impl Places {
     /// The first block of a triangle.
     #[inline(always)]
     pub(super) fn block(&self, at: u32) -> usize {
-        let block = self.blocks.as_flattened()[(at % BATCH) as usize];
-        (block & BLOCK_BITS) as usize
+        self.format.id(self.blocks.as_flattened()[(at % BATCH) as usize]) as usize
     }
 
     /// The entry of a plain triangle; of a straddling one what [`straddling`] takes, of one that is
     /// not simple nothing of use.
     #[inline(always)]
-    pub(super) fn entry(&self, at: u32, id: u32, format: Format) -> Entry {
+    pub(super) fn entry(&self, at: u32, id: u32) -> Entry {
         let at = (at % BATCH) as usize;
         let (block, cells) = (self.blocks.as_flattened()[at], self.cells.as_flattened()[at]);
-        Entry::of(id | block & format.halves(), cells)
+        Entry::of(id | block & self.format.quarters(), cells)
     }
 
     /// The entries of a run.
     #[inline(always)]
-    pub(super) fn eight(&self, at: u32, id: u32, format: Format) -> [Entry; LANES] {
-        let entry = |lane| self.entry(at + lane, id + lane, format);
+    pub(super) fn eight(&self, at: u32, id: u32) -> [Entry; LANES] {
+        let entry = |lane| self.entry(at + lane, id + lane);
         [entry(0), entry(1), entry(2), entry(3), entry(4), entry(5), entry(6), entry(7)]
     }
 }

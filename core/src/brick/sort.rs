@@ -26,12 +26,12 @@ use super::divide::{Plan, plan};
 use super::extent::{EXTENT_WORDS, Extent, LIST_WORDS, Owner};
 use super::frame::{Frame, Scene};
 use super::groups::Groups;
-use super::halves::Format;
 use super::layout::{
     BLOCK_CELLS, Bench, Block, CHILD_WORDS, CROWDED, Class, Entry, MASK_BITS, RECORD_WORDS, number,
     place,
 };
 use super::pool::Pool;
+use super::quarters::Format;
 use crate::bits::{halves, ones};
 use crate::bump::GRID;
 

@@ -22,11 +22,11 @@ use glam::Vec3A;
 
 use super::extent::{EXTENT_WORDS, Extent, LIST_WORDS, Owner};
 use super::frame::{Frame, Scene, classify, lists};
-use super::halves::{Format, Halves};
 use super::layout::{
     BLOCK, Block, CHILD_WORDS, Class, Layout, MAX_CHILDREN, RECORD_WORDS, mask, place,
 };
 use super::pass::Home;
+use super::quarters::{Format, Quarters};
 use super::size::{Settled, settle};
 use super::{Brick, Chunk, Content, Large, list};
 use crate::aabb::Aabb;
@@ -130,26 +130,26 @@ enum Within<'d> {
 /// A triangle in a domain.
 struct Placed {
     range: CellRange,
-    halves: Halves,
+    quarters: Quarters,
     class: Class,
     /// Its shapes in the domain and in those around it, as one number.
     shape: usize,
 }
 
 impl Placed {
-    fn new((range, halves): (CellRange, Halves), class: Class, around: usize) -> Self {
+    fn new((range, quarters): (CellRange, Quarters), class: Class, around: usize) -> Self {
         let [x, y, z] = core::array::from_fn(|axis| (range.max[axis] - range.min[axis]) as usize);
         let shape = if x | y | z <= 1 { x | y << 1 | z << 2 } else { SHAPES - 1 };
-        Self { range, halves, class, shape: around * SHAPES + shape }
+        Self { range, quarters, class, shape: around * SHAPES + shape }
     }
 
-    /// The halves of one of its cells in which it lies.
-    fn halves(&self, cell: [u32; 3]) -> Halves {
+    /// The quarters of one of its cells in which it lies.
+    fn quarters(&self, cell: [u32; 3]) -> Quarters {
         let CellRange { min, max } = self.range;
         let axes = |is: [bool; 3]| (0..3).map(|axis| u32::from(is[axis]) << axis).sum();
         let before = axes(core::array::from_fn(|axis| min[axis] < cell[axis]));
         let behind = axes(core::array::from_fn(|axis| cell[axis] < max[axis]));
-        self.halves.through(before, behind)
+        self.quarters.through(before, behind)
     }
 }
 
@@ -172,10 +172,10 @@ impl Domain<'_> {
         let Within::Domain(around, cell) = self.within else { return None };
         let placed = around.place(settled, corners)?;
         let reach = settled.lattice.reach(&Aabb::of(corners)?);
-        let (range, halves) = self.frame.range(&reach);
+        let (range, quarters) = self.frame.range(&reach);
         let class = classify(range.min, range.max, 1).unwrap_or(Class::Blocks);
         let is_in = placed.class == Class::Cells && placed.range.contains(cell);
-        is_in.then(|| Placed::new((range, halves), class, placed.shape))
+        is_in.then(|| Placed::new((range, quarters), class, placed.shape))
     }
 }
 
@@ -348,7 +348,7 @@ impl Check<'_> {
                 |k: usize| (min[k] >> shift..=max[k] >> shift).contains(&(cell[k] >> shift));
             let last = self.last.get_mut(placed.shape).ok_or(wrong)?;
             let written = match class {
-                Class::Cells => format.word(id, placed.halves(cell)),
+                Class::Cells => format.word(id, placed.quarters(cell)),
                 _ => id,
             };
             if placed.class != class || !(0..3).all(is_in) || *last > id || word != written {

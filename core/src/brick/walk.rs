@@ -4,8 +4,8 @@
 use fearless_simd::Simd;
 use glam::Vec3A;
 
-use super::halves::{Format, Halves};
 use super::layout::{BLOCK, mask, number};
+use super::quarters::{Format, Missed};
 use super::{Brick, Chunk, Content, Large};
 use crate::cell::as_f32;
 use crate::counters::Tally;
@@ -79,7 +79,7 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
         let brick = self.brick;
         let large = brick.large();
         if !large.is_empty() {
-            self.test(simd, large, 0);
+            self.test(simd, large, Missed::NONE);
             if self.is_over() {
                 return;
             }
@@ -153,9 +153,12 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
             if mask(brick.mask) >> bit & 1 != 0 {
                 match chunk.content(brick, bit) {
                     Some(Content::List(references)) => {
-                        // Eight take one test, however many are missed.
-                        let missed =
-                            if references.len() > LANES { self.missed(line, &walk) } else { 0 };
+                        // Four take one read, however many are missed.
+                        let missed = if references.len() > LANES / 2 {
+                            self.missed(line, &walk)
+                        } else {
+                            Missed::NONE
+                        };
                         self.test(simd, references, missed);
                     }
                     Some(Content::Chunk(chunk, cells)) if depth > 0 => {
@@ -195,24 +198,22 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
     #[inline(always)]
     fn test_large<S: Simd>(&mut self, simd: S, large: &Large<'_>, line: &Line, corner: [f32; 3]) {
         if line.meets(&large.extent.reach(large.owner), corner, self.limit) {
-            self.test(simd, large.ids, 0);
+            self.test(simd, large.ids, Missed::NONE);
         }
     }
 
-    /// The bits of references that the ray does not meet in the cell that a walk is in.
+    /// What the ray does not meet in the cell that a walk is in.
     #[inline(always)]
-    fn missed(&self, line: &Line, walk: &Walk) -> u32 {
+    fn missed(&self, line: &Line, walk: &Walk) -> Missed {
         let far = walk.next.min_element().min(self.limit);
-        let [upper, lower] = line.halves(walk.cell(), walk.entered, far);
-        self.format.missed(Halves::new(upper, lower))
+        self.format.missed(line.quarters(walk.cell(), walk.entered, far))
     }
 
-    /// Tests the ray against the triangles of a list, but for those of which a
-    /// reference has any of the bits `missed`.
+    /// Tests the ray against the triangles of a list, but for those that it misses.
     ///
     /// Out of line, or it would be several times in the walk; so it says once more
     /// what vectors it is compiled for.
-    fn test<S: Simd>(&mut self, simd: S, references: &[u32], missed: u32) {
+    fn test<S: Simd>(&mut self, simd: S, references: &[u32], missed: Missed) {
         simd.vectorize(
             #[inline(always)]
             || {
@@ -221,7 +222,7 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
                     return;
                 };
                 self.unread = rest;
-                if missed == 0 {
+                if missed == Missed::NONE {
                     self.test_all(simd, references);
                 } else {
                     self.test_some(simd, references, missed);
@@ -245,22 +246,27 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
     }
 
     #[inline(always)]
-    fn test_some<S: Simd>(&mut self, simd: S, references: &[u32], missed: u32) {
+    fn test_some<S: Simd>(&mut self, simd: S, references: &[u32], missed: Missed) {
         /// References that are looked at in one go.
         const MOST: usize = 4 * LANES;
         for some in references.chunks(MOST) {
             // No branch tells who is missed: it would be as good as random.
             let any = self.format.id(some.first().copied().unwrap_or(0));
             let (mut ids, mut count) = ([any; MOST], 0);
-            let mut take = |reference: u32| {
+            let mut take = |reference: u32, is_met: bool| {
                 ids[count % MOST] = self.format.id(reference);
-                count += usize::from(reference & missed == 0);
+                count += usize::from(is_met);
             };
             let (eights, rest) = some.as_chunks::<LANES>();
             for eight in eights {
-                eight.iter().copied().for_each(&mut take);
+                let others = missed.others(simd, *eight);
+                for (lane, &reference) in (0_u32..).zip(eight) {
+                    take(reference, others >> lane & 1 != 0);
+                }
             }
-            rest.iter().copied().for_each(&mut take);
+            for &reference in rest {
+                take(reference, !missed.contains(reference));
+            }
             for first in (0..count).step_by(LANES) {
                 let Some(eight) = ids.get(first..).and_then(|ids| ids.first_chunk()) else { break };
                 self.test_eight(simd, eight, count - first);
