@@ -19,6 +19,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 
 use crate::mesh::TriangleMesh;
+use crate::simd::HAS_VECTORS;
 use crate::triangle::{Axis, TriangleTest};
 
 /// How many triangles are tested at once.
@@ -132,6 +133,29 @@ fn read(mesh: &TriangleMesh<'_>, ids: [u32; 4]) -> ([[Row; 4]; 3], u32) {
 }
 
 impl TriangleTest {
+    /// Which of the first `count` of eight triangles pass the filter of [`TriangleTest::test`], as
+    /// bits: all at once, or where there are no vectors one by one.
+    #[inline(always)]
+    pub(crate) fn survivors_of<S: Simd>(
+        &self,
+        simd: S,
+        mesh: &TriangleMesh<'_>,
+        ids: &[u32; LANES],
+        count: usize,
+    ) -> u32 {
+        if HAS_VECTORS {
+            self.survivors(simd, &Eight::of(simd, mesh, *ids, count))
+        } else {
+            self.one_by_one(mesh, ids.get(..count).unwrap_or(ids))
+        }
+    }
+
+    /// The same of a few triangles.
+    fn one_by_one(&self, mesh: &TriangleMesh<'_>, ids: &[u32]) -> u32 {
+        let passes = |id| mesh.triangle(id).is_some_and(|triangle| self.passes(&triangle));
+        (0..).zip(ids).fold(0, |bits, (lane, &id)| bits | u32::from(passes(id)) << (lane % 32))
+    }
+
     /// The lanes whose triangles pass the filter of [`TriangleTest::test`], as bits.
     #[inline(always)]
     pub(crate) fn survivors<S: Simd>(&self, simd: S, triangles: &Eight<S>) -> u32 {
@@ -302,10 +326,11 @@ mod tests {
 
     /// What the triangles give one by one.
     fn expected(test: &TriangleTest, mesh: &TriangleMesh<'_>, ids: &[u32]) -> Answer {
-        let (mut survivors, mut hits) = (0, Vec::new());
+        let survivors = test.one_by_one(mesh, ids);
+        let mut hits = Vec::new();
         for (lane, &id) in ids.iter().enumerate() {
             let Some(triangle) = mesh.triangle(id) else { continue };
-            survivors |= u32::from(test.passes(&triangle)) << lane;
+            assert_eq!(test.passes(&triangle), survivors >> lane & 1 == 1);
             hits.extend(test.test(&triangle).map(|hit| (lane, hit_bits(hit.on(id)))));
         }
         (survivors, hits)

@@ -21,7 +21,7 @@ use crate::config::BuildFlags;
 use crate::eight::LANES;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
-use crate::simd::{Kernel, SimdLevel, dispatch};
+use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
 use crate::spans::Spans;
 use crate::tasks::Shared;
 
@@ -145,7 +145,7 @@ fn visit<S: Simd, V: Visit, const ENTRIES: bool>(
     visitor: &mut V,
 ) -> Result<(), Error> {
     let wide = ground.mesh.wide();
-    if wide.is_empty() {
+    if !HAS_VECTORS || wide.is_empty() {
         for id in ids {
             visit_any(simd, ground, id, visitor)?;
         }

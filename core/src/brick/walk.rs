@@ -10,10 +10,10 @@ use super::{Brick, Chunk, Content, Large};
 use crate::cell::as_f32;
 use crate::counters::Tally;
 use crate::dda::{Line, NEVER, Step, Walk};
-use crate::eight::{Eight, LANES, first_eight};
+use crate::eight::{LANES, first_eight};
 use crate::mesh::TriangleMesh;
 use crate::search::{Outcome, Search};
-use crate::simd::Kernel;
+use crate::simd::{HAS_VECTORS, Kernel};
 use crate::triangle::TriangleTest;
 
 /// A ray on its way, and what it is traced through.
@@ -257,7 +257,8 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
                 ids[count % MOST] = self.format.id(reference);
                 count += usize::from(is_met);
             };
-            let (eights, rest) = some.as_chunks::<LANES>();
+            let (eights, rest) =
+                if HAS_VECTORS { some.as_chunks::<LANES>() } else { (&[][..], some) };
             for eight in eights {
                 let others = missed.others(simd, *eight);
                 for (lane, &reference) in (0_u32..).zip(eight) {
@@ -277,12 +278,11 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
         }
     }
 
-    /// Tests the ray against the first `count` of eight triangles; the others are read, too.
+    /// Tests the ray against the first `count` of eight triangles; the others may be read, too.
     #[inline(always)]
     fn test_eight<S: Simd>(&mut self, simd: S, ids: &[u32; LANES], count: usize) {
         self.tally.primitive_tests(count.min(LANES));
-        let triangles = Eight::of(simd, self.mesh, *ids, count);
-        let mut survivors = self.test.survivors(simd, &triangles);
+        let mut survivors = self.test.survivors_of(simd, self.mesh, ids, count);
         while survivors != 0 {
             let lane = survivors.trailing_zeros() as usize;
             survivors &= survivors - 1;

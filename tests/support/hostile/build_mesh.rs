@@ -28,7 +28,8 @@ fn describe_and_build(u: &mut Unstructured<'_>) -> Result<()> {
     let shape = Shape::new(u)?;
     // Any strides and counts: refused, or a mesh that can be built like any other.
     if rarely(u, 8)? {
-        let numbers = <[usize; 4]>::arbitrary(u)?.map(|n| if n >> 60 == 0 { n % 64 } else { n });
+        let numbers =
+            <[usize; 4]>::arbitrary(u)?.map(|n| if n.leading_zeros() < 4 { n } else { n % 64 });
         let [stride, vertices, index_stride, triangles] = numbers;
         if let Ok(view) = shape.strided([stride, vertices], [index_stride, triangles]) {
             build(u, view, &config, tasks, run);
