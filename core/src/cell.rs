@@ -260,7 +260,7 @@ pub(crate) const fn whole(position: f32) -> u32 {
     position as u32
 }
 
-/// The whole parts of positions between 0 and four times [`MAX_RESOLUTION`] (quarters of cells); an odd
+/// The whole parts of positions between 0 and four times [`MAX_RESOLUTION`] (quarters); an odd
 /// whole number may count as the end of the cell before it, which the margin allows.
 ///
 /// Adding 1.5 * 2^23 rounds to whole numbers and leaves them in the low bits: 5 to 10 % of a build

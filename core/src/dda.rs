@@ -376,6 +376,46 @@ mod tests {
         BVec3A::new(axes & 1 != 0, axes & 2 != 0, axes & 4 != 0)
     }
 
+    /// What [`Line::quarters`] says of a cell for an axis, on which the line runs from one place in
+    /// it to another: up to its end, and from its start.
+    fn quarters(axis: usize, from: f32, to: f32) -> [[u32; 3]; 2] {
+        let mut line = Line {
+            position: Vec3A::splat(3.5),
+            rate: Vec3A::ZERO,
+            delta: Vec3A::ZERO,
+            base: Vec3A::INFINITY,
+            step: Vec3A::ZERO,
+            margin: Vec3A::splat(0.01),
+            end: 2.0,
+            start: 0.0,
+            scale: 1.0,
+        };
+        line.position[axis] = 3.0 + from;
+        line.rate[axis] = (to - from) / 2.0;
+        let bits = line.quarters([3; 3], 0.0, 2.0);
+        [axis, axis + 3].map(|bit| bits.map(|bits| bits >> bit & 1))
+    }
+
+    #[test]
+    fn within_the_margin_of_a_border_no_quarter_is_left_out() {
+        // Of three borders those that lie behind the end, and as seen from the other side.
+        let behind = [[1, 1, 1], [0, 1, 1], [0, 0, 1], [0, 0, 0]];
+        for axis in 0..3 {
+            for (at, border) in [0.25, 0.5, 0.75].into_iter().enumerate() {
+                for (off, is_there) in [(-0.02, 0), (-0.005, 1), (0.005, 1), (0.02, 1)] {
+                    let expected = behind[at + is_there];
+                    assert_eq!(quarters(axis, 0.0, border + off), [expected, [0; 3]]);
+                    assert_eq!(quarters(axis, border + off, 0.0), [expected, [0; 3]]);
+                    assert_eq!(quarters(axis, 1.0, 1.0 - border - off), [[0; 3], expected]);
+                }
+            }
+            assert_eq!(quarters(axis, 0.5, 0.5), [behind[2], behind[2]]);
+            assert_eq!(quarters(axis, 0.4, 0.4), [behind[1], behind[2]]);
+            assert_eq!(quarters(axis, f32::NAN, 0.0), [[0; 3]; 2]);
+            assert_eq!(quarters(axis, 0.0, f32::NAN), [[0; 3]; 2]);
+        }
+    }
+
     #[test]
     #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn all_axes_at_once_step_as_one_after_the_other() {

@@ -87,7 +87,7 @@ impl SimdLevel {
 }
 
 /// Whether the target has vectors at all. Without them eight or sixteen lanes one after the other
-/// are no gain, much code, and minutes of compilation.
+/// are up to twice the work, much code, and minutes of compilation.
 pub(crate) const HAS_VECTORS: bool = cfg!(any(
     all(
         any(target_arch = "x86", target_arch = "x86_64"),

@@ -1,5 +1,5 @@
-//! Where a triangle belongs: its cells in a block or a divided cell, the quarters of them, and which
-//! lists take it.
+//! Where a triangle belongs: its cells in a block or a divided cell, their quarters, and which lists
+//! take it.
 
 use glam::Vec3A;
 

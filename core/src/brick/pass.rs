@@ -1,8 +1,8 @@
 //! The pass over the triangles, twice: once to count the entries of each block, once to write them.
 //!
 //! Almost all triangles lie in at most two cells an axis, and most of these in one block. For them
-//! everything is done in vectors ([`places`](super::places)); what is larger, or has no number, is
-//! looked at once more.
+//! everything is done in vectors ([`places`](super::places)), where there are any; what is larger, or
+//! has no number, is looked at once more.
 
 #![expect(clippy::cast_possible_truncation, reason = "eight triangles, the words of entries")]
 
@@ -471,7 +471,8 @@ mod tests {
     fn every_level_counts_and_writes_what_one_triangle_after_the_other_does() {
         let bounds = Aabb { min: Vec3A::ZERO, max: Vec3A::new(48.0, 32.0, 32.0) };
         let lattice = Lattice::new(bounds, [48, 32, 32]);
-        // Ids of up to 256 triangles leave room for all quarters, of 2048 for some, of 20 000 for halves.
+        // Ids of 256 triangles leave room for all quarters, of 2048 for some, of 20 000 for
+        // halves.
         for count in [0, 1, 63, 64, 65, 200, 2048, 2100, 20_000] {
             let positions = positions(count);
             let indices: Vec<_> = (0..count).map(|id| [3 * id, 3 * id + 1, 3 * id + 2]).collect();

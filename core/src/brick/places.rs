@@ -5,7 +5,8 @@
 //! cells  | axes on which the last cell is in the next block | cells, as an entry has them |
 //! ```
 //!
-//! The number of a block is shorter than an id: there are fewer blocks than that.
+//! The number of a block fits into the bits of an id, which are twenty or more: there is at most one
+//! block for 32 triangles, and eight more.
 //!
 //! While places are found nothing is called but for triangles that cannot be read, so that all
 //! constants stay in vector registers, and nothing depends on how many cells and blocks a triangle

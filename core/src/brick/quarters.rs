@@ -105,7 +105,7 @@ pub(super) fn quarters<S: Simd>(format: Format, [x, y, z]: [u32x8<S>; 3]) -> u32
 }
 
 /// Which triangles something in a cell does not meet: those with a number above its limit, which is
-/// how many quarters begin before it ends, or end behind where it begins.
+/// how many quarters end before it does, or begin behind where it does.
 ///
 /// The numbers whose limits have no upper bit, and above them those whose limits have no lower one;
 /// both at the place of upper bits. In one word, so that it stays in a register.
@@ -180,8 +180,8 @@ impl Format {
         word & !(numbers(before, behind) & self.quarters())
     }
 
-    /// What a line misses that reaches so far: `below[i]` are the axes on which less than `i + 1`
-    /// quarters begin before its end, and, three bits above them, end behind where it begins.
+    /// What a line misses that reaches so far ([`Line::quarters`](crate::dda::Line::quarters)):
+    /// `below[i]` are the numbers whose limit is less than `i + 1`.
     #[inline(always)]
     pub(super) const fn missed(self, below: [u32; 3]) -> Missed {
         let [one, two, three] = below;
@@ -253,14 +253,22 @@ mod tests {
 
     #[test]
     fn eight_triangles_have_the_bits_of_each() {
-        let (format, simd) = (Format::of(1), Fallback::new());
-        for above in [0, 1, 9, 15] {
-            for [first, last] in SPANS {
-                let ends = [first | above << 2, 1, last].map(|at| (at, 4 * above + 2));
-                let vectors = ends.map(|(at, end)| u32x8::splat(simd, at | end << LAST));
-                let expected = Quarters::new(ends.map(|(at, _)| at), ends.map(|(_, end)| end));
-                let found: [u32; LANES] = quarters(format, vectors).into();
-                assert_eq!(found, [format.word(0, expected); LANES]);
+        let simd = Fallback::new();
+        for (round, triangles) in (0..).zip([1, 256, 1500, 6000, 20_000, 1 << 20]) {
+            let format = Format::of(triangles);
+            // Lane by lane and axis by axis other quarters, and other cells above them.
+            let end = |lane: usize, axis: usize, side: usize| {
+                let span = SPANS[(lane + 3 * axis + round) % SPANS.len()];
+                span[side] | [0, 4, 36, 60, 8][(lane + axis + side) % 5]
+            };
+            let of = |axis| {
+                let lanes = |lane| end(lane, axis, 0) | end(lane, axis, 1) << LAST;
+                u32x8::simd_from(simd, core::array::from_fn::<_, LANES, _>(lanes))
+            };
+            let found: [u32; LANES] = quarters(format, [of(0), of(1), of(2)]).into();
+            for (lane, found) in found.into_iter().enumerate() {
+                let [first, last] = [0, 1].map(|side| [0, 1, 2].map(|axis| end(lane, axis, side)));
+                assert_eq!(found, format.word(0, Quarters::new(first, last)));
             }
         }
     }

@@ -153,7 +153,8 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
             if mask(brick.mask) >> bit & 1 != 0 {
                 match chunk.content(brick, bit) {
                     Some(Content::List(references)) => {
-                        // Four take one read, however many are missed.
+                        // Four take one read, however many are missed. Without vectors they do not,
+                        // but the counters are the same everywhere.
                         let missed = if references.len() > LANES / 2 {
                             self.missed(line, &walk)
                         } else {
