@@ -1040,6 +1040,12 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_CANCELLED -37
 
 /**
+ * The method of the configuration, or of the blob, is none that this library was built with:
+ * `hgrid_has_method` tells which are.
+ */
+#define HGRID_ERROR_METHOD_LEFT_OUT -38
+
+/**
  * The bytes, or the view, are not a grid.
  */
 #define HGRID_ERROR_NOT_A_GRID -40
@@ -1111,8 +1117,9 @@ extern "C" {
  * has `index_bytes` and `scratch_bytes`; or what is wrong:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`,
  *   `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space;
- * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
- *   `HGRID_ERROR_INVALID_FLAGS`, `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
+ * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
+ *   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
+ *   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
  *   `HGRID_ERROR_INVALID_CELL_SIZE`.
  *
  * Threads: any number of calls at once, each with a report of its own.
@@ -1149,8 +1156,9 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
  *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`,
  *   `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_NON_FINITE`;
- * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
- *   `HGRID_ERROR_INVALID_FLAGS`, `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
+ * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
+ *   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
+ *   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
  *   `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_ERROR_PARALLEL_FOR`.
  *
  * Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
@@ -1543,7 +1551,7 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
  * - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
  *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
  * - with the blob: `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
- *   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`;
+ *   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_LEFT_OUT`, `HGRID_ERROR_CORRUPT`;
  * - with both: `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`.
  *
  * Threads: any number of calls at once, also on the same blob, each with a view of its own.
@@ -1723,6 +1731,16 @@ uint32_t hgrid_version(void);
  * Threads: any number of calls at once.
  */
 const char *hgrid_version_string(void);
+
+/**
+ * Whether the library that is linked has a method, `HGRID_METHOD_ONE_LEVEL` and so on; no for a
+ * number that is none.
+ *
+ * It has all of them unless it was built with fewer, to be smaller: see the README.
+ *
+ * Threads: any number of calls at once.
+ */
+bool hgrid_has_method(uint32_t method);
 
 #ifdef __cplusplus
 }  // extern "C"

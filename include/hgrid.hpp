@@ -169,6 +169,8 @@ enum class [[nodiscard]] status : std::int32_t {
     parallel_for = HGRID_ERROR_PARALLEL_FOR,
     /// `HGRID_ERROR_CANCELLED`
     cancelled = HGRID_ERROR_CANCELLED,
+    /// `HGRID_ERROR_METHOD_LEFT_OUT`
+    method_left_out = HGRID_ERROR_METHOD_LEFT_OUT,
     /// `HGRID_ERROR_NOT_A_GRID`
     not_a_grid = HGRID_ERROR_NOT_A_GRID,
     /// `HGRID_ERROR_WRONG_BYTE_ORDER`
@@ -255,6 +257,12 @@ inline constexpr ray make_ray(const point &origin, const point &direction, float
 inline bool is_compatible() noexcept
 {
     return ::hgrid_version() >> 8 == HGRID_VERSION >> 8;
+}
+
+/// Whether it has a method: it may have been built with fewer, to be smaller.
+inline bool has_method(method which) noexcept
+{
+    return ::hgrid_has_method(static_cast<std::uint32_t>(which));
 }
 
 // --- a value or a status --------------------------------------------------------------------------

@@ -20,8 +20,9 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 /// has `index_bytes` and `scratch_bytes`; or what is wrong:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`,
 ///   `HGRID_ERROR_TOO_MANY_TRIANGLES`, also if the sizes do not fit the machine's address space;
-/// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
-///   `HGRID_ERROR_INVALID_FLAGS`, `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
+/// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
+///   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
+///   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
 ///   `HGRID_ERROR_INVALID_CELL_SIZE`.
 ///
 /// Threads: any number of calls at once, each with a report of its own.
@@ -69,8 +70,9 @@ pub unsafe extern "C" fn hgrid_bound(
 /// - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
 ///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`,
 ///   `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_NON_FINITE`;
-/// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_INVALID_DENSITY`,
-///   `HGRID_ERROR_INVALID_FLAGS`, `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
+/// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
+///   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
+///   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
 ///   `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_ERROR_PARALLEL_FOR`.
 ///
 /// Threads: any number of calls at once, as long as each has a scratch and a report of its own. The

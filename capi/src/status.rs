@@ -91,6 +91,10 @@ pub const HGRID_ERROR_PARALLEL_FOR: hgrid_status = -36;
 /// The configuration's `progress` answered false. There is no grid.
 pub const HGRID_ERROR_CANCELLED: hgrid_status = -37;
 
+/// The method of the configuration, or of the blob, is none that this library was built with:
+/// `hgrid_has_method` tells which are.
+pub const HGRID_ERROR_METHOD_LEFT_OUT: hgrid_status = -38;
+
 /// The bytes, or the view, are not a grid.
 pub const HGRID_ERROR_NOT_A_GRID: hgrid_status = -40;
 
@@ -136,6 +140,7 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
         Error::TooManyTriangles => HGRID_ERROR_TOO_MANY_TRIANGLES,
         Error::IndexOutOfRange { .. } => HGRID_ERROR_INDEX_OUT_OF_RANGE,
         Error::NonFiniteTriangle { .. } => HGRID_ERROR_NON_FINITE,
+        Error::MethodLeftOut(_) => HGRID_ERROR_METHOD_LEFT_OUT,
         Error::InvalidConfig(ConfigField::Method) => HGRID_ERROR_INVALID_METHOD,
         Error::InvalidConfig(ConfigField::Density) => HGRID_ERROR_INVALID_DENSITY,
         Error::InvalidConfig(ConfigField::MacrocellFactor) => HGRID_ERROR_INVALID_MACROCELL_FACTOR,
@@ -208,6 +213,9 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
             c"tasks run twice or not at all: let run call each one once and wait for all of them"
         }
         HGRID_ERROR_CANCELLED => c"cancelled by the progress callback: there is no grid",
+        HGRID_ERROR_METHOD_LEFT_OUT => {
+            c"a method that this library was built without: take one that it has, or build it with all"
+        }
         HGRID_ERROR_NO_MESH => {
             c"a blob without its mesh: bring the mesh it was built for, or pack both with hgrid_pack"
         }

@@ -1,6 +1,8 @@
-//! The version, told once in `Cargo.toml` and checked here.
+//! Which library this is: its version, told once in `Cargo.toml` and checked here, and its methods.
 
 use core::ffi::{CStr, c_char};
+
+use hgrid_core::Method;
 
 /// Raised when programs must change to go on working.
 pub const HGRID_VERSION_MAJOR: u32 = 0;
@@ -48,4 +50,15 @@ pub const extern "C" fn hgrid_version() -> u32 {
 #[unsafe(no_mangle)]
 pub const extern "C" fn hgrid_version_string() -> *const c_char {
     VERSION.as_ptr()
+}
+
+/// Whether the library that is linked has a method, `HGRID_METHOD_ONE_LEVEL` and so on; no for a
+/// number that is none.
+///
+/// It has all of them unless it was built with fewer, to be smaller: see the README.
+///
+/// Threads: any number of calls at once.
+#[unsafe(no_mangle)]
+pub const extern "C" fn hgrid_has_method(method: u32) -> bool {
+    matches!(Method::from_u32(method), Some(method) if method.is_available())
 }

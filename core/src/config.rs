@@ -5,6 +5,20 @@ use bitflags::bitflags;
 use crate::error::{ConfigField, Error};
 use crate::recursive::MAX_DEPTH;
 
+/// Whether this library has a method. What builds, opens and asks grids says so beside its name,
+/// and has no code for one that is left out.
+pub(crate) const HAS_ONE_LEVEL: bool = cfg!(feature = "one-level");
+pub(crate) const HAS_FIXED: bool = cfg!(feature = "fixed");
+pub(crate) const HAS_VARIABLE: bool = cfg!(feature = "variable");
+pub(crate) const HAS_RECURSIVE: bool = cfg!(feature = "recursive");
+pub(crate) const HAS_BRICK: bool = cfg!(feature = "brick");
+
+const _: () = assert!(
+    HAS_ONE_LEVEL || HAS_RECURSIVE || HAS_BRICK,
+    "hgrid has no method to build grids with: turn on at least one of the features one-level, fixed, \
+     variable, recursive and brick"
+);
+
 /// The structure to build.
 #[non_exhaustive]
 #[repr(u32)]
@@ -52,6 +66,20 @@ impl Method {
             4 => Some(Self::Recursive),
             5 => Some(Self::Brick),
             _ => None,
+        }
+    }
+
+    /// Whether this library has it: a feature of the package that is off leaves its method out
+    /// ([`Error::MethodLeftOut`]).
+    #[inline(always)]
+    #[must_use]
+    pub const fn is_available(self) -> bool {
+        match self {
+            Self::OneLevel => HAS_ONE_LEVEL,
+            Self::Fixed => HAS_FIXED,
+            Self::Variable => HAS_VARIABLE,
+            Self::Recursive => HAS_RECURSIVE,
+            Self::Brick => HAS_BRICK,
         }
     }
 

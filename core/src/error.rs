@@ -6,6 +6,8 @@
 
 use core::fmt;
 
+use crate::config::Method;
+
 /// Which of the caller's two memory regions an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Region {
@@ -87,6 +89,9 @@ pub enum Error {
         /// The first such triangle.
         triangle: u32,
     },
+    /// This library has no such method, neither to build nor to open it: build it with the feature
+    /// of the method's name.
+    MethodLeftOut(Method),
     /// A field of the configuration is outside its range.
     InvalidConfig(ConfigField),
     /// The loop of a parallel build ran a task twice or not at all: see
@@ -168,6 +173,9 @@ impl fmt::Display for Error {
                 "there are not as many answers as rays, their bytes end before the last, or the stride is \
                  below an answer",
             ),
+            Self::MethodLeftOut(method) => {
+                write!(f, "this library was built without the feature {}", method.name())
+            }
             Self::InvalidConfig(ConfigField::Method) => f.write_str("unknown method"),
             Self::InvalidConfig(ConfigField::Density) => write!(
                 f,

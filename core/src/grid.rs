@@ -8,7 +8,9 @@ use crate::arena::check_alignment;
 use crate::blob::{Header, corrupt};
 use crate::brick::{self, Brick, OneRay, Tiles};
 use crate::cell::Lattice;
-use crate::config::{Config, Method};
+use crate::config::{
+    Config, HAS_BRICK, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
+};
 use crate::control::{Control, Watch};
 use crate::counters::Tally;
 use crate::dda::Line;
@@ -115,13 +117,22 @@ impl<'a> Grid<'a> {
         let watch = Watch::new(control);
         watch.at(0.0)?;
         let blob = match config.method {
-            Method::OneLevel => one_level::build(&mesh, config, &(), index, scratch, &watch)?,
-            Method::Fixed => {
+            Method::OneLevel if HAS_ONE_LEVEL => {
+                one_level::build(&mesh, config, &(), index, scratch, &watch)?
+            }
+            Method::Fixed if HAS_FIXED => {
                 one_level::build(&mesh, config, &Macrocells::of(config), index, scratch, &watch)?
             }
-            Method::Variable => variable::build(&mesh, config, index, scratch, &watch)?,
-            Method::Recursive => recursive::build(&mesh, config, index, scratch, &watch)?,
-            Method::Brick => brick::build(&mesh, config, index, scratch, control, &watch)?,
+            Method::Variable if HAS_VARIABLE => {
+                variable::build(&mesh, config, index, scratch, &watch)?
+            }
+            Method::Recursive if HAS_RECURSIVE => {
+                recursive::build(&mesh, config, index, scratch, &watch)?
+            }
+            Method::Brick if HAS_BRICK => {
+                brick::build(&mesh, config, index, scratch, control, &watch)?
+            }
+            method => return Err(Error::MethodLeftOut(method)),
         };
         let grid = Self::open(blob, mesh)?;
         watch.end();
@@ -138,22 +149,28 @@ impl<'a> Grid<'a> {
     /// # Errors
     /// [`Error::Misaligned`], [`Error::NotAGrid`], [`Error::WrongByteOrder`],
     /// [`Error::UnsupportedVersion`], [`Error::Truncated`], [`Error::MeshMismatch`] and
-    /// [`Error::Corrupt`], each for what it says.
+    /// [`Error::Corrupt`] and [`Error::MethodLeftOut`], each for what it says.
     pub fn open(blob: &'a [u8], mesh: TriangleMesh<'a>) -> Result<Self, Error> {
         let header = Header::read(blob, &mesh)?;
         header.has_mesh()?;
         let lattice = header.lattice()?;
         let bytes = usize::try_from(header.blob_bytes).ok().and_then(|bytes| blob.get(..bytes));
         let blob = bytes.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
-        let structure = match Method::from_u32(header.method) {
-            Some(Method::OneLevel) => {
+        let method = Method::from_u32(header.method)
+            .ok_or(corrupt(core::mem::offset_of!(Header, method)))?;
+        let structure = match method {
+            Method::OneLevel if HAS_ONE_LEVEL => {
                 Structure::OneLevel(OneLevel::open(&header, &lattice, &(), blob)?)
             }
-            Some(Method::Fixed) => Structure::Fixed(Fixed::open(&header, &lattice, blob)?),
-            Some(Method::Variable) => Structure::Variable(Variable::open(&header, &lattice, blob)?),
-            Some(Method::Recursive) => Structure::Recursive(Recursive::open(&header, blob)?),
-            Some(Method::Brick) => Structure::Brick(Brick::open(&header, &lattice, blob)?),
-            None => return Err(corrupt(core::mem::offset_of!(Header, method))),
+            Method::Fixed if HAS_FIXED => Structure::Fixed(Fixed::open(&header, &lattice, blob)?),
+            Method::Variable if HAS_VARIABLE => {
+                Structure::Variable(Variable::open(&header, &lattice, blob)?)
+            }
+            Method::Recursive if HAS_RECURSIVE => {
+                Structure::Recursive(Recursive::open(&header, blob)?)
+            }
+            Method::Brick if HAS_BRICK => Structure::Brick(Brick::open(&header, &lattice, blob)?),
+            method => return Err(Error::MethodLeftOut(method)),
         };
         Ok(Self { mesh, blob, lattice, structure, simd: SimdLevel::detect() })
     }
@@ -172,15 +189,22 @@ impl<'a> Grid<'a> {
             return Err(corrupt(core::mem::offset_of!(Header, macrocell_factor)));
         }
         match &self.structure {
-            Structure::OneLevel(grid) => {
+            Structure::OneLevel(grid) if HAS_ONE_LEVEL => {
                 grid.validate(&header, &self.lattice, self.blob, &self.mesh)
             }
-            Structure::Fixed(grid) => grid.validate(&header, &self.lattice, self.blob, &self.mesh),
-            Structure::Variable(grid) => {
+            Structure::Fixed(grid) if HAS_FIXED => {
                 grid.validate(&header, &self.lattice, self.blob, &self.mesh)
             }
-            Structure::Recursive(grid) => grid.validate(&header, &self.lattice, &self.mesh),
-            Structure::Brick(grid) => grid.validate(&header, &self.lattice, &self.mesh),
+            Structure::Variable(grid) if HAS_VARIABLE => {
+                grid.validate(&header, &self.lattice, self.blob, &self.mesh)
+            }
+            Structure::Recursive(grid) if HAS_RECURSIVE => {
+                grid.validate(&header, &self.lattice, &self.mesh)
+            }
+            Structure::Brick(grid) if HAS_BRICK => {
+                grid.validate(&header, &self.lattice, &self.mesh)
+            }
+            _ => Err(Error::MethodLeftOut(self.method())),
         }
     }
 
@@ -213,7 +237,7 @@ impl<'a> Grid<'a> {
         let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
         let Some(line) = Line::new(&self.lattice, ray, &approach) else { return };
         let test = TriangleTest::from(ray, &approach).culling(cull);
-        if let Structure::Brick(brick) = &self.structure {
+        if HAS_BRICK && let Structure::Brick(brick) = &self.structure {
             let mut ray = OneRay::new(brick, &self.mesh, &line, &test, search, tally);
             dispatch(self.simd, &mut ray);
         } else {
@@ -253,11 +277,11 @@ impl<'a> Grid<'a> {
             limit
         };
         match &self.structure {
-            Structure::OneLevel(grid) => grid.traverse(line, tally, leaf),
-            Structure::Fixed(grid) => grid.traverse(line, tally, leaf),
-            Structure::Variable(grid) => grid.traverse(line, tally, leaf),
-            Structure::Recursive(grid) => grid.traverse(line, tally, leaf),
-            Structure::Brick(_) => {}
+            Structure::OneLevel(grid) if HAS_ONE_LEVEL => grid.traverse(line, tally, leaf),
+            Structure::Fixed(grid) if HAS_FIXED => grid.traverse(line, tally, leaf),
+            Structure::Variable(grid) if HAS_VARIABLE => grid.traverse(line, tally, leaf),
+            Structure::Recursive(grid) if HAS_RECURSIVE => grid.traverse(line, tally, leaf),
+            _ => {}
         }
     }
 
@@ -267,11 +291,12 @@ impl<'a> Grid<'a> {
         let reach = self.lattice.reach(bounds);
         let visitor = &mut Visitor::new(self.list_words(), leaf);
         match &self.structure {
-            Structure::OneLevel(grid) => grid.visit(&reach, visitor),
-            Structure::Fixed(grid) => grid.visit(&reach, visitor),
-            Structure::Variable(grid) => grid.visit(&reach, visitor),
-            Structure::Recursive(grid) => grid.visit(&reach, visitor),
-            Structure::Brick(grid) => grid.visit(&reach, visitor),
+            Structure::OneLevel(grid) if HAS_ONE_LEVEL => grid.visit(&reach, visitor),
+            Structure::Fixed(grid) if HAS_FIXED => grid.visit(&reach, visitor),
+            Structure::Variable(grid) if HAS_VARIABLE => grid.visit(&reach, visitor),
+            Structure::Recursive(grid) if HAS_RECURSIVE => grid.visit(&reach, visitor),
+            Structure::Brick(grid) if HAS_BRICK => grid.visit(&reach, visitor),
+            _ => true,
         };
     }
 
@@ -288,7 +313,7 @@ impl<'a> Grid<'a> {
         rays: &Strided<'_>,
         answer: impl FnMut(usize, &[Hit]),
     ) -> bool {
-        if !HAS_VECTORS {
+        if !HAS_VECTORS || !HAS_BRICK {
             return false;
         }
         let Structure::Brick(brick) = &self.structure else { return false };

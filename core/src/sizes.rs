@@ -1,7 +1,9 @@
 //! How much memory a build takes, asked before the build.
 
 use crate::brick;
-use crate::config::{Config, Method};
+use crate::config::{
+    Config, HAS_BRICK, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
+};
 use crate::control::Control;
 use crate::error::{ConfigField, Error, Region};
 use crate::fixed;
@@ -55,11 +57,12 @@ impl Sizes {
             return None;
         }
         let (index, scratch) = match config.method {
-            Method::OneLevel => one_level::bound(triangles, config.density, 0),
-            Method::Fixed => fixed::bound(triangles, config),
-            Method::Variable => variable::bound(triangles, config),
-            Method::Recursive => recursive::bound(triangles, config),
-            Method::Brick => brick::bound(triangles, tasks),
+            Method::OneLevel if HAS_ONE_LEVEL => one_level::bound(triangles, config.density, 0),
+            Method::Fixed if HAS_FIXED => fixed::bound(triangles, config),
+            Method::Variable if HAS_VARIABLE => variable::bound(triangles, config),
+            Method::Recursive if HAS_RECURSIVE => recursive::bound(triangles, config),
+            Method::Brick if HAS_BRICK => brick::bound(triangles, tasks),
+            _ => return None,
         };
         if index > usize::MAX as u64 || scratch > usize::MAX as u64 {
             return None;
@@ -132,11 +135,14 @@ pub fn sizes_with(
     config.check()?;
     crate::arena::check_alignment(scratch, Region::Scratch)?;
     match config.method {
-        Method::OneLevel => one_level::sizes(mesh, config, &(), scratch),
-        Method::Fixed => one_level::sizes(mesh, config, &fixed::Macrocells::of(config), scratch),
-        Method::Variable => variable::sizes(mesh, config, scratch),
-        Method::Recursive => recursive::sizes(mesh, config, scratch),
-        Method::Brick => brick::sizes(mesh, config, scratch, control),
+        Method::OneLevel if HAS_ONE_LEVEL => one_level::sizes(mesh, config, &(), scratch),
+        Method::Fixed if HAS_FIXED => {
+            one_level::sizes(mesh, config, &fixed::Macrocells::of(config), scratch)
+        }
+        Method::Variable if HAS_VARIABLE => variable::sizes(mesh, config, scratch),
+        Method::Recursive if HAS_RECURSIVE => recursive::sizes(mesh, config, scratch),
+        Method::Brick if HAS_BRICK => brick::sizes(mesh, config, scratch, control),
+        method => Err(Error::MethodLeftOut(method)),
     }
 }
 

@@ -8,6 +8,7 @@ mod answers;
 mod cases;
 mod create;
 mod header;
+mod left_out;
 mod programs;
 mod promises;
 mod symbols;

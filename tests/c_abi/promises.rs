@@ -9,6 +9,7 @@ use std::sync::OnceLock;
 use hgrid_tests::artefact::{Flavour, run};
 
 use crate::header::{documentation, functions, parameters, statuses, structs};
+use crate::left_out;
 use crate::programs::plain;
 
 /// What is behind a word at the start of a line of any program.
@@ -17,7 +18,7 @@ fn printed(word: &str) -> BTreeSet<&'static str> {
     let all = PRINTED.get_or_init(|| {
         let print = |program| run(&mut Command::new(program)).stdout;
         let all = plain().flat_map(|(program, _)| print(program)).collect();
-        String::from_utf8(all).expect("text")
+        String::from_utf8(all).expect("text") + left_out::printed()
     });
     all.lines().filter_map(|line| line.strip_prefix(word)?.strip_prefix(' ')).collect()
 }

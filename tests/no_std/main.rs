@@ -55,10 +55,11 @@ fn is_fetched(target: &str) -> bool {
 }
 
 /// Builds the C library, and core for it, and returns the folder it is in: one for each target, so
-/// that no build waits for the other.
-fn build(target: &str) -> PathBuf {
+/// that no build waits for the other. Arguments may leave methods out.
+fn build(target: &str, arguments: &[&str]) -> PathBuf {
     let dir = target_dir().join("no_std").join(target);
-    run(cargo_in(&dir, "build").args(["--release", "-p", "hgrid-capi", "--target", target]));
+    let mut build = cargo_in(&dir, "build");
+    run(build.args(["--release", "-p", "hgrid-capi", "--target", target]).args(arguments));
     dir.join(target).join("release")
 }
 
@@ -66,16 +67,20 @@ fn build(target: &str) -> PathBuf {
 fn a_microcontroller_gets_a_static_library() {
     let target = "thumbv7em-none-eabihf";
     if is_available(target) {
-        let dir = build(target);
-        let archive = dir.join("libhgrid.a");
+        let archive = build(target, &[]).join("libhgrid.a");
         let bytes = fs::read(&archive).expect("the C library");
         assert!(bytes.starts_with(b"!<arch>\n"));
-        check_flash(&archive);
+        check_flash("| all | ", &archive);
+        for method in ["one-level", "fixed", "brick"] {
+            build(target, &["--no-default-features", "--features", method]);
+            check_flash(&format!("| `{method}` | "), &archive);
+        }
     }
 }
 
-/// Links what programs need of the archive, and of nothing else, as the linker would for them.
-fn check_flash(archive: &Path) {
+/// Links what programs need of the archive, and of nothing else, as the linker would for them, and
+/// compares it with a row of the README's table.
+fn check_flash(row: &str, archive: &Path) {
     let host = rustc("host-tuple");
     let linker = rustlib(&host).join("bin/rust-lld");
     if !linker.is_file() {
@@ -95,17 +100,14 @@ fn check_flash(archive: &Path) {
     };
     let traces = flash(&["hgrid_open", "hgrid_intersect"]);
     let builds = flash(&["hgrid_open", "hgrid_intersect", "hgrid_build"]);
-    check_sizes(
-        ["`hgrid_open` and `hgrid_intersect` take ", " bytes, with `hgrid_build` "],
-        [traces, builds],
-    );
+    check_sizes([row, " | "], [traces, builds]);
 }
 
 #[test]
 fn a_web_page_gets_a_module_that_needs_nothing() {
     let target = "wasm32-unknown-unknown";
     if is_available(target) {
-        let dir = build(target);
+        let dir = build(target, &[]);
         let module = fs::read(dir.join("hgrid.wasm")).expect("the module");
         let sections = sections(&module);
         assert!(sections.contains(&EXPORTS) && !sections.contains(&IMPORTS), "{sections:?}");
