@@ -1,8 +1,9 @@
 //! How much work is done, in numbers that do not depend on the machine?
 //!
 //! Bytes and counters of every method on a few scenes, as a table in counters.txt. A slower
-//! algorithm or a larger blob shows as a difference there, in review and on any machine;
-//! `HGRID_BLESS=1` writes the table anew.
+//! algorithm or a larger blob shows as a difference there, in review and on any machine, and so does
+//! a blob with other bits: `content` is what its lists hold, `words` all behind its header. Another
+//! `words` alone asks for another `BLOB_VERSION`. `HGRID_BLESS=1` writes the table anew.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,6 +16,17 @@ use hgrid_tests::owned::Owned;
 
 /// Pixels on a side of the picture that is counted.
 const SIZE: u16 = 64;
+
+/// Bytes before the first word of a grid that is not its header's.
+const HEADER_BYTES: usize = 128;
+
+/// A hash of words (FNV-1a, word by word).
+fn hash_of(words: &[u8]) -> u64 {
+    let words = words.as_chunks::<4>().0.iter().map(|&word| u32::from_ne_bytes(word));
+    words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {
+        (hash ^ u64::from(word)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
 
 /// A line for a method on a scene.
 fn line(name: &str, mesh: &Mesh, method: Method) -> String {
@@ -38,9 +50,10 @@ fn line(name: &str, mesh: &Mesh, method: Method) -> String {
     let [x, y, z] = grid.resolution();
     let resolution = format!("{x}x{y}x{z}");
     format!(
-        "{name:8} {:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6} {longest_list:>7} {content_hash:016x}",
+        "{name:8} {:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6} {longest_list:>7} {content_hash:016x} {:016x}",
         method.name(),
         grid.blob_bytes(),
+        hash_of(&grid.blob()[HEADER_BYTES..]),
     )
 }
 
@@ -57,7 +70,7 @@ fn work_is_what_it_was() {
         ("crowd", crowd.map(|[x, _, z]| [x, 0.0, z])),
     ];
     let mut table = String::from(
-        "scene    method     resolution    bytes  hits   tests   steps  grids longest content\n",
+        "scene    method     resolution    bytes  hits   tests   steps  grids longest content          words\n",
     );
     for (name, mesh) in &scenes {
         for &method in Method::ALL {
