@@ -90,6 +90,10 @@
  * it while they write: hgrid_sizes tells it in advance if it is given scratch, and an index that
  * turns out to be too small is lost, see HGRID_ERROR_INDEX_TOO_SMALL.
  *
+ * A library may be built with fewer methods, to be smaller: hgrid_has_method tells which it has, and
+ * what needs another one answers HGRID_ERROR_METHOD_LEFT_OUT. NULL for a configuration and
+ * HGRID_CONFIG_INIT mean brick, in a library without it, too: name a method there.
+ *
  * Pointers
  * --------
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
@@ -1733,10 +1737,11 @@ uint32_t hgrid_version(void);
 const char *hgrid_version_string(void);
 
 /**
- * Whether the library that is linked has a method, `HGRID_METHOD_ONE_LEVEL` and so on; no for a
- * number that is none.
+ * Whether the library that is linked has a method, `HGRID_METHOD_ONE_LEVEL` and so on. False for a
+ * number that is no method.
  *
- * It has all of them unless it was built with fewer, to be smaller: see the README.
+ * It has all of them unless it was built with fewer, to be smaller: `cargo build --release -p
+ * hgrid-capi --no-default-features --features one-level`, say.
  *
  * Threads: any number of calls at once.
  */

@@ -259,7 +259,7 @@ inline bool is_compatible() noexcept
     return ::hgrid_version() >> 8 == HGRID_VERSION >> 8;
 }
 
-/// Whether it has a method: it may have been built with fewer, to be smaller.
+/// Whether the library that is linked has a method: it may have been built with fewer, to be smaller.
 inline bool has_method(method which) noexcept
 {
     return ::hgrid_has_method(static_cast<std::uint32_t>(which));

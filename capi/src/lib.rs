@@ -10,7 +10,7 @@
 //! test looks for the symbols of all but the state in the library. Core remembers in one byte which
 //! vector instructions the processor has.
 //!
-//! That is the library without features. With `std` it also has `create`, which gets memory from
+//! That is the library without the feature `std`. With it, it also has `create`, which gets memory from
 //! the caller's allocator or the system's and looks after the pointers to it.
 #![no_std]
 

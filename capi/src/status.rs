@@ -214,7 +214,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         }
         HGRID_ERROR_CANCELLED => c"cancelled by the progress callback: there is no grid",
         HGRID_ERROR_METHOD_LEFT_OUT => {
-            c"a method that this library was built without: take one that it has, or build it with all"
+            c"a method that this library was built without: take one that it has, or build the library with it"
         }
         HGRID_ERROR_NO_MESH => {
             c"a blob without its mesh: bring the mesh it was built for, or pack both with hgrid_pack"

@@ -5,8 +5,8 @@ use bitflags::bitflags;
 use crate::error::{ConfigField, Error};
 use crate::recursive::MAX_DEPTH;
 
-/// Whether this library has a method. What builds, opens and asks grids says so beside its name,
-/// and has no code for one that is left out.
+// Which methods this library has. Every choice of a method names its constant beside it, so that no
+// code stays for one that is left out.
 pub(crate) const HAS_ONE_LEVEL: bool = cfg!(feature = "one-level");
 pub(crate) const HAS_FIXED: bool = cfg!(feature = "fixed");
 pub(crate) const HAS_VARIABLE: bool = cfg!(feature = "variable");
@@ -40,7 +40,8 @@ pub enum Method {
 }
 
 impl Method {
-    /// All methods, in the order of the paper's Table 1 but for its baseline, which comes last.
+    /// All methods, in the order of the paper's Table 1 but for its baseline, which comes last; also
+    /// those that this library has not ([`is_available`](Self::is_available)).
     pub const ALL: &[Self] =
         &[Self::OneLevel, Self::Variable, Self::Fixed, Self::Recursive, Self::Brick];
 
@@ -69,9 +70,8 @@ impl Method {
         }
     }
 
-    /// Whether this library has it: a feature of the package that is off leaves its method out
-    /// ([`Error::MethodLeftOut`]).
-    #[inline(always)]
+    /// Whether this library has it. A feature of the package that is off leaves its method out, and
+    /// who asks for it gets [`Error::MethodLeftOut`]; the default, brick, is no exception.
     #[must_use]
     pub const fn is_available(self) -> bool {
         match self {
@@ -166,6 +166,9 @@ impl Config {
 
     /// Refuses values that no build can use.
     pub(crate) const fn check(&self) -> Result<(), Error> {
+        if !self.method.is_available() {
+            return Err(Error::MethodLeftOut(self.method));
+        }
         if self.method.has_density() && !self.density_is_valid() {
             return Err(Error::InvalidConfig(ConfigField::Density));
         }

@@ -89,8 +89,8 @@ pub enum Error {
         /// The first such triangle.
         triangle: u32,
     },
-    /// This library has no such method, neither to build nor to open it: build it with the feature
-    /// of the method's name.
+    /// This library was built without the method, and can neither build nor open its grids: turn on
+    /// the feature of its name.
     MethodLeftOut(Method),
     /// A field of the configuration is outside its range.
     InvalidConfig(ConfigField),
@@ -174,7 +174,7 @@ impl fmt::Display for Error {
                  below an answer",
             ),
             Self::MethodLeftOut(method) => {
-                write!(f, "this library was built without the feature {}", method.name())
+                write!(f, "this library has no method {0}: turn on its feature {0}", method.name())
             }
             Self::InvalidConfig(ConfigField::Method) => f.write_str("unknown method"),
             Self::InvalidConfig(ConfigField::Density) => write!(

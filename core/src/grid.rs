@@ -64,8 +64,8 @@ impl<'a> Grid<'a> {
     /// # Errors
     /// [`Error::OutOfMemory`] names the region and its need, [`Error::Misaligned`] the region;
     /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
-    /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field. After an
-    /// error the index region is as it was, but for variable, recursive and brick grids, which fill
+    /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field,
+    /// [`Error::MethodLeftOut`] the method. After an error the index region is as it was, but for variable, recursive and brick grids, which fill
     /// it as they go: there it holds nothing of use. Either way both regions can be used again.
     ///
     /// ```
@@ -148,7 +148,7 @@ impl<'a> Grid<'a> {
     ///
     /// # Errors
     /// [`Error::Misaligned`], [`Error::NotAGrid`], [`Error::WrongByteOrder`],
-    /// [`Error::UnsupportedVersion`], [`Error::Truncated`], [`Error::MeshMismatch`] and
+    /// [`Error::UnsupportedVersion`], [`Error::Truncated`], [`Error::MeshMismatch`],
     /// [`Error::Corrupt`] and [`Error::MethodLeftOut`], each for what it says.
     pub fn open(blob: &'a [u8], mesh: TriangleMesh<'a>) -> Result<Self, Error> {
         let header = Header::read(blob, &mesh)?;
@@ -204,7 +204,11 @@ impl<'a> Grid<'a> {
             Structure::Brick(grid) if HAS_BRICK => {
                 grid.validate(&header, &self.lattice, &self.mesh)
             }
-            _ => Err(Error::MethodLeftOut(self.method())),
+            Structure::OneLevel(_)
+            | Structure::Fixed(_)
+            | Structure::Variable(_)
+            | Structure::Recursive(_)
+            | Structure::Brick(_) => Err(Error::MethodLeftOut(self.method())),
         }
     }
 
@@ -281,7 +285,11 @@ impl<'a> Grid<'a> {
             Structure::Fixed(grid) if HAS_FIXED => grid.traverse(line, tally, leaf),
             Structure::Variable(grid) if HAS_VARIABLE => grid.traverse(line, tally, leaf),
             Structure::Recursive(grid) if HAS_RECURSIVE => grid.traverse(line, tally, leaf),
-            _ => {}
+            Structure::OneLevel(_)
+            | Structure::Fixed(_)
+            | Structure::Variable(_)
+            | Structure::Recursive(_)
+            | Structure::Brick(_) => {}
         }
     }
 
@@ -296,7 +304,11 @@ impl<'a> Grid<'a> {
             Structure::Variable(grid) if HAS_VARIABLE => grid.visit(&reach, visitor),
             Structure::Recursive(grid) if HAS_RECURSIVE => grid.visit(&reach, visitor),
             Structure::Brick(grid) if HAS_BRICK => grid.visit(&reach, visitor),
-            _ => true,
+            Structure::OneLevel(_)
+            | Structure::Fixed(_)
+            | Structure::Variable(_)
+            | Structure::Recursive(_)
+            | Structure::Brick(_) => true,
         };
     }
 

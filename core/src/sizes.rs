@@ -30,8 +30,8 @@ impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
     /// A one-level grid of a scan takes a sixth of it or less, a brick grid a thirteenth; for
-    /// recursive grids it is generous beyond use. `None` if no build takes the configuration, or
-    /// the sizes do not fit the machine's address space.
+    /// recursive grids it is generous beyond use. `None` if no build takes the configuration (its
+    /// method is left out, say), or the sizes do not fit the machine's address space.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Method, Sizes};
@@ -62,7 +62,11 @@ impl Sizes {
             Method::Variable if HAS_VARIABLE => variable::bound(triangles, config),
             Method::Recursive if HAS_RECURSIVE => recursive::bound(triangles, config),
             Method::Brick if HAS_BRICK => brick::bound(triangles, tasks),
-            _ => return None,
+            Method::OneLevel
+            | Method::Fixed
+            | Method::Variable
+            | Method::Recursive
+            | Method::Brick => return None,
         };
         if index > usize::MAX as u64 || scratch > usize::MAX as u64 {
             return None;

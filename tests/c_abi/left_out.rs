@@ -12,8 +12,9 @@ use tempfile::TempDir;
 use crate::programs::{SANITIZERS, compile};
 
 /// Features, and the methods that they bring.
-const LIBRARIES: [(&str, &[Method]); 2] = [
+const LIBRARIES: [(&str, &[Method]); 3] = [
     ("fixed", &[Method::OneLevel, Method::Fixed]),
+    ("variable", &[Method::OneLevel, Method::Variable]),
     ("brick,recursive", &[Method::Brick, Method::Recursive]),
 ];
 

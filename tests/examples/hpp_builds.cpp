@@ -40,6 +40,7 @@ static void check_grids()
 {
     const scene s(3);
     for (const hgrid::method method : METHODS) {
+        CHECK(hgrid::has_method(method));
         hgrid::report report = HGRID_REPORT_INIT;
         auto built = hgrid::grid::build(s.mesh(), method, &report);
         CHECK(built && built.error() == status::ok && report.index_bytes == built->blob().size());

@@ -2,8 +2,8 @@
 //!
 //! Bytes and counters of every method on a few scenes, as a table in counters.txt. A slower
 //! algorithm or a larger blob shows as a difference there, in review and on any machine, and so does
-//! a blob with other bits: `content` is what its lists hold, `words` all behind its header. Another
-//! `words` alone asks for another `BLOB_VERSION`. `HGRID_BLESS=1` writes the table anew.
+//! a blob with other bits: `content` is what its lists hold, `words` all behind its header on machines
+//! of little endian. Another `words` alone asks for another `BLOB_VERSION`. `HGRID_BLESS=1` writes the table anew.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,6 +11,7 @@ use std::path::Path;
 use hgrid_core::{Config, Counters, Method, QueryOptions, Statistics};
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_lab::scene::Scene;
+use hgrid_tests::copy::hash;
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
 
@@ -19,14 +20,6 @@ const SIZE: u16 = 64;
 
 /// Bytes before the first word of a grid that is not its header's.
 const HEADER_BYTES: usize = 128;
-
-/// A hash of words (FNV-1a, word by word).
-fn hash_of(words: &[u8]) -> u64 {
-    let words = words.as_chunks::<4>().0.iter().map(|&word| u32::from_ne_bytes(word));
-    words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {
-        (hash ^ u64::from(word)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
-}
 
 /// A line for a method on a scene.
 fn line(name: &str, mesh: &Mesh, method: Method) -> String {
@@ -53,7 +46,7 @@ fn line(name: &str, mesh: &Mesh, method: Method) -> String {
         "{name:8} {:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6} {longest_list:>7} {content_hash:016x} {:016x}",
         method.name(),
         grid.blob_bytes(),
-        hash_of(&grid.blob()[HEADER_BYTES..]),
+        hash(&grid.blob()[HEADER_BYTES..]),
     )
 }
 

@@ -102,7 +102,7 @@ impl Flavour {
 /// The static library with some of its methods: the names of features, between commas.
 #[must_use]
 pub fn library_with(features: &str) -> PathBuf {
-    let target = target_dir().join(features.replace(',', "_"));
+    let target = target_dir().join("methods").join(features.replace(',', "_"));
     let build = &mut cargo_in(&target, "build");
     build.args(["--release", "-p", "hgrid-capi", "--no-default-features", "--features", features]);
     run(build);

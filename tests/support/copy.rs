@@ -67,13 +67,19 @@ impl Copy {
             return;
         };
         let Some(checksum) = behind.first_chunk_mut::<4>() else { return };
-        let words = covered.as_chunks::<4>().0.iter().map(|word| u32::from_ne_bytes(*word));
-        let sum = words.fold(0xcbf2_9ce4_8422_2325, |sum: u64, word| {
-            (sum ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3)
-        });
+        let sum = hash(covered);
         let sum = sum ^ (sum >> 29);
         *checksum = (sum as u32 ^ (sum >> 32) as u32).to_ne_bytes();
     }
+}
+
+/// A hash of the words of a blob: FNV-1a, word by word.
+#[must_use]
+pub fn hash(words: &[u8]) -> u64 {
+    let words = words.as_chunks::<4>().0.iter().map(|word| u32::from_ne_bytes(*word));
+    words.fold(0xcbf2_9ce4_8422_2325, |sum, word| {
+        (sum ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 /// The word at a byte of a blob.
