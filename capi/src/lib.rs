@@ -10,8 +10,8 @@
 //! test looks for the symbols of all but the state in the library. Core remembers in one byte which
 //! vector instructions the processor has.
 //!
-//! That is the library without the feature `std`. With it, it also has `create`, which gets memory from
-//! the caller's allocator or the system's and looks after the pointers to it.
+//! That is the library without the feature `std`, with which it has `create`, too: that gets memory
+//! from the caller's allocator or the system's and looks after the pointers to it.
 #![no_std]
 
 // What C sees, in the order of the header.

@@ -65,8 +65,9 @@ impl<'a> Grid<'a> {
     /// [`Error::OutOfMemory`] names the region and its need, [`Error::Misaligned`] the region;
     /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
     /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field,
-    /// [`Error::MethodLeftOut`] the method. After an error the index region is as it was, but for variable, recursive and brick grids, which fill
-    /// it as they go: there it holds nothing of use. Either way both regions can be used again.
+    /// [`Error::MethodLeftOut`] the method. After an error the index region is as it was, but for
+    /// variable, recursive and brick grids, which fill it as they go: there it holds nothing of use.
+    /// Either way both regions can be used again.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};

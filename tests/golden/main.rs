@@ -2,8 +2,9 @@
 //!
 //! Bytes and counters of every method on a few scenes, as a table in counters.txt. A slower
 //! algorithm or a larger blob shows as a difference there, in review and on any machine, and so does
-//! a blob with other bits: `content` is what its lists hold, `words` all behind its header on machines
-//! of little endian. Another `words` alone asks for another `BLOB_VERSION`. `HGRID_BLESS=1` writes the table anew.
+//! a blob with other bits: `content` is what its lists hold, `words` all behind its header, on
+//! machines of little endian. Another `words` alone asks for another `BLOB_VERSION`. `HGRID_BLESS=1`
+//! writes the table anew.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -18,7 +19,7 @@ use hgrid_tests::owned::Owned;
 /// Pixels on a side of the picture that is counted.
 const SIZE: u16 = 64;
 
-/// Bytes before the first word of a grid that is not its header's.
+/// Bytes of a blob's header.
 const HEADER_BYTES: usize = 128;
 
 /// A line for a method on a scene.
