@@ -23,9 +23,18 @@ pub(crate) enum Outcome {
 pub(crate) trait Search {
     fn show(&mut self, hit: Hit) -> Outcome;
 
+    /// Whether a triangle need not be shown again, as the ray met it in a cell before.
+    #[inline(always)]
+    fn knows(&self, _: u32) -> bool {
+        false
+    }
+
     /// Shows the hit with a triangle that passed the filter, if it is one.
     #[inline(always)]
     fn decide(&mut self, test: &TriangleTest, mesh: &TriangleMesh<'_>, id: u32) -> Outcome {
+        if self.knows(id) {
+            return Outcome::Unchanged;
+        }
         let hit = test.decide(mesh, id);
         if hit.primitive == INVALID_ID { Outcome::Unchanged } else { self.show(hit) }
     }
@@ -43,6 +52,11 @@ impl Search for Closest {
         }
         self.0 = Some(hit);
         Outcome::EndsAt(hit.t)
+    }
+
+    #[inline(always)]
+    fn knows(&self, id: u32) -> bool {
+        self.0.is_some_and(|best| best.primitive == id)
     }
 }
 

@@ -253,7 +253,7 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
         for some in references.chunks(MOST) {
             // No branch tells who is missed: it would be as good as random.
             let any = self.format.id(some.first().copied().unwrap_or(0));
-            let (mut ids, mut count) = ([any; MOST], 0);
+            let (mut ids, mut count) = ([any; MOST + LANES], 0);
             let mut take = |reference: u32, is_met: bool| {
                 ids[count % MOST] = self.format.id(reference);
                 count += usize::from(is_met);
@@ -268,6 +268,11 @@ impl<'q, F: Search, T: Tally> OneRay<'q, F, T> {
             }
             for &reference in rest {
                 take(reference, !missed.contains(reference));
+            }
+            // What fills up the last eight is read, too: not one that was missed, far away in memory.
+            let met = ids[0];
+            if let Some(rest) = ids.get_mut(count..).and_then(|rest| rest.first_chunk_mut()) {
+                *rest = [met; LANES];
             }
             for first in (0..count).step_by(LANES) {
                 let Some(eight) = ids.get(first..).and_then(|ids| ids.first_chunk()) else { break };
