@@ -439,6 +439,18 @@ impl Bundle {
         self.alive = self.members & alive;
     }
 
+    /// The last k at which any member ends.
+    #[inline(always)]
+    pub(super) fn farthest<S: Simd>(&self, simd: S) -> f32 {
+        // Who does not belong may end at what is no number.
+        let row = |row| {
+            let to = row_of(simd, &self.to, row * WIDTH);
+            let nowhere = f32x16::splat(simd, f32::NEG_INFINITY);
+            to.simd_ge(nowhere).select(to, nowhere)
+        };
+        most(row(0).max(row(1)).max(row(2).max(row(3))))
+    }
+
     /// The members between two planes, unless they have ended before.
     #[inline(always)]
     pub(super) fn between<S: Simd>(&self, simd: S, [near, far]: [f32; 2]) -> u64 {

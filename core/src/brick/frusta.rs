@@ -13,6 +13,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16};
 
 use super::bundle::{Bounds, Bundle, RAYS, WIDTH, below_three};
+use crate::aabb::lesser;
 use crate::eight::Eight;
 use crate::mesh::Triangle;
 
@@ -82,9 +83,9 @@ impl Frusta {
         }
     }
 
-    /// Those of eight triangles that rays of the tile may meet, as bits.
+    /// Those of eight triangles that rays of the tile may meet before a plane of k, as bits.
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(&self, simd: S, triangles: &Eight<S>) -> u32 {
+    pub(super) fn meet<S: Simd>(&self, simd: S, triangles: &Eight<S>, far: f32) -> u32 {
         let [u, v, k] = below_three(self.axes);
         let splat = |number: f32| f32x8::splat(simd, number);
         let place = |xyz: &[f32x8<S>; 3], axis: usize, side: usize| {
@@ -94,7 +95,8 @@ impl Frusta {
         let on_k = |xyz| place(xyz, k, 2) + splat(self.offset);
         let ks = [on_k(a), on_k(b), on_k(c)];
         let margin = splat(self.margin);
-        let mut outside = splat(0.0).simd_lt(splat(0.0));
+        let nearest = ks[0].min(ks[1]).min(ks[2]) - margin;
+        let mut outside = nearest.simd_gt(splat(far));
         for (side, axis) in [u, v].into_iter().enumerate() {
             let at = [place(a, axis, side), place(b, axis, side), place(c, axis, side)];
             let (low, high) = (self.whole.low[side], self.whole.high[side]);
@@ -110,6 +112,15 @@ impl Frusta {
         #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
         let outside = outside.to_bitmask() as u32;
         !outside & triangles.used
+    }
+
+    /// The plane of k before which a triangle is not hit.
+    #[inline(always)]
+    pub(super) fn nearest(&self, triangle: &Triangle) -> f32 {
+        let [_, _, k] = below_three(self.axes);
+        let on_k = |corner: [f32; 3]| (corner[k] - self.corner[2]) * self.rate[2] + self.offset;
+        let [p, q, r] = triangle.map(on_k);
+        lesser(lesser(p, q), r) - self.margin
     }
 
     /// The rays that may meet a triangle, row by row.

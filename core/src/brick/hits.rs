@@ -12,7 +12,8 @@ use fearless_simd::{Simd, f32x4, f32x8, f32x16, f64x8, mask32x8, mask64x8, u32x4
 
 use super::bundle::{Bundle, PerRay, RAYS, WIDTH, row_of};
 use super::frusta::Frusta;
-use crate::eight::{Eight, LANES, transpose};
+use super::quarters::Format;
+use crate::eight::{Eight, LANES, first_eight, transpose};
 use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Cull;
 use crate::ray::{Hit, INVALID_ID};
@@ -27,6 +28,14 @@ const SLOTS: usize = 256;
 
 /// Rays resolved at once.
 const PART: usize = WIDTH / 2;
+
+/// Triangles of a mesh that some rays may meet.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct List<'a> {
+    pub(super) references: &'a [u32],
+    pub(super) format: Format,
+    pub(super) mesh: &'a TriangleMesh<'a>,
+}
 
 /// What the rays of a bundle have hit.
 #[derive(Debug)]
@@ -101,7 +110,7 @@ impl Hits {
         [hit(a), hit(b), hit(c), hit(d)]
     }
 
-    /// Tests rays of a bundle against the triangles of a list; if they are many, all rays that are
+    /// Tests rays of a bundle against a list of triangles; if they are many, all rays that are
     /// alive.
     ///
     /// Out of line, or it would be on the stack once for each division of a cell; so it says once
@@ -111,8 +120,7 @@ impl Hits {
         &mut self,
         simd: S,
         bundle: &mut Bundle,
-        mesh: &TriangleMesh<'_>,
-        ids: &[u32],
+        List { references, format, mesh }: List<'_>,
         rays: u64,
     ) {
         simd.vectorize(
@@ -122,8 +130,12 @@ impl Hits {
                     self.begin(simd, bundle);
                 }
                 if rays.count_ones() < MANY {
-                    for ids in ids.chunks(LANES) {
-                        self.few::<S, ANY>(simd, bundle, mesh, ids, rays);
+                    for some in references.chunks(LANES) {
+                        let ids = first_eight(some).map(
+                            #[inline(always)]
+                            |reference| format.id(reference),
+                        );
+                        self.few::<S, ANY>(simd, bundle, mesh, &ids, some.len(), rays);
                     }
                     return;
                 }
@@ -131,15 +143,20 @@ impl Hits {
                     self.is_surrounded = true;
                     self.frusta.surround(simd, bundle);
                 }
+                // Where triangles are large, many lie behind what was hit. To look for that costs, too.
+                let far =
+                    if references.len() > LANES { bundle.farthest(simd) } else { f32::INFINITY };
                 // Eight by eight those that were not tested yet.
-                let (mut fresh, mut count) = ([ids.first().copied().unwrap_or(0); LANES], 0);
-                for (place, &id) in ids.iter().enumerate() {
+                let first = format.id(references.first().copied().unwrap_or(0));
+                let (mut fresh, mut count) = ([first; LANES], 0);
+                for (place, &reference) in references.iter().enumerate() {
+                    let id = format.id(reference);
                     let slot = &mut self.mailbox[id as usize % SLOTS];
                     fresh[count % LANES] = id;
                     count += usize::from(*slot != !id);
                     *slot = !id;
-                    if count == LANES || (count > 0 && place + 1 == ids.len()) {
-                        self.many::<S, ANY>(simd, bundle, mesh, &fresh[..count.min(LANES)]);
+                    if count == LANES || (count > 0 && place + 1 == references.len()) {
+                        self.many::<S, ANY>(simd, bundle, mesh, &fresh[..count.min(LANES)], far);
                         count = 0;
                     }
                 }
@@ -156,9 +173,10 @@ impl Hits {
         bundle: &mut Bundle,
         mesh: &TriangleMesh<'_>,
         ids: &[u32],
+        far: f32,
     ) {
         let triangles = Eight::gather(simd, mesh, ids);
-        let mut near = self.frusta.meet(simd, &triangles);
+        let mut near = self.frusta.meet(simd, &triangles, far);
         while near != 0 {
             let place = near.trailing_zeros() as usize;
             near &= near - 1;
@@ -166,15 +184,16 @@ impl Hits {
             let Some(triangle) = mesh.triangle(id) else { continue };
             let rays = self.frusta.rays(simd, &triangle) & bundle.alive;
             let rays = if ANY { rays & bundle.members } else { rays };
+            let nearest = self.frusta.nearest(&triangle);
             for axis in 0..3 {
                 let rays = rays & bundle.longest[axis];
                 if rays == 0 {
                     continue;
                 }
                 match axis {
-                    0 => self.side_by_side::<S, 0, ANY>(simd, bundle, &triangle, id, rays),
-                    1 => self.side_by_side::<S, 1, ANY>(simd, bundle, &triangle, id, rays),
-                    _ => self.side_by_side::<S, 2, ANY>(simd, bundle, &triangle, id, rays),
+                    0 => self.side_by_side::<S, 0, ANY>(simd, bundle, &triangle, nearest, id, rays),
+                    1 => self.side_by_side::<S, 1, ANY>(simd, bundle, &triangle, nearest, id, rays),
+                    _ => self.side_by_side::<S, 2, ANY>(simd, bundle, &triangle, nearest, id, rays),
                 }
             }
         }
@@ -187,10 +206,11 @@ impl Hits {
         simd: S,
         bundle: &mut Bundle,
         mesh: &TriangleMesh<'_>,
-        ids: &[u32],
+        ids: &[u32; LANES],
+        count: usize,
         rays: u64,
     ) {
-        let triangles = Eight::gather(simd, mesh, ids);
+        let triangles = Eight::of(simd, mesh, *ids, count);
         let mut rest = if ANY { rays & bundle.members } else { rays };
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize % RAYS;
@@ -201,6 +221,10 @@ impl Hits {
                 let place = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
                 let Some(&id) = ids.get(place) else { break };
+                // Met in a cell before.
+                if id == self.primitive[lane] {
+                    continue;
+                }
                 // A miss is closer than nothing.
                 let hit = test.decide(mesh, id);
                 let best =
@@ -228,6 +252,7 @@ impl Hits {
         simd: S,
         bundle: &mut Bundle,
         triangle: &Triangle,
+        nearest: f32,
         id: u32,
         rays: u64,
     ) {
@@ -237,7 +262,14 @@ impl Hits {
             if here == 0 {
                 continue;
             }
+
+            // Leave out who has a hit before the triangle begins.
             let first = row * WIDTH;
+            let to = row_of(simd, &bundle.to, first);
+            let here = here & to.simd_ge(f32x16::splat(simd, nearest)).to_bitmask();
+            if here == 0 {
+                continue;
+            }
 
             let (ox, oy, oz) = (
                 row_of(simd, &bundle.origin[x], first),

@@ -22,7 +22,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u8x64};
 
 use super::bundle::{Bounds, Bundle, RAYS, WIDTH, below_three};
-use super::hits::Hits;
+use super::hits::{Hits, List};
 use super::layout::{BLOCK, mask as mask_of, place};
 use super::{Brick, Chunk, Content, Large};
 use crate::bits::ones;
@@ -415,7 +415,7 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
                     continue;
                 }
                 match chunk.content(&brick, bit) {
-                    Some(Content::List(references)) => self.test_cell(simd, references, rays),
+                    Some(Content::List(references)) => self.test(simd, references, rays),
                     Some(Content::Chunk(chunk, cells)) if depth > 0 => {
                         let corner = view.corner([as_f32(cell_u), as_f32(cell_v), planes[0]]);
                         let (scale, depth) = (view.part.scale * as_f32(cells), depth - 1);
@@ -431,19 +431,21 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         }
     }
 
-    /// Tests the triangles of a brick or of all of a part, for the rays that look for
-    /// hits in the cells where they lie.
+    /// Tests the triangles of a brick or of all of a part, if the tile comes near the cells where
+    /// they lie. Which of its rays do is not asked: that costs more than it spares.
     #[inline(always)]
     fn test_large<S: Simd>(&mut self, simd: S, view: &View<'a>, large: &Large<'a>) {
         let last = view.part.cells - 1;
         let cells = large.extent.cells(large.owner).map(|ends| ends.map(|cell| cell.min(last)));
         let [u, v, k] = view.axes();
         let run = [cells[k][0], cells[k][1] + 1];
-        self.reach(simd, view, run);
-        let [in_u, in_v] = &self.reach;
-        let rays = in_u.meets(simd, cells[u]) & in_v.meets(simd, cells[v]);
-        let rays = rays & view.between(simd, &self.bundle, run);
-        self.test(simd, large.ids, rays);
+        let alive = view.between(simd, &self.bundle, run);
+        let Some([us, vs]) = view.cells(run).filter(|_| alive != 0) else { return };
+        let overlap = |[a, b]: [u32; 2], [low, high]: [u32; 2]| a <= high && low <= b;
+        if !(overlap(us, cells[u]) && overlap(vs, cells[v])) {
+            return;
+        }
+        self.test(simd, large.ids, alive);
     }
 
     /// Sets what each ray may meet beside some cells on k.
@@ -472,30 +474,16 @@ impl<'a, const ANY: bool> Tile<'a, ANY> {
         }
     }
 
-    /// Tests rays against the triangles of a cell.
-    #[inline(always)]
-    fn test_cell<S: Simd>(&mut self, simd: S, references: &[u32], rays: u64) {
-        // Only damaged bytes have an empty list; to look at it costs, too.
-        if references.is_empty() {
-            self.spend(u64::from(rays.count_ones()));
-        }
-        for references in references.chunks(RAYS) {
-            let mut ids = [0; RAYS];
-            for (id, &reference) in ids.iter_mut().zip(references) {
-                *id = self.brick.format.id(reference);
-            }
-            self.test(simd, ids.get(..references.len()).unwrap_or_default(), rays);
-        }
-    }
-
     /// Tests rays against the triangles of a list.
     #[inline(always)]
-    fn test<S: Simd>(&mut self, simd: S, ids: &[u32], rays: u64) {
+    fn test<S: Simd>(&mut self, simd: S, references: &[u32], rays: u64) {
         let rays = rays & self.bundle.members;
-        self.spend(ids.len().max(1) as u64 * u64::from(rays.count_ones()));
+        // Only damaged bytes have an empty list; to look at it costs, too.
+        self.spend(references.len().max(1) as u64 * u64::from(rays.count_ones()));
         let rays = rays & self.bundle.members;
         if rays != 0 {
-            self.hits.test::<S, ANY>(simd, &mut self.bundle, self.mesh, ids, rays);
+            let list = List { references, format: self.brick.format, mesh: self.mesh };
+            self.hits.test::<S, ANY>(simd, &mut self.bundle, list, rays);
         }
     }
 }
