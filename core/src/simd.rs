@@ -160,16 +160,16 @@ mod machine {
     pub(super) fn dispatch<K: Kernel>(level: SimdLevel, kernel: K) -> K::Output {
         match level.min(detect()) {
             SimdLevel::Avx512 => {
-                // SAFETY: `detect` found every instruction set that `Avx512` names.
-                let simd = unsafe { Avx512::assume_supported() };
+                // SAFETY: `detect` found every instruction set that `avx512` names.
+                let simd = unsafe { avx512() };
                 simd.vectorize(
                     #[inline(always)]
                     || kernel.run(simd),
                 )
             }
             SimdLevel::Avx2 => {
-                // SAFETY: `detect` found every instruction set that `Avx2` names.
-                let simd = unsafe { Avx2::assume_supported() };
+                // SAFETY: `detect` found every instruction set that `avx2` names.
+                let simd = unsafe { avx2() };
                 simd.vectorize(
                     #[inline(always)]
                     || kernel.run(simd),
@@ -177,10 +177,35 @@ mod machine {
             }
             _ => {
                 // SAFETY: this module exists where the target promises `sse2` and `fxsr`.
-                let simd = unsafe { Sse2::assume_supported() };
+                let simd = unsafe { sse2() };
                 base(simd, kernel)
             }
         }
+    }
+
+    // The tokens. Each function names what `ask` asks for (the last one what this module's target has):
+    // if a later version of the crate wanted more, the safe call in it would not compile.
+
+    #[inline]
+    #[target_feature(enable = "adx,aes,avx512bitalg,avx512bw,avx512cd,avx512dq,avx512f")]
+    #[target_feature(enable = "avx512ifma,avx512vbmi,avx512vbmi2,avx512vl,avx512vnni")]
+    #[target_feature(enable = "avx512vpopcntdq,avx2,bmi1,bmi2,cmpxchg16b,f16c,fma,fxsr,gfni,lzcnt")]
+    #[target_feature(enable = "movbe,pclmulqdq,popcnt,rdrand,rdseed,sha,vaes,vpclmulqdq,xsave")]
+    #[target_feature(enable = "xsavec,xsaveopt,xsaves")]
+    fn avx512() -> Avx512 {
+        Avx512::assume_supported()
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,bmi2,cmpxchg16b,f16c,fma,fxsr,lzcnt,movbe,popcnt,xsave")]
+    fn avx2() -> Avx2 {
+        Avx2::assume_supported()
+    }
+
+    #[inline]
+    #[target_feature(enable = "fxsr,sse,sse2")]
+    fn sse2() -> Sse2 {
+        Sse2::assume_supported()
     }
 
     /// Out of line as the others are, or its stack would be that of the others, too.
