@@ -195,7 +195,7 @@ impl Lattice {
         Vec3A::from_array(self.margin)
     }
 
-    /// The extent of a cell on each axis, up to a common factor.
+    /// The extent of a cell on each axis, in scene units.
     pub(crate) fn cell_size(&self) -> Vec3A {
         1.0 / Vec3A::from_array(self.cells_per_unit)
     }

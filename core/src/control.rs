@@ -91,7 +91,7 @@ impl Control<'_> {
 /// At every so many places of a loop the caller is asked: a millisecond or two.
 pub(crate) const OFTEN: u32 = 1 << 16;
 
-/// Of so little nobody is told.
+/// Smaller steps than this are not reported.
 const LEAST: f32 = 1.0 / 256.0;
 
 /// How far a build is, and who wants to know.

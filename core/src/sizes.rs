@@ -48,8 +48,9 @@ impl Sizes {
     }
 
     /// Enough for any mesh with so many triangles and a build with so many tasks
-    /// ([`Control::tasks`]), each of which takes scratch: four bytes for 32 triangles and those of
-    /// the fullest block.
+    /// ([`Control::tasks`]). Each task takes scratch for the fullest block, which at the worst has
+    /// all triangles: about 32 bytes a triangle for each task. [`sizes_with`] knows the mesh, and
+    /// asks for far less.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "compared before")]
     pub const fn bound_parallel(triangles: u32, config: &Config, tasks: u32) -> Option<Self> {

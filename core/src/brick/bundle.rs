@@ -316,8 +316,8 @@ impl Bundle {
         }
     }
 
-    /// Writes the members as lines in cells, k growing. Who does not belong stands where one does
-    /// that belongs: bounds need not ask.
+    /// Writes the members as lines in cells, k growing. The others get a
+    /// member's line, so that bounds need no mask.
     #[inline(always)]
     fn draw<const K: usize, S: Simd>(&mut self, simd: S) {
         let stand_in = self.members.trailing_zeros() as usize % RAYS;
@@ -378,8 +378,8 @@ impl Bundle {
         below_three(self.axes)
     }
 
-    /// The first k of any member, and the last, before any has a hit: from then on the ends of
-    /// who does not belong mean nothing.
+    /// The first k of any member, and the last, before any has a hit: after a hit the end of who
+    /// does not belong may be no number.
     #[inline(always)]
     pub(super) fn ends<S: Simd>(&self, simd: S) -> (f32, f32) {
         let rows = |array: &PerRay| {

@@ -67,7 +67,7 @@ impl Hits {
         mailbox: [0; SLOTS],
     };
 
-    /// Forgets the rays and what they hit.
+    /// Makes room for other rays; the arrays stay as they are until the first triangle.
     pub(super) fn clear(&mut self) {
         self.is_begun = false;
     }
@@ -225,7 +225,7 @@ impl Hits {
                 if id == self.primitive[lane] {
                     continue;
                 }
-                // A miss is closer than nothing.
+                // A miss never takes the place of a hit.
                 let hit = test.decide(mesh, id);
                 let best =
                     Hit { t: bundle.t_max[lane], primitive: self.primitive[lane], ..Hit::MISS };

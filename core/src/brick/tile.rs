@@ -61,7 +61,7 @@ pub(super) struct Tile<'a, const ANY: bool> {
     unread: u64,
 }
 
-/// The whole part of a number, between 0 and 255; of a whole one perhaps one less, which the margin
+/// The whole part of a number, between 0 and 254; of a whole one perhaps one less, which the margin
 /// allows. Without a cast, which would have to saturate lane by lane.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the low bits are what is wanted")]
@@ -72,8 +72,8 @@ fn byte(number: f32) -> u8 {
     ((number - 0.5) + 12_582_912.0).to_bits() as u8
 }
 
-/// The cells of a part that each ray may meet in a slice, on one axis, counted from 1: 0 and
-/// 255 are outside.
+/// The cells of a part that each ray may meet in a slice, on one axis, counted from 1: 0 is
+/// outside, and so is all above the last one.
 #[derive(Debug, Clone, Copy)]
 struct Reach {
     low: [u8; RAYS],
