@@ -201,6 +201,12 @@ impl<'a> TriangleMesh<'a> {
         self.indices
     }
 
+    /// The width of the vertex indices.
+    #[must_use]
+    pub const fn index_type(&self) -> IndexType {
+        self.index_type
+    }
+
     /// The masks, where the caller has them; none if there are none.
     #[must_use]
     pub const fn masks(&self) -> Strided<'a> {

@@ -6,4 +6,5 @@ mod exact;
 mod forms;
 mod scans;
 mod snapped;
+mod surfaces;
 mod watertight;

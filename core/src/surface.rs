@@ -1,0 +1,118 @@
+//! Where a ray met the mesh, and where the next one starts.
+//!
+//! A hit's point is on its triangle but for rounding, so a ray that starts there may hit the triangle
+//! that it leaves. How far above the plane a start has to lie follows from what the triangle test
+//! rounds, and so depends on the triangle alone, not on the scene's scale:
+//!
+//! ```text
+//! corners relative to the start, L the largest coordinate of these:
+//!   corner - start, shear, shear * z and their difference, in f32        6 * 2^-24 L on each of two axes
+//!   so t belongs to a point of the plane that is off the ray by at most  8.5 * 2^-24 L
+//!   what a start is lifted by                                            16 * 2^-24 L
+//! ```
+//!
+//! What is above the plane by more than the test is off, sees the plane behind it: `t` is negative. The
+//! start is rounded away from the plane on each axis, so rounding takes nothing from the lift.
+
+use glam::DVec3;
+
+use crate::mesh::TriangleMesh;
+use crate::ray::{Hit, Ray, round};
+
+/// A point of a mesh where a ray met it: 52 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// The point, in scene units; on the triangle but for the rounding to f32.
+    pub position: [f32; 3],
+    /// The triangle's normal, of length 1, on the side that the ray came from.
+    pub normal: [f32; 3],
+    /// Where rays start that leave on that side: reflections, and rays to lights.
+    pub above: [f32; 3],
+    /// Where rays start that go on through the triangle.
+    pub below: [f32; 3],
+    /// Whether the ray met the front, from which the vertices appear counter-clockwise: 1 or 0.
+    pub is_front: u32,
+}
+
+/// By how much a start is lifted, in parts of the distance to the farthest corner.
+const LIFT: f64 = 1.0 / (1 << 20) as f64;
+
+/// What f32 cannot resolve near zero, a few times.
+const LEAST: f64 = 1e-44;
+
+impl TriangleMesh<'_> {
+    /// The point where a ray met this mesh, with starts for the rays that leave it; `None` if the hit
+    /// names no triangle, as [`Hit::MISS`], or one without area.
+    ///
+    /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
+    /// `below` to the other side: with `t_min` 0, whatever the scene's scale, in single queries and
+    /// batches. Rays along the plane may, as the normal is rounded. A neighbour many times as large
+    /// may be hit beside the common edge, within the rounding of its own size.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
+    /// let hit = grid.intersect(&ray).expect("in front of the camera");
+    /// let surface = grid.mesh().surface(&ray, &hit).expect("a hit");
+    /// assert_eq!((surface.normal, surface.is_front), ([0.0, 0.0, 1.0], 1));
+    ///
+    /// let to_light = Ray::new(surface.above, [0.5, 0.0, 0.1]);
+    /// assert!(!grid.occluded(&to_light));
+    /// # Ok::<(), Error>(())
+    /// ```
+    #[must_use]
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
+        let [a, b, c] = self.triangle(hit.primitive)?.map(wide);
+        let (ab, ac) = (b - a, c - a);
+        let cross = ab.cross(ac);
+        // Twice the area; of the smallest triangles the square of it is a number, still.
+        let area = cross.length();
+        if !(area > 0.0 && area.is_finite()) {
+            return None;
+        }
+        let front = cross / area;
+        let is_front = front.dot(wide(ray.direction)) <= 0.0;
+        let normal = if is_front { front } else { -front };
+
+        let point = a + ab * f64::from(hit.u) + ac * f64::from(hit.v);
+        let farthest = [a, b, c].map(|corner| (corner - point).abs().max_element());
+        let farthest = farthest.into_iter().fold(0.0, f64::max);
+        let lift = normal * (farthest * LIFT + LEAST);
+        let start = |lift: DVec3| {
+            let (at, [u, v, w]) = (point + lift, lift.to_array());
+            [round_along(at.x, u), round_along(at.y, v), round_along(at.z, w)]
+        };
+        Some(Surface {
+            position: point.to_array().map(round),
+            normal: normal.to_array().map(round),
+            above: start(lift),
+            below: start(-lift),
+            is_front: is_front.into(),
+        })
+    }
+}
+
+fn wide(xyz: [f32; 3]) -> DVec3 {
+    DVec3::from_array(xyz.map(f64::from))
+}
+
+/// The f32 next to a number in a direction, or the number itself if it is one.
+fn round_along(number: f64, direction: f64) -> f32 {
+    let nearest = round(number);
+    let is_short = (number - f64::from(nearest)) * direction > 0.0;
+    match (is_short, direction > 0.0) {
+        (false, _) => nearest,
+        (true, true) => nearest.next_up(),
+        (true, false) => nearest.next_down(),
+    }
+}
+
+const _: () = assert!(size_of::<Surface>() == 52);
