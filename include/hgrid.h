@@ -15,8 +15,9 @@
  * triangle along a ray: hgrid_intersect_all. The nearest point: hgrid_closest_point. Masks, culling, a
  * triangle to skip, filters and counters are options of these. hgrid_bound, hgrid_sizes and hgrid_fit
  * are about memory: enough for any mesh, for this one, and the best grid for a budget. A build on
- * threads of yours, with progress, is a matter of hgrid_config. For grids that are stored there are
- * hgrid_open, hgrid_peek, hgrid_pack and hgrid_validate, and hgrid_inspect looks at all of one.
+ * threads of yours, with progress, is a matter of hgrid_config. hgrid_surface_at knows the normal of a
+ * hit, and where rays start that leave it. For grids that are stored there are hgrid_open, hgrid_peek,
+ * hgrid_pack, hgrid_mesh_of and hgrid_validate, and hgrid_inspect looks at all of one.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -62,7 +63,11 @@
  * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are enough for every mesh with so many
  * triangles, with the default configuration, and fit into an array declaration; hgrid_sizes knows
  * the mesh, takes any configuration and asks for less. Where the system hands out memory page by
- * page, an index that is too large costs nothing: pages that are not touched are never taken.
+ * page (large blocks of malloc, mmap, VirtualAlloc), an index that is too large costs nothing: pages
+ * that are not touched are never taken. So the shortest way to a grid there is hgrid_bound or
+ * hgrid_sizes without scratch, a build in so much, and if you like a copy of the index_bytes that its
+ * report tells. With scratch hgrid_sizes is exact, but takes about as long as the build itself: that is
+ * for memory that has to be there, as where there are no pages.
  *
  * The index is a blob: no pointer in it, so it can be copied to another region at a multiple of 64,
  * written to a file, mapped from one, sent, or put in flash, and opened there with hgrid_open. The
@@ -93,6 +98,22 @@
  * A library may be built with fewer methods, to be smaller: hgrid_has_method tells which it has, and
  * what needs another one answers HGRID_ERROR_METHOD_LEFT_OUT. NULL for a configuration and
  * HGRID_CONFIG_INIT mean brick, in a library without it, too: name a method there.
+ *
+ * Hits
+ * ----
+ * A hit names the triangle and the place on it. The normal is cross(b - a, c - a) for its vertices a, b,
+ * c, and points to the side from which they appear counter-clockwise, the front; which side was hit says
+ * the sign of its product with the direction. hgrid_surface_at tells all that, and where the next ray
+ * starts: a ray to a light that started at the hit itself could hit the triangle that it leaves.
+ *
+ * One grid is one mesh. With several, ask one after the other, and let each hit shorten the ray:
+ *
+ *   for (size_t i = 0; i < count; i++)
+ *       if (hgrid_intersect(&grids[i], &ray, NULL, &found) && found.t < hit.t)
+ *           hit = found, object = i, ray.t_max = found.t;
+ *
+ * where hit.t begins as INFINITY; a shadow ray is blocked if any grid blocks it. Or put all meshes into
+ * one, and keep where each begins: then rays take one way, and masks tell the meshes apart.
  *
  * Pointers
  * --------
@@ -139,7 +160,9 @@
  * Meshes and hits are in your units; t is in multiples of the ray's direction, whatever its length.
  * There is no epsilon, so the scale of a mesh does not matter, from 1e-30 to 1e30. Only IEEE
  * + - * / and square roots are used, in a fixed order: the same input gives the same bits on every
- * machine.
+ * machine. They are rounded to nearest, as in every C program that does not call fesetround: another
+ * mode loses hits. Where denormal numbers are taken for zero (FTZ and DAZ of x86), what is below 1.2e-38
+ * counts as zero, and all else is as it was.
  *
  * Versions
  * --------
@@ -687,8 +710,8 @@ typedef struct hgrid_query_options {
     /**
      * A triangle that is not hit, usually the one that the ray leaves, which then cannot
      * hit itself, without any epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge
-     * still may be hit, where the origin was rounded to just below it: where that
-     * matters, give a small `t_min`, too.
+     * still may be hit, where the origin was rounded to just below it. It is one triangle for all
+     * rays of a batch: rays that start where `hgrid_surface_at` says need none.
      */
     uint32_t skip;
     /**
@@ -762,6 +785,32 @@ typedef struct hgrid_closest {
      */
     uint32_t primitive;
 } hgrid_closest;
+
+/**
+ * A point of a mesh where a ray met it: 52 bytes. `hgrid_surface_at` fills it.
+ */
+typedef struct hgrid_surface {
+    /**
+     * The point, in scene units; on the triangle but for the rounding to `float`.
+     */
+    float position[3];
+    /**
+     * The triangle's normal, of length 1, on the side that the ray came from.
+     */
+    float normal[3];
+    /**
+     * Where rays start that leave on that side: reflections, and rays to lights.
+     */
+    float above[3];
+    /**
+     * Where rays start that go on through the triangle.
+     */
+    float below[3];
+    /**
+     * 1 if the ray met the front, from which the vertices appear counter-clockwise; 0 if the back.
+     */
+    uint32_t is_front;
+} hgrid_surface;
 
 /**
  * What a caller knows about the rays of a batch: one of `HGRID_COHERENCE_...`. It changes how fast
@@ -1434,6 +1483,48 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
                          struct hgrid_closest *closest);
 
 /**
+ * Tells where a ray met the mesh, which way the triangle faces there, and where rays start that leave
+ * it.
+ *
+ * `hit` is what a query has found for `ray`, of which the direction tells the side; the mesh says the
+ * rest. Returns true and writes `surface`; or returns false and writes nothing: the hit names no
+ * triangle (as that of a miss), or one without area, the view is one of zeros, or a pointer is NULL,
+ * which none may be. Takes about as long as a triangle test in `double`.
+ *
+ * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
+ * `below` to the other side: with `t_min` 0, at any scale, alone and in a batch. So rays to lights need
+ * no epsilon, and no `skip`, which would be one triangle for all rays of a batch:
+ *
+ * ```c
+ * static bool sees_light(const hgrid_grid *grid, const hgrid_ray *ray, const hgrid_hit *hit,
+ *                        const float toward[3])
+ * {
+ *     hgrid_surface at;
+ *     if (!hgrid_surface_at(grid, ray, hit, &at))
+ *         return false;
+ *     const float height =
+ *         at.normal[0] * toward[0] + at.normal[1] * toward[1] + at.normal[2] * toward[2];
+ *     const hgrid_ray to_light = {{at.above[0], at.above[1], at.above[2]}, 0,
+ *                                 {toward[0], toward[1], toward[2]}, INFINITY};
+ *     return height > 0 && !hgrid_occluded(grid, &to_light, NULL);
+ * }
+ * ```
+ *
+ * How far above the plane a start lies follows from what a triangle test may round: 1 / 2^20 of the
+ * distance to the triangle's farthest corner. A ray along the plane may still hit the triangle, as the
+ * normal is rounded, and a neighbour many times as large may be hit beside the common edge.
+ *
+ * Threads: any number of calls and queries on the same grid at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_surface_at(const struct hgrid_grid *grid,
+                      const struct hgrid_ray *ray,
+                      const struct hgrid_hit *hit,
+                      struct hgrid_surface *surface);
+
+/**
  * Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
  * each, bit for bit, but sooner.
  *
@@ -1501,7 +1592,7 @@ hgrid_status hgrid_intersect_n(const struct hgrid_grid *grid,
  * hold a ray and its byte, coherence, options, stack. `rays` and `occluded` may be
  * NULL if `count` is 0, `options` may be NULL. Returns `HGRID_OK` and has written all
  * bytes, or returns what `hgrid_intersect_n` returns and has written none. For the
- * shadow rays of a tile, towards one light:
+ * shadow rays of a tile, towards one light, which start where `hgrid_surface_at` says:
  *
  * ```c
  * static size_t count_lit(const hgrid_grid *grid, const hgrid_ray *rays, size_t count)
@@ -1542,7 +1633,8 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
  * in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of
  * `hgrid_pack`; bytes behind it are ignored. It says itself which method built it and how. The
  * mesh is the one it was built for, of which only the counts are compared. A blob that
- * `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL.
+ * `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL. With a mesh that one is used, its
+ * masks included, and the one in the blob is not looked at.
  *
  * What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
  * nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
@@ -1609,6 +1701,24 @@ hgrid_status hgrid_peek(const void *blob, size_t blob_bytes, struct hgrid_blob_i
  * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_pack(const struct hgrid_grid *grid, void *to, size_t capacity, uint64_t *bytes);
+
+/**
+ * Tells where the mesh of a grid is: the arrays that were given to the build or to `hgrid_open`, or
+ * those in a blob that `hgrid_pack` wrote (tight, with indices of 32 bits).
+ *
+ * `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with strides
+ * that are not 0, `masks` NULL if there are none, and other arrays NULL if they are empty. It is
+ * good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
+ * or `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
+ * it as it was.
+ *
+ * Threads: any number of calls and queries on the same grid at once, each with a mesh of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_mesh_of(const struct hgrid_grid *grid,
+                           struct hgrid_mesh *mesh);
 
 /**
  * Proves that a blob is the grid of its mesh, and so that every answer will be right.

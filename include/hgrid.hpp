@@ -77,8 +77,13 @@ using hit = ::hgrid_hit;
 using closest = ::hgrid_closest;
 /// Work done by queries. See `hgrid_counters`: it begins as `{}`.
 using counters = ::hgrid_counters;
-/// What a build found out. See `hgrid_report`: it begins as `HGRID_REPORT_INIT`.
-using report = ::hgrid_report;
+/// Where a ray met the mesh. See `hgrid_surface`.
+using surface = ::hgrid_surface;
+/// What a build found out. See `hgrid_report`.
+struct report : ::hgrid_report {
+    /// One before its call.
+    report() noexcept : ::hgrid_report HGRID_REPORT_INIT {}
+};
 /// What a look at a whole grid found out. See `hgrid_statistics`.
 using statistics = ::hgrid_statistics;
 /// What the first bytes of a blob say. See `hgrid_blob_info`.
@@ -515,6 +520,9 @@ public:
         raw_.mask_stride = is_one_each ? masks.stride() : 1;
         return *this;
     }
+    /// The mesh refers to its masks: give them a name.
+    template <class Masks, std::enable_if_t<!detail::stays<Masks &&>, int> = 0>
+    mesh &masks(Masks &&) = delete;
 
     /// How many vertices there are.
     std::size_t vertex_count() const noexcept { return raw_.vertex_count; }
@@ -803,12 +811,17 @@ private:
 
 // --- a grid in memory of the caller ---------------------------------------------------------------
 
+/// A grid that owns its memory: see below.
+class grid;
+
 /// A grid and its mesh, ready for queries: `hgrid_grid`, in memory that stays the caller's. A view of
 /// nothing, as the default one is, hits nothing.
 class view {
 public:
     /// A view of nothing.
     view() noexcept = default;
+    /// A view of a grid that is about to go: give the grid a name.
+    view(grid &&) = delete;
     /// A view that was built or opened in C.
     explicit view(const ::hgrid_grid &raw) noexcept : raw_(raw) {}
 
@@ -829,6 +842,10 @@ public:
     }
     /// Opens a blob that brings its mesh, as `pack` makes them.
     static result<view> open(span<const std::byte> blob) noexcept { return open(blob, nullptr); }
+    /// Memory that nobody keeps: give it a name, or `grid::adopt` it.
+    static result<view> open(memory &&blob, const mesh &of) = delete;
+    /// The same.
+    static result<view> open(memory &&blob) = delete;
     /// Proves that a blob from elsewhere is the grid of its mesh.
     status validate() const noexcept { return status{::hgrid_validate(&raw_)}; }
 
@@ -906,6 +923,22 @@ public:
                                          const options &with) const noexcept
     {
         return closest_point(from, max_distance, &with.c());
+    }
+
+    /// Where a ray met the mesh, which way it faces there, and where rays start that leave it; `hit` is
+    /// what a query has found for the ray.
+    std::optional<surface> surface_at(const ray &along, const hit &at) const noexcept
+    {
+        surface found;
+        return ::hgrid_surface_at(&raw_, &along, &at, &found) ? std::optional<surface>(found)
+                                                              : std::nullopt;
+    }
+    /// The mesh, wherever it lies: the caller's, or the one in a packed blob.
+    result<mesh> mesh_of() const noexcept
+    {
+        ::hgrid_mesh found = HGRID_MESH_INIT;
+        const status answer{::hgrid_mesh_of(&raw_, &found)};
+        return answer == status::ok ? result<mesh>(mesh(found)) : answer;
     }
 
     /// Bytes that `pack` writes; 0 for a view of nothing.
@@ -1011,6 +1044,10 @@ public:
     static result<grid> build(const mesh &of, const config &how = {},
                               report *details = nullptr) noexcept;
 
+    /// Opening takes a view: `view::open` where the blob stays yours, `adopt` where it becomes the grid's.
+    template <class... Arguments>
+    static void open(Arguments &&...) = delete;
+
     /// Opens a blob that was built for this mesh, and takes over its memory; if that fails it is freed.
     static result<grid> adopt(memory blob, const mesh &of) noexcept
     {
@@ -1071,7 +1108,7 @@ inline status sizes(const mesh &of, const config &how, report &found,
 inline result<report> bound(std::size_t triangle_count, const config &how) noexcept
 {
     const ::hgrid_config raw = how.c();
-    report found = HGRID_REPORT_INIT;
+    report found;
     const status answer{::hgrid_bound(triangle_count, &raw, &found)};
     return answer == status::ok ? result<report>(found) : answer;
 }
@@ -1082,7 +1119,7 @@ inline result<config> fit(const mesh &of, const config &how, std::size_t index_b
 {
     const ::hgrid_config raw = how.c();
     config fitted = how;
-    report found = HGRID_REPORT_INIT;
+    report found;
     const status answer{::hgrid_fit(&of.c(), &raw, index_bytes, scratch.data(), scratch.size(),
                                     &fitted.raw_, details != nullptr ? details : &found)};
     // The callables are set for each call.
@@ -1100,7 +1137,7 @@ inline result<blob_info> peek(span<const std::byte> blob) noexcept
 
 inline result<grid> grid::build(const mesh &of, const config &how, report *details) noexcept
 {
-    report own = HGRID_REPORT_INIT;
+    report own;
     report &found = details != nullptr ? *details : own;
 
     // There may be two attempts; who watches sees one.

@@ -90,7 +90,7 @@ pub unsafe extern "C" fn hgrid_intersect_n(
 /// hold a ray and its byte, coherence, options, stack. `rays` and `occluded` may be
 /// NULL if `count` is 0, `options` may be NULL. Returns `HGRID_OK` and has written all
 /// bytes, or returns what `hgrid_intersect_n` returns and has written none. For the
-/// shadow rays of a tile, towards one light:
+/// shadow rays of a tile, towards one light, which start where `hgrid_surface_at` says:
 ///
 /// ```c
 /// static size_t count_lit(const hgrid_grid *grid, const hgrid_ray *rays, size_t count)

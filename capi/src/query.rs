@@ -4,7 +4,7 @@ use core::ptr::NonNull;
 
 use hgrid_core::{Grid, QueryOptions};
 
-use crate::questions::{hgrid_closest, hgrid_hit, hgrid_query_options, hgrid_ray};
+use crate::questions::{hgrid_closest, hgrid_hit, hgrid_query_options, hgrid_ray, hgrid_surface};
 use crate::raw;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};
 use crate::types::hgrid_grid;
@@ -165,6 +165,56 @@ pub unsafe extern "C" fn hgrid_closest_point(
     let Ok(Some(found)) = (unsafe { raw::closest(grid, point, max_distance, options) }) else {
         return false;
     };
+    // SAFETY: the caller's promise.
+    unsafe { raw::write(to, found.into()) };
+    true
+}
+
+/// Tells where a ray met the mesh, which way the triangle faces there, and where rays start that leave
+/// it.
+///
+/// `hit` is what a query has found for `ray`, of which the direction tells the side; the mesh says the
+/// rest. Returns true and writes `surface`; or returns false and writes nothing: the hit names no
+/// triangle (as that of a miss), or one without area, the view is one of zeros, or a pointer is NULL,
+/// which none may be. Takes about as long as a triangle test in `double`.
+///
+/// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
+/// `below` to the other side: with `t_min` 0, at any scale, alone and in a batch. So rays to lights need
+/// no epsilon, and no `skip`, which would be one triangle for all rays of a batch:
+///
+/// ```c
+/// static bool sees_light(const hgrid_grid *grid, const hgrid_ray *ray, const hgrid_hit *hit,
+///                        const float toward[3])
+/// {
+///     hgrid_surface at;
+///     if (!hgrid_surface_at(grid, ray, hit, &at))
+///         return false;
+///     const float height =
+///         at.normal[0] * toward[0] + at.normal[1] * toward[1] + at.normal[2] * toward[2];
+///     const hgrid_ray to_light = {{at.above[0], at.above[1], at.above[2]}, 0,
+///                                 {toward[0], toward[1], toward[2]}, INFINITY};
+///     return height > 0 && !hgrid_occluded(grid, &to_light, NULL);
+/// }
+/// ```
+///
+/// How far above the plane a start lies follows from what a triangle test may round: 1 / 2^20 of the
+/// distance to the triangle's farthest corner. A ray along the plane may still hit the triangle, as the
+/// normal is rounded, and a neighbour many times as large may be hit beside the common edge.
+///
+/// Threads: any number of calls and queries on the same grid at once.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_surface_at(
+    grid: *const hgrid_grid,
+    ray: *const hgrid_ray,
+    hit: *const hgrid_hit,
+    surface: *mut hgrid_surface,
+) -> bool {
+    let Some(to) = NonNull::new(surface) else { return false };
+    // SAFETY: the caller's promise.
+    let Ok(Some(found)) = (unsafe { raw::surface(grid, ray, hit) }) else { return false };
     // SAFETY: the caller's promise.
     unsafe { raw::write(to, found.into()) };
     true

@@ -6,7 +6,8 @@
 use core::ffi::c_void;
 
 use hgrid_core::{
-    BlobInfo, ClosestPoint, Coherence, Counters, Cull, Hit, INVALID_ID, Ray, Statistics, Verdict,
+    BlobInfo, ClosestPoint, Coherence, Counters, Cull, Hit, INVALID_ID, Ray, Statistics, Surface,
+    Verdict,
 };
 
 use crate::status::{HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_CULL, hgrid_status};
@@ -116,8 +117,8 @@ pub struct hgrid_query_options {
     pub cull: u32,
     /// A triangle that is not hit, usually the one that the ray leaves, which then cannot
     /// hit itself, without any epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge
-    /// still may be hit, where the origin was rounded to just below it: where that
-    /// matters, give a small `t_min`, too.
+    /// still may be hit, where the origin was rounded to just below it. It is one triangle for all
+    /// rays of a batch: rays that start where `hgrid_surface_at` says need none.
     pub skip: u32,
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
@@ -179,6 +180,22 @@ pub struct hgrid_closest {
     pub v: f32,
     /// The triangle: its position in the index array.
     pub primitive: u32,
+}
+
+/// A point of a mesh where a ray met it: 52 bytes. `hgrid_surface_at` fills it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_surface {
+    /// The point, in scene units; on the triangle but for the rounding to `float`.
+    pub position: [f32; 3],
+    /// The triangle's normal, of length 1, on the side that the ray came from.
+    pub normal: [f32; 3],
+    /// Where rays start that leave on that side: reflections, and rays to lights.
+    pub above: [f32; 3],
+    /// Where rays start that go on through the triangle.
+    pub below: [f32; 3],
+    /// 1 if the ray met the front, from which the vertices appear counter-clockwise; 0 if the back.
+    pub is_front: u32,
 }
 
 /// What the header of a blob says. Initialise it with `HGRID_BLOB_INFO_INIT`.
@@ -272,6 +289,20 @@ impl From<ClosestPoint> for hgrid_closest {
     fn from(closest: ClosestPoint) -> Self {
         let ClosestPoint { position, distance, u, v, primitive } = closest;
         Self { position, distance, u, v, primitive }
+    }
+}
+
+impl From<hgrid_hit> for Hit {
+    fn from(hit: hgrid_hit) -> Self {
+        let hgrid_hit { t, u, v, primitive } = hit;
+        Self { t, u, v, primitive }
+    }
+}
+
+impl From<Surface> for hgrid_surface {
+    fn from(surface: Surface) -> Self {
+        let Surface { position, normal, above, below, is_front } = surface;
+        Self { position, normal, above, below, is_front }
     }
 }
 

@@ -166,7 +166,7 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
 pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
     match status {
         HGRID_OK => c"success",
-        HGRID_ERROR_NULL_ARGUMENT => c"a pointer is NULL: pass what the function asks for",
+        HGRID_ERROR_NULL_ARGUMENT => c"a pointer is NULL that may not be: an argument, an array of the mesh, or the configuration's run",
         HGRID_ERROR_STRUCT_SIZE => {
             c"wrong struct_size, or a reserved field that is not 0: use the struct's HGRID_..._INIT macro"
         }

@@ -17,7 +17,8 @@ use crate::types::{hgrid_grid, hgrid_mesh};
 /// in a mapped file, in flash. It is `index_bytes` of the build's report long, or `bytes` of
 /// `hgrid_pack`; bytes behind it are ignored. It says itself which method built it and how. The
 /// mesh is the one it was built for, of which only the counts are compared. A blob that
-/// `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL.
+/// `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL. With a mesh that one is used, its
+/// masks included, and the one in the blob is not looked at.
 ///
 /// What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
 /// nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
@@ -127,6 +128,33 @@ pub unsafe extern "C" fn hgrid_pack(
         packed
     };
     call().err().unwrap_or(HGRID_OK)
+}
+
+/// Tells where the mesh of a grid is: the arrays that were given to the build or to `hgrid_open`, or
+/// those in a blob that `hgrid_pack` wrote (tight, with indices of 32 bits).
+///
+/// `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with strides
+/// that are not 0, `masks` NULL if there are none, and other arrays NULL if they are empty. It is
+/// good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
+/// or `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
+/// it as it was.
+///
+/// Threads: any number of calls and queries on the same grid at once, each with a mesh of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_mesh_of(
+    grid: *const hgrid_grid,
+    mesh: *mut hgrid_mesh,
+) -> hgrid_status {
+    let call = |mesh: &mut hgrid_mesh| {
+        // SAFETY: the caller's promise.
+        mesh.note(unsafe { raw::grid(grid) }?.mesh());
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::filling(mesh, call) }
 }
 
 /// Proves that a blob is the grid of its mesh, and so that every answer will be right.

@@ -5,11 +5,11 @@
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
-use core::ptr::null_mut;
+use core::ptr::{null, null_mut};
 
 use hgrid_core::{
     BuildFlags, Config, Control, Error, Grid, INVALID_ID, IndexType, MAX_TRIANGLES, Method, Region,
-    Sizes, TriangleMesh, sizes,
+    Sizes, Strided, TriangleMesh, sizes,
 };
 
 use crate::status::{
@@ -423,6 +423,29 @@ impl Elements {
 }
 
 impl hgrid_mesh {
+    /// Notes where a mesh lies.
+    pub(crate) fn note(&mut self, mesh: &TriangleMesh<'_>) {
+        let start = |array: &Strided<'_>| {
+            if array.count > 0 { array.bytes.as_ptr().cast() } else { null() }
+        };
+        let (positions, indices, masks) = (mesh.positions(), mesh.triangles(), mesh.masks());
+        *self = Self {
+            struct_size: self.struct_size,
+            index_type: match mesh.index_type() {
+                IndexType::U32 => HGRID_INDEX_U32,
+                IndexType::U16 => HGRID_INDEX_U16,
+            },
+            positions: start(&positions),
+            position_stride: positions.stride,
+            vertex_count: positions.count,
+            indices: start(&indices),
+            index_stride: indices.stride,
+            triangle_count: indices.count,
+            masks: start(&masks),
+            mask_stride: masks.stride,
+        };
+    }
+
     /// The width of the indices.
     pub(crate) fn index_type(&self) -> Result<IndexType, hgrid_status> {
         match self.index_type {

@@ -72,6 +72,12 @@ static void layout(void)
     OFFSET(hgrid_closest, u);
     OFFSET(hgrid_closest, v);
     OFFSET(hgrid_closest, primitive);
+    SIZE(hgrid_surface);
+    OFFSET(hgrid_surface, position);
+    OFFSET(hgrid_surface, normal);
+    OFFSET(hgrid_surface, above);
+    OFFSET(hgrid_surface, below);
+    OFFSET(hgrid_surface, is_front);
     SIZE(hgrid_blob_info);
     OFFSET(hgrid_blob_info, struct_size);
     OFFSET(hgrid_blob_info, version);

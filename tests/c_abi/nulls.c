@@ -23,7 +23,9 @@ typedef struct {
     hgrid_grid grid;
     hgrid_hit hits[RAYS];
     hgrid_closest closest;
+    hgrid_surface surface;
     hgrid_config fitted;
+    hgrid_mesh mesh;
     hgrid_blob_info info;
     hgrid_statistics statistics;
     uint8_t occluded[RAYS];
@@ -37,6 +39,7 @@ static void reset(outputs *o)
 {
     memset(o, 0xc7, sizeof *o);
     o->fitted.struct_size = sizeof o->fitted;
+    o->mesh.struct_size = sizeof o->mesh;
     o->info.struct_size = sizeof o->info;
     o->statistics.struct_size = sizeof o->statistics;
 }
@@ -221,6 +224,13 @@ static void queries(void)
            hgrid_closest_point(&grid, point, INFINITY, &options, NULL));
     CHECK(hgrid_closest_point(&grid, point, INFINITY, NULL, &out.closest));
     puts("null hgrid_closest_point.options");
+
+    const hgrid_hit hit = {1, 0.25f, 0.25f, 3};
+    MISSED(hgrid_surface_at.grid, hgrid_surface_at(NULL, rays, &hit, &out.surface));
+    MISSED(hgrid_surface_at.ray, hgrid_surface_at(&grid, NULL, &hit, &out.surface));
+    MISSED(hgrid_surface_at.hit, hgrid_surface_at(&grid, rays, NULL, &out.surface));
+    MISSED(hgrid_surface_at.surface, hgrid_surface_at(&grid, rays, &hit, NULL));
+    CHECK(hgrid_surface_at(&grid, rays, &hit, &out.surface));
 }
 
 static void batches(void)
@@ -267,6 +277,8 @@ static void stored_grids(void)
     REFUSED(hgrid_pack.bytes, HGRID_ERROR_NULL_ARGUMENT,
             hgrid_pack(&grid, packed, packed_bytes, NULL));
 
+    REFUSED(hgrid_mesh_of.grid, HGRID_ERROR_NULL_ARGUMENT, hgrid_mesh_of(NULL, &out.mesh));
+    REFUSED(hgrid_mesh_of.mesh, HGRID_ERROR_NULL_ARGUMENT, hgrid_mesh_of(&grid, NULL));
     REFUSED(hgrid_validate.grid, HGRID_ERROR_NULL_ARGUMENT, hgrid_validate(NULL));
     REFUSED(hgrid_inspect.grid, HGRID_ERROR_NULL_ARGUMENT, hgrid_inspect(NULL, &out.statistics));
     REFUSED(hgrid_inspect.statistics, HGRID_ERROR_NULL_ARGUMENT, hgrid_inspect(&grid, NULL));

@@ -2,6 +2,10 @@
 
 #include "check.h"
 
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
+
 static sheet mesh_data;
 static hgrid_grid grid;
 static hgrid_report built;
@@ -198,9 +202,76 @@ static void the_lowest_of_equal_triangles_wins(void)
     CHECK(hit.primitive == 0 && hit.t == 1 && hit.u == 0.25f && hit.v == 0.5f);
 }
 
+/* Where a ray met the sheet, and rays from there: to the side where they start nothing is in the way,
+ * to the other side at most another part of the sheet. */
+static void rays_leave_the_surface_where_they_start(void)
+{
+    size_t found = 0;
+    for (int y = 1; y < 40; y++)
+        for (int x = 1; x < 40; x++) {
+            const hgrid_ray ray = ray_down((float)x / 39.7f, (float)y / 39.3f);
+            hgrid_hit hit, other;
+            hgrid_surface at;
+            memset(&at, 0xc7, sizeof at);
+            if (!hgrid_intersect(&grid, &ray, NULL, &hit))
+                continue;
+            CHECK(hgrid_surface_at(&grid, &ray, &hit, &at));
+            float length = 0, along = 0;
+            for (int axis = 0; axis < 3; axis++) {
+                const float there = ray.origin[axis] + hit.t * ray.direction[axis];
+                CHECK(fabsf(at.position[axis] - there) < 1e-5f);
+                CHECK(fabsf(at.above[axis] - there) < 2e-5f);
+                CHECK(fabsf(at.below[axis] - there) < 2e-5f);
+                length += at.normal[axis] * at.normal[axis];
+                along += at.normal[axis] * ray.direction[axis];
+            }
+            CHECK(fabsf(length - 1) < 1e-6f && along < 0);
+            hgrid_query_options front = HGRID_QUERY_OPTIONS_INIT;
+            front.cull = at.is_front ? HGRID_CULL_BACK : HGRID_CULL_FRONT;
+            CHECK(hgrid_intersect(&grid, &ray, &front, &other) && other.primitive == hit.primitive);
+
+            const hgrid_ray up = {{at.above[0], at.above[1], at.above[2]}, 0,
+                                  {at.normal[0], at.normal[1], at.normal[2]}, INFINITY};
+            CHECK(!hgrid_intersect(&grid, &up, NULL, &other) || other.primitive != hit.primitive);
+            const hgrid_ray on = {{at.below[0], at.below[1], at.below[2]}, 0,
+                                  {ray.direction[0], ray.direction[1], ray.direction[2]}, INFINITY};
+            CHECK(!hgrid_intersect(&grid, &on, NULL, &other) || other.primitive != hit.primitive);
+            hit.primitive = found % 2 == 0 ? TRIANGLES : HGRID_INVALID_ID;
+            memset(&at, 0xc7, sizeof at);
+            CHECK(!hgrid_surface_at(&grid, &ray, &hit, &at));
+            CHECK(all_bytes_are(&at, sizeof at, 0xc7));
+            found++;
+        }
+    CHECK(found > 500);
+}
+
+/* Who takes denormal numbers for zero, as renderers do, gets the same grid and the same hits. */
+static void denormal_numbers_may_be_zero(void)
+{
+#if defined(__SSE__)
+    const unsigned usual = _mm_getcsr();
+    for (unsigned bits = 0x0040; bits <= 0x8040; bits += 0x8000) {
+        _mm_setcsr(usual | bits);
+        const hgrid_mesh mesh = mesh_of(&mesh_data);
+        for (int i = 0; i < 2; i++) {
+            const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL, brick = HGRID_CONFIG_INIT;
+            void *other_blob;
+            size_t bytes;
+            const hgrid_grid other =
+                build_exactly(&mesh, i == 0 ? &one_level : &brick, &other_blob, &bytes);
+            CHECK(i > 0 || memcmp(other_blob, blob, bytes) == 0);
+            check_same(&other);
+        }
+        _mm_setcsr(usual);
+    }
+#endif
+}
+
 int main(void)
 {
     build();
+    rays_leave_the_surface_where_they_start();
+    denormal_numbers_may_be_zero();
     every_triangle_is_hit_in_its_middle();
     the_range_of_a_ray_is_closed();
     odd_rays_miss();

@@ -236,6 +236,47 @@ static void a_damaged_mesh_is_not_packed(const hgrid_grid *grid)
     CHECK(memcmp(to, sound, need) == 0);
 }
 
+/* The arrays of a grid that was built here, and those in a packed blob. */
+static void a_grid_knows_its_mesh(const hgrid_grid *grid, const unsigned char *packed,
+                                  size_t packed_bytes)
+{
+    hgrid_mesh found = HGRID_MESH_INIT;
+    EXPECT(HGRID_OK, hgrid_mesh_of(grid, &found));
+    CHECK(found.struct_size == sizeof found && memcmp(&found, &mesh, sizeof found) == 0);
+
+    hgrid_grid opened;
+    EXPECT(HGRID_OK, hgrid_open(packed, packed_bytes, NULL, &opened));
+    EXPECT(HGRID_OK, hgrid_mesh_of(&opened, &found));
+    CHECK(found.index_type == HGRID_INDEX_U32 && found.vertex_count == VERTICES);
+    CHECK(found.position_stride == 12 && found.index_stride == 12 && found.mask_stride == 4);
+    const unsigned char *const starts[] = {(const unsigned char *)found.positions,
+                                           (const unsigned char *)found.indices,
+                                           (const unsigned char *)found.masks};
+    for (int i = 0; i < 3; i++)
+        CHECK(starts[i] > packed && starts[i] < packed + packed_bytes);
+    CHECK(found.triangle_count == TRIANGLES);
+    for (int i = 0; i < TRIANGLES; i++) {
+        for (int corner = 0; corner < 3; corner++) {
+            uint32_t index;
+            memcpy(&index, starts[1] + 12 * i + 4 * corner, sizeof index);
+            CHECK(index == triangles[i].corners[corner]);
+            CHECK(memcmp(starts[0] + 12 * index, vertices[index].position, 12) == 0);
+        }
+        CHECK(memcmp(starts[2] + 4 * i, &triangles[i].mask, 4) == 0);
+    }
+
+    /* What is found is as good as what was given: a grid of it is the same. */
+    hgrid_grid again;
+    EXPECT(HGRID_OK, hgrid_open(packed, packed_bytes, &found, &again));
+    EXPECT(HGRID_OK, hgrid_validate(&again));
+    /* Another mesh than the packed one is the one that counts. */
+    static float elsewhere[VERTICES][3];
+    found.positions = elsewhere;
+    EXPECT(HGRID_OK, hgrid_open(packed, packed_bytes, &found, &again));
+    const hgrid_ray ray = ray_down(0.5f, 0.5f);
+    CHECK(hgrid_occluded(grid, &ray, NULL) && !hgrid_occluded(&again, &ray, NULL));
+}
+
 /* A view that no call has written is none; nor is a blob something else. */
 static void views_of_nothing_are_recognised(void)
 {
@@ -245,6 +286,14 @@ static void views_of_nothing_are_recognised(void)
     unsigned char *to = (unsigned char *)guarded(64);
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_validate(&none));
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_inspect(&none, &statistics));
+    hgrid_mesh found = HGRID_MESH_INIT;
+    const hgrid_mesh untouched = found;
+    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_mesh_of(&none, &found));
+    CHECK(memcmp(&found, &untouched, sizeof found) == 0);
+    hgrid_surface surface;
+    const hgrid_ray ray = ray_down(0.5f, 0.5f);
+    const hgrid_hit hit = {1, 0.25f, 0.25f, 0};
+    CHECK(!hgrid_surface_at(&none, &ray, &hit, &surface));
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack(&none, to, 64, &bytes));
     CHECK(bytes == 77 && all_bytes_are(to, 64, 0xc7));
     CHECK(statistics.list_count == 0 && statistics.first_bad == HGRID_INVALID_ID);
@@ -294,6 +343,7 @@ int main(int argc, char **argv)
         const void *packed = pack(&grid, &packed_bytes);
         a_header_tells_what_a_blob_is(config.method, blob, blob_bytes, packed, packed_bytes);
         a_packed_blob_needs_nothing_else(&grid, packed, packed_bytes);
+        a_grid_knows_its_mesh(&grid, (const unsigned char *)packed, packed_bytes);
         another_process_reads_it(argv[0], &grid, packed, packed_bytes);
         headers_are_checked(method % 2 == 0 ? blob : packed);
         a_damaged_mesh_is_not_packed(&grid);

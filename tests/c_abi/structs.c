@@ -40,6 +40,7 @@ static void meshes(void)
                    hgrid_build(it, NULL, index_region, index_bytes, scratch, scratch_bytes, &view,
                                NULL));
     CHECK_VERSIONS(hgrid_open.mesh, hgrid_mesh, mesh, hgrid_open(blob, blob_bytes, it, &view));
+    CHECK_VERSIONS(hgrid_mesh_of.mesh, hgrid_mesh, mesh, hgrid_mesh_of(&grid, it));
 }
 
 static void configurations(void)

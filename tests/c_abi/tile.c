@@ -44,6 +44,16 @@ int main(void)
         light_along(&grid, &rays[63], none) != 1)
         return 8;
 
+    /* From the first triangle nothing is in the way of a light above; between the two is the first. */
+    const float up[3] = {0, 0, 1}, down[3] = {0, 0, -1};
+    const hgrid_ray between = {{0.25f, 0.25f, -1}, 0, {0, 0, -1}, INFINITY};
+    hgrid_hit on_first, on_second;
+    if (!hgrid_intersect(&grid, &rays[0], NULL, &on_first) ||
+        !hgrid_intersect(&grid, &between, NULL, &on_second) ||
+        !sees_light(&grid, &rays[0], &on_first, up) || sees_light(&grid, &rays[0], &on_first, down) ||
+        sees_light(&grid, &between, &on_second, up))
+        return 9;
+
     HGRID_ALIGNED static unsigned char more_index[1 << 16], more_scratch[1 << 16];
     if (build_on_threads(&mesh, more_index, sizeof more_index, more_scratch, sizeof more_scratch,
                          &grid))

@@ -41,7 +41,7 @@ static void check_grids()
     const scene s(3);
     for (const hgrid::method method : METHODS) {
         CHECK(hgrid::has_method(method));
-        hgrid::report report = HGRID_REPORT_INIT;
+        hgrid::report report;
         auto built = hgrid::grid::build(s.mesh(), method, &report);
         CHECK(built && built.error() == status::ok && report.index_bytes == built->blob().size());
         CHECK(built->validate() == status::ok);
@@ -75,7 +75,7 @@ static void check_grids()
     /* Errors come with the triangle. */
     scene broken(1);
     broken.faces[5].corners[1] = 1000000;
-    hgrid::report report = HGRID_REPORT_INIT;
+    hgrid::report report;
     const auto refused = hgrid::grid::build(broken.mesh(), {}, &report);
     CHECK(!refused && refused.error() == status::index_out_of_range && report.triangle == 5);
     broken = scene(1);
@@ -124,7 +124,7 @@ static void check_views()
                                           hgrid::as_writable_bytes(scratch));
     CHECK(built && built->occluded(down()));
 
-    hgrid::report rough = HGRID_REPORT_INIT, exact = HGRID_REPORT_INIT;
+    hgrid::report rough, exact;
     CHECK(hgrid::sizes(s.mesh(), {}, rough) == status::ok && !rough.is_exact);
     CHECK(hgrid::sizes(s.mesh(), {}, exact, hgrid::as_writable_bytes(scratch)) == status::ok);
     CHECK(exact.is_exact && exact.index_bytes <= rough.index_bytes);
@@ -140,7 +140,7 @@ static void check_views()
                                       hgrid::as_writable_bytes(scratch), &details);
         };
         CHECK(hgrid::sizes(s.mesh(), how, exact, hgrid::as_writable_bytes(scratch)) == status::ok);
-        hgrid::report details = HGRID_REPORT_INIT, again = HGRID_REPORT_INIT;
+        hgrid::report details, again;
         CHECK(build(exact.index_bytes, details));
         CHECK(build(exact.index_bytes - 64, details).error() == status::index_too_small);
         CHECK(method == hgrid::method::brick ? details.index_bytes >= exact.index_bytes

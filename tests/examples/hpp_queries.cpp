@@ -58,6 +58,23 @@ static void check_rays()
     const auto closest = grid->closest_point({0.5f, 0.5f, 2.25f});
     CHECK(closest && is_near(closest->distance, 0.25f) && is_near(closest->position[2], 2));
     CHECK(!grid->closest_point({0.5f, 0.5f, 2.25f}, 0.2f));
+
+    /* Off the surface, and on through it to the next. */
+    const auto at = grid->surface_at(down(), *top);
+    CHECK(at && is_near(at->normal[2], 1) && at->is_front == 1 && is_near(at->position[2], 4));
+    const auto from = [](const float (&start)[3], float z) {
+        return hgrid::make_ray({start[0], start[1], start[2]}, {0, 0, z});
+    };
+    CHECK(!grid->occluded(from(at->above, 1)));
+    const auto next = grid->intersect(from(at->below, -1));
+    CHECK(next && s.faces[next->primitive].material == 3);
+    CHECK(!grid->surface_at(down(), hgrid::hit{1, 0, 0, hgrid::invalid_id}));
+    CHECK(!hgrid::view().surface_at(down(), *top));
+
+    const auto mesh = grid->mesh_of();
+    CHECK(mesh && mesh->triangle_count() == s.faces.size());
+    CHECK(mesh->c().indices == s.mesh().c().indices);
+    CHECK(hgrid::view().mesh_of().error() == status::not_a_grid);
 }
 
 static void check_options()

@@ -4,7 +4,9 @@
 
 use core::ptr::NonNull;
 
-use hgrid_core::{ClosestPoint, Counters, Cull, Error, Grid, Hit, QueryOptions, Ray, Verdict};
+use hgrid_core::{
+    ClosestPoint, Counters, Cull, Error, Grid, Hit, QueryOptions, Ray, Surface, Verdict,
+};
 
 use super::{bytes_mut, grid, read, read_sized, write};
 use crate::batch::Batch;
@@ -180,6 +182,24 @@ pub(crate) unsafe fn closest(
         // SAFETY: the caller's promise.
         Some(asked) => Ok(unsafe { asked.ask(0, find) }),
     }
+}
+
+/// Where a ray met a grid's mesh.
+///
+/// # Safety
+/// That of [`grid`].
+pub(crate) unsafe fn surface(
+    view: *const hgrid_grid,
+    ray: *const hgrid_ray,
+    hit: *const hgrid_hit,
+) -> Result<Option<Surface>, hgrid_status> {
+    // SAFETY: this function's contract.
+    let grid = unsafe { grid(view) }?;
+    // SAFETY: the caller's promise.
+    let ray = unsafe { read(ray) }?;
+    // SAFETY: the caller's promise.
+    let hit = unsafe { read(hit) }?;
+    Ok(grid.mesh().surface(&ray.into(), &hit.into()))
 }
 
 /// How many rays of a batch are read before their answers are written: a tile of 8 x 8. The buffers
