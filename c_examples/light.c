@@ -6,38 +6,12 @@ static const double LAMP[3] = {0.62, 0.60, 0.56};
 static const double SKY[3] = {0.09, 0.11, 0.14}, GROUND[3] = {0.03, 0.027, 0.024};
 static const double ZENITH[3] = {0.008, 0.018, 0.055}, HORIZON[3] = {0.22, 0.31, 0.44};
 
-/* A float has 24 bits. What a ray and its t are rounded by is below this part of the distances. */
-static const double ROUNDING = 1.0 / (1 << 20);
-
 lights lights_of(const camera *c, double sky_gain)
 {
     const vector up = vector_of(c->up), toward_eye = scale(vector_of(c->forward), -1);
     const vector from_left = offset(scale(vector_of(c->right), -0.7), 0.8, up);
     const lights l = {up, toward_eye, unit(offset(from_left, 1, toward_eye), toward_eye), sky_gain};
     return l;
-}
-
-/* Rays that leave a surface must not hit it where they start. The hit is on the surface but for
- * rounding, so they start above it by a little more than that. There is no other epsilon. */
-static vector lift(const hgrid_ray *ray, float t, vector normal)
-{
-    const vector way = scale(vector_of(ray->direction), t);
-    const vector at = offset(vector_of(ray->origin), 1, way);
-    const double size = fabs(at.x) + fabs(at.y) + fabs(at.z) + sqrt(dot(way, way));
-    return offset(at, ROUNDING * size, normal);
-}
-
-surface surface_at(const scene *s, const lights *l, const hgrid_ray *ray, const hgrid_hit *hit)
-{
-    const uint32_t *corners = s->indices[hit->primitive];
-    const vector first = vector_of(s->positions[corners[0]]);
-    const vector second = offset(vector_of(s->positions[corners[1]]), -1, first);
-    const vector third = offset(vector_of(s->positions[corners[2]]), -1, first);
-    const vector face = unit(cross(second, third), l->toward_eye);
-    surface at;
-    at.normal = dot(face, vector_of(ray->direction)) > 0 ? scale(face, -1) : face;
-    at.above = lift(ray, hit->t, at.normal);
-    return at;
 }
 
 double lamp_on(const lights *l, vector normal)

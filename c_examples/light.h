@@ -3,7 +3,6 @@
 #define LIGHT_H
 
 #include "camera.h"
-#include "scene.h"
 #include "vector.h"
 
 #include <hgrid.h>
@@ -16,13 +15,6 @@ typedef struct {
 
 /* The lamp stands behind the viewer's left shoulder, infinitely far away. */
 lights lights_of(const camera *c, double sky_gain);
-
-/* A point of the surface, just above it, and the unit normal on the ray's side. */
-typedef struct {
-    vector above, normal;
-} surface;
-
-surface surface_at(const scene *s, const lights *l, const hgrid_ray *ray, const hgrid_hit *hit);
 
 /* How much the lamp can add at a normal: 0 on the far side. */
 double lamp_on(const lights *l, vector normal);

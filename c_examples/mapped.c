@@ -124,29 +124,22 @@ static size_t store(const char *path, const hgrid_grid *grid)
     return packed.bytes;
 }
 
-static size_t align(uint64_t bytes)
+/* Where the camera stands follows from the mesh, which is in the blob, too: tight, with indices of 32
+ * bits. */
+static camera camera_of(const hgrid_grid *grid)
 {
-    return (size_t)(bytes + HGRID_ALIGNMENT - 1) / HGRID_ALIGNMENT * HGRID_ALIGNMENT;
-}
-
-/* The mesh in a packed blob, for the colours: hgrid_pack says where it is. */
-static scene scene_in(unsigned char *blob, const hgrid_blob_info *info)
-{
-    const size_t positions = align(info->grid_bytes);
-    const size_t indices = align(positions + info->vertex_count * 3 * sizeof(float));
-    scene s;
-    s.positions = (float(*)[3])(void *)(blob + positions);
-    s.vertex_count = (size_t)info->vertex_count;
-    s.indices = (uint32_t(*)[3])(void *)(blob + indices);
-    s.triangle_count = (size_t)info->triangle_count;
-    return s;
+    hgrid_mesh mesh = HGRID_MESH_INIT;
+    check(hgrid_mesh_of(grid, &mesh), NULL);
+    const scene s = {(float(*)[3])mesh.positions, mesh.vertex_count, (uint32_t(*)[3])mesh.indices,
+                     mesh.triangle_count};
+    return frame(&s);
 }
 
 /* Maps the file and opens the grid in it: nothing is read and nothing is copied until a ray comes by.
  *
  * This file has just been written by a process that we trust, and nobody changes it. A file that
  * others may write is not for mapping; and hgrid_validate would prove that it is sound. */
-static scene map(const char *path, hgrid_grid *grid)
+static hgrid_grid map(const char *path)
 {
     struct stat status;
     const int file = open(path, O_RDONLY);
@@ -158,22 +151,20 @@ static scene map(const char *path, hgrid_grid *grid)
         fail("%s: cannot be mapped: %s", path, strerror(errno));
     close(file);
 
-    hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
-    check(hgrid_peek(blob, bytes, &info), NULL);
-    check(hgrid_open(blob, bytes, NULL, grid), NULL);
-    return scene_in((unsigned char *)blob, &info);
+    hgrid_grid grid;
+    check(hgrid_open(blob, bytes, NULL, &grid), NULL);
+    return grid;
 }
 
 /* --- the picture ----------------------------------------------------------------------------- */
 
 /* The rows from one to before another, three bytes for each pixel; to be freed. */
-static unsigned char *draw_rows(const hgrid_grid *grid, const scene *s, int size, int first,
-                                int end)
+static unsigned char *draw_rows(const hgrid_grid *grid, int size, int first, int end)
 {
-    const camera c = frame(s);
+    const camera c = camera_of(grid);
     picture_job job;
     memset(&job, 0, sizeof job);
-    job.grid = grid, job.scene = s, job.camera = &c;
+    job.grid = grid, job.camera = &c;
     job.size = size, job.first_row = first, job.row_count = end - first;
     job.has_shadows = true;
     job.pixels = (unsigned char *)allocate((size_t)size * (size_t)job.row_count, 3);
@@ -188,9 +179,8 @@ static void draw_part(const mapped_options *o, size_t header_bytes, int part)
 {
     const int first = o->size * part / PROCESSES, end = o->size * (part + 1) / PROCESSES;
     const size_t row_bytes = 3 * (size_t)o->size;
-    hgrid_grid grid;
-    const scene s = map(o->grid_file, &grid);
-    unsigned char *pixels = draw_rows(&grid, &s, o->size, first, end);
+    const hgrid_grid grid = map(o->grid_file);
+    unsigned char *pixels = draw_rows(&grid, o->size, first, end);
     const int picture = open(o->output, O_WRONLY);
     if (picture < 0)
         fail("%s: cannot be written: %s", o->output, strerror(errno));
@@ -259,7 +249,7 @@ int main(int count, char **words)
     draw_in_processes(&o, (size_t)header_bytes);
     printf("drawn      %s, processes: %d\n", o.output, PROCESSES);
 
-    unsigned char *pixels = draw_rows(&b.grid, &s, o.size, 0, o.size);
+    unsigned char *pixels = draw_rows(&b.grid, o.size, 0, o.size);
     const size_t bytes = 3 * (size_t)o.size * (size_t)o.size;
     if (!is_equal(o.output, (size_t)header_bytes, pixels, bytes))
         fail("%s is not the picture that one process draws", o.output);

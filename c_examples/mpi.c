@@ -116,7 +116,7 @@ static void draw_bands(const shared_grid *g, int size, int first, int step, unsi
     for (int row = first * BAND; row < size; row += step * BAND) {
         picture_job job;
         memset(&job, 0, sizeof job);
-        job.grid = &g->grid, job.scene = &g->scene, job.camera = &c;
+        job.grid = &g->grid, job.camera = &c;
         job.size = size, job.first_row = row;
         job.row_count = size - row < BAND ? size - row : BAND;
         job.has_shadows = true;

@@ -80,7 +80,7 @@ int main(int count, char **words)
     p = start_progress("render", o.has_progress);
     picture_job job;
     memset(&job, 0, sizeof job);
-    job.grid = &b.grid, job.scene = &s, job.camera = &c;
+    job.grid = &b.grid, job.camera = &c;
     job.size = job.row_count = o.size;
     job.has_shadows = o.has_shadows, job.sky_rays = o.sky_rays;
     job.pixels = (unsigned char *)allocate(pixel_count, 3);

@@ -5,6 +5,7 @@
 #include "threads.h"
 
 #include <pthread.h>
+#include <string.h>
 
 /* Rays are traced by tiles of 8 x 8 pixels, all rays of a tile in one call. */
 enum { TILE = 8, TILE_PIXELS = TILE * TILE };
@@ -22,7 +23,7 @@ typedef struct {
     /* Its place in the whole picture and in the job's rows. */
     uint32_t number;
     size_t place;
-    surface at;
+    hgrid_surface at;
     double lit, open;
 } sample;
 
@@ -60,7 +61,7 @@ static bool is_hit(const sample *at)
 static probe probe_of(sample *of, vector toward, float reach)
 {
     probe p = {{{0, 0, 0}, 0, {0, 0, 0}, reach}, 0, of};
-    round_to(p.ray.origin, of->at.above);
+    memcpy(p.ray.origin, of->at.above, sizeof p.ray.origin);
     round_to(p.ray.direction, toward);
     return p;
 }
@@ -83,7 +84,7 @@ static void look_for_lamp(const shared *s, sample *tile, size_t count,
     probe probes[TILE_PIXELS];
     size_t probe_count = 0;
     for (sample *at = tile; at < tile + count; at++)
-        if (is_hit(at) && lamp_on(&s->lights, at->at.normal) > 0)
+        if (is_hit(at) && lamp_on(&s->lights, vector_of(at->at.normal)) > 0)
             probes[probe_count++] = probe_of(at, s->lights.toward_lamp, INFINITY);
     send(s, probes, probe_count, HGRID_COHERENCE_COHERENT, options);
     for (const probe *p = probes; p < probes + probe_count; p++)
@@ -104,7 +105,7 @@ static void look_for_sky(const shared *s, sample *tile, size_t count,
         for (sample *at = tile; at < tile + count; at++)
             if (is_hit(at))
                 probes[probe_count++] =
-                    probe_of(at, scatter(at->at.normal, at->number, i, rays), reach);
+                    probe_of(at, scatter(vector_of(at->at.normal), at->number, i, rays), reach);
         send(s, probes, probe_count, HGRID_COHERENCE_INCOHERENT, options);
         for (const probe *p = probes; p < probes + probe_count; p++)
             p->of->open += p->is_occluded ? 0 : 1.0 / rays;
@@ -118,7 +119,7 @@ static size_t paint(const shared *s, const sample *tile, size_t count)
     for (const sample *at = tile; at < tile + count; at++) {
         unsigned char *pixel = s->job->pixels + 3 * at->place;
         if (is_hit(at)) {
-            paint_surface(&s->lights, at->at.normal, at->lit, at->open, pixel);
+            paint_surface(&s->lights, vector_of(at->at.normal), at->lit, at->open, pixel);
             hits++;
         } else {
             paint_background(&s->lights, &at->ray, pixel);
@@ -133,7 +134,7 @@ static size_t draw(const shared *s, sample *tile, size_t count, const hgrid_quer
     trace(s, tile, count, options);
     for (sample *at = tile; at < tile + count; at++)
         if (is_hit(at))
-            at->at = surface_at(s->job->scene, &s->lights, &at->ray, &at->hit);
+            hgrid_surface_at(s->job->grid, &at->ray, &at->hit, &at->at);
     if (s->job->has_shadows)
         look_for_lamp(s, tile, count, options);
     if (s->job->sky_rays > 0)

@@ -4,7 +4,6 @@
 
 #include "camera.h"
 #include "progress.h"
-#include "scene.h"
 
 #include <hgrid.h>
 
@@ -15,7 +14,6 @@ enum { MAX_SIZE = 16384 };
 /* What is to be drawn. Initialise it with zeros and set what you need. */
 typedef struct {
     const hgrid_grid *grid;
-    const scene *scene;
     const camera *camera;
     /* Pixels on each side of the whole picture, and the rows that are drawn. */
     int size, first_row, row_count;
