@@ -133,8 +133,8 @@ static size_t draw(const shared *s, sample *tile, size_t count, const hgrid_quer
 {
     trace(s, tile, count, options);
     for (sample *at = tile; at < tile + count; at++)
-        if (is_hit(at))
-            hgrid_surface_at(s->job->grid, &at->ray, &at->hit, &at->at);
+        if (is_hit(at) && !hgrid_surface_at(s->job->grid, &at->ray, &at->hit, &at->at))
+            fail("a hit that the grid does not know");
     if (s->job->has_shadows)
         look_for_lamp(s, tile, count, options);
     if (s->job->sky_rays > 0)

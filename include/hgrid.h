@@ -63,11 +63,12 @@
  * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are enough for every mesh with so many
  * triangles, with the default configuration, and fit into an array declaration; hgrid_sizes knows
  * the mesh, takes any configuration and asks for less. Where the system hands out memory page by
- * page (large blocks of malloc, mmap, VirtualAlloc), an index that is too large costs nothing: pages
- * that are not touched are never taken. So the shortest way to a grid there is hgrid_bound or
- * hgrid_sizes without scratch, a build in so much, and if you like a copy of the index_bytes that its
- * report tells. With scratch hgrid_sizes is exact, but takes about as long as the build itself: that is
- * for memory that has to be there, as where there are no pages.
+ * page (on Linux mmap, and large blocks of aligned_alloc), an index that is too large costs addresses
+ * and no memory: pages that are not touched are never taken. So the shortest way to a grid there is
+ * hgrid_bound or hgrid_sizes without scratch, a build in so much, and if you like a copy of the
+ * index_bytes that its report tells. With scratch hgrid_sizes is exact, but takes about as long as the
+ * build itself: that is for memory that has to be there, as where there are no pages, or where they
+ * count when they are asked for (Windows, and Linux that may not overcommit).
  *
  * The index is a blob: no pointer in it, so it can be copied to another region at a multiple of 64,
  * written to a file, mapped from one, sent, or put in flash, and opened there with hgrid_open. The
@@ -113,7 +114,8 @@
  *           hit = found, object = i, ray.t_max = found.t;
  *
  * where hit.t begins as INFINITY; a shadow ray is blocked if any grid blocks it. Or put all meshes into
- * one, and keep where each begins: then rays take one way, and masks tell the meshes apart.
+ * one, and keep where each begins, which tells whose triangle was hit: then each ray takes one walk, and
+ * masks can leave meshes out.
  *
  * Pointers
  * --------
@@ -162,7 +164,7 @@
  * + - * / and square roots are used, in a fixed order: the same input gives the same bits on every
  * machine. They are rounded to nearest, as in every C program that does not call fesetround: another
  * mode loses hits. Where denormal numbers are taken for zero (FTZ and DAZ of x86), what is below 1.2e-38
- * counts as zero, and all else is as it was.
+ * counts as zero, in between, too: scenes of 1e-25 and less may get other hits.
  *
  * Versions
  * --------
@@ -1370,7 +1372,7 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle
  * count, unless `cull` of the options says otherwise. A ray through an edge or a vertex
  * that triangles share hits at least one of them. A triangle without area, or one that is
- * seen exactly edge-on, is not hit.
+ * seen exactly edge-on, is not hit, up to rounding.
  *
  * `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
  * or with options that break the rules for structs, nothing is hit. A view that nobody initialised,
@@ -1488,8 +1490,8 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  *
  * `hit` is what a query has found for `ray`, of which the direction tells the side; the mesh says the
  * rest. Returns true and writes `surface`; or returns false and writes nothing: the hit names no
- * triangle (as that of a miss), or one without area, the view is one of zeros, or a pointer is NULL,
- * which none may be. Takes about as long as a triangle test in `double`.
+ * triangle (as that of a miss), the ray has no direction, the view is one of zeros, or a pointer is
+ * NULL, which none may be. Takes about as long as a triangle test in `double`.
  *
  * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
  * `below` to the other side: with `t_min` 0, at any scale, alone and in a batch. So rays to lights need
@@ -1511,8 +1513,11 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * ```
  *
  * How far above the plane a start lies follows from what a triangle test may round: 1 / 2^20 of the
- * distance to the triangle's farthest corner. A ray along the plane may still hit the triangle, as the
- * normal is rounded, and a neighbour many times as large may be hit beside the common edge.
+ * distance to the triangle's farthest corner. A ray nearly along the plane may still hit the triangle,
+ * as the normal is rounded, and so may one whose direction is 10^38 times as long as that. A larger
+ * neighbour, from twice the size on, may be hit beside the common edge. A triangle without area,
+ * or a needle thinner than 1e-9 of its length, has no normal to rely on: without any it is the
+ * one that faces the ray. `is_front` is what `cull` goes by, but for triangles seen nearly edge-on.
  *
  * Threads: any number of calls and queries on the same grid at once.
  *
@@ -1706,9 +1711,9 @@ hgrid_status hgrid_pack(const struct hgrid_grid *grid, void *to, size_t capacity
  * Tells where the mesh of a grid is: the arrays that were given to the build or to `hgrid_open`, or
  * those in a blob that `hgrid_pack` wrote (tight, with indices of 32 bits).
  *
- * `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with strides
- * that are not 0, `masks` NULL if there are none, and other arrays NULL if they are empty. It is
- * good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
+ * `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with
+ * strides that are not 0, and arrays that are NULL if they are empty; without masks both of their
+ * fields are 0. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
  * or `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
  * it as it was.
  *

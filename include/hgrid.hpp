@@ -83,6 +83,8 @@ using surface = ::hgrid_surface;
 struct report : ::hgrid_report {
     /// One before its call.
     report() noexcept : ::hgrid_report HGRID_REPORT_INIT {}
+    /// One that a call in C has filled.
+    report(const ::hgrid_report &raw) noexcept : ::hgrid_report(raw) {}
 };
 /// What a look at a whole grid found out. See `hgrid_statistics`.
 using statistics = ::hgrid_statistics;
@@ -822,6 +824,8 @@ public:
     view() noexcept = default;
     /// A view of a grid that is about to go: give the grid a name.
     view(grid &&) = delete;
+    /// The same.
+    view &operator=(grid &&) = delete;
     /// A view that was built or opened in C.
     explicit view(const ::hgrid_grid &raw) noexcept : raw_(raw) {}
 
@@ -843,9 +847,11 @@ public:
     /// Opens a blob that brings its mesh, as `pack` makes them.
     static result<view> open(span<const std::byte> blob) noexcept { return open(blob, nullptr); }
     /// Memory that nobody keeps: give it a name, or `grid::adopt` it.
-    static result<view> open(memory &&blob, const mesh &of) = delete;
+    template <class Blob, std::enable_if_t<!detail::stays<Blob &&>, int> = 0>
+    static result<view> open(Blob &&, const mesh &) = delete;
     /// The same.
-    static result<view> open(memory &&blob) = delete;
+    template <class Blob, std::enable_if_t<!detail::stays<Blob &&>, int> = 0>
+    static result<view> open(Blob &&) = delete;
     /// Proves that a blob from elsewhere is the grid of its mesh.
     status validate() const noexcept { return status{::hgrid_validate(&raw_)}; }
 

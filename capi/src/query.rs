@@ -15,7 +15,7 @@ use crate::types::hgrid_grid;
 /// hit at the same `t`, the one with the lowest number is reported. Both sides of a triangle
 /// count, unless `cull` of the options says otherwise. A ray through an edge or a vertex
 /// that triangles share hits at least one of them. A triangle without area, or one that is
-/// seen exactly edge-on, is not hit.
+/// seen exactly edge-on, is not hit, up to rounding.
 ///
 /// `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
 /// or with options that break the rules for structs, nothing is hit. A view that nobody initialised,
@@ -175,8 +175,8 @@ pub unsafe extern "C" fn hgrid_closest_point(
 ///
 /// `hit` is what a query has found for `ray`, of which the direction tells the side; the mesh says the
 /// rest. Returns true and writes `surface`; or returns false and writes nothing: the hit names no
-/// triangle (as that of a miss), or one without area, the view is one of zeros, or a pointer is NULL,
-/// which none may be. Takes about as long as a triangle test in `double`.
+/// triangle (as that of a miss), the ray has no direction, the view is one of zeros, or a pointer is
+/// NULL, which none may be. Takes about as long as a triangle test in `double`.
 ///
 /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
 /// `below` to the other side: with `t_min` 0, at any scale, alone and in a batch. So rays to lights need
@@ -198,8 +198,11 @@ pub unsafe extern "C" fn hgrid_closest_point(
 /// ```
 ///
 /// How far above the plane a start lies follows from what a triangle test may round: 1 / 2^20 of the
-/// distance to the triangle's farthest corner. A ray along the plane may still hit the triangle, as the
-/// normal is rounded, and a neighbour many times as large may be hit beside the common edge.
+/// distance to the triangle's farthest corner. A ray nearly along the plane may still hit the triangle,
+/// as the normal is rounded, and so may one whose direction is 10^38 times as long as that. A larger
+/// neighbour, from twice the size on, may be hit beside the common edge. A triangle without area,
+/// or a needle thinner than 1e-9 of its length, has no normal to rely on: without any it is the
+/// one that faces the ray. `is_front` is what `cull` goes by, but for triangles seen nearly edge-on.
 ///
 /// Threads: any number of calls and queries on the same grid at once.
 ///

@@ -133,9 +133,9 @@ pub unsafe extern "C" fn hgrid_pack(
 /// Tells where the mesh of a grid is: the arrays that were given to the build or to `hgrid_open`, or
 /// those in a blob that `hgrid_pack` wrote (tight, with indices of 32 bits).
 ///
-/// `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with strides
-/// that are not 0, `masks` NULL if there are none, and other arrays NULL if they are empty. It is
-/// good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
+/// `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with
+/// strides that are not 0, and arrays that are NULL if they are empty; without masks both of their
+/// fields are 0. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
 /// or `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
 /// it as it was.
 ///

@@ -43,12 +43,17 @@ const LEAST: f64 = 1e-44;
 
 impl TriangleMesh<'_> {
     /// The point where a ray met this mesh, with starts for the rays that leave it; `None` if the hit
-    /// names no triangle, as [`Hit::MISS`], or one without area.
+    /// names no triangle, as [`Hit::MISS`], or the ray has no direction.
     ///
     /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
-    /// `below` to the other side: with `t_min` 0, whatever the scene's scale, in single queries and
-    /// batches. Rays along the plane may, as the normal is rounded. A neighbour many times as large
-    /// may be hit beside the common edge, within the rounding of its own size.
+    /// `below` to the other side: with `t_min` 0, at any scale, in single queries and batches. Rays
+    /// nearly along the plane may, as the normal is rounded, and so may directions 10^38 times as long
+    /// as the lift, for which `t` is rounded to 0. A larger neighbour, from twice the size on, may be
+    /// hit beside the common edge, within the rounding of its own size.
+    ///
+    /// A triangle without area, or a needle thinner than 1e-9 of its length, has no normal that could
+    /// be relied on; without any the normal is the one that faces the ray. `is_front` is what
+    /// [`Cull`](crate::Cull) goes by, but for rays that see the triangle nearly edge on.
     ///
     /// ```
     /// # use hgrid_core::*;
@@ -73,13 +78,10 @@ impl TriangleMesh<'_> {
         let [a, b, c] = self.triangle(hit.primitive)?.map(wide);
         let (ab, ac) = (b - a, c - a);
         let cross = ab.cross(ac);
-        // Twice the area; of the smallest triangles the square of it is a number, still.
-        let area = cross.length();
-        if !(area > 0.0 && area.is_finite()) {
-            return None;
-        }
-        let front = cross / area;
-        let is_front = front.dot(wide(ray.direction)) <= 0.0;
+        // The square of the smallest triangle's area is a number, still.
+        let along = wide(ray.direction);
+        let front = cross.try_normalize().or_else(|| (-along).try_normalize())?;
+        let is_front = front.dot(along) <= 0.0;
         let normal = if is_front { front } else { -front };
 
         let point = a + ab * f64::from(hit.u) + ac * f64::from(hit.v);
@@ -87,8 +89,8 @@ impl TriangleMesh<'_> {
         let farthest = farthest.into_iter().fold(0.0, f64::max);
         let lift = normal * (farthest * LIFT + LEAST);
         let start = |lift: DVec3| {
-            let (at, [u, v, w]) = (point + lift, lift.to_array());
-            [round_along(at.x, u), round_along(at.y, v), round_along(at.z, w)]
+            let ([x, y, z], [u, v, w]) = (point.to_array(), lift.to_array());
+            [lifted(x, u), lifted(y, v), lifted(z, w)]
         };
         Some(Surface {
             position: point.to_array().map(round),
@@ -104,14 +106,17 @@ fn wide(xyz: [f32; 3]) -> DVec3 {
     DVec3::from_array(xyz.map(f64::from))
 }
 
-/// The f32 next to a number in a direction, or the number itself if it is one.
-fn round_along(number: f64, direction: f64) -> f32 {
-    let nearest = round(number);
-    let is_short = (number - f64::from(nearest)) * direction > 0.0;
-    match (is_short, direction > 0.0) {
-        (false, _) => nearest,
-        (true, true) => nearest.next_up(),
-        (true, false) => nearest.next_down(),
+/// The f32 that is next to a coordinate with its lift, and not short of it.
+fn lifted(coordinate: f64, lift: f64) -> f32 {
+    let nearest = round(coordinate + lift);
+    // Not from their sum, in which a lift far from the origin is lost.
+    let missing = (coordinate - f64::from(nearest)) + lift;
+    if lift > 0.0 && missing > 0.0 {
+        nearest.next_up()
+    } else if lift < 0.0 && missing < 0.0 {
+        nearest.next_down()
+    } else {
+        nearest
     }
 }
 

@@ -124,7 +124,7 @@ impl TriangleTest {
 
     /// The hit with this triangle, if its `t` lies in the ray's closed range.
     ///
-    /// A triangle of no area, or seen exactly edge on, is never hit.
+    /// A triangle of no area, or seen exactly edge on, is not hit, up to the rounding of the shear.
     #[inline(always)]
     #[must_use]
     pub fn test(&self, triangle: &Triangle) -> Option<TriangleHit> {

@@ -46,6 +46,13 @@ fn triangle(random: &mut Random, scale: f32) -> [[f32; 3]; 3] {
     let size = [1.0, 1e-2, 1e-4][random.below(3)];
     let flat = [1.0, 1e-3][random.below(2)];
     let [a, b, c] = [random.point(), random.point(), random.point()];
+    if random.below(4) == 0 {
+        // Across an axis, and far out on it: down to 2^-40 of the distance.
+        let (axis, size) = (random.below(3), 0.5_f32.powi(random.below(41) as i32));
+        return [a, b, c].map(|p| {
+            std::array::from_fn(|i| if i == axis { place[axis] } else { p[i] * size } * scale)
+        });
+    }
     let c: [f32; 3] = std::array::from_fn(|i| a[i] + (b[i] - a[i]) * 0.4 + c[i] * flat);
     [a, b, c].map(|p| std::array::from_fn(|i| (place[i] + p[i] * size) * scale))
 }
@@ -160,12 +167,17 @@ fn a_convex_mesh_hides_nothing_from_itself() {
 }
 
 #[test]
-fn a_miss_and_a_triangle_without_area_have_no_surface() {
+fn a_miss_has_no_surface_and_a_triangle_without_area_one_that_faces_the_ray() {
     let mut mesh = Mesh::default();
     mesh.push([[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]);
     let ray = Ray::new([0.5, 0.0, 1.0], [0.0, 0.0, -1.0]);
     let on = |primitive| mesh.view().surface(&ray, &Hit { t: 1.0, u: 0.5, v: 0.0, primitive });
-    assert_eq!([on(0), on(1), mesh.view().surface(&ray, &Hit::MISS)], [None; 3]);
+    assert_eq!([on(1), mesh.view().surface(&ray, &Hit::MISS)], [None; 2]);
+    // Without area any normal is as good, if it faces the ray.
+    assert_eq!(on(0).map(|surface| surface.normal), Some([0.0, 0.0, 1.0]));
+    let ray = Ray { direction: [0.0; 3], ..ray };
+    let hit = Hit { t: 1.0, u: 0.5, v: 0.0, primitive: 0 };
+    assert_eq!(mesh.view().surface(&ray, &hit), None);
 }
 
 /// Through a ball: the hit where a ray goes in, and from below it the one where it leaves.

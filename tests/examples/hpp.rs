@@ -135,7 +135,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// What must not compile, and what the compiler has to say about it.
-const REFUSED: [(&str, &str); 15] = [
+const REFUSED: [(&str, &str); 17] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     ("hgrid::config().progress([](float) {});", "progress"),
@@ -148,7 +148,9 @@ const REFUSED: [(&str, &str); 15] = [
     ("hgrid::grid a; hgrid::grid b = a;", "delete"),
     ("hgrid::mesh(vertices, indices).masks(std::vector<unsigned>(1));", "delete"),
     ("hgrid::view v = *hgrid::grid::build(hgrid::mesh(vertices, indices));", "delete"),
+    ("hgrid::view v; v = *hgrid::grid::build(hgrid::mesh(vertices, indices));", "delete"),
     ("hgrid::grid g; auto v = hgrid::view::open(*g.pack());", "delete"),
+    ("auto v = hgrid::view::open(std::vector<std::byte>(64));", "delete"),
     (
         "hgrid::memory m; auto v = hgrid::view::open(std::move(m), hgrid::mesh(vertices, indices));",
         "delete",
