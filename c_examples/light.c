@@ -10,7 +10,7 @@ lights lights_of(const camera *c, double sky_gain)
 {
     const vector up = vector_of(c->up), toward_eye = scale(vector_of(c->forward), -1);
     const vector from_left = offset(scale(vector_of(c->right), -0.7), 0.8, up);
-    const lights l = {up, toward_eye, unit(offset(from_left, 1, toward_eye), toward_eye), sky_gain};
+    const lights l = {up, unit(offset(from_left, 1, toward_eye), toward_eye), sky_gain};
     return l;
 }
 

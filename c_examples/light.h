@@ -8,7 +8,7 @@
 #include <hgrid.h>
 
 typedef struct {
-    vector up, toward_eye, toward_lamp;
+    vector up, toward_lamp;
     /* How much brighter sky and ground are than in a picture without occlusion. */
     double sky_gain;
 } lights;
