@@ -168,9 +168,12 @@ pub(crate) fn build<'a>(
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
     let header = match for_tasks!(parallel, build_in(mesh, config, index, scratch, watch)) {
-        // The heads of many tasks may leave no room for the benches of one.
-        Err(Error::OutOfMemory { region: Region::Scratch, .. }) if parallel.tasks > 1 => {
-            let tasks = clamped(parallel.tasks) / 2;
+        // The heads of many tasks left little room for benches: as many tasks as have both.
+        Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes })
+            if parallel.tasks > 1 && available_bytes >= needed_bytes =>
+        {
+            let room = available_bytes / needed_bytes.max(1);
+            let tasks = room.min(u64::from(clamped(parallel.tasks)) - 1) as u32;
             return build(mesh, config, index, scratch, &Control { tasks, ..*parallel }, watch);
         }
         built => built?,
@@ -192,8 +195,11 @@ fn build_in<const N: usize>(
     let (settled, shares) = settle_in::<N>(mesh, config, scratch, parallel)?;
     let Settled { layout, census, .. } = &settled;
     let ground = settled.ground(mesh, config.flags);
-    let Some((mut work, _)) = Work::new(&ground, &settled, &shares, scratch, parallel) else {
-        let needed_bytes = layout.scratch_bytes(1);
+    let work = Work::new(&ground, &settled, &shares, scratch, parallel);
+    // Twice as many parts are worth another count.
+    let needed_bytes = layout.scratch_bytes(1);
+    let room = (available_bytes / needed_bytes.max(1)).min(shares.wanted.into());
+    let Some((mut work, _)) = work.filter(|(work, _)| 2 * work.part_count as u64 > room) else {
         return Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes });
     };
 

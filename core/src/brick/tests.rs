@@ -257,6 +257,41 @@ fn sizes_hold_to_the_byte_with_any_number_of_tasks() {
 
 #[test]
 #[cfg_attr(miri, ignore = "hours; another test has threads")]
+fn a_build_counts_the_mesh_twice_at_most() {
+    let counts = core::cell::RefCell::new(Vec::new());
+    let run = |count: u32, task: &(dyn Fn(u32) + Sync)| {
+        counts.borrow_mut().push(count);
+        forward(count, task);
+    };
+    let parallel = Control { tasks: 64, run: &run, progress: None };
+
+    // Of scratch for a few tasks the heads of all take too much.
+    let mesh = soup(20_000);
+    let [_, alone] = both_sizes(&mesh, &Control::SERIAL);
+    let (index_bytes, scratch_bytes) = (2 * alone.index_bytes, alone.scratch_bytes);
+    let serial = blob(&mesh, &Control::SERIAL, (index_bytes, scratch_bytes)).unwrap();
+    for room in [1, 2, 3, 5, 20] {
+        assert!(blob(&mesh, &parallel, (index_bytes, room * scratch_bytes)).unwrap() == serial);
+        // A count, a pass and the sorting, both twice if a part had little room, the closing of gaps.
+        let counts = counts.take();
+        assert!(counts[0] == 64 && counts.len() <= 7, "{room}: {counts:?}");
+        // As many sort as there is room for, or more than half of them; one is not handed out.
+        let sorts = |count: u32| count as usize <= room && 2 * count as usize > room;
+        let sorted = counts.iter().any(|&count| sorts(count));
+        assert!(if room > 1 { sorted } else { counts == [64] }, "{room}: {counts:?}");
+    }
+
+    // Few triangles are not worth as many tasks as there is room for.
+    let few = soup(600);
+    let [enough, _] = both_sizes(&few, &parallel);
+    counts.take();
+    blob(&few, &parallel, (enough.index_bytes, 64 * enough.scratch_bytes)).unwrap();
+    let counts = counts.take();
+    assert!(counts.len() <= 6 && counts.iter().all(|&count| count == 2), "{counts:?}");
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "hours; another test has threads")]
 fn a_bound_is_enough_for_all_tasks() {
     let mesh = soup(3000);
     for tasks in [1, 2, 7, 64] {
