@@ -12,7 +12,8 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16};
 
-use super::bundle::{Bounds, Bundle, RAYS, WIDTH, below_three};
+use super::bundle::{Bundle, RAYS, WIDTH, below_three};
+use super::chords::Bounds;
 use crate::aabb::lesser;
 use crate::eight::Eight;
 use crate::mesh::Triangle;

@@ -18,8 +18,10 @@
 //! too many cells is in the lists of bricks, of blocks, or of the grid: large ones cost little
 //! memory. A crowded cell is divided like a block, up to 16 cells wide, twice at most ([`sort`]).
 
+mod budget;
 mod build;
 mod bundle;
+mod chords;
 mod close;
 mod crowds;
 mod divide;
@@ -33,12 +35,14 @@ mod pass;
 mod places;
 mod pool;
 mod quarters;
+mod reach;
 mod size;
 mod sort;
 #[cfg(test)]
 mod tests;
 mod tile;
 mod validate;
+mod view;
 mod walk;
 
 use core::slice::from_ref;
@@ -55,7 +59,8 @@ use crate::mesh::{Strided, TriangleMesh};
 use crate::ray::Hit;
 use crate::simd::Kernel;
 use crate::visit::Visitor;
-pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
+pub(crate) use budget::{bound, scratch_bytes_at_most};
+pub(crate) use build::{build, sizes};
 use bundle::RAYS;
 use extent::{EXTENT_WORDS, Extent, Owner};
 use layout::{Block, Layout};

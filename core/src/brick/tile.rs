@@ -18,33 +18,18 @@
 //! Rays that turn off the axis of the others, and tiles that spread over too many cells, are
 //! left to the walk of single rays.
 
-use fearless_simd::prelude::*;
-use fearless_simd::{Simd, u8x64};
+use fearless_simd::Simd;
 
-use super::bundle::{Bounds, Bundle, RAYS, WIDTH, below_three};
+use super::bundle::{Bundle, RAYS, WIDTH};
 use super::hits::{Hits, List};
 use super::layout::{BLOCK, mask as mask_of, place};
-use super::{Brick, Chunk, Content, Large};
+use super::reach::Reach;
+use super::view::{LAYERS, Part, View, layer};
+use super::{Brick, Content, Large};
 use crate::bits::ones;
 use crate::cell::{Lattice, as_f32, whole};
 use crate::mesh::{Strided, TriangleMesh};
 use crate::ray::Hit;
-
-/// A part of the grid that is cut into up to 16 cells an axis: a block, or a divided cell.
-#[derive(Debug, Clone, Copy)]
-struct Part<'a> {
-    chunk: Chunk<'a>,
-    /// Its bricks that have anything, but for some that no ray meets.
-    bricks: u64,
-    /// Its corner on u, v and k, in cells of the lattice.
-    corner: [f32; 3],
-    /// Its cells in one of the lattice.
-    scale: f32,
-    /// Its cells on an axis.
-    cells: u32,
-    /// How often cells of it may be divided.
-    depth: u32,
-}
 
 /// The rays of a tile on their way through a grid: 7 KiB.
 #[derive(Debug)]
@@ -59,171 +44,6 @@ pub(super) struct Tile<'a, const ANY: bool> {
     /// Work that may still be done, about a primitive for a ray: damaged bytes may
     /// list everything in every cell.
     unread: u64,
-}
-
-/// The whole part of a number, between 0 and 254; of a whole one perhaps one less, which the margin
-/// allows. Without a cast, which would have to saturate lane by lane.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "the low bits are what is wanted")]
-fn byte(number: f32) -> u8 {
-    let number = if number > 0.5 { number } else { 0.5 };
-    let number = if number < 255.0 { number } else { 255.0 };
-    // Adding 1.5 * 2^23 rounds to a whole number and leaves it in the low bits.
-    ((number - 0.5) + 12_582_912.0).to_bits() as u8
-}
-
-/// The cells of a part that each ray may meet in a slice, on one axis, counted from 1: 0 is
-/// outside, and so is all above the last one.
-#[derive(Debug, Clone, Copy)]
-struct Reach {
-    low: [u8; RAYS],
-    high: [u8; RAYS],
-}
-
-impl Reach {
-    /// Of no rays.
-    const NONE: Self = Self { low: [0; RAYS], high: [0; RAYS] };
-
-    /// Sets them to those between two planes, `place` being where the cells are counted from.
-    #[inline(always)]
-    fn set(
-        &mut self,
-        bundle: &Bundle,
-        side: usize,
-        planes: [f32; 2],
-        place: impl Fn(f32) -> f32,
-        margin: f32,
-    ) {
-        let Self { low, high } = self;
-        let lines = bundle.start[side].iter().zip(&bundle.slope[side]);
-        for (((start, slope), low), high) in lines.zip(low).zip(high) {
-            let a = start + slope * planes[0];
-            let b = start + slope * planes[1];
-            *low = byte(place(if a < b { a } else { b }) + (1.0 - margin));
-            *high = byte(place(if a < b { b } else { a }) + (1.0 + margin));
-        }
-    }
-
-    /// The rays that meet any of the cells `first..=last`.
-    #[inline(always)]
-    fn meets<S: Simd>(&self, simd: S, [first, last]: [u32; 2]) -> u64 {
-        let byte = |cell: u32| (cell + 1).min(254) as u8;
-        let (first, last) = (u8x64::splat(simd, byte(first)), u8x64::splat(simd, byte(last)));
-        let low = u8x64::simd_from(simd, self.low).simd_le(last);
-        let high = u8x64::simd_from(simd, self.high).simd_ge(first);
-        (low & high).to_bitmask()
-    }
-}
-
-/// For each axis and range of four places, the cells of a brick or
-/// bricks of a block that lie there.
-const LAYERS: [[[u64; 4]; 4]; 3] = {
-    let mut layers = [[[0; 4]; 4]; 3];
-    let mut bit = 0;
-    while bit < 64 {
-        let at = [bit & 3, bit >> 2 & 3, bit >> 4];
-        let mut axis = 0;
-        while axis < 3 {
-            let (mut first, mut last) = (0, 0);
-            while first < 4 {
-                if first <= at[axis] && at[axis] <= last {
-                    layers[axis][first][last] |= 1 << bit;
-                }
-                last += 1;
-                if last == 4 {
-                    first += 1;
-                    last = 0;
-                }
-            }
-            axis += 1;
-        }
-        bit += 1;
-    }
-    layers
-};
-
-/// Of four places from `first` on, those inside a range; none if they are all outside.
-#[inline(always)]
-fn layer(axis: usize, first: u32, [low, high]: [u32; 2]) -> u64 {
-    if high < first || low > first + 3 {
-        return 0;
-    }
-    let (low, high) = (low.saturating_sub(first), (high - first).min(3));
-    LAYERS[axis % 3][(low & 3) as usize][(high & 3) as usize]
-}
-
-/// A part as the rays see it: in its own cells, from its corner on.
-struct View<'a> {
-    part: Part<'a>,
-    axes: [u8; 3],
-    is_mirrored: bool,
-    bounds: Bounds,
-    margin: f32,
-}
-
-impl<'a> View<'a> {
-    #[inline(always)]
-    fn new(bundle: &Bundle, part: &Part<'a>) -> Self {
-        let [_, _, near] = part.corner;
-        let mut bounds = bundle.bounds;
-        for side in 0..2 {
-            for chord in [&mut bounds.low[side], &mut bounds.high[side]] {
-                chord.start = (chord.at(near) - part.corner[side]) * part.scale;
-            }
-        }
-        let (axes, is_mirrored) = (bundle.axes, bundle.is_mirrored);
-        Self { part: *part, axes, is_mirrored, bounds, margin: bundle.margin * part.scale }
-    }
-
-    /// The planes of k between which cells lie, from the first to before the end.
-    #[inline(always)]
-    fn planes(&self, [first, end]: [u32; 2]) -> [f32; 2] {
-        let cells = self.part.cells;
-        if self.is_mirrored {
-            [as_f32(cells - end), as_f32(cells - first)]
-        } else {
-            [as_f32(first), as_f32(end)]
-        }
-    }
-
-    /// The axes u, v and k.
-    #[inline(always)]
-    fn axes(&self) -> [usize; 3] {
-        below_three(self.axes)
-    }
-
-    /// A step in the order of k as one in that of cells.
-    #[inline(always)]
-    const fn in_order(&self, step: u32, count: u32) -> u32 {
-        if self.is_mirrored { count - 1 - step } else { step }
-    }
-
-    /// A place in cells of the lattice.
-    #[inline(always)]
-    fn corner(&self, at: [f32; 3]) -> [f32; 3] {
-        core::array::from_fn(|axis| self.part.corner[axis] + at[axis] / self.part.scale)
-    }
-
-    /// The cells on u and v that rays may meet beside some on k; `None` if they pass the part.
-    #[inline(always)]
-    fn cells(&self, run: [u32; 2]) -> Option<[[u32; 2]; 2]> {
-        let (planes, cells) = (self.planes(run), self.part.cells);
-        let on = |side| self.bounds.cells(side, planes, 1.0, cells, self.margin);
-        Some([on(0)?, on(1)?])
-    }
-
-    /// The rays that look for hits beside some cells on k.
-    #[inline(always)]
-    fn between<S: Simd>(&self, simd: S, bundle: &Bundle, run: [u32; 2]) -> u64 {
-        bundle.between(simd, self.in_lattice(self.planes(run)))
-    }
-
-    /// Planes in cells of the lattice.
-    #[inline(always)]
-    fn in_lattice(&self, [near, far]: [f32; 2]) -> [f32; 2] {
-        let place = |plane: f32| self.part.corner[2] + plane / self.part.scale;
-        [place(near), place(far)]
-    }
 }
 
 impl<'a, const ANY: bool> Tile<'a, ANY> {
