@@ -1,5 +1,5 @@
-//! How much memory a brick grid may need: before the mesh was looked at, when its triangles are
-//! counted, and when they are sorted.
+//! How much memory a brick grid may need: before the mesh was looked at, and when its triangles are
+//! counted but not yet sorted.
 
 use super::divide;
 use super::extent::EXTENT_WORDS;
