@@ -946,8 +946,8 @@ typedef struct hgrid_allocator {
 #define HGRID_COHERENCE_INCOHERENT 0
 
 /**
- * Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 64
- * rays, a tile of 8 x 8 pixels after the other, each sixteen of them a square of 4 x 4.
+ * Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 128
+ * rays from two tiles of 8 x 8 pixels side by side, each sixteen of them a square of 4 x 4.
  */
 #define HGRID_COHERENCE_COHERENT 1
 
@@ -1559,7 +1559,7 @@ bool hgrid_surface_at(const struct hgrid_grid *grid,
  * strides are the same. Nor do hits overlap anything else that the call uses.
  *
  * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has
- * no influence on the hits. With `count` 0 nothing is done. Up to 64 rays are read
+ * no influence on the hits. With `count` 0 nothing is done. Up to 128 rays are read
  * before the first hit is written.
  *
  * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With others
@@ -1571,7 +1571,7 @@ bool hgrid_surface_at(const struct hgrid_grid *grid,
  * `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`,
  * `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no error: it misses.
  *
- * The call allocates nothing and needs at most 16 KiB of stack.
+ * The call allocates nothing and needs at most 24 KiB of stack.
  *
  * Threads: any number of queries on the same grid at once; each thread with hits and counters of
  * its own.

@@ -20,8 +20,8 @@ pub type hgrid_coherence = u32;
 /// Nothing is known: random rays, rays after a bounce.
 pub const HGRID_COHERENCE_INCOHERENT: hgrid_coherence = 0;
 
-/// Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 64
-/// rays, a tile of 8 x 8 pixels after the other, each sixteen of them a square of 4 x 4.
+/// Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 128
+/// rays from two tiles of 8 x 8 pixels side by side, each sixteen of them a square of 4 x 4.
 pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
 
 /// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.

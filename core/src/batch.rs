@@ -19,8 +19,8 @@ pub enum Coherence {
     /// Nothing: rays after a bounce, random rays. Each is traced alone.
     #[default]
     Incoherent = 0,
-    /// Rays that follow one another are neighbours: best are runs of 64 from a tile of 8 x 8
-    /// pixels, each sixteen of them a square of 4 x 4.
+    /// Rays that follow one another are neighbours: best are runs of 128 from two tiles of 8 x 8
+    /// pixels side by side, each sixteen of them a square of 4 x 4.
     Coherent = 1,
 }
 

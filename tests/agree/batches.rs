@@ -28,6 +28,13 @@ fn tile(bounds: ([f32; 3], [f32; 3]), view: View, [left, top]: [u16; 2]) -> Vec<
     (0..64).map(ray).collect()
 }
 
+/// A piece of a large picture, 128 rays, half of them beside the others: all in a few cells.
+fn close(bounds: ([f32; 3], [f32; 3]), view: View, size: u16, [left, top]: [u16; 2]) -> Vec<Ray> {
+    let camera = Camera::framing(bounds, view, Up::Y);
+    let ray = |i: u16| camera.ray(left + i % 8 + i / 64 * 8, top + i / 8 % 8, size);
+    (0..128).map(ray).collect()
+}
+
 /// What no kernel for many rays may stumble over.
 fn odd_rays() -> Vec<Ray> {
     let sound = Ray::new([0.1, 0.2, 3.0], [0.01, 0.02, -1.0]);
@@ -66,6 +73,35 @@ fn odd_rays() -> Vec<Ray> {
 fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
     let mut random = Random(73);
     let mut rays = Vec::new();
+    // First, so that those of each go together. Across the ball, its edges and the crowd.
+    for size in [256, 512, 1024, 2048] {
+        for at in 1..8 {
+            let view = if at % 2 == 0 { View::Front } else { View::ThreeQuarter };
+            rays.extend(close(bounds, view, size, [at * size / 8, size / 2 - 24]));
+        }
+    }
+    // One half ends before the other, or starts behind its end.
+    for at in 1..9_u16 {
+        let mut piece = close(bounds, View::Front, 512, [40 * at + 70, 230]);
+        let (near, far) = piece.split_at_mut(64);
+        let (near, far) = if at % 2 == 0 { (near, far) } else { (far, near) };
+        let end = 1.0 + 0.5 * f32::from(at / 2);
+        near.iter_mut().for_each(|ray| ray.t_max = end);
+        far.iter_mut().filter(|_| at > 4).for_each(|ray| ray.t_min = end);
+        rays.extend(piece);
+    }
+    // Rays that start and end anywhere, and strangers among them.
+    for at in [700, 900, 1100, 1300] {
+        let mut piece = close(bounds, View::Front, 2048, [at, 1000]);
+        for ray in &mut piece {
+            ray.t_min = random.unit() * 4.0;
+            ray.t_max = ray.t_min + random.unit() * 6.0;
+            if random.below(16) == 0 {
+                ray.direction.rotate_left(1);
+            }
+        }
+        rays.extend(piece);
+    }
     for view in [View::Front, View::ThreeQuarter] {
         for corner in [[0, 0], [24, 24], [32, 24], [40, 8]] {
             rays.extend(tile(bounds, view, corner));
@@ -74,7 +110,9 @@ fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
     // Behind a tile that hits one that meets nothing, with a ray that is none.
     rays.extend(tile(bounds, View::Front, [24, 24]));
     rays.extend(tile(bounds, View::Front, [0, 0]));
-    rays[600].direction = [0.0; 3];
+    if let Some(last) = rays.last_mut() {
+        last.direction = [0.0; 3];
+    }
     // One origin and all directions; one direction and all origins; ends before and behind.
     rays.extend((0..64).map(|_| Ray::new([0.1, 0.2, 0.3], random.point())));
     rays.extend((0..64).map(|_| Ray::new(random.point().map(|c| 2.0 * c), [0.3, -0.5, 0.7])));
@@ -107,7 +145,7 @@ fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
         }
         rays.extend(mixed);
     }
-    assert!(rays.len() >= 1000, "{}", rays.len());
+    assert!(rays.len() >= 3500, "{}", rays.len());
     rays
 }
 
@@ -143,7 +181,7 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
             if config.method == Method::Brick { levels() } else { vec![SimdLevel::detect()] };
         for (level, coherence) in levels.into_iter().flat_map(|l| COHERENCES.map(|c| (l, c))) {
             let grid = grid.with_simd(level);
-            for n in [0, 1, 7, 63, 64, 65, 1000] {
+            for n in [0, 1, 7, 63, 64, 65, 128, 1000, rays.len()] {
                 // From another ray on, so that tiles are cut at other places.
                 for from in [0, rays.len() - n] {
                     let what = format!("{:?} {level:?} {coherence:?} {n} {from}", config.method);

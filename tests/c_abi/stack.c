@@ -7,7 +7,7 @@
 
 #include <ucontext.h>
 
-enum { RAYS = 640, STACK = 256 * 1024, CROWDS = 2, CROWD = 3000 };
+enum { RAYS = 768, STACK = 256 * 1024, CROWDS = 2, CROWD = 3000 };
 
 /* Where the crowds are, and half their width. */
 static const float CENTER[3] = {0.3f, 0.3f, 0.05f}, WIDTH[CROWDS] = {0.01f, 0.0005f};
@@ -210,12 +210,13 @@ int main(void)
 {
     for (int i = 0; i < RAYS; i++) {
         /* Tiles of the sheet, some of them with rays that go elsewhere, then of the crowds. */
-        const int tile = i / 64, pixel = i % 64, crowd = tile - RAYS / 64 + CROWDS;
+        const int tile = i / 64, pixel = i % 64, crowd = i / 128 - RAYS / 128 + CROWDS;
         const float u = (float)(pixel % 8), v = (float)(pixel / 8);
         rays[i] = ray_down((float)(tile % 4) / 4 + u / 32, (float)(tile / 4) / 4 + v / 32);
         rays[i].direction[0] = tile > 4 && i % 7 == 0 ? -3.0f : 0.1f;
         if (crowd >= 0) {
-            rays[i] = ray_down(CENTER[0] + WIDTH[crowd] * (u / 4 - 1),
+            /* Two tiles, one between the rays of the other: all of them go together. */
+            rays[i] = ray_down(CENTER[0] + WIDTH[crowd] * (u / 4 - 1 + (float)(tile % 2) / 8),
                                CENTER[1] + WIDTH[crowd] * (v / 4 - 1));
             /* From among the triangles of the crowd, or all would end in the larger one around it. */
             rays[i].origin[2] = CENTER[2] + 1.2f * WIDTH[crowd];

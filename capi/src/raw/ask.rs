@@ -202,9 +202,9 @@ pub(crate) unsafe fn surface(
     Ok(grid.mesh().surface(&ray.into(), &hit.into()))
 }
 
-/// How many rays of a batch are read before their answers are written: a tile of 8 x 8. The buffers
-/// are 3 KiB.
-const CHUNK: usize = 64;
+/// How many rays of a batch are read before their answers are written: as many as go through a grid
+/// together. The buffers are 6 KiB.
+const CHUNK: usize = 128;
 
 /// Runs a batch: `many` answers a chunk of rays, or with options `one` a single ray.
 /// `unanswered` is written nowhere.

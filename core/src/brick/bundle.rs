@@ -1,4 +1,4 @@
-//! The rays of a tile as arrays: one number of all of them side by side.
+//! Some rays of a tile as arrays: one number of all of them side by side.
 //!
 //! Along one axis, k, all rays of a bundle run forward (it is mirrored if they run
 //! backward), at least half as fast as along any other. So they can be written as lines
@@ -7,17 +7,17 @@
 use core::ops::Range;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
+use fearless_simd::{Simd, f32x4, f32x16, mask32x16, u32x4};
 
 use super::Brick;
-use super::chords::{Bounds, Chord};
+use super::chords::Extremes;
 use super::layout::BLOCK;
 use crate::aabb::{greater, lesser};
 use crate::approach::FAR_EXTENTS;
 use crate::cell::{Lattice, as_f32};
 use crate::eight::{Row, load, transpose};
 use crate::mesh::Strided;
-use crate::ray::{Ray, round};
+use crate::ray::{Hit, INVALID_ID, Ray, round};
 
 /// Rays in a bundle.
 pub(crate) const RAYS: usize = 64;
@@ -26,10 +26,13 @@ pub(crate) const RAYS: usize = 64;
 const LEAST_SPEED: f32 = 1e-30;
 const MOST_SPEED: f32 = 1e30;
 
+/// Bundles in a tile, at most.
+pub(crate) const BUNDLES: usize = 2;
+
 /// A number for each ray.
 pub(super) type PerRay = [f32; RAYS];
 
-/// Up to 64 rays, and those of them that go together.
+/// Up to 64 rays, and those of them that run along one axis.
 #[derive(Debug)]
 pub(super) struct Bundle {
     /// By axis.
@@ -40,8 +43,14 @@ pub(super) struct Bundle {
     /// The rays whose longest axis is x, y, z, from then on.
     pub(super) longest: [u64; 3],
     pub(super) t_min: PerRay,
-    /// Where a ray ends: closer with every hit.
+    /// Where a ray ends: the t of its closest hit, if it has any.
     pub(super) t_max: PerRay,
+    /// The rest of these hits, once a triangle was tested; until then that of earlier rays.
+    pub(super) u: PerRay,
+    pub(super) v: PerRay,
+    pub(super) primitive: [u32; RAYS],
+    /// Whether one was; until then there are directions.
+    pub(super) is_begun: bool,
     /// Bit `i`: ray `i` is one of them.
     pub(super) members: u64,
     /// Members that had not ended where the slice of blocks at hand begins.
@@ -65,9 +74,6 @@ pub(super) struct Bundle {
     pub(super) corner: [f32; 3],
     pub(super) rate: [f32; 3],
     pub(super) width: f32,
-    /// The planes of k between which all members have their hits, and the chords around them there.
-    pub(super) planes: [f32; 2],
-    pub(super) bounds: Bounds,
 }
 
 /// Axes as places in arrays of three: said again so that the compiler knows, and checks nothing.
@@ -148,6 +154,10 @@ impl Bundle {
         longest: [0; 3],
         t_min: [0.0; RAYS],
         t_max: [0.0; RAYS],
+        u: [0.0; RAYS],
+        v: [0.0; RAYS],
+        primitive: [0; RAYS],
+        is_begun: false,
         members: 0,
         alive: 0,
         axes: [0; 3],
@@ -162,8 +172,6 @@ impl Bundle {
         corner: [0.0; 3],
         rate: [0.0; 3],
         width: 0.0,
-        planes: [0.0; 2],
-        bounds: Bounds::NONE,
     };
 
     /// Replaces the rays by `count` of the caller's, and makes those that run along the same axis
@@ -184,7 +192,7 @@ impl Bundle {
         simd.vectorize(
             #[inline(always)]
             || {
-                self.members = 0;
+                (self.members, self.is_begun) = (0, false);
                 let Some(leader) = self.read(simd, rays, first, count) else { return };
                 let [x, y, z] = [leader[0].abs(), leader[1].abs(), leader[2].abs()];
                 match (x >= y && x >= z, y >= z) {
@@ -335,10 +343,39 @@ impl Bundle {
         }
     }
 
+    /// Makes ready for the first triangle: no ray has hit anything.
+    #[inline(always)]
+    pub(super) fn begin<S: Simd>(&mut self, simd: S) {
+        self.is_begun = true;
+        self.u.fill(0.0);
+        self.v.fill(0.0);
+        self.primitive.fill(INVALID_ID);
+        self.shear(simd);
+    }
+
+    /// The closest hits of four rays, or [`Hit::MISS`].
+    #[inline(always)]
+    pub(super) fn hits<S: Simd>(&self, simd: S, four: usize) -> [Hit; 4] {
+        if !self.is_begun {
+            return [Hit::MISS; 4];
+        }
+        let place = four % (RAYS / 4);
+        let primitive = self.primitive.as_chunks::<4>().0[place];
+        let is_miss = u32x4::simd_from(simd, primitive).simd_eq(INVALID_ID);
+        let row = |numbers: &PerRay| f32x4::simd_from(simd, numbers.as_chunks::<4>().0[place]);
+        // u and v of a miss are 0 already.
+        let t = is_miss.select(f32x4::splat(simd, Hit::MISS.t), row(&self.t_max));
+        let primitive = u32x4::simd_from(simd, primitive).bitcast();
+        let [a, b, c, d] = transpose([t, row(&self.u), row(&self.v), primitive]);
+        // Written out: arrays that are mapped live in memory.
+        let hit = |hit: f32x4<S>| bytemuck::cast(<[f32; 4]>::from(hit));
+        [hit(a), hit(b), hit(c), hit(d)]
+    }
+
     /// Makes of directions what tests of triangles need, which most tiles of an empty part of a
     /// picture never ask for; once after the rays were loaded.
     #[inline(always)]
-    pub(super) fn shear<S: Simd>(&mut self, simd: S) {
+    fn shear<S: Simd>(&mut self, simd: S) {
         self.longest = [0; 3];
         for first in (0..RAYS).step_by(WIDTH) {
             let dx = row_of(simd, &self.aim[0], first);
@@ -357,6 +394,24 @@ impl Bundle {
             self.longest[1] |= rays_of(is_y, first);
         }
         self.longest[2] = !(self.longest[0] | self.longest[1]);
+    }
+
+    /// Whether the rays run along the same axis as others.
+    #[inline(always)]
+    pub(super) fn runs_along(&self, others: &Self) -> bool {
+        (self.axes, self.is_mirrored) == (others.axes, others.is_mirrored)
+    }
+
+    /// How far apart, in cells, this bundle's first ray and the last one of another are half way
+    /// through the grid: the corners of a tile.
+    #[inline(always)]
+    pub(super) fn distance(&self, other: &Self) -> f32 {
+        let half = self.width * 0.5;
+        let on = |side: usize| {
+            let first = self.start[side][0] + self.slope[side][0] * half;
+            (first - other.start[side][RAYS - 1] - other.slope[side][RAYS - 1] * half).abs()
+        };
+        greater(on(0), on(1))
     }
 
     /// The axes u, v and k.
@@ -379,21 +434,18 @@ impl Bundle {
         (first, most(a.max(b).max(c.max(d))))
     }
 
-    /// Chords around the members of some rows between two planes; `None` if they are too far apart.
+    /// Between where the members of some rows are on two planes.
     #[inline(always)]
-    pub(super) fn around<S: Simd>(
+    pub(super) fn extremes<S: Simd>(
         &self,
         simd: S,
         planes: [f32; 2],
         rows: Range<usize>,
-    ) -> Option<Bounds> {
-        /// The most cells that a bundle may be wide.
-        const WIDEST: f32 = 64.0;
-        let mut bounds = Bounds::NONE;
+    ) -> Extremes {
+        let mut extremes = Extremes::NONE;
         for side in 0..2 {
-            let (mut low, mut high) = ([0.0; 2], [0.0; 2]);
-            for end in 0..2 {
-                let plane = f32x16::splat(simd, planes[end]);
+            for (end, plane) in planes.into_iter().enumerate() {
+                let plane = f32x16::splat(simd, plane);
                 let mut lowest = f32x16::splat(simd, f32::INFINITY);
                 let mut highest = f32x16::splat(simd, f32::NEG_INFINITY);
                 for row in rows.clone() {
@@ -403,16 +455,11 @@ impl Bundle {
                     lowest = lowest.min(at);
                     highest = highest.max(at);
                 }
-                (low[end], high[end]) = (least(lowest), most(highest));
+                extremes.low[side][end] = least(lowest);
+                extremes.high[side][end] = most(highest);
             }
-            let is_narrow = |width: f32| (0.0..=WIDEST).contains(&width);
-            if !(is_narrow(high[0] - low[0]) && is_narrow(high[1] - low[1])) {
-                return None;
-            }
-            bounds.low[side] = Chord::new(planes, low);
-            bounds.high[side] = Chord::new(planes, high);
         }
-        Some(bounds)
+        extremes
     }
 
     /// Marks those alive that have not ended before a plane.

@@ -18,6 +18,41 @@ pub(super) struct Chord {
     pub(super) slope: f32,
 }
 
+/// The least and the greatest u and v of rays on two planes of k, by axis and plane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extremes {
+    pub(super) low: [[f32; 2]; 2],
+    pub(super) high: [[f32; 2]; 2],
+}
+
+impl Extremes {
+    /// Of no rays.
+    pub(super) const NONE: Self =
+        Self { low: [[f32::INFINITY; 2]; 2], high: [[f32::NEG_INFINITY; 2]; 2] };
+
+    /// Those of these rays and others.
+    #[inline(always)]
+    pub(super) fn and(mut self, others: &Self) -> Self {
+        for side in 0..2 {
+            for plane in 0..2 {
+                let (low, high) = (&mut self.low[side][plane], &mut self.high[side][plane]);
+                (*low, *high) = (
+                    lesser(*low, others.low[side][plane]),
+                    greater(*high, others.high[side][plane]),
+                );
+            }
+        }
+        self
+    }
+
+    /// Whether the rays are nowhere on the planes more than so many cells apart.
+    #[inline(always)]
+    pub(super) fn are_within(&self, cells: f32) -> bool {
+        let widths = self.high.as_flattened().iter().zip(self.low.as_flattened());
+        widths.fold(true, |all, (high, low)| all & (0.0..=cells).contains(&(high - low)))
+    }
+}
+
 impl Chord {
     /// A chord of what lies at `a` on plane `from` and at `b` on plane `to`.
     pub(super) fn new([from, to]: [f32; 2], [a, b]: [f32; 2]) -> Self {
@@ -37,6 +72,14 @@ impl Bounds {
         let none = Chord { start: 0.0, slope: 0.0 };
         Self { low: [none; 2], high: [none; 2] }
     };
+
+    /// Chords around rays between two planes.
+    #[inline(always)]
+    pub(super) fn around(planes: [f32; 2], Extremes { low, high }: &Extremes) -> Self {
+        let chords =
+            |ends: &[[f32; 2]; 2]| [Chord::new(planes, ends[0]), Chord::new(planes, ends[1])];
+        Self { low: chords(low), high: chords(high) }
+    }
 
     /// The first and the last of `count` cells on an axis that rays may meet between two planes,
     /// each cell `size` wide; `None` if they pass all of them. Chords are numbers.

@@ -12,7 +12,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16};
 
-use super::bundle::{Bundle, RAYS, WIDTH, below_three};
+use super::bundle::{BUNDLES, Bundle, RAYS, WIDTH, below_three};
 use super::chords::Bounds;
 use crate::aabb::lesser;
 use crate::eight::Eight;
@@ -35,8 +35,30 @@ pub(super) struct Frusta {
     /// How far off a triangle may be, in cells.
     margin: f32,
     whole: Bounds,
-    /// For every row its planes: what lies behind `a * u + b * v + c * k + d = 0` is outside.
-    rows: [[f32; ROWS * PLANES]; 4],
+    /// For every row of each bundle its planes.
+    rows: [Rows; BUNDLES],
+}
+
+/// A number for each plane of a bundle's rows.
+type PerPlane = [f32; ROWS * PLANES];
+
+/// For every row of a bundle its planes: what lies behind `a * u + b * v + c * k + d = 0` is outside.
+/// Of each it is c and d; a and b say on which side it is, [`ON_U`] and [`ON_V`].
+type Rows = [PerPlane; 2];
+
+/// What is below, what is above.
+const ON_U: PerPlane = sides([1.0, -1.0, 0.0, 0.0]);
+const ON_V: PerPlane = sides([0.0, 0.0, 1.0, -1.0]);
+
+/// The same for every row.
+const fn sides(row: [f32; PLANES]) -> PerPlane {
+    let mut sides = [0.0; ROWS * PLANES];
+    let mut at = 0;
+    while at < sides.len() {
+        sides[at] = row[at % PLANES];
+        at += 1;
+    }
+    sides
 }
 
 impl Frusta {
@@ -48,12 +70,20 @@ impl Frusta {
         offset: 0.0,
         margin: 0.0,
         whole: Bounds::NONE,
-        rows: [[0.0; ROWS * PLANES]; 4],
+        rows: [[[0.0; ROWS * PLANES]; 2]; BUNDLES],
     };
 
-    /// Replaces the planes by those around the rays of a bundle.
+    /// Replaces the planes by those around the rays of bundles that run along the same axis, and are
+    /// between chords between two planes of it.
     #[inline(always)]
-    pub(super) fn surround<S: Simd>(&mut self, simd: S, bundle: &Bundle) {
+    pub(super) fn surround<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        bundles: &[Bundle; N],
+        planes: [f32; 2],
+        whole: Bounds,
+    ) {
+        let Some(bundle) = bundles.first() else { return };
         let [u, v, k] = bundle.axes();
         self.axes = bundle.axes;
         let in_order = |xyz: [f32; 3]| [xyz[u], xyz[v], xyz[k]];
@@ -66,20 +96,17 @@ impl Frusta {
         }
         // A ray is as far off as a triangle.
         self.margin = 2.0 * bundle.margin;
-        self.whole = bundle.bounds;
-        let [a, b, c, d] = &mut self.rows;
-        for row in 0..ROWS {
-            // They are no farther apart than all of them.
-            let bounds = bundle.around(simd, bundle.planes, row..row + 1).unwrap_or(self.whole);
-            for side in 0..2 {
-                let (low, high) = (bounds.low[side], bounds.high[side]);
-                let on_side = |axis: usize| if side == axis { 1.0 } else { 0.0 };
-                let place = (row * PLANES + side * 2) % (ROWS * PLANES);
-                let next = (place + 1) % (ROWS * PLANES);
-                (a[place], b[place]) = (on_side(0), on_side(1));
-                (c[place], d[place]) = (-low.slope, self.margin - low.start);
-                (a[next], b[next]) = (-on_side(0), -on_side(1));
-                (c[next], d[next]) = (high.slope, self.margin + high.start);
+        self.whole = whole;
+        for (bundle, [c, d]) in bundles.iter().zip(&mut self.rows) {
+            for row in 0..ROWS {
+                let bounds = Bounds::around(planes, &bundle.extremes(simd, planes, row..row + 1));
+                for side in 0..2 {
+                    let (low, high) = (bounds.low[side], bounds.high[side]);
+                    let place = (row * PLANES + side * 2) % (ROWS * PLANES);
+                    let next = (place + 1) % (ROWS * PLANES);
+                    (c[place], d[place]) = (-low.slope, self.margin - low.start);
+                    (c[next], d[next]) = (high.slope, self.margin + high.start);
+                }
             }
         }
     }
@@ -124,9 +151,9 @@ impl Frusta {
         lesser(lesser(p, q), r) - self.margin
     }
 
-    /// The rays that may meet a triangle, row by row.
+    /// The rays of a bundle that may meet a triangle, row by row.
     #[inline(always)]
-    pub(super) fn rays<S: Simd>(&self, simd: S, triangle: &Triangle) -> u64 {
+    pub(super) fn rays<S: Simd>(&self, simd: S, bundle: usize, triangle: &Triangle) -> u64 {
         /// The rays of each set of rows.
         const RAYS_OF: [u64; 1 << ROWS] = {
             let mut rays = [0; 1 << ROWS];
@@ -144,7 +171,9 @@ impl Frusta {
             rays
         };
         let [p, q, r] = triangle;
-        let behind = self.behind(simd, p) & self.behind(simd, q) & self.behind(simd, r);
+        let rows = &self.rows[bundle % BUNDLES];
+        let behind =
+            self.behind(simd, rows, p) & self.behind(simd, rows, q) & self.behind(simd, rows, r);
         let planes = behind.to_bitmask();
         // A row is out if the triangle is behind one of its four planes.
         let planes = planes | planes >> 1;
@@ -155,14 +184,15 @@ impl Frusta {
 
     /// Behind which planes of the rows a corner lies.
     #[inline(always)]
-    fn behind<S: Simd>(&self, simd: S, corner: &[f32; 3]) -> mask32x16<S> {
+    fn behind<S: Simd>(&self, simd: S, rows: &Rows, corner: &[f32; 3]) -> mask32x16<S> {
         let [u, v, k] = below_three(self.axes);
-        let [a, b, c, d] = &self.rows;
-        let row = |numbers: &[f32; ROWS * PLANES]| f32x16::simd_from(simd, *numbers);
+        let [c, d] = rows;
+        let row = |numbers: &PerPlane| f32x16::simd_from(simd, *numbers);
         let splat = |number: f32| f32x16::splat(simd, number);
         let u = (corner[u] - self.corner[0]) * self.rate[0];
         let v = (corner[v] - self.corner[1]) * self.rate[1];
         let k = (corner[k] - self.corner[2]) * self.rate[2] + self.offset;
-        (row(a) * splat(u) + row(b) * splat(v) + row(c) * splat(k) + row(d)).simd_lt(splat(0.0))
+        (row(&ON_U) * splat(u) + row(&ON_V) * splat(v) + row(c) * splat(k) + row(d))
+            .simd_lt(splat(0.0))
     }
 }

@@ -8,15 +8,17 @@
 //! Both do for every ray and triangle what [`TriangleTest`] does, so hits have the same bits.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, f32x16, f64x8, mask32x8, mask64x8, u32x4, u32x8};
+use fearless_simd::{Simd, f32x8, f32x16, f64x8, mask32x8, mask64x8, u32x8};
 
 use super::bundle::{Bundle, PerRay, RAYS, WIDTH, row_of};
+use super::chords::Bounds;
 use super::frusta::Frusta;
 use super::quarters::Format;
-use crate::eight::{Eight, LANES, first_eight, transpose};
+use crate::aabb::greater;
+use crate::eight::{Eight, LANES, first_eight};
 use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Cull;
-use crate::ray::{Hit, INVALID_ID};
+use crate::ray::Hit;
 use crate::triangle::{Axis, TriangleTest};
 
 /// From so many rays on they are tested side by side. A choice by the number of rows and triangles
@@ -37,115 +39,86 @@ pub(super) struct List<'a> {
     pub(super) mesh: &'a TriangleMesh<'a>,
 }
 
-/// What the rays of a bundle have hit.
+/// What was tested against the rays of bundles that go together.
 #[derive(Debug)]
-pub(super) struct Hits {
-    /// The closest hit of each ray; its t is where the ray ends ([`Bundle::t_max`]).
-    u: PerRay,
-    v: PerRay,
-    primitive: [u32; RAYS],
-    /// Whether a triangle was tested. Until then the others are those of an earlier tile, and the
-    /// bundle has directions.
-    is_begun: bool,
+pub(super) struct Tests {
+    /// The planes of k between which all rays have their hits, and the chords around them there.
+    planes: [f32; 2],
+    pub(super) bounds: Bounds,
     frusta: Frusta,
-    /// Whether these are around the bundle; until a triangle is tested, around an earlier one.
+    /// Whether these are around the bundles; until a triangle is tested, around earlier ones.
     is_surrounded: bool,
     /// Triangles that were tested against all rays that may meet them, their ids with all bits
     /// inverted: 0 is none. Who comes later takes the place: a second test does no harm.
     mailbox: [u32; SLOTS],
 }
 
-impl Hits {
-    /// Of no rays: zeros, as in [`Bundle::EMPTY`].
-    pub(super) const EMPTY: Self = Self {
-        u: [0.0; RAYS],
-        v: [0.0; RAYS],
-        primitive: [0; RAYS],
-        is_begun: false,
+impl Tests {
+    /// Nothing: zeros, as in [`Bundle::EMPTY`].
+    pub(super) const NONE: Self = Self {
+        planes: [0.0; 2],
+        bounds: Bounds::NONE,
         frusta: Frusta::EMPTY,
         is_surrounded: false,
         mailbox: [0; SLOTS],
     };
 
-    /// Makes room for other rays; the arrays stay as they are until the first triangle.
-    pub(super) fn clear(&mut self) {
-        self.is_begun = false;
-    }
-
-    /// Whether any ray was tested against a triangle.
-    pub(super) const fn is_begun(&self) -> bool {
-        self.is_begun
-    }
-
-    /// Makes ready for the first triangle: no ray has hit anything.
+    /// Forgets everything: other rays go through the grid now, between these planes and chords.
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, simd: S, bundle: &mut Bundle) {
-        self.is_begun = true;
+    pub(super) fn clear(&mut self, planes: [f32; 2], bounds: Bounds) {
+        (self.planes, self.bounds) = (planes, bounds);
         if self.is_surrounded {
             self.is_surrounded = false;
             self.mailbox.fill(0);
         }
-        self.u.fill(0.0);
-        self.v.fill(0.0);
-        self.primitive.fill(INVALID_ID);
-        bundle.shear(simd);
     }
 
-    /// The closest hits of four rays, or [`Hit::MISS`].
-    #[inline(always)]
-    pub(super) fn four<S: Simd>(&self, simd: S, bundle: &Bundle, four: usize) -> [Hit; 4] {
-        if !self.is_begun {
-            return [Hit::MISS; 4];
-        }
-        let place = four % (RAYS / 4);
-        let primitive = self.primitive.as_chunks::<4>().0[place];
-        let is_miss = u32x4::simd_from(simd, primitive).simd_eq(INVALID_ID);
-        let row = |numbers: &PerRay| f32x4::simd_from(simd, numbers.as_chunks::<4>().0[place]);
-        // u and v of a miss are 0 already.
-        let t = is_miss.select(f32x4::splat(simd, Hit::MISS.t), row(&bundle.t_max));
-        let primitive = u32x4::simd_from(simd, primitive).bitcast();
-        let [a, b, c, d] = transpose([t, row(&self.u), row(&self.v), primitive]);
-        // Written out: arrays that are mapped live in memory.
-        let hit = |hit: f32x4<S>| bytemuck::cast(<[f32; 4]>::from(hit));
-        [hit(a), hit(b), hit(c), hit(d)]
-    }
-
-    /// Tests rays of a bundle against a list of triangles; if they are many, all rays that are
-    /// alive.
+    /// Tests rays of bundles between planes against a list of triangles; if they are many, all rays
+    /// that are alive.
     ///
     /// Out of line, or it would be on the stack once for each division of a cell; so it says once
     /// more what vectors it is compiled for.
     #[inline(never)]
-    pub(super) fn test<S: Simd, const ANY: bool>(
+    pub(super) fn test<S: Simd, const ANY: bool, const N: usize>(
         &mut self,
         simd: S,
-        bundle: &mut Bundle,
+        bundles: &mut [Bundle; N],
         List { references, format, mesh }: List<'_>,
-        rays: u64,
+        rays: [u64; N],
     ) {
         simd.vectorize(
             #[inline(always)]
             || {
-                if !self.is_begun {
-                    self.begin(simd, bundle);
+                if bundles.first().is_some_and(|bundle| !bundle.is_begun) {
+                    for bundle in &mut *bundles {
+                        bundle.begin(simd);
+                    }
                 }
-                if rays.count_ones() < MANY {
+                if count_of(&rays) < MANY {
                     for some in references.chunks(LANES) {
                         let ids = first_eight(some).map(
                             #[inline(always)]
                             |reference| format.id(reference),
                         );
-                        self.few::<S, ANY>(simd, bundle, mesh, &ids, some.len(), rays);
+                        let triangles = Eight::of(simd, mesh, ids, some.len());
+                        for (bundle, rays) in bundles.iter_mut().zip(rays) {
+                            bundle.few::<S, ANY>(simd, mesh, &ids, &triangles, rays);
+                        }
                     }
                     return;
                 }
                 if !self.is_surrounded {
                     self.is_surrounded = true;
-                    self.frusta.surround(simd, bundle);
+                    self.frusta.surround(simd, bundles, self.planes, self.bounds);
                 }
                 // Where triangles are large, many lie behind what was hit. To look for that costs, too.
-                let far =
-                    if references.len() > LANES { bundle.farthest(simd) } else { f32::INFINITY };
+                let mut far = f32::INFINITY;
+                if references.len() > LANES {
+                    far = f32::NEG_INFINITY;
+                    for bundle in &*bundles {
+                        far = greater(far, bundle.farthest(simd));
+                    }
+                }
                 // Eight by eight those that were not tested yet.
                 let first = format.id(references.first().copied().unwrap_or(0));
                 let (mut fresh, mut count) = ([first; LANES], 0);
@@ -156,7 +129,13 @@ impl Hits {
                     count += usize::from(*slot != !id);
                     *slot = !id;
                     if count == LANES || (count > 0 && place + 1 == references.len()) {
-                        self.many::<S, ANY>(simd, bundle, mesh, &fresh[..count.min(LANES)], far);
+                        self.many::<S, ANY, N>(
+                            simd,
+                            bundles,
+                            mesh,
+                            &fresh[..count.min(LANES)],
+                            far,
+                        );
                         count = 0;
                     }
                 }
@@ -167,10 +146,10 @@ impl Hits {
     /// Tests all rays that are alive, side by side, against up to eight triangles one by one: those
     /// that the planes around the rays let through.
     #[inline(always)]
-    fn many<S: Simd, const ANY: bool>(
-        &mut self,
+    fn many<S: Simd, const ANY: bool, const N: usize>(
+        &self,
         simd: S,
-        bundle: &mut Bundle,
+        bundles: &mut [Bundle; N],
         mesh: &TriangleMesh<'_>,
         ids: &[u32],
         far: f32,
@@ -182,41 +161,43 @@ impl Hits {
             near &= near - 1;
             let Some(&id) = ids.get(place) else { break };
             let Some(triangle) = mesh.triangle(id) else { continue };
-            let rays = self.frusta.rays(simd, &triangle) & bundle.alive;
-            let rays = if ANY { rays & bundle.members } else { rays };
             let nearest = self.frusta.nearest(&triangle);
-            for axis in 0..3 {
-                let rays = rays & bundle.longest[axis];
-                if rays == 0 {
-                    continue;
-                }
-                match axis {
-                    0 => self.side_by_side::<S, 0, ANY>(simd, bundle, &triangle, nearest, id, rays),
-                    1 => self.side_by_side::<S, 1, ANY>(simd, bundle, &triangle, nearest, id, rays),
-                    _ => self.side_by_side::<S, 2, ANY>(simd, bundle, &triangle, nearest, id, rays),
+            for (at, bundle) in bundles.iter_mut().enumerate() {
+                let rays = self.frusta.rays(simd, at, &triangle) & bundle.alive;
+                let rays = if ANY { rays & bundle.members } else { rays };
+                for axis in 0..3 {
+                    let rays = rays & bundle.longest[axis];
+                    if rays == 0 {
+                        continue;
+                    }
+                    match axis {
+                        0 => bundle.side_by_side::<S, 0, ANY>(simd, &triangle, nearest, id, rays),
+                        1 => bundle.side_by_side::<S, 1, ANY>(simd, &triangle, nearest, id, rays),
+                        _ => bundle.side_by_side::<S, 2, ANY>(simd, &triangle, nearest, id, rays),
+                    }
                 }
             }
         }
     }
+}
 
+impl Bundle {
     /// Tests rays one by one against up to eight triangles at once.
     #[inline(always)]
     fn few<S: Simd, const ANY: bool>(
         &mut self,
         simd: S,
-        bundle: &mut Bundle,
         mesh: &TriangleMesh<'_>,
         ids: &[u32; LANES],
-        count: usize,
+        triangles: &Eight<S>,
         rays: u64,
     ) {
-        let triangles = Eight::of(simd, mesh, *ids, count);
-        let mut rest = if ANY { rays & bundle.members } else { rays };
+        let mut rest = if ANY { rays & self.members } else { rays };
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize % RAYS;
             rest &= rest - 1;
-            let test = one(bundle, lane);
-            let mut survivors = test.survivors(simd, &triangles);
+            let test = self.one(lane);
+            let mut survivors = test.survivors(simd, triangles);
             while survivors != 0 {
                 let place = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
@@ -228,16 +209,15 @@ impl Hits {
                 // A miss never takes the place of a hit.
                 let hit = test.decide(mesh, id);
                 let best =
-                    Hit { t: bundle.t_max[lane], primitive: self.primitive[lane], ..Hit::MISS };
+                    Hit { t: self.t_max[lane], primitive: self.primitive[lane], ..Hit::MISS };
                 if hit.is_closer(&best) {
-                    bundle.t_max[lane] = hit.t;
+                    self.t_max[lane] = hit.t;
                     self.u[lane] = hit.u;
                     self.v[lane] = hit.v;
                     self.primitive[lane] = hit.primitive;
-                    bundle.to[lane] =
-                        bundle.zero[lane] + bundle.speed[lane] * hit.t + bundle.margin;
+                    self.to[lane] = self.zero[lane] + self.speed[lane] * hit.t + self.margin;
                     if ANY {
-                        bundle.members &= !(1 << lane);
+                        self.members &= !(1 << lane);
                         break;
                     }
                 }
@@ -250,7 +230,6 @@ impl Hits {
     fn side_by_side<S: Simd, const AXIS: usize, const ANY: bool>(
         &mut self,
         simd: S,
-        bundle: &mut Bundle,
         triangle: &Triangle,
         nearest: f32,
         id: u32,
@@ -265,19 +244,19 @@ impl Hits {
 
             // Leave out who has a hit before the triangle begins.
             let first = row * WIDTH;
-            let to = row_of(simd, &bundle.to, first);
+            let to = row_of(simd, &self.to, first);
             let here = here & to.simd_ge(f32x16::splat(simd, nearest)).to_bitmask();
             if here == 0 {
                 continue;
             }
 
             let (ox, oy, oz) = (
-                row_of(simd, &bundle.origin[x], first),
-                row_of(simd, &bundle.origin[y], first),
-                row_of(simd, &bundle.origin[z], first),
+                row_of(simd, &self.origin[x], first),
+                row_of(simd, &self.origin[y], first),
+                row_of(simd, &self.origin[z], first),
             );
             let (shear_x, shear_y) =
-                (row_of(simd, &bundle.aim[0], first), row_of(simd, &bundle.aim[1], first));
+                (row_of(simd, &self.aim[0], first), row_of(simd, &self.aim[1], first));
 
             // Shear the corners, and drop the triangle where two edge
             // functions have opposite signs.
@@ -303,10 +282,9 @@ impl Hits {
                 let survivors = survivors >> (part * PART) & ((1 << PART) - 1);
                 if survivors != 0 {
                     let first = first + part * PART;
-                    let taken =
-                        self.resolve(simd, bundle, &corners, depths, z, id, first, survivors);
+                    let taken = self.resolve(simd, &corners, depths, z, id, first, survivors);
                     if ANY {
-                        bundle.members &= !(taken << first);
+                        self.members &= !(taken << first);
                     }
                 }
             }
@@ -323,7 +301,6 @@ impl Hits {
     fn resolve<S: Simd>(
         &mut self,
         simd: S,
-        bundle: &mut Bundle,
         corners: &[[f32; WIDTH]; 6],
         depths: [f64; 3],
         z: usize,
@@ -335,32 +312,61 @@ impl Hits {
         let corner =
             |at: usize| widened(f32x8::simd_from(simd, part_of(&corners[at], first / PART)));
         let corners = [corner(0), corner(1), corner(2), corner(3), corner(4), corner(5)];
-        let origin = widened(row(&bundle.origin[z]));
-        let direction = widened(row(&bundle.aim[2]));
+        let origin = widened(row(&self.origin[z]));
+        let direction = widened(row(&self.aim[2]));
         let met = Met::of(corners, depths, origin, direction);
         let t = narrowed(met.t);
         let survivors = survivors & !met.outside.to_bitmask();
 
         // Take what is closer. Read all before anything is written, and write first what needs no
         // choice: or the compiler makes masked stores (core/DESIGN.md).
-        let (best_t, best_u, best_v) = (row(&bundle.t_max), row(&self.u), row(&self.v));
+        let (best_t, best_u, best_v) = (row(&self.t_max), row(&self.u), row(&self.v));
         let best_id = u32x8::simd_from(simd, part_of(&self.primitive, first / PART));
         let new_id = u32x8::splat(simd, id);
         let is_closer = t.simd_lt(best_t) | (t.simd_le(best_t) & new_id.simd_lt(best_id));
-        let is_hit = t.simd_ge(row(&bundle.t_min)) & t.abs().simd_lt(f32::INFINITY);
+        let is_hit = t.simd_ge(row(&self.t_min)) & t.abs().simd_lt(f32::INFINITY);
         let taken = is_hit & is_closer;
         let taken = taken & mask32x8::from_bitmask(simd, survivors);
         let t = taken.select(t, best_t);
         let u = taken.select(narrowed(met.weights[0]), best_u);
         let v = taken.select(narrowed(met.weights[1]), best_v);
-        let end = row(&bundle.zero) + row(&bundle.speed) * t + bundle.margin;
-        *part_mut(&mut bundle.to, first / PART) = end.into();
-        *part_mut(&mut bundle.t_max, first / PART) = t.into();
+        let end = row(&self.zero) + row(&self.speed) * t + self.margin;
+        *part_mut(&mut self.to, first / PART) = end.into();
+        *part_mut(&mut self.t_max, first / PART) = t.into();
         *part_mut(&mut self.u, first / PART) = u.into();
         *part_mut(&mut self.v, first / PART) = v.into();
         *part_mut(&mut self.primitive, first / PART) = taken.select(new_id, best_id).into();
         taken.to_bitmask()
     }
+
+    /// The test of one ray.
+    #[inline(always)]
+    fn one(&self, lane: usize) -> TriangleTest {
+        let lane = lane % RAYS;
+        let (axis, [x, y, z]) = if self.longest[0] >> lane & 1 == 1 {
+            (Axis::X, [1, 2, 0])
+        } else if self.longest[1] >> lane & 1 == 1 {
+            (Axis::Y, [2, 0, 1])
+        } else {
+            (Axis::Z, [0, 1, 2])
+        };
+        TriangleTest {
+            axis,
+            anchor: [self.origin[x][lane], self.origin[y][lane], self.origin[z][lane]],
+            shear: [self.aim[0][lane], self.aim[1][lane]],
+            origin_z: f64::from(self.origin[z][lane]),
+            direction_z: f64::from(self.aim[2][lane]),
+            t_min: self.t_min[lane],
+            t_max: self.t_max[lane],
+            cull: Cull::None,
+        }
+    }
+}
+
+/// How many rays of all bundles these are.
+#[inline(always)]
+pub(super) fn count_of<const N: usize>(rays: &[u64; N]) -> u32 {
+    rays.iter().map(|rays| rays.count_ones()).sum()
 }
 
 /// Eight numbers with twice the digits.
@@ -405,29 +411,6 @@ impl<S: Simd> Met<S> {
         let (u, v, w) = (u * share + 0.0, v * share + 0.0, w * share + 0.0);
         let depth = u * (a - origin) + v * (b - origin) + w * (c - origin);
         Self { outside, weights: [v, w], t: depth / direction }
-    }
-}
-
-/// The test of one ray.
-#[inline(always)]
-fn one(bundle: &Bundle, lane: usize) -> TriangleTest {
-    let lane = lane % RAYS;
-    let (axis, [x, y, z]) = if bundle.longest[0] >> lane & 1 == 1 {
-        (Axis::X, [1, 2, 0])
-    } else if bundle.longest[1] >> lane & 1 == 1 {
-        (Axis::Y, [2, 0, 1])
-    } else {
-        (Axis::Z, [0, 1, 2])
-    };
-    TriangleTest {
-        axis,
-        anchor: [bundle.origin[x][lane], bundle.origin[y][lane], bundle.origin[z][lane]],
-        shear: [bundle.aim[0][lane], bundle.aim[1][lane]],
-        origin_z: f64::from(bundle.origin[z][lane]),
-        direction_z: f64::from(bundle.aim[2][lane]),
-        t_min: bundle.t_min[lane],
-        t_max: bundle.t_max[lane],
-        cull: Cull::None,
     }
 }
 

@@ -31,6 +31,7 @@ mod frusta;
 mod groups;
 mod hits;
 mod layout;
+mod march;
 mod pass;
 mod places;
 mod pool;
@@ -61,7 +62,7 @@ use crate::simd::Kernel;
 use crate::visit::Visitor;
 pub(crate) use budget::{bound, scratch_bytes_at_most};
 pub(crate) use build::{build, sizes};
-use bundle::RAYS;
+use bundle::{BUNDLES, RAYS};
 use extent::{EXTENT_WORDS, Extent, Owner};
 use layout::{Block, Layout};
 use quarters::Format;
@@ -135,10 +136,10 @@ impl<'a> Brick<'a> {
     }
 }
 
-/// The hits of a tile that sees nothing.
+/// The hits of rays that see nothing.
 static MISSES: [Hit; RAYS] = [Hit::MISS; RAYS];
 
-/// Neighbouring rays on their way through a grid, 64 at a time.
+/// Neighbouring rays on their way through a grid, up to 128 at a time.
 #[derive(Debug)]
 pub(crate) struct Tiles<'q, F, const ANY: bool> {
     pub(crate) brick: &'q Brick<'q>,
@@ -146,7 +147,7 @@ pub(crate) struct Tiles<'q, F, const ANY: bool> {
     pub(crate) mesh: &'q TriangleMesh<'q>,
     pub(crate) rays: &'q Strided<'q>,
     /// Gets the place of a ray and its hit and perhaps those of some next ones, up to all of a
-    /// tile, or no hit if the ray did not go with its tile.
+    /// bundle, or no hit if the ray did not go with its tile.
     pub(crate) answer: F,
 }
 
@@ -156,24 +157,28 @@ impl<F: FnMut(usize, &[Hit]), const ANY: bool> Kernel for Tiles<'_, F, ANY> {
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) {
         let mut tile = tile::Tile::<ANY>::new(self.brick, self.lattice, self.mesh);
-        for first in (0..self.rays.count).step_by(RAYS) {
-            let count = RAYS.min(self.rays.count - first);
+        for first in (0..self.rays.count).step_by(BUNDLES * RAYS) {
+            let count = (BUNDLES * RAYS).min(self.rays.count - first);
             let members = tile.trace(simd, self.rays, first, count);
-            // As in an empty part of a picture: one answer, not sixteen.
-            if !tile.is_begun() && members.count_ones() as usize == count {
-                (self.answer)(first, MISSES.get(..count).unwrap_or_default());
-                continue;
-            }
-            for four in 0..count.div_ceil(4) {
-                // Said in both ways: hits that are handed on as they are
-                // need not go through memory.
-                if members >> (4 * four) & 0xf == 0xf {
-                    (self.answer)(first + 4 * four, &tile.hits(simd, four));
+            for (place, members) in members.into_iter().enumerate().take(count.div_ceil(RAYS)) {
+                let (first, count) = (first + place * RAYS, RAYS.min(count - place * RAYS));
+                let bundle = tile.bundle(place);
+                // As in an empty part of a picture: one answer, not sixteen.
+                if !bundle.is_begun && members.count_ones() as usize == count {
+                    (self.answer)(first, MISSES.get(..count).unwrap_or_default());
                     continue;
                 }
-                for (lane, hit) in (4 * four..count).zip(&tile.hits(simd, four)) {
-                    let is_traced = members >> lane & 1 == 1;
-                    (self.answer)(first + lane, if is_traced { from_ref(hit) } else { &[] });
+                for four in 0..count.div_ceil(4) {
+                    // Said in both ways: hits that are handed on as they are
+                    // need not go through memory.
+                    if members >> (4 * four) & 0xf == 0xf {
+                        (self.answer)(first + 4 * four, &bundle.hits(simd, four));
+                        continue;
+                    }
+                    for (lane, hit) in (4 * four..count).zip(&bundle.hits(simd, four)) {
+                        let is_traced = members >> lane & 1 == 1;
+                        (self.answer)(first + lane, if is_traced { from_ref(hit) } else { &[] });
+                    }
                 }
             }
         }

@@ -51,13 +51,12 @@ impl Reach {
         }
     }
 
-    /// The rays that meet any of the cells `first..=last`.
+    /// The rays that meet a cell.
     #[inline(always)]
-    pub(super) fn meets<S: Simd>(&self, simd: S, [first, last]: [u32; 2]) -> u64 {
-        let byte = |cell: u32| (cell + 1).min(254) as u8;
-        let (first, last) = (u8x64::splat(simd, byte(first)), u8x64::splat(simd, byte(last)));
-        let low = u8x64::simd_from(simd, self.low).simd_le(last);
-        let high = u8x64::simd_from(simd, self.high).simd_ge(first);
+    pub(super) fn meets<S: Simd>(&self, simd: S, cell: u32) -> u64 {
+        let cell = u8x64::splat(simd, (cell + 1).min(254) as u8);
+        let low = u8x64::simd_from(simd, self.low).simd_le(cell);
+        let high = u8x64::simd_from(simd, self.high).simd_ge(cell);
         (low & high).to_bitmask()
     }
 }

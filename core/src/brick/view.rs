@@ -35,9 +35,8 @@ pub(super) struct View<'a> {
 
 impl<'a> View<'a> {
     #[inline(always)]
-    pub(super) fn new(bundle: &Bundle, part: &Part<'a>) -> Self {
+    pub(super) fn new(bundle: &Bundle, mut bounds: Bounds, part: &Part<'a>) -> Self {
         let [_, _, near] = part.corner;
-        let mut bounds = bundle.bounds;
         for side in 0..2 {
             for chord in [&mut bounds.low[side], &mut bounds.high[side]] {
                 chord.start = (chord.at(near) - part.corner[side]) * part.scale;
@@ -84,10 +83,20 @@ impl<'a> View<'a> {
         Some([on(0)?, on(1)?])
     }
 
-    /// The rays that look for hits beside some cells on k.
+    /// The rays of each bundle that look for hits beside some cells on k.
     #[inline(always)]
-    pub(super) fn between<S: Simd>(&self, simd: S, bundle: &Bundle, run: [u32; 2]) -> u64 {
-        bundle.between(simd, self.in_lattice(self.planes(run)))
+    pub(super) fn between<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        bundles: &[Bundle; N],
+        run: [u32; 2],
+    ) -> [u64; N] {
+        let planes = self.in_lattice(self.planes(run));
+        let mut rays = [0; N];
+        for (rays, bundle) in rays.iter_mut().zip(bundles) {
+            *rays = bundle.between(simd, planes);
+        }
+        rays
     }
 
     /// Planes in cells of the lattice.
