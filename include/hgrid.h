@@ -66,8 +66,8 @@
  * page (on Linux mmap, and large blocks of aligned_alloc), an index that is too large costs addresses
  * and no memory: pages that are not touched are never taken. So the shortest way to a grid there is
  * hgrid_bound or hgrid_sizes without scratch, a build in so much, and if you like a copy of the
- * index_bytes that its report tells. With scratch hgrid_sizes is exact, but takes about as long as the
- * build itself: that is for memory that has to be there, as where there are no pages, or where they
+ * index_bytes that its report tells. With scratch hgrid_sizes is exact, but takes half as long as the
+ * build, or as long (brick, recursive): that is for memory that has to be there, as where there are no pages, or where they
  * count when they are asked for (Windows, and Linux that may not overcommit).
  *
  * The index is a blob: no pointer in it, so it can be copied to another region at a multiple of 64,
@@ -1031,7 +1031,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_INDEX_TYPE -22
 
 /**
- * The mesh has more than 4294967294 triangles.
+ * The mesh has more than 4294967294 triangles; or, from `hgrid_bound`, the sizes do not fit into the
+ * machine's address space.
  */
 #define HGRID_ERROR_TOO_MANY_TRIANGLES -23
 
@@ -1237,10 +1238,11 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  * dozen times as long as `hgrid_sizes`, or less. A density, or cells, that would be too fine
  * for a build count as too large here.
  *
- * Bring as much scratch as `hgrid_sizes` without scratch says: with `HGRID_METHOD_ONE_LEVEL` and
- * `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser
- * than it had to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch
- * holds nothing of use afterwards.
+ * Bring as much scratch as `hgrid_sizes` without scratch says. With less the grid may get coarser
+ * than the index had to be: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` it must fit by
+ * its bound, with the other methods there must be scratch enough to plan it; where there is not
+ * for any, they answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
+ * afterwards.
  *
  * `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be
  * the same as `fitted`, which is initialised before in either case. `report` may be NULL,

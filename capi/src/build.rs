@@ -109,10 +109,11 @@ pub unsafe extern "C" fn hgrid_sizes(
 /// dozen times as long as `hgrid_sizes`, or less. A density, or cells, that would be too fine
 /// for a build count as too large here.
 ///
-/// Bring as much scratch as `hgrid_sizes` without scratch says: with `HGRID_METHOD_ONE_LEVEL` and
-/// `HGRID_METHOD_FIXED` there may be less, then a grid must fit by its bound, and gets coarser
-/// than it had to be; the other methods answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch
-/// holds nothing of use afterwards.
+/// Bring as much scratch as `hgrid_sizes` without scratch says. With less the grid may get coarser
+/// than the index had to be: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` it must fit by
+/// its bound, with the other methods there must be scratch enough to plan it; where there is not
+/// for any, they answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
+/// afterwards.
 ///
 /// `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be
 /// the same as `fitted`, which is initialised before in either case. `report` may be NULL,

@@ -51,7 +51,8 @@ pub const HGRID_ERROR_INVALID_INDICES: hgrid_status = -21;
 /// The mesh's `index_type` is none that this version knows.
 pub const HGRID_ERROR_INVALID_INDEX_TYPE: hgrid_status = -22;
 
-/// The mesh has more than 4294967294 triangles.
+/// The mesh has more than 4294967294 triangles; or, from `hgrid_bound`, the sizes do not fit into the
+/// machine's address space.
 pub const HGRID_ERROR_TOO_MANY_TRIANGLES: hgrid_status = -23;
 
 /// A triangle names a vertex that the mesh does not have. The report says which triangle.
@@ -190,7 +191,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_INVALID_INDEX_TYPE => {
             c"unknown index_type: use HGRID_INDEX_U32 or HGRID_INDEX_U16"
         }
-        HGRID_ERROR_TOO_MANY_TRIANGLES => c"more than 4294967294 triangles: split the mesh",
+        HGRID_ERROR_TOO_MANY_TRIANGLES => c"more than 4294967294 triangles, or than memory has addresses for: split the mesh",
         HGRID_ERROR_INDEX_OUT_OF_RANGE => {
             c"a vertex number is out of range: repair the report's triangle"
         }

@@ -44,7 +44,8 @@ pub enum ConfigField {
     /// Not a method of this version.
     Method,
     /// Zero, negative, NaN, or so large that an axis would need more than
-    /// [`MAX_RESOLUTION`](crate::MAX_RESOLUTION) cells.
+    /// [`MAX_RESOLUTION`](crate::MAX_RESOLUTION) cells (1023 in a recursive grid), or ids and subgrids
+    /// more than 8 GiB.
     Density,
     /// Below 2, for a method with macrocells.
     MacrocellFactor,
@@ -179,8 +180,10 @@ impl fmt::Display for Error {
             Self::InvalidConfig(ConfigField::Method) => f.write_str("unknown method"),
             Self::InvalidConfig(ConfigField::Density) => write!(
                 f,
-                "density must be above 0 and ask for at most {} cells on an axis",
-                crate::MAX_RESOLUTION
+                "density must be above 0 and ask for at most {} cells on an axis, {} in a recursive \
+                 grid, and 8 GiB of ids",
+                crate::MAX_RESOLUTION,
+                crate::recursive::MAX_RESOLUTION
             ),
             Self::InvalidConfig(ConfigField::MacrocellFactor) => {
                 f.write_str("macrocell_factor must be at least 2")

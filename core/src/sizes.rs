@@ -156,9 +156,9 @@ pub fn sizes_with(
 /// [`Method::Brick`]), by no more than a step too much.
 ///
 /// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls
-/// of [`sizes`] at most. `scratch` is for them: with one-level and fixed grids there may be none,
-/// then a grid must fit by its bound and gets coarser than it had to be; the others need as much
-/// as [`sizes`] without scratch says.
+/// of [`sizes`] at most. `scratch` is for them: as much as [`sizes`] without scratch says. With less a grid may get
+/// coarser than the index had to be: one-level and fixed grids must fit by their bound then, the
+/// others must be such that they can be planned in the scratch.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] with the bytes of index that the coarsest grid needs, or

@@ -80,7 +80,8 @@ impl TriangleMesh<'_> {
         let cross = ab.cross(ac);
         // The square of the smallest triangle's area is a number, still.
         let along = wide(ray.direction);
-        let front = cross.try_normalize().or_else(|| (-along).try_normalize())?;
+        let facing = -along.try_normalize()?;
+        let front = cross.try_normalize().unwrap_or(facing);
         let is_front = front.dot(along) <= 0.0;
         let normal = if is_front { front } else { -front };
 

@@ -175,9 +175,13 @@ fn a_miss_has_no_surface_and_a_triangle_without_area_one_that_faces_the_ray() {
     assert_eq!([on(1), mesh.view().surface(&ray, &Hit::MISS)], [None; 2]);
     // Without area any normal is as good, if it faces the ray.
     assert_eq!(on(0).map(|surface| surface.normal), Some([0.0, 0.0, 1.0]));
-    let ray = Ray { direction: [0.0; 3], ..ray };
-    let hit = Hit { t: 1.0, u: 0.5, v: 0.0, primitive: 0 };
-    assert_eq!(mesh.view().surface(&ray, &hit), None);
+    // With area or without, a ray that goes nowhere meets none.
+    mesh.push([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    for direction in [[0.0; 3], [f32::NAN, 0.0, 1.0], [0.0, f32::INFINITY, 0.0]] {
+        let ray = Ray { direction, ..ray };
+        let on = |primitive| mesh.view().surface(&ray, &Hit { t: 1.0, u: 0.5, v: 0.0, primitive });
+        assert_eq!([on(0), on(1)], [None; 2], "{direction:?}");
+    }
 }
 
 /// Through a ball: the hit where a ray goes in, and from below it the one where it leaves.

@@ -73,5 +73,21 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
         let is_asked_for =
             matches!(without, Err(Error::OutOfMemory { region: Region::Scratch, .. }));
         assert_eq!(is_asked_for, needs_scratch, "{config:?}: {without:?}");
+
+        // What cannot be planned in the scratch is coarser, too, and then it can.
+        let enough = sizes(&mesh.view(), &config, &mut []).unwrap().scratch_bytes;
+        let mut scratch = vec![Block::ZERO; Block::count_for(enough)];
+        for bytes in [enough - 64, enough / 8 * 7, enough / 2, enough / 8] {
+            let scratch = &mut Block::bytes_mut(&mut scratch)[..bytes];
+            match fit(&mesh.view(), &config, usize::MAX, scratch) {
+                Ok((_, needed)) => {
+                    assert!(needed.is_exact || !needs_scratch, "{config:?}: {bytes} of {enough}");
+                }
+                Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, .. }) => {
+                    assert!(needs_scratch && needed_bytes > bytes as u64, "{config:?}");
+                }
+                Err(error) => panic!("{config:?}: {error}"),
+            }
+        }
     }
 }

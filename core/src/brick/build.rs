@@ -249,8 +249,9 @@ impl<'w, const N: usize> Work<'w, N> {
     fn place(&mut self, room: u64) {
         let census = &self.settled.census;
         let large = large_words(census);
-        let likely = likely_words(census);
-        let mut room = room.saturating_sub(large);
+        let most = u64::from(u32::MAX);
+        let likely = likely_words(census).min(most);
+        let mut room = room.min(most).saturating_sub(large);
         if self.part_count > 1 {
             room = room.min(likely + likely / 4);
         }

@@ -18,6 +18,7 @@
 
 use core::ops::Range;
 
+use super::budget::least_words;
 use super::frame::MOST_BLOCKS;
 use super::layout::Layout;
 use super::pass::{Census, Count, Ground};
@@ -25,7 +26,7 @@ use crate::aabb::{Aabb, greater, lesser};
 use crate::cell::{Lattice, MAX_RESOLUTION, as_f32};
 use crate::config::{BuildFlags, Config};
 use crate::control::{Control, Watch};
-use crate::error::Error;
+use crate::error::{ConfigField, Error};
 use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
 use crate::tasks::{run, task_count};
@@ -133,6 +134,10 @@ pub(super) fn settle_in<const N: usize>(
         };
         let limit = reference_limit(mesh.triangle_count());
         if settled.census.entries.max(settled.census.references) <= limit {
+            // A word of the pool has a number of 32 bits.
+            if least_words(&settled.census) > u32::MAX.into() {
+                return Err(Error::InvalidConfig(ConfigField::CellSize));
+            }
             if settled.is_counted {
                 settled.layout.fullest = fullest::<N>(&layout, shares.tasks, scratch);
             }

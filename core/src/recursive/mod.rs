@@ -30,6 +30,7 @@ use crate::dda::{Line, Step};
 use crate::error::Error;
 use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes, sizes};
+pub(crate) use node::MAX_RESOLUTION;
 use node::{Content, Node};
 
 /// A cell with no more primitives than this is not divided.

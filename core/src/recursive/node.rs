@@ -9,7 +9,7 @@ use crate::dda::{Line, Walk};
 use crate::one_level::row;
 
 /// The most cells of a grid on an axis: three such numbers share a word.
-pub(super) const MAX_RESOLUTION: u32 = (1 << RESOLUTION_BITS) - 1;
+pub(crate) const MAX_RESOLUTION: u32 = (1 << RESOLUTION_BITS) - 1;
 
 pub(super) const HEAD_WORDS: usize = 7;
 const RESOLUTION_BITS: u32 = 10;
