@@ -220,7 +220,7 @@ impl Bundle {
             let four_rays = if let Some([a, b, c, d]) = tight.get(four) {
                 [a, b, c, d]
             } else {
-                // Zeros where there are no more: such a ray is none, and what an earlier tile left
+                // Zeros where there are no more: such a ray is none, and what earlier rays left
                 // is gone.
                 let ray = |lane: usize| -> &[u8; 32] {
                     let place = (at + lane < count).then_some(first + at + lane);
@@ -372,7 +372,7 @@ impl Bundle {
         [hit(a), hit(b), hit(c), hit(d)]
     }
 
-    /// Makes of directions what tests of triangles need, which most tiles of an empty part of a
+    /// Makes of directions what tests of triangles need, which most bundles of an empty part of a
     /// picture never ask for; once after the rays were loaded.
     #[inline(always)]
     fn shear<S: Simd>(&mut self, simd: S) {

@@ -1,5 +1,5 @@
-//! Chords around the rays of a tile: between two planes of k all of them lie between a lower one and
-//! an upper one, on u and on v.
+//! Chords around rays that go together: between two planes of k all of them lie between a lower one
+//! and an upper one, on u and on v.
 
 use crate::aabb::{greater, lesser};
 use crate::cell::as_f32;

@@ -1,9 +1,9 @@
-//! What the rays of a tile cannot meet: triangles outside the planes around them.
+//! What rays that go together cannot meet: triangles outside the planes around them.
 //!
-//! A cell is often wider than a tile, and most of its triangles lie beside it. All rays lie between
-//! chords on u and v ([`Bounds`]), each of which is a plane; a triangle whose corners all lie
-//! behind one of them meets no ray. Eight triangles are compared with the planes of the whole tile,
-//! and what is left with those of its four rows of sixteen rays, which are squares of 4 x 4 pixels
+//! A cell is often wider than they are apart, and most of its triangles lie beside them. All rays
+//! lie between chords on u and v ([`Bounds`]), each of which is a plane; a triangle whose corners
+//! all lie behind one of them meets no ray. Eight triangles are compared with the planes around all
+//! rays, and what is left with those of each row of sixteen, which are squares of 4 x 4 pixels
 //! if a tile is in Morton order: half of them are far from a small triangle.
 //!
 //! Hits lie between the planes of k between which the chords hold, wherever the corners lie: behind
@@ -22,7 +22,7 @@ use crate::mesh::Triangle;
 const ROWS: usize = RAYS / WIDTH;
 const PLANES: usize = 4;
 
-/// The planes around the rays of a tile.
+/// The planes around rays that go together.
 #[derive(Debug)]
 pub(super) struct Frusta {
     /// The axes u, v and k.
@@ -111,7 +111,7 @@ impl Frusta {
         }
     }
 
-    /// Those of eight triangles that rays of the tile may meet before a plane of k, as bits.
+    /// Those of eight triangles that rays may meet before a plane of k, as bits.
     #[inline(always)]
     pub(super) fn meet<S: Simd>(&self, simd: S, triangles: &Eight<S>, far: f32) -> u32 {
         let [u, v, k] = below_three(self.axes);

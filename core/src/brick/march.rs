@@ -88,14 +88,14 @@ impl<'a, const ANY: bool, const N: usize> March<'_, 'a, ANY, N> {
         }
         let large = brick.large();
         if !large.is_empty() {
-            self.test(simd, large, self.members());
+            self.test(simd, large, [u64::MAX; N]);
         }
 
         let slice = |plane: f32| whole(plane) / BLOCK;
         for step in slice(planes[0])..=slice(planes[1]).min(brick.width[k] - 1) {
             let corner = as_f32(step * BLOCK);
             let planes = [corner.max(planes[0]), (corner + as_f32(BLOCK)).min(planes[1])];
-            if self.members() == [0; N] {
+            if self.left([u64::MAX; N]) == [0; N] {
                 return true;
             }
             // Which bricks of which blocks lie beside each other on u and v.
@@ -228,8 +228,8 @@ impl<'a, const ANY: bool, const N: usize> March<'_, 'a, ANY, N> {
         }
     }
 
-    /// Tests the triangles of a brick or of all of a part, if the tile comes near the cells where
-    /// they lie. Which of its rays do is not asked: that costs more than it spares.
+    /// Tests the triangles of a brick or of all of a part, if the rays together come near the cells
+    /// where they lie. Which of them do is not asked: that costs more than it spares.
     #[inline(always)]
     fn test_large<S: Simd>(&mut self, simd: S, view: &View<'a>, large: &Large<'a>) {
         let last = view.part.cells - 1;
@@ -272,27 +272,22 @@ impl<'a, const ANY: bool, const N: usize> March<'_, 'a, ANY, N> {
         }
     }
 
-    /// The rays of each bundle that have no hit that is enough.
+    /// Those of some rays that are members and still look for a hit.
     #[inline(always)]
-    fn members(&self) -> [u64; N] {
-        let mut members = [0; N];
-        for (members, bundle) in members.iter_mut().zip(&*self.bundles) {
-            *members = bundle.members;
+    fn left(&self, mut rays: [u64; N]) -> [u64; N] {
+        for (rays, bundle) in rays.iter_mut().zip(&*self.bundles) {
+            *rays &= bundle.members;
         }
-        members
+        rays
     }
 
     /// Tests rays against the triangles of a list.
     #[inline(always)]
-    fn test<S: Simd>(&mut self, simd: S, references: &[u32], mut rays: [u64; N]) {
-        let count = |rays: &[u64; N]| u64::from(count_of(rays));
-        let among = |rays: &mut [u64; N], members: [u64; N]| {
-            rays.iter_mut().zip(members).for_each(|(rays, members)| *rays &= members);
-        };
-        among(&mut rays, self.members());
+    fn test<S: Simd>(&mut self, simd: S, references: &[u32], rays: [u64; N]) {
+        let rays = self.left(rays);
         // Only damaged bytes have an empty list; to look at it costs, too.
-        self.spend(references.len().max(1) as u64 * count(&rays));
-        among(&mut rays, self.members());
+        self.spend(references.len().max(1) as u64 * u64::from(count_of(&rays)));
+        let rays = self.left(rays);
         if rays != [0; N] {
             let list = List { references, format: self.brick.format, mesh: self.mesh };
             self.tests.test::<S, ANY, N>(simd, self.bundles, list, rays);

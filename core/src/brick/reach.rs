@@ -1,4 +1,4 @@
-//! Which rays of a tile meet a cell: rectangles of cells, a byte for each of their sides.
+//! Which rays of a bundle meet a cell: rectangles of cells, a byte for each of their sides.
 //!
 //! Sixty-four rays are compared with a cell at once, so a side is the number of a cell in its part,
 //! which has sixteen on an axis, and not a place.

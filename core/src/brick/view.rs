@@ -1,4 +1,4 @@
-//! A part of the grid as the rays of a tile see it: along the axes u, v and k, from its own corner
+//! A part of the grid as rays that go together see it: along the axes u, v and k, from its own corner
 //! and in its own cells.
 
 use fearless_simd::Simd;
