@@ -7,8 +7,8 @@
 #include <pthread.h>
 #include <string.h>
 
-/* Rays are traced by tiles of 8 x 8 pixels, all rays of a tile in one call. */
-enum { TILE = 8, TILE_PIXELS = TILE * TILE };
+/* Rays are traced by tiles of 16 x 16 pixels, all rays of a tile in one call. */
+enum { TILE = 16, TILE_PIXELS = TILE * TILE };
 
 /* Skies that are partly hidden are brighter, so that one can see what is hidden. */
 static const double OPEN_SKY_GAIN = 2.2;
@@ -165,11 +165,11 @@ static size_t draw_and_count(const shared *s, sample *tile, size_t count)
 /* Every other bit of a number. */
 static int even_bits(int number)
 {
-    return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4);
+    return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4) | (number >> 3 & 8);
 }
 
-/* The rays of a tile, each sixteen of them a square, as hgrid_intersect_n likes them best; at the right
-   and lower edge it may be smaller. */
+/* The rays of a tile in the order that hgrid_intersect_n likes best: each sixteen are a square, each 64,
+   too, and each 128 are two of these side by side. At the right and lower edge a tile may be smaller. */
 static size_t aim(const shared *s, size_t number, sample *tile)
 {
     const picture_job *job = s->job;
