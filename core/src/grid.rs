@@ -32,7 +32,7 @@ use crate::visit::{Ids, Visitor};
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
 /// number of threads may query it at once. Queries never fail, never allocate and never panic;
 /// their steps are bounded by the resolutions (one level: by their sum). A single query's stack is
-/// below 6 KiB, a batch's below 16 KiB.
+/// below 6 KiB, a batch's below 24 KiB.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,

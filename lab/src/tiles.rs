@@ -7,8 +7,8 @@
 //! |  8  9 12 .. |
 //! ```
 //!
-//! That is what the packets of other structures and [`Grid::intersect_n`] like best: a call has four
-//! of the tiles that the grid traces together. The rays of a tile are made when it is its turn, as
+//! That is what the packets of other structures and [`Grid::intersect_n`] like best: a call has two
+//! of the tiles that a grid traces together. The rays of a tile are made when it is its turn, as
 //! a renderer does.
 
 use hgrid_core::{Coherence, Grid, Hit, Ray, Strided, StridedMut};

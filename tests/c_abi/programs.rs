@@ -164,7 +164,7 @@ fn no_thread_gets_in_the_way_of_another() {
     }
 }
 
-/// The header promises 6 KiB for a ray or a point, 16 KiB for a batch, 12 KiB for a build, 96 KiB
+/// The header promises 6 KiB for a ray or a point, 24 KiB for a batch, 12 KiB for a build, 96 KiB
 /// for one with tasks and 8 KiB for a task.
 #[test]
 fn queries_and_builds_take_little_stack() {

@@ -215,7 +215,7 @@ int main(void)
         rays[i] = ray_down((float)(tile % 4) / 4 + u / 32, (float)(tile / 4) / 4 + v / 32);
         rays[i].direction[0] = tile > 4 && i % 7 == 0 ? -3.0f : 0.1f;
         if (crowd >= 0) {
-            /* Two tiles, one between the rays of the other: all of them go together. */
+            /* Two tiles, one between the rays of the other: where they are less than two cells apart they go together. */
             rays[i] = ray_down(CENTER[0] + WIDTH[crowd] * (u / 4 - 1 + (float)(tile % 2) / 8),
                                CENTER[1] + WIDTH[crowd] * (v / 4 - 1));
             /* From among the triangles of the crowd, or all would end in the larger one around it. */

@@ -403,7 +403,7 @@ impl Bundle {
     }
 
     /// How far apart, in cells, this bundle's first ray and the last one of another are half way
-    /// through the grid: the corners of a tile.
+    /// through the grid: the corners of a tile, or members that stand in for them.
     #[inline(always)]
     pub(super) fn distance(&self, other: &Self) -> f32 {
         let half = self.width * 0.5;

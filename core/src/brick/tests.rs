@@ -165,6 +165,37 @@ fn tiles_that_test_nothing_are_answered_at_once() {
     assert!(rays.iter().map(|ray| grid.occluded(ray)).eq(occluded));
 }
 
+/// Rays that end before the grid test nothing; beside others that hit, they go with these where
+/// all are close.
+#[test]
+#[cfg_attr(miri, ignore = "hours")]
+fn bundles_go_together_where_they_are_close() {
+    let (positions, indices) = soup(3000);
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    let sizes = sizes_with(&mesh, &config(), &mut [], &Control::SERIAL).unwrap();
+    let [mut index, mut scratch] = regions(sizes.index_bytes, sizes.scratch_bytes);
+    let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
+    let grid = Grid::build(mesh, &config(), index, scratch).unwrap();
+    for (apart, are_together) in [(0.0001, true), (0.1, false)] {
+        let rays: Vec<_> = (0..128_u8)
+            .map(|ray| {
+                let [u, v] = [ray % 8, ray / 8].map(|at| 0.3 + apart * f32::from(at));
+                let t_max = if ray < 64 { f32::INFINITY } else { 0.5 };
+                Ray { t_max, ..Ray::new([u, v, -2.0], [0.0, 0.0, 1.0]) }
+            })
+            .collect();
+        let (mut lengths, mut hits) = (Vec::new(), Vec::new());
+        if !grid.tiles::<false>(&Strided::new(&rays), |first, found| {
+            lengths.push((first, found.len()));
+            hits.extend_from_slice(found);
+        }) {
+            return;
+        }
+        assert_eq!(lengths.contains(&(64, 64)), !are_together, "{apart}: {lengths:?}");
+        assert!(hits[..64] != [Hit::MISS; 64] && hits[64..] == [Hit::MISS; 64]);
+    }
+}
+
 /// With few triangles and with many: ids leave room for all quarters, for some, for halves, for
 /// some halves or for nothing ([`quarters`](super::quarters)).
 #[test]

@@ -5,7 +5,7 @@ use hgrid_core::{Grid, Ray, TriangleMesh};
 
 use crate::random::Random;
 
-/// No fuzzer needs more at once: two tiles and a ray.
+/// No fuzzer needs more at once: a tile of two bundles and two rays.
 const MOST: usize = if cfg!(miri) { 9 } else { 130 };
 
 /// How the numbers of a ray are chosen.
