@@ -7,6 +7,7 @@ use hgrid_core::{
 };
 
 use super::limits;
+use super::rays::close;
 use crate::copy::Copy;
 use crate::oracle;
 
@@ -79,16 +80,24 @@ pub fn ends(grid: &Grid<'_>, rays: &[Ray]) {
     let statistics = grid.inspect();
     assert!(statistics.reference_count <= most.primitive_tests, "{statistics:?}");
     for coherence in COHERENCES {
-        let (hits, occluded) = batch(grid, rays, coherence);
-        for (ray, (hit, occluded)) in rays.iter().zip(hits.iter().zip(occluded)) {
-            let is_miss = bits(hit) == bits(&Hit::MISS);
-            // Tiles do not ask whether a ray meets the box: a damaged one
-            // may lie beside its triangles.
-            let is_hit = hit.primitive < grid.mesh().triangle_count()
-                && (ray.t_min..=ray.t_max).contains(&hit.t);
-            assert!(is_miss || is_hit, "{coherence:?} {hit:?} {ray:?}");
-            assert!(occluded <= 1, "{coherence:?} {ray:?}");
-        }
+        many(grid, rays, coherence);
+    }
+    // What none of the others may be: all in a few cells, so that two bundles go together.
+    many(grid, &close(grid), Coherence::Coherent);
+}
+
+/// Asks about many rays at once: of every ray it is said that it hits a triangle that there is,
+/// where the ray is, or nothing.
+fn many(grid: &Grid<'_>, rays: &[Ray], coherence: Coherence) {
+    let (hits, occluded) = batch(grid, rays, coherence);
+    for (ray, (hit, occluded)) in rays.iter().zip(hits.iter().zip(occluded)) {
+        let is_miss = bits(hit) == bits(&Hit::MISS);
+        // Tiles do not ask whether a ray meets the box: a damaged one
+        // may lie beside its triangles.
+        let is_hit = hit.primitive < grid.mesh().triangle_count()
+            && (ray.t_min..=ray.t_max).contains(&hit.t);
+        assert!(is_miss || is_hit, "{coherence:?} {hit:?} {ray:?}");
+        assert!(occluded <= 1, "{coherence:?} {ray:?}");
     }
 }
 

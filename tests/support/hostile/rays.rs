@@ -85,7 +85,7 @@ impl Shot {
             }
             Kind::Tile { at, towards, spread, count } => {
                 let (origin, towards) = (around(grid, at), towards.map(f32::from));
-                for pixel in 0..count % 65 {
+                for pixel in 0..count % 129 {
                     let [x, y] =
                         [pixel % 8, pixel / 8].map(|i| f32::from(i) * f32::from(spread) / 32.0);
                     let [a, b, c] = towards;
@@ -105,6 +105,17 @@ impl Shot {
             }
         }
     }
+}
+
+/// A full tile of rays through the middle of the grid's box, from a corner on: closer to each
+/// other than any two cells.
+pub(super) fn close(grid: &Grid<'_>) -> [Ray; 128] {
+    let (from, to) = (around(grid, [-96, -80, -48]), around(grid, [0; 3]));
+    std::array::from_fn(|ray| {
+        let [x, y] = [ray % 8, ray / 8].map(|i| 1e-4 * i as f32);
+        let [a, b, c] = std::array::from_fn(|k| to[k] - from[k]);
+        Ray::new(from, [a + x * b, b + y * c, c - x * a])
+    })
 }
 
 /// A place in the grid's box, or around it as far as the box is wide.
