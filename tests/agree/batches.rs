@@ -1,6 +1,8 @@
 //! Many rays at once answer as each of them alone, bit for bit: whatever the caller says of them,
 //! however they lie in memory, with every kind of vectors.
 
+use std::ops::Range;
+
 use hgrid_core::{
     BatchField, Coherence, Config, Error, Grid, Hit, Method, Ray, SimdLevel, Strided, StridedMut,
 };
@@ -37,6 +39,9 @@ fn close(bounds: ([f32; 3], [f32; 3]), view: View, size: u16, [left, top]: [u16;
 
 /// Rays in the pieces of large pictures, which come first.
 const CLOSE: usize = 40 * 128;
+
+/// Those of them of which one half has ends of its own.
+const LIMITED: Range<usize> = 28 * 128..36 * 128;
 
 /// What no kernel for many rays may stumble over.
 fn odd_rays() -> Vec<Ray> {
@@ -84,6 +89,7 @@ fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
         }
     }
     // One half ends before the other, or starts behind its end.
+    assert_eq!(rays.len(), LIMITED.start);
     for at in 1..9_u16 {
         let mut piece = close(bounds, View::Front, 512, [40 * at + 70, 230]);
         let (near, far) = piece.split_at_mut(64);
@@ -93,6 +99,7 @@ fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
         far.iter_mut().filter(|_| at > 4).for_each(|ray| ray.t_min = end);
         rays.extend(piece);
     }
+    assert_eq!(rays.len(), LIMITED.end);
     // Rays that start and end anywhere, and strangers among them.
     for at in [700, 900, 1100, 1300] {
         let mut piece = close(bounds, View::Front, 2048, [at, 1000]);
@@ -180,13 +187,13 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
         }
         let hits = expected.iter().filter(|hit| **hit != Hit::MISS).count();
         assert!(hits > 200 && hits < rays.len() - 200, "{hits} of {}", rays.len());
-        // Where one half has ends of its own, they lie among the triangles.
-        let limited = (28 * 128..36 * 128).filter(|&i| {
+        // Ends that one half alone has lie among the triangles.
+        let limited = LIMITED.filter(|&i| {
             let whole = Ray::new(rays[i].origin, rays[i].direction);
             grid.intersect(&whole).unwrap_or(Hit::MISS) != expected[i]
         });
         let limited = limited.count();
-        let met = expected[28 * 128..36 * 128].iter().filter(|hit| **hit != Hit::MISS).count();
+        let met = expected[LIMITED].iter().filter(|hit| **hit != Hit::MISS).count();
         assert!(limited > 100 && met > 200, "{limited} {met}");
         // Other methods have no vectors in them.
         let levels =

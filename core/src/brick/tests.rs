@@ -120,17 +120,36 @@ fn bits_do_not_depend_on_the_tasks_nor_on_their_order() {
     }
 }
 
-/// Tiles of 64 rays on a mesh, beside it, on it from another side, and a part of one beside it.
-#[test]
-#[cfg_attr(miri, ignore = "hours")]
-fn tiles_that_test_nothing_are_answered_at_once() {
+/// Shows the grid of a soup.
+fn on_soup(ask: impl FnOnce(&Grid<'_>)) {
     let (positions, indices) = soup(3000);
     let mesh = TriangleMesh::new(&positions, &indices).unwrap();
     let sizes = sizes_with(&mesh, &config(), &mut [], &Control::SERIAL).unwrap();
     let [mut index, mut scratch] = regions(sizes.index_bytes, sizes.scratch_bytes);
     let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
     let grid = Grid::build(mesh, &config(), index, scratch).unwrap();
+    ask(&grid);
+}
 
+/// The first ray of each run of answers and how many they are.
+type Runs = Vec<(usize, usize)>;
+
+/// What tiles answer; `None` on a machine without vectors.
+fn traced<const ANY: bool>(grid: &Grid<'_>, rays: &[Ray]) -> Option<(Runs, Vec<Hit>)> {
+    let (mut lengths, mut hits) = (Vec::new(), Vec::new());
+    let is_done = grid.tiles::<ANY>(&Strided::new(rays), |first, found| {
+        assert_eq!(first, hits.len());
+        lengths.push((first, found.len()));
+        hits.extend_from_slice(found);
+    });
+    assert_eq!(is_done, HAS_VECTORS);
+    is_done.then_some((lengths, hits))
+}
+
+/// Tiles of 64 rays on a mesh, beside it, on it from another side, and a part of one beside it.
+#[test]
+#[cfg_attr(miri, ignore = "hours")]
+fn tiles_that_test_nothing_are_answered_at_once() {
     let tile = |side: f32, axis: usize| {
         (0..64_u8).map(move |ray| {
             let [u, v] = [ray % 8, ray / 8].map(|at| side + 0.05 * f32::from(at));
@@ -142,27 +161,19 @@ fn tiles_that_test_nothing_are_answered_at_once() {
     };
     let rays = tile(0.3, 0).chain(tile(3.0, 0)).chain(tile(0.3, 1)).chain(tile(3.0, 0).take(40));
     let rays: Vec<_> = rays.collect();
-    let (mut lengths, mut hits) = (Vec::new(), Vec::new());
-    let is_done = grid.tiles::<false>(&Strided::new(&rays), |first, found| {
-        assert_eq!(first, hits.len());
-        lengths.push((first, found.len()));
-        hits.extend_from_slice(found);
-    });
-    assert_eq!(is_done, HAS_VECTORS);
-    if !HAS_VECTORS {
-        return;
-    }
-    let alone: Vec<_> = rays.iter().map(|ray| grid.intersect(ray).unwrap_or(Hit::MISS)).collect();
-    assert_eq!(hits, alone);
-    assert!(alone[..64] != [Hit::MISS; 64] && alone[128..192] != [Hit::MISS; 64]);
-    assert!(lengths.contains(&(64, 64)) && lengths.contains(&(192, 40)), "{lengths:?}");
-    assert!(!lengths.contains(&(0, 64)) && !lengths.contains(&(128, 64)));
+    on_soup(|grid| {
+        let Some((lengths, hits)) = traced::<false>(grid, &rays) else { return };
+        let alone: Vec<_> =
+            rays.iter().map(|ray| grid.intersect(ray).unwrap_or(Hit::MISS)).collect();
+        assert_eq!(hits, alone);
+        assert!(alone[..64] != [Hit::MISS; 64] && alone[128..192] != [Hit::MISS; 64]);
+        assert!(lengths.contains(&(64, 64)) && lengths.contains(&(192, 40)), "{lengths:?}");
+        assert!(!lengths.contains(&(0, 64)) && !lengths.contains(&(128, 64)));
 
-    let mut occluded = Vec::new();
-    grid.tiles::<true>(&Strided::new(&rays), |_, found| {
-        occluded.extend(found.iter().map(|hit| *hit != Hit::MISS));
+        let Some((_, occluded)) = traced::<true>(grid, &rays) else { return };
+        let occluded = occluded.iter().map(|hit| *hit != Hit::MISS);
+        assert!(rays.iter().map(|ray| grid.occluded(ray)).eq(occluded));
     });
-    assert!(rays.iter().map(|ray| grid.occluded(ray)).eq(occluded));
 }
 
 /// Rays that end before the grid test nothing; beside others that hit, they go with these where
@@ -170,30 +181,19 @@ fn tiles_that_test_nothing_are_answered_at_once() {
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn bundles_go_together_where_they_are_close() {
-    let (positions, indices) = soup(3000);
-    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
-    let sizes = sizes_with(&mesh, &config(), &mut [], &Control::SERIAL).unwrap();
-    let [mut index, mut scratch] = regions(sizes.index_bytes, sizes.scratch_bytes);
-    let (index, scratch) = (Memory::bytes_mut(&mut index), Memory::bytes_mut(&mut scratch));
-    let grid = Grid::build(mesh, &config(), index, scratch).unwrap();
-    for (apart, are_together) in [(0.0001, true), (0.1, false)] {
-        let rays: Vec<_> = (0..128_u8)
-            .map(|ray| {
+    on_soup(|grid| {
+        for (apart, are_together) in [(0.0001, true), (0.1, false)] {
+            let ray = |ray: u8| {
                 let [u, v] = [ray % 8, ray / 8].map(|at| 0.3 + apart * f32::from(at));
                 let t_max = if ray < 64 { f32::INFINITY } else { 0.5 };
                 Ray { t_max, ..Ray::new([u, v, -2.0], [0.0, 0.0, 1.0]) }
-            })
-            .collect();
-        let (mut lengths, mut hits) = (Vec::new(), Vec::new());
-        if !grid.tiles::<false>(&Strided::new(&rays), |first, found| {
-            lengths.push((first, found.len()));
-            hits.extend_from_slice(found);
-        }) {
-            return;
+            };
+            let rays: Vec<_> = (0..128).map(ray).collect();
+            let Some((lengths, hits)) = traced::<false>(grid, &rays) else { return };
+            assert_eq!(lengths.contains(&(64, 64)), !are_together, "{apart}: {lengths:?}");
+            assert!(hits[..64] != [Hit::MISS; 64] && hits[64..] == [Hit::MISS; 64]);
         }
-        assert_eq!(lengths.contains(&(64, 64)), !are_together, "{apart}: {lengths:?}");
-        assert!(hits[..64] != [Hit::MISS; 64] && hits[64..] == [Hit::MISS; 64]);
-    }
+    });
 }
 
 /// With few triangles and with many: ids leave room for all quarters, for some, for halves, for

@@ -107,8 +107,8 @@ impl Shot {
     }
 }
 
-/// A full tile of rays through the middle of the grid's box, from a corner on: closer to each
-/// other than any two cells.
+/// A full tile of rays from beside the grid's box through its middle: a thousandth of the way
+/// apart, so that they are in the same cells of all but the finest grids.
 pub(super) fn close(grid: &Grid<'_>) -> [Ray; 128] {
     let (from, to) = (around(grid, [-96, -80, -48]), around(grid, [0; 3]));
     std::array::from_fn(|ray| {
