@@ -20,8 +20,8 @@ static void make_mesh(void)
     for (uint32_t y = 0; y <= WIDE; y++)
         for (uint32_t x = 0; x <= WIDE; x++) {
             float *p = positions[y * (WIDE + 1) + x];
-            p[0] = (float)x / WIDE;
-            p[1] = (float)y / WIDE;
+            p[0] = (float)x / (float)WIDE;
+            p[1] = (float)y / (float)WIDE;
             p[2] = (float)((x * 5 + y * 3) % 7) / 70;
         }
     for (uint32_t y = 0; y < WIDE; y++)

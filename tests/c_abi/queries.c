@@ -236,7 +236,7 @@ static void rays_leave_the_surface_where_they_start(void)
             const hgrid_ray on = {{at.below[0], at.below[1], at.below[2]}, 0,
                                   {ray.direction[0], ray.direction[1], ray.direction[2]}, INFINITY};
             CHECK(!hgrid_intersect(&grid, &on, NULL, &other) || other.primitive != hit.primitive);
-            hit.primitive = found % 2 == 0 ? TRIANGLES : HGRID_INVALID_ID;
+            hit.primitive = found % 2 == 0 ? (uint32_t)TRIANGLES : HGRID_INVALID_ID;
             memset(&at, 0xc7, sizeof at);
             CHECK(!hgrid_surface_at(&grid, &ray, &hit, &at));
             CHECK(all_bytes_are(&at, sizeof at, 0xc7));
