@@ -7,7 +7,7 @@ use std::process::Command;
 use hgrid_core::{
     Coherence, Config, Counters, Grid, Hit, QueryOptions, Ray, Strided, StridedMut, Verdict,
 };
-use hgrid_tests::artefact::{compiler, is_installed, root, run, static_library, warnings};
+use hgrid_tests::artefact::{clang, compiler, cpp_compiler, root, run, static_library};
 use hgrid_tests::owned::Owned;
 use tempfile::TempDir;
 
@@ -124,19 +124,18 @@ fn rust_c_and_cpp_answer_as_brute_force_does() {
     fs::write(&table, bytes(&cases, built)).expect("a file");
 
     let sanitized: Vec<_> = SANITIZERS.into_iter().chain(["-O1"]).collect();
-    let mut counts = vec![
-        ask(compiler("c99"), "answers.c", &sanitized, &table),
-        ask(compiler("c++17"), "answers.c", &["-O2"], &table),
-        ask(compiler("c++17"), "answers.cpp", &sanitized, &table),
+    let strict = ["-O2", "-fno-exceptions", "-fno-rtti"];
+    let askers = [
+        (Some(compiler("c99")), "answers.c", &sanitized[..]),
+        (cpp_compiler("c++17"), "answers.c", &["-O2"]),
+        (cpp_compiler("c++17"), "answers.cpp", &sanitized),
+        (clang("c17"), "answers.c", &["-O2"]),
+        (clang("c++20"), "answers.cpp", &strict),
     ];
-    if is_installed("clang") {
-        let clang = |name: &str, dialect| warnings(Command::new(name), dialect);
-        counts.push(ask(clang("clang", "c17"), "answers.c", &["-O2"], &table));
-        if is_installed("clang++") {
-            let flags = ["-O2", "-fno-exceptions", "-fno-rtti"];
-            counts.push(ask(clang("clang++", "c++20"), "answers.cpp", &flags, &table));
-        }
-    }
+    let askers = askers
+        .into_iter()
+        .filter_map(|(compiler, source, flags)| Some(ask(compiler?, source, flags, &table)));
+    let counts: Vec<_> = askers.collect();
     // All of them asked everything.
     assert!(counts[0] > 500_000 && counts.iter().all(|count| *count == counts[0]), "{counts:?}");
 }

@@ -4,7 +4,8 @@
 use std::fs;
 use std::process::Command;
 
-use hgrid_tests::artefact::{Flavour, compiler, is_installed, run, warnings};
+use hgrid_tests::artefact::{Flavour, compiler, compilers, run};
+use hgrid_tests::tools::{command, is_installed};
 use tempfile::TempDir;
 
 use crate::header::{examples, seen_by};
@@ -18,7 +19,7 @@ fn it_leaks_nothing() {
     let dir = TempDir::new().expect("a folder");
     let program =
         compile("create", compiler("c99"), &[], &Flavour::Std.static_library(), dir.path());
-    let mut valgrind = Command::new("valgrind");
+    let mut valgrind = command("valgrind");
     valgrind.args(["--quiet", "--error-exitcode=99", "--leak-check=full"]);
     run(valgrind.args(["--show-leak-kinds=all", "--errors-for-leak-kinds=all"]).arg(program));
 }
@@ -34,8 +35,7 @@ fn its_example_runs_by_every_compiler() {
     let dir = TempDir::new().expect("a folder");
     let [source, program] = ["example.c", "example"].map(|name| dir.path().join(name));
     fs::write(&source, include_str!("created.c").replace("FUNCTIONS", example)).expect("a file");
-    let clang = is_installed("clang").then(|| warnings(Command::new("clang"), "c99"));
-    for mut compiler in [compiler("c99")].into_iter().chain(clang) {
+    for mut compiler in compilers("c99") {
         compiler.arg(&source).arg(Flavour::Std.static_library()).arg("-o").arg(&program);
         run(&mut compiler);
         run(&mut Command::new(&program));

@@ -6,11 +6,11 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use hgrid_core::{Config, Method, Sizes};
-use hgrid_tests::artefact::{Flavour, compiler, is_installed, root, run, static_library, warnings};
+use hgrid_tests::artefact::{Flavour, compiler, compilers, is_cpp, root, run, static_library};
 use tempfile::TempDir;
 
 /// The dialects that renderers are written in.
-const DIALECTS: [&str; 7] = ["c99", "c11", "c17", "c++11", "c++14", "c++17", "c++20"];
+pub(crate) const DIALECTS: [&str; 7] = ["c99", "c11", "c17", "c++11", "c++14", "c++17", "c++20"];
 
 /// The committed header.
 pub(crate) fn committed() -> String {
@@ -173,13 +173,9 @@ fn its_macros_give_no_warning_in_any_dialect() {
 
 /// Shows `visit` each compiler in each dialect with the language's name.
 fn for_every_compiler(mut visit: impl FnMut(&mut Command, &str)) {
-    let has_clang = is_installed("clang");
     for dialect in DIALECTS {
-        let language = if dialect.starts_with("c++") { "c++" } else { "c" };
-        visit(&mut compiler(dialect), language);
-        if has_clang {
-            visit(&mut warnings(Command::new("clang"), dialect), language);
-        }
+        let language = if is_cpp(dialect) { "c++" } else { "c" };
+        compilers(dialect).for_each(|mut compiler| visit(&mut compiler, language));
     }
 }
 

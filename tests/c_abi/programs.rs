@@ -6,13 +6,13 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock};
 use std::{env, fs, thread};
 
 use hgrid_tests::artefact::{
-    Flavour, compiler, is_installed, library_dir, output, root, run, static_library, warnings,
+    Flavour, clang, compiler, cpp_compiler, library_dir, output, root, run, static_library,
 };
+use hgrid_tests::tools::{command, is_installed, skip};
 use tempfile::TempDir;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
@@ -58,11 +58,6 @@ pub(crate) fn compile(
     program
 }
 
-/// A compiler by its name, if it is there, or else the usual one.
-fn other_compiler(name: &str, dialect: &str) -> Command {
-    if is_installed(name) { warnings(Command::new(name), dialect) } else { compiler(dialect) }
-}
-
 /// The programs compiled plainly, for whoever only wants to run them.
 pub(crate) fn plain() -> impl Iterator<Item = (PathBuf, Flavour)> {
     static DIR: OnceLock<PathBuf> = OnceLock::new();
@@ -87,11 +82,11 @@ fn they_pass_as_c99_with_sanitizers() {
 }
 
 #[test]
-fn they_pass_as_cpp_by_clang_with_the_larger_flavour() {
+fn they_pass_as_cpp_with_the_larger_flavour() {
     let dir = TempDir::new().expect("a folder");
     for (name, _) in PROGRAMS {
         let (flags, library) = (["-DHGRID_STD"], Flavour::Std.static_library());
-        let compiler = other_compiler("clang++", "c++17");
+        let Some(compiler) = clang("c++17").or_else(|| cpp_compiler("c++17")) else { return };
         run(&mut Command::new(compile(name, compiler, &flags, &library, dir.path())));
     }
 }
@@ -102,7 +97,7 @@ fn they_pass_as_cpp_by_clang_with_the_larger_flavour() {
 fn they_pass_with_the_shared_libraries() {
     let dir = TempDir::new().expect("a folder");
     for (name, flavour) in PROGRAMS {
-        let compiler = other_compiler("clang", "c11");
+        let compiler = clang("c11").unwrap_or_else(|| compiler("c11"));
         let program = compile(name, compiler, &[], &flavour.shared_library(), dir.path());
         for library in [flavour, Flavour::Std] {
             run(Command::new(&program).env("LD_LIBRARY_PATH", library.dir()));
@@ -110,18 +105,27 @@ fn they_pass_with_the_shared_libraries() {
     }
 }
 
-/// Runs all programs in valgrind, as many at once as there are cores: it is slow.
-fn run_in_valgrind(programs: &[PathBuf], options: &[&str]) {
-    let next = AtomicUsize::new(0);
+/// Runs all commands, as many at once as there are cores.
+fn run_side_by_side(commands: Vec<Command>) {
+    let commands = Mutex::new(commands);
+    let next = || commands.lock().expect("no thread panics while it takes one").pop();
     let work = || {
-        while let Some(program) = programs.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let mut valgrind = Command::new("valgrind");
-            valgrind.args(["--quiet", "--error-exitcode=99"]).args(options).arg(program);
-            run(&mut valgrind);
+        while let Some(mut command) = next() {
+            run(&mut command);
         }
     };
     let count = thread::available_parallelism().map_or(1, usize::from);
     thread::scope(|scope| (0..count).for_each(|_| drop(scope.spawn(work))));
+}
+
+/// Runs all programs in valgrind, which is slow.
+fn run_in_valgrind(programs: &[PathBuf], options: &[&str]) {
+    let valgrind = programs.iter().map(|program| {
+        let mut valgrind = command("valgrind");
+        valgrind.args(["--quiet", "--error-exitcode=99"]).args(options).arg(program);
+        valgrind
+    });
+    run_side_by_side(valgrind.collect());
 }
 
 #[test]
@@ -147,17 +151,20 @@ fn no_thread_gets_in_the_way_of_another() {
     let flags = ["-fsanitize=thread"];
     let [source, empty] = ["empty.c", "empty"].map(|name| dir.path().join(name));
     fs::write(&source, "int main(void) { return 0; }\n").expect("a file");
-    let compilers: [fn() -> Command; 2] = [|| compiler("c99"), || other_compiler("clang", "c99")];
-    for compiler in compilers {
-        if !output(compiler().args(flags).arg(&source).arg("-o").arg(&empty)).status.success() {
-            println!("skipped: a compiler without ThreadSanitizer (for clang: libclang-rt-dev)");
+    let usual: fn() -> Option<Command> = || Some(compiler("c99"));
+    let clang: fn() -> Option<Command> =
+        || if is_installed("libclang-rt") { clang("c99") } else { None };
+    for compiler in [usual, clang] {
+        let (Some(mut check), Some(compiler)) = (compiler(), compiler()) else { continue };
+        if !output(check.args(flags).arg(&source).arg("-o").arg(&empty)).status.success() {
+            skip("a compiler without ThreadSanitizer (for clang: libclang-rt-dev)");
             continue;
         }
-        let program = compile("threads", compiler(), &flags, &static_library(), dir.path());
+        let program = compile("threads", compiler, &flags, &static_library(), dir.path());
         let output = output(&mut Command::new(program));
         let said = String::from_utf8_lossy(&output.stderr);
         if said.contains("unexpected memory mapping") {
-            println!("skipped: ThreadSanitizer cannot run on this kernel");
+            skip("ThreadSanitizer cannot run on this kernel");
             continue;
         }
         assert!(output.status.success(), "{said}");

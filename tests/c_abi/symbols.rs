@@ -6,10 +6,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use hgrid_tests::artefact::{
-    Flavour, cargo_in, compiler, is_installed, root, run, static_library, target_dir,
-};
+use hgrid_tests::artefact::{Flavour, cargo_in, compiler, root, run, static_library, target_dir};
 use hgrid_tests::symbols::{extract_ours, symbols, symbols_of_ours};
+use hgrid_tests::tools::{command, is_installed};
 use tempfile::TempDir;
 
 use crate::header::functions;
@@ -41,8 +40,7 @@ fn exports(flavour: Flavour) -> BTreeSet<String> {
 fn callers(archive: &Path, words: &[&str]) -> String {
     let dir = TempDir::new().expect("a folder");
     let object = extract_ours(archive, dir.path());
-    let code =
-        run(Command::new("objdump").args(["-drlC", "--no-show-raw-insn"]).arg(object)).stdout;
+    let code = run(command("objdump").args(["-drlC", "--no-show-raw-insn"]).arg(object)).stdout;
     let (mut function, mut place, mut found) = ("", "", BTreeSet::new());
     let code = String::from_utf8_lossy(&code);
     for line in code.lines() {
@@ -75,7 +73,7 @@ fn the_committed_list_is_what_the_header_declares() {
 
 #[test]
 fn both_flavours_export_what_is_listed_and_no_more() {
-    if !is_installed("nm") {
+    if !is_installed("binutils") {
         return;
     }
     for flavour in Flavour::ALL {
@@ -88,7 +86,7 @@ fn both_flavours_export_what_is_listed_and_no_more() {
 
 #[test]
 fn the_static_libraries_need_nothing_but_memory() {
-    if !is_installed("nm") {
+    if !is_installed("binutils") {
         return;
     }
     for flavour in Flavour::ALL {
@@ -100,7 +98,7 @@ fn the_static_libraries_need_nothing_but_memory() {
 
 /// Fails if a library has a symbol with one of the words, and says from where it is called.
 fn has_none(words: &[&str]) {
-    if !is_installed("nm") {
+    if !is_installed("binutils") {
         return;
     }
     for flavour in Flavour::ALL {
@@ -148,12 +146,12 @@ fn neither_flavour_asks_for_a_library() {
 /// meet, so with others for these the second copy lies beside the first.
 #[test]
 fn two_copies_in_one_program_do_not_clash() {
-    if !is_installed("objcopy") {
+    if !is_installed("binutils") {
         return;
     }
     let dir = TempDir::new().expect("a folder");
     let [copy, program] = ["copy.o", "copies"].map(|name| dir.path().join(name));
-    let mut objcopy = Command::new("objcopy");
+    let mut objcopy = command("objcopy");
     for function in functions(Flavour::NoStd) {
         objcopy.arg("--redefine-sym").arg(format!("{function}=other_{function}"));
     }
@@ -198,7 +196,7 @@ fn the_library_of_another_vendor_in_rust_does_not_clash() {
 
 #[test]
 fn the_shared_libraries_need_nothing_but_libc() {
-    if !is_installed("nm") {
+    if !is_installed("binutils") {
         return;
     }
     for flavour in Flavour::ALL {

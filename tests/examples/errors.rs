@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use hgrid_tests::tools::skip;
 use tempfile::TempDir;
 
 use crate::pictures::{ascii, binary};
@@ -77,7 +78,7 @@ fn a_full_disk_is_noticed() {
         let said = refusal(watched_raytracer().arg(path).args(["-o", "/dev/full"]));
         assert!(said.contains("/dev/full: cannot be written to the end"), "{said}");
     } else {
-        println!("skipped: this system has no /dev/full");
+        skip("this system has no /dev/full");
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use hgrid_tests::artefact::run;
+use hgrid_tests::tools::skip;
 use tempfile::TempDir;
 
 use crate::pictures::ascii;
@@ -76,7 +77,7 @@ fn it_says_what_is_wrong_and_leaves_no_file() {
 #[test]
 fn a_full_disk_is_noticed() {
     if !Path::new("/dev/full").exists() {
-        println!("skipped: this system has no /dev/full");
+        skip("this system has no /dev/full");
         return;
     }
     let dir = TempDir::new().expect("a folder");

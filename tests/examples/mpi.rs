@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use hgrid_tests::artefact::{is_installed, output, root, run, warnings};
+use hgrid_tests::artefact::{output, root, run, warnings};
+use hgrid_tests::tools::{command, is_installed};
 use tempfile::TempDir;
 
 use crate::pictures::ascii;
@@ -12,23 +13,23 @@ use crate::programs::{drawing, link, printed, raytracer};
 
 /// The program, if there is an MPI to build it with.
 fn mpi(dir: &Path) -> Option<PathBuf> {
-    if !is_installed("mpicc") || !is_installed("mpirun") {
+    if !is_installed("mpi") {
         return None;
     }
     let program = dir.join("mpi");
-    link(warnings(Command::new("mpicc"), "c99"), &drawing(&["mpi.c"]), &[], &program);
+    link(warnings(command("mpicc"), "c99"), &drawing(&["mpi.c"]), &[], &program);
     Some(program)
 }
 
 /// So many ranks on this machine, however few cores it has and whoever runs the test.
 fn ranks(count: u32, program: &Path) -> Command {
-    let mut command = Command::new("mpirun");
-    command.args(["-n", &count.to_string()]).arg(program).current_dir(root());
-    command
+    let mut mpirun = command("mpirun");
+    mpirun.args(["-n", &count.to_string()]).arg(program).current_dir(root());
+    mpirun
         .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
-    command
+    mpirun
 }
 
 /// The mesh and the grid of the built-in scene are several pieces each.

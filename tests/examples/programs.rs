@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use hgrid_tests::artefact::{compiler, is_installed, output, root, run, static_library, warnings};
+use hgrid_tests::artefact::{compiler, compilers, output, root, run, static_library};
 use tempfile::TempDir;
 
 /// What draws, in every program that does.
@@ -105,12 +105,8 @@ pub(crate) fn printed(program: &mut Command) -> String {
 fn no_compiler_warns_about_them() {
     let sources = drawing(&["minimal.c", "raytracer.c", "heat.c", "mapped.c"]);
     let dir = TempDir::new().expect("a folder");
-    for name in ["gcc", "clang"] {
-        if !is_installed(name) {
-            continue;
-        }
-        for dialect in ["c99", "c17"] {
-            let mut compiler = warnings(Command::new(name), dialect);
+    for dialect in ["c99", "c17"] {
+        for mut compiler in compilers(dialect) {
             compiler.current_dir(dir.path()).args(["-O2", "-Wconversion", "-c"]);
             run(compiler.args(&sources));
         }

@@ -2,7 +2,8 @@
 
 use std::process::Command;
 
-use hgrid_tests::artefact::{is_installed, run};
+use hgrid_tests::artefact::run;
+use hgrid_tests::tools::{command, is_installed};
 use tempfile::TempDir;
 
 use crate::programs::raytracer;
@@ -38,7 +39,7 @@ fn a_terminal_gets_a_line_that_changes() {
     let (program, _dir) = small();
     let words = [program.get_program()].into_iter().chain(program.get_args());
     let words: Vec<_> = words.map(|word| word.to_str().expect("text")).collect();
-    let mut script = Command::new("script");
+    let mut script = command("script");
     let typescript = run(script.args(["-qec", &words.join(" "), "/dev/null"]));
     let said = String::from_utf8(typescript.stdout).expect("text");
     assert!(said.contains("\rbuild 100 %\r\n"), "{said:?}");

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use hgrid_tests::artefact::{output, run};
+use hgrid_tests::tools::skip;
 use tempfile::TempDir;
 
 use crate::pictures::ascii;
@@ -48,7 +49,7 @@ fn its_threads_do_not_race() {
     let output = output(&mut raytracer);
     let said = String::from_utf8_lossy(&output.stderr);
     if said.contains("unexpected memory mapping") {
-        println!("skipped: ThreadSanitizer cannot run on this kernel");
+        skip("ThreadSanitizer cannot run on this kernel");
         return;
     }
     assert!(output.status.success() && !said.contains("ThreadSanitizer"), "{said}");

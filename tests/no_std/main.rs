@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use hgrid_tests::artefact::{cargo_in, run, target_dir};
 use hgrid_tests::readme::check_sizes;
+use hgrid_tests::tools::{command, is_installed, skip};
 use tempfile::TempDir;
 
 /// How long `rustup` may take to fetch a target.
@@ -29,9 +30,12 @@ fn rustlib(target: &str) -> PathBuf {
 
 /// Whether Rust can build for a target. If it cannot, the test says so and ends.
 fn is_available(target: &str) -> bool {
+    if !is_installed("rust-targets") {
+        return false;
+    }
     let libraries = rustlib(target).join("lib");
     if !libraries.is_dir() && !is_fetched(target) {
-        println!("skipped: no Rust libraries for {target}, and rustup did not bring them");
+        skip(&format!("no Rust libraries for {target}, and rustup did not bring them"));
         return false;
     }
     true
@@ -39,10 +43,11 @@ fn is_available(target: &str) -> bool {
 
 /// Asks rustup for a target, once and not for long.
 fn is_fetched(target: &str) -> bool {
-    let Ok(mut rustup) = Command::new("rustup").args(["--quiet", "target", "add", target]).spawn()
-    else {
+    if !is_installed("rustup") {
         return false;
-    };
+    }
+    let mut rustup = command("rustup");
+    let mut rustup = rustup.args(["--quiet", "target", "add", target]).spawn().expect("rustup");
     let start = Instant::now();
     while start.elapsed() < PATIENCE {
         if let Some(status) = rustup.try_wait().expect("a child can be asked") {
@@ -84,7 +89,7 @@ fn check_flash(row: &str, archive: &Path) {
     let host = rustc("host-tuple");
     let linker = rustlib(&host).join("bin/rust-lld");
     if !linker.is_file() {
-        println!("skipped: no linker comes with Rust for {host}");
+        skip(&format!("no linker comes with Rust for {host}"));
         return;
     }
     let dir = TempDir::new().expect("a folder");

@@ -5,8 +5,9 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hgrid_tests::artefact::{Flavour, is_installed, root};
+use hgrid_tests::artefact::{Flavour, root};
 use hgrid_tests::symbols::{symbols, symbols_of_ours};
+use hgrid_tests::tools::is_installed;
 
 use crate::prefix::{VERSION, assets, dynamic, files, installed};
 
@@ -55,7 +56,7 @@ fn cargo_c_installs_what_is_listed_and_no_more() {
 #[test]
 fn the_shared_library_has_the_name_of_its_compatible_versions() {
     let Some(prefix) = installed(Flavour::NoStd) else { return };
-    if is_installed("readelf") {
+    if is_installed("binutils") {
         assert_eq!(dynamic(&prefix.lib.join("libhgrid.so"), "SONAME"), [soname()]);
         for name in ["libhgrid.so", &soname()] {
             let target = fs::read_link(prefix.lib.join(name)).expect("a link");
@@ -67,7 +68,7 @@ fn the_shared_library_has_the_name_of_its_compatible_versions() {
 /// Were they not optimised as a whole, there would be more than one object, and panics in it.
 #[test]
 fn the_installed_libraries_are_those_of_the_tests() {
-    if !is_installed("nm") {
+    if !is_installed("binutils") {
         return;
     }
     for flavour in Flavour::ALL {

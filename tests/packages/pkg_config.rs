@@ -1,9 +1,9 @@
 //! A project that asks pkg-config: flags in, program out.
 
 use std::path::Path;
-use std::process::Command;
 
-use hgrid_tests::artefact::{Flavour, is_installed, root, run};
+use hgrid_tests::artefact::{Flavour, bare_compiler, root, run};
+use hgrid_tests::tools::{command, is_installed};
 use tempfile::TempDir;
 
 use crate::installed::soname;
@@ -11,21 +11,21 @@ use crate::prefix::{HIT, Prefix, VERSION, dynamic, installed, output_of, program
 
 /// What pkg-config answers about the installed library.
 fn ask(prefix: &Prefix, question: &[&str]) -> String {
-    let mut pkg_config = Command::new("pkg-config");
+    let mut pkg_config = command("pkg-config");
     pkg_config.args(question).arg("hgrid").env("PKG_CONFIG_PATH", prefix.lib.join("pkgconfig"));
     output_of(&mut pkg_config).trim().to_owned()
 }
 
 /// Compiles a program with what it answers and nothing else.
 fn compile(source: &Path, flags: &[&str], answer: &str, to: &Path) {
-    let mut compiler = Command::new("cc");
+    let mut compiler = bare_compiler();
     compiler.args(flags).arg(source).args(answer.split_whitespace()).arg("-o").arg(to);
     run(&mut compiler);
 }
 
 /// The prefix of a flavour, where there are the tools to make and to use it.
 fn prefix(flavour: Flavour) -> Option<&'static Prefix> {
-    ["cc", "readelf", "pkg-config"].into_iter().all(is_installed).then(|| installed(flavour))?
+    ["binutils", "pkg-config"].into_iter().all(is_installed).then(|| installed(flavour))?
 }
 
 #[test]

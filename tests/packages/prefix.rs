@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use hgrid_tests::artefact::{Flavour, bare_cargo, is_installed, root, run, target_dir};
+use hgrid_tests::artefact::{Flavour, bare_cargo, root, run, target_dir};
+use hgrid_tests::tools::{command, is_installed};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -25,7 +26,7 @@ pub(crate) struct Prefix {
 /// What cargo-c installs of a flavour. Nothing, and a line that says so, where there is none.
 pub(crate) fn installed(flavour: Flavour) -> Option<&'static Prefix> {
     static PREFIXES: [OnceLock<Prefix>; 2] = [const { OnceLock::new() }; 2];
-    if !is_installed("cargo-cinstall") {
+    if !is_installed("cargo-c") {
         return None;
     }
     Some(PREFIXES[flavour as usize].get_or_init(|| {
@@ -117,7 +118,7 @@ pub(crate) fn output_of(program: &mut Command) -> String {
 
 /// The entries of one kind in the dynamic section: what stands between the brackets.
 pub(crate) fn dynamic(file: &Path, kind: &str) -> Vec<String> {
-    let section = output_of(Command::new("readelf").args(["-d", "-W"]).arg(file));
+    let section = output_of(command("readelf").args(["-d", "-W"]).arg(file));
     let lines = section.lines().filter(|line| line.contains(&format!("({kind})")));
     let names = lines.filter_map(|line| Some(line.split_once('[')?.1.split_once(']')?.0));
     names.map(str::to_owned).collect()

@@ -11,6 +11,8 @@ use std::sync::OnceLock;
 
 use cc::Tool;
 
+use crate::tools::{command, is_installed};
+
 /// The root of the repository.
 #[must_use]
 pub fn root() -> &'static Path {
@@ -126,22 +128,69 @@ pub fn shared_library() -> PathBuf {
     Flavour::NoStd.shared_library()
 }
 
-/// A compiler for a dialect like `c99` or `c++17`, with the header on its path and every warning an
-/// error: the one that a build script would use, so `$CC` or `$CXX` if they are set.
-#[must_use]
-pub fn compiler(dialect: &str) -> Command {
+/// The compiler that a build script would use, so `$CC` or `$CXX` if they are set.
+fn tool(is_cpp: bool) -> &'static Tool {
     static TOOLS: [OnceLock<Tool>; 2] = [const { OnceLock::new() }; 2];
-    let is_cpp = dialect.starts_with("c++");
-    let find = || {
+    TOOLS[usize::from(is_cpp)].get_or_init(|| {
         let mut build = cc::Build::new();
         build.host(host()).target(host()).opt_level(0).cargo_metadata(false).cpp(is_cpp);
         build.get_compiler()
-    };
-    let tool = TOOLS[usize::from(is_cpp)].get_or_init(find);
+    })
+}
+
+/// Where the usual C++ compiler lies, if there is one.
+pub(crate) fn cpp_path() -> &'static Path {
+    tool(true).path()
+}
+
+/// The usual C compiler alone, for command lines as strangers write them.
+#[must_use]
+pub fn bare_compiler() -> Command {
+    Command::new(tool(false).path())
+}
+
+fn usual_compiler(dialect: &str) -> Command {
+    let tool = tool(is_cpp(dialect));
     // Not `to_command`: it sets the whole environment, which a failing test would print.
     let mut compiler = Command::new(tool.path());
     compiler.args(tool.args());
     warnings(compiler, dialect)
+}
+
+/// Returns whether a dialect is one of C++, like `c++17`, and not of C, like `c99`.
+#[must_use]
+pub fn is_cpp(dialect: &str) -> bool {
+    dialect.starts_with("c++")
+}
+
+/// The usual C compiler for a dialect, with the header on its path and every warning an error.
+///
+/// # Panics
+/// If the dialect is one of C++, whose compiler may be missing.
+#[must_use]
+pub fn compiler(dialect: &str) -> Command {
+    assert!(!is_cpp(dialect), "cpp_compiler finds the compiler for {dialect}");
+    usual_compiler(dialect)
+}
+
+/// The same for a dialect of C++, if there is a C++ compiler.
+#[must_use]
+pub fn cpp_compiler(dialect: &str) -> Option<Command> {
+    assert!(is_cpp(dialect), "{dialect} is C");
+    is_installed("c++").then(|| usual_compiler(dialect))
+}
+
+/// The same for clang and a dialect of either language.
+#[must_use]
+pub fn clang(dialect: &str) -> Option<Command> {
+    let program = if is_cpp(dialect) { "clang++" } else { "clang" };
+    is_installed("clang").then(|| warnings(command(program), dialect))
+}
+
+/// All compilers that there are for a dialect: the usual one and clang.
+pub fn compilers(dialect: &str) -> impl Iterator<Item = Command> {
+    let usual = if is_cpp(dialect) { cpp_compiler(dialect) } else { Some(usual_compiler(dialect)) };
+    usual.into_iter().chain(clang(dialect))
 }
 
 /// The triple of this machine, as its Rust compiler tells it.
@@ -155,7 +204,7 @@ fn host() -> &'static str {
     })
 }
 
-/// The same for a compiler by name.
+/// Sets a dialect, the path of the header, and every warning as an error.
 #[must_use]
 pub fn warnings(mut compiler: Command, dialect: &str) -> Command {
     compiler
@@ -163,15 +212,6 @@ pub fn warnings(mut compiler: Command, dialect: &str) -> Command {
         .args(["-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-I"])
         .arg(root().join("include"));
     compiler
-}
-
-/// Whether there is a program of this name. If not, the test says so and goes on without it.
-pub fn is_installed(program: &str) -> bool {
-    let found = Command::new(program).arg("--version").output().is_ok();
-    if !found {
-        println!("skipped: `{program}` is not installed");
-    }
-    found
 }
 
 /// Runs a command that must succeed.

@@ -16,3 +16,5 @@ pub mod readme;
 pub mod scans;
 #[cfg(feature = "full")]
 pub mod symbols;
+#[cfg(feature = "full")]
+pub mod tools;

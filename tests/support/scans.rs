@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::meshes::Mesh;
+use crate::tools::skip;
 
 /// The scan of this name, or `None` after a line that says so.
 ///
@@ -15,7 +16,7 @@ use crate::meshes::Mesh;
 pub fn load(name: &str) -> Option<Mesh> {
     let path = folder().join(name).with_extension("ply");
     if !path.is_file() {
-        println!("skipped: {name}.ply is not here (set HGRID_SCENES to the folder that has it)");
+        skip(&format!("{name}.ply is not here (HGRID_SCENES names the folder that has it)"));
         return None;
     }
     let path = path.to_str().expect("a path in UTF-8");

@@ -1,10 +1,10 @@
-//! The names in a library, as the tools of the linker tell them.
+//! The names in a library, as binutils tell them: tests ask `tools` for these before.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use crate::artefact::run;
+use crate::tools::command;
 
 /// The symbols that `nm` lists with these flags.
 ///
@@ -36,13 +36,13 @@ pub fn symbols_of_ours(archive: &Path, flags: &[&str]) -> BTreeSet<String> {
 #[must_use]
 pub fn extract_ours(archive: &Path, dir: &Path) -> PathBuf {
     let ours = ours(archive);
-    run(Command::new("ar").current_dir(dir).arg("x").arg(archive).arg(&ours));
+    run(command("ar").current_dir(dir).arg("x").arg(archive).arg(&ours));
     dir.join(ours)
 }
 
 /// The name of that object.
 fn ours(archive: &Path) -> String {
-    let members = run(Command::new("ar").arg("t").arg(archive)).stdout;
+    let members = run(command("ar").arg("t").arg(archive)).stdout;
     let members = String::from_utf8(members).expect("text");
     let ours: Vec<_> = members.lines().filter(|name| name.starts_with("hgrid.")).collect();
     let [ours] = ours[..] else { panic!("one object after link-time optimisation, not {ours:?}") };
@@ -50,7 +50,7 @@ fn ours(archive: &Path) -> String {
 }
 
 fn list(library: &Path, flags: &[&str]) -> String {
-    let output = run(Command::new("nm").args(flags).arg(library));
+    let output = run(command("nm").args(flags).arg(library));
     String::from_utf8(output.stdout).expect("text")
 }
 

@@ -1,0 +1,102 @@
+//! Programs that tests use where they are installed, and do without elsewhere.
+//!
+//! A test that wants more than Rust, a C compiler, the C library and POSIX commands asks here. The
+//! variable `HGRID_WITHOUT` names what to treat as missing, so that a machine with every program can
+//! run the tests as one with few of them does.
+
+use std::collections::BTreeSet;
+use std::env;
+use std::ffi::OsString;
+use std::io::{Write as _, stderr};
+use std::process::Command;
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+
+use crate::artefact::cpp_path;
+
+/// The names that `HGRID_WITHOUT` takes, and the programs that come with each. Those without a
+/// program are libraries. tests/README.md tells how to install them.
+pub const OPTIONAL: [(&str, &[&str]); 13] = [
+    ("binutils", &["ar", "nm", "objcopy", "objdump", "readelf"]),
+    ("c++", &["c++"]),
+    ("cargo-c", &["cargo-cinstall"]),
+    ("clang", &["clang", "clang++"]),
+    ("cmake", &["cmake"]),
+    ("libclang-rt", &[]),
+    ("make", &["make"]),
+    ("mpi", &["mpicc", "mpirun"]),
+    ("pkg-config", &["pkg-config"]),
+    ("rust-targets", &[]),
+    ("rustup", &["rustup"]),
+    ("script", &["script"]),
+    ("valgrind", &["valgrind"]),
+];
+
+/// The names in `HGRID_WITHOUT`.
+fn left_out() -> BTreeSet<&'static str> {
+    let list = env::var_os("HGRID_WITHOUT").unwrap_or_default();
+    let list = list.to_string_lossy();
+    let names = list.split(',').map(str::trim).filter(|name| !name.is_empty());
+    let known = |name| {
+        let mut all = OPTIONAL.iter().map(|(known, _)| *known);
+        all.find(|known| *known == name).unwrap_or_else(|| {
+            let all = OPTIONAL.map(|(known, _)| known).join(", ");
+            panic!("HGRID_WITHOUT: `{name}` is none of {all}")
+        })
+    };
+    names.map(known).collect()
+}
+
+/// The command line of a program begins with this.
+fn path(program: &str) -> OsString {
+    if program == "c++" { cpp_path().into() } else { program.into() }
+}
+
+fn runs(program: &str) -> bool {
+    Command::new(path(program)).arg("--version").output().is_ok()
+}
+
+/// Returns whether all programs of a name in [`OPTIONAL`] are installed and not left out. If not, the
+/// test says what it does without.
+///
+/// # Panics
+/// If there is no such name, here or in `HGRID_WITHOUT`.
+pub fn is_installed(name: &str) -> bool {
+    let entry = OPTIONAL.iter().find(|(known, _)| *known == name);
+    let (_, programs) = entry.unwrap_or_else(|| panic!("`{name}` is not in OPTIONAL"));
+    if left_out().contains(name) {
+        skip(&format!("HGRID_WITHOUT names {name}"));
+        return false;
+    }
+    let missing = programs.iter().find(|program| !runs(program));
+    if let Some(program) = missing {
+        skip(&format!("`{program}` is not installed"));
+    }
+    missing.is_none()
+}
+
+/// A command that runs an optional program, for tests that asked [`is_installed`] before.
+///
+/// # Panics
+/// If the program comes with no name in [`OPTIONAL`], or with one that is left out.
+#[must_use]
+pub fn command(program: &str) -> Command {
+    let entry = OPTIONAL.iter().find(|(_, programs)| programs.contains(&program));
+    let (name, _) = entry.unwrap_or_else(|| panic!("`{program}` is not in OPTIONAL"));
+    assert!(!left_out().contains(name), "the test uses `{program}` and did not ask for {name}");
+    Command::new(path(program))
+}
+
+/// Says once for each test why a part of it, or all of it, is skipped.
+///
+/// The line goes past the test harness, which shows what a test prints only if the test fails.
+pub fn skip(reason: &str) {
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let thread = thread::current();
+    let line = format!("skipped in {}: {reason}\n", thread.name().unwrap_or("a thread"));
+    let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
+    if said.insert(line.clone()) {
+        // Where standard error is closed nobody reads the line.
+        let _ = stderr().write_all(line.as_bytes());
+    }
+}
