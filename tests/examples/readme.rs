@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 use hgrid_tests::artefact::{bare_compiler, library_dir, root, run};
+use hgrid_tests::tools::OPTIONAL;
 use tempfile::TempDir;
 
 fn page(name: &str) -> String {
@@ -42,6 +43,23 @@ fn its_c_program_prints_the_hit() {
     let printed = run(Command::new(dir.path().join(start)).current_dir(dir.path()));
     assert!(compiled.stderr.is_empty(), "{}", String::from_utf8_lossy(&compiled.stderr));
     assert_eq!(String::from_utf8(printed.stdout).as_deref(), Ok("hit at t = 1\n"));
+}
+
+/// Each has a row in the table of tests/README.md, and `.ci/run` leaves out all but make once.
+#[test]
+fn programs_that_may_be_missing_are_listed() {
+    let names = OPTIONAL.map(|(name, _)| name);
+    let table = page("tests/README.md");
+    let (_, table) = table.split_once("| name | how to install it").expect("the table");
+    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let rows = rows.map(|row| row.split('`').nth(1).unwrap_or_default());
+    assert_eq!(rows.collect::<Vec<_>>(), names);
+
+    let ci = page(".ci/run");
+    let list = ci.lines().find_map(|line| line.strip_prefix("HGRID_WITHOUT="));
+    let list = list.and_then(|line| line.split(' ').next()).expect("a run without them");
+    let without: Vec<_> = names.into_iter().filter(|name| *name != "make").collect();
+    assert_eq!(list.split(',').collect::<Vec<_>>(), without);
 }
 
 #[test]
