@@ -10,10 +10,13 @@ use std::sync::{Mutex, OnceLock};
 use std::{env, fs, thread};
 
 use hgrid_tests::artefact::{
-    Flavour, clang, compiler, cpp_compiler, library_dir, output, root, run, static_library,
+    Flavour, clang, compiler, compilers, cpp_compiler, is_cpp, library_dir, output, root, run,
+    static_library,
 };
 use hgrid_tests::tools::{command, is_installed, skip};
 use tempfile::TempDir;
+
+use crate::header::DIALECTS;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
 /// flavour of the library that they need.
@@ -79,6 +82,37 @@ fn they_pass_as_c99_with_sanitizers() {
         let library = flavour.static_library();
         run(&mut Command::new(compile(name, compiler("c99"), &SANITIZERS, &library, dir.path())));
     }
+}
+
+/// The sources of this folder that are whole: into the others, tests put examples of the header.
+fn sources(dialect: &str) -> Vec<PathBuf> {
+    let is_whole = |path: &PathBuf| {
+        let name = path.file_name().expect("a name").to_string_lossy();
+        // hgrid.hpp asks for C++17.
+        name.ends_with(".c") && !["created.c", "tile.c"].contains(&&*name)
+            || name.ends_with(".cpp") && ["c++17", "c++20"].contains(&dialect)
+    };
+    let entries = fs::read_dir(root().join("tests/c_abi")).expect("this folder");
+    entries.map(|entry| entry.expect("a file").path()).filter(is_whole).collect()
+}
+
+/// Other tests run each program in one or two dialects and by one compiler for each.
+#[test]
+fn no_compiler_warns_about_them_in_any_dialect() {
+    let dir = TempDir::new().expect("a folder");
+    let commands = DIALECTS.into_iter().flat_map(|dialect| {
+        // Some warnings need an optimiser. The tests that run the programs have one for C, and for
+        // C++ that of clang, if it is installed.
+        let flags = if dialect == "c++17" { &["-O1", "-c"][..] } else { &["-fsyntax-only"] };
+        let language = if is_cpp(dialect) { "c++" } else { "c" };
+        let dir = dir.path();
+        compilers(dialect).map(move |mut compiler| {
+            compiler.current_dir(dir).args(flags).args(["-D_DEFAULT_SOURCE", "-pthread"]);
+            compiler.args(["-x", language]).args(sources(dialect));
+            compiler
+        })
+    });
+    run_side_by_side(commands.collect());
 }
 
 #[test]
