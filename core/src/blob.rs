@@ -72,7 +72,11 @@ pub(crate) struct Header {
     pub(crate) cell_size: f32,
     /// Whether the mesh lies behind the grid: see [`HasMesh`].
     mesh: u32,
-    reserved: [u32; 3],
+    /// Nodes of a tree; 0 for a method without nodes.
+    pub(crate) node_count: u32,
+    /// Levels of nodes.
+    pub(crate) levels: u32,
+    reserved: u32,
     /// Over all bytes before it: a header is what a build wrote, or `open` refuses it.
     checksum: u32,
 }
@@ -241,13 +245,7 @@ impl Header {
         mesh: &TriangleMesh<'_>,
         rule: impl FnOnce(Vec3A, u32) -> Option<[u32; 3]>,
     ) -> Result<(), Error> {
-        let survey = Survey::of(mesh, BuildFlags::empty(), &Watch::none())?;
-        if self.skipped_count != survey.skipped_count {
-            return Err(corrupt(core::mem::offset_of!(Self, skipped_count)));
-        }
-        if lattice.bounds() != Lattice::pad(&survey.bounds) {
-            return Err(corrupt(core::mem::offset_of!(Self, bounds_min)));
-        }
+        let survey = self.survey(lattice, mesh)?;
         let asked = Config { density: self.density, ..Config::default() };
         if !asked.density_is_valid() {
             return Err(corrupt(core::mem::offset_of!(Self, density)));
@@ -258,6 +256,22 @@ impl Header {
         Ok(())
     }
 
+    /// Surveys the mesh; an error unless the header says what it says: what was skipped, and its box.
+    pub(crate) fn survey(
+        &self,
+        lattice: &Lattice,
+        mesh: &TriangleMesh<'_>,
+    ) -> Result<Survey, Error> {
+        let survey = Survey::of(mesh, BuildFlags::empty(), &Watch::none())?;
+        if self.skipped_count != survey.skipped_count {
+            return Err(corrupt(core::mem::offset_of!(Self, skipped_count)));
+        }
+        if lattice.bounds() != Lattice::pad(&survey.bounds) {
+            return Err(corrupt(core::mem::offset_of!(Self, bounds_min)));
+        }
+        Ok(survey)
+    }
+
     /// Whether the fields that mean nothing to the method are zero, as a build leaves them.
     pub(crate) fn unused_is_zero(&self, method: Method) -> bool {
         (method.has_macrocells() || self.macrocell_factor == 0)
@@ -265,7 +279,8 @@ impl Header {
             && (method.has_depth() || self.depth == 0)
             && (method.has_cell_size() || self.cell_size.to_bits() == 0)
             && (method.has_density() || self.density.to_bits() == 0)
-            && self.reserved == [0; 3]
+            && (method.has_nodes() || (self.node_count, self.levels) == (0, 0))
+            && self.reserved == 0
     }
 }
 

@@ -12,11 +12,12 @@ pub(crate) const HAS_FIXED: bool = cfg!(feature = "fixed");
 pub(crate) const HAS_VARIABLE: bool = cfg!(feature = "variable");
 pub(crate) const HAS_RECURSIVE: bool = cfg!(feature = "recursive");
 pub(crate) const HAS_BRICK: bool = cfg!(feature = "brick");
+pub(crate) const HAS_BVH: bool = cfg!(feature = "bvh");
 
 const _: () = assert!(
-    HAS_ONE_LEVEL || HAS_RECURSIVE || HAS_BRICK,
+    HAS_ONE_LEVEL || HAS_RECURSIVE || HAS_BRICK || HAS_BVH,
     "hgrid has no method to build grids with: turn on at least one of the features one-level, fixed, \
-     variable, recursive and brick"
+     variable, recursive, brick and bvh"
 );
 
 /// The structure to build.
@@ -37,13 +38,16 @@ pub enum Method {
     /// shortest build and the least trouble with triangles of all sizes.
     #[default]
     Brick = 5,
+    /// A wide tree of tight boxes over a grid of the triangles' centres: this project's own, for rays of
+    /// every kind in scenes of every kind, in memory that the number of triangles bounds.
+    Bvh = 6,
 }
 
 impl Method {
     /// All methods, in the order of the paper's Table 1 but for its baseline, which comes last; also
     /// those that this library has not ([`is_available`](Self::is_available)).
     pub const ALL: &[Self] =
-        &[Self::OneLevel, Self::Variable, Self::Fixed, Self::Recursive, Self::Brick];
+        &[Self::OneLevel, Self::Variable, Self::Fixed, Self::Recursive, Self::Brick, Self::Bvh];
 
     /// The name that commands and tables use.
     #[must_use]
@@ -54,6 +58,7 @@ impl Method {
             Self::Variable => "variable",
             Self::Recursive => "recursive",
             Self::Brick => "brick",
+            Self::Bvh => "bvh",
         }
     }
 
@@ -66,6 +71,7 @@ impl Method {
             3 => Some(Self::Variable),
             4 => Some(Self::Recursive),
             5 => Some(Self::Brick),
+            6 => Some(Self::Bvh),
             _ => None,
         }
     }
@@ -80,6 +86,7 @@ impl Method {
             Self::Variable => HAS_VARIABLE,
             Self::Recursive => HAS_RECURSIVE,
             Self::Brick => HAS_BRICK,
+            Self::Bvh => HAS_BVH,
         }
     }
 
@@ -101,7 +108,12 @@ impl Method {
     /// Whether [`Config::density`] means something to it.
     #[must_use]
     pub const fn has_density(self) -> bool {
-        !self.has_cell_size()
+        !self.has_cell_size() && !self.has_nodes()
+    }
+
+    /// Whether its index has nodes, not cells.
+    pub(crate) const fn has_nodes(self) -> bool {
+        matches!(self, Self::Bvh)
     }
 
     /// Whether [`Config::cell_size`] means something to it.
@@ -113,7 +125,7 @@ impl Method {
     #[must_use]
     pub const fn default_density(self) -> f32 {
         match self {
-            Self::OneLevel | Self::Variable | Self::Brick => 4.0,
+            Self::OneLevel | Self::Variable | Self::Brick | Self::Bvh => 4.0,
             Self::Fixed => 32.0,
             Self::Recursive => 8.0,
         }

@@ -7,9 +7,10 @@ use crate::approach::Approach;
 use crate::arena::check_alignment;
 use crate::blob::{Header, corrupt};
 use crate::brick::{self, Brick, OneRay, Tiles};
+use crate::bvh::{self, Bvh};
 use crate::cell::Lattice;
 use crate::config::{
-    Config, HAS_BRICK, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
+    Config, HAS_BRICK, HAS_BVH, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
 };
 use crate::control::{Control, Watch};
 use crate::counters::Tally;
@@ -49,6 +50,7 @@ enum Structure<'a> {
     Variable(Variable<'a>),
     Recursive(Recursive<'a>),
     Brick(Brick<'a>),
+    Bvh(Bvh<'a>),
 }
 
 impl<'a> Grid<'a> {
@@ -133,6 +135,7 @@ impl<'a> Grid<'a> {
             Method::Brick if HAS_BRICK => {
                 brick::build(&mesh, config, index, scratch, control, &watch)?
             }
+            Method::Bvh if HAS_BVH => bvh::build(&mesh, config, index, scratch, control, &watch)?,
             method => return Err(Error::MethodLeftOut(method)),
         };
         let grid = Self::open(blob, mesh)?;
@@ -171,6 +174,7 @@ impl<'a> Grid<'a> {
                 Structure::Recursive(Recursive::open(&header, blob)?)
             }
             Method::Brick if HAS_BRICK => Structure::Brick(Brick::open(&header, &lattice, blob)?),
+            Method::Bvh if HAS_BVH => Structure::Bvh(Bvh::open(&header, blob)?),
             method => return Err(Error::MethodLeftOut(method)),
         };
         Ok(Self { mesh, blob, lattice, structure, simd: SimdLevel::detect() })
@@ -178,13 +182,16 @@ impl<'a> Grid<'a> {
 
     /// Proves that the blob is a grid of the mesh, and so that every answer is right.
     ///
-    /// O(triangles + references) time, no memory. A grid that was just built needs no proof; one
-    /// that came from a file, a network or another process may.
+    /// O(triangles + references) time. `scratch` is a bit for each triangle of a grid of
+    /// [`Method::Bvh`] ([`validate_bytes`](Self::validate_bytes)), nothing for the other methods; it need
+    /// not be aligned. A grid that was just built needs no proof; one that came from a file, a network
+    /// or another process may.
     ///
     /// # Errors
+    /// [`Error::OutOfMemory`] if there is less scratch;
     /// [`Error::Corrupt`] with a byte that a build would not have written so;
     /// [`Error::IndexOutOfRange`] if the mesh itself is damaged.
-    pub fn validate(&self) -> Result<(), Error> {
+    pub fn validate(&self, scratch: &mut [u8]) -> Result<(), Error> {
         let header = Header::read(self.blob, &self.mesh)?;
         if !header.unused_is_zero(self.method()) {
             return Err(corrupt(core::mem::offset_of!(Header, macrocell_factor)));
@@ -205,11 +212,24 @@ impl<'a> Grid<'a> {
             Structure::Brick(grid) if HAS_BRICK => {
                 grid.validate(&header, &self.lattice, &self.mesh)
             }
+            Structure::Bvh(bvh) if HAS_BVH => {
+                bvh.validate(&header, &self.lattice, &self.mesh, scratch)
+            }
             Structure::OneLevel(_)
             | Structure::Fixed(_)
             | Structure::Variable(_)
             | Structure::Recursive(_)
-            | Structure::Brick(_) => Err(Error::MethodLeftOut(self.method())),
+            | Structure::Brick(_)
+            | Structure::Bvh(_) => Err(Error::MethodLeftOut(self.method())),
+        }
+    }
+
+    /// Bytes of scratch that [`validate`](Self::validate) takes: at most one for eight triangles.
+    #[must_use]
+    pub const fn validate_bytes(&self) -> usize {
+        match self.structure {
+            Structure::Bvh(_) => bvh::proof_bytes(self.mesh.triangle_count()) as usize,
+            _ => 0,
         }
     }
 
@@ -240,6 +260,13 @@ impl<'a> Grid<'a> {
         tally: &mut T,
     ) {
         let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
+        if HAS_BVH && let Structure::Bvh(bvh) = &self.structure {
+            let test = &TriangleTest::from(ray, &approach).culling(cull);
+            let slab = &bvh::Slab::new(ray, &approach);
+            let mesh = &self.mesh;
+            dispatch(self.simd, bvh::OneRay { bvh, mesh, slab, test, search, tally });
+            return;
+        }
         let Some(line) = Line::new(&self.lattice, ray, &approach) else { return };
         let test = TriangleTest::from(ray, &approach).culling(cull);
         if HAS_BRICK && let Structure::Brick(brick) = &self.structure {
@@ -290,7 +317,8 @@ impl<'a> Grid<'a> {
             | Structure::Fixed(_)
             | Structure::Variable(_)
             | Structure::Recursive(_)
-            | Structure::Brick(_) => {}
+            | Structure::Brick(_)
+            | Structure::Bvh(_) => {}
         }
     }
 
@@ -305,11 +333,13 @@ impl<'a> Grid<'a> {
             Structure::Variable(grid) if HAS_VARIABLE => grid.visit(&reach, visitor),
             Structure::Recursive(grid) if HAS_RECURSIVE => grid.visit(&reach, visitor),
             Structure::Brick(grid) if HAS_BRICK => grid.visit(&reach, visitor),
+            Structure::Bvh(bvh) if HAS_BVH => bvh.visit(visitor),
             Structure::OneLevel(_)
             | Structure::Fixed(_)
             | Structure::Variable(_)
             | Structure::Recursive(_)
-            | Structure::Brick(_) => true,
+            | Structure::Brick(_)
+            | Structure::Bvh(_) => true,
         };
     }
 
@@ -350,6 +380,7 @@ impl<'a> Grid<'a> {
             Structure::Variable(grid) => grid.list_words(),
             Structure::Recursive(grid) => grid.list_words(),
             Structure::Brick(grid) => grid.list_words(),
+            Structure::Bvh(bvh) => bvh.list_words(),
         }
     }
 
@@ -383,6 +414,7 @@ impl<'a> Grid<'a> {
             Structure::OneLevel(_) | Structure::Fixed(_) => one_level::scratch_bytes(resolution),
             Structure::Recursive(_) => recursive::scratch_bytes(triangles, &self.config()),
             Structure::Brick(_) => brick::scratch_bytes_at_most(resolution, triangles),
+            Structure::Bvh(_) => bvh::bound(triangles, 1).1,
             Structure::Variable(_) => {
                 variable::scratch_bytes_at_most(resolution, triangles, self.density())
             }
@@ -411,6 +443,7 @@ impl<'a> Grid<'a> {
             Structure::Variable(_) => Method::Variable,
             Structure::Recursive(_) => Method::Recursive,
             Structure::Brick(_) => Method::Brick,
+            Structure::Bvh(_) => Method::Bvh,
         }
     }
 

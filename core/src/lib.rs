@@ -59,6 +59,7 @@ mod bits;
 mod blob;
 mod brick;
 mod bump;
+mod bvh;
 mod cell;
 mod closest;
 mod config;

@@ -1,8 +1,9 @@
 //! How much memory a build takes, asked before the build.
 
 use crate::brick;
+use crate::bvh;
 use crate::config::{
-    Config, HAS_BRICK, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
+    Config, HAS_BRICK, HAS_BVH, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
 };
 use crate::control::Control;
 use crate::error::{ConfigField, Error, Region};
@@ -63,11 +64,13 @@ impl Sizes {
             Method::Variable if HAS_VARIABLE => variable::bound(triangles, config),
             Method::Recursive if HAS_RECURSIVE => recursive::bound(triangles, config),
             Method::Brick if HAS_BRICK => brick::bound(triangles, tasks),
+            Method::Bvh if HAS_BVH => bvh::bound(triangles, tasks),
             Method::OneLevel
             | Method::Fixed
             | Method::Variable
             | Method::Recursive
-            | Method::Brick => return None,
+            | Method::Brick
+            | Method::Bvh => return None,
         };
         if index > usize::MAX as u64 || scratch > usize::MAX as u64 {
             return None;
@@ -147,6 +150,7 @@ pub fn sizes_with(
         Method::Variable if HAS_VARIABLE => variable::sizes(mesh, config, scratch),
         Method::Recursive if HAS_RECURSIVE => recursive::sizes(mesh, config, scratch),
         Method::Brick if HAS_BRICK => brick::sizes(mesh, config, scratch, control),
+        Method::Bvh if HAS_BVH => bvh::sizes(mesh, config, scratch, control),
         method => Err(Error::MethodLeftOut(method)),
     }
 }

@@ -65,7 +65,7 @@ impl<S: Simd> Spans<S> {
 
 /// The corners of four triangles that follow one another, by corner and axis.
 #[inline(always)]
-fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4<S>; 3]; 3] {
+pub(crate) fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4<S>; 3]; 3] {
     if let Some([a, b, c, d]) = mesh.four(first) {
         let row = |row: &Row| load(simd, row);
         return [
@@ -129,15 +129,15 @@ impl<S: Simd> Axis<S> {
 
 /// One corner of eight triangles.
 #[derive(Clone, Copy)]
-struct Corners<S: Simd> {
-    x: f32x8<S>,
-    y: f32x8<S>,
-    z: f32x8<S>,
+pub(crate) struct Corners<S: Simd> {
+    pub(crate) x: f32x8<S>,
+    pub(crate) y: f32x8<S>,
+    pub(crate) z: f32x8<S>,
 }
 
 impl<S: Simd> Corners<S> {
     #[inline(always)]
-    fn join(low: [f32x4<S>; 3], high: [f32x4<S>; 3]) -> Self {
+    pub(crate) fn join(low: [f32x4<S>; 3], high: [f32x4<S>; 3]) -> Self {
         let [x, y, z] = join(low, high);
         Self { x, y, z }
     }
@@ -145,7 +145,7 @@ impl<S: Simd> Corners<S> {
     /// The largest magnitudes, as the bits that they have: those of what is not finite or no number
     /// are larger than all others.
     #[inline(always)]
-    fn largest(self) -> u32x8<S> {
+    pub(crate) fn largest(self) -> u32x8<S> {
         let x = self.x.bitcast::<u32x8<S>>() & 0x7fff_ffff;
         let y = self.y.bitcast::<u32x8<S>>() & 0x7fff_ffff;
         let z = self.z.bitcast::<u32x8<S>>() & 0x7fff_ffff;

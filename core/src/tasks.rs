@@ -121,10 +121,10 @@ mod with_atomics {
 
         /// Writes words that lie there, if they do.
         #[inline(always)]
-        pub(crate) fn set<const N: usize>(&self, at: u32, words: [u32; N]) {
+        pub(crate) fn set<const N: usize>(&self, at: usize, words: [u32; N]) {
             // One comparison; behind where the first lies there would be two.
-            let end = (at as usize).checked_add(N);
-            let slots = end.and_then(|end| self.0.get(at as usize..end));
+            let end = at.checked_add(N);
+            let slots = end.and_then(|end| self.0.get(at..end));
             for (slot, word) in slots.into_iter().flatten().zip(words) {
                 slot.store(word, Ordering::Relaxed);
             }
@@ -182,10 +182,10 @@ mod without_atomics {
 
         /// Writes words that lie there, if they do.
         #[inline(always)]
-        pub(crate) fn set<const N: usize>(&self, at: u32, words: [u32; N]) {
+        pub(crate) fn set<const N: usize>(&self, at: usize, words: [u32; N]) {
             // One comparison; behind where the first lies there would be two.
-            let end = (at as usize).checked_add(N);
-            let slots = end.and_then(|end| self.0.get(at as usize..end));
+            let end = at.checked_add(N);
+            let slots = end.and_then(|end| self.0.get(at..end));
             for (slot, word) in slots.into_iter().flatten().zip(words) {
                 slot.set(word);
             }

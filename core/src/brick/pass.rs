@@ -341,7 +341,7 @@ impl Visit for Scatter<'_, '_> {
         if let Some(head) = self.heads.get_mut(block) {
             let (at, words) = (*head, entry.words());
             *head = at.wrapping_add(words.len() as u32);
-            self.words.set(at, words);
+            self.words.set(at as usize, words);
         }
     }
 
@@ -351,7 +351,7 @@ impl Visit for Scatter<'_, '_> {
             let words: [u32; LANES * ENTRY_WORDS] = bytemuck::cast(entries);
             let at = *head;
             *head = at.wrapping_add(words.len() as u32);
-            self.words.set(at, words);
+            self.words.set(at as usize, words);
         }
     }
 
@@ -359,7 +359,7 @@ impl Visit for Scatter<'_, '_> {
     fn counted(&mut self, _: u64, _: u64) {}
 
     fn large(&mut self, id: u32) {
-        self.words.set(self.large, [id]);
+        self.words.set(self.large as usize, [id]);
         self.large = self.large.wrapping_add(1);
     }
 

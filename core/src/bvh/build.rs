@@ -1,0 +1,506 @@
+//! Building a tree: two passes over the triangles, then bin after bin in cache, then a tree on top.
+//!
+//! ```text
+//! bounds    the box of the vertices                                             (mesh.rs)
+//! census    each triangle's key, and how many there are in each bin             (census.rs, key.rs)
+//! scatter   each triangle's entry into its bin
+//! roots     bins sorted and cut into subtrees                                   (roots.rs, subtree.rs)
+//! top       a tree over the subtrees                                            (top.rs)
+//!
+//! index   | header | ids (first the keys)    | nodes: root | subtrees of all tasks | top |
+//! scratch | counts of tasks, sizes of bins | entries (then records of roots, top nodes) | bench |
+//! ```
+//!
+//! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
+//! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up
+//! side by side in the order of the bins.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "numbers of triangles, bins and nodes, which fit into 32 bits"
+)]
+
+use core::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::Simd;
+
+use super::census::{Census, count, share};
+use super::key::{KEY_BITS, Keys};
+use super::layout::{
+    CROWD, Entry, MOST_TRIANGLES, MOST_UNIT, bin_bits, index_bytes, most_below, most_nodes,
+    scratch_bytes, small_bench,
+};
+use super::node::Node;
+use super::roots::{RECORD, Record, Roots, Side};
+use super::top::{self, ITEM, Item};
+use super::units::{Units, starts};
+use crate::aabb::Aabb;
+use crate::arena::{section_bytes, split_mut};
+use crate::blob::{HEADER_BYTES, Header};
+use crate::cell::Lattice;
+use crate::config::Config;
+use crate::control::{Control, Watch};
+use crate::error::{Error, Region};
+use crate::mesh::TriangleMesh;
+use crate::simd::{Kernel, SimdLevel, dispatch};
+use crate::sizes::Sizes;
+use crate::tasks::{Shared, run, task_count};
+
+/// The memory that any mesh with so many triangles and a build with so many tasks needs.
+pub(crate) const fn bound(triangles: u32, tasks: u32) -> (u64, u64) {
+    let triangles = triangles as u64;
+    let tasks = if tasks < 1 { 1 } else { tasks } as u64;
+    (index_bytes(triangles, most_nodes(triangles)), scratch_bytes(triangles, tasks, triangles))
+}
+
+/// The memory that a mesh needs: exact if one task can build in the scratch, with room for the ids.
+pub(crate) fn sizes(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+    control: &Control<'_>,
+) -> Result<Sizes, Error> {
+    check_count(mesh)?;
+    let (index, needed) = bound(mesh.triangle_count(), control.tasks.clamp(1, Control::MAX_TASKS));
+    let ids = usize::try_from(index_bytes(mesh.triangle_count().into(), 0)).ok();
+    let both = ids.and_then(|ids| scratch.split_at_mut_checked(ids));
+    if let Some((ids, scratch)) = both.filter(|_| control.tasks <= 1) {
+        // Nodes are counted, and there is no room for them.
+        match build_in::<1>(mesh, config, ids, scratch, &Control::SERIAL, &Watch::none()) {
+            Err(Error::OutOfMemory { region: Region::Index, needed_bytes, .. }) => {
+                return Sizes::new(needed_bytes, needed, true);
+            }
+            Ok(header) => return Sizes::new(header.blob_bytes, needed, true),
+            Err(Error::OutOfMemory { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Sizes::new(index, needed, false)
+}
+
+fn check_count(mesh: &TriangleMesh<'_>) -> Result<(), Error> {
+    if mesh.triangle_count() <= MOST_TRIANGLES { Ok(()) } else { Err(Error::TooManyTriangles) }
+}
+
+/// Builds into `index` and returns the part of it that is the blob.
+pub(crate) fn build<'a>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &'a mut [u8],
+    scratch: &mut [u8],
+    control: &Control<'_>,
+    watch: &Watch<'_>,
+) -> Result<&'a [u8], Error> {
+    check_count(mesh)?;
+    // Room on the stack for as many tasks as there may be, or for one.
+    let header = if control.tasks > 1 {
+        build_in::<{ Control::MAX_TASKS as usize }>(mesh, config, index, scratch, control, watch)
+    } else {
+        build_in::<1>(mesh, config, index, scratch, control, watch)
+    }?;
+    let available_bytes = index.len() as u64;
+    let needed_bytes = header.blob_bytes;
+    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
+    let blob = usize::try_from(needed_bytes).ok().and_then(|bytes| index.get_mut(..bytes));
+    let blob = blob.ok_or(too_small)?;
+    if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>() {
+        *head = header.to_bytes();
+    }
+    Ok(blob)
+}
+
+/// How far the steps of a build are, about.
+const CENSUS: f32 = 0.02;
+const SCATTER: f32 = 0.15;
+const ROOTS: f32 = 0.25;
+const TOP: f32 = 0.8;
+
+#[inline(never)]
+fn build_in<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &mut [u8],
+    scratch: &mut [u8],
+    control: &Control<'_>,
+    watch: &Watch<'_>,
+) -> Result<Header, Error> {
+    let triangles = mesh.triangle_count();
+    let all = u64::from(triangles);
+    let index_available = index.len() as u64;
+    let index_error = |needed_bytes: u64| Error::OutOfMemory {
+        region: Region::Index,
+        needed_bytes,
+        available_bytes: index_available,
+    };
+    let scratch_available = scratch.len() as u64;
+    let scratch_error = |needed_bytes: u64| Error::OutOfMemory {
+        region: Region::Scratch,
+        needed_bytes,
+        available_bytes: scratch_available,
+    };
+
+    // Fewer tasks where there is no memory for more.
+    let mut tasks = task_count::<N>(control, triangles as usize / LEAST_TASK);
+    let fits = |tasks: u32| {
+        let bench = small_bench(all, tasks.into());
+        scratch_available >= scratch_bytes(all, tasks.into(), bench)
+            && (tasks == 1 || index_available >= bound(triangles, tasks).0)
+    };
+    while tasks > 1 && !fits(tasks) {
+        tasks /= 2;
+    }
+    if !fits(tasks) {
+        return Err(scratch_error(scratch_bytes(all, 1, small_bench(all, 1))));
+    }
+
+    // Cut the scratch, and the ids out of the index.
+    let bits = bin_bits(all);
+    let bins = 1_usize << bits;
+    let too_small = scratch_error(scratch_bytes(all, tasks.into(), small_bench(all, tasks.into())));
+    let mut rest = scratch;
+    let mut counts = [const { None }; N];
+    for slot in counts.iter_mut().take(tasks as usize) {
+        let (section, behind) = split_mut::<u32>(rest, bins as u64).ok_or(too_small)?;
+        section.fill(0);
+        *slot = Some(section);
+        rest = behind;
+    }
+    let (sizes, rest) = split_mut::<u32>(rest, bins as u64).ok_or(too_small)?;
+    let (entries, bench) = split_mut::<Entry>(rest, all).ok_or(too_small)?;
+    let bench = whole::<Entry>(bench);
+    let behind = index.get_mut(HEADER_BYTES..);
+    let keys = behind.and_then(|behind| Some(split_mut::<u32>(behind, all)?.0));
+    let keys = keys.ok_or(index_error(index_bytes(all, 1)))?;
+
+    // Find the box, then every triangle's key.
+    watch.at(CENSUS)?;
+    let rule = Keys::new(&vertex_bounds::<N>(mesh, tasks, control)?);
+    let census = count::<N>(mesh, config.flags, &rule, keys, &mut counts, bits, control)?;
+    let Census { finite, skipped, bounds } = census;
+
+    // Give each bin its place, and each task its place in it.
+    watch.at(SCATTER)?;
+    for (bin, size) in sizes.iter_mut().enumerate() {
+        *size = counts.iter().flatten().filter_map(|counts| counts.get(bin)).sum();
+    }
+    let is_crowded = sizes.iter().any(|&size| size as usize > CROWD);
+    if is_crowded && (bench.len() as u64) < all {
+        return Err(scratch_error(scratch_bytes(all, tasks.into(), all)));
+    }
+    place_tasks(sizes, &mut counts);
+    let entries = entries.get_mut(..finite as usize).unwrap_or_default();
+    scatter::<N>(keys, entries, &mut counts, bits, control)?;
+
+    // Cut bins into subtrees.
+    watch.at(ROOTS)?;
+    let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
+    let behind = index.get_mut(HEADER_BYTES..).and_then(|b| b.split_at_mut_checked(ids_bytes));
+    let (ids, nodes) = behind.ok_or(index_error(index_bytes(finite.into(), 1)))?;
+    let (ids, _) = split_mut::<u32>(ids, finite.into()).unwrap_or_default();
+    let nodes = whole::<Node>(nodes);
+    let bench = if is_crowded { Bench::Whole(bench) } else { Bench::Small(bench) };
+    let work = Work {
+        mesh,
+        least: bounds.size().max_element() * LEAST_NODE,
+        sizes,
+        shift: KEY_BITS - bits,
+    };
+    let made = work.roots::<N>(entries, bench, ids, nodes, tasks, control)?;
+
+    // Build the tree on top of them.
+    watch.at(TOP)?;
+    let (node_count, levels) = work.top(entries, nodes, &made);
+    let needed_bytes = index_bytes(finite.into(), node_count.into());
+    if nodes.len() < node_count as usize {
+        return Err(index_error(needed_bytes));
+    }
+    let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
+    if let Some(padding) = index.get_mut(used..needed_bytes as usize) {
+        padding.fill(0);
+    }
+    let lattice = Lattice::new(Lattice::pad(&bounds), [1; 3]);
+    let mut header = Header::new(config, mesh, &lattice);
+    header.skipped_count = skipped;
+    header.reference_count = finite;
+    header.node_count = node_count;
+    header.levels = levels;
+    header.blob_bytes = needed_bytes;
+    Ok(header)
+}
+
+/// No task has fewer triangles.
+const LEAST_TASK: usize = 16_384;
+
+/// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
+/// axis has an inverse direction that is finite ([`slab`](super::slab)).
+const LEAST_NODE: f32 = 254.0 / (1_u64 << 60) as f32;
+
+/// The whole elements of some bytes.
+fn whole<T: Pod>(bytes: &mut [u8]) -> &mut [T] {
+    let used = bytes.len() / size_of::<T>() * size_of::<T>();
+    let bytes = bytes.get_mut(..used).unwrap_or_default();
+    bytemuck::try_cast_slice_mut(bytes).unwrap_or_default()
+}
+
+/// The box of all vertices, used or not.
+fn vertex_bounds<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    tasks: u32,
+    control: &Control<'_>,
+) -> Result<Aabb, Error> {
+    let (vertices, tasks) = (mesh.vertex_count(), tasks as usize);
+    let parts =
+        (0..tasks).map(|task| share(vertices, task, tasks)..share(vertices, task + 1, tasks));
+    let boxes = run::<N, _, _>(control, parts, |part| mesh.vertex_bounds(part))?;
+    Ok(boxes.into_iter().flatten().fold(Aabb::EMPTY, |all, part| all.union(&part)))
+}
+
+/// Turns counts of bins into where each task writes: in a bin, the first task's entries come first.
+fn place_tasks<const N: usize>(sizes: &mut [u32], counts: &mut [Option<&mut [u32]>; N]) {
+    let mut next = starts(sizes);
+    for (bin, &size) in sizes.iter().enumerate() {
+        let next = &mut next[usize::from(size as usize <= CROWD)];
+        for count in counts.iter_mut().flatten().filter_map(|counts| counts.get_mut(bin)) {
+            *next += core::mem::replace(count, *next);
+        }
+    }
+}
+
+/// Moves every triangle's entry to its bin.
+fn scatter<const N: usize>(
+    keys: &[u32],
+    entries: &mut [Entry],
+    counts: &mut [Option<&mut [u32]>; N],
+    bits: u32,
+    control: &Control<'_>,
+) -> Result<(), Error> {
+    let tasks = counts.iter().flatten().count();
+    let shift = KEY_BITS - bits;
+    if tasks == 1
+        && let Some(Some(heads)) = counts.first_mut()
+    {
+        for (id, &key) in (0..).zip(keys) {
+            // A triangle that is left out has a key behind that of all bins.
+            let Some(head) = heads.get_mut((key >> shift) as usize) else { continue };
+            if let Some(entry) = entries.get_mut(*head as usize) {
+                *entry = [key, id];
+            }
+            *head += 1;
+        }
+        return Ok(());
+    }
+    let entries = Shared::new(bytemuck::cast_slice_mut(entries));
+    let parts = counts.iter_mut().flatten().enumerate().map(|(task, heads)| {
+        let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
+        (range.start as u32, keys.get(range).unwrap_or_default(), heads)
+    });
+    run::<N, _, _>(control, parts, |(first, keys, heads)| {
+        for (id, &key) in (first..).zip(keys) {
+            let Some(head) = heads.get_mut((key >> shift) as usize) else { continue };
+            entries.set(2 * *head as usize, [key, id]);
+            *head += 1;
+        }
+    })?;
+    Ok(())
+}
+
+/// Where bins are sorted.
+enum Bench<'w> {
+    /// Room for all entries, each where its entry is.
+    Whole(&'w mut [Entry]),
+    /// Room for the largest bin of each task.
+    Small(&'w mut [Entry]),
+}
+
+/// What the steps on top of the bins know.
+struct Work<'w> {
+    mesh: &'w TriangleMesh<'w>,
+    least: f32,
+    /// Entries of each bin.
+    sizes: &'w [u32],
+    /// Lower bits of a key, which do not choose a bin.
+    shift: u32,
+}
+
+/// Units with about as many entries as those of the other tasks, and what is made of them.
+struct Task<'w> {
+    work: &'w Work<'w>,
+    /// The entries of the units among all.
+    range: Range<usize>,
+    entries: &'w mut [Entry],
+    bench: &'w mut [Entry],
+    ids: &'w mut [u32],
+    nodes: &'w mut [Node],
+    /// Where the nodes lie.
+    child: u32,
+}
+
+/// How many nodes and roots a task made, and of which entries.
+#[derive(Clone, Copy, Default)]
+struct Made {
+    first: u32,
+    child: u32,
+    nodes: u32,
+    roots: u32,
+}
+
+impl Kernel for Task<'_> {
+    type Output = (Made, Record);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Self::Output {
+        let Self { work, range, entries, bench, ids, nodes, child } = self;
+        let Work { mesh, least, sizes, shift } = *work;
+        let first = range.start as u32;
+        let mut roots = Roots::new(mesh, least, entries, bench, ids, first, nodes, child);
+        let units = Units::new(sizes).skip_while(|unit| unit.start < range.start);
+        for unit in units.take_while(|unit| unit.start < range.end) {
+            roots.unit(unit.start - range.start..unit.end - range.start, Side::Entries, shift, 0);
+        }
+        let made = Made { first, child, nodes: roots.node_count, roots: roots.root_count };
+        (made, roots.last)
+    }
+}
+
+impl Work<'_> {
+    /// Makes the subtrees and their records.
+    #[expect(clippy::too_many_arguments, reason = "each is its own")]
+    fn roots<const N: usize>(
+        &self,
+        entries: &mut [Entry],
+        bench: Bench<'_>,
+        ids: &mut [u32],
+        nodes: &mut [Node],
+        tasks: u32,
+        control: &Control<'_>,
+    ) -> Result<All, Error> {
+        let finite = entries.len();
+        let mut ends = [0; N];
+        self.cut(&mut ends, tasks as usize, finite);
+        // The root of all comes first.
+        let (mut rest_of_nodes, mut child) = (nodes.get_mut(1..).unwrap_or_default(), 1);
+        let (mut rest, mut ids) = (&mut *entries, ids);
+        let (mut bench, is_whole) = match bench {
+            Bench::Whole(bench) => (bench, true),
+            Bench::Small(bench) => (bench, false),
+        };
+        let mut start = 0;
+        let parts = ends.into_iter().take(tasks as usize).enumerate().map(|(task, end)| {
+            let count = end - start;
+            let entries = take(&mut rest, count);
+            let ids = take(&mut ids, count);
+            let is_last = task + 1 == tasks as usize;
+            let room =
+                if is_last { rest_of_nodes.len() } else { most_below(count as u64) as usize };
+            let nodes = take(&mut rest_of_nodes, room);
+            let bench = take(&mut bench, if is_whole { count } else { MOST_UNIT.min(finite) });
+            let part = Task { work: self, range: start..end, entries, bench, ids, nodes, child };
+            start = end;
+            child += room as u32;
+            part
+        });
+        let level = SimdLevel::detect();
+        let made = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
+
+        // Move nodes and records together.
+        let mut all = All { nodes: 1, roots: 0, last: Record::zeroed() };
+        for (made, last) in made.into_iter().flatten() {
+            let moved = made.child - all.nodes;
+            let from = made.child as usize..(made.child + made.nodes) as usize;
+            if moved > 0 && from.end <= nodes.len() {
+                for node in nodes.get_mut(from.clone()).unwrap_or_default() {
+                    node.child -= moved;
+                }
+                nodes.copy_within(from, all.nodes as usize);
+            }
+            let to = all.roots as usize * RECORD;
+            let from = made.first as usize;
+            let records = from..from + made.roots as usize * RECORD;
+            all.nodes += made.nodes;
+            all.roots += made.roots;
+            if made.roots == 1 {
+                // Its few entries may have had no room for it.
+                all.last = last;
+                all.last.node.child -= moved;
+                if let Some(record) = entries.get_mut(to..to + RECORD) {
+                    record.copy_from_slice(bytemuck::cast_slice(&[all.last]));
+                }
+            } else if let Some(of_task) = entries.get_mut(records.clone()) {
+                for record in bytemuck::cast_slice_mut::<_, Record>(of_task) {
+                    record.node.child -= moved;
+                }
+                entries.copy_within(records, to);
+            }
+        }
+        Ok(all)
+    }
+
+    /// Where the units of each task end: about as many entries for each.
+    fn cut<const N: usize>(&self, ends: &mut [usize; N], tasks: usize, entries: usize) {
+        let mut units = Units::new(self.sizes);
+        let mut end = 0;
+        for (task, slot) in ends.iter_mut().enumerate().take(tasks) {
+            let goal = share(entries, task + 1, tasks);
+            while end < goal
+                && let Some(unit) = units.next()
+            {
+                end = unit.end;
+            }
+            *slot = end;
+        }
+    }
+
+    /// Builds the tree over the roots, behind their nodes; returns how many nodes and levels there are then.
+    fn top(&self, entries: &mut [Entry], nodes: &mut [Node], all: &All) -> (u32, u32) {
+        // One root or none is all there is.
+        if all.roots < 2 {
+            if let Some(root) = nodes.first_mut() {
+                *root = if all.roots == 1 { all.last.node } else { Node::EMPTY };
+            }
+            return (all.nodes, all.last.levels.max(1));
+        }
+        let roots = all.roots as usize;
+        let made = entries.split_at_mut_checked(roots * RECORD).and_then(|(records, rest)| {
+            let (items, rest) = rest.split_at_mut_checked(roots * ITEM)?;
+            let items = bytemuck::cast_slice_mut::<_, Item>(items);
+            let records: &[Record] = bytemuck::cast_slice(records);
+            for (at, (item, record)) in (0..).zip(items.iter_mut().zip(records)) {
+                let Record { min, max, count, .. } = *record;
+                *item = Item { min, max, count, record: at };
+            }
+            let record =
+                |at: u32| records.get(at as usize).map_or((Node::EMPTY, 0), |r| (r.node, r.levels));
+            let top = whole::<Node>(bytemuck::cast_slice_mut(rest));
+            let (count, levels) = top::build(items, record, top, all.nodes, self.least);
+            Some((count, levels, &*top))
+        });
+        let Some((count, levels, top)) = made else { return (all.nodes, 0) };
+        let below = all.nodes as usize;
+        let behind = top.get(1..count as usize).unwrap_or_default();
+        if let Some(nodes) = nodes.get_mut(below..below + behind.len()) {
+            nodes.copy_from_slice(behind);
+        }
+        if let (Some(to), Some(root)) = (nodes.first_mut(), top.first()) {
+            *to = *root;
+        }
+        (all.nodes + count - 1, levels)
+    }
+}
+
+/// What all tasks made together.
+struct All {
+    /// Nodes, with one for the root of all.
+    nodes: u32,
+    roots: u32,
+    /// The record of the last root.
+    last: Record,
+}
+
+/// Takes the first elements of a slice, or all there are.
+fn take<'w, T>(rest: &mut &'w mut [T], count: usize) -> &'w mut [T] {
+    let count = count.min(rest.len());
+    let (first, behind) = core::mem::take(rest).split_at_mut(count);
+    *rest = behind;
+    first
+}

@@ -1,0 +1,165 @@
+//! The census: the key of every triangle, how many fall into each bin, and the box around them all.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, u32x8};
+use glam::Vec3A;
+
+use crate::aabb::{Aabb, MAX_COORDINATE};
+use crate::config::BuildFlags;
+use crate::control::Control;
+use crate::error::Error;
+use crate::mesh::TriangleMesh;
+use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
+use crate::spans::{Corners, four};
+use crate::tasks::run;
+
+use super::key::{KEY_BITS, Keys, NO_KEY};
+
+/// What a census finds, but for keys and counts.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Census {
+    /// Triangles that go into the tree.
+    pub(crate) finite: u32,
+    /// Triangles left out because a coordinate is not finite.
+    pub(crate) skipped: u32,
+    /// The box around those in the tree.
+    pub(crate) bounds: Aabb,
+}
+
+/// A task: some triangles, room for their keys, and its counts.
+struct Part<'w> {
+    mesh: &'w TriangleMesh<'w>,
+    flags: BuildFlags,
+    rule: &'w Keys,
+    first: u32,
+    keys: &'w mut [u32],
+    counts: &'w mut [u32],
+    shift: u32,
+    skipped: u32,
+    bounds: Aabb,
+}
+
+/// Fills in the keys of all triangles, and the counts of each task.
+#[expect(clippy::too_many_arguments, reason = "each is its own")]
+pub(crate) fn count<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    flags: BuildFlags,
+    rule: &Keys,
+    keys: &mut [u32],
+    counts: &mut [Option<&mut [u32]>; N],
+    bits: u32,
+    control: &Control<'_>,
+) -> Result<Census, Error> {
+    let tasks = counts.iter().flatten().count();
+    let triangles = keys.len();
+    let mut rest = keys;
+    let mut first = 0;
+    let parts = counts.iter_mut().flatten().enumerate().map(|(task, counts)| {
+        let end = share(triangles, task + 1, tasks);
+        let (keys, behind) = core::mem::take(&mut rest).split_at_mut(end - first);
+        rest = behind;
+        let start = first;
+        first = end;
+        #[expect(clippy::cast_possible_truncation, reason = "numbers of triangles")]
+        let first = start as u32;
+        let (skipped, bounds) = (0, Aabb::EMPTY);
+        Part { mesh, flags, rule, first, keys, counts, shift: KEY_BITS - bits, skipped, bounds }
+    });
+    let level = SimdLevel::detect();
+    let results = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
+    let mut census = Census { finite: 0, skipped: 0, bounds: Aabb::EMPTY };
+    for result in results.into_iter().flatten() {
+        let (skipped, bounds) = result?;
+        census.skipped += skipped;
+        census.bounds = census.bounds.union(&bounds);
+    }
+    census.finite = mesh.triangle_count() - census.skipped;
+    Ok(census)
+}
+
+/// Where the first of so many tasks end that share a number of things.
+pub(crate) const fn share(things: usize, task: usize, tasks: usize) -> usize {
+    (things as u64 * task as u64 / tasks as u64) as usize
+}
+
+impl Kernel for Part<'_> {
+    type Output = Result<(u32, Aabb), Error>;
+
+    #[inline(always)]
+    fn run<S: Simd>(mut self, simd: S) -> Self::Output {
+        let wide = self.mesh.wide();
+        let mut low = [f32x8::splat(simd, f32::INFINITY); 3];
+        let mut high = [f32x8::splat(simd, f32::NEG_INFINITY); 3];
+        let limit = u32x8::splat(simd, MAX_COORDINATE.to_bits());
+        let keys = core::mem::take(&mut self.keys);
+        let mut first = self.first;
+        let (eights, rest) = keys.as_chunks_mut::<8>();
+        for keys in eights {
+            let mut is_done = false;
+            if HAS_VECTORS {
+                let (head, tail) =
+                    (four(simd, &wide, first), four(simd, &wide, first.wrapping_add(4)));
+                let a = Corners::join(head[0], tail[0]);
+                let b = Corners::join(head[1], tail[1]);
+                let c = Corners::join(head[2], tail[2]);
+                let largest = a.largest().max(b.largest()).max(c.largest());
+                if largest.simd_le(limit).all_true() {
+                    let min = [a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y), a.z.min(b.z).min(c.z)];
+                    let max = [a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y), a.z.max(b.z).max(c.z)];
+                    low = [low[0].min(min[0]), low[1].min(min[1]), low[2].min(min[2])];
+                    high = [high[0].max(max[0]), high[1].max(max[1]), high[2].max(max[2])];
+                    *keys = self.rule.of_eight(simd, min, max).into();
+                    for key in &*keys {
+                        self.add(*key);
+                    }
+                    is_done = true;
+                }
+            }
+            if !is_done {
+                self.one_by_one(first, keys)?;
+            }
+            first = first.wrapping_add(8);
+        }
+        self.one_by_one(first, rest)?;
+        let least = |lanes: [f32; 8]| lanes.into_iter().fold(f32::INFINITY, f32::min);
+        let most = |lanes: [f32; 8]| lanes.into_iter().fold(f32::NEG_INFINITY, f32::max);
+        let low = low.map(|lanes| least(lanes.into()));
+        let high = high.map(|lanes| most(lanes.into()));
+        let bounds = Aabb { min: Vec3A::from_array(low), max: Vec3A::from_array(high) };
+        Ok((self.skipped, self.bounds.union(&bounds)))
+    }
+}
+
+impl Part<'_> {
+    #[inline(always)]
+    fn add(&mut self, key: u32) {
+        if let Some(count) = self.counts.get_mut((key >> self.shift) as usize) {
+            *count += 1;
+        }
+    }
+
+    /// Triangles that are not all finite, or cannot be read eight at a time.
+    #[inline(never)]
+    fn one_by_one(&mut self, first: u32, keys: &mut [u32]) -> Result<(), Error> {
+        for (triangle, key) in (first..).zip(keys) {
+            let Some(corners) = self.mesh.corners(triangle) else {
+                return Err(Error::IndexOutOfRange { triangle });
+            };
+            match Aabb::of(corners) {
+                Some(bounds) => {
+                    self.bounds = self.bounds.union(&bounds);
+                    *key = self.rule.of(&bounds);
+                    self.add(*key);
+                }
+                None if self.flags.contains(BuildFlags::STRICT) => {
+                    return Err(Error::NonFiniteTriangle { triangle });
+                }
+                None => {
+                    *key = NO_KEY;
+                    self.skipped += 1;
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,94 @@
+//! Keys of triangles: the Morton code of the cell in which the centre of the box lies.
+//!
+//! A cube around the centres is cut into 1024 cells an axis; the ten bits of each axis are interleaved,
+//! x highest. Sorted by key, triangles are in the order of a grid of grids of grids: cells that share
+//! their first `3 k` bits share a cell of the grid of `2^k` cells an axis.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, u32x8};
+use glam::Vec3A;
+
+use crate::aabb::Aabb;
+
+/// Bits of a key.
+pub(crate) const KEY_BITS: u32 = 30;
+
+/// The key of a triangle that has none: one of its corners is not finite.
+pub(crate) const NO_KEY: u32 = u32::MAX;
+
+/// Takes boxes to keys.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Keys {
+    /// Twice the least corner of the cube.
+    origin: Vec3A,
+    /// Half of the cells for each unit.
+    scale: f32,
+}
+
+/// The last cell of an axis, and a part of it.
+const END: f32 = 1023.5;
+/// What is added to round to a whole number, which then stands in the low bits.
+const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
+const CELL_BITS: u32 = 0x3ff;
+
+impl Keys {
+    /// Keys for boxes whose centres lie in `centers`. A box of a single point has one key.
+    pub(crate) fn new(centers: &Aabb) -> Self {
+        let extent = centers.size().max_element();
+        // Not infinite, so that nothing times it is a NaN.
+        let scale = (512.0 / extent).min(MOST_SCALE);
+        let is_box = extent >= 0.0;
+        let origin = if is_box { centers.min + centers.min } else { Vec3A::ZERO };
+        Self { origin, scale: if is_box { scale } else { 0.0 } }
+    }
+
+    /// The key of a box.
+    #[inline(always)]
+    pub(crate) fn of(&self, bounds: &Aabb) -> u32 {
+        let cell = ((bounds.min + bounds.max) - self.origin) * self.scale;
+        let cell = cell.max(Vec3A::ZERO).min(Vec3A::splat(END));
+        let [x, y, z] = ((cell - Vec3A::splat(0.5)) + Vec3A::splat(SHIFT))
+            .to_array()
+            .map(|cell| spread(cell.to_bits() & CELL_BITS));
+        x << 2 | y << 1 | z
+    }
+
+    /// The keys of eight boxes: of each the same as [`of`](Self::of).
+    #[inline(always)]
+    pub(crate) fn of_eight<S: Simd>(
+        &self,
+        simd: S,
+        min: [f32x8<S>; 3],
+        max: [f32x8<S>; 3],
+    ) -> u32x8<S> {
+        let x = self.axis(simd, 0, min[0], max[0]);
+        let y = self.axis(simd, 1, min[1], max[1]);
+        let z = self.axis(simd, 2, min[2], max[2]);
+        (x << 2) | (y << 1) | z
+    }
+
+    #[inline(always)]
+    fn axis<S: Simd>(&self, simd: S, axis: usize, min: f32x8<S>, max: f32x8<S>) -> u32x8<S> {
+        let origin = f32x8::splat(simd, self.origin[axis]);
+        let cell = ((min + max) - origin) * f32x8::splat(simd, self.scale);
+        let cell = cell.max(f32x8::splat(simd, 0.0)).min(f32x8::splat(simd, END));
+        let mut bits = ((cell - 0.5) + SHIFT).bitcast::<u32x8<S>>() & CELL_BITS;
+        bits = (bits | bits << 16) & 0x0300_00ff;
+        bits = (bits | bits << 8) & 0x0300_f00f;
+        bits = (bits | bits << 4) & 0x030c_30c3;
+        (bits | bits << 2) & 0x0924_9249
+    }
+}
+
+/// The largest scale for which a coordinate's cell is finite.
+const MOST_SCALE: f32 = 1e38;
+
+/// Ten bits with two zeros before each.
+#[inline(always)]
+const fn spread(cell: u32) -> u32 {
+    let mut bits = cell;
+    bits = (bits | bits << 16) & 0x0300_00ff;
+    bits = (bits | bits << 8) & 0x0300_f00f;
+    bits = (bits | bits << 4) & 0x030c_30c3;
+    (bits | bits << 2) & 0x0924_9249
+}

@@ -1,0 +1,96 @@
+//! How much memory a tree takes, and where everything lies in it.
+//!
+//! ```text
+//! index    | header 128 B | ids: u32 a triangle | nodes: 80 B each                        |
+//! scratch  | counts of the bins, for each task  | entries: 8 B a triangle | bench: 8 B a triangle |
+//! ```
+//!
+//! The bounds depend on the number `n` of triangles alone:
+//!
+//! - A node has eight children, unless its subtree has fewer triangles (a root of a small mesh) or fewer
+//!   roots. So each node below a root replaces one range of ids by eight: `n / 7` nodes at most.
+//! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
+//!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`.
+//! - A root holds at least [`LEAST_ROOT`] triangles, but for one in each division of a crowded bin, which
+//!   has more than [`CROWD`] triangles; at most [`DIVISIONS`] of them lie inside one another.
+//!
+//! A bin has one count a task and one for all, and there is at most one bin for sixteen triangles. A bin is
+//! sorted on the bench; only bins of more than [`CROWD`] entries need more of it than that.
+
+use crate::arena::section_bytes;
+use crate::blob::HEADER_BYTES;
+
+use super::node::Node;
+
+/// Triangles of a root, at least.
+pub(crate) const LEAST_ROOT: usize = 112;
+
+/// Triangles of a root, at most.
+pub(crate) const MOST_ROOT: usize = 224;
+
+/// Bins with more entries are divided again.
+pub(crate) const CROWD: usize = 4096;
+
+/// Entries of a unit of bins that is not divided, at most: a bin, and what is too little for a root before
+/// and behind it.
+pub(crate) const MOST_UNIT: usize = CROWD + 2 * LEAST_ROOT;
+
+/// Divisions of a bin inside one another, at most.
+pub(crate) const DIVISIONS: u32 = 5;
+
+/// The most bits of a key that choose a bin.
+const MOST_BITS: u32 = 18;
+
+/// A triangle in the making: its key, then its id.
+pub(crate) type Entry = [u32; 2];
+
+/// The most triangles of a tree: a place on the stack of a query names a node and a child in 32 bits.
+pub(crate) const MOST_TRIANGLES: u32 = 1 << 31;
+
+/// Bits of a key that choose one of the bins for so many triangles: sixteen or more a bin on average.
+pub(crate) const fn bin_bits(triangles: u64) -> u32 {
+    let mut bits = 0;
+    while bits < MOST_BITS && 16 << (bits + 3) <= triangles {
+        bits += 3;
+    }
+    bits
+}
+
+/// Roots with fewer triangles than others, at most.
+const fn small_roots(triangles: u64) -> u64 {
+    (DIVISIONS as u64 + 1) * (triangles / CROWD as u64) + 1
+}
+
+/// The most nodes below the roots that hold so many triangles.
+pub(crate) const fn most_below(triangles: u64) -> u64 {
+    triangles / 7 + small_roots(triangles)
+}
+
+/// The most nodes of a tree over so many triangles.
+pub(crate) const fn most_nodes(triangles: u64) -> u64 {
+    let roots = triangles / LEAST_ROOT as u64 + small_roots(triangles);
+    most_below(triangles) + 4 * roots / 7 + 2
+}
+
+/// Bytes of an index with so many ids and nodes.
+pub(crate) const fn index_bytes(ids: u64, nodes: u64) -> u64 {
+    HEADER_BYTES as u64 + section_bytes::<u32>(ids) + section_bytes::<Node>(nodes)
+}
+
+/// Bytes of the counts of all bins for so many tasks.
+pub(crate) const fn count_bytes(triangles: u64, tasks: u64) -> u64 {
+    (tasks + 1) * section_bytes::<u32>(1 << bin_bits(triangles))
+}
+
+/// Bytes of scratch: for counts, entries and a bench of so many entries.
+pub(crate) const fn scratch_bytes(triangles: u64, tasks: u64, bench: u64) -> u64 {
+    count_bytes(triangles, tasks)
+        + section_bytes::<Entry>(triangles)
+        + section_bytes::<Entry>(bench)
+}
+
+/// Entries on the benches of so many tasks, as long as no bin is crowded.
+pub(crate) const fn small_bench(triangles: u64, tasks: u64) -> u64 {
+    let all = tasks * MOST_UNIT as u64;
+    if all < triangles { all } else { triangles }
+}

@@ -1,0 +1,102 @@
+//! A wide bounding volume hierarchy, built the way this library builds grids.
+//!
+//! Every triangle belongs to one cell of a grid, by its centre; crowded cells get a finer grid of their own.
+//! Cells in Morton order are cut into small subtrees, and above them stands a tree by SAH. A node keeps
+//! the boxes of up to eight children in eight bits a side, a leaf up to eight ids; triangles stay in the
+//! caller's mesh.
+//!
+//! ```text
+//! blob | header | ids, those of a leaf side by side | nodes, the root first, siblings side by side |
+//! ```
+//!
+//! Each triangle stands in one leaf. So index and scratch are bounded by the number of triangles alone,
+//! wherever they lie ([`layout`]).
+//!
+//! Sources: binning by Morton code with SAH on top, Pantaleoni and Luebke 2010 and Garanzha et al. 2011;
+//! nodes with quantised boxes, Ylitie et al. 2017. Departures: bins are sorted in cache, no level of the tree
+//! is bound to a level of the grid, and leaves hold ids, not triangles.
+
+mod build;
+mod census;
+mod key;
+mod layout;
+mod node;
+mod roots;
+mod slab;
+mod sort;
+mod subtree;
+mod top;
+mod units;
+mod validate;
+mod walk;
+
+use crate::arena::split;
+use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::error::Error;
+use crate::visit::Visitor;
+pub(crate) use build::{bound, build, sizes};
+use node::{LEAF, Node};
+pub(crate) use slab::Slab;
+pub(crate) use validate::proof_bytes;
+pub(crate) use walk::OneRay;
+
+/// Levels of nodes, at most: 20 by SAH and 9 that halve roots ([`top`]), 32 of a subtree, whose nodes take
+/// seven triangles each ([`subtree`]).
+pub(crate) const LEVELS: u32 = 64;
+
+/// A view of a built tree.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bvh<'a> {
+    nodes: &'a [Node],
+    ids: &'a [u32],
+    /// Levels of nodes.
+    levels: u32,
+}
+
+impl<'a> Bvh<'a> {
+    /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
+    pub(crate) fn open(header: &Header, blob: &'a [u8]) -> Result<Self, Error> {
+        let sections = blob.get(HEADER_BYTES..).and_then(|behind| {
+            let (ids, behind) = split::<u32>(behind, header.reference_count.into())?;
+            Some((ids, split::<Node>(behind, header.node_count.into())?))
+        });
+        let (ids, (nodes, rest)) =
+            sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
+        if !rest.is_empty() {
+            return Err(corrupt(core::mem::offset_of!(Header, blob_bytes)));
+        }
+        Ok(Self { nodes, ids, levels: header.levels.min(LEVELS) })
+    }
+
+    /// The ids of all leaves.
+    pub(crate) const fn list_words(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// Nodes and leaves that a ray enters, at most: there are no more leaves than ids, and a node has
+    /// eight children.
+    #[inline(always)]
+    const fn budget(&self) -> usize {
+        self.nodes.len() * 9
+    }
+
+    /// The ids of a leaf; none where there is no such leaf.
+    #[inline(always)]
+    fn leaf(&self, first: u32, count: u32) -> &'a [u32] {
+        let start = first as usize;
+        let end = start.saturating_add(count.min(LEAF as u32) as usize);
+        self.ids.get(start..end).unwrap_or_default()
+    }
+
+    /// Shows all leaves; `false` if that was enough.
+    pub(crate) fn visit(&self, visitor: &mut Visitor<'_>) -> bool {
+        self.nodes.iter().all(|node| {
+            (0..8).all(|slot| match node.child(slot) {
+                node::Child::Leaf { first, count } if count > 0 => {
+                    visitor.list(self.leaf(first, count))
+                }
+                _ => true,
+            })
+        })
+    }
+}

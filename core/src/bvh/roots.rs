@@ -1,0 +1,292 @@
+//! From bins of entries to roots: subtrees over a hundred to two hundred triangles each, which the tree
+//! on top ([`top`](super::top)) then treats as one thing.
+//!
+//! ```text
+//! for each unit (a crowded bin, or bins side by side with LEAST_ROOT entries or more):
+//!     crowded: a box of its own around the centres, new keys, new bins; then these
+//!     else:    sort by key, cut where high bits of the key change, make a subtree of each part
+//!
+//! entries | records of roots | used up | this unit | later units      |
+//! bench   |                            | the same unit, while it is binned again |
+//! ```
+//!
+//! A unit's entries lie in one of the two arrays, and binning moves them to the other. What a root leaves
+//! behind is 112 bytes, written over entries that were used up: a root takes 896 bytes of them or more, and
+//! a smaller one comes behind a crowded bin.
+
+#![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
+
+use core::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::aabb::Aabb;
+use crate::mesh::TriangleMesh;
+
+use super::key::{KEY_BITS, Keys};
+use super::layout::{CROWD, DIVISIONS, Entry, LEAST_ROOT, MOST_ROOT, MOST_UNIT, bin_bits};
+use super::node::Node;
+use super::sort::sort;
+use super::subtree::Subtree;
+use super::units::starts;
+
+/// What is known of a root.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct Record {
+    pub(crate) node: Node,
+    pub(crate) min: [f32; 3],
+    pub(crate) max: [f32; 3],
+    /// Triangles below it.
+    pub(crate) count: u32,
+    /// Levels of nodes.
+    pub(crate) levels: u32,
+}
+
+/// A record in entries.
+pub(crate) const RECORD: usize = size_of::<Record>() / size_of::<Entry>();
+
+const _: () = assert!(size_of::<Record>() == 112 && 2 * RECORD <= LEAST_ROOT);
+
+/// The roots of a range of units.
+pub(crate) struct Roots<'w> {
+    pub(crate) mesh: &'w TriangleMesh<'w>,
+    /// No step of a node is smaller than that of a box of this size.
+    pub(crate) least: f32,
+    /// Where the entries are, and where the records go.
+    pub(crate) entries: &'w mut [Entry],
+    /// Room for as many, or only for the largest bin.
+    pub(crate) bench: &'w mut [Entry],
+    /// The ids, each where an entry was.
+    pub(crate) ids: &'w mut [u32],
+    /// Where the ids lie in the index.
+    pub(crate) first: u32,
+    /// Where the nodes go.
+    pub(crate) nodes: &'w mut [Node],
+    /// Where the nodes lie in the index.
+    pub(crate) child: u32,
+    subtree: Subtree,
+    /// Nodes so far, whether or not there was room for them.
+    pub(crate) node_count: u32,
+    pub(crate) root_count: u32,
+    /// The record of the last root.
+    pub(crate) last: Record,
+}
+
+/// Where the entries of a unit lie.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Side {
+    Entries,
+    Bench,
+}
+
+impl<'w> Roots<'w> {
+    #[expect(clippy::too_many_arguments, reason = "each is its own")]
+    pub(crate) fn new(
+        mesh: &'w TriangleMesh<'w>,
+        least: f32,
+        entries: &'w mut [Entry],
+        bench: &'w mut [Entry],
+        ids: &'w mut [u32],
+        first: u32,
+        nodes: &'w mut [Node],
+        child: u32,
+    ) -> Self {
+        let (subtree, last) = (Subtree::new(), Record::zeroed());
+        let (node_count, root_count) = (0, 0);
+        Self {
+            mesh,
+            least,
+            entries,
+            bench,
+            ids,
+            first,
+            nodes,
+            child,
+            subtree,
+            node_count,
+            root_count,
+            last,
+        }
+    }
+
+    /// Makes the roots of a unit: of bins that are in order, chosen by what is above the lowest `shift`
+    /// bits of a key. It was divided `depth` times.
+    pub(crate) fn unit(&mut self, range: Range<usize>, side: Side, shift: u32, depth: u32) {
+        if range.len() > MOST_UNIT {
+            let centers = self.centers(range.clone(), side);
+            // Equal centres have no order but that of their ids.
+            if depth < DIVISIONS && centers.size().max_element() > 0.0 {
+                self.divide(range, side, &centers, depth);
+            } else {
+                self.cut(range, side);
+            }
+            return;
+        }
+        let (entries, bench) = match side {
+            Side::Entries => (self.entries.get_mut(range.clone()), bench_for(self.bench, &range)),
+            Side::Bench => (self.bench.get_mut(range.clone()), self.entries.get_mut(range.clone())),
+        };
+        if let (Some(entries), Some(bench)) = (entries, bench) {
+            let differing = |[first, last]: [&Entry; 2]| 32 - (first[0] ^ last[0]).leading_zeros();
+            let ends = entries.first().zip(entries.last());
+            let bits = ends.map_or(0, |(first, last)| differing([first, last]));
+            sort(entries, bench, bits.max(shift));
+        }
+        self.cut(range, side);
+    }
+
+    /// Makes roots of sorted entries: halves them where a high bit of the key changes, until parts
+    /// are small enough.
+    fn cut(&mut self, range: Range<usize>, side: Side) {
+        let mut start = range.start;
+        while start < range.end {
+            let mut end = range.end;
+            while end - start > MOST_ROOT {
+                end = start + self.split(start..end, side);
+            }
+            self.root(start..end, side);
+            start = end;
+        }
+    }
+
+    /// Where to cut a range in two, none of them smaller than a root.
+    fn split(&self, range: Range<usize>, side: Side) -> usize {
+        let entries = self.on(side).get(range).unwrap_or_default();
+        let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return 0 };
+        let differing = first[0] ^ last[0];
+        let middle = if differing == 0 {
+            entries.len() / 2
+        } else {
+            let bit = 1 << (31 - differing.leading_zeros());
+            entries.partition_point(|entry| entry[0] & bit == 0)
+        };
+        middle.clamp(LEAST_ROOT, entries.len() - LEAST_ROOT)
+    }
+
+    /// Makes the subtree of a few entries, and leaves a record of it.
+    fn root(&mut self, range: Range<usize>, side: Side) {
+        let count = range.len() as u32;
+        let first = self.first + range.start as u32;
+        let child = self.child + self.node_count;
+        let entries = match side {
+            Side::Entries => self.entries.get(range.clone()),
+            Side::Bench => self.bench.get(range.clone()),
+        };
+        let (Some(entries), Some(ids)) = (entries, self.ids.get_mut(range)) else { return };
+        self.subtree.build(self.mesh, entries, ids, [first, child], self.least);
+
+        let below = self.subtree.below();
+        let start = self.node_count as usize;
+        if let Some(nodes) = self.nodes.get_mut(start..start + below.len()) {
+            nodes.copy_from_slice(below);
+        }
+        self.node_count += below.len() as u32;
+        let (node, bounds) = self.subtree.root();
+        let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+        let levels = self.subtree.levels();
+        let record = Record { node: *node, min, max, count, levels };
+        let start = self.root_count as usize * RECORD;
+        if let Some(slot) = self.entries.get_mut(start..start + RECORD) {
+            slot.copy_from_slice(bytemuck::cast_slice(&[record]));
+        }
+        self.last = record;
+        self.root_count += 1;
+    }
+
+    /// Bins a crowded unit by keys of its own, and makes the roots of its units.
+    fn divide(&mut self, range: Range<usize>, side: Side, centers: &Aabb, depth: u32) {
+        let keys = Keys::new(centers);
+        let bits = bin_bits(range.len() as u64).min(KEY_BITS);
+        let shift = KEY_BITS - bits;
+        let (from, to, other) = match side {
+            Side::Entries => (
+                self.entries.get_mut(range.clone()),
+                self.bench.get_mut(range.clone()),
+                Side::Bench,
+            ),
+            Side::Bench => (
+                self.bench.get_mut(range.clone()),
+                self.entries.get_mut(range.clone()),
+                Side::Entries,
+            ),
+        };
+        // Where ids will be there is room for one count for each of at least sixteen entries.
+        let counts = self.ids.get_mut(range.clone()).and_then(|ids| ids.get_mut(..1 << bits));
+        let (Some(from), Some(to), Some(counts)) = (from, to, counts) else { return };
+        counts.fill(0);
+        for entry in &mut *from {
+            let bounds = self.mesh.corners(entry[1]).and_then(Aabb::of).unwrap_or(Aabb::EMPTY);
+            entry[0] = keys.of(&bounds);
+            if let Some(count) = counts.get_mut((entry[0] >> shift) as usize) {
+                *count += 1;
+            }
+        }
+        let mut next = starts(counts);
+        for count in &mut *counts {
+            let next = &mut next[usize::from(*count as usize <= CROWD)];
+            *next += core::mem::replace(count, *next);
+        }
+        for entry in from {
+            if let Some(head) = counts.get_mut((entry[0] >> shift) as usize) {
+                if let Some(slot) = to.get_mut(*head as usize) {
+                    *slot = *entry;
+                }
+                *head += 1;
+            }
+        }
+
+        // Crowded bins come first, then all others in order.
+        let mut start = range.start;
+        while start < range.end {
+            let mut end = self.bin_end(start..range.end, other, shift);
+            if end - start <= CROWD {
+                while end - start < LEAST_ROOT && end < range.end {
+                    end = self.bin_end(end..range.end, other, shift);
+                }
+                if range.end - end < LEAST_ROOT {
+                    end = range.end;
+                }
+            }
+            self.unit(start..end, other, shift, depth + 1);
+            start = end;
+        }
+    }
+
+    /// Where the bin ends that begins with a range.
+    fn bin_end(&self, range: Range<usize>, side: Side, shift: u32) -> usize {
+        let entries = self.on(side).get(range.clone()).unwrap_or_default();
+        let Some(first) = entries.first() else { return range.end };
+        let bin = first[0] >> shift;
+        let others = entries.iter().position(|entry| entry[0] >> shift != bin);
+        others.map_or(range.end, |count| range.start + count)
+    }
+
+    /// The box of the centres of some triangles.
+    fn centers(&self, range: Range<usize>, side: Side) -> Aabb {
+        let mut centers = Aabb::EMPTY;
+        for entry in self.on(side).get(range).unwrap_or_default() {
+            let Some(bounds) = self.mesh.corners(entry[1]).and_then(Aabb::of) else { continue };
+            let center = (bounds.min + bounds.max) * 0.5;
+            centers.min = centers.min.min(center);
+            centers.max = centers.max.max(center);
+        }
+        centers
+    }
+
+    fn on(&self, side: Side) -> &[Entry] {
+        match side {
+            Side::Entries => self.entries,
+            Side::Bench => self.bench,
+        }
+    }
+}
+
+/// The part of a bench that a bin is sorted on: its own place, or the start of a small one.
+fn bench_for<'b>(bench: &'b mut [Entry], range: &Range<usize>) -> Option<&'b mut [Entry]> {
+    if range.end <= bench.len() {
+        bench.get_mut(range.clone())
+    } else {
+        bench.get_mut(..range.len())
+    }
+}

@@ -1,0 +1,94 @@
+//! Sorting the entries of a bin by their keys, stably, where they lie in cache.
+
+use super::layout::Entry;
+
+/// Few entries are sorted by insertion.
+const FEW: usize = 24;
+/// Bits of a key that one pass sorts by.
+const PASS_BITS: u32 = 9;
+const COUNTS: usize = 1 << PASS_BITS;
+
+/// Sorts entries by the lowest `bits` bits of their keys; the others are the same in all. Equal keys
+/// keep their order. `bench` has room for as many entries.
+pub(crate) fn sort(entries: &mut [Entry], bench: &mut [Entry], bits: u32) {
+    if entries.len() <= FEW {
+        insert(entries);
+        return;
+    }
+    let Some(bench) = bench.get_mut(..entries.len()) else { return };
+    // Two passes bring the entries back to where they were.
+    let passes = bits.div_ceil(2 * PASS_BITS) * 2;
+    let mut shift = 0;
+    for _ in 0..passes / 2 {
+        let width = bits.div_ceil(passes).min(PASS_BITS);
+        pass(entries, bench, shift, width);
+        pass(bench, entries, shift + width, width);
+        shift += 2 * width;
+    }
+}
+
+/// Moves entries to another place, in the order of some bits of their keys.
+#[expect(clippy::cast_possible_truncation, reason = "a bin has no more than CROWD entries")]
+fn pass(from: &[Entry], to: &mut [Entry], shift: u32, width: u32) {
+    let mut heads = [0_u16; COUNTS];
+    let mask = (1 << width) - 1;
+    let digit = |entry: &Entry| (entry[0] >> shift & mask) as usize % COUNTS;
+    for entry in from {
+        heads[digit(entry)] += 1;
+    }
+    let mut end = 0;
+    for head in heads.iter_mut().take(mask as usize + 1) {
+        end += core::mem::replace(head, end);
+    }
+    for entry in from {
+        let head = &mut heads[digit(entry)];
+        if let Some(slot) = to.get_mut(*head as usize) {
+            *slot = *entry;
+        }
+        *head = head.wrapping_add(1);
+    }
+}
+
+/// Sorts a few entries by all of their keys.
+fn insert(entries: &mut [Entry]) {
+    for at in 1..entries.len() {
+        let mut hole = at;
+        while let Some([before, entry]) =
+            hole.checked_sub(1).and_then(|b| entries.get_mut(b..=hole)?.as_mut_array::<2>())
+        {
+            if before[0] <= entry[0] {
+                break;
+            }
+            core::mem::swap(before, entry);
+            hole -= 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+
+    #[test]
+    fn entries_are_in_the_order_of_their_keys_and_then_as_they_were() {
+        let mut state = 1_u32;
+        for count in [0, 1, 2, 23, 24, 25, 100, 4096] {
+            for bits in [12, 15, 18, 30] {
+                let mut entries: Vec<Entry> = (0..count)
+                    .map(|id| {
+                        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                        // Few different keys, so that many are equal; and the same bits above.
+                        [(state >> 7) % (count / 2 + 1) * 0x0101_0101 % (1 << bits), id]
+                    })
+                    .collect();
+                let mut expected = entries.clone();
+                expected.sort_by_key(|entry| entry[0]);
+                let mut bench = entries.clone();
+                sort(&mut entries, &mut bench, bits);
+                assert_eq!(entries, expected, "{count} {bits}");
+            }
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! The nodes over a few triangles in the order of their keys: what a root stands for.
+//!
+//! ```text
+//! ranges = [all]
+//! for each range of more than a leaf, breadth first:
+//!     until it is in eight parts: cut the part whose keys differ in the highest bit, where that bit changes
+//!     parts of a leaf's size or less become leaves, the others nodes
+//! for each node, the last one first: gather the boxes of its leaves, quantise all eight, unite them
+//! ```
+
+#![expect(clippy::cast_possible_truncation, reason = "no more than MOST_ROOT triangles")]
+
+use crate::aabb::Aabb;
+use crate::mesh::TriangleMesh;
+
+use super::layout::{Entry, MOST_ROOT};
+use super::node::{LEAF, Node, WIDTH};
+
+/// Nodes of a subtree, at most.
+const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 1;
+
+/// The nodes of a subtree, the root first, each behind its parent.
+pub(crate) struct Subtree {
+    nodes: [Node; MOST_NODES],
+    /// The boxes of the nodes; before they are known, the ranges of entries that the nodes hold.
+    ranges: [Part; MOST_NODES],
+    boxes: [Aabb; MOST_NODES],
+    /// Levels above each node.
+    above: [u8; MOST_NODES],
+    count: usize,
+}
+
+/// A range of entries, and in which bits the keys of its first and last one differ.
+#[derive(Clone, Copy)]
+struct Part {
+    start: u8,
+    end: u8,
+    differing: u32,
+}
+
+const _: () = assert!(MOST_ROOT <= u8::MAX as usize);
+
+impl Part {
+    const NONE: Self = Self { start: 0, end: 0, differing: 0 };
+
+    #[inline(always)]
+    fn new(entries: &[Entry], start: u8, end: u8) -> Self {
+        let key = |at: u8| entries.get(usize::from(at)).map_or(0, |entry| entry[0]);
+        // Parts that can be cut have the lowest bit set: those of equal keys come last.
+        let is_cut = u32::from(end > start + 1);
+        let differing = (key(start) ^ key(end.saturating_sub(1))) << 1 | is_cut;
+        Self { start, end, differing }
+    }
+
+    const fn count(self) -> usize {
+        (self.end - self.start) as usize
+    }
+}
+
+impl Subtree {
+    pub(crate) const fn new() -> Self {
+        Self {
+            nodes: [Node::EMPTY; MOST_NODES],
+            ranges: [Part::NONE; MOST_NODES],
+            boxes: [Aabb::EMPTY; MOST_NODES],
+            above: [0; MOST_NODES],
+            count: 0,
+        }
+    }
+
+    /// The root and its box.
+    pub(crate) const fn root(&self) -> (&Node, &Aabb) {
+        (&self.nodes[0], &self.boxes[0])
+    }
+
+    /// Levels of nodes.
+    pub(crate) fn levels(&self) -> u32 {
+        let last = self.count.checked_sub(1).and_then(|last| self.above.get(last));
+        last.map_or(0, |&above| u32::from(above) + 1)
+    }
+
+    /// The nodes below the root.
+    pub(crate) fn below(&self) -> &[Node] {
+        self.nodes.get(1..self.count).unwrap_or_default()
+    }
+
+    /// Makes the nodes over some entries, no more than [`MOST_ROOT`], and writes their ids. The ids
+    /// lie in the index from `first` on, the nodes below the root from `child` on. No step of a node is
+    /// smaller than that of a box of size `least`.
+    pub(crate) fn build(
+        &mut self,
+        mesh: &TriangleMesh<'_>,
+        entries: &[Entry],
+        ids: &mut [u32],
+        [first, child]: [u32; 2],
+        least: f32,
+    ) {
+        self.nodes[0] = Node::EMPTY;
+        self.ranges[0] = Part::new(entries, 0, entries.len().min(MOST_ROOT) as u8);
+        self.count = 1;
+        let (mut at, mut written) = (0, 0);
+        while at < self.count {
+            let count = self.cut(at, entries, ids.get_mut(written..).unwrap_or_default());
+            self.nodes[at].first = written as u32;
+            written += count;
+            at += 1;
+        }
+        // Quantise, children before parents.
+        for at in (0..self.count).rev() {
+            self.quantise(at, mesh, ids, least);
+        }
+        // Name ids and nodes by where they lie in the index.
+        for node in self.nodes.iter_mut().take(self.count) {
+            node.first += first;
+            node.child = (node.child + child).wrapping_sub(1);
+        }
+    }
+
+    /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for
+    /// each other; returns how many ids.
+    fn cut(&mut self, at: usize, entries: &[Entry], ids: &mut [u32]) -> usize {
+        let parts = parts(self.ranges[at], entries);
+        let mut node = Node { child: self.count as u32, ..Node::EMPTY };
+        let mut written = 0;
+        for (slot, part) in parts.iter().enumerate().take_while(|(_, part)| part.count() > 0) {
+            if part.count() > LEAF && self.count < MOST_NODES {
+                node.inner |= 1 << slot;
+                self.nodes[self.count] = Node::EMPTY;
+                self.ranges[self.count] = *part;
+                self.above[self.count] = self.above[at] + 1;
+                self.count += 1;
+                continue;
+            }
+            node.counts[slot] = part.count() as u8;
+            let range = entries.get(usize::from(part.start)..usize::from(part.end));
+            let to = ids.get_mut(written..).unwrap_or_default();
+            for (id, entry) in to.iter_mut().zip(range.unwrap_or_default()) {
+                *id = entry[1];
+            }
+            written += part.count();
+        }
+        self.nodes[at] = node;
+        written
+    }
+
+    /// Finds the boxes of a node's children, and its own.
+    fn quantise(&mut self, at: usize, mesh: &TriangleMesh<'_>, ids: &[u32], least: f32) {
+        let node = &self.nodes[at];
+        let mut boxes = [Aabb::EMPTY; WIDTH];
+        let mut child = node.child as usize;
+        let mut first = node.first as usize;
+        let mut bounds = Aabb::EMPTY;
+        for (slot, bounds_of) in boxes.iter_mut().enumerate() {
+            let count = usize::from(node.counts[slot]);
+            if node.inner >> slot & 1 == 1 {
+                *bounds_of = self.boxes.get(child).copied().unwrap_or(Aabb::EMPTY);
+                child += 1;
+            } else if count > 0 {
+                let leaf = ids.get(first..first + count).unwrap_or_default();
+                for &id in leaf {
+                    let Some([a, b, c]) = mesh.corners(id) else { continue };
+                    bounds_of.min = bounds_of.min.min(a.min(b).min(c));
+                    bounds_of.max = bounds_of.max.max(a.max(b).max(c));
+                }
+                first += count;
+            } else {
+                break;
+            }
+            bounds = bounds.union(bounds_of);
+        }
+        let node = &mut self.nodes[at];
+        node.set_boxes(&bounds, &boxes, least);
+        self.boxes[at] = bounds;
+    }
+}
+
+/// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys.
+#[inline(always)]
+fn parts(range: Part, entries: &[Entry]) -> [Part; WIDTH] {
+    let mut parts = [Part::NONE; WIDTH];
+    parts[0] = range;
+    for count in 1..WIDTH {
+        // The part whose keys differ in the highest bit.
+        let mut widest = 0;
+        for (at, part) in parts.iter().enumerate().take(count) {
+            if part.differing > parts[widest].differing {
+                widest = at;
+            }
+        }
+        let part = parts[widest];
+        if part.differing == 0 {
+            break;
+        }
+        let middle = part.start + split(entries, part);
+        parts.copy_within(widest..count, widest + 1);
+        parts[widest] = Part::new(entries, part.start, middle);
+        parts[widest + 1] = Part::new(entries, middle, part.end);
+    }
+    parts
+}
+
+/// How many entries of a part come before the highest bit in which its keys differ is set; half of them
+/// if all keys are equal.
+#[inline(always)]
+fn split(entries: &[Entry], part: Part) -> u8 {
+    let range = entries.get(usize::from(part.start)..usize::from(part.end)).unwrap_or_default();
+    let differing = part.differing >> 1;
+    if differing == 0 {
+        return (part.end - part.start) / 2;
+    }
+    let bit = 1 << (31 - differing.leading_zeros());
+    // Where keys are in no order, both sides still get some.
+    let middle = range.partition_point(|entry| entry[0] & bit == 0);
+    middle.clamp(1, range.len().max(2) - 1) as u8
+}

@@ -1,0 +1,279 @@
+//! The tree over the roots: binned SAH (Wald 2007), eight children a node.
+//!
+//! ```text
+//! parts = [all roots]
+//! until there are eight: cut the part with the largest surface in two, at the least SAH cost
+//!                        of sixteen bins an axis by centre; a cost counts leaves of four triangles
+//! parts of one root become that root's node, the others nodes of their own, breadth first
+//! ```
+//!
+//! At [`DEEP`] levels parts are halved instead, so that the number of levels is bounded.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3A;
+
+use crate::aabb::Aabb;
+
+use super::layout::Entry;
+use super::node::{Node, WIDTH};
+
+/// A root, as the tree above sees it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct Item {
+    pub(crate) min: [f32; 3],
+    pub(crate) max: [f32; 3],
+    /// Triangles below it.
+    pub(crate) count: u32,
+    /// Which record it is.
+    pub(crate) record: u32,
+}
+
+/// An item in entries.
+pub(crate) const ITEM: usize = size_of::<Item>() / size_of::<Entry>();
+
+/// Levels from which on parts are halved.
+const DEEP: u32 = 20;
+const BINS: usize = 16;
+
+impl Item {
+    fn bounds(&self) -> Aabb {
+        Aabb { min: Vec3A::from_array(self.min), max: Vec3A::from_array(self.max) }
+    }
+
+    /// Twice the centre.
+    #[inline(always)]
+    fn center(&self) -> Vec3A {
+        Vec3A::from_array(self.min) + Vec3A::from_array(self.max)
+    }
+
+    /// The cost of entering it: its leaves, about.
+    #[inline(always)]
+    fn cost(&self) -> f32 {
+        as_cost(self.count)
+    }
+}
+
+#[inline(always)]
+#[expect(clippy::cast_precision_loss, reason = "a cost")]
+fn as_cost(count: u32) -> f32 {
+    count.div_ceil(4) as f32
+}
+
+/// Half the surface of a box; 0 of an empty one.
+#[inline(always)]
+fn surface(bounds: &Aabb) -> f32 {
+    let size = bounds.size().max(Vec3A::ZERO).to_array();
+    size[0] * size[1] + size[1] * size[2] + size[2] * size[0]
+}
+
+/// A range of items that becomes a child.
+#[derive(Clone, Copy)]
+struct Part {
+    start: u32,
+    end: u32,
+    bounds: Aabb,
+    /// Its surface, or its number of items where parts are halved; negative if it cannot be cut.
+    priority: f32,
+}
+
+impl Part {
+    const NONE: Self = Self { start: 0, end: 0, bounds: Aabb::EMPTY, priority: -1.0 };
+
+    #[expect(clippy::cast_precision_loss, reason = "a priority")]
+    fn new(start: u32, end: u32, bounds: Aabb, halve: bool) -> Self {
+        let priority = match end - start {
+            0 | 1 => -1.0,
+            count if halve => count as f32,
+            _ => surface(&bounds),
+        };
+        Self { start, end, bounds, priority }
+    }
+}
+
+/// Makes the nodes over some items into `nodes`, the root first, and returns how many and how many levels
+/// all have. `record` gives the node of a root, which becomes a child, and its levels.
+///
+/// `child` is where the second node will lie in the index. No step is smaller than
+/// that of a box of size `least`.
+pub(crate) fn build(
+    items: &mut [Item],
+    record: impl Fn(u32) -> (Node, u32),
+    nodes: &mut [Node],
+    child: u32,
+    least: f32,
+) -> (u32, u32) {
+    let all = items.iter().fold(Aabb::EMPTY, |all, item| all.union(&item.bounds()));
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
+    let item_count = items.len() as u32;
+    let mut count = 1;
+    // A node that waits keeps its range and level where its children will be.
+    let Some(root) = nodes.first_mut() else { return (count, 0) };
+    *root = waiting(0, item_count, 0);
+    let (mut at, mut levels) = (0, 0);
+    while at < count {
+        let Some(node) = nodes.get(at as usize).copied() else { break };
+        if node.exponents != WAITING {
+            at += 1;
+            continue;
+        }
+        let (start, end, level) = (node.child, node.first, u32::from(node.counts[0]));
+        let bounds = if at == 0 { all } else { bounds_of(items, start, end) };
+        let parts = parts(items, Part::new(start, end, bounds, level >= DEEP), level >= DEEP);
+        let mut node = Node { child: child + count - 1, ..Node::EMPTY };
+        let mut boxes = [Aabb::EMPTY; WIDTH];
+        for (slot, part) in parts.iter().enumerate().filter(|(_, part)| part.end > part.start) {
+            node.inner |= 1 << slot;
+            boxes[slot] = part.bounds;
+            let below = match items.get(part.start as usize) {
+                Some(item) if part.end - part.start == 1 => {
+                    let (node, below) = record(item.record);
+                    levels = levels.max(level + 1 + below);
+                    node
+                }
+                _ => waiting(part.start, part.end, level + 1),
+            };
+            if let Some(slot) = nodes.get_mut(count as usize) {
+                *slot = below;
+            }
+            count += 1;
+        }
+        node.set_boxes(&bounds, &boxes, least);
+        if let Some(slot) = nodes.get_mut(at as usize) {
+            *slot = node;
+        }
+        at += 1;
+    }
+    (count, levels)
+}
+
+/// The exponents of a node that waits for its children; no other node has them.
+const WAITING: [u8; 3] = [0; 3];
+
+fn waiting(start: u32, end: u32, level: u32) -> Node {
+    #[expect(clippy::cast_possible_truncation, reason = "below 64")]
+    let level = level as u8;
+    Node {
+        exponents: WAITING,
+        child: start,
+        first: end,
+        counts: [level, 0, 0, 0, 0, 0, 0, 0],
+        ..Node::EMPTY
+    }
+}
+
+fn bounds_of(items: &[Item], start: u32, end: u32) -> Aabb {
+    let items = items.get(start as usize..end as usize).unwrap_or_default();
+    items.iter().fold(Aabb::EMPTY, |all, item| all.union(&item.bounds()))
+}
+
+/// Cuts a range of items into eight parts, or into single items.
+fn parts(items: &mut [Item], all: Part, halve: bool) -> [Part; WIDTH] {
+    let mut parts = [Part::NONE; WIDTH];
+    parts[0] = all;
+    for count in 1..WIDTH {
+        let mut widest = 0;
+        for (at, part) in parts.iter().enumerate().take(count) {
+            if part.priority > parts[widest].priority {
+                widest = at;
+            }
+        }
+        let part = parts[widest];
+        if part.end - part.start < 2 {
+            break;
+        }
+        let range = part.start as usize..part.end as usize;
+        let Some(items_of) = items.get_mut(range) else { break };
+        let middle = cut(items_of, halve);
+        #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
+        let middle = part.start + middle as u32;
+        parts[widest] = Part::new(part.start, middle, bounds_of(items, part.start, middle), halve);
+        parts[count] = Part::new(middle, part.end, bounds_of(items, middle, part.end), halve);
+    }
+    parts
+}
+
+/// What a bin has.
+#[derive(Clone, Copy)]
+struct Bin {
+    bounds: Aabb,
+    cost: f32,
+}
+
+impl Bin {
+    const EMPTY: Self = Self { bounds: Aabb::EMPTY, cost: 0.0 };
+}
+
+/// Cuts two or more items in two where the SAH cost is least; returns how many are in the first part.
+fn cut(items: &mut [Item], halve: bool) -> usize {
+    let half = items.len() / 2;
+    if halve || items.len() < 3 {
+        return half;
+    }
+    // Bin by centre.
+    let mut centers = Aabb::EMPTY;
+    for item in &*items {
+        centers.min = centers.min.min(item.center());
+        centers.max = centers.max.max(item.center());
+    }
+    #[expect(clippy::cast_precision_loss, reason = "sixteen")]
+    let scale = (Vec3A::splat(BINS as f32 * 0.999) / centers.size()).min(Vec3A::splat(f32::MAX));
+    let bin_of = |item: &Item| {
+        ((item.center() - centers.min) * scale).to_array().map(
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "saturates"
+            )]
+            |at| (at as u32 as usize).min(BINS - 1),
+        )
+    };
+    let mut bins = [[Bin::EMPTY; BINS]; 3];
+    for item in &*items {
+        let (bounds, cost) = (item.bounds(), item.cost());
+        for (bins, at) in bins.iter_mut().zip(bin_of(item)) {
+            if let Some(bin) = bins.get_mut(at) {
+                bin.bounds = bin.bounds.union(&bounds);
+                bin.cost += cost;
+            }
+        }
+    }
+    // Sweep over each axis: costs of what is before, then of what is behind.
+    let mut best = (f32::INFINITY, 0, 0);
+    for (axis, bins) in bins.iter().enumerate() {
+        let mut before = [0.0; BINS];
+        let mut all = Bin::EMPTY;
+        for (bin, before) in bins.iter().zip(&mut before) {
+            *before = surface(&all.bounds) * all.cost;
+            all.bounds = all.bounds.union(&bin.bounds);
+            all.cost += bin.cost;
+        }
+        let mut all = Bin::EMPTY;
+        for (at, bin) in bins.iter().enumerate().skip(1).rev() {
+            all.bounds = all.bounds.union(&bin.bounds);
+            all.cost += bin.cost;
+            let cost = before[at] + surface(&all.bounds) * all.cost;
+            if before[at] > 0.0 && all.cost > 0.0 && cost < best.0 {
+                best = (cost, axis, at);
+            }
+        }
+    }
+    let (cost, axis, at) = best;
+    if !cost.is_finite() {
+        return half;
+    }
+    let middle = partition(items, |item| bin_of(item)[axis] < at);
+    if middle == 0 || middle == items.len() { half } else { middle }
+}
+
+/// Moves items for which something holds before the others; returns how many there are.
+fn partition(items: &mut [Item], is_first: impl Fn(&Item) -> bool) -> usize {
+    let mut count = 0;
+    for at in 0..items.len() {
+        if items.get(at).is_some_and(&is_first) {
+            items.swap(count, at);
+            count += 1;
+        }
+    }
+    count
+}

@@ -1,0 +1,160 @@
+//! Proof that a foreign blob is a tree of its mesh.
+//!
+//! A tree answers right if every finite triangle stands in a leaf, and every box on the way from the root to
+//! that leaf holds it, with the margin that the slab test relies on ([`node`](super::node)). One walk
+//! over all nodes shows it: for each level of the way down it keeps the box that all above leave, and for
+//! each triangle one bit of scratch says that it was met. A second leaf with the same triangle is an error, so no
+//! sum has to be trusted, and a walk that ends has met each node once.
+
+use glam::DVec3;
+
+use super::node::{Child, LEAF, Node, WIDTH};
+use super::{Bvh, LEVELS};
+use crate::aabb::Aabb;
+use crate::arena::section_bytes;
+use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::cell::Lattice;
+use crate::error::{Error, Region};
+use crate::mesh::TriangleMesh;
+
+/// Bytes of scratch that a proof takes.
+pub(crate) const fn proof_bytes(triangles: u32) -> u64 {
+    triangles.div_ceil(u32::BITS) as u64 * size_of::<u32>() as u64
+}
+
+/// The part of a step that a box must be larger by: less than a build's, by its own rounding.
+const MARGIN: f64 = 1.0 / 128.0;
+
+/// A node on the way down.
+#[derive(Clone, Copy)]
+struct Level {
+    node: u32,
+    /// Children that are still to be looked at.
+    rest: u32,
+    /// The box that those above leave.
+    min: DVec3,
+    max: DVec3,
+}
+
+impl Bvh<'_> {
+    /// Whether this tree answers right; the error names the first byte that does not.
+    pub(crate) fn validate(
+        &self,
+        header: &Header,
+        lattice: &Lattice,
+        mesh: &TriangleMesh<'_>,
+        scratch: &mut [u8],
+    ) -> Result<(), Error> {
+        let at = |byte: u64| corrupt(usize::try_from(byte).unwrap_or(usize::MAX));
+        let ids_at = HEADER_BYTES as u64;
+        let nodes_at = ids_at + section_bytes::<u32>(self.ids.len() as u64);
+        let node_at = |node: u32| at(nodes_at + u64::from(node) * size_of::<Node>() as u64);
+        let word_at = |word: u64| at(ids_at + word * size_of::<u32>() as u64);
+
+        let survey = header.survey(lattice, mesh)?;
+        if header.resolution != [1; 3] {
+            return Err(corrupt(core::mem::offset_of!(Header, resolution)));
+        }
+        if header.reference_count != survey.finite_count {
+            return Err(corrupt(core::mem::offset_of!(Header, reference_count)));
+        }
+        let (needed_bytes, available_bytes) =
+            (proof_bytes(header.triangle_count), scratch.len() as u64);
+        let short = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
+        let bytes = usize::try_from(needed_bytes).ok().and_then(|bytes| scratch.get_mut(..bytes));
+        let met = bytes.ok_or(short)?;
+        met.fill(0);
+
+        let bounds = lattice.bounds();
+        let least = f64::from(bounds.size().max_element()) * LEAST_STEP;
+        let mut levels =
+            [Level { node: 0, rest: 0, min: DVec3::ZERO, max: DVec3::ZERO }; LEVELS as usize];
+        let (mut depth, mut deepest) = (0, 1);
+        let mut budget = self.nodes.len();
+        let mut ids = 0;
+        let start = |node: u32, min, max| Level { node, rest: 0xff, min, max };
+        let everywhere = DVec3::INFINITY;
+        levels[0] = start(0, -everywhere, everywhere);
+        loop {
+            let Some(level) = levels.get_mut(depth) else { return Err(node_at(0)) };
+            let number = level.node;
+            let node = self.nodes.get(number as usize).ok_or(node_at(number))?;
+            if level.rest == 0xff {
+                budget = budget.checked_sub(1).ok_or(node_at(number))?;
+                node.check(least, number == 0 && self.ids.is_empty()).ok_or(node_at(number))?;
+            }
+            if level.rest == 0 {
+                let Some(above) = depth.checked_sub(1) else { break };
+                depth = above;
+                continue;
+            }
+            let slot = level.rest.trailing_zeros();
+            level.rest &= level.rest - 1;
+            let (min, max) = node.holds(slot as usize);
+            let (min, max) = (level.min.max(min), level.max.min(max));
+            match node.child(slot) {
+                Child::Inner(child) => {
+                    depth += 1;
+                    deepest = deepest.max(depth + 1);
+                    *levels.get_mut(depth).ok_or(node_at(number))? = start(child, min, max);
+                }
+                Child::Leaf { first, count } => {
+                    for word in (u64::from(first)..).take(count as usize) {
+                        let id = usize::try_from(word).ok().and_then(|word| self.ids.get(word));
+                        let id = *id.ok_or(node_at(number))?;
+                        let byte = met.get_mut(id as usize / 8).ok_or(word_at(word))?;
+                        let bit = 1 << (id % 8);
+                        let bounds = mesh.corners(id).and_then(Aabb::of).ok_or(word_at(word))?;
+                        let is_held = bounds.min.as_dvec3().cmpge(min).all()
+                            && bounds.max.as_dvec3().cmple(max).all();
+                        if *byte & bit != 0 || !is_held {
+                            return Err(word_at(word));
+                        }
+                        *byte |= bit;
+                        ids += 1;
+                    }
+                }
+            }
+        }
+        if ids != self.ids.len() || budget != 0 {
+            return Err(corrupt(core::mem::offset_of!(Header, node_count)));
+        }
+        if header.levels as usize != deepest {
+            return Err(corrupt(core::mem::offset_of!(Header, levels)));
+        }
+        Ok(())
+    }
+}
+
+/// No step is smaller than this part of the scene: a little less than a build's, whose scene has no pad.
+const LEAST_STEP: f64 = 1.0 / (1_u64 << 61) as f64;
+
+impl Node {
+    /// Whether a build could have written what is not a box: steps that are numbers and not too small, and
+    /// children that are one thing each, of which there is one unless all are missing as they may.
+    fn check(&self, least: f64, may_be_empty: bool) -> Option<()> {
+        let steps = self.steps().map(f64::from);
+        let are_steps = self.exponents.iter().all(|exponent| (1..=253).contains(exponent))
+            && steps.iter().all(|&step| step >= least)
+            && self.origin().iter().all(|origin| origin.is_finite());
+        let mut children = 0;
+        for slot in 0..WIDTH {
+            let is_inner = self.inner >> slot & 1 == 1;
+            let count = usize::from(self.counts[slot]);
+            if count > LEAF || is_inner && count > 0 {
+                return None;
+            }
+            children += usize::from(is_inner || count > 0);
+        }
+        (are_steps && (children > 0 || may_be_empty)).then_some(())
+    }
+
+    /// The box that child `slot` may fill: its quantised one without the margin.
+    fn holds(&self, slot: usize) -> (DVec3, DVec3) {
+        let (origin, step) = (self.origin().map(f64::from), self.steps().map(f64::from));
+        let bound = |side: usize| f64::from(self.bounds[side][slot % WIDTH]);
+        let low = |axis: usize| origin[axis] + (bound(axis) + MARGIN) * step[axis];
+        let high = |axis: usize| origin[axis] + (bound(axis + 3) - MARGIN) * step[axis];
+        (DVec3::new(low(0), low(1), low(2)), DVec3::new(high(0), high(1), high(2)))
+    }
+}

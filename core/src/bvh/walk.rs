@@ -1,0 +1,255 @@
+//! One ray through the tree: nearest child first.
+//!
+//! ```text
+//! node = root
+//! loop: intersect the ray with the eight boxes of the node
+//!       descend into the nearest child that is met, push the others, the nearest last
+//!       a leaf: test its triangles at once; a hit ends the ray there
+//!       pop what does not begin behind that end
+//! ```
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, u8x16, u16x8, u32x8};
+
+use super::Bvh;
+use super::node::{Child, Node, WIDTH};
+use super::slab::Slab;
+use crate::counters::Tally;
+use crate::eight::first_eight;
+use crate::mesh::TriangleMesh;
+use crate::search::{Outcome, Search};
+use crate::simd::Kernel;
+use crate::triangle::TriangleTest;
+
+/// Places on the stack of a ray: seven a level, and one.
+pub(crate) const STACK: usize = 7 * super::LEVELS as usize + 1;
+
+/// As many places as nearly all trees need.
+pub(crate) const SMALL_STACK: usize = 7 * 16 + 1;
+
+/// A child that waits: how far it begins, in the high half, and its node and slot.
+pub(crate) type Waiting = u64;
+
+/// A single ray, and what it looks for.
+pub(crate) struct OneRay<'r, F, T> {
+    pub(crate) bvh: &'r Bvh<'r>,
+    pub(crate) mesh: &'r TriangleMesh<'r>,
+    pub(crate) slab: &'r Slab,
+    pub(crate) test: &'r TriangleTest,
+    pub(crate) search: &'r mut F,
+    pub(crate) tally: &'r mut T,
+}
+
+/// The ray in vectors.
+#[derive(Clone, Copy)]
+struct Wide<S: Simd> {
+    origin_near: [f32x8<S>; 3],
+    origin_far: [f32x8<S>; 3],
+    inverse_near: [f32x8<S>; 3],
+    inverse_far: [f32x8<S>; 3],
+    start: f32x8<S>,
+    /// Which sides are near, and which are far.
+    near: [usize; 3],
+    far: [usize; 3],
+}
+
+impl<S: Simd> Wide<S> {
+    #[inline(always)]
+    fn new(simd: S, slab: &Slab) -> Self {
+        let [x, y, z] = slab.inverse.map(|inverse| usize::from(inverse < 0.0) * 3);
+        Self {
+            origin_near: splat(simd, slab.origin_near),
+            origin_far: splat(simd, slab.origin_far),
+            inverse_near: splat(simd, slab.inverse),
+            inverse_far: splat(simd, slab.inverse_far()),
+            start: f32x8::splat(simd, slab.start),
+            near: [x, y + 1, z + 2],
+            far: [3 - x, 4 - y, 5 - z],
+        }
+    }
+
+    /// Which boxes of a node the ray meets before its end, as bits, and where it enters each.
+    #[inline(always)]
+    fn meet(&self, simd: S, node: &Node, end: f32) -> (u32, f32x8<S>) {
+        let origin = node.origin();
+        let word = u32x8::splat(simd, node.exponent_word());
+        let near = self.sides(simd, node, self.near);
+        let far = self.sides(simd, node, self.far);
+        // The exponents of x, y and z stand in the three low bytes.
+        let steps = [word << 23, word << 15, word << 7];
+        let mut distances = [(near[0], far[0]); 3];
+        for axis in 0..3 {
+            let step = (steps[axis] & 0x7f80_0000).bitcast::<f32x8<S>>();
+            let origin = f32x8::splat(simd, origin[axis]);
+            let step_near = step * self.inverse_near[axis];
+            let step_far = step * self.inverse_far[axis];
+            let base_near = (origin - self.origin_near[axis]) * self.inverse_near[axis];
+            let base_far = (origin - self.origin_far[axis]) * self.inverse_far[axis];
+            distances[axis] = (near[axis] * step_near + base_near, far[axis] * step_far + base_far);
+        }
+        let [x, y, z] = distances;
+        let near = x.0.max(y.0).max(z.0.max(self.start));
+        let far = x.1.min(y.1).min(z.1.min(f32x8::splat(simd, end)));
+        let missed = near.simd_gt(far).to_bitmask();
+        #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
+        let met = !missed as u32 & 0xff;
+        (met, near)
+    }
+
+    /// Three rows of sides as numbers.
+    #[inline(always)]
+    fn sides(&self, simd: S, node: &Node, rows: [usize; 3]) -> [f32x8<S>; 3] {
+        let row = |row: usize| node.bounds.get(row).copied().unwrap_or([0; WIDTH]);
+        let [x, y, z] = [row(rows[0]), row(rows[1]), row(rows[2])];
+        let (x, y) = bytes(simd, x, y);
+        let (z, _) = bytes(simd, z, z);
+        [x, y, z]
+    }
+}
+
+/// Twice eight bytes as numbers.
+#[inline(always)]
+pub(crate) fn bytes<S: Simd>(simd: S, low: [u8; 8], high: [u8; 8]) -> (f32x8<S>, f32x8<S>) {
+    let both: [u8; 16] = bytemuck::cast([low, high]);
+    let (low, high) = u8x16::simd_from(simd, both).widen();
+    (numbers(low), numbers(high))
+}
+
+#[inline(always)]
+fn numbers<S: Simd>(half: u16x8<S>) -> f32x8<S> {
+    let (low, high) = half.widen();
+    low.combine(high).to_float()
+}
+
+/// A point in vectors.
+#[inline(always)]
+fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
+    [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)]
+}
+
+impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        // Most trees are shallow, and a stack is zeros first.
+        if self.bvh.levels <= 16 {
+            self.walk(simd, &mut [0; SMALL_STACK]);
+        } else {
+            self.walk_deep(simd);
+        }
+    }
+}
+
+impl<F: Search, T: Tally> OneRay<'_, F, T> {
+    #[inline(never)]
+    fn walk_deep<S: Simd>(self, simd: S) {
+        self.walk(simd, &mut [0; STACK]);
+    }
+
+    #[inline(always)]
+    fn walk<S: Simd>(self, simd: S, stack: &mut [Waiting]) {
+        let Self { bvh, mesh, slab, test, search, tally } = self;
+        let ray = Wide::new(simd, slab);
+        let mut end = slab.end;
+        let mut top = 0;
+        // Damaged bytes may lead in circles; a tree's nodes are entered once.
+        let mut budget = bvh.budget();
+        let mut child = Child::Inner(0);
+        loop {
+            match child {
+                Child::Inner(number) => {
+                    tally.grid_step();
+                    let node = bvh.nodes.get(number as usize);
+                    let rest = budget.checked_sub(1);
+                    let (Some(node), Some(rest)) = (node, rest) else { return };
+                    budget = rest;
+                    let (met, near) = ray.meet(simd, node, end);
+                    if met != 0 {
+                        let first = met.trailing_zeros();
+                        let others = met & (met - 1);
+                        if others == 0 {
+                            child = node.child(first);
+                            continue;
+                        }
+                        // Descend into the nearest, push the others.
+                        let near: [f32; WIDTH] = near.into();
+                        let at = |slot: u32| near[slot as usize % WIDTH];
+                        let second = others.trailing_zeros();
+                        let mut rest = others & (others - 1);
+                        let (mut nearest, mut other) = (first, second);
+                        if at(second) < at(first) {
+                            (nearest, other) = (second, first);
+                        }
+                        let base = top;
+                        push(stack, &mut top, base, number, other, at(other));
+                        while rest != 0 {
+                            let mut slot = rest.trailing_zeros();
+                            rest &= rest - 1;
+                            if at(slot) < at(nearest) {
+                                core::mem::swap(&mut slot, &mut nearest);
+                            }
+                            push(stack, &mut top, base, number, slot, at(slot));
+                        }
+                        child = node.child(nearest);
+                        continue;
+                    }
+                }
+                Child::Leaf { first, count } => {
+                    let ids = bvh.leaf(first, count);
+                    let rest = budget.checked_sub(1);
+                    let Some(rest) = rest else { return };
+                    budget = rest;
+                    tally.cell_step();
+                    tally.primitive_tests(ids.len());
+                    let lanes = first_eight(ids);
+                    let mut survivors = test.survivors_of(simd, mesh, &lanes, ids.len());
+                    while survivors != 0 {
+                        let lane = survivors.trailing_zeros() as usize;
+                        survivors &= survivors - 1;
+                        let Some(&id) = ids.get(lane) else { break };
+                        match search.decide(test, mesh, id) {
+                            Outcome::Unchanged => {}
+                            Outcome::EndsAt(t) => end = slab.latest(t),
+                            Outcome::Done => return,
+                        }
+                    }
+                }
+            }
+            // Pop what is not behind the end.
+            loop {
+                let Some(below) = top.checked_sub(1) else { return };
+                top = below;
+                let Some(&waiting) = stack.get(top) else { return };
+                if !(f32::from_bits((waiting >> 32) as u32) > end) {
+                    #[expect(clippy::cast_possible_truncation, reason = "the low half")]
+                    let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
+                    child =
+                        bvh.nodes.get(node as usize).map_or(Child::NONE, |node| node.child(slot));
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// Pushes a child behind those of the same node that begin farther away.
+#[inline(always)]
+fn push(stack: &mut [Waiting], top: &mut usize, base: usize, node: u32, slot: u32, near: f32) {
+    let waiting = u64::from(near.to_bits()) << 32 | u64::from(node << 3 | slot);
+    let mut at = *top;
+    let Some(_) = stack.get(at) else { return };
+    *top += 1;
+    while at > base
+        && let Some(&below) = stack.get(at - 1)
+        && f32::from_bits((below >> 32) as u32) < near
+    {
+        if let Some(slot) = stack.get_mut(at) {
+            *slot = below;
+        }
+        at -= 1;
+    }
+    if let Some(slot) = stack.get_mut(at) {
+        *slot = waiting;
+    }
+}
