@@ -263,8 +263,12 @@ impl<'a> Grid<'a> {
         if HAS_BVH && let Structure::Bvh(bvh) = &self.structure {
             let test = &TriangleTest::from(ray, &approach).culling(cull);
             let slab = &bvh::Slab::new(ray, &approach);
-            let mesh = &self.mesh;
-            dispatch(self.simd, bvh::OneRay { bvh, mesh, slab, test, search, tally });
+            if bvh.is_shallow() {
+                let stack = &mut [0; bvh::SMALL_STACK];
+                self.walk(bvh, slab, test, search, tally, stack);
+            } else {
+                self.walk_deep(bvh, slab, test, search, tally);
+            }
             return;
         }
         let Some(line) = Line::new(&self.lattice, ray, &approach) else { return };
@@ -275,6 +279,34 @@ impl<'a> Grid<'a> {
         } else {
             self.traverse(&line, &test, search, tally);
         }
+    }
+
+    /// Walks a ray through a tree.
+    #[inline(always)]
+    fn walk<F: Search, T: Tally>(
+        &self,
+        bvh: &Bvh<'_>,
+        slab: &bvh::Slab,
+        test: &TriangleTest,
+        search: &mut F,
+        tally: &mut T,
+        stack: &mut [bvh::Waiting],
+    ) {
+        let mesh = &self.mesh;
+        dispatch(self.simd, bvh::OneRay { bvh, mesh, slab, test, search, tally, stack });
+    }
+
+    /// The same with room for the deepest tree.
+    #[inline(never)]
+    fn walk_deep<F: Search, T: Tally>(
+        &self,
+        bvh: &Bvh<'_>,
+        slab: &bvh::Slab,
+        test: &TriangleTest,
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        self.walk(bvh, slab, test, search, tally, &mut [0; bvh::STACK]);
     }
 
     /// Walks a ray through a structure that shows its triangles one by one.
@@ -356,6 +388,11 @@ impl<'a> Grid<'a> {
         rays: &Strided<'_>,
         answer: impl FnMut(usize, &[Hit]),
     ) -> bool {
+        if HAS_BVH && HAS_VECTORS && let Structure::Bvh(bvh) = &self.structure {
+            let (mesh, bounds) = (&self.mesh, self.lattice.bounds());
+            dispatch(self.simd, bvh::Groups::<_, ANY> { bvh, mesh, bounds, rays, answer });
+            return true;
+        }
         if !HAS_VECTORS || !HAS_BRICK {
             return false;
         }

@@ -27,7 +27,7 @@ use crate::ray::{Ray, round};
 pub(crate) const STEEP: f32 = (1_u128 << 75) as f32;
 
 /// What errors are relative to: 1 + 2^-20.
-const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
+pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 
 /// A ray, ready for boxes.
 #[derive(Debug, Clone, Copy)]

@@ -124,7 +124,7 @@ impl Subtree {
         let mut written = 0;
         for (slot, part) in parts.iter().enumerate().take_while(|(_, part)| part.count() > 0) {
             if part.count() > LEAF && self.count < MOST_NODES {
-                node.inner |= 1 << slot;
+                node.set_inner(slot);
                 self.nodes[self.count] = Node::EMPTY;
                 self.ranges[self.count] = *part;
                 self.above[self.count] = self.above[at] + 1;
@@ -152,7 +152,7 @@ impl Subtree {
         let mut bounds = Aabb::EMPTY;
         for (slot, bounds_of) in boxes.iter_mut().enumerate() {
             let count = usize::from(node.counts[slot]);
-            if node.inner >> slot & 1 == 1 {
+            if node.inner() >> slot & 1 == 1 {
                 *bounds_of = self.boxes.get(child).copied().unwrap_or(Aabb::EMPTY);
                 child += 1;
             } else if count > 0 {

@@ -9,7 +9,7 @@
 //! ```
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u8x16, u16x8, u32x8};
+use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
 
 use super::Bvh;
 use super::node::{Child, Node, WIDTH};
@@ -24,8 +24,10 @@ use crate::triangle::TriangleTest;
 /// Places on the stack of a ray: seven a level, and one.
 pub(crate) const STACK: usize = 7 * super::LEVELS as usize + 1;
 
-/// As many places as nearly all trees need.
-pub(crate) const SMALL_STACK: usize = 7 * 16 + 1;
+/// Levels of a tree for which a small stack is enough, as for nearly all: a stack is set to zeros first.
+pub(crate) const FEW_LEVELS: u32 = 14;
+/// Places on a small stack.
+pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
 
 /// A child that waits: how far it begins, in the high half, and its node and slot.
 pub(crate) type Waiting = u64;
@@ -38,6 +40,7 @@ pub(crate) struct OneRay<'r, F, T> {
     pub(crate) test: &'r TriangleTest,
     pub(crate) search: &'r mut F,
     pub(crate) tally: &'r mut T,
+    pub(crate) stack: &'r mut [Waiting],
 }
 
 /// The ray in vectors.
@@ -72,7 +75,7 @@ impl<S: Simd> Wide<S> {
     #[inline(always)]
     fn meet(&self, simd: S, node: &Node, end: f32) -> (u32, f32x8<S>) {
         let origin = node.origin();
-        let word = u32x8::splat(simd, node.exponent_word());
+        let word = u32x8::splat(simd, node.word);
         let near = self.sides(simd, node, self.near);
         let far = self.sides(simd, node, self.far);
         // The exponents of x, y and z stand in the three low bytes.
@@ -118,13 +121,21 @@ pub(crate) fn bytes<S: Simd>(simd: S, low: [u8; 8], high: [u8; 8]) -> (f32x8<S>,
 #[inline(always)]
 fn numbers<S: Simd>(half: u16x8<S>) -> f32x8<S> {
     let (low, high) = half.widen();
-    low.combine(high).to_float()
+    // Signed: one instruction, where the unsigned conversion is several.
+    low.combine(high).bitcast::<i32x8<S>>().to_float()
 }
 
 /// A point in vectors.
 #[inline(always)]
 fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
-    [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)]
+    [opaque(simd, x), opaque(simd, y), opaque(simd, z)]
+}
+
+/// A number in all lanes, hidden from the compiler: it would subtract and multiply one lane and spread
+/// the result, which makes the way from one node to the next longer.
+#[inline(always)]
+fn opaque<S: Simd>(simd: S, number: f32) -> f32x8<S> {
+    f32x8::simd_from(simd, core::hint::black_box([number; WIDTH]))
 }
 
 impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
@@ -132,24 +143,7 @@ impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        // Most trees are shallow, and a stack is zeros first.
-        if self.bvh.levels <= 16 {
-            self.walk(simd, &mut [0; SMALL_STACK]);
-        } else {
-            self.walk_deep(simd);
-        }
-    }
-}
-
-impl<F: Search, T: Tally> OneRay<'_, F, T> {
-    #[inline(never)]
-    fn walk_deep<S: Simd>(self, simd: S) {
-        self.walk(simd, &mut [0; STACK]);
-    }
-
-    #[inline(always)]
-    fn walk<S: Simd>(self, simd: S, stack: &mut [Waiting]) {
-        let Self { bvh, mesh, slab, test, search, tally } = self;
+        let Self { bvh, mesh, slab, test, search, tally, stack } = self;
         let ray = Wide::new(simd, slab);
         let mut end = slab.end;
         let mut top = 0;
@@ -202,7 +196,7 @@ impl<F: Search, T: Tally> OneRay<'_, F, T> {
                     budget = rest;
                     tally.cell_step();
                     tally.primitive_tests(ids.len());
-                    let lanes = first_eight(ids);
+                    let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
                     let mut survivors = test.survivors_of(simd, mesh, &lanes, ids.len());
                     while survivors != 0 {
                         let lane = survivors.trailing_zeros() as usize;
