@@ -67,6 +67,7 @@ mod counters;
 mod dda;
 mod eight;
 mod error;
+mod filter;
 mod fixed;
 mod grid;
 mod hash;
