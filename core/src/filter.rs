@@ -50,8 +50,6 @@
 //! With R <= 2^60 nothing overflows: no intermediate value exceeds 12 * 2^122 + 24 * 2^121 < 2^127.
 //! Beyond that slope is infinite and nothing is dropped.
 
-#![cfg_attr(not(test), expect(dead_code, reason = "the triangle test does not use it yet"))]
-
 use core::ops::{Add, BitAnd, BitOr, Mul, Neg, Sub};
 
 use fearless_simd::prelude::*;
@@ -238,6 +236,7 @@ impl<L: Lanes> Filter<L> {
 }
 
 /// A triangle in all lanes.
+#[allow(dead_code, reason = "so far only tests have rays side by side")]
 #[inline(always)]
 pub(crate) fn splat<S: Simd>(simd: S, [a, b, c]: &Triangle) -> [[f32x8<S>; 3]; 3] {
     let lanes = |number: f32| f32x8::splat(simd, number);
@@ -281,7 +280,9 @@ mod tests {
     use alloc::vec::Vec;
 
     use super::*;
+    use crate::ray::Ray;
     use crate::simd::{Kernel, SimdLevel, dispatch};
+    use crate::triangle::TriangleTest;
 
     /// Random numbers as in Marsaglia's xorshift.
     struct Random(u64);
@@ -370,28 +371,10 @@ mod tests {
         points.iter().flatten().fold(0.0, |largest, x| greater(largest, x.abs()))
     }
 
-    /// Whether the f64 test finds the line among the corners. Its signs are exact or 0.
+    /// Whether the f64 test finds the line among the corners.
     fn is_hit(origin: [f32; 3], direction: [f32; 3], triangle: &Triangle) -> bool {
-        let [x, y, z] = direction.map(f32::abs);
-        let [i, j, k] = if x > y && x > z {
-            [1, 2, 0]
-        } else if y > z {
-            [2, 0, 1]
-        } else {
-            [0, 1, 2]
-        };
-        let wide = |axis: usize| f64::from(direction[axis]);
-        let shear = [wide(i) / wide(k), wide(j) / wide(k)];
-        let [a, b, c] = triangle.map(|corner| {
-            let from = |axis: usize| f64::from(corner[axis]) - f64::from(origin[axis]);
-            [from(i) - shear[0] * from(k), from(j) - shear[1] * from(k)]
-        });
-        let u = c[0] * b[1] - c[1] * b[0];
-        let v = a[0] * c[1] - a[1] * c[0];
-        let w = b[0] * a[1] - b[1] * a[0];
-        let is_outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
-        let no_area = [u, v, w].iter().all(|edge| edge.abs() <= 0.0);
-        !is_outside && !no_area
+        let ray = Ray { t_min: f32::NEG_INFINITY, ..Ray::new(origin, direction) };
+        TriangleTest::new(&ray).unwrap().test(triangle).is_some()
     }
 
     /// Eight rays, each against its triangle; the first against all triangles; all against the first

@@ -218,7 +218,7 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut closest = Closest(None);
-        self.search(ray, Cull::None, &mut closest, &mut ());
+        self.search(ray, ray.t_min, Cull::None, &mut closest, &mut ());
         closest.0
     }
 
@@ -226,27 +226,50 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
         let mut any = Any(false);
-        self.search(ray, Cull::None, &mut any, &mut ());
+        self.search(ray, ray.t_min, Cull::None, &mut any, &mut ());
         any.0
     }
 
-    /// Walks a ray and shows a search what it hits.
+    /// Walks a ray and shows a search what it hits from `begin` on, which is no less than `t_min`, and
+    /// perhaps some of what it hits before.
     #[inline(always)]
     pub(crate) fn search<F: Search, T: Tally>(
         &self,
         ray: &Ray,
+        begin: f32,
         cull: Cull,
         search: &mut F,
         tally: &mut T,
     ) {
         let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
-        let Some(line) = Line::new(&self.lattice, ray, &approach) else { return };
         let test = TriangleTest::from(ray, &approach).culling(cull);
+        if approach.is_remote {
+            return self.test_all(&test, search, tally);
+        }
+        // The test has the ray's own range: the same hit, whichever part of the ray is walked.
+        let part = Ray { t_min: begin, ..*ray };
+        let Some(line) = Line::new(&self.lattice, &part, &approach) else { return };
         if HAS_BRICK && let Structure::Brick(brick) = &self.structure {
             let mut ray = OneRay::new(brick, &self.mesh, &line, &test, search, tally);
             dispatch(self.simd, &mut ray);
         } else {
             self.traverse(&line, &test, search, tally);
+        }
+    }
+
+    /// Shows a search what a ray hits of all triangles.
+    #[cold]
+    #[inline(never)]
+    fn test_all<F: Search, T: Tally>(&self, test: &TriangleTest, search: &mut F, tally: &mut T) {
+        for id in 0..self.mesh.triangle_count() {
+            // Of those that the structure has: with finite corners.
+            if self.mesh.corners(id).and_then(Aabb::of).is_none() {
+                continue;
+            }
+            tally.primitive_test();
+            if search.decide(test, &self.mesh, id) == Outcome::Done {
+                return;
+            }
         }
     }
 

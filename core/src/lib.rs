@@ -67,6 +67,7 @@ mod counters;
 mod dda;
 mod eight;
 mod error;
+mod exact;
 mod filter;
 mod fixed;
 mod grid;
