@@ -238,7 +238,7 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut closest = Closest(None);
-        self.search(ray, Cull::None, &mut closest, &mut ());
+        self.search(ray, ray.t_min, Cull::None, &mut closest, &mut ());
         closest.0
     }
 
@@ -246,33 +246,32 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
         let mut any = Any(false);
-        self.search(ray, Cull::None, &mut any, &mut ());
+        self.search(ray, ray.t_min, Cull::None, &mut any, &mut ());
         any.0
     }
 
-    /// Walks a ray and shows a search what it hits.
+    /// Walks a ray and shows a search what it hits from `begin` on, which is no less than `t_min`, and
+    /// perhaps some of what it hits before.
     #[inline(always)]
     pub(crate) fn search<F: Search, T: Tally>(
         &self,
         ray: &Ray,
+        begin: f32,
         cull: Cull,
         search: &mut F,
         tally: &mut T,
     ) {
-        let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
         if HAS_BVH && let Structure::Bvh(bvh) = &self.structure {
-            let test = &TriangleTest::from(ray, &approach).culling(cull);
-            let slab = &bvh::Slab::new(ray, &approach);
-            if bvh.is_shallow() {
-                let stack = &mut [0; bvh::SMALL_STACK];
-                self.walk(bvh, slab, test, search, tally, stack);
-            } else {
-                self.walk_deep(bvh, slab, test, search, tally);
-            }
-            return;
+            return self.search_tree(bvh, ray, begin, cull, search, tally);
         }
-        let Some(line) = Line::new(&self.lattice, ray, &approach) else { return };
+        let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
         let test = TriangleTest::from(ray, &approach).culling(cull);
+        if approach.is_remote {
+            return self.test_all(&test, search, tally);
+        }
+        // The test has the ray's own range: the same hit, whichever part of the ray is walked.
+        let part = Ray { t_min: begin, ..*ray };
+        let Some(line) = Line::new(&self.lattice, &part, &approach) else { return };
         if HAS_BRICK && let Structure::Brick(brick) = &self.structure {
             let mut ray = OneRay::new(brick, &self.mesh, &line, &test, search, tally);
             dispatch(self.simd, &mut ray);
@@ -281,7 +280,38 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Walks a ray through a tree.
+    /// Walks a ray through a tree and shows a search what it hits.
+    #[inline(always)]
+    fn search_tree<F: Search, T: Tally>(
+        &self,
+        bvh: &Bvh<'_>,
+        ray: &Ray,
+        begin: f32,
+        cull: Cull,
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        let bounds = &self.lattice.bounds();
+        let (slab, test) = match bvh::Slab::nearby(ray, begin, bounds) {
+            Some((slab, filter)) => (slab, TriangleTest::with(ray, filter)),
+            None => {
+                let Some(approach) = Approach::new(ray, bounds) else { return };
+                let test = TriangleTest::from(ray, &approach);
+                if approach.is_remote {
+                    return self.test_all(&test.culling(cull), search, tally);
+                }
+                (bvh::Slab::new(ray, begin, &approach), test)
+            }
+        };
+        let test = &test.culling(cull);
+        if bvh.is_shallow() {
+            self.walk(bvh, &slab, test, search, tally, &mut [0; bvh::SMALL_STACK]);
+        } else {
+            self.walk_deep(bvh, &slab, test, search, tally);
+        }
+    }
+
+    /// Walks a ray through a tree, with a stack.
     #[inline(always)]
     fn walk<F: Search, T: Tally>(
         &self,
@@ -307,6 +337,22 @@ impl<'a> Grid<'a> {
         tally: &mut T,
     ) {
         self.walk(bvh, slab, test, search, tally, &mut [0; bvh::STACK]);
+    }
+
+    /// Shows a search what a ray hits of all triangles.
+    #[cold]
+    #[inline(never)]
+    fn test_all<F: Search, T: Tally>(&self, test: &TriangleTest, search: &mut F, tally: &mut T) {
+        for id in 0..self.mesh.triangle_count() {
+            // Of those that the structure has: with finite corners.
+            if self.mesh.corners(id).and_then(Aabb::of).is_none() {
+                continue;
+            }
+            tally.primitive_test();
+            if search.decide(test, &self.mesh, id) == Outcome::Done {
+                return;
+            }
+        }
     }
 
     /// Walks a ray through a structure that shows its triangles one by one.

@@ -68,6 +68,8 @@ mod counters;
 mod dda;
 mod eight;
 mod error;
+mod exact;
+mod filter;
 mod fixed;
 mod grid;
 mod hash;

@@ -4,11 +4,11 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u32x8};
 
 use super::boxes::{Beam, Slabs};
-use super::slab::{STEEP, WIDER};
+use super::slab::{LONG, SHORT, STEEP, TINY, WIDER};
 use crate::aabb::Aabb;
 use crate::approach::FAR_EXTENTS;
 use crate::eight::{join, load, transpose};
-use crate::filter::Filter;
+use crate::filter::{Filter, NEARBY_FLOOR, NEARBY_REACH, NEARBY_UNIT, RayFilter};
 use crate::mesh::TriangleMesh;
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::triangle::TriangleTest;
@@ -53,8 +53,6 @@ const PAIRS: usize = 8;
 
 /// 2^-24: how much rounding to f32 changes a number, in parts of it.
 const UNIT: f32 = 1.0 / 16_777_216.0;
-/// More than what underflows on the way to a distance.
-const TINY: f32 = f32::MIN_POSITIVE;
 
 impl Rays {
     pub(crate) const fn new() -> Self {
@@ -157,10 +155,10 @@ impl Rays {
             let distance = (a + half[0]).max(b + half[1]).max(c + half[2]);
             let [u, v, w] = [scaled[0].abs(), scaled[1].abs(), scaled[2].abs()];
             let reach = distance * 29.0 + 19.0 * extent;
-            let slope = (u + v + w) * reach * (UNIT * 1.001);
-            let is_in_range = distance.simd_le(splat(MOST_REACH));
+            let slope = (u + v + w) * reach * NEARBY_UNIT;
+            let is_in_range = distance.simd_le(splat(NEARBY_REACH));
             self.slope[octet] = is_in_range.select(slope, finite).into();
-            self.floor[octet] = (distance * distance * 2e-29 + distance * TINY + TINY).into();
+            self.floor[octet] = (distance * distance * NEARBY_FLOOR + distance * TINY + TINY).into();
         }
         self.alive = *alive;
         self.settle();
@@ -312,8 +310,7 @@ impl Rays {
     #[inline(never)]
     fn decide_one<const ANY: bool>(&mut self, mesh: &TriangleMesh<'_>, ray: u32, id: u32) {
         let at = ray as usize % GROUP;
-        let bounds = ([-1e30; 3], [1e30; 3]);
-        let Some(test) = TriangleTest::new(&self.rays[at], bounds) else { return };
+        let test = TriangleTest::with(&self.rays[at], RayFilter::NONE);
         let hit = test.decide(mesh, id);
         if hit.primitive == INVALID_ID || !hit.is_closer(&self.hits[at]) {
             return;
@@ -327,13 +324,6 @@ impl Rays {
         }
     }
 }
-
-/// Directions that are longer or shorter are not divided by in f32.
-const LONG: f32 = f32::from_bits(0x7e00_0000); // 2^125
-const SHORT: f32 = f32::from_bits(0x0180_0000); // 2^-124
-
-/// The largest reach with which the filter does not overflow.
-const MOST_REACH: f32 = f32::from_bits(0x5d80_0000); // 2^60
 
 /// The lowest bits.
 #[inline(always)]
