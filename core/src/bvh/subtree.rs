@@ -17,7 +17,7 @@ use super::layout::{Entry, MOST_ROOT};
 use super::node::{LEAF, Node, WIDTH};
 
 /// Nodes of a subtree, at most.
-const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 1;
+const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 2;
 
 /// The nodes of a subtree, the root first, each behind its parent.
 pub(crate) struct Subtree {
@@ -28,6 +28,15 @@ pub(crate) struct Subtree {
     /// Levels above each node.
     above: [u8; MOST_NODES],
     count: usize,
+}
+
+/// How ranges are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cut {
+    /// Where the highest bit changes in which keys differ.
+    Keys,
+    /// In halves, the largest first: fewer nodes, worse boxes.
+    Halves,
 }
 
 /// A range of entries, and in which bits the keys of its first and last one differ.
@@ -44,11 +53,15 @@ impl Part {
     const NONE: Self = Self { start: 0, end: 0, differing: 0 };
 
     #[inline(always)]
-    fn new(entries: &[Entry], start: u8, end: u8) -> Self {
+    fn new(entries: &[Entry], start: u8, end: u8, by: Cut) -> Self {
         let key = |at: u8| entries.get(usize::from(at)).map_or(0, |entry| entry[0]);
         // Parts that can be cut have the lowest bit set: those of equal keys come last.
         let is_cut = u32::from(end > start + 1);
-        let differing = (key(start) ^ key(end.saturating_sub(1))) << 1 | is_cut;
+        let differing = match by {
+            Cut::Keys => key(start) ^ key(end.saturating_sub(1)),
+            Cut::Halves => u32::from(end - start),
+        };
+        let differing = differing << 1 | is_cut;
         Self { start, end, differing }
     }
 
@@ -94,13 +107,14 @@ impl Subtree {
         ids: &mut [u32],
         [first, child]: [u32; 2],
         least: f32,
+        by: Cut,
     ) {
         self.nodes[0] = Node::EMPTY;
-        self.ranges[0] = Part::new(entries, 0, entries.len().min(MOST_ROOT) as u8);
+        self.ranges[0] = Part::new(entries, 0, entries.len().min(MOST_ROOT) as u8, by);
         self.count = 1;
         let (mut at, mut written) = (0, 0);
         while at < self.count {
-            let count = self.cut(at, entries, ids.get_mut(written..).unwrap_or_default());
+            let count = self.cut(at, entries, ids.get_mut(written..).unwrap_or_default(), by);
             self.nodes[at].first = written as u32;
             written += count;
             at += 1;
@@ -118,8 +132,8 @@ impl Subtree {
 
     /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for
     /// each other; returns how many ids.
-    fn cut(&mut self, at: usize, entries: &[Entry], ids: &mut [u32]) -> usize {
-        let parts = parts(self.ranges[at], entries);
+    fn cut(&mut self, at: usize, entries: &[Entry], ids: &mut [u32], by: Cut) -> usize {
+        let parts = parts(self.ranges[at], entries, by);
         let mut node = Node { child: self.count as u32, ..Node::EMPTY };
         let mut written = 0;
         for (slot, part) in parts.iter().enumerate().take_while(|(_, part)| part.count() > 0) {
@@ -176,7 +190,7 @@ impl Subtree {
 
 /// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys.
 #[inline(always)]
-fn parts(range: Part, entries: &[Entry]) -> [Part; WIDTH] {
+fn parts(range: Part, entries: &[Entry], by: Cut) -> [Part; WIDTH] {
     let mut parts = [Part::NONE; WIDTH];
     parts[0] = range;
     for count in 1..WIDTH {
@@ -188,13 +202,17 @@ fn parts(range: Part, entries: &[Entry]) -> [Part; WIDTH] {
             }
         }
         let part = parts[widest];
-        if part.differing == 0 {
+        if part.count() < 2 {
             break;
         }
-        let middle = part.start + split(entries, part);
+        let middle = part.start
+            + match by {
+                Cut::Keys => split(entries, part),
+                Cut::Halves => (part.end - part.start) / 2,
+            };
         parts.copy_within(widest..count, widest + 1);
-        parts[widest] = Part::new(entries, part.start, middle);
-        parts[widest + 1] = Part::new(entries, middle, part.end);
+        parts[widest] = Part::new(entries, part.start, middle, by);
+        parts[widest + 1] = Part::new(entries, middle, part.end, by);
     }
     parts
 }
