@@ -19,6 +19,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 
 use crate::mesh::TriangleMesh;
+use crate::ray::Ray;
 use crate::simd::HAS_VECTORS;
 use crate::triangle::TriangleTest;
 
@@ -171,6 +172,29 @@ pub(crate) fn transpose<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
     let (ac_xy, bd_xy) = (a.zip_low(c), b.zip_low(d));
     let (ac_z, bd_z) = (a.zip_high(c), b.zip_high(d));
     [ac_xy.zip_low(bd_xy), ac_xy.zip_high(bd_xy), ac_z.zip_low(bd_z), ac_z.zip_high(bd_z)]
+}
+
+/// Eight rays, number by number.
+#[inline(always)]
+#[expect(clippy::type_complexity, reason = "the fields of a ray")]
+pub(crate) fn columns<S: Simd>(
+    simd: S,
+    rays: &[Ray; 8],
+) -> ([f32x8<S>; 3], f32x8<S>, [f32x8<S>; 3], f32x8<S>) {
+    let rows: [[[u8; 16]; 2]; 8] = bytemuck::cast(*rays);
+    let [q, r, s, t, u, v, w, x] = &rows;
+    let ([a, b, c, d], [e, f, g, h]) =
+        (transpose(rows_of(simd, [q, r, s, t], 0)), transpose(rows_of(simd, [u, v, w, x], 0)));
+    let ([i, j, k, l], [m, n, o, p]) =
+        (transpose(rows_of(simd, [q, r, s, t], 1)), transpose(rows_of(simd, [u, v, w, x], 1)));
+    (join([a, b, c], [e, f, g]), d.combine(h), join([i, j, k], [m, n, o]), l.combine(p))
+}
+
+/// One half of four rays.
+#[inline(always)]
+fn rows_of<S: Simd>(simd: S, [a, b, c, d]: [&[Row; 2]; 4], half: usize) -> [f32x4<S>; 4] {
+    let half = half % 2;
+    [load(simd, &a[half]), load(simd, &b[half]), load(simd, &c[half]), load(simd, &d[half])]
 }
 
 /// Sixteen bytes as four numbers.

@@ -55,7 +55,7 @@ use core::ops::{Add, BitAnd, BitOr, Mul, Neg, Sub};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8};
 
-use crate::aabb::{Aabb, greater};
+use crate::aabb::{Aabb, greater, lesser};
 use crate::mesh::Triangle;
 use crate::ray::round;
 
@@ -90,6 +90,9 @@ pub(crate) trait Lanes:
     /// The greater of two numbers. With a NaN among them it is any number or NaN.
     fn or_greater(self, other: Self) -> Self;
 
+    /// The lesser of two numbers. With a NaN among them it is any number or NaN.
+    fn or_less(self, other: Self) -> Self;
+
     fn is_less(self, other: Self) -> Self::Mask;
 }
 
@@ -104,6 +107,11 @@ impl Lanes for f32 {
     #[inline(always)]
     fn or_greater(self, other: Self) -> Self {
         greater(self, other)
+    }
+
+    #[inline(always)]
+    fn or_less(self, other: Self) -> Self {
+        lesser(self, other)
     }
 
     #[inline(always)]
@@ -123,6 +131,11 @@ impl<S: Simd> Lanes for f32x8<S> {
     #[inline(always)]
     fn or_greater(self, other: Self) -> Self {
         self.max(other)
+    }
+
+    #[inline(always)]
+    fn or_less(self, other: Self) -> Self {
+        self.min(other)
     }
 
     #[inline(always)]
@@ -252,10 +265,9 @@ impl<L: Lanes> Filter<L> {
 
         let longest = greatest(e).or_greater(greatest(f));
         let error = self.slope * longest + self.floor;
-        let below = -error;
-        let any_negative = u.is_less(below) | v.is_less(below) | w.is_less(below);
-        let any_positive = error.is_less(u) | error.is_less(v) | error.is_less(w);
-        any_negative & any_positive
+        let least = u.or_less(v).or_less(w);
+        let most = u.or_greater(v).or_greater(w);
+        least.is_less(-error) & error.is_less(most)
     }
 }
 

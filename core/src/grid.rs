@@ -16,6 +16,7 @@ use crate::control::{Control, Watch};
 use crate::counters::Tally;
 use crate::dda::Line;
 use crate::error::{Error, Region};
+use crate::filter::RayFilter;
 use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::{Strided, TriangleMesh};
 use crate::one_level::{self, OneLevel};
@@ -292,51 +293,44 @@ impl<'a> Grid<'a> {
         tally: &mut T,
     ) {
         let bounds = &self.lattice.bounds();
-        let (slab, test) = match bvh::Slab::nearby(ray, begin, bounds) {
-            Some((slab, filter)) => (slab, TriangleTest::with(ray, filter)),
-            None => {
-                let Some(approach) = Approach::new(ray, bounds) else { return };
-                let test = TriangleTest::from(ray, &approach);
-                if approach.is_remote {
-                    return self.test_all(&test.culling(cull), search, tally);
-                }
-                (bvh::Slab::new(ray, begin, &approach), test)
-            }
-        };
-        let test = &test.culling(cull);
-        if bvh.is_shallow() {
-            self.walk(bvh, &slab, test, search, tally, &mut [0; bvh::SMALL_STACK]);
-        } else {
-            self.walk_deep(bvh, &slab, test, search, tally);
+        if self.walk(bvh, ray, begin, cull, bounds, None, search, tally) {
+            return;
         }
+        let Some(approach) = Approach::new(ray, bounds) else { return };
+        let test = TriangleTest::from(ray, &approach).culling(cull);
+        if approach.is_remote {
+            return self.test_all(&test, search, tally);
+        }
+        let afar = (bvh::Slab::new(ray, begin, &approach), test.filter);
+        self.walk(bvh, ray, begin, cull, bounds, Some(&afar), search, tally);
     }
 
-    /// Walks a ray through a tree, with a stack.
+    /// Walks a ray through a tree; false if it comes from afar and must be brought to the box.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "each is its own")]
     fn walk<F: Search, T: Tally>(
         &self,
         bvh: &Bvh<'_>,
-        slab: &bvh::Slab,
-        test: &TriangleTest,
+        ray: &Ray,
+        begin: f32,
+        cull: Cull,
+        bounds: &Aabb,
+        afar: Option<&(bvh::Slab, RayFilter)>,
         search: &mut F,
         tally: &mut T,
-        stack: &mut [bvh::Waiting],
-    ) {
+    ) -> bool {
         let mesh = &self.mesh;
-        dispatch(self.simd, bvh::OneRay { bvh, mesh, slab, test, search, tally, stack });
-    }
-
-    /// The same with room for the deepest tree.
-    #[inline(never)]
-    fn walk_deep<F: Search, T: Tally>(
-        &self,
-        bvh: &Bvh<'_>,
-        slab: &bvh::Slab,
-        test: &TriangleTest,
-        search: &mut F,
-        tally: &mut T,
-    ) {
-        self.walk(bvh, slab, test, search, tally, &mut [0; bvh::STACK]);
+        if bvh.is_shallow() {
+            let stack = &mut [0; bvh::SMALL_STACK];
+            let ray =
+                bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
+            dispatch(self.simd, ray)
+        } else {
+            let stack = &mut [0; bvh::STACK];
+            let ray =
+                bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
+            dispatch(self.simd, ray)
+        }
     }
 
     /// Shows a search what a ray hits of all triangles.
@@ -434,7 +428,10 @@ impl<'a> Grid<'a> {
         rays: &Strided<'_>,
         answer: impl FnMut(usize, &[Hit]),
     ) -> bool {
-        if HAS_BVH && HAS_VECTORS && let Structure::Bvh(bvh) = &self.structure {
+        if HAS_BVH
+            && HAS_VECTORS
+            && let Structure::Bvh(bvh) = &self.structure
+        {
             let (mesh, bounds) = (&self.mesh, self.lattice.bounds());
             dispatch(self.simd, bvh::Groups::<_, ANY> { bvh, mesh, bounds, rays, answer });
             return true;

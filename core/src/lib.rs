@@ -79,6 +79,7 @@ mod mesh;
 mod one_level;
 mod options;
 mod packed;
+mod pairs;
 mod ray;
 mod recursive;
 mod search;

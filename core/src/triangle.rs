@@ -110,10 +110,10 @@ impl Axis {
 }
 
 /// An edge function that is smaller than this part of its products is computed without rounding.
-const SMALL: f64 = 1.0 / (1 << 10) as f64;
+pub(crate) const SMALL: f64 = 1.0 / (1 << 10) as f64;
 
 /// By how much the t of a hit may lie outside of the range, in parts of the range of its corners.
-const OUTSIDE: f64 = 1.0 / (1 << 21) as f64;
+pub(crate) const OUTSIDE: f64 = 1.0 / (1 << 21) as f64;
 
 /// How far off a determinant in f64 may be, in parts of the sum of its terms' magnitudes: nine
 /// roundings, and those of the sum. 2^-49.

@@ -65,23 +65,30 @@ impl<S: Simd> Boxes<S> {
     /// One of the boxes in all lanes.
     #[inline(always)]
     pub(crate) fn one(simd: S, sides: &[[f32; WIDTH]; 6], slot: usize) -> Self {
-        let side = |row: usize| f32x8::splat(simd, sides[row][slot % WIDTH]);
-        Self { low: [side(0), side(1), side(2)], high: [side(3), side(4), side(5)] }
+        let slot = slot % WIDTH;
+        let [a, b, c, d, e, f] = sides;
+        Self {
+            low: splat(simd, [a[slot], b[slot], c[slot]]),
+            high: splat(simd, [d[slot], e[slot], f[slot]]),
+        }
     }
 
     /// Where rays enter the boxes, and which of them they meet.
     #[inline(always)]
     pub(crate) fn meet(&self, simd: S, rays: &Slabs<S>) -> (f32x8<S>, mask32x8<S>) {
-        let axis = |axis: usize| {
-            let low = (self.low[axis] - rays.origin[axis]) * rays.inverse[axis];
-            let high = (self.high[axis] - rays.origin[axis]) * rays.inverse[axis];
-            (low.min(high), low.max(high))
-        };
-        let (x, y, z) = (axis(0), axis(1), axis(2));
+        let (x, y, z) = (self.cross(rays, 0), self.cross(rays, 1), self.cross(rays, 2));
         let near = x.0.max(y.0).max(z.0.max(rays.start));
         let far = x.1.min(y.1).min(z.1) * f32x8::splat(simd, WIDER);
         let far = far.min(rays.end);
         (near, !near.simd_gt(far))
+    }
+
+    /// Where rays cross the near and the far sides on an axis.
+    #[inline(always)]
+    fn cross(&self, rays: &Slabs<S>, axis: usize) -> (f32x8<S>, f32x8<S>) {
+        let low = (self.low[axis] - rays.origin[axis]) * rays.inverse[axis];
+        let high = (self.high[axis] - rays.origin[axis]) * rays.inverse[axis];
+        (low.min(high), low.max(high))
     }
 
     /// The boxes that a beam meets, as bits.
@@ -104,4 +111,10 @@ impl<S: Simd> Boxes<S> {
         let far = (far * f32x8::splat(simd, WIDER)).min(beam.end);
         !near.simd_gt(far).to_bitmask() as u32 & 0xff
     }
+}
+
+/// A point in vectors.
+#[inline(always)]
+pub(crate) fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
+    [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)]
 }

@@ -138,7 +138,8 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                                 if of_octet == 0 {
                                     continue;
                                 }
-                                let dropped = rays.filters(simd, octet).drops(&corners).to_bitmask();
+                                let dropped =
+                                    rays.filters(simd, octet).drops(&corners).to_bitmask();
                                 let mut survivors = !dropped as u8 & of_octet;
                                 while survivors != 0 {
                                     let ray = 8 * octet as u32 + survivors.trailing_zeros();
@@ -237,12 +238,7 @@ fn eight_by_eight<S: Simd>(
 
 /// Pushes a child; for closest hits behind those of the same node that begin farther away.
 #[inline(always)]
-fn push<const ANY: bool>(
-    stack: &mut [Waiting],
-    top: &mut usize,
-    base: usize,
-    waiting: Waiting,
-) {
+fn push<const ANY: bool>(stack: &mut [Waiting], top: &mut usize, base: usize, waiting: Waiting) {
     let mut at = *top;
     if at >= stack.len() {
         return;

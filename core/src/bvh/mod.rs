@@ -43,7 +43,7 @@ pub(crate) use build::{bound, build, sizes};
 use node::{LEAF, Node};
 pub(crate) use slab::Slab;
 pub(crate) use validate::proof_bytes;
-pub(crate) use walk::{OneRay, STACK, SMALL_STACK, Waiting};
+pub(crate) use walk::{OneRay, SMALL_STACK, STACK, Waiting};
 
 /// Levels of nodes, at most: 20 by SAH and 9 that halve roots ([`top`]), 32 of a subtree, whose nodes take
 /// seven triangles each ([`subtree`]).

@@ -1,15 +1,16 @@
 //! The rays of a group, number by number side by side, and what was found for each.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, u32x8};
+use fearless_simd::{Simd, f32x8, u32x8};
 
-use super::boxes::{Beam, Slabs};
+use super::boxes::{Beam, Slabs, splat};
 use super::slab::{LONG, SHORT, STEEP, TINY, WIDER};
 use crate::aabb::Aabb;
 use crate::approach::FAR_EXTENTS;
-use crate::eight::{join, load, transpose};
+use crate::eight::columns;
 use crate::filter::{Filter, NEARBY_FLOOR, NEARBY_REACH, NEARBY_UNIT, RayFilter};
 use crate::mesh::TriangleMesh;
+use crate::pairs;
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::triangle::TriangleTest;
 
@@ -35,7 +36,8 @@ pub(crate) struct Rays {
     inverse: [Row; 3],
     start: Row,
     end: Row,
-    /// For the filter.
+    /// For the filter, with origins that are not relative.
+    anchor: [Row; 3],
     direction: [Row; 3],
     slope: Row,
     floor: Row,
@@ -50,6 +52,8 @@ pub(crate) struct Rays {
 
 /// Pairs that are decided at once.
 const PAIRS: usize = 8;
+/// As many are decided one by one.
+const FEW_PAIRS: usize = 2;
 
 /// 2^-24: how much rounding to f32 changes a number, in parts of it.
 const UNIT: f32 = 1.0 / 16_777_216.0;
@@ -65,6 +69,7 @@ impl Rays {
             inverse: [ZEROS; 3],
             start: ZEROS,
             end: ZEROS,
+            anchor: [ZEROS; 3],
             direction: [ZEROS; 3],
             slope: ZEROS,
             floor: ZEROS,
@@ -95,10 +100,9 @@ impl Rays {
         let size = bounds.size();
         let half = (size * 0.5).to_array();
         let extent = size.max_element();
-        let splat = |number: f32| f32x8::splat(simd, number);
-        let near = splat(FAR_EXTENTS * extent);
-        let zero = splat(0.0);
-        let finite = splat(f32::INFINITY);
+        let near = f32x8::splat(simd, FAR_EXTENTS * extent);
+        let zero = f32x8::splat(simd, 0.0);
+        let finite = f32x8::splat(simd, f32::INFINITY);
         self.hits = [Hit::MISS; GROUP];
         self.pair_count = 0;
         for octet in 0..count.div_ceil(8).min(OCTETS) {
@@ -117,14 +121,10 @@ impl Rays {
                 & y.simd_eq(y)
                 & z.simd_eq(z);
             let is_valid = is_finite & longest.simd_gt(zero) & t_min.simd_le(t_max);
-            let [a, b, c] = [
-                (a - middle[0]).abs(),
-                (b - middle[1]).abs(),
-                (c - middle[2]).abs(),
-            ];
+            let [a, b, c] = [(a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs()];
             let is_near = a.max(b).max(c).simd_le(near)
-                & longest.simd_gt(splat(SHORT))
-                & longest.simd_lt(splat(LONG));
+                & longest.simd_gt(f32x8::splat(simd, SHORT))
+                & longest.simd_lt(f32x8::splat(simd, LONG));
             let of_count = bits_below(count - 8 * octet);
             let valid = is_valid.to_bitmask() as u64 & of_count;
             let ready = (is_valid & is_near).to_bitmask() as u64 & of_count;
@@ -136,15 +136,16 @@ impl Rays {
             let scale = exponent.bitcast::<f32x8<S>>();
             let inverse_scale = (u32x8::splat(simd, 0x7f00_0000) - exponent).bitcast::<f32x8<S>>();
             let scaled = [x * inverse_scale, y * inverse_scale, z * inverse_scale];
-            let steep = splat(STEEP);
+            let steep = f32x8::splat(simd, STEEP);
             for axis in 0..3 {
                 let direction = scaled[axis];
-                let inverse = splat(1.0) / direction;
+                let inverse = f32x8::splat(simd, 1.0) / direction;
                 let is_less = inverse.abs().simd_le(steep);
                 let inverse = is_less.select(inverse, steep.copysign(direction));
                 self.inverse[axis][octet] = inverse.into();
                 self.direction[axis][octet] = direction.into();
                 self.origin[axis][octet] = origin[axis].into();
+                self.anchor[axis][octet] = origin[axis].into();
             }
             let (start, end) = (t_min * scale, t_max * scale);
             self.start[octet] = (start - (start.abs() * (WIDER - 1.0) + TINY)).into();
@@ -156,9 +157,10 @@ impl Rays {
             let [u, v, w] = [scaled[0].abs(), scaled[1].abs(), scaled[2].abs()];
             let reach = distance * 29.0 + 19.0 * extent;
             let slope = (u + v + w) * reach * NEARBY_UNIT;
-            let is_in_range = distance.simd_le(splat(NEARBY_REACH));
+            let is_in_range = distance.simd_le(f32x8::splat(simd, NEARBY_REACH));
             self.slope[octet] = is_in_range.select(slope, finite).into();
-            self.floor[octet] = (distance * distance * NEARBY_FLOOR + distance * TINY + TINY).into();
+            self.floor[octet] =
+                (distance * distance * NEARBY_FLOOR + distance * TINY + TINY).into();
         }
         self.alive = *alive;
         self.settle();
@@ -188,84 +190,67 @@ impl Rays {
     /// All rays as one beam.
     #[inline(always)]
     pub(crate) fn beam<S: Simd>(&self, simd: S) -> Beam<S> {
-        let interval = |row: &Row| {
-            let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-            let mut rest = self.alive;
-            while rest != 0 {
-                let number = get(row, rest.trailing_zeros());
-                rest &= rest - 1;
-                low = if number < low { number } else { low };
-                high = if number > high { number } else { high };
-            }
-            [low, high]
-        };
-        let splat = |[low, high]: [f32; 2]| [f32x8::splat(simd, low), f32x8::splat(simd, high)];
-        let origins = [interval(&self.origin[0]), interval(&self.origin[1]), interval(&self.origin[2])];
-        let inverses =
-            [interval(&self.inverse[0]), interval(&self.inverse[1]), interval(&self.inverse[2])];
-        let is_bounded = inverses.map(|[low, high]| low > 0.0 || high < 0.0);
-        let ([a, b, c], [d, e, f]) = (origins, inverses);
+        let alive = self.alive;
+        let [a, b, c] = &self.origin;
+        let [d, e, f] = &self.inverse;
+        let inverses = [interval(d, alive), interval(e, alive), interval(f, alive)];
+        let [d, e, f] = inverses;
         Beam {
-            origin: [splat(a), splat(b), splat(c)],
-            inverse: [splat(d), splat(e), splat(f)],
-            is_bounded,
-            start: f32x8::splat(simd, interval(&self.start)[0]),
-            end: f32x8::splat(simd, interval(&self.end)[1]),
+            origin: [
+                ends(simd, interval(a, alive)),
+                ends(simd, interval(b, alive)),
+                ends(simd, interval(c, alive)),
+            ],
+            inverse: [ends(simd, d), ends(simd, e), ends(simd, f)],
+            is_bounded: inverses.map(|[low, high]| low > 0.0 || high < 0.0),
+            start: f32x8::splat(simd, interval(&self.start, alive)[0]),
+            end: f32x8::splat(simd, interval(&self.end, alive)[1]),
         }
     }
 
     /// One ray in all lanes.
     #[inline(always)]
     pub(crate) fn slab<S: Simd>(&self, simd: S, ray: u32) -> Slabs<S> {
-        let splat = |row: &Row| f32x8::splat(simd, get(row, ray));
         let ([a, b, c], [d, e, f]) = (&self.origin, &self.inverse);
         Slabs {
-            origin: [splat(a), splat(b), splat(c)],
-            inverse: [splat(d), splat(e), splat(f)],
-            start: splat(&self.start),
-            end: splat(&self.end),
+            origin: splat(simd, [get(a, ray), get(b, ray), get(c, ray)]),
+            inverse: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
+            start: f32x8::splat(simd, get(&self.start, ray)),
+            end: f32x8::splat(simd, get(&self.end, ray)),
         }
     }
 
     /// Eight rays.
     #[inline(always)]
     pub(crate) fn slabs<S: Simd>(&self, simd: S, octet: usize) -> Slabs<S> {
-        let lanes = |row: &Row| f32x8::simd_from(simd, row[octet % OCTETS]);
-        let ([a, b, c], [d, e, f]) = (&self.origin, &self.inverse);
         Slabs {
-            origin: [lanes(a), lanes(b), lanes(c)],
-            inverse: [lanes(d), lanes(e), lanes(f)],
-            start: lanes(&self.start),
-            end: lanes(&self.end),
+            origin: octet_of(simd, &self.origin, octet),
+            inverse: octet_of(simd, &self.inverse, octet),
+            start: f32x8::simd_from(simd, self.start[octet % OCTETS]),
+            end: f32x8::simd_from(simd, self.end[octet % OCTETS]),
         }
     }
 
     /// The filter of one ray in all lanes.
     #[inline(always)]
     pub(crate) fn filter<S: Simd>(&self, simd: S, ray: u32) -> Filter<f32x8<S>> {
-        let splat = |row: &Row| f32x8::splat(simd, get(row, ray));
-        let [x, y, z] = self.rays[ray as usize % GROUP].origin;
         let [d, e, f] = &self.direction;
         Filter {
-            origin: [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)],
-            direction: [splat(d), splat(e), splat(f)],
-            slope: splat(&self.slope),
-            floor: splat(&self.floor),
+            origin: splat(simd, self.rays[ray as usize % GROUP].origin),
+            direction: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
+            slope: f32x8::splat(simd, get(&self.slope, ray)),
+            floor: f32x8::splat(simd, get(&self.floor, ray)),
         }
     }
 
     /// The filters of eight rays.
     #[inline(always)]
     pub(crate) fn filters<S: Simd>(&self, simd: S, octet: usize) -> Filter<f32x8<S>> {
-        let lanes = |row: &Row| f32x8::simd_from(simd, row[octet % OCTETS]);
-        let rays = self.rays.as_chunks::<8>().0[octet % OCTETS];
-        let (origin, ..) = columns(simd, &rays);
-        let [d, e, f] = &self.direction;
         Filter {
-            origin,
-            direction: [lanes(d), lanes(e), lanes(f)],
-            slope: lanes(&self.slope),
-            floor: lanes(&self.floor),
+            origin: octet_of(simd, &self.anchor, octet),
+            direction: octet_of(simd, &self.direction, octet),
+            slope: f32x8::simd_from(simd, self.slope[octet % OCTETS]),
+            floor: f32x8::simd_from(simd, self.floor[octet % OCTETS]),
         }
     }
 
@@ -299,10 +284,43 @@ impl Rays {
 
     /// Decides the pairs that passed.
     #[inline(always)]
-    pub(crate) fn decide<S: Simd, const ANY: bool>(&mut self, _: S, mesh: &TriangleMesh<'_>) {
-        for at in 0..core::mem::take(&mut self.pair_count) {
-            let (ray, id) = self.pairs[at % PAIRS];
-            self.decide_one::<ANY>(mesh, ray, id);
+    pub(crate) fn decide<S: Simd, const ANY: bool>(&mut self, simd: S, mesh: &TriangleMesh<'_>) {
+        let count = core::mem::take(&mut self.pair_count);
+        if count <= FEW_PAIRS {
+            for at in 0..count {
+                let (ray, id) = self.pairs[at % PAIRS];
+                self.decide_one::<ANY>(mesh, ray, id);
+            }
+            return;
+        }
+        self.decide_eight::<S, ANY>(simd, mesh, count);
+    }
+
+    /// Decides pairs side by side.
+    #[inline(always)]
+    fn decide_eight<S: Simd, const ANY: bool>(
+        &mut self,
+        simd: S,
+        mesh: &TriangleMesh<'_>,
+        count: usize,
+    ) {
+        let pairs = self.pairs;
+        let ray = |at: usize| self.rays[pairs[at].0 as usize % GROUP];
+        let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
+        let id = |at: usize| pairs[at].1;
+        let ids = [id(0), id(1), id(2), id(3), id(4), id(5), id(6), id(7)];
+        let decided = pairs::decide(simd, mesh, &rays, ids, count);
+        let mut hits = decided.hits;
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize % PAIRS;
+            hits &= hits - 1;
+            self.found::<ANY>(pairs[lane].0, decided.hit(lane, pairs[lane].1));
+        }
+        let mut unsure = decided.unsure;
+        while unsure != 0 {
+            let lane = unsure.trailing_zeros() as usize % PAIRS;
+            unsure &= unsure - 1;
+            self.decide_one::<ANY>(mesh, pairs[lane].0, pairs[lane].1);
         }
     }
 
@@ -312,7 +330,16 @@ impl Rays {
         let at = ray as usize % GROUP;
         let test = TriangleTest::with(&self.rays[at], RayFilter::NONE);
         let hit = test.decide(mesh, id);
-        if hit.primitive == INVALID_ID || !hit.is_closer(&self.hits[at]) {
+        if hit.primitive != INVALID_ID {
+            self.found::<ANY>(ray, hit);
+        }
+    }
+
+    /// Keeps a hit if it is the closest so far.
+    #[inline(always)]
+    fn found<const ANY: bool>(&mut self, ray: u32, hit: Hit) {
+        let at = ray as usize % GROUP;
+        if !hit.is_closer(&self.hits[at]) {
             return;
         }
         self.hits[at] = hit;
@@ -331,21 +358,35 @@ const fn bits_below(count: usize) -> u64 {
     if count >= 8 { 0xff } else { (1 << count) - 1 }
 }
 
-/// Eight rays, number by number.
+/// The least and the greatest number of some rays.
 #[inline(always)]
-#[expect(clippy::type_complexity, reason = "the fields of a ray")]
-fn columns<S: Simd>(
-    simd: S,
-    rays: &[Ray; 8],
-) -> ([f32x8<S>; 3], f32x8<S>, [f32x8<S>; 3], f32x8<S>) {
-    let rows: [[[u8; 16]; 2]; 8] = bytemuck::cast(*rays);
-    let row = |ray: usize, half: usize| load(simd, &rows[ray][half]);
-    let four = |first: usize, half: usize| -> [f32x4<S>; 4] {
-        transpose([row(first, half), row(first + 1, half), row(first + 2, half), row(first + 3, half)])
-    };
-    let ([a, b, c, d], [e, f, g, h]) = (four(0, 0), four(4, 0));
-    let ([i, j, k, l], [m, n, o, p]) = (four(0, 1), four(4, 1));
-    (join([a, b, c], [e, f, g]), d.combine(h), join([i, j, k], [m, n, o]), l.combine(p))
+fn interval(row: &Row, rays: u64) -> [f32; 2] {
+    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+    let mut rest = rays;
+    while rest != 0 {
+        let number = get(row, rest.trailing_zeros());
+        rest &= rest - 1;
+        low = if number < low { number } else { low };
+        high = if number > high { number } else { high };
+    }
+    [low, high]
+}
+
+#[inline(always)]
+fn ends<S: Simd>(simd: S, [low, high]: [f32; 2]) -> [f32x8<S>; 2] {
+    [f32x8::splat(simd, low), f32x8::splat(simd, high)]
+}
+
+/// Eight rays of three rows.
+#[inline(always)]
+fn octet_of<S: Simd>(simd: S, rows: &[Row; 3], octet: usize) -> [f32x8<S>; 3] {
+    let octet = octet % OCTETS;
+    let [a, b, c] = rows;
+    [
+        f32x8::simd_from(simd, a[octet]),
+        f32x8::simd_from(simd, b[octet]),
+        f32x8::simd_from(simd, c[octet]),
+    ]
 }
 
 #[inline(always)]

@@ -14,9 +14,13 @@ use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
 use super::Bvh;
 use super::node::{Child, Node, WIDTH};
 use super::slab::Slab;
+use crate::aabb::Aabb;
 use crate::counters::Tally;
-use crate::eight::first_eight;
+use crate::eight::{Eight, first_eight};
+use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
+use crate::options::Cull;
+use crate::ray::Ray;
 use crate::search::{Outcome, Search};
 use crate::simd::Kernel;
 use crate::triangle::TriangleTest;
@@ -36,8 +40,14 @@ pub(crate) type Waiting = u64;
 pub(crate) struct OneRay<'r, F, T> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
-    pub(crate) slab: &'r Slab,
-    pub(crate) test: &'r TriangleTest,
+    pub(crate) ray: &'r Ray,
+    /// Where the ray begins to matter: no less than its `t_min`.
+    pub(crate) begin: f32,
+    pub(crate) cull: Cull,
+    /// The box of the scene.
+    pub(crate) bounds: &'r Aabb,
+    /// For a ray from afar, what [`Slab::nearby`] cannot find.
+    pub(crate) afar: Option<&'r (Slab, RayFilter)>,
     pub(crate) search: &'r mut F,
     pub(crate) tally: &'r mut T,
     pub(crate) stack: &'r mut [Waiting],
@@ -139,12 +149,18 @@ fn opaque<S: Simd>(simd: S, number: f32) -> f32x8<S> {
 }
 
 impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
-    type Output = ();
+    /// Returns false if the ray comes from afar, and nothing was done.
+    type Output = bool;
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        let Self { bvh, mesh, slab, test, search, tally, stack } = self;
-        let ray = Wide::new(simd, slab);
+    fn run<S: Simd>(self, simd: S) -> bool {
+        let Self { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack } = self;
+        let nearby = if afar.is_none() { Slab::nearby(ray, begin, bounds) } else { afar.copied() };
+        let Some((slab, filter)) = nearby else { return false };
+        let slab = &slab;
+        let filter = filter.splat(simd);
+        let mut test = None;
+        let (given, ray) = (ray, Wide::new(simd, slab));
         let mut end = slab.end;
         let mut top = 0;
         // Damaged bytes may lead in circles; a tree's nodes are entered once.
@@ -156,7 +172,7 @@ impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
                     tally.grid_step();
                     let node = bvh.nodes.get(number as usize);
                     let rest = budget.checked_sub(1);
-                    let (Some(node), Some(rest)) = (node, rest) else { return };
+                    let (Some(node), Some(rest)) = (node, rest) else { return true };
                     budget = rest;
                     let (met, near) = ray.meet(simd, node, end);
                     if met != 0 {
@@ -192,29 +208,33 @@ impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
                 Child::Leaf { first, count } => {
                     let ids = bvh.leaf(first, count);
                     let rest = budget.checked_sub(1);
-                    let Some(rest) = rest else { return };
+                    let Some(rest) = rest else { return true };
                     budget = rest;
                     tally.cell_step();
                     tally.primitive_tests(ids.len());
                     let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
-                    let mut survivors = test.survivors_of(simd, mesh, &lanes, ids.len());
+                    let triangles = Eight::of(simd, mesh, lanes, ids.len());
+                    #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
+                    let dropped = filter.drops(&triangles.corners).to_bitmask() as u32;
+                    let mut survivors = !dropped & triangles.used;
                     while survivors != 0 {
                         let lane = survivors.trailing_zeros() as usize;
                         survivors &= survivors - 1;
                         let Some(&id) = ids.get(lane) else { break };
+                        let test = test.get_or_insert_with(|| exact(given, cull));
                         match search.decide(test, mesh, id) {
                             Outcome::Unchanged => {}
                             Outcome::EndsAt(t) => end = slab.latest(t),
-                            Outcome::Done => return,
+                            Outcome::Done => return true,
                         }
                     }
                 }
             }
             // Pop what is not behind the end.
             loop {
-                let Some(below) = top.checked_sub(1) else { return };
+                let Some(below) = top.checked_sub(1) else { return true };
                 top = below;
-                let Some(&waiting) = stack.get(top) else { return };
+                let Some(&waiting) = stack.get(top) else { return true };
                 if !(f32::from_bits((waiting >> 32) as u32) > end) {
                     #[expect(clippy::cast_possible_truncation, reason = "the low half")]
                     let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
@@ -225,6 +245,12 @@ impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
             }
         }
     }
+}
+
+/// The test that decides in f64. Most rays that miss never ask for it.
+#[inline(never)]
+fn exact(ray: &Ray, cull: Cull) -> TriangleTest {
+    TriangleTest::with(ray, RayFilter::NONE).culling(cull)
 }
 
 /// Pushes a child behind those of the same node that begin farther away.
