@@ -72,10 +72,10 @@ impl Slab {
         slab
     }
 
-    /// A distance no farther than a `t`.
+    /// A distance no farther than a `t` and all that rounds to it.
     #[inline(always)]
     fn earliest(&self, t: f32) -> f32 {
-        let distance = round((f64::from(t) - self.t) * self.scale);
+        let distance = round((f64::from(t.next_down()) - self.t) * self.scale);
         (distance - distance.abs() * (WIDER - 1.0)).next_down()
     }
 
