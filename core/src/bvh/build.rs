@@ -169,9 +169,12 @@ fn build_in<const N: usize>(
     let (sizes, rest) = split_mut::<u32>(rest, bins as u64).ok_or(too_small)?;
     let (entries, bench) = split_mut::<Entry>(rest, all).ok_or(too_small)?;
     let bench = whole::<Entry>(bench);
-    let behind = index.get_mut(HEADER_BYTES..);
-    let keys = behind.and_then(|behind| Some(split_mut::<u32>(behind, all)?.0));
-    let keys = keys.ok_or(index_error(index_bytes(all, 1)))?;
+    let parts = index
+        .split_at_mut_checked(HEADER_BYTES)
+        .and_then(|(header, behind)| Some((header, split_mut::<u32>(behind, all)?.0)));
+    let (header, keys) = parts.ok_or(index_error(bound(triangles, 1).0))?;
+    // No header in front of what is not its tree, should the build end early.
+    header.fill(0);
 
     // Find the box, then every triangle's key.
     watch.at(CENSUS)?;
@@ -196,7 +199,7 @@ fn build_in<const N: usize>(
     watch.at(ROOTS)?;
     let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
     let behind = index.get_mut(HEADER_BYTES..).and_then(|b| b.split_at_mut_checked(ids_bytes));
-    let (ids, nodes) = behind.ok_or(index_error(index_bytes(finite.into(), 1)))?;
+    let (ids, nodes) = behind.ok_or(index_error(bound(triangles, 1).0))?;
     let (ids, _) = split_mut::<u32>(ids, finite.into()).unwrap_or_default();
     let nodes = whole::<Node>(nodes);
     let bench = if is_crowded { Bench::Whole(bench) } else { Bench::Small(bench) };
