@@ -1,4 +1,4 @@
-//! A grid and the memory it lives in.
+//! A grid and the memory it lives in, and the proof that it is right.
 
 use hgrid_core::{ALIGNMENT, Config, Error, Grid, Method, TriangleMesh, sizes};
 
@@ -34,6 +34,14 @@ pub struct Owned {
     index: Region,
 }
 
+/// Proves that a grid is right, in scratch of just the size that it asks for, which may hold anything.
+///
+/// # Errors
+/// Those of the proof.
+pub fn prove(grid: &Grid<'_>) -> Result<(), Error> {
+    grid.validate(&mut vec![0xa5; grid.validate_bytes()])
+}
+
 impl Owned {
     /// Builds a grid in memory of exactly the size that it takes.
     ///
@@ -41,7 +49,9 @@ impl Owned {
     /// Those of the build.
     pub fn build(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Self, Error> {
         let bound = sizes(mesh, config, &mut [])?;
-        let mut scratch = Region::new(bound.scratch_bytes);
+        // The exact size of a tree takes a build, and room for its ids beside that.
+        let ids = if config.method == Method::Bvh { 4 * mesh.triangle_count() + 256 } else { 0 };
+        let mut scratch = Region::new(bound.scratch_bytes + ids as usize);
         let exact = sizes(mesh, config, scratch.bytes_mut())?;
         assert!(exact.is_exact && exact.index_bytes <= bound.index_bytes);
         assert!(exact.scratch_bytes <= bound.scratch_bytes);

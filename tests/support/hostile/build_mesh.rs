@@ -12,6 +12,7 @@ use super::memory::rarely;
 use super::rays;
 use super::shape::{Shape, config};
 use crate::guarded::Guarded;
+use crate::owned::prove;
 
 /// What is larger is asked about, but not built.
 const MOST_BYTES: usize = 1 << 20;
@@ -82,7 +83,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
         let mut index = Guarded::new(exact.index_bytes);
         let result = Grid::build_with(mesh, config, index.region(), scratch.region(), &odd);
         let is_told = matches!(result, Err(Error::InvalidParallelFor));
-        assert!(is_told || result.is_ok_and(|grid| grid.validate().is_ok()), "{run:?}");
+        assert!(is_told || result.is_ok_and(|grid| prove(&grid).is_ok()), "{run:?}");
         assert!(index.around_is_intact() && scratch.around_is_intact());
     }
 
@@ -129,7 +130,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     assert!(alone.blob() == blob, "the number of tasks shows");
     let copy = crate::copy::Copy::of(&blob);
     let grid = Grid::open(copy.bytes(), mesh).expect("what was built opens");
-    grid.validate().expect("what was built is valid");
+    prove(&grid).expect("what was built is valid");
     assert_eq!(grid.method(), config.method);
     let mut rays = rays::fixed_rays(grid.bounds(), 6);
     rays.extend(rays::chosen(u, &grid).unwrap_or_default());
