@@ -89,8 +89,7 @@ pub(crate) const fn scratch_bytes(triangles: u64, tasks: u64, bench: u64) -> u64
         + section_bytes::<Entry>(bench)
 }
 
-/// Entries on the benches of so many tasks, as long as no bin is crowded.
-pub(crate) const fn small_bench(triangles: u64, tasks: u64) -> u64 {
-    let all = tasks * MOST_UNIT as u64;
-    if all < triangles { all } else { triangles }
+/// Entries on the bench of a single task, as long as no bin is crowded.
+pub(crate) const fn small_bench(triangles: u64) -> u64 {
+    if (MOST_UNIT as u64) < triangles { MOST_UNIT as u64 } else { triangles }
 }

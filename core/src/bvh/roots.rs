@@ -57,7 +57,7 @@ pub(crate) struct Roots<'w> {
     pub(crate) entries: &'w mut [Entry],
     /// Room for as many, or only for the largest bin.
     pub(crate) bench: &'w mut [Entry],
-    /// The ids, each where an entry was.
+    /// The ids, each where an entry was; nothing if nobody wants them.
     pub(crate) ids: &'w mut [u32],
     /// Where the ids lie in the index.
     pub(crate) first: u32,
@@ -65,6 +65,8 @@ pub(crate) struct Roots<'w> {
     pub(crate) nodes: &'w mut [Node],
     /// Where the nodes lie in the index.
     pub(crate) child: u32,
+    /// One for each bin of the tree, so no fewer than any division of it has bins.
+    counts: &'w mut [u32],
     subtree: Subtree,
     /// Nodes so far, whether or not there was room for them.
     pub(crate) node_count: u32,
@@ -91,6 +93,7 @@ impl<'w> Roots<'w> {
         first: u32,
         nodes: &'w mut [Node],
         child: u32,
+        counts: &'w mut [u32],
     ) -> Self {
         let (subtree, last) = (Subtree::new(), Record::zeroed());
         let (node_count, root_count) = (0, 0);
@@ -103,6 +106,7 @@ impl<'w> Roots<'w> {
             first,
             nodes,
             child,
+            counts,
             subtree,
             node_count,
             root_count,
@@ -173,8 +177,11 @@ impl<'w> Roots<'w> {
             Side::Entries => self.entries.get(range.clone()),
             Side::Bench => self.bench.get(range.clone()),
         };
-        let (Some(entries), Some(ids)) = (entries, self.ids.get_mut(range)) else { return };
-        self.subtree.build(self.mesh, entries, ids, [first, child], self.least);
+        let Some(entries) = entries else { return };
+        self.subtree.build(self.mesh, entries, [first, child], self.least);
+        if let Some(ids) = self.ids.get_mut(range) {
+            ids.copy_from_slice(self.subtree.ids());
+        }
 
         let below = self.subtree.below();
         let start = self.node_count as usize;
@@ -211,8 +218,7 @@ impl<'w> Roots<'w> {
                 Side::Entries,
             ),
         };
-        // Where ids will be there is room for one count for each of at least sixteen entries.
-        let counts = self.ids.get_mut(range.clone()).and_then(|ids| ids.get_mut(..1 << bits));
+        let counts = self.counts.get_mut(..1 << bits);
         let (Some(from), Some(to), Some(counts)) = (from, to, counts) else { return };
         counts.fill(0);
         for entry in &mut *from {

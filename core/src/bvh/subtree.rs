@@ -28,6 +28,9 @@ pub(crate) struct Subtree {
     /// Levels above each node.
     above: [u8; MOST_NODES],
     count: usize,
+    /// The ids of the leaves, one leaf behind the other.
+    ids: [u32; MOST_ROOT],
+    id_count: usize,
 }
 
 /// A range of entries, and in which bits the keys of its first and last one differ.
@@ -65,6 +68,8 @@ impl Subtree {
             boxes: [Aabb::EMPTY; MOST_NODES],
             above: [0; MOST_NODES],
             count: 0,
+            ids: [0; MOST_ROOT],
+            id_count: 0,
         }
     }
 
@@ -84,30 +89,32 @@ impl Subtree {
         self.nodes.get(1..self.count).unwrap_or_default()
     }
 
-    /// Makes the nodes over some entries, no more than [`MOST_ROOT`], and writes their ids. The ids
+    /// The ids of all leaves, in their order in the index.
+    pub(crate) fn ids(&self) -> &[u32] {
+        self.ids.get(..self.id_count).unwrap_or_default()
+    }
+
+    /// Makes the nodes over some entries, no more than [`MOST_ROOT`]. Their ids
     /// lie in the index from `first` on, the nodes below the root from `child` on. No step of a node is
     /// smaller than that of a box of size `least`.
     pub(crate) fn build(
         &mut self,
         mesh: &TriangleMesh<'_>,
         entries: &[Entry],
-        ids: &mut [u32],
         [first, child]: [u32; 2],
         least: f32,
     ) {
         self.nodes[0] = Node::EMPTY;
         self.ranges[0] = Part::new(entries, 0, entries.len().min(MOST_ROOT) as u8);
-        self.count = 1;
-        let (mut at, mut written) = (0, 0);
+        (self.count, self.id_count) = (1, 0);
+        let mut at = 0;
         while at < self.count {
-            let count = self.cut(at, entries, ids.get_mut(written..).unwrap_or_default());
-            self.nodes[at].first = written as u32;
-            written += count;
+            self.cut(at, entries);
             at += 1;
         }
         // Quantise, children before parents.
         for at in (0..self.count).rev() {
-            self.quantise(at, mesh, ids, least);
+            self.quantise(at, mesh, least);
         }
         // Name ids and nodes by where they lie in the index.
         for node in self.nodes.iter_mut().take(self.count) {
@@ -117,11 +124,11 @@ impl Subtree {
     }
 
     /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for
-    /// each other; returns how many ids.
-    fn cut(&mut self, at: usize, entries: &[Entry], ids: &mut [u32]) -> usize {
+    /// each other.
+    fn cut(&mut self, at: usize, entries: &[Entry]) {
         let parts = parts(self.ranges[at], entries);
-        let mut node = Node { child: self.count as u32, ..Node::EMPTY };
-        let mut written = 0;
+        let (child, first) = (self.count as u32, self.id_count as u32);
+        let mut node = Node { child, first, ..Node::EMPTY };
         for (slot, part) in parts.iter().enumerate().take_while(|(_, part)| part.count() > 0) {
             if part.count() > LEAF && self.count < MOST_NODES {
                 node.inner |= 1 << slot;
@@ -133,18 +140,17 @@ impl Subtree {
             }
             node.counts[slot] = part.count() as u8;
             let range = entries.get(usize::from(part.start)..usize::from(part.end));
-            let to = ids.get_mut(written..).unwrap_or_default();
+            let to = self.ids.get_mut(self.id_count..).unwrap_or_default();
             for (id, entry) in to.iter_mut().zip(range.unwrap_or_default()) {
                 *id = entry[1];
             }
-            written += part.count();
+            self.id_count += part.count();
         }
         self.nodes[at] = node;
-        written
     }
 
     /// Finds the boxes of a node's children, and its own.
-    fn quantise(&mut self, at: usize, mesh: &TriangleMesh<'_>, ids: &[u32], least: f32) {
+    fn quantise(&mut self, at: usize, mesh: &TriangleMesh<'_>, least: f32) {
         let node = &self.nodes[at];
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let mut child = node.child as usize;
@@ -156,7 +162,7 @@ impl Subtree {
                 *bounds_of = self.boxes.get(child).copied().unwrap_or(Aabb::EMPTY);
                 child += 1;
             } else if count > 0 {
-                let leaf = ids.get(first..first + count).unwrap_or_default();
+                let leaf = self.ids.get(first..first + count).unwrap_or_default();
                 for &id in leaf {
                     let Some([a, b, c]) = mesh.corners(id) else { continue };
                     bounds_of.min = bounds_of.min.min(a.min(b).min(c));
