@@ -49,9 +49,7 @@ impl Owned {
     /// Those of the build.
     pub fn build(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Self, Error> {
         let bound = sizes(mesh, config, &mut [])?;
-        // The exact size of a tree takes a build, and room for its ids beside that.
-        let ids = if config.method == Method::Bvh { 4 * mesh.triangle_count() + 256 } else { 0 };
-        let mut scratch = Region::new(bound.scratch_bytes + ids as usize);
+        let mut scratch = Region::new(bound.scratch_bytes);
         let exact = sizes(mesh, config, scratch.bytes_mut())?;
         assert!(exact.is_exact && exact.index_bytes <= bound.index_bytes);
         assert!(exact.scratch_bytes <= bound.scratch_bytes);

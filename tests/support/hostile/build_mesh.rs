@@ -4,7 +4,7 @@
 use std::cell::Cell;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
-use hgrid_core::{Config, Control, Error, Grid, Region, Sizes, TriangleMesh, sizes_with};
+use hgrid_core::{Config, Control, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes_with};
 
 use super::ask::agrees;
 use super::caller::Loop;
@@ -72,7 +72,9 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
         // What shows only when all is counted.
         Err(error) => return assert!(matches!(error, Error::InvalidConfig(_)), "{error:?}"),
     };
-    assert!(exact.is_exact && exact.index_bytes <= enough.index_bytes, "{exact:?} {enough:?}");
+    // Several tasks of a tree may take as much as any mesh, and get that where it is there.
+    let is_exact = config.method != Method::Bvh || tasks < 2;
+    assert!(exact.is_exact == is_exact && exact.index_bytes <= enough.index_bytes, "{exact:?}");
     assert!(exact.scratch_bytes <= enough.scratch_bytes, "{exact:?} {enough:?}");
     if exact.index_bytes > MOST_BYTES {
         return;
@@ -93,6 +95,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
         Err(Error::OutOfMemory { region: Region::Index, needed_bytes, .. }) => {
             assert!(needed_bytes >= exact.index_bytes as u64, "{needed_bytes} {exact:?}");
         }
+        Ok(_) if !is_exact => {}
         other => panic!("{other:?} in too little memory"),
     }
     assert!(small.around_is_intact() && scratch.around_is_intact());
