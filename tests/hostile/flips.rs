@@ -15,6 +15,10 @@ fn is_fit(at: usize, copy: &Copy, grid: &Grid<'_>) -> bool {
     let rebuilt = Owned::build(grid.mesh(), &grid.config()).unwrap();
     // Why a list was not divided is not proven: see core/src/variable/validate.rs.
     let is_built = rebuilt.bytes() == copy.bytes() || grid.method() == Method::Variable;
+    // A tree may have other boxes than those of a build, if they are large enough.
+    if grid.method() == Method::Bvh && at > CHECKSUM {
+        return true;
+    }
     // Two ways to say that the mesh lies behind the grid, where nobody looks who brings it.
     is_built && TOLD.contains(&(at & !3)) || at == MESH && copy.word(MESH) <= 2
 }
@@ -83,8 +87,11 @@ fn flip(method: Method) {
         let rays = (12_000 / seed.blob.len().max(1000)).max(4);
         let ended = flip_all(seed, rays);
         println!("{} triangles, {} bytes: {ended:?}", seed.mesh.indices.len(), seed.blob.len());
-        assert!(ended.refused > 400 && ended.valid < 80, "{ended:?}");
-        assert!(ended.found > 2 * ended.valid, "{ended:?}");
+        // Half of the bits of a tree belong to boxes, and half of those make a box larger or belong to none.
+        let is_tree = method == Method::Bvh;
+        assert!(ended.refused > 400 && (is_tree || ended.valid < 80), "{ended:?}");
+        let share = if is_tree { 1 } else { 2 };
+        assert!(ended.found > share * ended.valid, "{ended:?}");
     }
 }
 
@@ -116,6 +123,12 @@ fn recursive() {
 #[cfg_attr(miri, ignore = "hours")]
 fn brick() {
     flip(Method::Brick);
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "hours")]
+fn bvh() {
+    flip(Method::Bvh);
 }
 
 /// The mesh behind a grid. The grid may well be right for a mesh that is a little different.

@@ -11,7 +11,8 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, top nodes) | bench |
 //! ```
 //!
-//! The exact size takes a build without an index: keys lie on the bench, ids and nodes are counted.
+//! The exact size takes a build without an index: keys lie on the bench, ids and nodes are counted. Keys lie
+//! there, too, if the index has no room for them: it holds no ids of skipped triangles.
 //!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
 //! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up
@@ -166,17 +167,17 @@ fn build_in<const N: usize>(
     let (entries, bench) = split_mut::<Entry>(rest, all).ok_or(scratch_error)?;
     let bench = whole::<Entry>(bench);
     let has_whole_bench = bench.len() as u64 >= all;
-    let keys = if let Some(index) = &mut index {
-        let parts = index
-            .split_at_mut_checked(HEADER_BYTES)
-            .and_then(|(header, behind)| Some((header, split_mut::<u32>(behind, all)?.0)));
-        let (header, keys) = parts.ok_or(index_error(bound(triangles, 1).0))?;
+    let behind = index.as_mut().and_then(|index| {
         // No header in front of what is not its tree, should the build end early.
-        header.fill(0);
+        index.first_chunk_mut::<HEADER_BYTES>()?.fill(0);
+        index.get_mut(HEADER_BYTES..)
+    });
+    let keys = if let Some((keys, _)) = behind.and_then(|behind| split_mut::<u32>(behind, all)) {
         keys
     } else {
+        // There are fewer ids than keys if triangles are skipped.
         let keys = bytemuck::cast_slice_mut(bench).get_mut(..triangles as usize);
-        keys.ok_or(scratch_error)?
+        keys.filter(|_| has_whole_bench).ok_or(index_error(bound(triangles, 1).0))?
     };
 
     // Find the box, then every triangle's key.
@@ -206,9 +207,10 @@ fn build_in<const N: usize>(
     let (ids, nodes) = parts.unwrap_or_default();
     let (ids, _) = split_mut::<u32>(ids, finite.into()).unwrap_or_default();
     let nodes = whole::<Node>(nodes);
+    let scene = Lattice::pad(&bounds);
     let work = Work {
         mesh,
-        least: bounds.size().max_element() * LEAST_NODE,
+        least: scene.size().max_element() * LEAST_NODE,
         sizes,
         shift: KEY_BITS - bits,
     };
@@ -227,7 +229,7 @@ fn build_in<const N: usize>(
             padding.fill(0);
         }
     }
-    let lattice = Lattice::new(Lattice::pad(&bounds), [1; 3]);
+    let lattice = Lattice::new(scene, [1; 3]);
     let mut header = Header::new(config, mesh, &lattice);
     header.skipped_count = skipped;
     header.reference_count = finite;

@@ -11,8 +11,9 @@
 //!   roots. So each node below a root replaces one range of ids by eight: `n / 7` nodes at most.
 //! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
 //!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`.
-//! - A root holds at least [`LEAST_ROOT`] triangles, but for one in each division of a crowded bin, which
-//!   has more than [`CROWD`] triangles; at most [`DIVISIONS`] of them lie inside one another.
+//! - A root holds at least [`LEAST_ROOT`] triangles, but for one behind the crowded bins of the tree, and
+//!   one behind those of each division of a crowded bin. A crowded bin has more than [`CROWD`] triangles, and
+//!   at most [`DIVISIONS`] of them that are divided lie inside one another.
 //!
 //! A bin has one count a task and one for all, and there is at most one bin for sixteen triangles. A bin is
 //! sorted on the bench; only bins of more than [`CROWD`] entries need more of it than that.
@@ -58,7 +59,7 @@ pub(crate) const fn bin_bits(triangles: u64) -> u32 {
 
 /// Roots with fewer triangles than others, at most.
 const fn small_roots(triangles: u64) -> u64 {
-    (DIVISIONS as u64 + 1) * (triangles / CROWD as u64) + 1
+    DIVISIONS as u64 * (triangles / (CROWD as u64 + 1)) + 1
 }
 
 /// The most nodes below the roots that hold so many triangles.

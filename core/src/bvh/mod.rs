@@ -35,6 +35,7 @@ use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::error::Error;
 use crate::visit::Visitor;
 pub(crate) use build::{bound, build, sizes};
+pub(crate) use layout::MOST_TRIANGLES;
 use node::{LEAF, Node};
 pub(crate) use slab::Slab;
 pub(crate) use validate::proof_bytes;

@@ -4,6 +4,7 @@
 //! The words are found here from the format's description alone. Those of brick grids are in
 //! tests/edges/chunks.rs.
 
+mod bvh;
 mod hashed;
 mod header;
 mod recursive;
