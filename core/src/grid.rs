@@ -227,6 +227,7 @@ impl<'a> Grid<'a> {
 
     /// Bytes of scratch that [`validate`](Self::validate) takes: at most one for eight triangles.
     #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "an eighth of what 32 bits count")]
     pub const fn validate_bytes(&self) -> usize {
         match self.structure {
             Structure::Bvh(_) => bvh::proof_bytes(self.mesh.triangle_count()) as usize,

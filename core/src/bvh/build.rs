@@ -28,14 +28,15 @@ use core::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::Simd;
 
-use super::census::{Census, count, share};
+use super::census::{Census, count, share, take};
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
     CROWD, Entry, MOST_TRIANGLES, bin_bits, index_bytes, most_below, most_nodes, scratch_bytes,
     small_bench,
 };
 use super::node::Node;
-use super::roots::{RECORD, Record, Roots, Side};
+use super::roots::{RECORD, Record, Roots, Side, copy};
+use super::subtree::Subtree;
 use super::top::{self, ITEM, Item};
 use super::units::{Units, starts};
 use crate::aabb::Aabb;
@@ -244,7 +245,7 @@ const LEAST_TASK: usize = 16_384;
 
 /// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
 /// axis has an inverse direction that is finite ([`slab`](super::slab)).
-const LEAST_NODE: f32 = 254.0 / (1_u64 << 60) as f32;
+const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
 
 /// The whole elements of some bytes.
 fn whole<T: Pod>(bytes: &mut [u8]) -> &mut [T] {
@@ -356,7 +357,9 @@ impl Kernel for Task<'_> {
         let Self { work, range, entries, bench, ids, nodes, child, counts } = self;
         let Work { mesh, least, sizes, shift } = *work;
         let first = range.start as u32;
-        let mut roots = Roots::new(mesh, least, entries, bench, ids, first, nodes, child, counts);
+        let subtree = &mut Subtree::new();
+        let mut roots =
+            Roots::new(mesh, least, entries, bench, ids, first, nodes, child, counts, subtree);
         let units = Units::new(sizes).skip_while(|unit| unit.start < range.start);
         for unit in units.take_while(|unit| unit.start < range.end) {
             roots.unit(unit.start - range.start..unit.end - range.start, Side::Entries, shift, 0);
@@ -412,7 +415,7 @@ impl Work<'_> {
                 for node in nodes.get_mut(from.clone()).unwrap_or_default() {
                     node.child -= moved;
                 }
-                nodes.copy_within(from, all.nodes as usize);
+                move_down(nodes, from, all.nodes as usize);
             }
             let to = all.roots as usize * RECORD;
             let from = made.first as usize;
@@ -423,14 +426,12 @@ impl Work<'_> {
                 // Its few entries may have had no room for it.
                 all.last = last;
                 all.last.node.child -= moved;
-                if let Some(record) = entries.get_mut(to..to + RECORD) {
-                    record.copy_from_slice(bytemuck::cast_slice(&[all.last]));
-                }
+                all.last.write(entries.get_mut(to..));
             } else if let Some(of_task) = entries.get_mut(records.clone()) {
-                for record in bytemuck::cast_slice_mut::<_, Record>(of_task) {
+                for record in whole::<Record>(bytemuck::cast_slice_mut(of_task)) {
                     record.node.child -= moved;
                 }
-                entries.copy_within(records, to);
+                move_down(entries, records, to);
             }
         }
         Ok(all)
@@ -463,8 +464,8 @@ impl Work<'_> {
         let roots = all.roots as usize;
         let made = entries.split_at_mut_checked(roots * RECORD).and_then(|(records, rest)| {
             let (items, rest) = rest.split_at_mut_checked(roots * ITEM)?;
-            let items = bytemuck::cast_slice_mut::<_, Item>(items);
-            let records: &[Record] = bytemuck::cast_slice(records);
+            let items = whole::<Item>(bytemuck::cast_slice_mut(items));
+            let records = &*whole::<Record>(bytemuck::cast_slice_mut(records));
             for (at, (item, record)) in (0..).zip(items.iter_mut().zip(records)) {
                 let Record { min, max, count, .. } = *record;
                 *item = Item { min, max, count, record: at };
@@ -478,9 +479,7 @@ impl Work<'_> {
         let Some((count, levels, top)) = made else { return (all.nodes, 0) };
         let below = all.nodes as usize;
         let behind = top.get(1..count as usize).unwrap_or_default();
-        if let Some(nodes) = nodes.get_mut(below..below + behind.len()) {
-            nodes.copy_from_slice(behind);
-        }
+        copy(behind, nodes.get_mut(below..));
         if let (Some(to), Some(root)) = (nodes.first_mut(), top.first()) {
             *to = *root;
         }
@@ -497,10 +496,12 @@ struct All {
     last: Record,
 }
 
-/// Takes the first elements of a slice, or all there are.
-fn take<'w, T>(rest: &mut &'w mut [T], count: usize) -> &'w mut [T] {
-    let count = count.min(rest.len());
-    let (first, behind) = core::mem::take(rest).split_at_mut(count);
-    *rest = behind;
-    first
+/// Moves elements to an earlier place.
+fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
+    for (at, to) in from.zip(to..) {
+        let Some(&element) = elements.get(at) else { return };
+        if let Some(slot) = elements.get_mut(to) {
+            *slot = element;
+        }
+    }
 }

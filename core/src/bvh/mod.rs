@@ -85,7 +85,7 @@ impl<'a> Bvh<'a> {
     #[inline(always)]
     fn leaf(&self, first: u32, count: u32) -> &'a [u32] {
         let start = first as usize;
-        let end = start.saturating_add(count.min(LEAF as u32) as usize);
+        let end = start.saturating_add((count as usize).min(LEAF));
         self.ids.get(start..end).unwrap_or_default()
     }
 

@@ -48,6 +48,22 @@ pub(crate) const RECORD: usize = size_of::<Record>() / size_of::<Entry>();
 
 const _: () = assert!(size_of::<Record>() == 112 && 2 * RECORD <= LEAST_ROOT);
 
+impl Record {
+    /// Writes it to the start of some entries, if it has room there.
+    pub(crate) fn write(&self, entries: Option<&mut [Entry]>) {
+        if let Some(slot) = entries.and_then(|entries| entries.first_chunk_mut::<RECORD>()) {
+            *slot = bytemuck::cast(*self);
+        }
+    }
+}
+
+/// Copies elements to the start of others, as many as have room there.
+pub(crate) fn copy<T: Copy>(from: &[T], to: Option<&mut [T]>) {
+    for (slot, element) in to.into_iter().flatten().zip(from) {
+        *slot = *element;
+    }
+}
+
 /// The roots of a range of units.
 pub(crate) struct Roots<'w> {
     pub(crate) mesh: &'w TriangleMesh<'w>,
@@ -67,7 +83,7 @@ pub(crate) struct Roots<'w> {
     pub(crate) child: u32,
     /// One for each bin of the tree, so no fewer than any division of it has bins.
     counts: &'w mut [u32],
-    subtree: Subtree,
+    subtree: &'w mut Subtree,
     /// Nodes so far, whether or not there was room for them.
     pub(crate) node_count: u32,
     pub(crate) root_count: u32,
@@ -94,8 +110,9 @@ impl<'w> Roots<'w> {
         nodes: &'w mut [Node],
         child: u32,
         counts: &'w mut [u32],
+        subtree: &'w mut Subtree,
     ) -> Self {
-        let (subtree, last) = (Subtree::new(), Record::zeroed());
+        let last = Record::zeroed();
         let (node_count, root_count) = (0, 0);
         Self {
             mesh,
@@ -162,10 +179,10 @@ impl<'w> Roots<'w> {
         let middle = if differing == 0 {
             entries.len() / 2
         } else {
-            let bit = 1 << (31 - differing.leading_zeros());
+            let bit = 1 << differing.ilog2();
             entries.partition_point(|entry| entry[0] & bit == 0)
         };
-        middle.clamp(LEAST_ROOT, entries.len() - LEAST_ROOT)
+        middle.min(entries.len().saturating_sub(LEAST_ROOT)).max(LEAST_ROOT)
     }
 
     /// Makes the subtree of a few entries, and leaves a record of it.
@@ -179,24 +196,17 @@ impl<'w> Roots<'w> {
         };
         let Some(entries) = entries else { return };
         self.subtree.build(self.mesh, entries, [first, child], self.least);
-        if let Some(ids) = self.ids.get_mut(range) {
-            ids.copy_from_slice(self.subtree.ids());
-        }
+        copy(self.subtree.ids(), self.ids.get_mut(range));
 
         let below = self.subtree.below();
-        let start = self.node_count as usize;
-        if let Some(nodes) = self.nodes.get_mut(start..start + below.len()) {
-            nodes.copy_from_slice(below);
-        }
+        copy(below, self.nodes.get_mut(self.node_count as usize..));
         self.node_count += below.len() as u32;
         let (node, bounds) = self.subtree.root();
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         let levels = self.subtree.levels();
         let record = Record { node: *node, min, max, count, levels };
         let start = self.root_count as usize * RECORD;
-        if let Some(slot) = self.entries.get_mut(start..start + RECORD) {
-            slot.copy_from_slice(bytemuck::cast_slice(&[record]));
-        }
+        record.write(self.entries.get_mut(start..));
         self.last = record;
         self.root_count += 1;
     }

@@ -24,7 +24,7 @@ use crate::approach::Approach;
 use crate::ray::{Ray, round};
 
 /// The inverse of a direction that is zero, or as good as zero.
-pub(crate) const STEEP: f32 = (1_u128 << 75) as f32;
+pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0; // 2^75
 
 /// What errors are relative to: 1 + 2^-20.
 const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;

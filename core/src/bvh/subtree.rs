@@ -104,7 +104,6 @@ impl Subtree {
         [first, child]: [u32; 2],
         least: f32,
     ) {
-        self.nodes[0] = Node::EMPTY;
         self.ranges[0] = Part::new(entries, 0, entries.len().min(MOST_ROOT) as u8);
         (self.count, self.id_count) = (1, 0);
         let mut at = 0;
@@ -126,15 +125,19 @@ impl Subtree {
     /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for
     /// each other.
     fn cut(&mut self, at: usize, entries: &[Entry]) {
-        let parts = parts(self.ranges[at], entries);
+        let (Some(&range), Some(&above)) = (self.ranges.get(at), self.above.get(at)) else {
+            return;
+        };
+        let parts = parts(range, entries);
         let (child, first) = (self.count as u32, self.id_count as u32);
         let mut node = Node { child, first, ..Node::EMPTY };
         for (slot, part) in parts.iter().enumerate().take_while(|(_, part)| part.count() > 0) {
-            if part.count() > LEAF && self.count < MOST_NODES {
+            let places = (self.ranges.get_mut(self.count), self.above.get_mut(self.count));
+            if part.count() > LEAF
+                && let (Some(range_of), Some(above_of)) = places
+            {
+                (*range_of, *above_of) = (*part, above + 1);
                 node.inner |= 1 << slot;
-                self.nodes[self.count] = Node::EMPTY;
-                self.ranges[self.count] = *part;
-                self.above[self.count] = self.above[at] + 1;
                 self.count += 1;
                 continue;
             }
@@ -146,12 +149,14 @@ impl Subtree {
             }
             self.id_count += part.count();
         }
-        self.nodes[at] = node;
+        if let Some(slot) = self.nodes.get_mut(at) {
+            *slot = node;
+        }
     }
 
     /// Finds the boxes of a node's children, and its own.
     fn quantise(&mut self, at: usize, mesh: &TriangleMesh<'_>, least: f32) {
-        let node = &self.nodes[at];
+        let Some(node) = self.nodes.get_mut(at) else { return };
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let mut child = node.child as usize;
         let mut first = node.first as usize;
@@ -174,9 +179,10 @@ impl Subtree {
             }
             bounds = bounds.union(bounds_of);
         }
-        let node = &mut self.nodes[at];
         node.set_boxes(&bounds, &boxes, least);
-        self.boxes[at] = bounds;
+        if let Some(slot) = self.boxes.get_mut(at) {
+            *slot = bounds;
+        }
     }
 }
 
@@ -198,9 +204,14 @@ fn parts(range: Part, entries: &[Entry]) -> [Part; WIDTH] {
             break;
         }
         let middle = part.start + split(entries, part);
-        parts.copy_within(widest..count, widest + 1);
-        parts[widest] = Part::new(entries, part.start, middle);
-        parts[widest + 1] = Part::new(entries, middle, part.end);
+        // The parts behind it make room for its second half.
+        for at in (1..WIDTH).rev().filter(|&at| at > widest) {
+            parts[at] = parts[at - 1];
+        }
+        let halves = [Part::new(entries, part.start, middle), Part::new(entries, middle, part.end)];
+        for (slot, half) in parts.iter_mut().skip(widest).zip(halves) {
+            *slot = half;
+        }
     }
     parts
 }
@@ -214,7 +225,7 @@ fn split(entries: &[Entry], part: Part) -> u8 {
     if differing == 0 {
         return (part.end - part.start) / 2;
     }
-    let bit = 1 << (31 - differing.leading_zeros());
+    let bit = 1 << differing.ilog2();
     // Where keys are in no order, both sides still get some.
     let middle = range.partition_point(|entry| entry[0] & bit == 0);
     middle.clamp(1, range.len().max(2) - 1) as u8

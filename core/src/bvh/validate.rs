@@ -136,7 +136,7 @@ impl Bvh<'_> {
 }
 
 /// No step is smaller than this part of the scene: half of a build's.
-const LEAST_STEP: f64 = 1.0 / (1_u64 << 61) as f64;
+const LEAST_STEP: f64 = 0.5 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^-61
 
 impl Node {
     /// Whether a build could have written what is not a box: steps that are numbers and not too small, and
