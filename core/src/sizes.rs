@@ -32,7 +32,7 @@ impl Sizes {
     ///
     /// A one-level grid of a scan takes a sixth of it or less, a brick grid a thirteenth, a tree half; for
     /// recursive grids it is generous beyond use. `None` if no build takes the configuration (its
-    /// method is left out, say), or the sizes do not fit the machine's address space.
+    /// method is left out, say) or a tree of more than 2^31 triangles, or the sizes do not fit the machine's address space.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Method, Sizes};
@@ -64,7 +64,9 @@ impl Sizes {
             Method::Variable if HAS_VARIABLE => variable::bound(triangles, config),
             Method::Recursive if HAS_RECURSIVE => recursive::bound(triangles, config),
             Method::Brick if HAS_BRICK => brick::bound(triangles, tasks),
-            Method::Bvh if HAS_BVH => bvh::bound(triangles, tasks),
+            Method::Bvh if HAS_BVH && triangles <= bvh::MOST_TRIANGLES => {
+                bvh::bound(triangles, tasks)
+            }
             Method::OneLevel
             | Method::Fixed
             | Method::Variable
