@@ -1,12 +1,24 @@
 //! Bringing a ray to a box, so that what follows works at the box's scale.
 //!
-//! A vertex minus an origin a million extents away has lost all that tells cells and edges apart.
-//! So a ray from far away gets a new origin where it enters the box, computed in f64; walk and
-//! triangle test start there. Only `t` is still measured from the ray's own origin.
+//! A cell's border minus an origin a million extents away has lost all that tells cells apart. So a
+//! ray from far away gets a new origin where it enters the box, the anchor, computed in f64; the
+//! traversal and the f32 filter start there. `t` is still measured from the ray's own origin, and
+//! the triangle test works from there, too.
+//!
+//! ```text
+//! distance of the origin   starts at      the triangle test may see the ray off by
+//! up to 4 extents          the origin     nothing
+//! up to 2^29               the anchor     slack: 2^-23 of the anchor's coordinates + 2^-49 of the distance
+//! beyond                   the origin     more than the margin of the cells: the caller tests all triangles
+//! ```
+//!
+//! Slack: half an ulp of the anchor on each of two axes that the shear adds, 2^-23; the roundings in
+//! `near * direction`, 2^-51 of the distance; those of the triangle test, 6 * 2^-53.
 
 use glam::Vec3A;
 
-use crate::aabb::Aabb;
+use crate::aabb::{Aabb, greater};
+use crate::filter::Reach;
 use crate::ray::{Ray, round};
 
 /// Origins farther than this many extents from the box's centre are moved.
@@ -14,6 +26,12 @@ use crate::ray::{Ray, round};
 /// Up to here the rounding of `vertex - origin` stays far below the margin by which triangles are
 /// spread over cells (see [`cell`](crate::cell)).
 pub(crate) const FAR_EXTENTS: f32 = 4.0;
+
+/// Origins farther than this are remote: 2^-49 of such a distance is 2^-20 of an extent.
+const REMOTE_EXTENTS: f64 = (1 << 29) as f64;
+
+/// By how much a ray from afar may be off, in parts of its distance: 2^-49.
+const OFF: f64 = 8.0 * f64::EPSILON;
 
 /// Where a ray meets a box.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +46,14 @@ pub(crate) struct Approach {
     pub(crate) far: f64,
     /// One over the direction.
     pub(crate) inverse: [f64; 3],
+    /// How far the line through the anchor may be from the ray that the triangle test sees, on each
+    /// axis of a plane across the ray's longest axis, in scene units.
+    pub(crate) slack: f32,
+    /// How far the box reaches from the anchor, and how large it is.
+    pub(crate) reach: Reach,
+    /// Returns true if the ray comes from so far away that no structure can find its way: all
+    /// triangles have to be tested.
+    pub(crate) is_remote: bool,
 }
 
 impl Approach {
@@ -39,17 +65,61 @@ impl Approach {
         }
         let [x, y, z] = ray.direction;
         let inverse = [1.0 / f64::from(x), 1.0 / f64::from(y), 1.0 / f64::from(z)];
-        let (near, far) = bounds.clip(ray.origin, inverse)?;
         let center = (bounds.min + bounds.max) * 0.5;
         let distance = (Vec3A::from_array(ray.origin) - center).abs().max_element();
         if distance <= FAR_EXTENTS * bounds.size().max_element() {
-            return Some(Self { anchor: ray.origin, t: 0.0, near, far, inverse });
+            let (near, far) = bounds.clip(ray.origin, inverse)?;
+            let reach = Reach::of(bounds, ray.origin);
+            let anchor = ray.origin;
+            return Some(Self {
+                anchor,
+                t: 0.0,
+                near,
+                far,
+                inverse,
+                slack: 0.0,
+                reach,
+                is_remote: false,
+            });
         }
-        let anchor = core::array::from_fn(|axis| {
-            round(f64::from(ray.origin[axis]) + near * f64::from(ray.direction[axis]))
-        });
-        let t = near;
+        Self::from_afar(ray, bounds, inverse)
+    }
+
+    /// The same for a ray whose origin is far away.
+    #[cold]
+    #[inline(never)]
+    fn from_afar(ray: &Ray, bounds: &Aabb, inverse: [f64; 3]) -> Option<Self> {
+        // In f64: the distance may be larger than any f32.
+        let from_origin = Reach::of(bounds, ray.origin);
+        let off = from_origin.distance * OFF;
+        if from_origin.distance > REMOTE_EXTENTS * from_origin.extent {
+            // Grow the box by what may be wrong, with what f32 cannot hold.
+            let coordinate = bounds.min.abs().max(bounds.max.abs());
+            let growth = Vec3A::splat(round(2.0 * off)) + coordinate * (4.0 * f32::EPSILON);
+            let bounds = Aabb { min: bounds.min - growth, max: bounds.max + growth };
+            let (near, far) = bounds.clip(ray.origin, inverse)?;
+            let (anchor, slack) = (ray.origin, round(2.0 * off));
+            return Some(Self {
+                anchor,
+                t: 0.0,
+                near,
+                far,
+                inverse,
+                slack,
+                reach: from_origin,
+                is_remote: true,
+            });
+        }
+        let (t, _) = bounds.clip(ray.origin, inverse)?;
+        let at =
+            |axis: usize| round(f64::from(ray.origin[axis]) + t * f64::from(ray.direction[axis]));
+        let anchor = [at(0), at(1), at(2)];
         let (near, far) = bounds.clip(anchor, inverse)?;
-        Some(Self { anchor, t, near, far, inverse })
+        let [x, y, z] = anchor.map(|coordinate| f64::from(coordinate.abs()));
+        let slack = greater(x, greater(y, z)) * f64::from(f32::EPSILON) + off;
+        // Rounded up.
+        let slack = round(slack).next_up();
+        let reach = Reach::of(bounds, anchor);
+        Some(Self { anchor, t, near, far, inverse, slack, reach, is_remote: false })
     }
 }

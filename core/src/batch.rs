@@ -170,7 +170,9 @@ impl Grid<'_> {
         coherence: Coherence,
         mut answer: impl FnMut(usize, &[Hit]),
     ) {
-        let is_done = coherence == Coherence::Coherent && self.tiles::<ANY>(rays, &mut answer);
+        let is_done = (coherence == Coherence::Coherent
+            || self.method() == crate::config::Method::Bvh)
+            && self.tiles::<ANY>(rays, &mut answer);
         if !is_done {
             (0..rays.count).for_each(|index| answer(index, &[]));
         }

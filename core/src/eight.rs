@@ -1,13 +1,13 @@
-//! Eight triangles against one ray: the filter of [`triangle`](crate::triangle) in eight lanes.
+//! Eight triangles against one ray: the [`filter`](crate::filter) in eight lanes.
 //!
 //! ```text
 //! for each corner:  a row | x y z . | of each triangle, transposed:  x = | lane 0 | ... | lane 7 |
 //!                                                                    y, z likewise
 //! ```
 //!
-//! The lanes do the same operations in the same order as [`TriangleTest::test`], none of them
-//! fused, so they drop exactly the triangles that it drops. What passes, about one triangle a
-//! ray, is resolved in f64 one by one.
+//! The lanes do the same operations in the same order as one triangle alone, none of them fused,
+//! so they drop the same triangles. What passes, about one triangle a ray, is decided in f64 one
+//! by one.
 //!
 //! What was measured (Zen 4, November 2026, one to eight triangles a call): rows transposed in
 //! registers beat floats written one by one to where the lanes want them (13 to 28 ns against
@@ -19,8 +19,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 
 use crate::mesh::TriangleMesh;
+use crate::ray::Ray;
 use crate::simd::HAS_VECTORS;
-use crate::triangle::{Axis, TriangleTest};
+use crate::triangle::TriangleTest;
 
 /// How many triangles are tested at once.
 pub(crate) const LANES: usize = 8;
@@ -159,64 +160,9 @@ impl TriangleTest {
     /// The lanes whose triangles pass the filter of [`TriangleTest::test`], as bits.
     #[inline(always)]
     pub(crate) fn survivors<S: Simd>(&self, simd: S, triangles: &Eight<S>) -> u32 {
-        let corners = triangles.corners;
-        // Three times the code, but no vector is moved for its axis.
-        let dropped = match self.axis {
-            Axis::X => self.dropped(
-                simd,
-                corners,
-                #[inline(always)]
-                |[x, y, z]| [y, z, x],
-            ),
-            Axis::Y => self.dropped(
-                simd,
-                corners,
-                #[inline(always)]
-                |[x, y, z]| [z, x, y],
-            ),
-            Axis::Z => self.dropped(
-                simd,
-                corners,
-                #[inline(always)]
-                |corner| corner,
-            ),
-        };
-        !dropped & triangles.used
-    }
-
-    /// The lanes whose triangles do not, empty ones or not.
-    #[inline(always)]
-    fn dropped<S: Simd>(
-        &self,
-        simd: S,
-        corners: [[f32x8<S>; 3]; 3],
-        to_z: impl Fn([f32x8<S>; 3]) -> [f32x8<S>; 3],
-    ) -> u32 {
-        let [a, b, c] = corners;
-        let a = self.shear_eight(simd, to_z(a));
-        let b = self.shear_eight(simd, to_z(b));
-        let c = self.shear_eight(simd, to_z(c));
-
-        // Drop a triangle if two edge functions have opposite signs. A NaN passes.
-        let u = c[0] * b[1] - c[1] * b[0];
-        let v = a[0] * c[1] - a[1] * c[0];
-        let w = b[0] * a[1] - b[1] * a[0];
-        let zero = f32x8::splat(simd, 0.0);
-        let any_negative = u.simd_lt(zero) | v.simd_lt(zero) | w.simd_lt(zero);
-        let any_positive = u.simd_gt(zero) | v.simd_gt(zero) | w.simd_gt(zero);
-        let dropped = any_negative & any_positive;
         #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
-        let dropped = dropped.to_bitmask() as u32;
-        dropped
-    }
-
-    /// Eight corners relative to the ray, sheared so that the ray is the z axis.
-    #[inline(always)]
-    fn shear_eight<S: Simd>(&self, simd: S, [x, y, z]: [f32x8<S>; 3]) -> [f32x8<S>; 2] {
-        let x = x - f32x8::splat(simd, self.anchor[0]);
-        let y = y - f32x8::splat(simd, self.anchor[1]);
-        let z = z - f32x8::splat(simd, self.anchor[2]);
-        [x - f32x8::splat(simd, self.shear[0]) * z, y - f32x8::splat(simd, self.shear[1]) * z]
+        let dropped = self.filter.splat(simd).drops(&triangles.corners).to_bitmask() as u32;
+        !dropped & triangles.used
     }
 }
 
@@ -228,6 +174,29 @@ pub(crate) fn transpose<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
     [ac_xy.zip_low(bd_xy), ac_xy.zip_high(bd_xy), ac_z.zip_low(bd_z), ac_z.zip_high(bd_z)]
 }
 
+/// Eight rays, number by number.
+#[inline(always)]
+#[expect(clippy::type_complexity, reason = "the fields of a ray")]
+pub(crate) fn columns<S: Simd>(
+    simd: S,
+    rays: &[Ray; 8],
+) -> ([f32x8<S>; 3], f32x8<S>, [f32x8<S>; 3], f32x8<S>) {
+    let rows: [[[u8; 16]; 2]; 8] = bytemuck::cast(*rays);
+    let [q, r, s, t, u, v, w, x] = &rows;
+    let ([a, b, c, d], [e, f, g, h]) =
+        (transpose(rows_of(simd, [q, r, s, t], 0)), transpose(rows_of(simd, [u, v, w, x], 0)));
+    let ([i, j, k, l], [m, n, o, p]) =
+        (transpose(rows_of(simd, [q, r, s, t], 1)), transpose(rows_of(simd, [u, v, w, x], 1)));
+    (join([a, b, c], [e, f, g]), d.combine(h), join([i, j, k], [m, n, o]), l.combine(p))
+}
+
+/// One half of four rays.
+#[inline(always)]
+fn rows_of<S: Simd>(simd: S, [a, b, c, d]: [&[Row; 2]; 4], half: usize) -> [f32x4<S>; 4] {
+    let half = half % 2;
+    [load(simd, &a[half]), load(simd, &b[half]), load(simd, &c[half]), load(simd, &d[half])]
+}
+
 /// Sixteen bytes as four numbers.
 #[inline(always)]
 pub(crate) fn load<S: Simd>(simd: S, row: &Row) -> f32x4<S> {
@@ -236,7 +205,11 @@ pub(crate) fn load<S: Simd>(simd: S, row: &Row) -> f32x4<S> {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3A;
+
     use super::*;
+    use crate::aabb::Aabb;
+    use crate::approach::Approach;
     use crate::mesh::{IndexType, Strided, Triangle};
     use crate::ray::{Hit, Ray, round};
     use crate::simd::{Kernel, SimdLevel, dispatch};
@@ -345,7 +318,7 @@ mod tests {
             let positions = triangles(&mut random, scale, 200);
             let indices: Vec<[u32; 3]> = (0..200).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
             let mesh = TriangleMesh::new(&positions, &indices).unwrap();
-            let bounds = ([-scale; 3], [scale; 3]);
+            let bounds = Aabb { min: Vec3A::splat(-scale), max: Vec3A::splat(scale) };
             for round in 0..rounds {
                 let target = positions[random.next() as usize % positions.len()];
                 let origin = random.point().map(|x| x * scale * 2.0);
@@ -359,7 +332,8 @@ mod tests {
                     direction[round / 3 % 3] = if round % 2 == 0 { 1.0 } else { -1.0 };
                 }
                 let ray = Ray { t_min: f32::NEG_INFINITY, ..Ray::new(origin, direction) };
-                let Some(test) = TriangleTest::new(&ray, bounds) else { continue };
+                let Some(approach) = Approach::new(&ray, &bounds) else { continue };
+                let test = TriangleTest::from(&ray, &approach);
 
                 // One to eight, some of which do not exist, sometimes more than eight.
                 let ids: Vec<u32> = (0..round % 11).map(|_| random.next() % 220).collect();

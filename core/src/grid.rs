@@ -16,6 +16,7 @@ use crate::control::{Control, Watch};
 use crate::counters::Tally;
 use crate::dda::Line;
 use crate::error::{Error, Region};
+use crate::filter::RayFilter;
 use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::{Strided, TriangleMesh};
 use crate::one_level::{self, OneLevel};
@@ -240,7 +241,7 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut closest = Closest(None);
-        self.search(ray, Cull::None, &mut closest, &mut ());
+        self.search(ray, ray.t_min, Cull::None, &mut closest, &mut ());
         closest.0
     }
 
@@ -248,34 +249,105 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
         let mut any = Any(false);
-        self.search(ray, Cull::None, &mut any, &mut ());
+        self.search(ray, ray.t_min, Cull::None, &mut any, &mut ());
         any.0
     }
 
-    /// Walks a ray and shows a search what it hits.
+    /// Walks a ray and shows a search what it hits from `begin` on, which is no less than `t_min`, and
+    /// perhaps some of what it hits before.
     #[inline(always)]
     pub(crate) fn search<F: Search, T: Tally>(
         &self,
         ray: &Ray,
+        begin: f32,
         cull: Cull,
         search: &mut F,
         tally: &mut T,
     ) {
-        let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
         if HAS_BVH && let Structure::Bvh(bvh) = &self.structure {
-            let test = &TriangleTest::from(ray, &approach).culling(cull);
-            let slab = &bvh::Slab::new(ray, &approach);
-            let mesh = &self.mesh;
-            dispatch(self.simd, bvh::OneRay { bvh, mesh, slab, test, search, tally });
-            return;
+            return self.search_tree(bvh, ray, begin, cull, search, tally);
         }
-        let Some(line) = Line::new(&self.lattice, ray, &approach) else { return };
+        let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
         let test = TriangleTest::from(ray, &approach).culling(cull);
+        if approach.is_remote {
+            return self.test_all(&test, search, tally);
+        }
+        // The test has the ray's own range: the same hit, whichever part of the ray is walked.
+        let part = Ray { t_min: begin, ..*ray };
+        let Some(line) = Line::new(&self.lattice, &part, &approach) else { return };
         if HAS_BRICK && let Structure::Brick(brick) = &self.structure {
             let mut ray = OneRay::new(brick, &self.mesh, &line, &test, search, tally);
             dispatch(self.simd, &mut ray);
         } else {
             self.traverse(&line, &test, search, tally);
+        }
+    }
+
+    /// Walks a ray through a tree and shows a search what it hits.
+    #[inline(always)]
+    fn search_tree<F: Search, T: Tally>(
+        &self,
+        bvh: &Bvh<'_>,
+        ray: &Ray,
+        begin: f32,
+        cull: Cull,
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        let bounds = &self.lattice.bounds();
+        if self.walk(bvh, ray, begin, cull, bounds, None, search, tally) {
+            return;
+        }
+        let Some(approach) = Approach::new(ray, bounds) else { return };
+        let test = TriangleTest::from(ray, &approach).culling(cull);
+        if approach.is_remote {
+            return self.test_all(&test, search, tally);
+        }
+        let afar = (bvh::Slab::new(ray, begin, &approach), test.filter);
+        self.walk(bvh, ray, begin, cull, bounds, Some(&afar), search, tally);
+    }
+
+    /// Walks a ray through a tree; false if it comes from afar and must be brought to the box.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "each is its own")]
+    fn walk<F: Search, T: Tally>(
+        &self,
+        bvh: &Bvh<'_>,
+        ray: &Ray,
+        begin: f32,
+        cull: Cull,
+        bounds: &Aabb,
+        afar: Option<&(bvh::Slab, RayFilter)>,
+        search: &mut F,
+        tally: &mut T,
+    ) -> bool {
+        let mesh = &self.mesh;
+        if bvh.is_shallow() {
+            let stack = &mut [0; bvh::SMALL_STACK];
+            let ray =
+                bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
+            dispatch(self.simd, ray)
+        } else {
+            let stack = &mut [0; bvh::STACK];
+            let ray =
+                bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
+            dispatch(self.simd, ray)
+        }
+    }
+
+    /// Shows a search what a ray hits of all triangles.
+    #[cold]
+    #[inline(never)]
+    fn test_all<F: Search, T: Tally>(&self, test: &TriangleTest, search: &mut F, tally: &mut T) {
+        for id in 0..self.mesh.triangle_count() {
+            // Of those that the structure has: with finite corners.
+            if self.mesh.corners(id).and_then(Aabb::of).is_none() {
+                continue;
+            }
+            tally.primitive_test();
+            if search.decide(test, &self.mesh, id) == Outcome::Done {
+                return;
+            }
         }
     }
 
@@ -358,6 +430,14 @@ impl<'a> Grid<'a> {
         rays: &Strided<'_>,
         answer: impl FnMut(usize, &[Hit]),
     ) -> bool {
+        if HAS_BVH
+            && HAS_VECTORS
+            && let Structure::Bvh(bvh) = &self.structure
+        {
+            let (mesh, bounds) = (&self.mesh, self.lattice.bounds());
+            dispatch(self.simd, bvh::Groups::<_, ANY> { bvh, mesh, bounds, rays, answer });
+            return true;
+        }
         if !HAS_VECTORS || !HAS_BRICK {
             return false;
         }

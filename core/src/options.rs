@@ -267,9 +267,9 @@ impl Grid<'_> {
     ) -> usize {
         let selection = Selection::new(self.mesh(), options);
         let mut nearest = Nearest { selection: &selection, after, hits, count: 0, is_any };
-        let t_min = after.map_or(ray.t_min, |after| after.t);
+        let begin = after.map_or(ray.t_min, |after| after.t);
         let mut work = Counters::default();
-        self.search(&Ray { t_min, ..*ray }, options.cull, &mut nearest, &mut work);
+        self.search(ray, begin, options.cull, &mut nearest, &mut work);
         if let Some(counters) = &mut options.counters {
             counters.add(&work);
         }

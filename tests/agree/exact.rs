@@ -65,8 +65,7 @@ fn clear_cases_are_right_and_exact() {
         };
         let (weights, determinant, distance) = volumes(origin, direction, corners);
         let ray = Ray::new(float(origin), float(direction));
-        let box_size = 2.0 * width as f32;
-        let test = TriangleTest::new(&ray, ([-box_size; 3], [box_size; 3]));
+        let test = TriangleTest::new(&ray);
         let hit = test.and_then(|test| test.test(&corners.map(float)));
         if determinant == 0 {
             continue;

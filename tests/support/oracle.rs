@@ -8,7 +8,7 @@ use hgrid_core::{Counters, Cull, Grid, Hit, INVALID_ID, QueryOptions, Ray, Trian
 
 /// All hits of a ray with the grid's mesh, the nearest first.
 pub fn all_hits(grid: &Grid<'_>, ray: &Ray, cull: Cull) -> Vec<Hit> {
-    let Some(test) = TriangleTest::new(ray, grid.bounds()) else { return Vec::new() };
+    let Some(test) = TriangleTest::new(ray) else { return Vec::new() };
     let test = test.culling(cull);
     let mut hits = Vec::new();
     for id in 0..grid.mesh().triangle_count() {
@@ -39,16 +39,22 @@ pub fn check(grid: &Grid<'_>, ray: &Ray) {
     assert_eq!(grid.intersect(ray), expected, "intersect {ray:?}");
     assert_eq!(grid.occluded(ray), expected.is_some(), "occluded {ray:?}");
 
-    // What is closed at both ends can be narrowed down to the hit itself.
+    // Ranges that end at the hit, or next to it: the exact t lies on either side of the rounded one.
     if let Some(hit) = expected {
-        let only = Ray { t_min: hit.t, t_max: hit.t, ..*ray };
-        assert_eq!(grid.intersect(&only), expected, "t_min = t = t_max {ray:?}");
-        assert!(grid.occluded(&only), "t_min = t = t_max {ray:?}");
-        let before = Ray { t_max: hit.t.next_down(), ..*ray };
-        assert_eq!(grid.intersect(&before), None, "before the hit {ray:?}");
-        assert!(!grid.occluded(&before), "before the hit {ray:?}");
-        let behind = Ray { t_min: hit.t.next_up(), ..*ray };
-        assert_eq!(grid.intersect(&behind), brute_force(grid, &behind), "behind the hit {ray:?}");
+        let (before, behind) = (hit.t.next_down(), hit.t.next_up());
+        for (t_min, t_max) in [
+            (hit.t, hit.t),
+            (ray.t_min, hit.t),
+            (hit.t, ray.t_max),
+            (ray.t_min, before),
+            (behind, ray.t_max),
+            (before, behind),
+        ] {
+            let part = Ray { t_min, t_max, ..*ray };
+            let expected = brute_force(grid, &part);
+            assert_eq!(grid.intersect(&part), expected, "part of the ray {part:?}");
+            assert_eq!(grid.occluded(&part), expected.is_some(), "part of the ray {part:?}");
+        }
     }
     // Without memory for more, the ray is walked again for each few hits: not with a million.
     if all.len() > 1000 {

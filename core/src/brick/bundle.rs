@@ -8,11 +8,12 @@ use core::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16, mask32x16, u32x4};
+use glam::Vec3A;
 
 use super::Brick;
 use super::chords::Extremes;
 use super::layout::BLOCK;
-use crate::aabb::{greater, lesser};
+use crate::aabb::{Aabb, greater, lesser};
 use crate::approach::FAR_EXTENTS;
 use crate::cell::{Lattice, as_f32};
 use crate::eight::{Row, load, transpose};
@@ -37,14 +38,15 @@ pub(super) type PerRay = [f32; RAYS];
 pub(super) struct Bundle {
     /// By axis.
     pub(super) origin: [PerRay; 3],
-    /// By axis the directions; from [`shear`](Self::shear) on what a
-    /// [`TriangleTest`](crate::triangle::TriangleTest) needs of them: shear x, shear y and z.
-    pub(super) aim: [PerRay; 3],
-    /// The rays whose longest axis is x, y, z, from then on.
-    pub(super) longest: [u64; 3],
+    /// By axis.
+    pub(super) direction: [PerRay; 3],
+    /// The grid's box.
+    pub(super) bounds: Aabb,
     pub(super) t_min: PerRay,
     /// Where a ray ends: the t of its closest hit, if it has any.
     pub(super) t_max: PerRay,
+    /// Where it ended before it had any, once a triangle was tested.
+    pub(super) last: PerRay,
     /// The rest of these hits, once a triangle was tested; until then that of earlier rays.
     pub(super) u: PerRay,
     pub(super) v: PerRay,
@@ -150,10 +152,11 @@ impl Bundle {
     /// No rays: zeros, which are written without being read from anywhere.
     pub(super) const EMPTY: Self = Self {
         origin: [[0.0; RAYS]; 3],
-        aim: [[0.0; RAYS]; 3],
-        longest: [0; 3],
+        direction: [[0.0; RAYS]; 3],
+        bounds: Aabb { min: Vec3A::ZERO, max: Vec3A::ZERO },
         t_min: [0.0; RAYS],
         t_max: [0.0; RAYS],
+        last: [0.0; RAYS],
         u: [0.0; RAYS],
         v: [0.0; RAYS],
         primitive: [0; RAYS],
@@ -246,9 +249,9 @@ impl Bundle {
             set(&mut self.origin[2], z);
             set(&mut self.t_min, t_min);
             let [x, y, z, t_max] = transpose(row(1));
-            set(&mut self.aim[0], x);
-            set(&mut self.aim[1], y);
-            set(&mut self.aim[2], z);
+            set(&mut self.direction[0], x);
+            set(&mut self.direction[1], y);
+            set(&mut self.direction[2], z);
             set(&mut self.t_max, t_max);
         }
         leader
@@ -274,6 +277,7 @@ impl Bundle {
         self.width = as_f32(brick.width[K] * BLOCK);
         self.margin = lattice.margin().max_element();
         let bounds = lattice.bounds();
+        self.bounds = bounds;
         let center = ((bounds.min + bounds.max) * 0.5).to_array();
         let splat = |number: f32| f32x16::splat(simd, number);
         let (reach, zero) = (splat(FAR_EXTENTS * bounds.size().max_element()), splat(0.0));
@@ -282,9 +286,9 @@ impl Bundle {
             let ox = row_of(simd, &self.origin[0], first);
             let oy = row_of(simd, &self.origin[1], first);
             let oz = row_of(simd, &self.origin[2], first);
-            let dx = row_of(simd, &self.aim[0], first);
-            let dy = row_of(simd, &self.aim[1], first);
-            let dz = row_of(simd, &self.aim[2], first);
+            let dx = row_of(simd, &self.direction[0], first);
+            let dy = row_of(simd, &self.direction[1], first);
+            let dz = row_of(simd, &self.direction[2], first);
             let t_min = row_of(simd, &self.t_min, first);
             let t_max = row_of(simd, &self.t_max, first);
             let [x, y, z] = [dx.abs(), dy.abs(), dz.abs()];
@@ -328,8 +332,8 @@ impl Bundle {
             let inverse = splat(1.0) / speed;
             let from = zero + speed * rays.of(simd, &self.t_min) - splat(self.margin);
             let to = zero + speed * rays.of(simd, &self.t_max) + splat(self.margin);
-            let slope_u = rays.of(simd, &self.aim[u]) * splat(rate[u]) * inverse;
-            let slope_v = rays.of(simd, &self.aim[v]) * splat(rate[v]) * inverse;
+            let slope_u = rays.of(simd, &self.direction[u]) * splat(rate[u]) * inverse;
+            let slope_v = rays.of(simd, &self.direction[v]) * splat(rate[v]) * inverse;
             let at_u = (rays.of(simd, &self.origin[u]) - splat(corner[u])) * splat(rate[u]);
             let at_v = (rays.of(simd, &self.origin[v]) - splat(corner[v])) * splat(rate[v]);
             let (start_u, start_v) = (at_u - slope_u * zero, at_v - slope_v * zero);
@@ -345,12 +349,12 @@ impl Bundle {
 
     /// Makes ready for the first triangle: no ray has hit anything.
     #[inline(always)]
-    pub(super) fn begin<S: Simd>(&mut self, simd: S) {
+    pub(super) fn begin(&mut self) {
         self.is_begun = true;
         self.u.fill(0.0);
         self.v.fill(0.0);
         self.primitive.fill(INVALID_ID);
-        self.shear(simd);
+        self.last = self.t_max;
     }
 
     /// The closest hits of four rays, or [`Hit::MISS`].
@@ -370,30 +374,6 @@ impl Bundle {
         // Written out: arrays that are mapped live in memory.
         let hit = |hit: f32x4<S>| bytemuck::cast(<[f32; 4]>::from(hit));
         [hit(a), hit(b), hit(c), hit(d)]
-    }
-
-    /// Makes of directions what tests of triangles need, which most bundles of an empty part of a
-    /// picture never ask for; once after the rays were loaded.
-    #[inline(always)]
-    fn shear<S: Simd>(&mut self, simd: S) {
-        self.longest = [0; 3];
-        for first in (0..RAYS).step_by(WIDTH) {
-            let dx = row_of(simd, &self.aim[0], first);
-            let dy = row_of(simd, &self.aim[1], first);
-            let dz = row_of(simd, &self.aim[2], first);
-            let [x, y, z] = [dx.abs(), dy.abs(), dz.abs()];
-            let is_x = x.simd_gt(y) & x.simd_gt(z);
-            let is_y = !is_x & y.simd_gt(z);
-            let longest = is_x.select(dx, is_y.select(dy, dz));
-            let shear_x = is_x.select(dy, is_y.select(dz, dx)) / longest;
-            let shear_y = is_x.select(dz, is_y.select(dx, dy)) / longest;
-            *row_mut(&mut self.aim[0], first) = shear_x.into();
-            *row_mut(&mut self.aim[1], first) = shear_y.into();
-            *row_mut(&mut self.aim[2], first) = longest.into();
-            self.longest[0] |= rays_of(is_x, first);
-            self.longest[1] |= rays_of(is_y, first);
-        }
-        self.longest[2] = !(self.longest[0] | self.longest[1]);
     }
 
     /// Whether the rays run along the same axis as others.

@@ -14,7 +14,6 @@ use fearless_simd::{Simd, f32x8, f32x16, mask32x16};
 
 use super::bundle::{BUNDLES, Bundle, RAYS, WIDTH, below_three};
 use super::chords::Bounds;
-use crate::aabb::lesser;
 use crate::eight::Eight;
 use crate::mesh::Triangle;
 
@@ -140,15 +139,6 @@ impl Frusta {
         #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
         let outside = outside.to_bitmask() as u32;
         !outside & triangles.used
-    }
-
-    /// The plane of k before which a triangle is not hit.
-    #[inline(always)]
-    pub(super) fn nearest(&self, triangle: &Triangle) -> f32 {
-        let [_, _, k] = below_three(self.axes);
-        let on_k = |corner: [f32; 3]| (corner[k] - self.corner[2]) * self.rate[2] + self.offset;
-        let [p, q, r] = triangle.map(on_k);
-        lesser(lesser(p, q), r) - self.margin
     }
 
     /// The rays of a bundle that may meet a triangle, row by row.

@@ -8,12 +8,15 @@
 //! The bounds depend on the number `n` of triangles alone:
 //!
 //! - A node has eight children, unless its subtree has fewer triangles (a root of a small mesh) or fewer
-//!   roots. So each node below a root replaces one range of ids by eight: `n / 7` nodes at most.
+//!   roots. So each node below a root replaces one range of ids by eight: (m - 1) / 7 nodes at most for
+//!   `m` triangles.
 //! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
 //!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`.
-//! - A root holds at least [`LEAST_ROOT`] triangles, but for one behind the crowded bins of the tree, and
-//!   one behind those of each division of a crowded bin. A crowded bin has more than [`CROWD`] triangles, and
-//!   at most [`DIVISIONS`] of them that are divided lie inside one another.
+//! - A root of [`LEAST_ROOT`] triangles or more has no more than [`SHARE`] nodes a triangle, with its part of
+//!   those above: one that would have more is built again by halving its entries ([`most_of_root`]).
+//! - A root may be smaller than that behind the crowded bins of the tree, and behind those of each division of a
+//!   crowded bin. A crowded bin has more than [`CROWD`] triangles, and at most [`DIVISIONS`] of them that are
+//!   divided lie inside one another.
 //!
 //! A bin has one count a task and one for all, and there is at most one bin for sixteen triangles. A bin is
 //! sorted on the bench; only bins of more than [`CROWD`] entries need more of it than that.
@@ -24,10 +27,19 @@ use crate::blob::HEADER_BYTES;
 use super::node::Node;
 
 /// Triangles of a root, at least.
-pub(crate) const LEAST_ROOT: usize = 112;
+pub(crate) const LEAST_ROOT: usize = 40;
 
 /// Triangles of a root, at most.
-pub(crate) const MOST_ROOT: usize = 224;
+pub(crate) const MOST_ROOT: usize = 128;
+
+/// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above them may cost.
+const SHARE: u64 = 4130;
+const WHOLE: u64 = 28_000;
+
+/// The most nodes below a root of so many triangles.
+pub(crate) const fn most_of_root(triangles: usize) -> usize {
+    ((SHARE * triangles as u64).saturating_sub(WHOLE * 4 / 7) / WHOLE) as usize
+}
 
 /// Bins with more entries are divided again.
 pub(crate) const CROWD: usize = 4096;
@@ -69,8 +81,8 @@ pub(crate) const fn most_below(triangles: u64) -> u64 {
 
 /// The most nodes of a tree over so many triangles.
 pub(crate) const fn most_nodes(triangles: u64) -> u64 {
-    let roots = triangles / LEAST_ROOT as u64 + small_roots(triangles);
-    most_below(triangles) + 4 * roots / 7 + 2
+    // A small root is one more node, and so is the root of all.
+    (triangles * SHARE).div_ceil(WHOLE) + 11 * small_roots(triangles) / 7 + 3
 }
 
 /// Bytes of an index with so many ids and nodes.

@@ -16,11 +16,15 @@
 //! nodes with quantised boxes, Ylitie et al. 2017. Departures: bins are sorted in cache, no level of the tree
 //! is bound to a level of the grid, and leaves hold ids, not triangles.
 
+mod batch;
+mod boxes;
 mod build;
 mod census;
+mod group;
 mod key;
 mod layout;
 mod node;
+mod rays;
 mod roots;
 mod slab;
 mod sort;
@@ -34,12 +38,13 @@ use crate::arena::split;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::error::Error;
 use crate::visit::Visitor;
+pub(crate) use batch::Groups;
 pub(crate) use build::{bound, build, sizes};
 pub(crate) use layout::MOST_TRIANGLES;
 use node::{LEAF, Node};
 pub(crate) use slab::Slab;
 pub(crate) use validate::proof_bytes;
-pub(crate) use walk::OneRay;
+pub(crate) use walk::{OneRay, SMALL_STACK, STACK, Waiting};
 
 /// Levels of nodes, at most: 20 by SAH and 9 that halve roots ([`top`]), 32 of a subtree, whose nodes take
 /// seven triangles each ([`subtree`]).
@@ -69,6 +74,11 @@ impl<'a> Bvh<'a> {
         Ok(Self { nodes, ids, levels: header.levels.min(LEVELS) })
     }
 
+    /// Whether a small stack is enough for a ray.
+    pub(crate) const fn is_shallow(&self) -> bool {
+        self.levels <= walk::FEW_LEVELS
+    }
+
     /// The ids of all leaves.
     pub(crate) const fn list_words(&self) -> usize {
         self.ids.len()
@@ -87,6 +97,12 @@ impl<'a> Bvh<'a> {
         let start = first as usize;
         let end = start.saturating_add((count as usize).min(LEAF));
         self.ids.get(start..end).unwrap_or_default()
+    }
+
+    /// The ids of a leaf and those behind them, if there are eight.
+    #[inline(always)]
+    fn eight(&self, first: u32) -> Option<[u32; LEAF]> {
+        self.ids.get(first as usize..)?.first_chunk().copied()
     }
 
     /// Shows all leaves; `false` if that was enough.

@@ -1,7 +1,7 @@
 //! One node: the boxes of up to eight children in 80 bytes.
 //!
 //! ```text
-//! origin 3 x f32 | exponents 3 x u8 | inner u8 | child u32 | first u32 | counts 8 x u8 | bounds 6 x 8 x u8
+//! origin 3 x f32 | word: exponents 3 x u8, inner u8 | child u32 | first u32 | counts 8 x u8 | bounds 6 x 8 x u8
 //!
 //! side of a box  = origin + bound * 2^(exponent - 127), on each axis
 //! child s is       an inner node   if bit s of inner is set: nodes[child + set bits below s]
@@ -32,10 +32,9 @@ pub(crate) const LEAF: usize = 8;
 pub(crate) struct Node {
     /// The bits of three f32: where bound 0 lies.
     pub(crate) origin: [u32; 3],
-    /// The step of each axis, a power of two: the exponent bits of an f32.
-    pub(crate) exponents: [u8; 3],
-    /// Bit `s`: child `s` is a node.
-    pub(crate) inner: u8,
+    /// From low to high byte: the step of each axis, a power of two, as the exponent bits of an f32; and
+    /// the mask of inner children: bit `s` says that child `s` is a node.
+    pub(crate) word: u32,
     /// The first child node; the others follow it.
     pub(crate) child: u32,
     /// Where the ids of the first leaf lie; those of the others follow them.
@@ -66,8 +65,7 @@ impl Node {
     /// A node without children.
     pub(crate) const EMPTY: Self = Self {
         origin: [0; 3],
-        exponents: [1; 3],
-        inner: 0,
+        word: 0x0001_0101,
         child: 0,
         first: 0,
         counts: [0; WIDTH],
@@ -81,25 +79,36 @@ impl Node {
         [f32::from_bits(x), f32::from_bits(y), f32::from_bits(z)]
     }
 
+    /// The step of each axis as exponent bits.
+    #[inline(always)]
+    pub(crate) const fn exponents(&self) -> [u8; 3] {
+        let [x, y, z, _] = self.word.to_le_bytes();
+        [x, y, z]
+    }
+
     /// The size of a step on each axis.
     #[inline(always)]
     pub(crate) const fn steps(&self) -> [f32; 3] {
-        let [x, y, z] = self.exponents;
+        let [x, y, z] = self.exponents();
         [step(x), step(y), step(z)]
     }
 
-    /// The three exponents and the mask of inner children as one word, the exponent of x in its low bits.
+    /// The children that are nodes, as bits.
     #[inline(always)]
-    pub(crate) const fn exponent_word(&self) -> u32 {
-        let [x, y, z] = self.exponents;
-        u32::from_le_bytes([x, y, z, self.inner])
+    pub(crate) const fn inner(&self) -> u32 {
+        self.word >> 24
+    }
+
+    /// Makes child `slot` a node.
+    pub(crate) const fn set_inner(&mut self, slot: usize) {
+        self.word |= 1 << (24 + slot % WIDTH);
     }
 
     /// What child `slot` is. A slot that is not used is a leaf of no ids.
     #[inline(always)]
     pub(crate) const fn child(&self, slot: u32) -> Child {
         let below = (1_u32 << (slot % 8)) - 1;
-        let inner = self.inner as u32;
+        let inner = self.inner();
         if inner >> (slot % 8) & 1 == 1 {
             return Child::Inner(self.child.wrapping_add((inner & below).count_ones()));
         }
@@ -140,7 +149,7 @@ impl Node {
     pub(crate) fn set_boxes(&mut self, bounds: &Aabb, boxes: &[Aabb; WIDTH], least: f32) {
         self.frame(bounds, least);
         for (slot, child) in boxes.iter().enumerate() {
-            if self.inner >> slot & 1 == 1 || self.counts[slot] > 0 {
+            if self.inner() >> slot & 1 == 1 || self.counts[slot] > 0 {
                 self.set_box(slot, child);
             }
         }
@@ -149,21 +158,23 @@ impl Node {
     /// Sets where bounds are measured from: steps that hold a box, none below `least` in size.
     fn frame(&mut self, bounds: &Aabb, least: f32) {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+        let mut exponents = [0; 4];
         for axis in 0..3 {
             // A quarter of a step must show beside the coordinates.
             let magnitude = min[axis].abs().max(max[axis].abs());
             let extent = (max[axis] - min[axis]).max(magnitude * LEAST_STEPS).max(least);
             let exponent = exponent_for(extent);
-            self.exponents[axis] = exponent;
+            exponents[axis] = exponent;
             self.origin[axis] = (min[axis] - 0.25 * step(exponent)).to_bits();
         }
+        self.word = self.word & 0xff00_0000 | u32::from_le_bytes(exponents);
     }
 
     /// Writes the box of child `slot`, which lies in the box that the frame was set for.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the low byte")]
     fn set_box(&mut self, slot: usize, bounds: &Aabb) {
-        let inverse = Vec3A::from_array(self.exponents.map(inverse_step));
+        let inverse = Vec3A::from_array(self.exponents().map(inverse_step));
         let origin = Vec3A::from_array(self.origin());
         // Rounding half a step and the margin away is rounding outwards by at least the margin.
         let low = (bounds.min - origin) * inverse - Vec3A::splat(0.5 + MARGIN);

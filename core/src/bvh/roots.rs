@@ -24,10 +24,12 @@ use crate::aabb::Aabb;
 use crate::mesh::TriangleMesh;
 
 use super::key::{KEY_BITS, Keys};
-use super::layout::{CROWD, DIVISIONS, Entry, LEAST_ROOT, MOST_ROOT, MOST_UNIT, bin_bits};
+use super::layout::{
+    CROWD, DIVISIONS, Entry, LEAST_ROOT, MOST_ROOT, MOST_UNIT, bin_bits, most_of_root,
+};
 use super::node::Node;
 use super::sort::sort;
-use super::subtree::Subtree;
+use super::subtree::{Cut, Subtree};
 use super::units::starts;
 
 /// What is known of a root.
@@ -195,7 +197,12 @@ impl<'w> Roots<'w> {
             Side::Bench => self.bench.get(range.clone()),
         };
         let Some(entries) = entries else { return };
-        self.subtree.build(self.mesh, entries, [first, child], self.least);
+        let places = [first, child];
+        self.subtree.build(self.mesh, entries, places, self.least, Cut::Keys);
+        let is_costly = self.subtree.below().len() > most_of_root(entries.len());
+        if is_costly && entries.len() >= LEAST_ROOT {
+            self.subtree.build(self.mesh, entries, places, self.least, Cut::Halves);
+        }
         copy(self.subtree.ids(), self.ids.get_mut(range));
 
         let below = self.subtree.below();

@@ -20,19 +20,28 @@
 //! The direction is scaled by a power of two so that its largest component lies between 1 and 2, and the
 //! range of the ray with it: distances are about those of the scene, whatever the direction's length.
 
-use crate::approach::Approach;
+use crate::aabb::{Aabb, greater};
+use crate::approach::{Approach, FAR_EXTENTS};
+use crate::filter::RayFilter;
 use crate::ray::{Ray, round};
 
 /// The inverse of a direction that is zero, or as good as zero.
 pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0; // 2^75
 
 /// What errors are relative to: 1 + 2^-20.
-const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
+pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
+
+/// More than what underflows on the way to a distance.
+pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
+
+/// Directions that are longer or shorter are not divided by in f32.
+pub(crate) const LONG: f32 = f32::from_bits(0x7e00_0000); // 2^125
+pub(crate) const SHORT: f32 = f32::from_bits(0x0180_0000); // 2^-124
 
 /// A ray, ready for boxes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slab {
-    /// Where the ray starts, moved by the slack towards far sides and near sides.
+    /// Where the ray starts, moved by the slack so that near sides come nearer and far ones go farther.
     pub(crate) origin_near: [f32; 3],
     pub(crate) origin_far: [f32; 3],
     /// One over the scaled direction.
@@ -46,9 +55,55 @@ pub(crate) struct Slab {
 }
 
 impl Slab {
-    /// A ray that was brought to the scene.
+    /// A ray that starts near a box, looked at from `begin` on, and its filter for triangles there; `None`
+    /// if it is none or its direction is very long or short.
     #[inline(always)]
-    pub(crate) fn new(ray: &Ray, approach: &Approach) -> Self {
+    pub(crate) fn nearby(ray: &Ray, begin: f32, bounds: &Aabb) -> Option<(Self, RayFilter)> {
+        let [x, y, z] = ray.direction;
+        let longest = greater(x.abs(), greater(y.abs(), z.abs()));
+        let size = bounds.size();
+        let center = ((bounds.min + bounds.max) * 0.5).to_array();
+        let [a, b, c] = ray.origin;
+        let away = |at: f32, axis: usize| (at - center[axis]).abs();
+        let (a, b, c) = (away(a, 0), away(b, 1), away(c, 2));
+        let limit = FAR_EXTENTS * size.max_element();
+        let is_near = a <= limit && b <= limit && c <= limit;
+        let is_ray = longest > SHORT && longest < LONG && begin <= ray.t_max;
+        // A NaN may hide beside the longest component.
+        let is_number = x + y + z <= f32::MAX;
+        if !(is_near && is_ray && is_number) {
+            return None;
+        }
+        let exponent = longest.to_bits() & 0x7f80_0000;
+        let scale = f32::from_bits(exponent);
+        let inverse_scale = f32::from_bits(0x7f00_0000 - exponent);
+        let direction = [x * inverse_scale, y * inverse_scale, z * inverse_scale];
+        let inverse = |d: f32| {
+            let inverse = 1.0 / d;
+            if inverse.abs() <= STEEP { inverse } else { STEEP.copysign(d) }
+        };
+        let inverse = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
+        let (start, end) = (begin * scale, ray.t_max * scale);
+        let slab = Self {
+            origin_near: ray.origin,
+            origin_far: ray.origin,
+            inverse,
+            start: start - (start.abs() * (WIDER - 1.0) + TINY),
+            end: end + (end.abs() * (WIDER - 1.0) + TINY),
+            t: 0.0,
+            scale: f64::from(scale),
+        };
+        let half = (size * 0.5).to_array();
+        let distance = greater(a + half[0], greater(b + half[1], c + half[2]));
+        let sum = direction[0].abs() + direction[1].abs() + direction[2].abs();
+        let filter = RayFilter::nearby(ray.origin, direction, sum, distance, size.max_element());
+        Some((slab, filter))
+    }
+
+    /// A ray that was brought to the scene, looked at from `begin` on.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn new(ray: &Ray, begin: f32, approach: &Approach) -> Self {
         let [x, y, z] = ray.direction;
         let largest = f64::from(x.abs().max(y.abs()).max(z.abs()));
         // A power of two: the exponent of the largest component.
@@ -58,32 +113,40 @@ impl Slab {
             if inverse.abs() <= STEEP { inverse } else { STEEP.copysign(d) }
         };
         let inverse = [inverse(x), inverse(y), inverse(z)];
+        let slack = approach.slack;
+        let near = |axis: usize| {
+            let at = approach.anchor[axis];
+            if inverse[axis] > 0.0 { (at + slack).next_up() } else { (at - slack).next_down() }
+        };
+        let far = |axis: usize| {
+            let at = approach.anchor[axis];
+            if inverse[axis] > 0.0 { (at - slack).next_down() } else { (at + slack).next_up() }
+        };
         let mut slab = Self {
-            origin_near: approach.anchor,
-            origin_far: approach.anchor,
+            origin_near: [near(0), near(1), near(2)],
+            origin_far: [far(0), far(1), far(2)],
             inverse,
             start: 0.0,
             end: 0.0,
             t: approach.t,
             scale,
         };
-        slab.start = slab.earliest(ray.t_min);
+        slab.start = slab.earliest(begin);
         slab.end = slab.latest(ray.t_max);
         slab
     }
 
     /// A distance no farther than a `t` and all that rounds to it.
-    #[inline(always)]
     fn earliest(&self, t: f32) -> f32 {
         let distance = round((f64::from(t.next_down()) - self.t) * self.scale);
-        (distance - distance.abs() * (WIDER - 1.0)).next_down()
+        (distance - distance.abs() * (WIDER - 1.0)) - TINY
     }
 
     /// A distance no nearer than a `t` and all that rounds to it.
     #[inline(always)]
     pub(crate) fn latest(&self, t: f32) -> f32 {
         let distance = round((f64::from(t.next_up()) - self.t) * self.scale);
-        (distance + distance.abs() * (WIDER - 1.0)).next_up()
+        (distance + distance.abs() * (WIDER - 1.0)) + TINY
     }
 
     /// The inverse direction for far sides.

@@ -17,7 +17,7 @@ use super::layout::{Entry, MOST_ROOT};
 use super::node::{LEAF, Node, WIDTH};
 
 /// Nodes of a subtree, at most.
-const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 1;
+const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 2;
 
 /// The nodes of a subtree, the root first, each behind its parent.
 pub(crate) struct Subtree {
@@ -31,6 +31,15 @@ pub(crate) struct Subtree {
     /// The ids of the leaves, one leaf behind the other.
     ids: [u32; MOST_ROOT],
     id_count: usize,
+}
+
+/// How ranges are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cut {
+    /// Where the highest bit changes in which keys differ.
+    Keys,
+    /// In halves, the largest first: fewer nodes, worse boxes.
+    Halves,
 }
 
 /// A range of entries, and in which bits the keys of its first and last one differ.
@@ -47,11 +56,15 @@ impl Part {
     const NONE: Self = Self { start: 0, end: 0, differing: 0 };
 
     #[inline(always)]
-    fn new(entries: &[Entry], start: u8, end: u8) -> Self {
+    fn new(entries: &[Entry], start: u8, end: u8, by: Cut) -> Self {
         let key = |at: u8| entries.get(usize::from(at)).map_or(0, |entry| entry[0]);
         // Parts that can be cut have the lowest bit set: those of equal keys come last.
         let is_cut = u32::from(end > start + 1);
-        let differing = (key(start) ^ key(end.saturating_sub(1))) << 1 | is_cut;
+        let differing = match by {
+            Cut::Keys => key(start) ^ key(end.saturating_sub(1)),
+            Cut::Halves => u32::from(end - start),
+        };
+        let differing = differing << 1 | is_cut;
         Self { start, end, differing }
     }
 
@@ -103,12 +116,13 @@ impl Subtree {
         entries: &[Entry],
         [first, child]: [u32; 2],
         least: f32,
+        by: Cut,
     ) {
-        self.ranges[0] = Part::new(entries, 0, entries.len().min(MOST_ROOT) as u8);
+        self.ranges[0] = Part::new(entries, 0, entries.len().min(MOST_ROOT) as u8, by);
         (self.count, self.id_count) = (1, 0);
         let mut at = 0;
         while at < self.count {
-            self.cut(at, entries);
+            self.cut(at, entries, by);
             at += 1;
         }
         // Quantise, children before parents.
@@ -124,11 +138,11 @@ impl Subtree {
 
     /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for
     /// each other.
-    fn cut(&mut self, at: usize, entries: &[Entry]) {
+    fn cut(&mut self, at: usize, entries: &[Entry], by: Cut) {
         let (Some(&range), Some(&above)) = (self.ranges.get(at), self.above.get(at)) else {
             return;
         };
-        let parts = parts(range, entries);
+        let parts = parts(range, entries, by);
         let (child, first) = (self.count as u32, self.id_count as u32);
         let mut node = Node { child, first, ..Node::EMPTY };
         for (slot, part) in parts.iter().enumerate().take_while(|(_, part)| part.count() > 0) {
@@ -137,7 +151,7 @@ impl Subtree {
                 && let (Some(range_of), Some(above_of)) = places
             {
                 (*range_of, *above_of) = (*part, above + 1);
-                node.inner |= 1 << slot;
+                node.set_inner(slot);
                 self.count += 1;
                 continue;
             }
@@ -163,7 +177,7 @@ impl Subtree {
         let mut bounds = Aabb::EMPTY;
         for (slot, bounds_of) in boxes.iter_mut().enumerate() {
             let count = usize::from(node.counts[slot]);
-            if node.inner >> slot & 1 == 1 {
+            if node.inner() >> slot & 1 == 1 {
                 *bounds_of = self.boxes.get(child).copied().unwrap_or(Aabb::EMPTY);
                 child += 1;
             } else if count > 0 {
@@ -188,7 +202,7 @@ impl Subtree {
 
 /// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys.
 #[inline(always)]
-fn parts(range: Part, entries: &[Entry]) -> [Part; WIDTH] {
+fn parts(range: Part, entries: &[Entry], by: Cut) -> [Part; WIDTH] {
     let mut parts = [Part::NONE; WIDTH];
     parts[0] = range;
     for count in 1..WIDTH {
@@ -200,15 +214,20 @@ fn parts(range: Part, entries: &[Entry]) -> [Part; WIDTH] {
             }
         }
         let part = parts[widest];
-        if part.differing == 0 {
+        if part.count() < 2 {
             break;
         }
-        let middle = part.start + split(entries, part);
+        let middle = part.start
+            + match by {
+                Cut::Keys => split(entries, part),
+                Cut::Halves => (part.end - part.start) / 2,
+            };
         // The parts behind it make room for its second half.
         for at in (1..WIDTH).rev().filter(|&at| at > widest) {
             parts[at] = parts[at - 1];
         }
-        let halves = [Part::new(entries, part.start, middle), Part::new(entries, middle, part.end)];
+        let halves =
+            [Part::new(entries, part.start, middle, by), Part::new(entries, middle, part.end, by)];
         for (slot, half) in parts.iter_mut().skip(widest).zip(halves) {
             *slot = half;
         }

@@ -113,7 +113,7 @@ pub(crate) fn build(
     let (mut at, mut levels) = (0, 0);
     while at < count {
         let Some(node) = nodes.get(at as usize).copied() else { break };
-        if node.exponents != WAITING {
+        if node.word != WAITING {
             at += 1;
             continue;
         }
@@ -124,7 +124,7 @@ pub(crate) fn build(
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let parts = parts.iter().zip(&mut boxes).enumerate();
         for (slot, (part, bounds)) in parts.filter(|(_, (part, _))| part.end > part.start) {
-            node.inner |= 1 << slot;
+            node.set_inner(slot);
             *bounds = part.bounds;
             let below = match items.get(part.start as usize) {
                 Some(item) if part.end - part.start == 1 => {
@@ -149,13 +149,13 @@ pub(crate) fn build(
 }
 
 /// The exponents of a node that waits for its children; no other node has them.
-const WAITING: [u8; 3] = [0; 3];
+const WAITING: u32 = 0;
 
 fn waiting(start: u32, end: u32, level: u32) -> Node {
     #[expect(clippy::cast_possible_truncation, reason = "below 64")]
     let level = level as u8;
     Node {
-        exponents: WAITING,
+        word: WAITING,
         child: start,
         first: end,
         counts: [level, 0, 0, 0, 0, 0, 0, 0],

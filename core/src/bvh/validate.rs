@@ -143,12 +143,12 @@ impl Node {
     /// children that are one thing each, of which there is one unless all are missing as they may.
     fn check(&self, least: f64, may_be_empty: bool) -> Option<()> {
         let steps = self.steps().map(f64::from);
-        let are_steps = self.exponents.iter().all(|exponent| (1..=253).contains(exponent))
+        let are_steps = self.exponents().iter().all(|exponent| (1..=253).contains(exponent))
             && steps.iter().all(|&step| step >= least)
             && self.origin().iter().all(|origin| origin.is_finite());
         let mut children = 0;
         for slot in 0..WIDTH {
-            let is_inner = self.inner >> slot & 1 == 1;
+            let is_inner = self.inner() >> slot & 1 == 1;
             let count = usize::from(self.counts[slot]);
             if count > LEAF || is_inner && count > 0 {
                 return None;

@@ -9,14 +9,18 @@
 //! ```
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u8x16, u16x8, u32x8};
+use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
 
 use super::Bvh;
 use super::node::{Child, Node, WIDTH};
 use super::slab::Slab;
+use crate::aabb::Aabb;
 use crate::counters::Tally;
-use crate::eight::first_eight;
+use crate::eight::{Eight, first_eight};
+use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
+use crate::options::Cull;
+use crate::ray::Ray;
 use crate::search::{Outcome, Search};
 use crate::simd::Kernel;
 use crate::triangle::TriangleTest;
@@ -24,8 +28,10 @@ use crate::triangle::TriangleTest;
 /// Places on the stack of a ray: seven a level, and one.
 pub(crate) const STACK: usize = 7 * super::LEVELS as usize + 1;
 
-/// As many places as nearly all trees need.
-pub(crate) const SMALL_STACK: usize = 7 * 16 + 1;
+/// Levels of a tree for which a small stack is enough, as for nearly all: a stack is set to zeros first.
+pub(crate) const FEW_LEVELS: u32 = 14;
+/// Places on a small stack.
+pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
 
 /// A child that waits: how far it begins, in the high half, and its node and slot.
 pub(crate) type Waiting = u64;
@@ -34,10 +40,17 @@ pub(crate) type Waiting = u64;
 pub(crate) struct OneRay<'r, F, T> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
-    pub(crate) slab: &'r Slab,
-    pub(crate) test: &'r TriangleTest,
+    pub(crate) ray: &'r Ray,
+    /// Where the ray begins to matter: no less than its `t_min`.
+    pub(crate) begin: f32,
+    pub(crate) cull: Cull,
+    /// The box of the scene.
+    pub(crate) bounds: &'r Aabb,
+    /// For a ray from afar, what [`Slab::nearby`] cannot find.
+    pub(crate) afar: Option<&'r (Slab, RayFilter)>,
     pub(crate) search: &'r mut F,
     pub(crate) tally: &'r mut T,
+    pub(crate) stack: &'r mut [Waiting],
 }
 
 /// The ray in vectors.
@@ -72,7 +85,7 @@ impl<S: Simd> Wide<S> {
     #[inline(always)]
     fn meet(&self, simd: S, node: &Node, end: f32) -> (u32, f32x8<S>) {
         let origin = node.origin();
-        let word = u32x8::splat(simd, node.exponent_word());
+        let word = u32x8::splat(simd, node.word);
         let near = self.sides(simd, node, self.near);
         let far = self.sides(simd, node, self.far);
         // The exponents of x, y and z stand in the three low bytes.
@@ -118,39 +131,36 @@ pub(crate) fn bytes<S: Simd>(simd: S, low: [u8; 8], high: [u8; 8]) -> (f32x8<S>,
 #[inline(always)]
 fn numbers<S: Simd>(half: u16x8<S>) -> f32x8<S> {
     let (low, high) = half.widen();
-    low.combine(high).to_float()
+    // Signed: one instruction, where the unsigned conversion is several.
+    low.combine(high).bitcast::<i32x8<S>>().to_float()
 }
 
 /// A point in vectors.
 #[inline(always)]
 fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
-    [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)]
+    [opaque(simd, x), opaque(simd, y), opaque(simd, z)]
+}
+
+/// A number in all lanes, hidden from the compiler: it would subtract and multiply one lane and spread
+/// the result, which makes the way from one node to the next longer.
+#[inline(always)]
+fn opaque<S: Simd>(simd: S, number: f32) -> f32x8<S> {
+    f32x8::simd_from(simd, core::hint::black_box([number; WIDTH]))
 }
 
 impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
-    type Output = ();
+    /// Returns false if the ray comes from afar, and nothing was done.
+    type Output = bool;
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        // Most trees are shallow, and a stack is zeros first.
-        if self.bvh.levels <= 16 {
-            self.walk(simd, &mut [0; SMALL_STACK]);
-        } else {
-            self.walk_deep(simd);
-        }
-    }
-}
-
-impl<F: Search, T: Tally> OneRay<'_, F, T> {
-    #[inline(never)]
-    fn walk_deep<S: Simd>(self, simd: S) {
-        self.walk(simd, &mut [0; STACK]);
-    }
-
-    #[inline(always)]
-    fn walk<S: Simd>(self, simd: S, stack: &mut [Waiting]) {
-        let Self { bvh, mesh, slab, test, search, tally } = self;
-        let ray = Wide::new(simd, slab);
+    fn run<S: Simd>(self, simd: S) -> bool {
+        let Self { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack } = self;
+        let nearby = if afar.is_none() { Slab::nearby(ray, begin, bounds) } else { afar.copied() };
+        let Some((slab, filter)) = nearby else { return false };
+        let slab = &slab;
+        let filter = filter.splat(simd);
+        let mut test = None;
+        let (given, ray) = (ray, Wide::new(simd, slab));
         let mut end = slab.end;
         let mut top = 0;
         // Damaged bytes may lead in circles; a tree's nodes are entered once.
@@ -162,7 +172,7 @@ impl<F: Search, T: Tally> OneRay<'_, F, T> {
                     tally.grid_step();
                     let node = bvh.nodes.get(number as usize);
                     let rest = budget.checked_sub(1);
-                    let (Some(node), Some(rest)) = (node, rest) else { return };
+                    let (Some(node), Some(rest)) = (node, rest) else { return true };
                     budget = rest;
                     let (met, near) = ray.meet(simd, node, end);
                     if met != 0 {
@@ -198,29 +208,33 @@ impl<F: Search, T: Tally> OneRay<'_, F, T> {
                 Child::Leaf { first, count } => {
                     let ids = bvh.leaf(first, count);
                     let rest = budget.checked_sub(1);
-                    let Some(rest) = rest else { return };
+                    let Some(rest) = rest else { return true };
                     budget = rest;
                     tally.cell_step();
                     tally.primitive_tests(ids.len());
-                    let lanes = first_eight(ids);
-                    let mut survivors = test.survivors_of(simd, mesh, &lanes, ids.len());
+                    let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
+                    let triangles = Eight::of(simd, mesh, lanes, ids.len());
+                    #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
+                    let dropped = filter.drops(&triangles.corners).to_bitmask() as u32;
+                    let mut survivors = !dropped & triangles.used;
                     while survivors != 0 {
                         let lane = survivors.trailing_zeros() as usize;
                         survivors &= survivors - 1;
                         let Some(&id) = ids.get(lane) else { break };
+                        let test = test.get_or_insert_with(|| exact(given, cull));
                         match search.decide(test, mesh, id) {
                             Outcome::Unchanged => {}
                             Outcome::EndsAt(t) => end = slab.latest(t),
-                            Outcome::Done => return,
+                            Outcome::Done => return true,
                         }
                     }
                 }
             }
             // Pop what is not behind the end.
             loop {
-                let Some(below) = top.checked_sub(1) else { return };
+                let Some(below) = top.checked_sub(1) else { return true };
                 top = below;
-                let Some(&waiting) = stack.get(top) else { return };
+                let Some(&waiting) = stack.get(top) else { return true };
                 if !(f32::from_bits((waiting >> 32) as u32) > end) {
                     #[expect(clippy::cast_possible_truncation, reason = "the low half")]
                     let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
@@ -231,6 +245,12 @@ impl<F: Search, T: Tally> OneRay<'_, F, T> {
             }
         }
     }
+}
+
+/// The test that decides in f64. Most rays that miss never ask for it.
+#[inline(never)]
+fn exact(ray: &Ray, cull: Cull) -> TriangleTest {
+    TriangleTest::with(ray, RayFilter::NONE).culling(cull)
 }
 
 /// Pushes a child behind those of the same node that begin farther away.

@@ -25,7 +25,7 @@ fn levels(grid: &Grid<'_>) -> impl Iterator<Item = SimdLevel> {
 
 /// Whether a hit, or none, is one that the ray has with that triangle, wherever it was found.
 fn is_possible(grid: &Grid<'_>, ray: &Ray, hit: &Hit) -> bool {
-    let test = TriangleTest::new(ray, grid.bounds());
+    let test = TriangleTest::new(ray);
     let triangle = grid.mesh().triangle(hit.primitive);
     let found = test.zip(triangle).and_then(|(test, triangle)| test.test(&triangle));
     found

@@ -1,0 +1,120 @@
+//! The boxes of a node as numbers, and the slab tests of rays and beams against them.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
+
+use super::node::{Node, WIDTH};
+use super::slab::WIDER;
+use super::walk::bytes;
+
+/// Sides of eight boxes, or of one box in all lanes, by axis.
+#[derive(Clone, Copy)]
+pub(crate) struct Boxes<S: Simd> {
+    low: [f32x8<S>; 3],
+    high: [f32x8<S>; 3],
+}
+
+/// Rays for slab tests: one in all lanes, or eight.
+#[derive(Clone, Copy)]
+pub(crate) struct Slabs<S: Simd> {
+    pub(crate) origin: [f32x8<S>; 3],
+    pub(crate) inverse: [f32x8<S>; 3],
+    pub(crate) start: f32x8<S>,
+    pub(crate) end: f32x8<S>,
+}
+
+/// All rays of a group as intervals, in all lanes. On an axis on which directions have both signs, the
+/// inverse directions are unbounded.
+#[derive(Clone, Copy)]
+pub(crate) struct Beam<S: Simd> {
+    pub(crate) origin: [[f32x8<S>; 2]; 3],
+    pub(crate) inverse: [[f32x8<S>; 2]; 3],
+    pub(crate) is_bounded: [bool; 3],
+    pub(crate) start: f32x8<S>,
+    pub(crate) end: f32x8<S>,
+}
+
+impl<S: Simd> Boxes<S> {
+    /// The eight boxes of a node relative to a point, grown on each side.
+    #[inline(always)]
+    pub(crate) fn decode(simd: S, node: &Node, center: [f32; 3], growth: f32) -> Self {
+        let origin = node.origin();
+        let word = u32x8::splat(simd, node.word);
+        let steps = [word << 23, word << 15, word << 7];
+        let growth = f32x8::splat(simd, growth);
+        let [a, b, c, d, e, f] = node.bounds;
+        let (rows, others, last) = (bytes(simd, a, d), bytes(simd, b, e), bytes(simd, c, f));
+        let rows = [rows, others, last];
+        let mut boxes = Self { low: [growth; 3], high: [growth; 3] };
+        for axis in 0..3 {
+            let step = (steps[axis] & 0x7f80_0000).bitcast::<f32x8<S>>();
+            let base = f32x8::splat(simd, origin[axis] - center[axis]);
+            boxes.low[axis] = rows[axis].0 * step + base - growth;
+            boxes.high[axis] = rows[axis].1 * step + base + growth;
+        }
+        boxes
+    }
+
+    /// The sides as arrays.
+    #[inline(always)]
+    pub(crate) fn sides(&self) -> [[f32; WIDTH]; 6] {
+        let ([a, b, c], [d, e, f]) = (self.low, self.high);
+        [a.into(), b.into(), c.into(), d.into(), e.into(), f.into()]
+    }
+
+    /// One of the boxes in all lanes.
+    #[inline(always)]
+    pub(crate) fn one(simd: S, sides: &[[f32; WIDTH]; 6], slot: usize) -> Self {
+        let slot = slot % WIDTH;
+        let [a, b, c, d, e, f] = sides;
+        Self {
+            low: splat(simd, [a[slot], b[slot], c[slot]]),
+            high: splat(simd, [d[slot], e[slot], f[slot]]),
+        }
+    }
+
+    /// Where rays enter the boxes, and which of them they meet.
+    #[inline(always)]
+    pub(crate) fn meet(&self, simd: S, rays: &Slabs<S>) -> (f32x8<S>, mask32x8<S>) {
+        let (x, y, z) = (self.cross(rays, 0), self.cross(rays, 1), self.cross(rays, 2));
+        let near = x.0.max(y.0).max(z.0.max(rays.start));
+        let far = x.1.min(y.1).min(z.1) * f32x8::splat(simd, WIDER);
+        let far = far.min(rays.end);
+        (near, !near.simd_gt(far))
+    }
+
+    /// Where rays cross the near and the far sides on an axis.
+    #[inline(always)]
+    fn cross(&self, rays: &Slabs<S>, axis: usize) -> (f32x8<S>, f32x8<S>) {
+        let low = (self.low[axis] - rays.origin[axis]) * rays.inverse[axis];
+        let high = (self.high[axis] - rays.origin[axis]) * rays.inverse[axis];
+        (low.min(high), low.max(high))
+    }
+
+    /// The boxes that a beam meets, as bits.
+    #[inline(always)]
+    pub(crate) fn meet_beam(&self, simd: S, beam: &Beam<S>) -> u32 {
+        let (mut near, mut far) = (beam.start, f32x8::splat(simd, f32::INFINITY));
+        for axis in 0..3 {
+            if !beam.is_bounded[axis] {
+                continue;
+            }
+            let [first, last] = beam.origin[axis];
+            let [least, most] = beam.inverse[axis];
+            // The farthest apart that a side and an origin can be, each way.
+            let (low, high) = (self.low[axis] - last, self.high[axis] - first);
+            let (a, b) = (low * least, low * most);
+            let (c, d) = (high * least, high * most);
+            near = near.max(a.min(b).min(c.min(d)));
+            far = far.min(a.max(b).max(c.max(d)));
+        }
+        let far = (far * f32x8::splat(simd, WIDER)).min(beam.end);
+        !near.simd_gt(far).to_bitmask() as u32 & 0xff
+    }
+}
+
+/// A point in vectors.
+#[inline(always)]
+pub(crate) fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
+    [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)]
+}

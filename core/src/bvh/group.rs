@@ -1,0 +1,262 @@
+//! Up to 64 rays through the tree together.
+//!
+//! Each place on the stack has a child and the rays that met its box, one bit each. So a node is decoded and
+//! a leaf's triangles are fetched once for all of them, and no ray waits for another.
+//!
+//! ```text
+//! stack = [(root, all rays)]
+//! pop a child and its rays, without those that are done or end before it begins
+//! node: decode the eight boxes
+//!       few rays: intersect each with the eight boxes
+//!       many:     intersect the beam of all rays with the eight boxes, then eight rays at a time with each
+//!                 box that is left
+//!       push the children with the rays that met them, those that begin nearest last
+//! leaf: filter its triangles, all at once for each ray or eight rays at a time for each triangle;
+//!       decide what passes in f64, eight pairs of a ray and a triangle at a time
+//! ```
+//!
+//! The rays may go anywhere: rays of a camera share most nodes, rays from a surface share the first ones.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, u32x8};
+
+use super::Bvh;
+use super::boxes::Boxes;
+use super::node::{Child, WIDTH};
+use super::rays::{GROUP, OCTETS, Rays};
+use super::walk::STACK;
+use crate::eight::{Eight, first_eight};
+use crate::mesh::TriangleMesh;
+use crate::simd::Kernel;
+
+/// From more rays on the beam of all is worth asking.
+const FEW_RAYS: u32 = 8;
+
+/// Vectors of eight rays in which some are left.
+#[inline(always)]
+const fn octets(rays: u64) -> u32 {
+    let pairs = rays | rays >> 1;
+    let fours = pairs | pairs >> 2;
+    ((fours | fours >> 4) & 0x0101_0101_0101_0101).count_ones()
+}
+
+/// A child that waits, and the rays that met it.
+#[derive(Clone, Copy)]
+pub(crate) struct Waiting {
+    /// Node and slot.
+    place: u32,
+    /// The least distance at which one of the rays enters.
+    near: f32,
+    rays: u64,
+}
+
+impl Waiting {
+    const NONE: Self = Self { place: 0, near: 0.0, rays: 0 };
+}
+
+/// The stack of a group.
+pub(crate) struct Stack([Waiting; STACK]);
+
+impl Stack {
+    pub(crate) const fn new() -> Self {
+        Self([Waiting::NONE; STACK])
+    }
+}
+
+/// A group of rays on its way; `ANY` if the first hit of a ray ends it.
+pub(crate) struct Group<'r, const ANY: bool> {
+    pub(crate) bvh: &'r Bvh<'r>,
+    pub(crate) mesh: &'r TriangleMesh<'r>,
+    pub(crate) rays: &'r mut Rays,
+    pub(crate) stack: &'r mut Stack,
+}
+
+impl<const ANY: bool> Kernel for Group<'_, ANY> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { bvh, mesh, rays, stack } = self;
+        let stack = &mut stack.0;
+        let mut budget = bvh.budget();
+        let mut top = 0;
+        let beam = rays.beam(simd);
+        let (mut child, mut mask) = (Child::Inner(0), rays.alive);
+        loop {
+            let Some(rest) = budget.checked_sub(1) else { return };
+            budget = rest;
+            match child {
+                Child::Inner(number) => {
+                    let Some(node) = bvh.nodes.get(number as usize) else { return };
+                    let boxes = Boxes::decode(simd, node, rays.center, rays.spread);
+                    let count = mask.count_ones();
+                    let mut met = 0xff;
+                    if count > FEW_RAYS {
+                        met = boxes.meet_beam(simd, &beam);
+                    }
+                    let (masks, near) = if count <= octets(mask) * met.count_ones() {
+                        one_by_one(simd, &boxes, rays, mask)
+                    } else {
+                        eight_by_eight(simd, &boxes, rays, mask, met)
+                    };
+                    // Push what is met, the nearest last.
+                    let base = top;
+                    for slot in 0..WIDTH {
+                        if masks[slot] == 0 {
+                            continue;
+                        }
+                        let place = number << 3 | slot as u32;
+                        let waiting = Waiting { place, near: near[slot], rays: masks[slot] };
+                        push::<ANY>(stack, &mut top, base, waiting);
+                    }
+                }
+                Child::Leaf { first, count } => {
+                    let ids = bvh.leaf(first, count);
+                    if mask.count_ones() <= octets(mask) * count {
+                        let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
+                        let triangles = Eight::of(simd, mesh, lanes, ids.len());
+                        let mut rest = mask;
+                        while rest != 0 {
+                            let ray = rest.trailing_zeros();
+                            rest &= rest - 1;
+                            let filter = rays.filter(simd, ray);
+                            let dropped = filter.drops(&triangles.corners).to_bitmask() as u32;
+                            let mut survivors = !dropped & triangles.used;
+                            while survivors != 0 {
+                                let lane = survivors.trailing_zeros();
+                                survivors &= survivors - 1;
+                                let Some(&id) = ids.get(lane as usize) else { break };
+                                rays.candidate::<S, ANY>(simd, mesh, ray, id);
+                            }
+                        }
+                    } else {
+                        for &id in ids {
+                            let Some(triangle) = mesh.triangle(id) else { continue };
+                            let corners = crate::filter::splat(simd, &triangle);
+                            for octet in 0..OCTETS {
+                                let of_octet = (mask >> (8 * octet)) as u8;
+                                if of_octet == 0 {
+                                    continue;
+                                }
+                                let dropped =
+                                    rays.filters(simd, octet).drops(&corners).to_bitmask();
+                                let mut survivors = !dropped as u8 & of_octet;
+                                while survivors != 0 {
+                                    let ray = 8 * octet as u32 + survivors.trailing_zeros();
+                                    survivors &= survivors - 1;
+                                    rays.candidate::<S, ANY>(simd, mesh, ray, id);
+                                }
+                            }
+                        }
+                    }
+                    rays.decide::<S, ANY>(simd, mesh);
+                }
+            }
+            // Pop the next child that a ray still has to look at.
+            loop {
+                let Some(below) = top.checked_sub(1) else { return };
+                top = below;
+                let Some(waiting) = stack.get(top) else { return };
+                mask = waiting.rays & rays.alive;
+                if !ANY && mask != 0 {
+                    mask &= rays.ending_behind(simd, waiting.near);
+                }
+                if mask != 0 {
+                    let (node, slot) = (waiting.place >> 3, waiting.place & 7);
+                    let node = bvh.nodes.get(node as usize);
+                    child = node.map_or(Child::NONE, |node| node.child(slot));
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// Intersects few rays with all boxes of a node: for each box the rays that meet it, and where the first
+/// one enters.
+#[inline(always)]
+fn one_by_one<S: Simd>(
+    simd: S,
+    boxes: &Boxes<S>,
+    rays: &Rays,
+    mask: u64,
+) -> ([u64; WIDTH], [f32; WIDTH]) {
+    let zero = u32x8::splat(simd, 0);
+    let far_away = f32x8::splat(simd, f32::INFINITY);
+    let mut least = far_away;
+    let mut halves = [zero; 2];
+    for (half, met_by) in halves.iter_mut().enumerate() {
+        let mut rest = (mask >> (32 * half)) as u32;
+        while rest != 0 {
+            let bit = rest.trailing_zeros();
+            rest &= rest - 1;
+            let (near, met) = boxes.meet(simd, &rays.slab(simd, 32 * half as u32 + bit));
+            *met_by = *met_by | met.select(u32x8::splat(simd, 1 << bit), zero);
+            least = least.min(met.select(near, far_away));
+        }
+    }
+    let [low, high]: [[u32; WIDTH]; 2] = [halves[0].into(), halves[1].into()];
+    let mut masks = [0; WIDTH];
+    for ((mask, low), high) in masks.iter_mut().zip(low).zip(high) {
+        *mask = u64::from(low) | u64::from(high) << 32;
+    }
+    (masks, least.into())
+}
+
+/// Intersects many rays with the boxes of a node that their beam meets, eight rays at a time.
+#[inline(always)]
+fn eight_by_eight<S: Simd>(
+    simd: S,
+    boxes: &Boxes<S>,
+    rays: &Rays,
+    mask: u64,
+    met: u32,
+) -> ([u64; WIDTH], [f32; WIDTH]) {
+    let far_away = f32x8::splat(simd, f32::INFINITY);
+    let sides = boxes.sides();
+    let (mut masks, mut nearest) = ([0; WIDTH], [f32::INFINITY; WIDTH]);
+    let mut rest = met;
+    while rest != 0 {
+        let slot = rest.trailing_zeros() as usize % WIDTH;
+        rest &= rest - 1;
+        let child = Boxes::one(simd, &sides, slot);
+        let mut least = far_away;
+        for octet in 0..OCTETS {
+            let of_octet = mask >> (8 * octet) & 0xff;
+            if of_octet == 0 {
+                continue;
+            }
+            let (near, met) = child.meet(simd, &rays.slabs(simd, octet));
+            masks[slot] |= (met.to_bitmask() as u64 & of_octet) << (8 * octet);
+            least = least.min(met.select(near, far_away));
+        }
+        let lanes: [f32; 8] = least.into();
+        nearest[slot] = lanes.into_iter().fold(f32::INFINITY, |a, b| if b < a { b } else { a });
+    }
+    (masks, nearest)
+}
+
+/// Pushes a child; for closest hits behind those of the same node that begin farther away.
+#[inline(always)]
+fn push<const ANY: bool>(stack: &mut [Waiting], top: &mut usize, base: usize, waiting: Waiting) {
+    let mut at = *top;
+    if at >= stack.len() {
+        return;
+    }
+    *top += 1;
+    while !ANY
+        && at > base
+        && let Some(&below) = stack.get(at - 1)
+        && below.near < waiting.near
+    {
+        if let Some(slot) = stack.get_mut(at) {
+            *slot = below;
+        }
+        at -= 1;
+    }
+    if let Some(slot) = stack.get_mut(at) {
+        *slot = waiting;
+    }
+}
+
+const _: () = assert!(GROUP == 8 * OCTETS);

@@ -1,0 +1,400 @@
+//! The rays of a group, number by number side by side, and what was found for each.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, u32x8};
+
+use super::boxes::{Beam, Slabs, splat};
+use super::slab::{LONG, SHORT, STEEP, TINY, WIDER};
+use crate::aabb::Aabb;
+use crate::approach::FAR_EXTENTS;
+use crate::eight::columns;
+use crate::filter::{Filter, NEARBY_FLOOR, NEARBY_REACH, NEARBY_UNIT, RayFilter};
+use crate::mesh::TriangleMesh;
+use crate::pairs;
+use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::triangle::TriangleTest;
+
+/// Rays of a group, at most.
+pub(crate) const GROUP: usize = 64;
+/// Vectors of eight rays.
+pub(crate) const OCTETS: usize = GROUP / 8;
+
+/// A number of each ray.
+type Row = [[f32; 8]; OCTETS];
+
+const ZEROS: Row = [[0.0; 8]; OCTETS];
+
+/// Rays that go down together.
+pub(crate) struct Rays {
+    /// Bit `i`: ray `i` is still on its way.
+    pub(crate) alive: u64,
+    /// Where boxes and origins are measured from, and by how much boxes grow for that.
+    pub(crate) center: [f32; 3],
+    pub(crate) spread: f32,
+    /// Relative to the center.
+    origin: [Row; 3],
+    inverse: [Row; 3],
+    start: Row,
+    end: Row,
+    /// For the filter, with origins that are not relative.
+    anchor: [Row; 3],
+    direction: [Row; 3],
+    slope: Row,
+    floor: Row,
+    /// From `t` to distances.
+    scale: Row,
+    rays: [Ray; GROUP],
+    pub(crate) hits: [Hit; GROUP],
+    /// Pairs of a ray and a triangle that passed the filter.
+    pairs: [(u32, u32); PAIRS],
+    pair_count: usize,
+}
+
+/// Pairs that are decided at once.
+const PAIRS: usize = 8;
+/// As many are decided one by one.
+const FEW_PAIRS: usize = 2;
+
+/// 2^-24: how much rounding to f32 changes a number, in parts of it.
+const UNIT: f32 = 1.0 / 16_777_216.0;
+
+impl Rays {
+    pub(crate) const fn new() -> Self {
+        let ray = Ray { origin: [0.0; 3], t_min: 0.0, direction: [0.0; 3], t_max: 0.0 };
+        Self {
+            alive: 0,
+            center: [0.0; 3],
+            spread: 0.0,
+            origin: [ZEROS; 3],
+            inverse: [ZEROS; 3],
+            start: ZEROS,
+            end: ZEROS,
+            anchor: [ZEROS; 3],
+            direction: [ZEROS; 3],
+            slope: ZEROS,
+            floor: ZEROS,
+            scale: ZEROS,
+            rays: [ray; GROUP],
+            hits: [Hit::MISS; GROUP],
+            pairs: [(0, 0); PAIRS],
+            pair_count: 0,
+        }
+    }
+
+    /// Where rays are put before [`prepare`](Self::prepare).
+    pub(crate) fn slots(&mut self) -> &mut [Ray] {
+        &mut self.rays
+    }
+
+    /// A ray of the group.
+    pub(crate) fn ray(&self, at: usize) -> &Ray {
+        &self.rays[at % GROUP]
+    }
+
+    /// Makes the first `count` rays ready, to be asked about triangles in a box. Returns those that must be
+    /// traced alone: they come from afar, or their direction is longer or shorter than f32 divides by.
+    #[inline(always)]
+    pub(crate) fn prepare<S: Simd>(&mut self, simd: S, count: usize, bounds: &Aabb) -> u64 {
+        let (alive, special) = (&mut 0, &mut 0);
+        let middle = ((bounds.min + bounds.max) * 0.5).to_array();
+        let size = bounds.size();
+        let half = (size * 0.5).to_array();
+        let extent = size.max_element();
+        let near = f32x8::splat(simd, FAR_EXTENTS * extent);
+        let zero = f32x8::splat(simd, 0.0);
+        let finite = f32x8::splat(simd, f32::INFINITY);
+        self.hits = [Hit::MISS; GROUP];
+        self.pair_count = 0;
+        for octet in 0..count.div_ceil(8).min(OCTETS) {
+            let rays = self.rays.as_chunks::<8>().0[octet];
+            let (origin, t_min, direction, t_max) = columns(simd, &rays);
+            let [x, y, z] = direction;
+            let longest = x.abs().max(y.abs()).max(z.abs());
+
+            // Find the rays that can hit anything, and those that are not for vectors.
+            let [a, b, c] = origin;
+            let is_finite = a.abs().simd_lt(finite)
+                & b.abs().simd_lt(finite)
+                & c.abs().simd_lt(finite)
+                & longest.simd_lt(finite)
+                & x.simd_eq(x)
+                & y.simd_eq(y)
+                & z.simd_eq(z);
+            let is_valid = is_finite & longest.simd_gt(zero) & t_min.simd_le(t_max);
+            let [a, b, c] = [(a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs()];
+            let is_near = a.max(b).max(c).simd_le(near)
+                & longest.simd_gt(f32x8::splat(simd, SHORT))
+                & longest.simd_lt(f32x8::splat(simd, LONG));
+            let of_count = bits_below(count - 8 * octet);
+            let valid = is_valid.to_bitmask() as u64 & of_count;
+            let ready = (is_valid & is_near).to_bitmask() as u64 & of_count;
+            *alive |= ready << (8 * octet);
+            *special |= (valid & !ready) << (8 * octet);
+
+            // Scale directions by powers of two: the largest component lies between 1 and 2.
+            let exponent = longest.bitcast::<u32x8<S>>() & 0x7f80_0000;
+            let scale = exponent.bitcast::<f32x8<S>>();
+            let inverse_scale = (u32x8::splat(simd, 0x7f00_0000) - exponent).bitcast::<f32x8<S>>();
+            let scaled = [x * inverse_scale, y * inverse_scale, z * inverse_scale];
+            let steep = f32x8::splat(simd, STEEP);
+            for axis in 0..3 {
+                let direction = scaled[axis];
+                let inverse = f32x8::splat(simd, 1.0) / direction;
+                let is_less = inverse.abs().simd_le(steep);
+                let inverse = is_less.select(inverse, steep.copysign(direction));
+                self.inverse[axis][octet] = inverse.into();
+                self.direction[axis][octet] = direction.into();
+                self.origin[axis][octet] = origin[axis].into();
+                self.anchor[axis][octet] = origin[axis].into();
+            }
+            let (start, end) = (t_min * scale, t_max * scale);
+            self.start[octet] = (start - (start.abs() * (WIDER - 1.0) + TINY)).into();
+            self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + TINY)).into();
+            self.scale[octet] = scale.into();
+
+            // What the filter may be wrong by: see its proof.
+            let distance = (a + half[0]).max(b + half[1]).max(c + half[2]);
+            let [u, v, w] = [scaled[0].abs(), scaled[1].abs(), scaled[2].abs()];
+            let reach = distance * 29.0 + 19.0 * extent;
+            let slope = (u + v + w) * reach * NEARBY_UNIT;
+            let is_in_range = distance.simd_le(f32x8::splat(simd, NEARBY_REACH));
+            self.slope[octet] = is_in_range.select(slope, finite).into();
+            self.floor[octet] =
+                (distance * distance * NEARBY_FLOOR + distance * TINY + TINY).into();
+        }
+        self.alive = *alive;
+        self.settle();
+        *special
+    }
+
+    /// Measures origins from that of the first ray.
+    #[inline(always)]
+    fn settle(&mut self) {
+        let first = self.alive.trailing_zeros() as usize % GROUP;
+        self.center = self.rays[first].origin;
+        let mut farthest = 0.0_f32;
+        for axis in 0..3 {
+            let center = self.center[axis];
+            for (octet, origin) in self.origin[axis].iter_mut().enumerate() {
+                for (lane, origin) in origin.iter_mut().enumerate() {
+                    *origin -= center;
+                    let is_alive = self.alive >> (8 * octet + lane) & 1 == 1;
+                    let distance = if is_alive { origin.abs() } else { 0.0 };
+                    farthest = if distance > farthest { distance } else { farthest };
+                }
+            }
+        }
+        self.spread = farthest * 8.0 * UNIT;
+    }
+
+    /// All rays as one beam.
+    #[inline(always)]
+    pub(crate) fn beam<S: Simd>(&self, simd: S) -> Beam<S> {
+        let alive = self.alive;
+        let [a, b, c] = &self.origin;
+        let [d, e, f] = &self.inverse;
+        let inverses = [interval(d, alive), interval(e, alive), interval(f, alive)];
+        let [d, e, f] = inverses;
+        Beam {
+            origin: [
+                ends(simd, interval(a, alive)),
+                ends(simd, interval(b, alive)),
+                ends(simd, interval(c, alive)),
+            ],
+            inverse: [ends(simd, d), ends(simd, e), ends(simd, f)],
+            is_bounded: inverses.map(|[low, high]| low > 0.0 || high < 0.0),
+            start: f32x8::splat(simd, interval(&self.start, alive)[0]),
+            end: f32x8::splat(simd, interval(&self.end, alive)[1]),
+        }
+    }
+
+    /// One ray in all lanes.
+    #[inline(always)]
+    pub(crate) fn slab<S: Simd>(&self, simd: S, ray: u32) -> Slabs<S> {
+        let ([a, b, c], [d, e, f]) = (&self.origin, &self.inverse);
+        Slabs {
+            origin: splat(simd, [get(a, ray), get(b, ray), get(c, ray)]),
+            inverse: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
+            start: f32x8::splat(simd, get(&self.start, ray)),
+            end: f32x8::splat(simd, get(&self.end, ray)),
+        }
+    }
+
+    /// Eight rays.
+    #[inline(always)]
+    pub(crate) fn slabs<S: Simd>(&self, simd: S, octet: usize) -> Slabs<S> {
+        Slabs {
+            origin: octet_of(simd, &self.origin, octet),
+            inverse: octet_of(simd, &self.inverse, octet),
+            start: f32x8::simd_from(simd, self.start[octet % OCTETS]),
+            end: f32x8::simd_from(simd, self.end[octet % OCTETS]),
+        }
+    }
+
+    /// The filter of one ray in all lanes.
+    #[inline(always)]
+    pub(crate) fn filter<S: Simd>(&self, simd: S, ray: u32) -> Filter<f32x8<S>> {
+        let [d, e, f] = &self.direction;
+        Filter {
+            origin: splat(simd, self.rays[ray as usize % GROUP].origin),
+            direction: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
+            slope: f32x8::splat(simd, get(&self.slope, ray)),
+            floor: f32x8::splat(simd, get(&self.floor, ray)),
+        }
+    }
+
+    /// The filters of eight rays.
+    #[inline(always)]
+    pub(crate) fn filters<S: Simd>(&self, simd: S, octet: usize) -> Filter<f32x8<S>> {
+        Filter {
+            origin: octet_of(simd, &self.anchor, octet),
+            direction: octet_of(simd, &self.direction, octet),
+            slope: f32x8::simd_from(simd, self.slope[octet % OCTETS]),
+            floor: f32x8::simd_from(simd, self.floor[octet % OCTETS]),
+        }
+    }
+
+    /// The rays that do not end before a distance.
+    #[inline(always)]
+    pub(crate) fn ending_behind<S: Simd>(&self, simd: S, distance: f32) -> u64 {
+        let distance = f32x8::splat(simd, distance);
+        let mut bits = 0;
+        for (octet, end) in self.end.iter().enumerate() {
+            let is_behind = f32x8::simd_from(simd, *end).simd_ge(distance).to_bitmask();
+            bits |= (is_behind as u64 & 0xff) << (8 * octet);
+        }
+        bits
+    }
+
+    /// Notes a pair that passed the filter.
+    #[inline(always)]
+    pub(crate) fn candidate<S: Simd, const ANY: bool>(
+        &mut self,
+        simd: S,
+        mesh: &TriangleMesh<'_>,
+        ray: u32,
+        id: u32,
+    ) {
+        self.pairs[self.pair_count % PAIRS] = (ray, id);
+        self.pair_count += 1;
+        if self.pair_count == PAIRS {
+            self.decide::<S, ANY>(simd, mesh);
+        }
+    }
+
+    /// Decides the pairs that passed.
+    #[inline(always)]
+    pub(crate) fn decide<S: Simd, const ANY: bool>(&mut self, simd: S, mesh: &TriangleMesh<'_>) {
+        let count = core::mem::take(&mut self.pair_count);
+        if count <= FEW_PAIRS {
+            for at in 0..count {
+                let (ray, id) = self.pairs[at % PAIRS];
+                self.decide_one::<ANY>(mesh, ray, id);
+            }
+            return;
+        }
+        self.decide_eight::<S, ANY>(simd, mesh, count);
+    }
+
+    /// Decides pairs side by side.
+    #[inline(always)]
+    fn decide_eight<S: Simd, const ANY: bool>(
+        &mut self,
+        simd: S,
+        mesh: &TriangleMesh<'_>,
+        count: usize,
+    ) {
+        let pairs = self.pairs;
+        let ray = |at: usize| self.rays[pairs[at].0 as usize % GROUP];
+        let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
+        let id = |at: usize| pairs[at].1;
+        let ids = [id(0), id(1), id(2), id(3), id(4), id(5), id(6), id(7)];
+        let decided = pairs::decide(simd, mesh, &rays, ids, count);
+        let mut hits = decided.hits;
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize % PAIRS;
+            hits &= hits - 1;
+            self.found::<ANY>(pairs[lane].0, decided.hit(lane, pairs[lane].1));
+        }
+        let mut unsure = decided.unsure;
+        while unsure != 0 {
+            let lane = unsure.trailing_zeros() as usize % PAIRS;
+            unsure &= unsure - 1;
+            self.decide_one::<ANY>(mesh, pairs[lane].0, pairs[lane].1);
+        }
+    }
+
+    /// Decides one pair.
+    #[inline(never)]
+    fn decide_one<const ANY: bool>(&mut self, mesh: &TriangleMesh<'_>, ray: u32, id: u32) {
+        let at = ray as usize % GROUP;
+        let test = TriangleTest::with(&self.rays[at], RayFilter::NONE);
+        let hit = test.decide(mesh, id);
+        if hit.primitive != INVALID_ID {
+            self.found::<ANY>(ray, hit);
+        }
+    }
+
+    /// Keeps a hit if it is the closest so far.
+    #[inline(always)]
+    fn found<const ANY: bool>(&mut self, ray: u32, hit: Hit) {
+        let at = ray as usize % GROUP;
+        if !hit.is_closer(&self.hits[at]) {
+            return;
+        }
+        self.hits[at] = hit;
+        if ANY {
+            self.alive &= !(1 << at);
+        } else {
+            let end = hit.t * get(&self.scale, ray);
+            put(&mut self.end, at, end + (end.abs() * (WIDER - 1.0) + TINY));
+        }
+    }
+}
+
+/// The lowest bits.
+#[inline(always)]
+const fn bits_below(count: usize) -> u64 {
+    if count >= 8 { 0xff } else { (1 << count) - 1 }
+}
+
+/// The least and the greatest number of some rays.
+#[inline(always)]
+fn interval(row: &Row, rays: u64) -> [f32; 2] {
+    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+    let mut rest = rays;
+    while rest != 0 {
+        let number = get(row, rest.trailing_zeros());
+        rest &= rest - 1;
+        low = if number < low { number } else { low };
+        high = if number > high { number } else { high };
+    }
+    [low, high]
+}
+
+#[inline(always)]
+fn ends<S: Simd>(simd: S, [low, high]: [f32; 2]) -> [f32x8<S>; 2] {
+    [f32x8::splat(simd, low), f32x8::splat(simd, high)]
+}
+
+/// Eight rays of three rows.
+#[inline(always)]
+fn octet_of<S: Simd>(simd: S, rows: &[Row; 3], octet: usize) -> [f32x8<S>; 3] {
+    let octet = octet % OCTETS;
+    let [a, b, c] = rows;
+    [
+        f32x8::simd_from(simd, a[octet]),
+        f32x8::simd_from(simd, b[octet]),
+        f32x8::simd_from(simd, c[octet]),
+    ]
+}
+
+#[inline(always)]
+fn put(row: &mut Row, ray: usize, number: f32) {
+    row[ray / 8 % OCTETS][ray % 8] = number;
+}
+
+#[inline(always)]
+fn get(row: &Row, ray: u32) -> f32 {
+    row[ray as usize / 8 % OCTETS][ray as usize % 8]
+}

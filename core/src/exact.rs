@@ -1,0 +1,137 @@
+//! On which side of a plane a point of a ray lies, decided exactly for all finite f32 numbers.
+//!
+//! ```text
+//! n = (b - a) x (c - a) = a x b + b x c + c x a
+//! the line meets the plane at     T = n . (a - o) / n . d
+//! so   T - t  has the sign of     n . (a - o - t d) / n . d
+//!
+//! n . d                = S(d)                                 S(x) = |b c x| + |c a x| + |a b x|
+//! n . (a - o - t d)    = |a b c| - S(o) - t S(d)              |x y z|: the determinant
+//! ```
+//!
+//! Every term is a product of up to four f32 numbers: an integer of 96 bits times a power of two. A
+//! [`Sum`] adds such terms without rounding. It has as many bits as any of them needs.
+
+use core::cmp::Ordering;
+
+use crate::mesh::Triangle;
+
+/// An f32 as `mantissa * 2^(exponent - 149)`.
+#[derive(Debug, Clone, Copy)]
+struct Number {
+    mantissa: i32,
+    exponent: u32,
+}
+
+impl Number {
+    const ONE: Self = Self { mantissa: 1, exponent: 149 };
+
+    const fn new(number: f32) -> Self {
+        let bits = number.to_bits();
+        let (power, fraction) = (bits >> 23 & 0xff, bits & 0x007f_ffff);
+        let (magnitude, exponent) =
+            if power == 0 { (fraction, 0) } else { (fraction | 0x0080_0000, power - 1) };
+        let magnitude = magnitude.cast_signed();
+        let mantissa = if bits >> 31 == 0 { magnitude } else { -magnitude };
+        Self { mantissa, exponent }
+    }
+
+    const fn negated(self) -> Self {
+        Self { mantissa: -self.mantissa, ..self }
+    }
+}
+
+type Vector = [Number; 3];
+
+fn vector([x, y, z]: [f32; 3]) -> Vector {
+    [Number::new(x), Number::new(y), Number::new(z)]
+}
+
+/// Four exponents of at most 254, 96 bits, and room for the sum of 42 terms.
+const LIMBS: usize = 36;
+
+/// A sum of products of four numbers, as an integer in units of 2^-596: 32 bits a limb, and room
+/// for carries, which are left until the end.
+struct Sum([i64; LIMBS]);
+
+impl Sum {
+    /// Adds `scale * x * y * z`.
+    fn add(&mut self, scale: Number, x: Number, y: Number, z: Number) {
+        let factor = |number: Number| i128::from(number.mantissa);
+        let product = factor(scale) * factor(x) * factor(y) * factor(z);
+        let exponent = scale.exponent + x.exponent + y.exponent + z.exponent;
+        let sign = if product < 0 { -1 } else { 1 };
+        let mut rest = product.unsigned_abs();
+        let limbs = self.0.get_mut((exponent / 32) as usize..).unwrap_or_default();
+        for place in 0..3 {
+            let Some([low, high]) = limbs.get_mut(place..).and_then(<[i64]>::first_chunk_mut)
+            else {
+                return;
+            };
+            let part = (rest & 0xffff_ffff) << (exponent % 32);
+            #[expect(clippy::cast_possible_truncation, reason = "64 bits")]
+            let part = part as u64;
+            *low += sign * (part & 0xffff_ffff).cast_signed();
+            *high += sign * (part >> 32).cast_signed();
+            rest >>= 32;
+        }
+    }
+
+    /// Adds a multiple of a determinant.
+    fn add_determinant(&mut self, scale: Number, x: Vector, y: Vector, z: Vector) {
+        if scale.mantissa == 0 {
+            return;
+        }
+        let negated = scale.negated();
+        self.add(scale, x[0], y[1], z[2]);
+        self.add(scale, x[1], y[2], z[0]);
+        self.add(scale, x[2], y[0], z[1]);
+        self.add(negated, x[0], y[2], z[1]);
+        self.add(negated, x[1], y[0], z[2]);
+        self.add(negated, x[2], y[1], z[0]);
+    }
+
+    /// Adds a multiple of the normal's product with a vector.
+    fn add_across(&mut self, scale: Number, [a, b, c]: [Vector; 3], x: Vector) {
+        self.add_determinant(scale, b, c, x);
+        self.add_determinant(scale, c, a, x);
+        self.add_determinant(scale, a, b, x);
+    }
+
+    /// The sum compared with 0.
+    fn sign(&self) -> Ordering {
+        let (mut carry, mut rest) = (0, 0);
+        for limb in self.0 {
+            let limb = limb + carry;
+            rest |= limb & 0xffff_ffff;
+            carry = limb >> 32;
+        }
+        // All limbs but the carry out of the last one are positive.
+        if carry < 0 { Ordering::Less } else { (carry | rest).cmp(&0) }
+    }
+}
+
+/// Where a line meets a triangle's plane, compared with `t`; `None` if it runs along the plane or
+/// there is none.
+#[cold]
+#[inline(never)]
+pub(crate) fn compare(
+    origin: [f32; 3],
+    direction: [f32; 3],
+    triangle: &Triangle,
+    t: f32,
+) -> Option<Ordering> {
+    let corners @ [a, b, c] = [vector(triangle[0]), vector(triangle[1]), vector(triangle[2])];
+    let (origin, direction) = (vector(origin), vector(direction));
+    let mut along = Sum([0; LIMBS]);
+    along.add_across(Number::ONE, corners, direction);
+    let mut ahead = Sum([0; LIMBS]);
+    ahead.add_determinant(Number::ONE, a, b, c);
+    ahead.add_across(Number::ONE.negated(), corners, origin);
+    ahead.add_across(Number::new(t).negated(), corners, direction);
+    match along.sign() {
+        Ordering::Less => Some(ahead.sign().reverse()),
+        Ordering::Equal => None,
+        Ordering::Greater => Some(ahead.sign()),
+    }
+}

@@ -1,0 +1,559 @@
+//! A conservative f32 filter in front of the f64 triangle test: Möller and Trumbore (1997) without
+//! a division, with a proven error bound.
+//!
+//! The same function tests one ray against eight triangles, eight rays against one triangle, and
+//! one ray against one triangle. All of them give the same bits.
+//!
+//! ```text
+//! t = o - a    e = b - a    f = c - a    p = d x f    q = t x e
+//! U = t . p    V = d . q    det = e . p    W = det - U - V
+//! error = slope * max |e, f| + floor
+//! drop if one of U, V, W is below -error and one is above error
+//! ```
+//!
+//! The claim: [`TriangleTest`](crate::triangle::TriangleTest) misses every triangle that this
+//! filter drops. A NaN compares false, so it never drops a triangle.
+//!
+//! # Proof
+//!
+//! d is the ray's direction, scaled by a power of two so that its largest component lies in [1, 2).
+//! Let D be the sum of the magnitudes of its components, R the largest magnitude of a component of
+//! t, E that of e and f, X the largest E of any triangle, u = 2^-24.
+//!
+//! Multiply out U, V and det into products of three factors. Their magnitudes sum up to no more than
+//! 2 D R E, 2 D R E and 2 D E^2. Each rounding multiplies a product by (1 + r), |r| <= u.
+//!
+//! ```text
+//! error of   roundings of each product                                       bound
+//! U          t 1, f 1, d * f 1, minus 1, t * p 1, sums 2           7     14 u D R E
+//! V          t 1, e 1, t * e 1, minus 1, d * q 1, sums 2           7     14 u D R E
+//! det        e 1, f 1, d * f 1, minus 1, e * p 1, sums 2           7     14 u D E^2
+//! W          those of U, V and det, and two of its own          2 + 2    28 u D R E + 18 u D E^2
+//! ```
+//!
+//! The own roundings of W act on values that are at most |det| <= 2 D E^2 if the line meets the
+//! triangle, which is the only case that matters.
+//!
+//! The f64 test decides exactly on corners that are moved across the ray by at most s per axis of the
+//! sheared plane: by the f64 rounding of `corner - origin` and of the shear, 7 * 2^-53 R, and by the
+//! distance between its ray and the line through the anchor ([`Approach::slack`]). If it reports a
+//! hit, the corners lie within 4 E + 3 s of the ray on that plane, as the ray is among them. Then
+//! moving them changes no edge function by more than 2 * (16 E s + 14 s^2); the 2 is for the
+//! direction, which multiplies areas of that plane. What is left is the second order of u, below
+//! 2^-19 of everything, and underflow:
+//!
+//! ```text
+//! slope     u D (29 R + 19 X) + 32 slack       29 and 19 for 28 and 18: higher orders, 32 * 7 * 2^-53 R
+//! floor     28 s^2 + 2^-140 (R + 1)            underflow: 18 R + 21 products, each off by 2^-150
+//! ```
+//!
+//! With R <= 2^60 nothing overflows: no intermediate value exceeds 12 * 2^122 + 24 * 2^121 < 2^127.
+//! Beyond that slope is infinite and nothing is dropped.
+
+use core::ops::{Add, BitAnd, BitOr, Mul, Neg, Sub};
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, mask32x8};
+
+use crate::aabb::{Aabb, greater, lesser};
+use crate::mesh::Triangle;
+use crate::ray::round;
+
+/// The largest reach with which nothing overflows.
+const MOST_REACH: f64 = f64::from_bits(0x43b0_0000_0000_0000); // 2^60
+
+/// More than all that underflows, for each unit of distance.
+const LEAST: f64 = f64::from_bits(0x3730_0000_0000_0000); // 2^-140
+
+/// 2^-24: how much rounding to f32 changes a number, in parts of it.
+const UNIT: f64 = 1.0 / (1 << 24) as f64;
+
+/// Rounds up what f64 and f32 round to nearest.
+const UP: f64 = 1.0 + 1.0 / (1 << 20) as f64;
+
+/// [`UNIT`], with room for roundings in f32.
+pub(crate) const NEARBY_UNIT: f32 = 1.001 / 16_777_216.0;
+/// [`MOST_REACH`].
+pub(crate) const NEARBY_REACH: f32 = f32::from_bits(0x5d80_0000); // 2^60
+/// What the floor grows by with the square of the distance: 28 * (7 * 2^-53)^2, and a little more.
+pub(crate) const NEARBY_FLOOR: f32 = 2e-29;
+
+/// Numbers that the filter works on: one f32, or eight.
+pub(crate) trait Lanes:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+    /// The answer of a comparison in each lane.
+    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
+
+    fn magnitude(self) -> Self;
+
+    /// The greater of two numbers. With a NaN among them it is any number or NaN.
+    fn or_greater(self, other: Self) -> Self;
+
+    /// The lesser of two numbers. With a NaN among them it is any number or NaN.
+    fn or_less(self, other: Self) -> Self;
+
+    fn is_less(self, other: Self) -> Self::Mask;
+}
+
+impl Lanes for f32 {
+    type Mask = bool;
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn or_greater(self, other: Self) -> Self {
+        greater(self, other)
+    }
+
+    #[inline(always)]
+    fn or_less(self, other: Self) -> Self {
+        lesser(self, other)
+    }
+
+    #[inline(always)]
+    fn is_less(self, other: Self) -> bool {
+        self < other
+    }
+}
+
+impl<S: Simd> Lanes for f32x8<S> {
+    type Mask = mask32x8<S>;
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn or_greater(self, other: Self) -> Self {
+        self.max(other)
+    }
+
+    #[inline(always)]
+    fn or_less(self, other: Self) -> Self {
+        self.min(other)
+    }
+
+    #[inline(always)]
+    fn is_less(self, other: Self) -> mask32x8<S> {
+        self.simd_lt(other)
+    }
+}
+
+/// Lines as the filter sees them: one a lane, or the same one in all.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Filter<L> {
+    /// A point of the line near the triangles.
+    pub(crate) origin: [L; 3],
+    /// The direction, its largest component in [1, 2).
+    pub(crate) direction: [L; 3],
+    /// The error for each unit of a triangle's longest edge component.
+    pub(crate) slope: L,
+    /// The error of a triangle of any size.
+    pub(crate) floor: L,
+}
+
+/// One ray.
+pub(crate) type RayFilter = Filter<f32>;
+
+/// How far away triangles are from a point, and how large.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reach {
+    /// The most that a coordinate of a corner differs from the point's.
+    pub(crate) distance: f64,
+    /// The most that a coordinate differs between corners of a triangle.
+    pub(crate) extent: f64,
+}
+
+impl Reach {
+    /// That of triangles in a box.
+    #[inline(always)]
+    pub(crate) fn of(bounds: &Aabb, point: [f32; 3]) -> Self {
+        let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+        let (mut distance, mut extent) = (0.0, 0.0);
+        for axis in 0..3 {
+            let at = f64::from(point[axis]);
+            let (low, high) = (f64::from(min[axis]), f64::from(max[axis]));
+            distance = greater(distance, greater((low - at).abs(), (high - at).abs()));
+            extent = greater(extent, high - low);
+        }
+        Self { distance, extent }
+    }
+}
+
+impl RayFilter {
+    /// The filter that drops nothing.
+    pub(crate) const NONE: Self =
+        Self { origin: [0.0; 3], direction: [0.0; 3], slope: f32::INFINITY, floor: 0.0 };
+
+    /// A line along a direction that is finite and not null, through an anchor that may be off
+    /// the ray by the slack of its [`Approach`](crate::approach::Approach).
+    #[inline(always)]
+    pub(crate) fn new(direction: [f32; 3], anchor: [f32; 3], slack: f32, reach: Reach) -> Self {
+        let [x, y, z] = direction;
+        let longest = greater(x.abs(), greater(y.abs(), z.abs()));
+        let scale = inverse_power(longest);
+        let (x, y, z) =
+            (round(f64::from(x) * scale), round(f64::from(y) * scale), round(f64::from(z) * scale));
+        let sum = f64::from(x.abs()) + f64::from(y.abs()) + f64::from(z.abs());
+        let Reach { distance, extent } = reach;
+        let slack = f64::from(slack);
+
+        let slope = UNIT * sum * (29.0 * distance + 19.0 * extent) + 32.0 * slack;
+        let off = slack + 3.5 * f64::EPSILON * distance;
+        let floor = 28.0 * off * off + (distance + 1.0) * LEAST;
+        let is_in_range = distance <= MOST_REACH;
+        let slope = if is_in_range { round(slope * UP) } else { f32::INFINITY };
+        Self { origin: anchor, direction: [x, y, z], slope, floor: round(floor * UP) }
+    }
+
+    /// The filter of a ray that starts at its own origin, which no corner is farther from than `distance`.
+    /// The direction is scaled, and `sum` is the sum of its components' magnitudes. In f32: each number of
+    /// [`new`](Self::new), or a little more.
+    #[inline(always)]
+    pub(crate) fn nearby(
+        origin: [f32; 3],
+        direction: [f32; 3],
+        sum: f32,
+        distance: f32,
+        extent: f32,
+    ) -> Self {
+        let slope = sum * (distance * 29.0 + extent * 19.0) * NEARBY_UNIT;
+        let slope = if distance <= NEARBY_REACH { slope } else { f32::INFINITY };
+        let floor = distance * distance * NEARBY_FLOOR + distance * f32::MIN_POSITIVE;
+        Self { origin, direction, slope, floor: floor + f32::MIN_POSITIVE }
+    }
+
+    /// The same ray in all lanes.
+    #[inline(always)]
+    pub(crate) fn splat<S: Simd>(&self, simd: S) -> Filter<f32x8<S>> {
+        let ([x, y, z], [u, v, w]) = (self.origin, self.direction);
+        let lanes = |number: f32| f32x8::splat(simd, number);
+        Filter {
+            origin: [lanes(x), lanes(y), lanes(z)],
+            direction: [lanes(u), lanes(v), lanes(w)],
+            slope: lanes(self.slope),
+            floor: lanes(self.floor),
+        }
+    }
+
+    /// Returns true unless the triangle is dropped.
+    #[inline(always)]
+    pub(crate) fn passes(&self, triangle: &Triangle) -> bool {
+        !self.drops(triangle)
+    }
+}
+
+impl<L: Lanes> Filter<L> {
+    /// The lanes whose triangles the f64 test is sure to miss.
+    #[inline(always)]
+    pub(crate) fn drops(&self, [a, b, c]: &[[L; 3]; 3]) -> L::Mask {
+        // Written out: arrays that are mapped live in memory.
+        let d = self.direction;
+        let t = minus(self.origin, *a);
+        let e = minus(*b, *a);
+        let f = minus(*c, *a);
+        let p = cross(d, f);
+        let q = cross(t, e);
+        let u = dot(t, p);
+        let v = dot(d, q);
+        let w = dot(e, p) - u - v;
+
+        let longest = greatest(e).or_greater(greatest(f));
+        let error = self.slope * longest + self.floor;
+        let least = u.or_less(v).or_less(w);
+        let most = u.or_greater(v).or_greater(w);
+        least.is_less(-error) & error.is_less(most)
+    }
+}
+
+/// A triangle in all lanes.
+#[allow(dead_code, reason = "so far only tests have rays side by side")]
+#[inline(always)]
+pub(crate) fn splat<S: Simd>(simd: S, [a, b, c]: &Triangle) -> [[f32x8<S>; 3]; 3] {
+    let lanes = |number: f32| f32x8::splat(simd, number);
+    [
+        [lanes(a[0]), lanes(a[1]), lanes(a[2])],
+        [lanes(b[0]), lanes(b[1]), lanes(b[2])],
+        [lanes(c[0]), lanes(c[1]), lanes(c[2])],
+    ]
+}
+
+/// The power of two that takes a number's magnitude to [1, 2).
+#[inline(always)]
+fn inverse_power(number: f32) -> f64 {
+    // As f64 every f32 but 0 is a normal number, and so is the result.
+    let exponent = f64::from(number).to_bits() >> 52 & 0x7ff;
+    f64::from_bits((2046_u64.saturating_sub(exponent)) << 52)
+}
+
+#[inline(always)]
+fn minus<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline(always)]
+fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn greatest<L: Lanes>(a: [L; 3]) -> L {
+    a[0].magnitude().or_greater(a[1].magnitude()).or_greater(a[2].magnitude())
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::ray::Ray;
+    use crate::simd::{Kernel, SimdLevel, dispatch};
+    use crate::triangle::TriangleTest;
+
+    /// Random numbers as in Marsaglia's xorshift.
+    struct Random(u64);
+
+    impl Random {
+        fn bits(&mut self) -> u64 {
+            self.0 ^= self.0 << 13;
+            self.0 ^= self.0 >> 7;
+            self.0 ^= self.0 << 17;
+            self.0
+        }
+
+        fn below(&mut self, end: usize) -> usize {
+            (self.bits() >> 32) as usize % end
+        }
+
+        /// From -1 to 1; now and then one of few numbers, so that rays meet edges exactly.
+        fn coordinate(&mut self) -> f32 {
+            let fine = f64::from((self.bits() >> 32) as u32) / f64::from(1_u32 << 31) - 1.0;
+            round(if self.below(3) == 0 { (fine * 4.0).round() / 4.0 } else { fine })
+        }
+
+        fn point(&mut self) -> [f32; 3] {
+            [self.coordinate(), self.coordinate(), self.coordinate()]
+        }
+    }
+
+    fn along(a: [f32; 3], b: [f32; 3], share: f32) -> [f32; 3] {
+        core::array::from_fn(|axis| a[axis] + b[axis] * share)
+    }
+
+    /// Triangles of all shapes in the box from -1 to 1: any, small, slivers, needles, flat on an
+    /// axis, without area.
+    fn triangle(random: &mut Random) -> Triangle {
+        let [a, b, c] = [random.point(), random.point(), random.point()];
+        let share = [1.0, 1e-2, 1e-4, 1e-6, 1e-9, 1e-20][random.below(6)];
+        let a = a.map(|coordinate| coordinate * 0.5);
+        match random.below(8) {
+            0 => [a, along(a, b, 0.5), along(a, along(b, c, share), 0.25)],
+            1 => [a, along(a, b, 0.5), along(along(a, b, 0.2), c, 0.2 * share)],
+            2 => {
+                let axis = random.below(3);
+                [a, along(a, b, share * 0.5), along(a, c, share * 0.5)].map(|mut corner| {
+                    corner[axis] = a[axis];
+                    corner
+                })
+            }
+            3 => [a, along(a, b, 0.5), a],
+            4 => [a.map(|coordinate| coordinate * share), b, c],
+            _ => [a, along(a, b, share * 0.5), along(a, c, share * 0.5)],
+        }
+    }
+
+    /// A line that passes a triangle at a point of it, closely or not, from nearby or afar: where
+    /// it starts and its direction.
+    fn line(random: &mut Random, [a, b, c]: &Triangle) -> ([f32; 3], [f32; 3]) {
+        let ab: [f32; 3] = core::array::from_fn(|axis| b[axis] - a[axis]);
+        let ac: [f32; 3] = core::array::from_fn(|axis| c[axis] - a[axis]);
+        let shares = [0.0, 1.0, 0.5, 0.25, 0.3, 1e-7, -1e-7];
+        let (u, v) = (shares[random.below(7)], shares[random.below(7)]);
+        let target = along(along(*a, ab, u), ac, v);
+        let beside = [0.0, 1e-8, 1e-5, 1e-2, 1.0][random.below(5)];
+        let target = along(target, random.point(), beside);
+        let distance = [1.0, 0.1, 1e-3, 4.0][random.below(4)];
+        let mut direction = random.point();
+        match random.below(6) {
+            // Along an edge or in the plane; along an axis; nearly along it.
+            0 => direction = ab,
+            1 => direction = along(ab, ac, 0.7),
+            2 => direction = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]][random.below(3)],
+            3 => {
+                let axis = random.below(3);
+                direction = direction.map(|d| d * 1e-7);
+                direction[axis] = 1.0;
+            }
+            _ => {}
+        }
+        let origin = along(target, direction, -distance);
+        if random.below(2) == 0 {
+            direction = core::array::from_fn(|axis| target[axis] - origin[axis]);
+        }
+        (origin, direction)
+    }
+
+    fn largest(points: &[[f32; 3]]) -> f32 {
+        points.iter().flatten().fold(0.0, |largest, x| greater(largest, x.abs()))
+    }
+
+    /// Whether the f64 test finds the line among the corners.
+    fn is_hit(origin: [f32; 3], direction: [f32; 3], triangle: &Triangle) -> bool {
+        let ray = Ray { t_min: f32::NEG_INFINITY, ..Ray::new(origin, direction) };
+        TriangleTest::new(&ray).unwrap().test(triangle).is_some()
+    }
+
+    /// Eight rays, each against its triangle; the first against all triangles; all against the first
+    /// triangle: what is dropped.
+    struct Lines<'a>(&'a [RayFilter; 8], &'a [Triangle; 8]);
+
+    impl Kernel for Lines<'_> {
+        type Output = [u64; 3];
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> [u64; 3] {
+            let Self(rays, triangles) = self;
+            let of = |number: &dyn Fn(usize) -> f32| {
+                f32x8::simd_from(simd, core::array::from_fn::<f32, 8, _>(number))
+            };
+            let all = Filter {
+                origin: core::array::from_fn(|axis| of(&|lane| rays[lane].origin[axis])),
+                direction: core::array::from_fn(|axis| of(&|lane| rays[lane].direction[axis])),
+                slope: of(&|lane| rays[lane].slope),
+                floor: of(&|lane| rays[lane].floor),
+            };
+            let corners = core::array::from_fn(|corner| {
+                core::array::from_fn(|axis| of(&|lane| triangles[lane][corner][axis]))
+            });
+            let first = splat(simd, &triangles[0]);
+            [all.drops(&corners), rays[0].splat(simd).drops(&corners), all.drops(&first)]
+                .map(SimdMask::to_bitmask)
+        }
+    }
+
+    fn bits(is_dropped: impl Fn(usize) -> bool) -> u64 {
+        (0..8).fold(0, |bits, lane| bits | u64::from(is_dropped(lane)) << lane)
+    }
+
+    fn check_lanes(rays: &[RayFilter; 8], triangles: &[Triangle; 8]) {
+        let expected = [
+            bits(|lane| rays[lane].drops(&triangles[lane])),
+            bits(|lane| rays[0].drops(&triangles[lane])),
+            bits(|lane| rays[lane].drops(&triangles[0])),
+        ];
+        for level in SimdLevel::available() {
+            assert_eq!(dispatch(level, Lines(rays, triangles)), expected, "{level:?}");
+        }
+        assert_eq!(Lines(rays, triangles).run(fearless_simd::Fallback::new()), expected);
+    }
+
+    #[test]
+    fn what_is_dropped_is_missed_at_every_scale_and_in_all_lanes() {
+        let mut random = Random(0x9e37_79b9_7f4a_7c15);
+        let rounds = if cfg!(miri) { 40 } else { 300_000 };
+        for scale in [1.0, 1e-38, 1e-30, 1e-18, 1e-15, 1e6, 1e15, 1e18, 1e30] {
+            let (mut hits, mut drops, mut misses) = (0, 0, 0);
+            let (mut rays, mut triangles) = (Vec::new(), Vec::new());
+            for _ in 0..rounds / 9 {
+                let triangle = triangle(&mut random);
+                let (origin, direction) = line(&mut random, &triangle);
+                let shift = [0.0, 0.0, 100.0, 1e5][random.below(4)];
+                let place = |point: [f32; 3]| point.map(|x| (x + shift) * scale);
+                let (triangle, origin) = (triangle.map(place), place(origin));
+                let length = [1.0, 1e-20, 1e20, scale][random.below(4)];
+                let direction = direction.map(|d| d * length);
+                if largest(&[direction]) <= 0.0 || !largest(&[direction]).is_finite() {
+                    continue;
+                }
+                // The box of this triangle, or a larger one.
+                let [a, b, c] = triangle.map(glam::Vec3A::from_array);
+                let mut bounds = Aabb { min: a.min(b).min(c), max: a.max(b).max(c) };
+                if random.below(2) == 0 {
+                    bounds.min -= glam::Vec3A::splat(scale);
+                    bounds.max += glam::Vec3A::splat(scale);
+                }
+                let reach = Reach::of(&bounds, origin);
+                let filter = RayFilter::new(direction, origin, 0.0, reach);
+                let is_hit = is_hit(origin, direction, &triangle);
+                let is_dropped = !filter.passes(&triangle);
+                assert!(!(is_hit && is_dropped), "{origin:?} {direction:?} {triangle:?}");
+                hits += u32::from(is_hit);
+                drops += u32::from(is_dropped);
+                misses += u32::from(!is_hit);
+                rays.push(filter);
+                triangles.push(triangle);
+            }
+            for (rays, triangles) in rays.chunks_exact(8).zip(triangles.chunks_exact(8)) {
+                check_lanes(rays.try_into().unwrap(), triangles.try_into().unwrap());
+            }
+            if cfg!(miri) {
+                continue;
+            }
+            assert!(hits > 2000 && misses > 5000, "{scale}: {hits} {misses}");
+            // Beyond these scales f32 has no room for three factors.
+            let is_in_range = (1e-15..=1e6).contains(&scale);
+            assert!(!is_in_range || drops > 4 * misses / 10, "{scale}: {drops} of {misses}");
+        }
+    }
+
+    /// Of random lines beside small triangles hardly any passes that should not.
+    #[test]
+    #[cfg_attr(miri, ignore = "hours of arithmetic")]
+    fn few_triangles_pass_that_are_missed() {
+        let mut random = Random(0x2545_f491_4f6c_dd1d);
+        let bounds = Aabb { min: glam::Vec3A::splat(-1.0), max: glam::Vec3A::splat(1.0) };
+        let (mut passes, mut hits) = (0, 0);
+        for _ in 0..200_000 {
+            let [a, b, c] = [random.point(), random.point(), random.point()];
+            let triangle = [a, along(a, b, 1e-3), along(a, c, 1e-3)];
+            let origin = random.point().map(|x| 3.0 * x);
+            let target = along(along(a, b, 5e-4), random.point(), 2e-3);
+            let direction = core::array::from_fn(|axis| target[axis] - origin[axis]);
+            let filter = RayFilter::new(direction, origin, 0.0, Reach::of(&bounds, origin));
+            passes += u32::from(filter.passes(&triangle));
+            hits += u32::from(is_hit(origin, direction, &triangle));
+        }
+        assert!(passes < hits + hits / 3, "{passes} pass, {hits} are hit");
+    }
+
+    #[test]
+    fn no_numbers_and_no_filter_drop_nothing() {
+        let unit: Triangle = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let reach = Reach { distance: 4.0, extent: 1.0 };
+        let beside = RayFilter::new([0.0, 0.0, 1.0], [2.0, 2.0, -1.0], 0.0, reach);
+        assert!(!beside.passes(&unit) && RayFilter::NONE.passes(&unit));
+        let huge = Reach { distance: 1e19, extent: 1.0 };
+        assert!(RayFilter::new([0.0, 0.0, 1.0], [2.0, 2.0, -1.0], 0.0, huge).passes(&unit));
+        for number in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for at in 0..9 {
+                let mut triangle = unit;
+                triangle[at / 3][at % 3] = number;
+                assert!(beside.passes(&triangle), "{number} at {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn directions_are_scaled_to_one() {
+        // Every power of two, with and without bits behind it.
+        let least = (0..23).flat_map(|bit| [1_u32 << bit, (1 << bit) + (1 << bit) / 2]);
+        let others = (1..255_u32).flat_map(|power| [power << 23, power << 23 | 0x0055_5555]);
+        for length in least.chain(others).map(f32::from_bits) {
+            let reach = Reach { distance: 1.0, extent: 1.0 };
+            let filter = RayFilter::new([0.0, length, -length], [0.0; 3], 0.0, reach);
+            let [x, y, z] = filter.direction;
+            assert!((1.0..2.0).contains(&y), "{length}: {y}");
+            assert_eq!([x, z].map(f32::to_bits), [0.0, -y].map(f32::to_bits));
+        }
+    }
+}
