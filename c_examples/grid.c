@@ -11,6 +11,7 @@ const method METHODS[METHOD_COUNT] = {
     {"fixed", HGRID_CONFIG_INIT_FIXED},
     {"variable", HGRID_CONFIG_INIT_VARIABLE},
     {"recursive", HGRID_CONFIG_INIT_RECURSIVE},
+    {"bvh", HGRID_CONFIG_INIT_BVH},
 };
 
 void check(hgrid_status status, const hgrid_report *report)

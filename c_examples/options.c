@@ -23,13 +23,13 @@ static const char HELP[] =
     "                     tests (of triangles) or steps (from cell to cell)\n"
     "\n"
     "the grid\n"
-    "  --method NAME      brick, one-level, fixed, variable or recursive; brick\n"
-    "  --density CELLS    for each triangle; not for brick\n"
+    "  --method NAME      brick, one-level, fixed, variable, recursive or bvh; brick\n"
+    "  --density CELLS    for each triangle; not for brick and bvh\n"
     "  --cell-size FACTOR 2 makes cells twice as wide as usual; for brick\n"
     "\n"
     "the work\n"
-    "  --threads COUNT    that draw and, with brick, build, 1 to 256; 1. The picture is the\n"
-    "                     same with any number\n"
+    "  --threads COUNT    that draw and, with brick and bvh, build, 1 to 256; 1. The picture\n"
+    "                     is the same with any number\n"
     "  --progress         say how far it is, even where nobody sits at a terminal\n"
     "  --help             this text\n"
     "\n"
@@ -67,7 +67,7 @@ static int parse_method(const char *value)
     for (int i = 0; i < METHOD_COUNT; i++)
         if (strcmp(value, METHODS[i].name) == 0)
             return i;
-    fail("--method is brick, one-level, fixed, variable or recursive, not `%s`", value);
+    fail("--method is brick, one-level, fixed, variable, recursive or bvh, not `%s`", value);
     return 0;
 }
 
@@ -119,9 +119,11 @@ options parse_options(int count, char **words)
             o.input = word;
         }
     }
-    const bool is_brick = METHODS[o.method].config.method == HGRID_METHOD_BRICK;
-    if (is_brick ? o.density > 0 : o.cell_size > 0)
-        fail("--method %s has no %s: leave out %s", METHODS[o.method].name,
-             is_brick ? "density" : "cell size", is_brick ? "--density" : "--cell-size");
+    const uint32_t method = METHODS[o.method].config.method;
+    const bool is_brick = method == HGRID_METHOD_BRICK;
+    if (o.density > 0 && (is_brick || method == HGRID_METHOD_BVH))
+        fail("--method %s has no density: leave out --density", METHODS[o.method].name);
+    if (o.cell_size > 0 && !is_brick)
+        fail("--method %s has no cell size: leave out --cell-size", METHODS[o.method].name);
     return o;
 }

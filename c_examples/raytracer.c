@@ -50,7 +50,7 @@ static void print(const options *o, const scene *s, const hgrid_config *config, 
     printf("method         %s\n", METHODS[o->method].name);
     if (config->method == HGRID_METHOD_BRICK)
         printf("cell size      %g\n", (double)config->cell_size);
-    else
+    else if (config->method != HGRID_METHOD_BVH)
         printf("density        %g\n", (double)b->report.density);
     printf("index bytes    %lu\n", (unsigned long)b->report.index_bytes);
     printf("scratch bytes  %lu\n", (unsigned long)b->scratch_bytes);

@@ -67,7 +67,7 @@
  * and no memory: pages that are not touched are never taken. So the shortest way to a grid there is
  * hgrid_bound or hgrid_sizes without scratch, a build in so much, and if you like a copy of the
  * index_bytes that its report tells. With scratch hgrid_sizes is exact, but takes half as long as the
- * build, or as long (brick, recursive): that is for memory that has to be there, as where there are no pages, or where they
+ * build, or as long (brick, bvh, recursive): that is for memory that has to be there, as where there are no pages, or where they
  * count when they are asked for (Windows, and Linux that may not overcommit).
  *
  * The index is a blob: no pointer in it, so it can be copied to another region at a multiple of 64,
@@ -79,7 +79,7 @@
  *
  * Methods
  * -------
- * A grid is built by one of five methods, which hgrid_config says; all of them answer every ray the
+ * A grid is built by one of six methods, which hgrid_config says; all of them answer every ray the
  * same, hit for hit and bit for bit.
  *
  *   HGRID_METHOD_BRICK       the default: cells as large as triangles, a bit for each: the shortest
@@ -89,6 +89,8 @@
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
  *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
  *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
+ *   HGRID_METHOD_BVH         a tree of boxes over a grid of the triangles' centres, for rays of every kind in
+ *                            scenes of every kind; what it takes at most is known from the number of triangles
  *
  *   hgrid_config config = HGRID_CONFIG_INIT_VARIABLE;
  *
@@ -229,6 +231,23 @@
 #define HGRID_SCRATCH_BOUND_ONE_LEVEL(triangles) ((size_t)5 * (triangles) + 1024)
 
 /**
+ * The same with `HGRID_CONFIG_INIT_BVH`: bytes of index. No mesh takes less than a third of it, and a scan
+ * takes half. With 32 bits the result wraps beyond 268 million triangles.
+ */
+#define HGRID_BVH_INDEX_BOUND(triangles) ((size_t)16 * (triangles) + 640)
+
+/**
+ * The same with `HGRID_CONFIG_INIT_BVH`, bytes of scratch. With 32 bits the result wraps beyond 252 million
+ * triangles.
+ */
+#define HGRID_BVH_SCRATCH_BOUND(triangles) ((size_t)17 * (triangles) + 320)
+
+/**
+ * Bytes of scratch that are enough for `hgrid_validate` of a grid of so many triangles: a bit for each.
+ */
+#define HGRID_VALIDATE_BOUND(triangles) ((size_t)(triangles) / 32 * 4 + 4)
+
+/**
  * The id that no triangle has.
  */
 #define HGRID_INVALID_ID UINT32_MAX
@@ -329,6 +348,22 @@
 #define HGRID_METHOD_BRICK 5
 
 /**
+ * A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
+ * to eight children with tight boxes.
+ *
+ * Choose it for rays that share nothing with their neighbours, for interiors and for scenes with small
+ * detail in one place. It has no parameters: no cells, so neither `density` nor `cell_size` means anything
+ * to it, and its resolution is 1 x 1 x 1.
+ *
+ * Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
+ * alone and is less than twice that: `HGRID_BVH_INDEX_BOUND` and `HGRID_BVH_SCRATCH_BOUND` hold for it.
+ * `hgrid_sizes` without scratch answers with that bound; with scratch it gives the exact size. With several
+ * tasks it answers with the bound in either case: tasks fill their parts of the index side by side, and where
+ * there is less, one task builds. A tree has no more than 2^31 triangles.
+ */
+#define HGRID_METHOD_BVH 6
+
+/**
  * The most levels of a recursive grid.
  */
 #define HGRID_MAX_DEPTH 4
@@ -413,7 +448,7 @@ typedef struct hgrid_config {
     /**
      * Cells per triangle, above 0: 4 for one level and variable, 32 for fixed, 8 for recursive.
      * More cells mean fewer tests, more steps, more memory. `HGRID_METHOD_BRICK` has `cell_size`
-     * instead.
+     * instead, `HGRID_METHOD_BVH` neither.
      */
     float density;
     /**
@@ -441,8 +476,8 @@ typedef struct hgrid_config {
      */
     uint32_t flags;
     /**
-     * For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores;
-     * each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
+     * For `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH`: the most tasks that are run at once, usually the
+     * number of cores; each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
      * `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer, down to one. With 0 and 1 nothing
      * is parallel, and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL,
      * not even for `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the
@@ -522,18 +557,19 @@ typedef struct hgrid_report {
      */
     uint32_t skipped_count;
     /**
-     * Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`
+     * Triangle ids in all cells or leaves together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`
      * and `HGRID_METHOD_BRICK` the words of 4 bytes that ids, subgrids and bricks take together.
      */
     uint32_t reference_count;
     /**
      * The density of the outermost grid: what was asked for, or a half, a quarter, ... of it where
      * the mesh would have needed more than 16 references for each triangle. 0 for
-     * `HGRID_METHOD_BRICK`, which has none.
+     * `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH`, which have none.
      */
     float density;
     /**
-     * Cells of the outermost grid on each axis, or of the finest level under macrocells.
+     * Cells of the outermost grid on each axis, or of the finest level under macrocells; 1 for
+     * `HGRID_METHOD_BVH`.
      */
     uint32_t resolution[3];
     /**
@@ -681,7 +717,7 @@ typedef struct hgrid_counters {
      */
     uint64_t cell_steps;
     /**
-     * How often a ray went down a level, into a macrocell, a subgrid, a block or a brick; 0 for a
+     * How often a ray went down a level, into a macrocell, a subgrid, a block, a brick or a node; 0 for a
      * grid of one level.
      */
     uint64_t grid_steps;
@@ -881,7 +917,7 @@ typedef struct hgrid_statistics {
     uint32_t first_bad;
     /**
      * Lists of triangles: one for each cell that has any, and for each brick or
-     * block that has some of its own.
+     * block that has some of its own; the leaves of a tree.
      */
     uint64_t list_count;
     /**
@@ -1165,9 +1201,9 @@ extern "C" {
  * lie: O(1), nothing is looked at.
  *
  * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
- * as constants, rounded up a little; with brick and `tasks` above 1 the scratch is larger. How much
+ * as constants, rounded up a little; with brick or bvh and `tasks` above 1 the scratch is larger. How much
  * more than enough it is depends on the method: a scan takes a sixth of it or less with one level, a
- * thirteenth with brick; with recursive it is generous beyond use.
+ * thirteenth with brick, half with bvh; with recursive it is generous beyond use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
  * has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -1193,15 +1229,15 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
  * `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more
  * than enough the index is depends on the method: for a scan up to 2 times with one level, 4 with
- * fixed, 6 with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
+ * fixed, 6 with variable, 7 with brick, 2 with bvh; with recursive it is a bound that no mesh comes near.
  *
  * With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
- * is 1. That takes about half the time of a build; with recursive and brick, which have to build
+ * is 1. That takes about half the time of a build; with recursive, brick and bvh, which have to build
  * the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
  *
  * With `tasks` in the configuration the answer is for a build with so many at once: each takes
- * scratch, the index is filled by all of them and may be a little larger. `run` is called for
- * the answer, too; `progress` is not.
+ * scratch, the index is filled by all of them and may be a little larger; with bvh it is what any
+ * mesh takes, and `is_exact` is 0. `run` may be called for the answer, too; `progress` is not.
  *
  * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL
  * if its size is 0; scratch that is too small is no error, and counts as none.
@@ -1234,7 +1270,8 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  *
  * `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
  * (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no
- * more than a step too much: a step is a factor of 1.41 in the number of cells. It takes a
+ * more than a step too much: a step is a factor of 1.41 in the number of cells. A tree
+ * (`HGRID_METHOD_BVH`) has no cells and fits or does not. It takes a
  * dozen times as long as `hgrid_sizes`, or less. A density, or cells, that would be too fine
  * for a build count as too large here.
  *
@@ -1290,11 +1327,11 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
  * anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
  * `HGRID_ERROR_INVALID_CELL_SIZE` and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`,
- * `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BRICK` may have left anything in it, so a grid that
- * lay there before is gone. A view of it (`grid` itself, where a build is repeated) can be asked
+ * `HGRID_METHOD_RECURSIVE`, `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH` may have left anything in it, so a
+ * grid that lay there before is gone. A view of it (`grid` itself, where a build is repeated) can be asked
  * without harm, but answers anything: set it to `HGRID_GRID_INIT`. These methods write as far as the
- * index reaches and then go on counting: the report's `index_bytes` is exact (with brick maybe only
- * enough), and with so many the same call succeeds.
+ * index reaches and then go on counting: the report's `index_bytes` is exact (with brick and bvh maybe
+ * only enough), and with so many the same call succeeds.
  *
  * A build allocates nothing and needs at most 12 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
  * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8
@@ -1302,8 +1339,8 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  *
  * # A build on threads
  *
- * The library knows no threads. With `tasks` and `run` in the configuration, `HGRID_METHOD_BRICK`
- * is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
+ * The library knows no threads. With `tasks` and `run` in the configuration, a build with
+ * `HGRID_METHOD_BRICK` or `HGRID_METHOD_BVH` is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
  * calls the tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte.
  * With POSIX threads, one for each task:
  *
@@ -1730,21 +1767,42 @@ hgrid_status hgrid_mesh_of(const struct hgrid_grid *grid,
 /**
  * Proves that a blob is the grid of its mesh, and so that every answer will be right.
  *
- * Takes no memory, and at most about the time of a build with one level and fixed, two or three
- * times that with variable, three to five times with recursive, and three times with brick, whose
- * builds are short; on damaged bytes it may take much longer. A grid that was just built needs no
+ * Takes at most about the time of a build with one level and fixed, two or three times that with
+ * variable, three to five times with recursive, and three times with brick and bvh, whose builds are
+ * short; on damaged bytes it may take much longer. A grid that was just built needs no
  * proof; a blob from a file, a network or another process may.
  *
+ * A tree (`HGRID_METHOD_BVH`) is proven in scratch: a bit for each triangle, of which `hgrid_validate_bytes`
+ * and `HGRID_VALIDATE_BOUND` tell the bytes. The other methods take none. The scratch may lie at any
+ * address, overlaps neither blob nor mesh nor any argument of this call, and may be NULL if
+ * `scratch_bytes` is 0. It may hold anything before and holds nothing of use afterwards.
+ *
  * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
- * that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
+ * that is damaged; `HGRID_ERROR_SCRATCH_TOO_SMALL` and `HGRID_ERROR_OVERLAP` if it is the scratch that
+ * will not do; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
  * `HGRID_ERROR_NULL_ARGUMENT`.
+ *
+ * Threads: any number of calls and queries on the same grid at once, each with scratch of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_validate(const struct hgrid_grid *grid,
+                            void *scratch,
+                            size_t scratch_bytes);
+
+/**
+ * Tells how much scratch `hgrid_validate` takes for a grid: 0, or for a tree one byte for eight
+ * triangles.
+ *
+ * 0 also for NULL and for a view of zeros (`HGRID_GRID_INIT`).
  *
  * Threads: any number of calls and queries on the same grid at once.
  *
  * # Safety
  * Pointers are as the head of this file says.
  */
-hgrid_status hgrid_validate(const struct hgrid_grid *grid);
+size_t hgrid_validate_bytes(const struct hgrid_grid *grid);
 
 /**
  * Looks at all of a grid and its mesh: O(cells + ids + triangles), no memory.
@@ -1903,6 +1961,12 @@ bool hgrid_has_method(uint32_t method);
  * The usual configuration of a recursive grid.
  */
 #define HGRID_CONFIG_INIT_RECURSIVE {sizeof(hgrid_config), HGRID_METHOD_RECURSIVE, 8.0f, 6, 16, 3, 1.0f, 0, \
+                           1, 0, NULL, NULL, NULL}
+
+/**
+ * The configuration of a tree.
+ */
+#define HGRID_CONFIG_INIT_BVH {sizeof(hgrid_config), HGRID_METHOD_BVH, 4.0f, 6, 16, 3, 1.0f, 0, \
                            1, 0, NULL, NULL, NULL}
 
 /**

@@ -123,6 +123,21 @@ inline constexpr std::size_t one_level_scratch_bound(std::size_t triangles) noex
 {
     return HGRID_SCRATCH_BOUND_ONE_LEVEL(triangles);
 }
+/// The same with `method::bvh`: bytes of index.
+inline constexpr std::size_t bvh_index_bound(std::size_t triangles) noexcept
+{
+    return HGRID_BVH_INDEX_BOUND(triangles);
+}
+/// The same with `method::bvh`, bytes of scratch.
+inline constexpr std::size_t bvh_scratch_bound(std::size_t triangles) noexcept
+{
+    return HGRID_BVH_SCRATCH_BOUND(triangles);
+}
+/// Bytes of scratch that are enough for `view::validate` with so many triangles.
+inline constexpr std::size_t validate_bound(std::size_t triangles) noexcept
+{
+    return HGRID_VALIDATE_BOUND(triangles);
+}
 #if defined(__GNUC__)
 #pragma GCC diagnostic pop
 #endif
@@ -220,6 +235,8 @@ enum class method : std::uint32_t {
     recursive = HGRID_METHOD_RECURSIVE,
     /// `HGRID_METHOD_BRICK`
     brick = HGRID_METHOD_BRICK,
+    /// `HGRID_METHOD_BVH`
+    bvh = HGRID_METHOD_BVH,
 };
 
 /// What is known about the rays of a batch. It changes how fast the answers come, never the answers.
@@ -601,16 +618,18 @@ public:
         static constexpr ::hgrid_config fixed = HGRID_CONFIG_INIT_FIXED;
         static constexpr ::hgrid_config variable = HGRID_CONFIG_INIT_VARIABLE;
         static constexpr ::hgrid_config recursive = HGRID_CONFIG_INIT_RECURSIVE;
+        static constexpr ::hgrid_config bvh = HGRID_CONFIG_INIT_BVH;
         switch (of) {
         case method::one_level: raw_ = one_level; break;
         case method::fixed: raw_ = fixed; break;
         case method::variable: raw_ = variable; break;
         case method::recursive: raw_ = recursive; break;
+        case method::bvh: raw_ = bvh; break;
         case method::brick: break;
         }
     }
 
-    /// Cells for each triangle. Not for brick.
+    /// Cells for each triangle. Not for brick and bvh.
     config &density(float cells) noexcept { return raw_.density = cells, *this; }
     /// The width of a cell in multiples of the usual one. For brick.
     config &cell_size(float factor) noexcept { return raw_.cell_size = factor, *this; }
@@ -852,8 +871,22 @@ public:
     /// The same.
     template <class Blob, std::enable_if_t<!detail::stays<Blob &&>, int> = 0>
     static result<view> open(Blob &&) = delete;
-    /// Proves that a blob from elsewhere is the grid of its mesh.
-    status validate() const noexcept { return status{::hgrid_validate(&raw_)}; }
+    /// Bytes of scratch that `validate` takes: some for a tree, none for the other methods.
+    std::size_t validate_bytes() const noexcept { return ::hgrid_validate_bytes(&raw_); }
+    /// Proves that a blob from elsewhere is the grid of its mesh, in scratch that may lie at any address.
+    status validate(span<std::byte> scratch) const noexcept
+    {
+        return status{::hgrid_validate(&raw_, scratch.data(), scratch.size())};
+    }
+    /// The same in memory of its own, if it takes any.
+    status validate() const noexcept
+    {
+        const std::size_t bytes = validate_bytes();
+        if (bytes == 0)
+            return validate(span<std::byte>());
+        const auto scratch = memory::allocate(bytes);
+        return scratch ? validate(*scratch) : scratch.error();
+    }
 
     /// The closest triangle that a ray hits.
     std::optional<hit> intersect(const ray &along) const noexcept

@@ -12,9 +12,9 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 /// lie: O(1), nothing is looked at.
 ///
 /// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
-/// as constants, rounded up a little; with brick and `tasks` above 1 the scratch is larger. How much
+/// as constants, rounded up a little; with brick or bvh and `tasks` above 1 the scratch is larger. How much
 /// more than enough it is depends on the method: a scan takes a sixth of it or less with one level, a
-/// thirteenth with brick; with recursive it is generous beyond use.
+/// thirteenth with brick, half with bvh; with recursive it is generous beyond use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
 /// has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -51,15 +51,15 @@ pub unsafe extern "C" fn hgrid_bound(
 /// Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
 /// `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more
 /// than enough the index is depends on the method: for a scan up to 2 times with one level, 4 with
-/// fixed, 6 with variable, 7 with brick; with recursive it is a bound that no mesh comes near.
+/// fixed, 6 with variable, 7 with brick, 2 with bvh; with recursive it is a bound that no mesh comes near.
 ///
 /// With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
-/// is 1. That takes about half the time of a build; with recursive and brick, which have to build
+/// is 1. That takes about half the time of a build; with recursive, brick and bvh, which have to build
 /// the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
 ///
 /// With `tasks` in the configuration the answer is for a build with so many at once: each takes
-/// scratch, the index is filled by all of them and may be a little larger. `run` is called for
-/// the answer, too; `progress` is not.
+/// scratch, the index is filled by all of them and may be a little larger; with bvh it is what any
+/// mesh takes, and `is_exact` is 0. `run` may be called for the answer, too; `progress` is not.
 ///
 /// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL
 /// if its size is 0; scratch that is too small is no error, and counts as none.
@@ -105,7 +105,8 @@ pub unsafe extern "C" fn hgrid_sizes(
 ///
 /// `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
 /// (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no
-/// more than a step too much: a step is a factor of 1.41 in the number of cells. It takes a
+/// more than a step too much: a step is a factor of 1.41 in the number of cells. A tree
+/// (`HGRID_METHOD_BVH`) has no cells and fits or does not. It takes a
 /// dozen times as long as `hgrid_sizes`, or less. A density, or cells, that would be too fine
 /// for a build count as too large here.
 ///
@@ -183,11 +184,11 @@ pub unsafe extern "C" fn hgrid_fit(
 /// After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
 /// anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
 /// `HGRID_ERROR_INVALID_CELL_SIZE` and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`,
-/// `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BRICK` may have left anything in it, so a grid that
-/// lay there before is gone. A view of it (`grid` itself, where a build is repeated) can be asked
+/// `HGRID_METHOD_RECURSIVE`, `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH` may have left anything in it, so a
+/// grid that lay there before is gone. A view of it (`grid` itself, where a build is repeated) can be asked
 /// without harm, but answers anything: set it to `HGRID_GRID_INIT`. These methods write as far as the
-/// index reaches and then go on counting: the report's `index_bytes` is exact (with brick maybe only
-/// enough), and with so many the same call succeeds.
+/// index reaches and then go on counting: the report's `index_bytes` is exact (with brick and bvh maybe
+/// only enough), and with so many the same call succeeds.
 ///
 /// A build allocates nothing and needs at most 12 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
 /// `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8
@@ -195,8 +196,8 @@ pub unsafe extern "C" fn hgrid_fit(
 ///
 /// # A build on threads
 ///
-/// The library knows no threads. With `tasks` and `run` in the configuration, `HGRID_METHOD_BRICK`
-/// is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
+/// The library knows no threads. With `tasks` and `run` in the configuration, a build with
+/// `HGRID_METHOD_BRICK` or `HGRID_METHOD_BVH` is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
 /// calls the tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte.
 /// With POSIX threads, one for each task:
 ///

@@ -60,8 +60,9 @@ impl Input {
                     if let Ok(enough) = enough {
                         report.note_sizes(&enough);
                     }
-                    // Without room for its bins, a brick grid names a bound like any other.
-                    let is_exact = region == Region::Index && config.method != Method::Brick;
+                    // Without room for bins or ids, grids of these methods name a bound.
+                    let is_bound = matches!(config.method, Method::Brick | Method::Bvh);
+                    let is_exact = region == Region::Index && !is_bound;
                     report.is_exact = is_exact.into();
                 }
                 Err(report.note_error(error))

@@ -3,11 +3,13 @@
 use core::ffi::c_void;
 use core::ptr::NonNull;
 
+use hgrid_core::Grid;
+
 use crate::questions::{hgrid_blob_info, hgrid_statistics};
 use crate::raw;
 use crate::span::Region;
 use crate::status::{
-    HGRID_ERROR_INDEX_TOO_SMALL, HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status, status_of,
+    HGRID_ERROR_INDEX_TOO_SMALL, HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status,
 };
 use crate::types::{hgrid_grid, hgrid_mesh};
 
@@ -159,26 +161,53 @@ pub unsafe extern "C" fn hgrid_mesh_of(
 
 /// Proves that a blob is the grid of its mesh, and so that every answer will be right.
 ///
-/// Takes no memory, and at most about the time of a build with one level and fixed, two or three
-/// times that with variable, three to five times with recursive, and three times with brick, whose
-/// builds are short; on damaged bytes it may take much longer. A grid that was just built needs no
+/// Takes at most about the time of a build with one level and fixed, two or three times that with
+/// variable, three to five times with recursive, and three times with brick and bvh, whose builds are
+/// short; on damaged bytes it may take much longer. A grid that was just built needs no
 /// proof; a blob from a file, a network or another process may.
 ///
+/// A tree (`HGRID_METHOD_BVH`) is proven in scratch: a bit for each triangle, of which `hgrid_validate_bytes`
+/// and `HGRID_VALIDATE_BOUND` tell the bytes. The other methods take none. The scratch may lie at any
+/// address, overlaps neither blob nor mesh nor any argument of this call, and may be NULL if
+/// `scratch_bytes` is 0. It may hold anything before and holds nothing of use afterwards.
+///
 /// Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
-/// that is damaged; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
+/// that is damaged; `HGRID_ERROR_SCRATCH_TOO_SMALL` and `HGRID_ERROR_OVERLAP` if it is the scratch that
+/// will not do; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
 /// `HGRID_ERROR_NULL_ARGUMENT`.
+///
+/// Threads: any number of calls and queries on the same grid at once, each with scratch of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_validate(
+    grid: *const hgrid_grid,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+) -> hgrid_status {
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    // SAFETY: the caller's promise.
+    let proof = unsafe { raw::grid(grid) }.and_then(|grid| {
+        // SAFETY: the caller's promise.
+        unsafe { raw::validate(grid, scratch) }
+    });
+    proof.err().unwrap_or(HGRID_OK)
+}
+
+/// Tells how much scratch `hgrid_validate` takes for a grid: 0, or for a tree one byte for eight
+/// triangles.
+///
+/// 0 also for NULL and for a view of zeros (`HGRID_GRID_INIT`).
 ///
 /// Threads: any number of calls and queries on the same grid at once.
 ///
 /// # Safety
 /// Pointers are as the head of this file says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hgrid_validate(grid: *const hgrid_grid) -> hgrid_status {
+pub unsafe extern "C" fn hgrid_validate_bytes(grid: *const hgrid_grid) -> usize {
     // SAFETY: the caller's promise.
-    match unsafe { raw::grid(grid) } {
-        Ok(grid) => grid.validate().map_or_else(status_of, |()| HGRID_OK),
-        Err(status) => status,
-    }
+    unsafe { raw::grid(grid) }.map_or(0, Grid::validate_bytes)
 }
 
 /// Looks at all of a grid and its mesh: O(cells + ids + triangles), no memory.

@@ -91,6 +91,20 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 /// scratch it gives the exact size.
 pub const HGRID_METHOD_BRICK: u32 = 5;
 
+/// A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
+/// to eight children with tight boxes.
+///
+/// Choose it for rays that share nothing with their neighbours, for interiors and for scenes with small
+/// detail in one place. It has no parameters: no cells, so neither `density` nor `cell_size` means anything
+/// to it, and its resolution is 1 x 1 x 1.
+///
+/// Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
+/// alone and is less than twice that: `HGRID_BVH_INDEX_BOUND` and `HGRID_BVH_SCRATCH_BOUND` hold for it.
+/// `hgrid_sizes` without scratch answers with that bound; with scratch it gives the exact size. With several
+/// tasks it answers with the bound in either case: tasks fill their parts of the index side by side, and where
+/// there is less, one task builds. A tree has no more than 2^31 triangles.
+pub const HGRID_METHOD_BVH: u32 = 6;
+
 /// The most levels of a recursive grid.
 pub const HGRID_MAX_DEPTH: u32 = 4;
 
@@ -107,6 +121,7 @@ const _: () = assert!(HGRID_METHOD_FIXED == Method::Fixed as u32);
 const _: () = assert!(HGRID_METHOD_VARIABLE == Method::Variable as u32);
 const _: () = assert!(HGRID_METHOD_RECURSIVE == Method::Recursive as u32);
 const _: () = assert!(HGRID_METHOD_BRICK == Method::Brick as u32);
+const _: () = assert!(HGRID_METHOD_BVH == Method::Bvh as u32);
 const _: () = assert!(HGRID_MAX_DEPTH == hgrid_core::MAX_DEPTH);
 const _: () = assert!(HGRID_MAX_TASKS == Control::MAX_TASKS);
 const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
@@ -158,7 +173,7 @@ pub struct hgrid_config {
     pub method: u32,
     /// Cells per triangle, above 0: 4 for one level and variable, 32 for fixed, 8 for recursive.
     /// More cells mean fewer tests, more steps, more memory. `HGRID_METHOD_BRICK` has `cell_size`
-    /// instead.
+    /// instead, `HGRID_METHOD_BVH` neither.
     pub density: f32,
     /// For `HGRID_METHOD_FIXED`: cells of a level in one macrocell of the level above, on each
     /// axis; 2 or more, usually 6.
@@ -174,8 +189,8 @@ pub struct hgrid_config {
     pub cell_size: f32,
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
-    /// For `HGRID_METHOD_BRICK`: the most tasks that are run at once, usually the number of cores;
-    /// each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
+    /// For `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH`: the most tasks that are run at once, usually the
+    /// number of cores; each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
     /// `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer, down to one. With 0 and 1 nothing
     /// is parallel, and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL,
     /// not even for `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the
@@ -248,14 +263,15 @@ pub struct hgrid_report {
     /// Triangles left out because a coordinate is not finite, or beyond 2^120. Known
     /// after a build, as are all below.
     pub skipped_count: u32,
-    /// Triangle ids in all cells together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`
+    /// Triangle ids in all cells or leaves together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`
     /// and `HGRID_METHOD_BRICK` the words of 4 bytes that ids, subgrids and bricks take together.
     pub reference_count: u32,
     /// The density of the outermost grid: what was asked for, or a half, a quarter, ... of it where
     /// the mesh would have needed more than 16 references for each triangle. 0 for
-    /// `HGRID_METHOD_BRICK`, which has none.
+    /// `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH`, which have none.
     pub density: f32,
-    /// Cells of the outermost grid on each axis, or of the finest level under macrocells.
+    /// Cells of the outermost grid on each axis, or of the finest level under macrocells; 1 for
+    /// `HGRID_METHOD_BVH`.
     pub resolution: [u32; 3],
     /// 0.
     pub reserved: u32,
@@ -323,8 +339,8 @@ impl hgrid_config {
     /// have none, and a field of another method is not looked at.
     pub(crate) const fn task_count(&self) -> Result<u32, hgrid_status> {
         match (self.method, self.tasks, self.run) {
-            (HGRID_METHOD_BRICK, 2.., None) => Err(HGRID_ERROR_NULL_ARGUMENT),
-            (HGRID_METHOD_BRICK, tasks, _) => Ok(tasks),
+            (HGRID_METHOD_BRICK | HGRID_METHOD_BVH, 2.., None) => Err(HGRID_ERROR_NULL_ARGUMENT),
+            (HGRID_METHOD_BRICK | HGRID_METHOD_BVH, tasks, _) => Ok(tasks),
             _ => Ok(1),
         }
     }
@@ -372,7 +388,7 @@ impl hgrid_report {
         self.scratch_bytes = grid.scratch_bytes();
         self.skipped_count = grid.skipped_count();
         self.reference_count = grid.reference_count();
-        self.density = if grid.method() == Method::Brick { 0.0 } else { grid.density() };
+        self.density = if grid.method().has_density() { grid.density() } else { 0.0 };
         self.resolution = grid.resolution();
     }
 

@@ -69,7 +69,8 @@ impl<'a> Grid<'a> {
     /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
     /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field,
     /// [`Error::MethodLeftOut`] the method. After an error the index region is as it was, but for
-    /// variable, recursive and brick grids, which fill it as they go: there it holds nothing of use.
+    /// variable, recursive and brick grids and trees, which fill it as they go: there it holds nothing of
+    /// use.
     /// Either way both regions can be used again.
     ///
     /// ```
@@ -99,8 +100,8 @@ impl<'a> Grid<'a> {
 
     /// Builds a grid on the caller's threads: [`build`](Self::build), and bit by bit the same grid.
     ///
-    /// Only [`Method::Brick`] is cut into tasks; the other methods build on the thread that calls.
-    /// [`sizes_with`](crate::sizes_with) and
+    /// Only [`Method::Brick`] and [`Method::Bvh`] are cut into tasks; the other methods build on the thread
+    /// that calls. [`sizes_with`](crate::sizes_with) and
     /// [`Sizes::bound_parallel`](crate::Sizes::bound_parallel) tell how much memory so many tasks
     /// take; where there is less, but enough for fewer, there are fewer.
     ///
@@ -227,6 +228,7 @@ impl<'a> Grid<'a> {
 
     /// Bytes of scratch that [`validate`](Self::validate) takes: at most one for eight triangles.
     #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "an eighth of what 32 bits count")]
     pub const fn validate_bytes(&self) -> usize {
         match self.structure {
             Structure::Bvh(_) => bvh::proof_bytes(self.mesh.triangle_count()) as usize,
@@ -508,7 +510,7 @@ impl<'a> Grid<'a> {
         (self.lattice.min, self.lattice.max)
     }
 
-    /// Cells per axis.
+    /// Cells per axis; a tree is one cell.
     #[must_use]
     pub const fn resolution(&self) -> [u32; 3] {
         self.lattice.resolution
@@ -529,7 +531,7 @@ impl<'a> Grid<'a> {
 
     /// The density that the grid has: the configured one, or a half, a quarter, ... of it where the
     /// mesh would have needed more than 16 references a triangle. It
-    /// means nothing for a brick grid.
+    /// means nothing for a brick grid or a tree.
     #[must_use]
     pub fn density(&self) -> f32 {
         self.config().density
@@ -548,7 +550,7 @@ impl<'a> Grid<'a> {
         self.header().map_or(0, |header| header.skipped_count)
     }
 
-    /// Primitive ids in all cells together; words of the pool for a
+    /// Primitive ids in all cells or leaves together; words of the pool for a
     /// variable, recursive or brick grid.
     #[must_use]
     pub fn reference_count(&self) -> u32 {

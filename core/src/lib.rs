@@ -33,7 +33,7 @@
 //! `surface`, `inspect`, `packed`. core/DESIGN.md tells how it all works and what was left out.
 //!
 //! Each structure has a feature of the package (`one-level`, `fixed`, `variable`, `recursive` and
-//! `brick`, all on by default), so that a program with little flash takes the ones it needs:
+//! `brick`, `bvh`, all on by default), so that a program with little flash takes the ones it needs:
 //! [`Method::is_available`] and [`Error::MethodLeftOut`] tell of the others.
 //!
 //! Keys used in these pages: **CP10** Costa, Pereira, Jorge 2010; **LD08** Lagae and Dutré,

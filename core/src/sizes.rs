@@ -30,9 +30,9 @@ pub struct Sizes {
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A one-level grid of a scan takes a sixth of it or less, a brick grid a thirteenth; for
+    /// A one-level grid of a scan takes a sixth of it or less, a brick grid a thirteenth, a tree half; for
     /// recursive grids it is generous beyond use. `None` if no build takes the configuration (its
-    /// method is left out, say), or the sizes do not fit the machine's address space.
+    /// method is left out, say) or a tree of more than 2^31 triangles, or the sizes do not fit the machine's address space.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Method, Sizes};
@@ -49,9 +49,9 @@ impl Sizes {
     }
 
     /// Enough for any mesh with so many triangles and a build with so many tasks
-    /// ([`Control::tasks`]). Each task takes scratch for the fullest block, which at the worst has
-    /// all triangles: about 32 bytes a triangle for each task. [`sizes_with`] knows the mesh, and
-    /// asks for far less.
+    /// ([`Control::tasks`]). Each task of a brick grid takes scratch for the fullest block, which at the
+    /// worst has all triangles: about 32 bytes a triangle for each task. [`sizes_with`] knows the mesh,
+    /// and asks for far less. A task of a tree takes no more than a byte for four triangles.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "compared before")]
     pub const fn bound_parallel(triangles: u32, config: &Config, tasks: u32) -> Option<Self> {
@@ -64,7 +64,9 @@ impl Sizes {
             Method::Variable if HAS_VARIABLE => variable::bound(triangles, config),
             Method::Recursive if HAS_RECURSIVE => recursive::bound(triangles, config),
             Method::Brick if HAS_BRICK => brick::bound(triangles, tasks),
-            Method::Bvh if HAS_BVH => bvh::bound(triangles, tasks),
+            Method::Bvh if HAS_BVH && triangles <= bvh::MOST_TRIANGLES => {
+                bvh::bound(triangles, tasks)
+            }
             Method::OneLevel
             | Method::Fixed
             | Method::Variable
@@ -104,8 +106,8 @@ impl Sizes {
 ///
 /// With an empty `scratch` the answer takes two passes over the triangles, one more for each
 /// halving of the density, and `index_bytes` is enough: for a scan up to twice what one level
-/// takes, four times what a fixed grid takes, seven times what a brick grid takes, for the others a
-/// generous multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid
+/// takes, four times what a fixed grid takes, seven times what a brick grid takes, twice what a tree
+/// takes, for the others a generous multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid
 /// is planned in it and `index_bytes` is exact, for about half the time of a build, up to all of it
 /// for the others. The scratch holds nothing of use afterwards.
 ///
@@ -128,9 +130,10 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
 
 /// The memory that a parallel build of this mesh takes: [`sizes`], by the caller's threads.
 ///
-/// More tasks take more scratch, each as much again as the first. The index is filled in parts, one
-/// for each task, and may take a few bytes more than the grid in it. Only [`Method::Brick`] builds
-/// in parallel; for the others this is [`sizes`].
+/// More tasks take more scratch, for a brick grid each as much again as the first. The index is filled in
+/// parts, one for each task: a brick grid may take a few bytes more of it than it has in the end, and a
+/// tree as much as any mesh with so many triangles, so the answer for a tree of several tasks is never
+/// exact. Only [`Method::Brick`] and [`Method::Bvh`] build in parallel; for the others this is [`sizes`].
 ///
 /// # Errors
 /// Those of [`Grid::build_with`](crate::Grid::build_with), but for index memory.
@@ -157,7 +160,8 @@ pub fn sizes_with(
 
 /// The finest grid of a method that fits into so many bytes of index, and what it takes: a
 /// configuration that is the given one, or has a lower density (larger cells for
-/// [`Method::Brick`]), by no more than a step too much.
+/// [`Method::Brick`]), by no more than a step too much. [`Method::Bvh`] has no cells: its tree fits or
+/// does not.
 ///
 /// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls
 /// of [`sizes`] at most. `scratch` is for them: as much as [`sizes`] without scratch says. With less a grid may get
@@ -186,13 +190,16 @@ pub fn fit(
     scratch: &mut [u8],
 ) -> Result<(Config, Sizes), Error> {
     config.check()?;
+    // A tree is neither fine nor coarse.
+    let can_coarsen = config.method.has_density() || config.method.has_cell_size();
+    let most_steps = if can_coarsen { MOST_STEPS } else { 0 };
     let mut try_with = |steps: u32| fits(mesh, &coarsened(config, steps), index_bytes, scratch);
     // The first number of steps of 0, 1, 2, 4, ... that fits, then the smallest one below it.
     let (mut low, mut high) = (0, 0);
     let mut needed = loop {
         match try_with(high) {
             Ok(needed) => break needed,
-            Err(error) if high >= MOST_STEPS || !is_too_large(error) => return Err(error),
+            Err(error) if high >= most_steps || !is_too_large(error) => return Err(error),
             Err(_) => (low, high) = (high, (2 * high).max(1)),
         }
     };

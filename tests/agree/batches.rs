@@ -196,8 +196,11 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
         let met = expected[LIMITED].iter().filter(|hit| **hit != Hit::MISS).count();
         assert!(limited > 100 && met > 200, "{limited} {met}");
         // Other methods have no vectors in them.
-        let levels =
-            if config.method == Method::Brick { levels() } else { vec![SimdLevel::detect()] };
+        let levels = if matches!(config.method, Method::Brick | Method::Bvh) {
+            levels()
+        } else {
+            vec![SimdLevel::detect()]
+        };
         for (level, coherence) in levels.into_iter().flat_map(|l| COHERENCES.map(|c| (l, c))) {
             let grid = grid.with_simd(level);
             for n in [0, 1, 7, 63, 64, 65, 128, 1000, rays.len() - 37] {

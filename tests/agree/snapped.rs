@@ -4,7 +4,7 @@
 use hgrid_core::{Config, Method, Ray, Strided};
 use hgrid_tests::meshes::Mesh;
 use hgrid_tests::oracle;
-use hgrid_tests::owned::Owned;
+use hgrid_tests::owned::{Owned, prove};
 use proptest::prelude::*;
 
 /// The scene is 4 units wide; at the densities below a cell is 1 unit, half of one, or two. Brick
@@ -86,7 +86,7 @@ proptest! {
         };
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
-        grid.validate().unwrap();
+        prove(&grid).unwrap();
         for ray in rays {
             let ray = Ray { origin: ray.origin.map(|c| c * scale), ..ray };
             let direction = ray.direction.map(|c| c * scale);

@@ -45,7 +45,7 @@ static void make_views(const hgrid_mesh *mesh, const hgrid_config *config, const
     CHECK(hgrid_pack(&views[1], packed, packed_bytes, &packed_bytes) == HGRID_OK);
     CHECK(hgrid_open(packed, packed_bytes, NULL, &views[2]) == HGRID_OK);
     for (int i = 0; i < VIEWS; i++)
-        CHECK_ANSWER(hgrid_validate(&views[i]) == HGRID_OK);
+        CHECK_ANSWER(proof(&views[i]) == HGRID_OK);
 }
 
 static bool ask_closest_hit(const grid_view *view, const asked *how, const hgrid_ray *ray,

@@ -87,10 +87,10 @@ static void a_changed_mesh_is_found(void)
     const hgrid_mesh moved = mesh_of(&changed);
     hgrid_grid grid;
     EXPECT(HGRID_OK, hgrid_open(blob, blob_bytes, &moved, &grid));
-    EXPECT(HGRID_ERROR_CORRUPT, hgrid_validate(&grid));
+    EXPECT_PROOF(HGRID_ERROR_CORRUPT, &grid);
     changed = mesh_data;
     changed.indices[7][1] = VERTICES;
-    EXPECT(HGRID_ERROR_INDEX_OUT_OF_RANGE, hgrid_validate(&grid));
+    EXPECT_PROOF(HGRID_ERROR_INDEX_OUT_OF_RANGE, &grid);
 }
 
 static void answers(const hgrid_grid *grid, hgrid_hit hits[64])
@@ -120,7 +120,7 @@ static void damage_is_harmless_and_found(void)
         if (hgrid_open(damaged, blob_bytes, &mesh, &grid) == HGRID_OK) {
             opened++;
             answers(&grid, found);
-            if (hgrid_validate(&grid) == HGRID_OK) {
+            if (proof(&grid) == HGRID_OK) {
                 passed++;
                 CHECK(memcmp(expected, found, sizeof found) == 0);
             }

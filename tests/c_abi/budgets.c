@@ -67,7 +67,7 @@ static void bounds_are_enough(void)
                 CHECK(sizes.scratch_bytes <= bound.scratch_bytes);
                 EXPECT(HGRID_OK, hgrid_build(&awkward, &config, index, bound.index_bytes, scratch,
                                              bound.scratch_bytes, &grid, NULL));
-                EXPECT(HGRID_OK, hgrid_validate(&grid));
+                EXPECT_PROOF(HGRID_OK, &grid);
             }
 }
 
@@ -77,9 +77,17 @@ static void macros_are_no_less_than_the_function(void)
         const hgrid_report bound = bound_of(count, NULL);
         CHECK(HGRID_INDEX_BOUND(count) / 64 * 64 >= bound.index_bytes);
         CHECK(HGRID_SCRATCH_BOUND(count) / 64 * 64 >= bound.scratch_bytes);
+        if (count > 2147483648u)
+            continue;
+        const hgrid_config tree = HGRID_CONFIG_INIT_BVH;
+        const hgrid_report of_tree = bound_of(count, &tree);
+        CHECK(HGRID_BVH_INDEX_BOUND(count) / 64 * 64 >= of_tree.index_bytes);
+        CHECK(HGRID_BVH_SCRATCH_BOUND(count) / 64 * 64 >= of_tree.scratch_bytes);
     }
     bound_of(4294967294u, NULL);
     hgrid_report bound = new_report;
+    const hgrid_config large_tree = HGRID_CONFIG_INIT_BVH;
+    EXPECT(HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_bound(2147483649u, &large_tree, &bound));
     for (int method = 0; method < METHODS; method++) {
         const hgrid_config config = usual(method);
         EXPECT(HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_bound(4294967295u, &config, &bound));
@@ -148,7 +156,7 @@ static void check_fit(const hgrid_config *config, size_t budget, void *scratch, 
     hgrid_grid grid;
     EXPECT(HGRID_OK, hgrid_build(&mesh, &fitted, index, budget, enough, again.scratch_bytes, &grid,
                                  NULL));
-    EXPECT(HGRID_OK, hgrid_validate(&grid));
+    EXPECT_PROOF(HGRID_OK, &grid);
     if (fitted.density < config->density || fitted.cell_size > config->cell_size) {
         fitted.density *= 1.41422f, fitted.cell_size /= 1.12247f;
         EXPECT(HGRID_OK, hgrid_sizes(&mesh, &fitted, scratch, bytes, &again));

@@ -22,16 +22,32 @@
     } while (0)
 
 /* Checks what a call returns, and tells the test which function reached which status. */
-#define EXPECT(expected, call) \
+#define EXPECT(expected, call) EXPECT_OF(#call, expected, call)
+
+/* The same for a proof. */
+#define EXPECT_PROOF(expected, grid) \
+    EXPECT_OF("hgrid_validate(" #grid ", scratch, bytes)", expected, proof(grid))
+
+#define EXPECT_OF(text, expected, call) \
     do { \
         const hgrid_status status_ = (call); \
         if (status_ != (expected)) { \
-            fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, #call, \
+            fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, text, \
                     hgrid_status_string(status_)); \
             exit(1); \
         } \
-        reached(#call, status_); \
+        reached(text, status_); \
     } while (0)
+
+/* Proves a grid in scratch of just the size that it asks for. */
+static inline hgrid_status proof(const hgrid_grid *grid)
+{
+    const size_t bytes = hgrid_validate_bytes(grid);
+    void *scratch = bytes > 0 ? malloc(bytes) : NULL;
+    const hgrid_status status = hgrid_validate(grid, scratch, bytes);
+    free(scratch);
+    return status;
+}
 
 /* Tells it of a call like "hgrid_open(...)", each pair once. */
 static inline void reached(const char *call, hgrid_status status)
@@ -118,13 +134,13 @@ static inline hgrid_mesh mesh_of(const sheet *s)
 }
 
 /* The usual configuration of each method. */
-enum { METHODS = 5 };
+enum { METHODS = 6 };
 
 static inline hgrid_config usual(int method)
 {
     const hgrid_config all[METHODS] = {HGRID_CONFIG_INIT_ONE_LEVEL, HGRID_CONFIG_INIT_FIXED,
                                        HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
-                                       HGRID_CONFIG_INIT};
+                                       HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_BVH};
     return all[method];
 }
 

@@ -94,7 +94,7 @@ static void compare_with_a_build(const hgrid_grid *grid, const hgrid_report *rep
     EXPECT(HGRID_OK, hgrid_build(&mesh, config, index, need.index_bytes, scratch,
                                  need.scratch_bytes, &built, &told));
     CHECK(memcmp(report, &told, sizeof told) == 0);
-    EXPECT(HGRID_OK, hgrid_validate(grid));
+    EXPECT_PROOF(HGRID_OK, grid);
     const hgrid_grid copy = *grid;
     for (int i = 0; i < 200; i++) {
         const hgrid_ray ray = ray_down((float)(i % 19) / 17, (float)(i % 23) / 21);
@@ -237,7 +237,7 @@ static void null_is_refused_where_it_is_not_allowed(void)
 
     /* Config, allocator and report may be NULL, and so may what is destroyed. */
     EXPECT(HGRID_OK, hgrid_create(&mesh, NULL, NULL, &grid, NULL));
-    EXPECT(HGRID_OK, hgrid_validate(grid));
+    EXPECT_PROOF(HGRID_OK, grid);
     puts("null hgrid_create.config\nnull hgrid_create.allocator\nnull hgrid_create.report");
     hgrid_destroy(grid);
     hgrid_destroy(NULL);

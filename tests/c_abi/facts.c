@@ -9,9 +9,10 @@
 #define SIZE(type) printf(#type " %zu\n", sizeof(type))
 #define OFFSET(type, field) printf(#type "." #field " %zu\n", offsetof(type, field))
 #define BOUNDS(count) \
-    printf("bounds %lu %zu %zu %zu %zu\n", (unsigned long)(count), HGRID_INDEX_BOUND(count), \
-           HGRID_SCRATCH_BOUND(count), HGRID_INDEX_BOUND_ONE_LEVEL(count), \
-           HGRID_SCRATCH_BOUND_ONE_LEVEL(count))
+    printf("bounds %lu %zu %zu %zu %zu %zu %zu %zu\n", (unsigned long)(count), \
+           HGRID_VALIDATE_BOUND(count), HGRID_INDEX_BOUND(count), HGRID_SCRATCH_BOUND(count), \
+           HGRID_INDEX_BOUND_ONE_LEVEL(count), HGRID_SCRATCH_BOUND_ONE_LEVEL(count), \
+           HGRID_BVH_INDEX_BOUND(count), HGRID_BVH_SCRATCH_BOUND(count))
 
 static void layout(void)
 {
@@ -130,6 +131,7 @@ static void constants(void)
     NUMBER(HGRID_METHOD_VARIABLE);
     NUMBER(HGRID_METHOD_RECURSIVE);
     NUMBER(HGRID_METHOD_BRICK);
+    NUMBER(HGRID_METHOD_BVH);
     NUMBER(HGRID_MAX_DEPTH);
     NUMBER(HGRID_BUILD_STRICT);
     NUMBER(HGRID_MAX_TASKS);
@@ -193,7 +195,7 @@ static void defaults(void)
     const hgrid_mesh m = HGRID_MESH_INIT;
     const hgrid_config configs[] = {HGRID_CONFIG_INIT_ONE_LEVEL, HGRID_CONFIG_INIT_FIXED,
                                     HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
-                                    HGRID_CONFIG_INIT};
+                                    HGRID_CONFIG_INIT_BVH, HGRID_CONFIG_INIT};
     const hgrid_query_options o = HGRID_QUERY_OPTIONS_INIT;
     const hgrid_report r = HGRID_REPORT_INIT;
     const hgrid_blob_info b = HGRID_BLOB_INFO_INIT;

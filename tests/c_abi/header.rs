@@ -276,12 +276,18 @@ fn bounds_are_no_less_than_those_of_core() {
     let mut count = 0;
     for line in facts().lines().filter_map(|line| line.strip_prefix("bounds ")) {
         let numbers: Vec<usize> = line.split(' ').map(|word| word.parse().unwrap()).collect();
-        let [triangles, all @ ..] = &numbers[..] else { panic!("{line}") };
+        let [triangles, proof, all @ ..] = &numbers[..] else { panic!("{line}") };
+        // Whole words of a bit for each triangle.
+        let least = triangles.div_ceil(32) * 4;
+        assert!((least..=least + 4).contains(proof), "{line}");
         let triangles = u32::try_from(*triangles).unwrap();
-        let configs = [Config::default(), Config::new(Method::OneLevel)];
+        let configs = [Config::default(), Config::new(Method::OneLevel), Config::new(Method::Bvh)];
         assert_eq!(all.len(), 2 * configs.len());
         for (config, macros) in configs.iter().zip(all.chunks(2)) {
-            let bound = Sizes::bound(triangles, config).unwrap();
+            let is_too_many = config.method == Method::Bvh && triangles > 1 << 31;
+            let bound = Sizes::bound(triangles, config);
+            assert_eq!(bound.is_none(), is_too_many, "{line}");
+            let Some(bound) = bound else { continue };
             let bounds = [bound.index_bytes, bound.scratch_bytes];
             assert!(macros.iter().zip(bounds).all(|(&given, bound)| given >= bound), "{line}");
             // Nobody is asked for much more than what a static array in Rust takes.

@@ -32,7 +32,7 @@ static void ask(const hgrid_config *config, const void *blob, size_t bytes, answ
 
     hgrid_grid grid;
     EXPECT(HGRID_OK, hgrid_open(blob, bytes, &mesh, &grid));
-    EXPECT(HGRID_OK, hgrid_validate(&grid));
+    EXPECT_PROOF(HGRID_OK, &grid);
     EXPECT(HGRID_OK, hgrid_inspect(&grid, &a->statistics));
     hgrid_ray rays[RAYS];
     int found = 0;

@@ -12,10 +12,11 @@ use tempfile::TempDir;
 use crate::programs::{SANITIZERS, compile};
 
 /// Features, and the methods that they bring.
-const LIBRARIES: [(&str, &[Method]); 3] = [
+const LIBRARIES: [(&str, &[Method]); 4] = [
     ("fixed", &[Method::OneLevel, Method::Fixed]),
     ("variable", &[Method::OneLevel, Method::Variable]),
     ("brick,recursive", &[Method::Brick, Method::Recursive]),
+    ("bvh", &[Method::Bvh]),
 ];
 
 /// What `left_out.c` prints with each of them, about grids of a library that has all methods.

@@ -10,7 +10,10 @@ HGRID_ALIGNED unsigned char scratch_region[HGRID_SCRATCH_BOUND(3)];
 static hgrid_mesh mesh = HGRID_MESH_INIT;
 static const hgrid_config config = HGRID_CONFIG_INIT;
 static const hgrid_config others[] = {HGRID_CONFIG_INIT_ONE_LEVEL, HGRID_CONFIG_INIT_FIXED,
-                                      HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE};
+                                      HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
+                                      HGRID_CONFIG_INIT_BVH};
+HGRID_ALIGNED static unsigned char tree[HGRID_BVH_INDEX_BOUND(3)], tree_scratch[HGRID_BVH_SCRATCH_BOUND(3)];
+static unsigned char proof[HGRID_VALIDATE_BOUND(3)];
 
 #if HGRID_VERSION < 0x000100 || HGRID_BLOB_VERSION < 1 || HGRID_ALIGNMENT != 64 || HGRID_MAX_DEPTH < 1 || \
     HGRID_MAX_TASKS != 64
@@ -36,6 +39,11 @@ int main(void)
     size_t misplaced = ((size_t)index_region | (size_t)scratch_region | (size_t)local) % 64;
     hgrid_status status = hgrid_build(&mesh, &config, index_region, sizeof index_region,
                                       scratch_region, sizeof scratch_region, &grid, &report);
+    if (status == HGRID_OK)
+        status = hgrid_build(&mesh, &others[4], tree, sizeof tree, tree_scratch, sizeof tree_scratch,
+                             &grid, &report);
+    if (status == HGRID_OK)
+        status = hgrid_validate(&grid, proof, sizeof proof);
     for (size_t i = 0; i < sizeof others / sizeof *others && status == HGRID_OK; i++)
         status = hgrid_sizes(&mesh, &others[i], NULL, 0, &report);
     if (status == HGRID_OK)

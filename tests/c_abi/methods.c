@@ -35,6 +35,12 @@ static bool is_brick(const hgrid_config *config)
     return config->method == HGRID_METHOD_BRICK;
 }
 
+/* A tree learns how many nodes it has while it writes the index. */
+static bool is_tree(const hgrid_config *config)
+{
+    return config->method == HGRID_METHOD_BVH;
+}
+
 /* A grid in memory of exactly its size, and that memory. */
 typedef struct {
     hgrid_config config;
@@ -61,12 +67,12 @@ static built build(const hgrid_config *config)
               ? report.scratch_bytes >= b.need.scratch_bytes
               : report.scratch_bytes == b.need.scratch_bytes);
     CHECK(report.triangle == HGRID_INVALID_ID && report.skipped_count == 0);
-    CHECK(report.density == (is_brick(config) ? 0 : config->density));
+    CHECK(report.density == (is_brick(config) || is_tree(config) ? 0 : config->density));
     CHECK(report.reference_count >= TRIANGLES);
     b.blob_bytes = (size_t)report.index_bytes;
     for (int axis = 0; axis < 3; axis++)
         CHECK(report.resolution[axis] > 0);
-    EXPECT(HGRID_OK, hgrid_validate(&b.grid));
+    EXPECT_PROOF(HGRID_OK, &b.grid);
     return b;
 }
 
@@ -110,7 +116,7 @@ static void answers_are_those_of_one_level(const built *b)
     const void *elsewhere = guarded_copy(b->index, b->blob_bytes);
     hgrid_grid opened;
     EXPECT(HGRID_OK, hgrid_open(elsewhere, b->blob_bytes, &mesh, &opened));
-    EXPECT(HGRID_OK, hgrid_validate(&opened));
+    EXPECT_PROOF(HGRID_OK, &opened);
     ask(&opened, found);
     CHECK(memcmp(expected, found, sizeof found) == 0);
 }
@@ -127,7 +133,7 @@ static void refuse_index(const built *b, unsigned char *region, size_t region_by
     memset(region, 0xc7, region_bytes);
     EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_build(&mesh, &b->config, region, bytes, b->scratch,
                                                     b->need.scratch_bytes, &grid, &report));
-    if (is_brick(&b->config)) {
+    if (is_brick(&b->config) || is_tree(&b->config)) {
         CHECK(report.index_bytes >= b->need.index_bytes && report.is_exact == 0);
         CHECK(report.scratch_bytes >= b->need.scratch_bytes);
     } else {
@@ -168,7 +174,7 @@ static void too_small_an_index_is_refused_and_used_again(const built *b)
     EXPECT(HGRID_OK, hgrid_build(&mesh, &b->config, region, need, b->scratch,
                                  b->need.scratch_bytes, &grid, NULL));
     CHECK(memcmp(region, b->index, b->blob_bytes) == 0);
-    EXPECT(HGRID_OK, hgrid_validate(&grid));
+    EXPECT_PROOF(HGRID_OK, &grid);
 }
 
 static void too_small_a_scratch_is_refused(const built *b)
@@ -223,7 +229,7 @@ static void regions_may_hold_anything(const built *b)
     EXPECT(HGRID_OK, hgrid_build(&mesh, &b->config, index, index_bytes, index + index_bytes,
                                  b->need.scratch_bytes, &grid, NULL));
     CHECK(memcmp(index, b->index, b->blob_bytes) == 0);
-    EXPECT(HGRID_OK, hgrid_validate(&grid));
+    EXPECT_PROOF(HGRID_OK, &grid);
     free(memory);
 }
 
@@ -236,7 +242,7 @@ static void a_changed_mesh_is_found(const built *b)
     const hgrid_mesh moved = mesh_of(&changed);
     hgrid_grid grid;
     EXPECT(HGRID_OK, hgrid_open(b->index, b->need.index_bytes, &moved, &grid));
-    EXPECT(HGRID_ERROR_CORRUPT, hgrid_validate(&grid));
+    EXPECT_PROOF(HGRID_ERROR_CORRUPT, &grid);
 }
 
 /* Bits here and there: queries end and stay inside, and what validation lets pass answers as the
@@ -261,7 +267,7 @@ static void damage_is_harmless_and_found(const built *b)
                 const hgrid_ray asked = ray_number(ray);
                 hgrid_intersect(&grid, &asked, NULL, &found[ray]);
             }
-            if (hgrid_validate(&grid) == HGRID_OK) {
+            if (proof(&grid) == HGRID_OK) {
                 passed++;
                 for (int ray = 0; ray < RAYS; ray += 9)
                     CHECK(memcmp(&expected[ray], &found[ray], sizeof *found) == 0);
@@ -270,8 +276,28 @@ static void damage_is_harmless_and_found(const built *b)
         damaged[at] ^= bit;
     }
     CHECK(opened > FLIPS / 2);
-    /* A bit that changes nothing is no damage: the end of a list that is a grid. */
-    CHECK(passed < FLIPS / 5);
+    /* A bit that changes nothing is no damage: the end of a list that is a grid, or a box of a tree that
+     * is larger. */
+    CHECK(passed < (is_tree(&b->config) ? FLIPS / 2 : FLIPS / 5));
+}
+
+/* At any address, and no more of it than was asked for. */
+static void a_proof_takes_the_scratch_that_it_asks_for(const built *b)
+{
+    const size_t need = hgrid_validate_bytes(&b->grid);
+    CHECK((need > 0) == is_tree(&b->config) && need <= HGRID_VALIDATE_BOUND(TRIANGLES));
+    for (size_t more = 0; more < 4; more++) {
+        unsigned char *scratch = (unsigned char *)guarded(need + more);
+        EXPECT(HGRID_OK, hgrid_validate(&b->grid, scratch, need + more));
+        CHECK(all_bytes_are(scratch + need, more, 0xc7));
+    }
+    for (size_t bytes = 0; bytes < need; bytes += 7)
+        EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL,
+               hgrid_validate(&b->grid, guarded(bytes), bytes));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate(&b->grid, b->index + b->blob_bytes - 1, 64));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate(&b->grid, mesh_data.indices, sizeof(uint32_t)));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate(&b->grid, mesh_data.positions, 1));
+    EXPECT_PROOF(HGRID_OK, &b->grid);
 }
 
 static void check_method(const hgrid_config *config)
@@ -283,6 +309,7 @@ static void check_method(const hgrid_config *config)
     what_is_more_than_needed_is_not_touched(&b);
     regions_may_hold_anything(&b);
     a_changed_mesh_is_found(&b);
+    a_proof_takes_the_scratch_that_it_asks_for(&b);
     /* It takes a while. */
     if (!is_deep(config))
         damage_is_harmless_and_found(&b);

@@ -72,7 +72,7 @@ static void refuse_mesh(hgrid_status expected, const hgrid_mesh *input)
 
 static void unknown_values_are_errors(void)
 {
-    const uint32_t unknown[] = {0, 6, 100, 0x7fffffffu, 0x80000000u, UINT32_MAX};
+    const uint32_t unknown[] = {0, 8, 100, 0x7fffffffu, 0x80000000u, UINT32_MAX};
     for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) {
         hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL;
         config.method = unknown[i];
@@ -124,7 +124,10 @@ static void fields_of_methods_are_checked(void)
         for (size_t n = 0; n < sizeof numbers / sizeof *numbers; n++) {
             hgrid_config density = usual(i), cell_size = usual(i);
             density.density = cell_size.cell_size = numbers[n];
-            if (method == HGRID_METHOD_BRICK) {
+            if (method == HGRID_METHOD_BVH) {
+                exact_sizes(&mesh, &density);
+                exact_sizes(&mesh, &cell_size);
+            } else if (method == HGRID_METHOD_BRICK) {
                 refuse_config(HGRID_ERROR_INVALID_CELL_SIZE, &cell_size);
             } else {
                 refuse_config(HGRID_ERROR_INVALID_DENSITY, &density);

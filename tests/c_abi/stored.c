@@ -119,7 +119,7 @@ static void a_packed_blob_needs_nothing_else(const hgrid_grid *grid, const void 
     hgrid_grid opened;
     ask(grid, &expected);
     EXPECT(HGRID_OK, hgrid_open(packed, packed_bytes, NULL, &opened));
-    EXPECT(HGRID_OK, hgrid_validate(&opened));
+    EXPECT_PROOF(HGRID_OK, &opened);
     ask(&opened, &found);
     CHECK(memcmp(&expected, &found, sizeof found) == 0);
     EXPECT(HGRID_OK, hgrid_inspect(grid, &statistics[0]));
@@ -155,7 +155,7 @@ static void answer_from_file(int file, int to)
     CHECK(info.total_bytes == (uint64_t)bytes && info.has_mesh == 1);
     hgrid_grid grid;
     EXPECT(HGRID_OK, hgrid_open(blob, (size_t)bytes, NULL, &grid));
-    EXPECT(HGRID_OK, hgrid_validate(&grid));
+    EXPECT_PROOF(HGRID_OK, &grid);
     static answers a;
     ask(&grid, &a);
     CHECK(write(to, &a, sizeof a) == (ssize_t)sizeof a);
@@ -230,7 +230,7 @@ static void a_damaged_mesh_is_not_packed(const hgrid_grid *grid)
     bytes = 77;
     EXPECT(HGRID_ERROR_INDEX_OUT_OF_RANGE, hgrid_pack(grid, to, need, &bytes));
     CHECK(bytes == 77 && all_bytes_are(to, need, 0xc7));
-    EXPECT(HGRID_ERROR_INDEX_OUT_OF_RANGE, hgrid_validate(grid));
+    EXPECT_PROOF(HGRID_ERROR_INDEX_OUT_OF_RANGE, grid);
     make_mesh();
     EXPECT(HGRID_OK, hgrid_pack(grid, to, need, &bytes));
     CHECK(memcmp(to, sound, need) == 0);
@@ -268,7 +268,7 @@ static void a_grid_knows_its_mesh(const hgrid_grid *grid, const unsigned char *p
     /* What is found is as good as what was given: a grid of it is the same. */
     hgrid_grid again;
     EXPECT(HGRID_OK, hgrid_open(packed, packed_bytes, &found, &again));
-    EXPECT(HGRID_OK, hgrid_validate(&again));
+    EXPECT_PROOF(HGRID_OK, &again);
     /* Another mesh than the packed one is the one that counts. */
     static float elsewhere[VERTICES][3];
     found.positions = elsewhere;
@@ -284,7 +284,7 @@ static void views_of_nothing_are_recognised(void)
     hgrid_statistics statistics = HGRID_STATISTICS_INIT;
     uint64_t bytes = 77;
     unsigned char *to = (unsigned char *)guarded(64);
-    EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_validate(&none));
+    EXPECT_PROOF(HGRID_ERROR_NOT_A_GRID, &none);
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_inspect(&none, &statistics));
     hgrid_mesh found = HGRID_MESH_INIT;
     const hgrid_mesh untouched = found;

@@ -86,7 +86,7 @@ static void ask_about_the_grid(answers *a, const worker *w)
     a->statistics = statistics, a->info = info;
     CHECK(hgrid_inspect(&grid, &a->statistics) == HGRID_OK);
     CHECK(hgrid_peek(blob, blob_bytes, &a->info) == HGRID_OK);
-    a->validated = hgrid_validate(&grid);
+    a->validated = proof(&grid);
     a->packed = hgrid_pack(&grid, w->packed, packed_bytes, &bytes);
     a->opened = hgrid_open(blob, blob_bytes, &mesh, &view);
     CHECK(hgrid_occluded(&view, &rays[33], NULL) == hgrid_occluded(&grid, &rays[33], NULL));

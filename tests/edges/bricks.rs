@@ -7,7 +7,7 @@ use hgrid_core::{
 };
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::oracle;
-use hgrid_tests::owned::Owned;
+use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 
 use crate::chunks::{Kind, sites};
@@ -32,7 +32,7 @@ fn agrees(mesh: &Mesh, cost: &Cost) {
     for cell_size in [1.0, 0.3, 4.0] {
         let owned = Owned::build(&view, &config(cell_size)).unwrap();
         let grid = owned.open(&view).unwrap();
-        grid.validate().unwrap();
+        prove(&grid).unwrap();
         let longest = rays(mesh, &grid, 150)
             .into_iter()
             .map(|ray| {
@@ -167,7 +167,7 @@ fn identical_triangles() {
     let view = mesh.view();
     let owned = Owned::build(&view, &config(1.0)).unwrap();
     let grid = owned.open(&view).unwrap();
-    grid.validate().unwrap();
+    prove(&grid).unwrap();
     assert!(owned.bytes().len() <= 40 * mesh.indices.len(), "{}", owned.bytes().len());
     for ray in rays(&mesh, &grid, 12) {
         oracle::check(&grid, &ray);
@@ -285,7 +285,7 @@ fn triangles_and_rays_on_planes_of_cells_bricks_and_blocks() {
         let owned = Owned::build(&mesh.view(), &config(1.0)).unwrap();
         let view = mesh.view();
         let grid = owned.open(&view).unwrap();
-        grid.validate().unwrap();
+        prove(&grid).unwrap();
         let ((min, max), resolution) = (grid.bounds(), grid.resolution());
         let found = Some((min, max, resolution));
         if found == planes {
@@ -332,7 +332,7 @@ fn more_cells_wanted_than_an_axis_may_have() {
     let view = mesh.view();
     let owned = Owned::build(&view, &config(1.0)).unwrap();
     let grid = owned.open(&view).unwrap();
-    grid.validate().unwrap();
+    prove(&grid).unwrap();
     let [cells, ..] = grid.resolution();
     assert!((MAX_RESOLUTION / 2..=MAX_RESOLUTION).contains(&cells), "{cells}");
     assert!(owned.bytes().len() <= 40 * mesh.indices.len(), "{}", owned.bytes().len());
@@ -382,7 +382,7 @@ fn meshes_in_any_form() {
         let owned = Owned::build(&view, &config(1.0)).unwrap();
         assert!(owned.bytes() == expected.bytes(), "{position_stride} {index_stride}");
         let grid = owned.open(&view).unwrap();
-        grid.validate().unwrap();
+        prove(&grid).unwrap();
         for ray in rays(&mesh, &grid, 40) {
             oracle::check(&grid, &ray);
         }
@@ -397,7 +397,7 @@ fn spanning_triangles_make_cells_larger() {
     let view = mesh.view();
     let owned = Owned::build(&view, &config(0.01)).unwrap();
     let grid = owned.open(&view).unwrap();
-    grid.validate().unwrap();
+    prove(&grid).unwrap();
     let rebuilt = Owned::build(&view, &grid.config()).unwrap();
     assert_eq!(rebuilt.bytes(), owned.bytes());
     assert!(owned.bytes().len() <= 120 * mesh.indices.len(), "{}", owned.bytes().len());

@@ -10,7 +10,7 @@ use hgrid_core::{Config, Error, Grid, Method, Ray};
 use hgrid_tests::copy::{Copy, word};
 use hgrid_tests::meshes::{Mesh, soup};
 use hgrid_tests::oracle;
-use hgrid_tests::owned::Owned;
+use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 
 use crate::blobs::query;
@@ -218,7 +218,7 @@ impl Damage {
         changes.iter().for_each(|&(at, word)| self.copy.set(at, &word.to_ne_bytes()));
         let grid = self.open();
         query(&grid);
-        let result = grid.validate();
+        let result = prove(&grid);
         let length = self.copy.bytes().len() as u64;
         assert!(
             matches!(result, Err(Error::Corrupt { offset }) if (128..length).contains(&offset)),
@@ -247,7 +247,7 @@ fn the_mesh_has_everything_and_all_words_are_known() {
 
     let view = mesh.view();
     let grid = Grid::open(copy.bytes(), view).unwrap();
-    grid.validate().unwrap();
+    prove(&grid).unwrap();
     let mut random = Random(89);
     for _ in 0..100 {
         oracle::check(&grid, &Ray::new(random.point(), random.point()));
@@ -271,7 +271,7 @@ fn every_kind_of_word_counts() {
             }
         }
     }
-    damage.open().validate().unwrap();
+    prove(&damage.open()).unwrap();
 }
 
 #[test]
@@ -289,7 +289,7 @@ fn a_triangle_twice_or_elsewhere_is_refused() {
             damage.is_refused(&[(at, absent)], "a triangle that is not there");
         }
     }
-    damage.open().validate().unwrap();
+    prove(&damage.open()).unwrap();
 }
 
 #[test]
@@ -322,7 +322,7 @@ fn lists_of_different_places_cannot_be_exchanged() {
         let none: Vec<(usize, u32)> = (0..4).map(|i| (a + 4 * i, 0)).collect();
         damage.is_refused(&none, "a chunk belongs to no block");
     }
-    damage.open().validate().unwrap();
+    prove(&damage.open()).unwrap();
 }
 
 /// A brick grid without one of its ids: what lies behind it moves up, and every place is said anew.
@@ -380,7 +380,7 @@ fn a_list_that_has_lost_a_triangle_is_refused() {
             assert!(kinds[0] == kinds[1], "the rest is a grid");
             let grid = Grid::open(copy.bytes(), damage.mesh.view()).unwrap();
             query(&grid);
-            let result = grid.validate();
+            let result = prove(&grid);
             assert!(matches!(result, Err(Error::Corrupt { .. })), "{depth}: {result:?}");
         }
     }
@@ -414,7 +414,7 @@ fn divided_cells_in_circles_end() {
         damage.is_refused(&[(at, start ^ 1 << 31)], "a list is no divided cell");
     }
     assert!(count > 0, "every divided cell has all bricks");
-    damage.open().validate().unwrap();
+    prove(&damage.open()).unwrap();
 }
 
 #[test]
@@ -432,7 +432,7 @@ fn headers_of_other_grids_are_refused() {
             copy.sign();
             let Ok(grid) = Grid::open(copy.bytes(), mesh.view()) else { continue };
             query(&grid);
-            let result = grid.validate();
+            let result = prove(&grid);
             // Another width may well give the same cells: then it is the header of this grid.
             let is_same = Owned::build(&mesh.view(), &grid.config())
                 .is_ok_and(|rebuilt| what == "cell" && rebuilt.bytes() == copy.bytes());
@@ -445,7 +445,7 @@ fn headers_of_other_grids_are_refused() {
         copy.set(104, &cell_size.to_ne_bytes());
         copy.sign();
         let grid = Grid::open(copy.bytes(), mesh.view()).unwrap();
-        assert!(matches!(grid.validate(), Err(Error::Corrupt { offset: 104 })), "{cell_size}");
+        assert!(matches!(prove(&grid), Err(Error::Corrupt { offset: 104 })), "{cell_size}");
     }
 }
 
@@ -473,7 +473,7 @@ fn random_words_are_harmless() {
         }
         let Ok(grid) = Grid::open(copy.bytes(), view) else { continue };
         query(&grid);
-        if grid.validate().is_err() {
+        if prove(&grid).is_err() {
             refused += 1;
         } else {
             for _ in 0..20 {

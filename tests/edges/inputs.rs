@@ -6,7 +6,7 @@ use hgrid_core::{
     Method, Ray, Sizes, Strided, TriangleMesh, sizes,
 };
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
-use hgrid_tests::owned::Owned;
+use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
 
@@ -124,7 +124,7 @@ fn widths_of_cells_outside_the_range_are_refused() {
         let config = Config { cell_size, ..Config::new(Method::Brick) };
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
-        grid.validate().unwrap();
+        prove(&grid).unwrap();
         assert_eq!(grid.config().cell_size.to_bits(), cell_size.to_bits());
         oracle::check(&grid, &Ray::new([0.1, 0.2, 3.0], [0.0, 0.0, -1.0]));
     }
@@ -255,7 +255,7 @@ fn parameters_outside_their_range_are_refused() {
         let view = mesh.view();
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
-        grid.validate().unwrap();
+        prove(&grid).unwrap();
         oracle::check(&grid, &Ray::new([0.1, 0.2, 3.0], [0.0, 0.0, -1.0]));
     }
 }

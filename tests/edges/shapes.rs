@@ -2,7 +2,7 @@
 
 use hgrid_core::{Config, Method, Ray, Sizes};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
-use hgrid_tests::owned::Owned;
+use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
 
@@ -14,7 +14,7 @@ fn agrees(mesh: &Mesh) {
         let bound = Sizes::bound(view.triangle_count(), &config).unwrap();
         assert!(owned.bytes().len() <= bound.index_bytes);
         let grid = owned.open(&view).unwrap();
-        grid.validate().unwrap();
+        prove(&grid).unwrap();
         let (min, max) = grid.bounds();
         let mut random = Random(43);
         for i in 0..200 {
@@ -166,7 +166,7 @@ fn a_mesh_of_spanning_triangles_lowers_the_density() {
         }
         let owned = Owned::build(&view, &Config { depth, ..config }).unwrap();
         let grid = owned.open(&view).unwrap();
-        grid.validate().unwrap();
+        prove(&grid).unwrap();
         let ratio = 64.0 / grid.density();
         assert!(ratio.log2().fract() == 0.0, "halved, again and again: {ratio}");
         // A deep recursive grid has few cells at the root, whatever the triangles.

@@ -48,6 +48,8 @@ fn bad_arguments_are_refused() {
             "--method one-level has no cell size: leave out --cell-size",
         ),
         (&["--method", "brick", "--density", "1"], "brick has no density: leave out --density"),
+        (&["--method", "bvh", "--density", "1"], "bvh has no density: leave out --density"),
+        (&["--method", "bvh", "--cell-size", "1"], "bvh has no cell size: leave out --cell-size"),
         (&["--cell-size", "inf", "--method", "brick"], "invalid cell_size: above 0"),
         (&["--threads"], "--threads needs a value"),
         (&["--threads", "0"], "--threads is a number from 1 to 256, not `0`"),

@@ -77,6 +77,7 @@ fn every_method_draws_the_same_picture() {
         let owned = Owned::build(&mesh, &config).expect("a sound mesh");
         let cells = match config.method {
             Method::Brick => format!("cell size      {}\n", config.cell_size),
+            Method::Bvh => String::new(),
             _ => format!("density        {}\n", config.density),
         };
         let bytes = format!("index bytes    {}\n", owned.bytes().len());

@@ -2,6 +2,7 @@
 //! nothing touched beside it?
 
 mod budget;
+mod trees;
 
 use hgrid_core::{Config, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes};
 use hgrid_tests::guarded::Guarded;
@@ -111,8 +112,11 @@ fn every_size_of_bricks(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
 #[test]
 fn every_size_from_nothing_to_enough() {
     for config in methods::configs() {
-        let every_size =
-            if config.method == Method::Brick { every_size_of_bricks } else { every_size };
+        let every_size = match config.method {
+            Method::Brick => every_size_of_bricks,
+            Method::Bvh => trees::every_size,
+            _ => every_size,
+        };
         every_size(&Mesh::default().view(), &config, 1);
         every_size(&one_triangle().view(), &config, 1);
         every_size(&ball(2, 1.0).view(), &config, 1);

@@ -327,6 +327,26 @@ pub(crate) unsafe fn peek(
 /// # Safety
 /// That of [`grid`].
 pub(crate) unsafe fn pack(grid: &Grid<'_>, to: Region) -> Result<(), hgrid_status> {
+    // SAFETY: the caller's promise.
+    let to = unsafe { bytes_beside(grid, to) }?;
+    grid.pack(to).map(|_| ()).map_err(status_of)
+}
+
+/// Proves that a grid is right, in scratch, once it is sure that this lies elsewhere.
+///
+/// # Safety
+/// That of [`grid`].
+pub(crate) unsafe fn validate(grid: &Grid<'_>, scratch: Region) -> Result<(), hgrid_status> {
+    // SAFETY: the caller's promise.
+    let scratch = unsafe { bytes_beside(grid, scratch) }?;
+    grid.validate(scratch).map_err(status_of)
+}
+
+/// Bytes to write that lie in neither blob nor mesh.
+///
+/// # Safety
+/// That of [`grid`].
+unsafe fn bytes_beside(grid: &Grid<'_>, to: Region) -> Result<&'static mut [u8], hgrid_status> {
     let mesh = grid.mesh();
     let [positions, triangles, masks] =
         [mesh.positions(), mesh.triangles(), mesh.masks()].map(|array| array.bytes);
@@ -336,8 +356,7 @@ pub(crate) unsafe fn pack(grid: &Grid<'_>, to: Region) -> Result<(), hgrid_statu
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads lies there.
-    let to = unsafe { bytes_mut(to.start, to.bytes) }?;
-    grid.pack(to).map(|_| ()).map_err(status_of)
+    unsafe { bytes_mut(to.start, to.bytes) }
 }
 
 /// The grid of a view.

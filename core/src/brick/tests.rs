@@ -224,7 +224,7 @@ fn rays_find_what_a_hashed_grid_finds() {
         let (hashed, brick) = (open(&hashed), open(&brick));
         let hashed = Grid::open(Memory::bytes(&hashed), mesh).unwrap();
         let brick = Grid::open(Memory::bytes(&brick), mesh).unwrap();
-        brick.validate().unwrap();
+        brick.validate(&mut []).unwrap();
         let (mut hits, mut rays) = (0, 0);
         for at in positions.iter().step_by(3 * (triangles / 6000).max(1) as usize) {
             rays += 1;

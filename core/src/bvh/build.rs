@@ -11,6 +11,9 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, top nodes) | bench |
 //! ```
 //!
+//! The exact size takes a build without an index: keys lie on the bench, ids and nodes are counted. Keys lie
+//! there, too, if the index has no room for them: it holds no ids of skipped triangles.
+//!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
 //! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up
 //! side by side in the order of the bins.
@@ -25,14 +28,15 @@ use core::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::Simd;
 
-use super::census::{Census, count, share};
+use super::census::{Census, count, share, take};
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
-    CROWD, Entry, MOST_TRIANGLES, MOST_UNIT, bin_bits, index_bytes, most_below, most_nodes,
-    scratch_bytes, small_bench,
+    CROWD, Entry, MOST_TRIANGLES, bin_bits, index_bytes, most_below, most_nodes, scratch_bytes,
+    small_bench,
 };
 use super::node::Node;
-use super::roots::{RECORD, Record, Roots, Side};
+use super::roots::{RECORD, Record, Roots, Side, copy};
+use super::subtree::Subtree;
 use super::top::{self, ITEM, Item};
 use super::units::{Units, starts};
 use crate::aabb::Aabb;
@@ -54,7 +58,7 @@ pub(crate) const fn bound(triangles: u32, tasks: u32) -> (u64, u64) {
     (index_bytes(triangles, most_nodes(triangles)), scratch_bytes(triangles, tasks, triangles))
 }
 
-/// The memory that a mesh needs: exact if one task can build in the scratch, with room for the ids.
+/// The memory that a mesh needs: exact for one task if the scratch is large enough for any mesh.
 pub(crate) fn sizes(
     mesh: &TriangleMesh<'_>,
     config: &Config,
@@ -63,18 +67,10 @@ pub(crate) fn sizes(
 ) -> Result<Sizes, Error> {
     check_count(mesh)?;
     let (index, needed) = bound(mesh.triangle_count(), control.tasks.clamp(1, Control::MAX_TASKS));
-    let ids = usize::try_from(index_bytes(mesh.triangle_count().into(), 0)).ok();
-    let both = ids.and_then(|ids| scratch.split_at_mut_checked(ids));
-    if let Some((ids, scratch)) = both.filter(|_| control.tasks <= 1) {
-        // Nodes are counted, and there is no room for them.
-        match build_in::<1>(mesh, config, ids, scratch, &Control::SERIAL, &Watch::none()) {
-            Err(Error::OutOfMemory { region: Region::Index, needed_bytes, .. }) => {
-                return Sizes::new(needed_bytes, needed, true);
-            }
-            Ok(header) => return Sizes::new(header.blob_bytes, needed, true),
-            Err(Error::OutOfMemory { .. }) => {}
-            Err(error) => return Err(error),
-        }
+    if control.tasks <= 1 && scratch.len() as u64 >= needed {
+        let watch = &Watch::none();
+        let header = build_in::<1>(mesh, config, None, scratch, &Control::SERIAL, watch)?;
+        return Sizes::new(header.blob_bytes, needed, true);
     }
     Sizes::new(index, needed, false)
 }
@@ -95,9 +91,10 @@ pub(crate) fn build<'a>(
     check_count(mesh)?;
     // Room on the stack for as many tasks as there may be, or for one.
     let header = if control.tasks > 1 {
-        build_in::<{ Control::MAX_TASKS as usize }>(mesh, config, index, scratch, control, watch)
+        const MOST: usize = Control::MAX_TASKS as usize;
+        build_in::<MOST>(mesh, config, Some(&mut *index), scratch, control, watch)
     } else {
-        build_in::<1>(mesh, config, index, scratch, control, watch)
+        build_in::<1>(mesh, config, Some(&mut *index), scratch, control, watch)
     }?;
     let available_bytes = index.len() as u64;
     let needed_bytes = header.blob_bytes;
@@ -116,62 +113,73 @@ const SCATTER: f32 = 0.15;
 const ROOTS: f32 = 0.25;
 const TOP: f32 = 0.8;
 
+/// Builds all but the header, which it returns; without an index it only finds out how large that is.
 #[inline(never)]
 fn build_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
     config: &Config,
-    index: &mut [u8],
+    mut index: Option<&mut [u8]>,
     scratch: &mut [u8],
     control: &Control<'_>,
     watch: &Watch<'_>,
 ) -> Result<Header, Error> {
     let triangles = mesh.triangle_count();
     let all = u64::from(triangles);
-    let index_available = index.len() as u64;
+    let index_available = index.as_ref().map_or(0, |index| index.len()) as u64;
     let index_error = |needed_bytes: u64| Error::OutOfMemory {
         region: Region::Index,
         needed_bytes,
         available_bytes: index_available,
     };
-    let scratch_available = scratch.len() as u64;
-    let scratch_error = |needed_bytes: u64| Error::OutOfMemory {
-        region: Region::Scratch,
-        needed_bytes,
-        available_bytes: scratch_available,
-    };
+    let available_bytes = scratch.len() as u64;
+    // Whether bins are crowded is not known yet.
+    let needed_bytes = scratch_bytes(all, 1, all);
+    let scratch_error =
+        Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
 
     // Fewer tasks where there is no memory for more.
     let mut tasks = task_count::<N>(control, triangles as usize / LEAST_TASK);
-    let fits = |tasks: u32| {
-        let bench = small_bench(all, tasks.into());
-        scratch_available >= scratch_bytes(all, tasks.into(), bench)
-            && (tasks == 1 || index_available >= bound(triangles, tasks).0)
+    let fits = |tasks: u32| match tasks {
+        1 => available_bytes >= scratch_bytes(all, 1, small_bench(all)),
+        _ => {
+            available_bytes >= scratch_bytes(all, tasks.into(), all)
+                && index_available >= bound(triangles, tasks).0
+        }
     };
     while tasks > 1 && !fits(tasks) {
         tasks /= 2;
     }
     if !fits(tasks) {
-        return Err(scratch_error(scratch_bytes(all, 1, small_bench(all, 1))));
+        return Err(scratch_error);
     }
 
     // Cut the scratch, and the ids out of the index.
     let bits = bin_bits(all);
     let bins = 1_usize << bits;
-    let too_small = scratch_error(scratch_bytes(all, tasks.into(), small_bench(all, tasks.into())));
     let mut rest = scratch;
     let mut counts = [const { None }; N];
     for slot in counts.iter_mut().take(tasks as usize) {
-        let (section, behind) = split_mut::<u32>(rest, bins as u64).ok_or(too_small)?;
+        let (section, behind) = split_mut::<u32>(rest, bins as u64).ok_or(scratch_error)?;
         section.fill(0);
         *slot = Some(section);
         rest = behind;
     }
-    let (sizes, rest) = split_mut::<u32>(rest, bins as u64).ok_or(too_small)?;
-    let (entries, bench) = split_mut::<Entry>(rest, all).ok_or(too_small)?;
+    let (sizes, rest) = split_mut::<u32>(rest, bins as u64).ok_or(scratch_error)?;
+    let (entries, bench) = split_mut::<Entry>(rest, all).ok_or(scratch_error)?;
     let bench = whole::<Entry>(bench);
-    let behind = index.get_mut(HEADER_BYTES..);
-    let keys = behind.and_then(|behind| Some(split_mut::<u32>(behind, all)?.0));
-    let keys = keys.ok_or(index_error(index_bytes(all, 1)))?;
+    let has_whole_bench = bench.len() as u64 >= all;
+    let behind = index.as_mut().and_then(|index| {
+        // No header in front of what is not its tree, should the build end early.
+        index.first_chunk_mut::<HEADER_BYTES>()?.fill(0);
+        index.get_mut(HEADER_BYTES..)
+    });
+    let keys = if let Some((keys, _)) = behind.and_then(|behind| split_mut::<u32>(behind, all)) {
+        keys
+    } else {
+        // There are fewer ids than keys if triangles are skipped.
+        let keys = bytemuck::cast_slice_mut(bench).get_mut(..triangles as usize);
+        keys.filter(|_| has_whole_bench).ok_or(index_error(bound(triangles, 1).0))?
+    };
 
     // Find the box, then every triangle's key.
     watch.at(CENSUS)?;
@@ -185,8 +193,8 @@ fn build_in<const N: usize>(
         *size = counts.iter().flatten().filter_map(|counts| counts.get(bin)).sum();
     }
     let is_crowded = sizes.iter().any(|&size| size as usize > CROWD);
-    if is_crowded && (bench.len() as u64) < all {
-        return Err(scratch_error(scratch_bytes(all, tasks.into(), all)));
+    if is_crowded && !has_whole_bench {
+        return Err(scratch_error);
     }
     place_tasks(sizes, &mut counts);
     let entries = entries.get_mut(..finite as usize).unwrap_or_default();
@@ -195,31 +203,34 @@ fn build_in<const N: usize>(
     // Cut bins into subtrees.
     watch.at(ROOTS)?;
     let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
-    let behind = index.get_mut(HEADER_BYTES..).and_then(|b| b.split_at_mut_checked(ids_bytes));
-    let (ids, nodes) = behind.ok_or(index_error(index_bytes(finite.into(), 1)))?;
+    let behind = index.as_mut().and_then(|index| index.get_mut(HEADER_BYTES..));
+    let parts = behind.and_then(|behind| behind.split_at_mut_checked(ids_bytes));
+    let (ids, nodes) = parts.unwrap_or_default();
     let (ids, _) = split_mut::<u32>(ids, finite.into()).unwrap_or_default();
     let nodes = whole::<Node>(nodes);
-    let bench = if is_crowded { Bench::Whole(bench) } else { Bench::Small(bench) };
+    let scene = Lattice::pad(&bounds);
     let work = Work {
         mesh,
-        least: bounds.size().max_element() * LEAST_NODE,
+        least: scene.size().max_element() * LEAST_NODE,
         sizes,
         shift: KEY_BITS - bits,
     };
-    let made = work.roots::<N>(entries, bench, ids, nodes, tasks, control)?;
+    let made = work.roots::<N>(entries, bench, ids, nodes, &mut counts, control)?;
 
     // Build the tree on top of them.
     watch.at(TOP)?;
     let (node_count, levels) = work.top(entries, nodes, &made);
     let needed_bytes = index_bytes(finite.into(), node_count.into());
-    if nodes.len() < node_count as usize {
-        return Err(index_error(needed_bytes));
+    if let Some(index) = index {
+        if needed_bytes > index_available {
+            return Err(index_error(needed_bytes));
+        }
+        let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
+        if let Some(padding) = index.get_mut(used..needed_bytes as usize) {
+            padding.fill(0);
+        }
     }
-    let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
-    if let Some(padding) = index.get_mut(used..needed_bytes as usize) {
-        padding.fill(0);
-    }
-    let lattice = Lattice::new(Lattice::pad(&bounds), [1; 3]);
+    let lattice = Lattice::new(scene, [1; 3]);
     let mut header = Header::new(config, mesh, &lattice);
     header.skipped_count = skipped;
     header.reference_count = finite;
@@ -234,7 +245,7 @@ const LEAST_TASK: usize = 16_384;
 
 /// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
 /// axis has an inverse direction that is finite ([`slab`](super::slab)).
-const LEAST_NODE: f32 = 254.0 / (1_u64 << 60) as f32;
+const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
 
 /// The whole elements of some bytes.
 fn whole<T: Pod>(bytes: &mut [u8]) -> &mut [T] {
@@ -305,14 +316,6 @@ fn scatter<const N: usize>(
     Ok(())
 }
 
-/// Where bins are sorted.
-enum Bench<'w> {
-    /// Room for all entries, each where its entry is.
-    Whole(&'w mut [Entry]),
-    /// Room for the largest bin of each task.
-    Small(&'w mut [Entry]),
-}
-
 /// What the steps on top of the bins know.
 struct Work<'w> {
     mesh: &'w TriangleMesh<'w>,
@@ -334,6 +337,7 @@ struct Task<'w> {
     nodes: &'w mut [Node],
     /// Where the nodes lie.
     child: u32,
+    counts: &'w mut [u32],
 }
 
 /// How many nodes and roots a task made, and of which entries.
@@ -350,10 +354,12 @@ impl Kernel for Task<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> Self::Output {
-        let Self { work, range, entries, bench, ids, nodes, child } = self;
+        let Self { work, range, entries, bench, ids, nodes, child, counts } = self;
         let Work { mesh, least, sizes, shift } = *work;
         let first = range.start as u32;
-        let mut roots = Roots::new(mesh, least, entries, bench, ids, first, nodes, child);
+        let subtree = &mut Subtree::new();
+        let mut roots =
+            Roots::new(mesh, least, entries, bench, ids, first, nodes, child, counts, subtree);
         let units = Units::new(sizes).skip_while(|unit| unit.start < range.start);
         for unit in units.take_while(|unit| unit.start < range.end) {
             roots.unit(unit.start - range.start..unit.end - range.start, Side::Entries, shift, 0);
@@ -364,42 +370,39 @@ impl Kernel for Task<'_> {
 }
 
 impl Work<'_> {
-    /// Makes the subtrees and their records.
-    #[expect(clippy::too_many_arguments, reason = "each is its own")]
+    /// Makes the subtrees and their records. The bench of a single task may be smaller than its entries.
     fn roots<const N: usize>(
         &self,
         entries: &mut [Entry],
-        bench: Bench<'_>,
+        bench: &mut [Entry],
         ids: &mut [u32],
         nodes: &mut [Node],
-        tasks: u32,
+        counts: &mut [Option<&mut [u32]>; N],
         control: &Control<'_>,
     ) -> Result<All, Error> {
-        let finite = entries.len();
+        let tasks = counts.iter().flatten().count();
         let mut ends = [0; N];
-        self.cut(&mut ends, tasks as usize, finite);
+        self.cut(&mut ends, tasks, entries.len());
         // The root of all comes first.
         let (mut rest_of_nodes, mut child) = (nodes.get_mut(1..).unwrap_or_default(), 1);
-        let (mut rest, mut ids) = (&mut *entries, ids);
-        let (mut bench, is_whole) = match bench {
-            Bench::Whole(bench) => (bench, true),
-            Bench::Small(bench) => (bench, false),
-        };
+        let (mut rest, mut bench, mut ids) = (&mut *entries, bench, ids);
         let mut start = 0;
-        let parts = ends.into_iter().take(tasks as usize).enumerate().map(|(task, end)| {
-            let count = end - start;
-            let entries = take(&mut rest, count);
-            let ids = take(&mut ids, count);
-            let is_last = task + 1 == tasks as usize;
-            let room =
-                if is_last { rest_of_nodes.len() } else { most_below(count as u64) as usize };
-            let nodes = take(&mut rest_of_nodes, room);
-            let bench = take(&mut bench, if is_whole { count } else { MOST_UNIT.min(finite) });
-            let part = Task { work: self, range: start..end, entries, bench, ids, nodes, child };
-            start = end;
-            child += room as u32;
-            part
-        });
+        let parts =
+            counts.iter_mut().flatten().zip(ends).enumerate().map(|(task, (counts, end))| {
+                let (count, is_last) = (end - start, task + 1 == tasks);
+                let entries = take(&mut rest, count);
+                let ids = take(&mut ids, count);
+                let room =
+                    if is_last { rest_of_nodes.len() } else { most_below(count as u64) as usize };
+                let nodes = take(&mut rest_of_nodes, room);
+                let room_to_sort = if is_last { bench.len() } else { count };
+                let bench = take(&mut bench, room_to_sort);
+                let range = start..end;
+                let part = Task { work: self, range, entries, bench, ids, nodes, child, counts };
+                start = end;
+                child += room as u32;
+                part
+            });
         let level = SimdLevel::detect();
         let made = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
 
@@ -412,7 +415,7 @@ impl Work<'_> {
                 for node in nodes.get_mut(from.clone()).unwrap_or_default() {
                     node.child -= moved;
                 }
-                nodes.copy_within(from, all.nodes as usize);
+                move_down(nodes, from, all.nodes as usize);
             }
             let to = all.roots as usize * RECORD;
             let from = made.first as usize;
@@ -423,14 +426,12 @@ impl Work<'_> {
                 // Its few entries may have had no room for it.
                 all.last = last;
                 all.last.node.child -= moved;
-                if let Some(record) = entries.get_mut(to..to + RECORD) {
-                    record.copy_from_slice(bytemuck::cast_slice(&[all.last]));
-                }
+                all.last.write(entries.get_mut(to..));
             } else if let Some(of_task) = entries.get_mut(records.clone()) {
-                for record in bytemuck::cast_slice_mut::<_, Record>(of_task) {
+                for record in whole::<Record>(bytemuck::cast_slice_mut(of_task)) {
                     record.node.child -= moved;
                 }
-                entries.copy_within(records, to);
+                move_down(entries, records, to);
             }
         }
         Ok(all)
@@ -463,8 +464,8 @@ impl Work<'_> {
         let roots = all.roots as usize;
         let made = entries.split_at_mut_checked(roots * RECORD).and_then(|(records, rest)| {
             let (items, rest) = rest.split_at_mut_checked(roots * ITEM)?;
-            let items = bytemuck::cast_slice_mut::<_, Item>(items);
-            let records: &[Record] = bytemuck::cast_slice(records);
+            let items = whole::<Item>(bytemuck::cast_slice_mut(items));
+            let records = &*whole::<Record>(bytemuck::cast_slice_mut(records));
             for (at, (item, record)) in (0..).zip(items.iter_mut().zip(records)) {
                 let Record { min, max, count, .. } = *record;
                 *item = Item { min, max, count, record: at };
@@ -478,9 +479,7 @@ impl Work<'_> {
         let Some((count, levels, top)) = made else { return (all.nodes, 0) };
         let below = all.nodes as usize;
         let behind = top.get(1..count as usize).unwrap_or_default();
-        if let Some(nodes) = nodes.get_mut(below..below + behind.len()) {
-            nodes.copy_from_slice(behind);
-        }
+        copy(behind, nodes.get_mut(below..));
         if let (Some(to), Some(root)) = (nodes.first_mut(), top.first()) {
             *to = *root;
         }
@@ -497,10 +496,12 @@ struct All {
     last: Record,
 }
 
-/// Takes the first elements of a slice, or all there are.
-fn take<'w, T>(rest: &mut &'w mut [T], count: usize) -> &'w mut [T] {
-    let count = count.min(rest.len());
-    let (first, behind) = core::mem::take(rest).split_at_mut(count);
-    *rest = behind;
-    first
+/// Moves elements to an earlier place.
+fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
+    for (at, to) in from.zip(to..) {
+        let Some(&element) = elements.get(at) else { return };
+        if let Some(slot) = elements.get_mut(to) {
+            *slot = element;
+        }
+    }
 }

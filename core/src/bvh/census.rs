@@ -40,7 +40,6 @@ struct Part<'w> {
 }
 
 /// Fills in the keys of all triangles, and the counts of each task.
-#[expect(clippy::too_many_arguments, reason = "each is its own")]
 pub(crate) fn count<const N: usize>(
     mesh: &TriangleMesh<'_>,
     flags: BuildFlags,
@@ -56,8 +55,7 @@ pub(crate) fn count<const N: usize>(
     let mut first = 0;
     let parts = counts.iter_mut().flatten().enumerate().map(|(task, counts)| {
         let end = share(triangles, task + 1, tasks);
-        let (keys, behind) = core::mem::take(&mut rest).split_at_mut(end - first);
-        rest = behind;
+        let keys = take(&mut rest, end.saturating_sub(first));
         let start = first;
         first = end;
         #[expect(clippy::cast_possible_truncation, reason = "numbers of triangles")]
@@ -78,8 +76,22 @@ pub(crate) fn count<const N: usize>(
 }
 
 /// Where the first of so many tasks end that share a number of things.
+#[expect(clippy::cast_possible_truncation, reason = "no more than there are things")]
 pub(crate) const fn share(things: usize, task: usize, tasks: usize) -> usize {
-    (things as u64 * task as u64 / tasks as u64) as usize
+    let all = things as u64 * task as u64;
+    match all.checked_div(tasks as u64) {
+        Some(share) => share as usize,
+        None => 0,
+    }
+}
+
+/// Takes the first elements of a slice, or all there are.
+#[expect(clippy::mut_mut, reason = "the slice becomes the rest of itself")]
+pub(crate) fn take<'w, T>(rest: &mut &'w mut [T], count: usize) -> &'w mut [T] {
+    let count = count.min(rest.len());
+    let (first, behind) = core::mem::take(rest).split_at_mut(count);
+    *rest = behind;
+    first
 }
 
 impl Kernel for Part<'_> {

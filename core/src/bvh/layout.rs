@@ -14,8 +14,9 @@
 //!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`.
 //! - A root of [`LEAST_ROOT`] triangles or more has no more than [`SHARE`] nodes a triangle, with its part of
 //!   those above: one that would have more is built again by halving its entries ([`most_of_root`]).
-//! - A root may be smaller than that in each division of a crowded bin, which has more than [`CROWD`]
-//!   triangles; at most [`DIVISIONS`] of them lie inside one another.
+//! - A root may be smaller than that behind the crowded bins of the tree, and behind those of each division of a
+//!   crowded bin. A crowded bin has more than [`CROWD`] triangles, and at most [`DIVISIONS`] of them that are
+//!   divided lie inside one another.
 //!
 //! A bin has one count a task and one for all, and there is at most one bin for sixteen triangles. A bin is
 //! sorted on the bench; only bins of more than [`CROWD`] entries need more of it than that.
@@ -70,7 +71,7 @@ pub(crate) const fn bin_bits(triangles: u64) -> u32 {
 
 /// Roots with fewer triangles than others, at most.
 const fn small_roots(triangles: u64) -> u64 {
-    (DIVISIONS as u64 + 1) * (triangles / CROWD as u64) + 1
+    DIVISIONS as u64 * (triangles / (CROWD as u64 + 1)) + 1
 }
 
 /// The most nodes below the roots that hold so many triangles.
@@ -101,8 +102,7 @@ pub(crate) const fn scratch_bytes(triangles: u64, tasks: u64, bench: u64) -> u64
         + section_bytes::<Entry>(bench)
 }
 
-/// Entries on the benches of so many tasks, as long as no bin is crowded.
-pub(crate) const fn small_bench(triangles: u64, tasks: u64) -> u64 {
-    let all = tasks * MOST_UNIT as u64;
-    if all < triangles { all } else { triangles }
+/// Entries on the bench of a single task, as long as no bin is crowded.
+pub(crate) const fn small_bench(triangles: u64) -> u64 {
+    if (MOST_UNIT as u64) < triangles { MOST_UNIT as u64 } else { triangles }
 }

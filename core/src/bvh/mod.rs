@@ -40,6 +40,7 @@ use crate::error::Error;
 use crate::visit::Visitor;
 pub(crate) use batch::Groups;
 pub(crate) use build::{bound, build, sizes};
+pub(crate) use layout::MOST_TRIANGLES;
 use node::{LEAF, Node};
 pub(crate) use slab::Slab;
 pub(crate) use validate::proof_bytes;
@@ -94,7 +95,7 @@ impl<'a> Bvh<'a> {
     #[inline(always)]
     fn leaf(&self, first: u32, count: u32) -> &'a [u32] {
         let start = first as usize;
-        let end = start.saturating_add(count.min(LEAF as u32) as usize);
+        let end = start.saturating_add((count as usize).min(LEAF));
         self.ids.get(start..end).unwrap_or_default()
     }
 

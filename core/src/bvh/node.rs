@@ -172,6 +172,7 @@ impl Node {
 
     /// Writes the box of child `slot`, which lies in the box that the frame was set for.
     #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "the low byte")]
     fn set_box(&mut self, slot: usize, bounds: &Aabb) {
         let inverse = Vec3A::from_array(self.exponents().map(inverse_step));
         let origin = Vec3A::from_array(self.origin());
@@ -201,7 +202,6 @@ const LEAST_STEPS: f32 = 254.0 / 2_097_152.0;
 const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 
 /// The exponent bits of the smallest power of two of which 254 make up an extent.
-#[expect(clippy::cast_possible_truncation, reason = "eight bits of exponent")]
 fn exponent_for(extent: f32) -> u8 {
     let least = extent * (1.0 / 254.0);
     let exponent = (least.to_bits() >> 23) & 0xff;

@@ -50,6 +50,22 @@ pub(crate) const RECORD: usize = size_of::<Record>() / size_of::<Entry>();
 
 const _: () = assert!(size_of::<Record>() == 112 && 2 * RECORD <= LEAST_ROOT);
 
+impl Record {
+    /// Writes it to the start of some entries, if it has room there.
+    pub(crate) fn write(&self, entries: Option<&mut [Entry]>) {
+        if let Some(slot) = entries.and_then(|entries| entries.first_chunk_mut::<RECORD>()) {
+            *slot = bytemuck::cast(*self);
+        }
+    }
+}
+
+/// Copies elements to the start of others, as many as have room there.
+pub(crate) fn copy<T: Copy>(from: &[T], to: Option<&mut [T]>) {
+    for (slot, element) in to.into_iter().flatten().zip(from) {
+        *slot = *element;
+    }
+}
+
 /// The roots of a range of units.
 pub(crate) struct Roots<'w> {
     pub(crate) mesh: &'w TriangleMesh<'w>,
@@ -59,7 +75,7 @@ pub(crate) struct Roots<'w> {
     pub(crate) entries: &'w mut [Entry],
     /// Room for as many, or only for the largest bin.
     pub(crate) bench: &'w mut [Entry],
-    /// The ids, each where an entry was.
+    /// The ids, each where an entry was; nothing if nobody wants them.
     pub(crate) ids: &'w mut [u32],
     /// Where the ids lie in the index.
     pub(crate) first: u32,
@@ -67,7 +83,9 @@ pub(crate) struct Roots<'w> {
     pub(crate) nodes: &'w mut [Node],
     /// Where the nodes lie in the index.
     pub(crate) child: u32,
-    subtree: Subtree,
+    /// One for each bin of the tree, so no fewer than any division of it has bins.
+    counts: &'w mut [u32],
+    subtree: &'w mut Subtree,
     /// Nodes so far, whether or not there was room for them.
     pub(crate) node_count: u32,
     pub(crate) root_count: u32,
@@ -93,8 +111,10 @@ impl<'w> Roots<'w> {
         first: u32,
         nodes: &'w mut [Node],
         child: u32,
+        counts: &'w mut [u32],
+        subtree: &'w mut Subtree,
     ) -> Self {
-        let (subtree, last) = (Subtree::new(), Record::zeroed());
+        let last = Record::zeroed();
         let (node_count, root_count) = (0, 0);
         Self {
             mesh,
@@ -105,6 +125,7 @@ impl<'w> Roots<'w> {
             first,
             nodes,
             child,
+            counts,
             subtree,
             node_count,
             root_count,
@@ -160,10 +181,10 @@ impl<'w> Roots<'w> {
         let middle = if differing == 0 {
             entries.len() / 2
         } else {
-            let bit = 1 << (31 - differing.leading_zeros());
+            let bit = 1 << differing.ilog2();
             entries.partition_point(|entry| entry[0] & bit == 0)
         };
-        middle.clamp(LEAST_ROOT, entries.len() - LEAST_ROOT)
+        middle.min(entries.len().saturating_sub(LEAST_ROOT)).max(LEAST_ROOT)
     }
 
     /// Makes the subtree of a few entries, and leaves a record of it.
@@ -175,28 +196,24 @@ impl<'w> Roots<'w> {
             Side::Entries => self.entries.get(range.clone()),
             Side::Bench => self.bench.get(range.clone()),
         };
-        let (Some(entries), Some(ids)) = (entries, self.ids.get_mut(range)) else { return };
+        let Some(entries) = entries else { return };
         let places = [first, child];
-        self.subtree.build(self.mesh, entries, ids, places, self.least, Cut::Keys);
+        self.subtree.build(self.mesh, entries, places, self.least, Cut::Keys);
         let is_costly = self.subtree.below().len() > most_of_root(entries.len());
         if is_costly && entries.len() >= LEAST_ROOT {
-            self.subtree.build(self.mesh, entries, ids, places, self.least, Cut::Halves);
+            self.subtree.build(self.mesh, entries, places, self.least, Cut::Halves);
         }
+        copy(self.subtree.ids(), self.ids.get_mut(range));
 
         let below = self.subtree.below();
-        let start = self.node_count as usize;
-        if let Some(nodes) = self.nodes.get_mut(start..start + below.len()) {
-            nodes.copy_from_slice(below);
-        }
+        copy(below, self.nodes.get_mut(self.node_count as usize..));
         self.node_count += below.len() as u32;
         let (node, bounds) = self.subtree.root();
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         let levels = self.subtree.levels();
         let record = Record { node: *node, min, max, count, levels };
         let start = self.root_count as usize * RECORD;
-        if let Some(slot) = self.entries.get_mut(start..start + RECORD) {
-            slot.copy_from_slice(bytemuck::cast_slice(&[record]));
-        }
+        record.write(self.entries.get_mut(start..));
         self.last = record;
         self.root_count += 1;
     }
@@ -218,8 +235,7 @@ impl<'w> Roots<'w> {
                 Side::Entries,
             ),
         };
-        // Where ids will be there is room for one count for each of at least sixteen entries.
-        let counts = self.ids.get_mut(range.clone()).and_then(|ids| ids.get_mut(..1 << bits));
+        let counts = self.counts.get_mut(..1 << bits);
         let (Some(from), Some(to), Some(counts)) = (from, to, counts) else { return };
         counts.fill(0);
         for entry in &mut *from {

@@ -26,7 +26,7 @@ use crate::filter::RayFilter;
 use crate::ray::{Ray, round};
 
 /// The inverse of a direction that is zero, or as good as zero.
-pub(crate) const STEEP: f32 = (1_u128 << 75) as f32;
+pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0; // 2^75
 
 /// What errors are relative to: 1 + 2^-20.
 pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
@@ -136,9 +136,9 @@ impl Slab {
         slab
     }
 
-    /// A distance no farther than a `t`.
+    /// A distance no farther than a `t` and all that rounds to it.
     fn earliest(&self, t: f32) -> f32 {
-        let distance = round((f64::from(t) - self.t) * self.scale);
+        let distance = round((f64::from(t.next_down()) - self.t) * self.scale);
         (distance - distance.abs() * (WIDER - 1.0)) - TINY
     }
 

@@ -28,7 +28,6 @@ pub(crate) fn sort(entries: &mut [Entry], bench: &mut [Entry], bits: u32) {
 }
 
 /// Moves entries to another place, in the order of some bits of their keys.
-#[expect(clippy::cast_possible_truncation, reason = "a bin has no more than CROWD entries")]
 fn pass(from: &[Entry], to: &mut [Entry], shift: u32, width: u32) {
     let mut heads = [0_u16; COUNTS];
     let mask = (1 << width) - 1;
@@ -54,7 +53,7 @@ fn insert(entries: &mut [Entry]) {
     for at in 1..entries.len() {
         let mut hole = at;
         while let Some([before, entry]) =
-            hole.checked_sub(1).and_then(|b| entries.get_mut(b..=hole)?.as_mut_array::<2>())
+            hole.checked_sub(1).and_then(|b| entries.get_mut(b..=hole)?.first_chunk_mut::<2>())
         {
             if before[0] <= entry[0] {
                 break;

@@ -28,6 +28,9 @@ pub(crate) struct Subtree {
     /// Levels above each node.
     above: [u8; MOST_NODES],
     count: usize,
+    /// The ids of the leaves, one leaf behind the other.
+    ids: [u32; MOST_ROOT],
+    id_count: usize,
 }
 
 /// How ranges are cut.
@@ -78,6 +81,8 @@ impl Subtree {
             boxes: [Aabb::EMPTY; MOST_NODES],
             above: [0; MOST_NODES],
             count: 0,
+            ids: [0; MOST_ROOT],
+            id_count: 0,
         }
     }
 
@@ -97,31 +102,32 @@ impl Subtree {
         self.nodes.get(1..self.count).unwrap_or_default()
     }
 
-    /// Makes the nodes over some entries, no more than [`MOST_ROOT`], and writes their ids. The ids
+    /// The ids of all leaves, in their order in the index.
+    pub(crate) fn ids(&self) -> &[u32] {
+        self.ids.get(..self.id_count).unwrap_or_default()
+    }
+
+    /// Makes the nodes over some entries, no more than [`MOST_ROOT`]. Their ids
     /// lie in the index from `first` on, the nodes below the root from `child` on. No step of a node is
     /// smaller than that of a box of size `least`.
     pub(crate) fn build(
         &mut self,
         mesh: &TriangleMesh<'_>,
         entries: &[Entry],
-        ids: &mut [u32],
         [first, child]: [u32; 2],
         least: f32,
         by: Cut,
     ) {
-        self.nodes[0] = Node::EMPTY;
         self.ranges[0] = Part::new(entries, 0, entries.len().min(MOST_ROOT) as u8, by);
-        self.count = 1;
-        let (mut at, mut written) = (0, 0);
+        (self.count, self.id_count) = (1, 0);
+        let mut at = 0;
         while at < self.count {
-            let count = self.cut(at, entries, ids.get_mut(written..).unwrap_or_default(), by);
-            self.nodes[at].first = written as u32;
-            written += count;
+            self.cut(at, entries, by);
             at += 1;
         }
         // Quantise, children before parents.
         for at in (0..self.count).rev() {
-            self.quantise(at, mesh, ids, least);
+            self.quantise(at, mesh, least);
         }
         // Name ids and nodes by where they lie in the index.
         for node in self.nodes.iter_mut().take(self.count) {
@@ -131,35 +137,40 @@ impl Subtree {
     }
 
     /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for
-    /// each other; returns how many ids.
-    fn cut(&mut self, at: usize, entries: &[Entry], ids: &mut [u32], by: Cut) -> usize {
-        let parts = parts(self.ranges[at], entries, by);
-        let mut node = Node { child: self.count as u32, ..Node::EMPTY };
-        let mut written = 0;
+    /// each other.
+    fn cut(&mut self, at: usize, entries: &[Entry], by: Cut) {
+        let (Some(&range), Some(&above)) = (self.ranges.get(at), self.above.get(at)) else {
+            return;
+        };
+        let parts = parts(range, entries, by);
+        let (child, first) = (self.count as u32, self.id_count as u32);
+        let mut node = Node { child, first, ..Node::EMPTY };
         for (slot, part) in parts.iter().enumerate().take_while(|(_, part)| part.count() > 0) {
-            if part.count() > LEAF && self.count < MOST_NODES {
+            let places = (self.ranges.get_mut(self.count), self.above.get_mut(self.count));
+            if part.count() > LEAF
+                && let (Some(range_of), Some(above_of)) = places
+            {
+                (*range_of, *above_of) = (*part, above + 1);
                 node.set_inner(slot);
-                self.nodes[self.count] = Node::EMPTY;
-                self.ranges[self.count] = *part;
-                self.above[self.count] = self.above[at] + 1;
                 self.count += 1;
                 continue;
             }
             node.counts[slot] = part.count() as u8;
             let range = entries.get(usize::from(part.start)..usize::from(part.end));
-            let to = ids.get_mut(written..).unwrap_or_default();
+            let to = self.ids.get_mut(self.id_count..).unwrap_or_default();
             for (id, entry) in to.iter_mut().zip(range.unwrap_or_default()) {
                 *id = entry[1];
             }
-            written += part.count();
+            self.id_count += part.count();
         }
-        self.nodes[at] = node;
-        written
+        if let Some(slot) = self.nodes.get_mut(at) {
+            *slot = node;
+        }
     }
 
     /// Finds the boxes of a node's children, and its own.
-    fn quantise(&mut self, at: usize, mesh: &TriangleMesh<'_>, ids: &[u32], least: f32) {
-        let node = &self.nodes[at];
+    fn quantise(&mut self, at: usize, mesh: &TriangleMesh<'_>, least: f32) {
+        let Some(node) = self.nodes.get_mut(at) else { return };
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let mut child = node.child as usize;
         let mut first = node.first as usize;
@@ -170,7 +181,7 @@ impl Subtree {
                 *bounds_of = self.boxes.get(child).copied().unwrap_or(Aabb::EMPTY);
                 child += 1;
             } else if count > 0 {
-                let leaf = ids.get(first..first + count).unwrap_or_default();
+                let leaf = self.ids.get(first..first + count).unwrap_or_default();
                 for &id in leaf {
                     let Some([a, b, c]) = mesh.corners(id) else { continue };
                     bounds_of.min = bounds_of.min.min(a.min(b).min(c));
@@ -182,9 +193,10 @@ impl Subtree {
             }
             bounds = bounds.union(bounds_of);
         }
-        let node = &mut self.nodes[at];
         node.set_boxes(&bounds, &boxes, least);
-        self.boxes[at] = bounds;
+        if let Some(slot) = self.boxes.get_mut(at) {
+            *slot = bounds;
+        }
     }
 }
 
@@ -210,9 +222,15 @@ fn parts(range: Part, entries: &[Entry], by: Cut) -> [Part; WIDTH] {
                 Cut::Keys => split(entries, part),
                 Cut::Halves => (part.end - part.start) / 2,
             };
-        parts.copy_within(widest..count, widest + 1);
-        parts[widest] = Part::new(entries, part.start, middle, by);
-        parts[widest + 1] = Part::new(entries, middle, part.end, by);
+        // The parts behind it make room for its second half.
+        for at in (1..WIDTH).rev().filter(|&at| at > widest) {
+            parts[at] = parts[at - 1];
+        }
+        let halves =
+            [Part::new(entries, part.start, middle, by), Part::new(entries, middle, part.end, by)];
+        for (slot, half) in parts.iter_mut().skip(widest).zip(halves) {
+            *slot = half;
+        }
     }
     parts
 }
@@ -226,7 +244,7 @@ fn split(entries: &[Entry], part: Part) -> u8 {
     if differing == 0 {
         return (part.end - part.start) / 2;
     }
-    let bit = 1 << (31 - differing.leading_zeros());
+    let bit = 1 << differing.ilog2();
     // Where keys are in no order, both sides still get some.
     let middle = range.partition_point(|entry| entry[0] & bit == 0);
     middle.clamp(1, range.len().max(2) - 1) as u8

@@ -122,9 +122,10 @@ pub(crate) fn build(
         let parts = parts(items, Part::new(start, end, bounds, level >= DEEP), level >= DEEP);
         let mut node = Node { child: child + count - 1, ..Node::EMPTY };
         let mut boxes = [Aabb::EMPTY; WIDTH];
-        for (slot, part) in parts.iter().enumerate().filter(|(_, part)| part.end > part.start) {
+        let parts = parts.iter().zip(&mut boxes).enumerate();
+        for (slot, (part, bounds)) in parts.filter(|(_, (part, _))| part.end > part.start) {
             node.set_inner(slot);
-            boxes[slot] = part.bounds;
+            *bounds = part.bounds;
             let below = match items.get(part.start as usize) {
                 Some(item) if part.end - part.start == 1 => {
                     let (node, below) = record(item.record);
@@ -271,7 +272,10 @@ fn partition(items: &mut [Item], is_first: impl Fn(&Item) -> bool) -> usize {
     let mut count = 0;
     for at in 0..items.len() {
         if items.get(at).is_some_and(&is_first) {
-            items.swap(count, at);
+            // Of a place that stays the same there is only one.
+            if let Ok([first, other]) = items.get_disjoint_mut([count, at]) {
+                core::mem::swap(first, other);
+            }
             count += 1;
         }
     }

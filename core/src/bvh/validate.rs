@@ -55,6 +55,9 @@ impl Bvh<'_> {
         if header.resolution != [1; 3] {
             return Err(corrupt(core::mem::offset_of!(Header, resolution)));
         }
+        if header.hash_count != 0 {
+            return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
+        }
         if header.reference_count != survey.finite_count {
             return Err(corrupt(core::mem::offset_of!(Header, reference_count)));
         }
@@ -74,6 +77,9 @@ impl Bvh<'_> {
         let mut ids = 0;
         let start = |node: u32, min, max| Level { node, rest: 0xff, min, max };
         let everywhere = DVec3::INFINITY;
+        if self.nodes.is_empty() {
+            return Err(corrupt(core::mem::offset_of!(Header, node_count)));
+        }
         levels[0] = start(0, -everywhere, everywhere);
         loop {
             let Some(level) = levels.get_mut(depth) else { return Err(node_at(0)) };
@@ -94,6 +100,9 @@ impl Bvh<'_> {
             let (min, max) = (level.min.max(min), level.max.min(max));
             match node.child(slot) {
                 Child::Inner(child) => {
+                    if child as usize >= self.nodes.len() {
+                        return Err(node_at(number));
+                    }
                     depth += 1;
                     deepest = deepest.max(depth + 1);
                     *levels.get_mut(depth).ok_or(node_at(number))? = start(child, min, max);
@@ -126,8 +135,8 @@ impl Bvh<'_> {
     }
 }
 
-/// No step is smaller than this part of the scene: a little less than a build's, whose scene has no pad.
-const LEAST_STEP: f64 = 1.0 / (1_u64 << 61) as f64;
+/// No step is smaller than this part of the scene: half of a build's.
+const LEAST_STEP: f64 = 0.5 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^-61
 
 impl Node {
     /// Whether a build could have written what is not a box: steps that are numbers and not too small, and

@@ -18,7 +18,7 @@ fn fields(seed: &Seed) -> Vec<Case<'static>> {
     let mut cases = vec![
         case("a triangle skipped", SKIPPED_COUNT..SKIPPED_COUNT + 4, |b| add(b, SKIPPED_COUNT, 1)),
         case("unknown method", METHOD..METHOD + 4, |b| b.set_word(METHOD, 0)),
-        case("unknown method", METHOD..METHOD + 4, |b| b.set_word(METHOD, 6)),
+        case("unknown method", METHOD..METHOD + 4, |b| b.set_word(METHOD, 7)),
         case("longer than its sections", 16..24, |b| {
             let longer = Copy::of(&[b.bytes(), &[0; 64]].concat());
             *b = longer;
@@ -50,7 +50,9 @@ fn fields(seed: &Seed) -> Vec<Case<'static>> {
     }
     // What lies behind the last known field, and fields of other methods.
     let unused = RESERVED - 20..RESERVED + 12;
-    for reserved in [0, 4, 8].map(|at| RESERVED + at) {
+    // A tree counts its nodes and their levels there: see bvh.rs.
+    let used = if method == Method::Bvh { 2 } else { 0 };
+    for reserved in [0, 4, 8].map(|at| RESERVED + at).into_iter().skip(used) {
         cases.push(case("a field that nobody knows", unused.clone(), move |b| {
             b.set_word(reserved, 1);
         }));
@@ -60,14 +62,14 @@ fn fields(seed: &Seed) -> Vec<Case<'static>> {
         (SUBDIVIDE_ABOVE, method == Method::Variable),
         (DEPTH, method == Method::Recursive),
         (CELL_SIZE, method == Method::Brick),
-        (DENSITY, method != Method::Brick),
+        (DENSITY, method.has_density()),
     ];
     for (at, _) in of_others.into_iter().filter(|(_, is_used)| !is_used) {
         cases.push(case("a field of another method", unused.clone(), move |b| {
             b.set_word(at, 1.0_f32.to_bits());
         }));
     }
-    if method != Method::Brick {
+    if method.has_density() {
         for density in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             cases.push(case("a density that is none", DENSITY..DENSITY + 4, move |b| {
                 b.set_word(DENSITY, density.to_bits());
@@ -109,7 +111,9 @@ fn what_fills_up_sections_is_zero() {
     for seed in seeds().filter(|seed| !seed.mesh.indices.is_empty()) {
         // The last section ends with what fills it up, if anything
         // does; macrocells fill their words.
-        let words = Copy::of(&seed.blob).word(REFERENCE_COUNT) as usize;
+        let count = |at| Copy::of(&seed.blob).word(at) as usize;
+        let is_tree = seed.config.method == Method::Bvh;
+        let words = if is_tree { 20 * count(RESERVED) } else { count(REFERENCE_COUNT) };
         let is_full = words.is_multiple_of(16) || seed.config.method == Method::Fixed;
         for back in (1..=(16 - words % 16) * 4).take(if is_full { 0 } else { 64 }) {
             let at = seed.blob.len() - back;

@@ -4,6 +4,7 @@
 //! The words are found here from the format's description alone. Those of brick grids are in
 //! tests/edges/chunks.rs.
 
+mod bvh;
 mod hashed;
 mod header;
 mod recursive;
@@ -15,6 +16,7 @@ use std::ops::Range;
 use hgrid_core::{Error, Grid};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::{Seed, ends, fixed_rays};
+use hgrid_tests::owned::prove;
 
 /// What a table says: what is broken, where the error points, and how to break it.
 type Case<'c> = (&'c str, Range<usize>, Box<dyn Fn(&mut Copy) + 'c>);
@@ -34,7 +36,7 @@ fn refused(seed: &Seed, cases: &[Case<'_>]) {
         copy.sign();
         let result = Grid::open(copy.bytes(), view).and_then(|grid| {
             ends(&grid, &fixed_rays(grid.bounds(), 12));
-            grid.validate()
+            prove(&grid)
         });
         let method = seed.config.method;
         let is_there = matches!(result, Err(Error::Corrupt { offset })

@@ -10,15 +10,16 @@ use super::limits;
 use super::rays::close;
 use crate::copy::Copy;
 use crate::oracle;
+use crate::owned::prove;
 
 const COHERENCES: [Coherence; 2] = [Coherence::Coherent, Coherence::Incoherent];
 
 /// Of so many rays everything is asked; of the rest, which are tiles, what tiles answer.
 const ASKED_ALL: usize = 12;
 
-/// The vector levels worth asking for: only brick grids have vectors.
+/// The vector levels worth asking for: only brick grids and trees have vectors.
 fn levels(grid: &Grid<'_>) -> impl Iterator<Item = SimdLevel> {
-    let all = grid.method() == Method::Brick;
+    let all = matches!(grid.method(), Method::Brick | Method::Bvh);
     SimdLevel::available().filter(move |level| all || *level == SimdLevel::detect())
 }
 
@@ -181,7 +182,7 @@ fn packs(grid: &Grid<'_>, rays: &[Ray]) {
     let info = BlobInfo::peek(copy.bytes()).expect("a header");
     assert!(info.has_mesh && info.total_bytes == bytes as u64, "{info:?}");
     let packed = Grid::open_packed(copy.bytes()).expect("what was packed opens");
-    packed.validate().expect("what was packed is valid");
+    prove(&packed).expect("what was packed is valid");
     assert_eq!(packed.inspect(), grid.inspect());
     for ray in rays {
         assert_eq!(packed.intersect(ray), grid.intersect(ray), "{ray:?}");

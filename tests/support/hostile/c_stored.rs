@@ -14,6 +14,7 @@ use super::damage::Edit;
 use super::memory::{Memory, Struct, rarely};
 use crate::copy::Copy;
 use crate::guarded::CANARY;
+use crate::owned::prove;
 
 impl Caller<'_> {
     /// The bytes of the grid's blob, or of none.
@@ -152,9 +153,16 @@ impl Caller<'_> {
     pub(super) fn validate(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         let grid = if rarely(u, 48)? { null() } else { from_ref(&self.grid) };
         // SAFETY: NULL or a view.
-        let status = known(unsafe { hgrid_validate(grid) });
+        let bytes = unsafe { hgrid_validate_bytes(grid) };
+        assert!(
+            bytes <= self.core().map_or(0, |grid| grid.mesh().triangle_count() as usize / 8 + 4)
+        );
+        let mut scratch = vec![0xa5_u8; bytes];
+        let to = if bytes == 0 { null_mut() } else { scratch.as_mut_ptr().cast() };
+        // SAFETY: NULL or a view, and so many bytes to write.
+        let status = known(unsafe { hgrid_validate(grid, to, bytes) });
         let core = self.core().filter(|_| !grid.is_null());
-        let is_valid = core.is_some_and(|grid| grid.validate().is_ok());
+        let is_valid = core.is_some_and(|grid| prove(&grid).is_ok());
         assert_eq!(status == HGRID_OK, is_valid, "{status}");
 
         let statistics = hgrid_statistics {
@@ -204,7 +212,10 @@ impl Caller<'_> {
         assert_eq!(status == HGRID_OK, !grid.is_null(), "{status}");
         if !grid.is_null() {
             // SAFETY: a view that was just made.
-            let status = known(unsafe { hgrid_validate(grid) });
+            let mut scratch = vec![0xa5_u8; unsafe { hgrid_validate_bytes(grid) }];
+            // SAFETY: a view that was just made, and so many bytes to write.
+            let status =
+                known(unsafe { hgrid_validate(grid, scratch.as_mut_ptr().cast(), scratch.len()) });
             assert_eq!(status, HGRID_OK, "what was created is valid");
         }
         // SAFETY: what was just made, or NULL.

@@ -25,10 +25,19 @@ pub fn most(grid: &Grid<'_>) -> Counters {
             let bricks = |cell: u64| 10 * (1 + 10 * (1 + cell));
             sum(grid.resolution().map(|c| c.div_ceil(16))) * (1 + bricks(bricks(bricks(0))))
         }
+        // A node for each node, and eight leaves; one more, and the budget is spent.
+        Method::Bvh => 9 * nodes(grid) + 1,
         method => panic!("nobody has said what {method:?} may cost"),
     };
-    // Lists hold each word once.
-    Counters { primitive_tests: words, cell_steps, grid_steps: cell_steps }
+    // Lists hold each word once, but for leaves of a tree, which have eight ids or fewer.
+    let primitive_tests = if grid.method() == Method::Bvh { 8 * cell_steps } else { words };
+    Counters { primitive_tests, cell_steps, grid_steps: cell_steps }
+}
+
+/// Nodes of a tree, which lie behind the ids.
+fn nodes(grid: &Grid<'_>) -> u64 {
+    let ids = (4 * u64::from(grid.reference_count())).next_multiple_of(64);
+    (grid.blob_bytes() as u64 - 128 - ids) / 80
 }
 
 /// Steps on all levels, if all macrocells were full.

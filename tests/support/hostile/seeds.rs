@@ -7,7 +7,7 @@ use hgrid_core::{Config, Method, Strided};
 use crate::copy::Copy;
 use crate::meshes::{Mesh, ball, soup};
 use crate::methods;
-use crate::owned::Owned;
+use crate::owned::{Owned, prove};
 
 /// A grid as it was built.
 #[derive(Debug)]
@@ -35,7 +35,7 @@ impl Seed {
         let masks: Vec<u32> = (0..).take(mesh.indices.len()).collect();
         let masked = view.with_masks(Strided::new(&masks)).expect("a mask for each triangle");
         let grid = owned.open(&masked).expect("its own mesh");
-        grid.validate().expect("a grid is valid");
+        prove(&grid).expect("a grid is valid");
         let mut packed = Copy::of(&vec![0; usize::try_from(grid.packed_bytes()).expect("small")]);
         grid.pack(packed.bytes_mut()).expect("enough memory");
         let packed = packed.bytes().to_vec();

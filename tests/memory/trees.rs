@@ -1,0 +1,228 @@
+//! Trees: what the number of triangles alone promises, for meshes that come nearest to it.
+
+use std::thread;
+
+use hgrid_core::{Config, Control, Error, Grid, Method, Region, Sizes, Task, TriangleMesh, sizes};
+use hgrid_tests::copy::word;
+use hgrid_tests::guarded::Guarded;
+use hgrid_tests::meshes::{Mesh, soup};
+use hgrid_tests::owned::{Owned, prove};
+
+/// Where the header has the number of nodes, and that of their levels.
+const NODE_COUNT: usize = 112;
+const LEVELS: usize = 116;
+
+fn config() -> Config {
+    Config::new(Method::Bvh)
+}
+
+/// Builds with every size of one region, from 0 to a little more than enough, the other ample.
+///
+/// Ids lie in the index before it is known how many nodes there are, so what an error asks for may be
+/// more than would do. A build without crowded bins takes less scratch than it may ask for.
+pub(crate) fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
+    let expected = Owned::build(mesh, config).unwrap();
+    let exact = expected.bytes().len();
+    let Sizes { scratch_bytes, .. } = sizes(mesh, config, &mut []).unwrap();
+    let bound = Sizes::bound(mesh.triangle_count(), config).unwrap();
+    let build = |index: &mut Guarded, scratch: &mut Guarded| {
+        let result = Grid::build(*mesh, config, index.region(), scratch.region())
+            .map(|grid| assert_eq!(grid.blob(), expected.bytes()));
+        assert!(index.around_is_intact() && scratch.around_is_intact());
+        result
+    };
+    let mut scratch = Guarded::new(scratch_bytes);
+    for bytes in (0..exact + 200).step_by(step).chain([exact - 1, exact, exact + 1]) {
+        let result = build(&mut Guarded::new(bytes), &mut scratch);
+        assert_eq!(result.is_ok(), bytes >= exact, "{bytes} of {exact} bytes");
+        let Err(error) = result else { continue };
+        let Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes } = error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!(available_bytes, bytes as u64);
+        let enough = usize::try_from(needed_bytes).unwrap();
+        assert!((exact..=bound.index_bytes).contains(&enough), "{enough} of {exact} bytes");
+        assert_eq!(build(&mut Guarded::new(enough), &mut scratch), Ok(()), "{bytes} bytes");
+    }
+
+    for bytes in (0..scratch_bytes + 200).step_by(step).chain([scratch_bytes - 1, scratch_bytes]) {
+        let (mut index, mut scratch) = (Guarded::new(exact), Guarded::new(bytes));
+        let answer = sizes(mesh, config, scratch.region()).unwrap();
+        assert!(scratch.around_is_intact());
+        assert_eq!(answer.scratch_bytes, scratch_bytes);
+        assert_eq!(answer.is_exact, bytes >= scratch_bytes);
+        let index_bytes = if answer.is_exact { exact } else { bound.index_bytes };
+        assert_eq!(answer.index_bytes, index_bytes);
+        let Err(error) = build(&mut index, &mut scratch) else { continue };
+        let (needed_bytes, available_bytes) = (scratch_bytes as u64, bytes as u64);
+        let region = Region::Scratch;
+        assert_eq!(error, Error::OutOfMemory { region, needed_bytes, available_bytes });
+        assert!(bytes < scratch_bytes && index.is_untouched(), "{bytes} bytes");
+    }
+}
+
+/// A small triangle around a point: the centre of its box is that point.
+fn around(mesh: &mut Mesh, [x, y, z]: [f32; 3], size: f32) {
+    mesh.push([[x - size, y - size, z], [x + size, y - size, z], [x, y + size, z]]);
+}
+
+/// Boxes of all sizes around one point.
+fn one_centre(count: usize) -> Mesh {
+    let mut mesh = Mesh::default();
+    (0..count).for_each(|i| around(&mut mesh, [0.0; 3], 1.0 + i as f32));
+    mesh
+}
+
+/// Each halving of the space leaves all triangles but one in one half: nodes have seven leaves of one
+/// triangle each, and all roots are as small as they may be.
+fn one_by_one(count: usize) -> Mesh {
+    let mut mesh = Mesh::default();
+    for i in 0..count {
+        // The corner of the scene, then points at powers of two of it along the axes.
+        let mut center = [0.0; 3];
+        if i % 31 > 0 {
+            let step = i % 31 - 1;
+            center[step % 3] = 0.5_f32.powi((step / 3) as i32);
+        }
+        around(&mut mesh, center, 1e-6);
+    }
+    mesh
+}
+
+/// As many triangles in a corner as make a bin crowded, and a triangle far away; all that in a corner
+/// of something larger, and another triangle; so often.
+fn nested(count: usize, depth: i32) -> Mesh {
+    let mut mesh = Mesh::default();
+    for level in 0..depth {
+        around(&mut mesh, [64_f32.powi(-level); 3], 64_f32.powi(-level) * 1e-3);
+    }
+    let inside = 64_f32.powi(-depth);
+    let few = soup(count.saturating_sub(mesh.indices.len()), 0.01, 7);
+    mesh.append(&few.map(|p| p.map(|c| (c + 1.0) * 0.5 * inside)));
+    mesh
+}
+
+/// Several of them side by side.
+fn many_nested(count: usize) -> Mesh {
+    let mut mesh = Mesh::default();
+    for i in 0..8 {
+        let shift = [i & 1, i >> 1 & 1, i >> 2].map(|bit| bit as f32 * 1.5);
+        let part = nested(count * (i + 1) / 8 - count * i / 8, 2 + (i as i32) % 3);
+        mesh.append(&part.map(|p| std::array::from_fn(|axis| p[axis] + shift[axis])));
+    }
+    mesh
+}
+
+/// Builds in the memory that is enough for so many triangles, and returns nodes and levels.
+fn builds_in_its_bound(mesh: &Mesh) -> [u32; 2] {
+    let view = mesh.view();
+    let bound = Sizes::bound(view.triangle_count(), &config()).unwrap();
+    let (mut index, mut scratch) =
+        (Guarded::new(bound.index_bytes), Guarded::new(bound.scratch_bytes));
+    let exact = sizes(&view, &config(), scratch.region()).unwrap();
+    assert!(exact.is_exact && exact.index_bytes <= bound.index_bytes, "{exact:?} {bound:?}");
+    let told = {
+        let grid = Grid::build(view, &config(), index.region(), scratch.region()).unwrap();
+        assert_eq!(grid.blob_bytes(), exact.index_bytes);
+        prove(&grid).unwrap();
+        [NODE_COUNT, LEVELS].map(|at| word(grid.blob(), at))
+    };
+    assert!(index.around_is_intact() && scratch.around_is_intact());
+    assert!((1..=64).contains(&told[1]), "{told:?}");
+    told
+}
+
+#[test]
+fn the_worst_meshes_stay_within_the_bound() {
+    for count in 0..=300 {
+        for mesh in [one_centre(count), one_by_one(count), soup(count, 0.01, count as u64)] {
+            let [nodes, _] = builds_in_its_bound(&mesh);
+            let (least, most) = (count.div_ceil(56), 1 + count / 7 + 4);
+            assert!((least..=most).contains(&(nodes as usize)), "{nodes} for {count}");
+        }
+    }
+    let mut deepest = 0;
+    for count in [4095, 4096, 4097, 4319, 4320, 4321, 4400, 8192, 9001, 20_000] {
+        let mut meshes = vec![one_centre(count), one_by_one(count), many_nested(count)];
+        meshes.extend((1..8).map(|depth| nested(count, depth)));
+        for mesh in meshes {
+            assert_eq!(mesh.indices.len(), count);
+            let [nodes, levels] = builds_in_its_bound(&mesh);
+            assert!((nodes as usize) < count / 7 + count / 40 + 20, "{nodes} for {count}");
+            deepest = deepest.max(levels);
+        }
+    }
+    assert!(deepest > 8, "{deepest}");
+}
+
+/// The chain of the powers of two that f32 has, around which there are too few triangles to cut.
+#[test]
+fn trees_are_no_deeper_than_queries_are_prepared_for() {
+    let mut deepest = 0;
+    for (copies, factor) in
+        [(1, 0.5_f32), (113, 0.5), (225, 0.5), (225, 0.125), (113, 0.8), (450, 1e-2)]
+    {
+        let mut mesh = Mesh::default();
+        let mut at = 1e20;
+        while at > 1e-20 {
+            (0..copies).for_each(|_| around(&mut mesh, [at, 0.0, 0.0], at * 1e-3));
+            at *= factor;
+        }
+        deepest = deepest.max(builds_in_its_bound(&mesh)[1]);
+    }
+    assert!((12..=64).contains(&deepest), "{deepest}");
+}
+
+/// Runs tasks on threads, or one after the other from the last to the first.
+fn on_threads(count: u32, task: &Task<'_>) {
+    thread::scope(|scope| (0..count).for_each(|i| drop(scope.spawn(move || task(i)))));
+}
+
+fn backwards(count: u32, task: &Task<'_>) {
+    (0..count).rev().for_each(task);
+}
+
+/// Any number of tasks makes the same blob, in memory for so many, for fewer, and for one.
+#[test]
+fn tasks_do_not_show() {
+    const COUNT: usize = 7 * 16_384 + 100;
+    let mut behind = nested(COUNT - 5, 0).map(|p| p.map(|c| c * 1e-3));
+    (0..5).for_each(|i| around(&mut behind, [1.0, i as f32, 1.0], 0.01));
+    let mut mixed = soup(COUNT / 2, 0.01, 3);
+    mixed.append(&many_nested(COUNT - COUNT / 2));
+    let meshes = [soup(COUNT, 0.01, 1), behind, mixed, one_centre(COUNT), nested(COUNT, 4)];
+    for (which, mesh) in meshes.iter().enumerate() {
+        assert_eq!(mesh.indices.len(), COUNT);
+        let view = mesh.view();
+        let expected = Owned::build(&view, &config()).unwrap();
+        let bound = |tasks| Sizes::bound_parallel(COUNT as u32, &config(), tasks).unwrap();
+        for (tasks, run) in [2, 3, 7, 64].into_iter().zip([on_threads, backwards].iter().cycle()) {
+            for memory in [tasks, 2, 1] {
+                let (index_bytes, mut scratch_bytes) =
+                    (bound(tasks).index_bytes, bound(memory).scratch_bytes);
+                // Not quite enough for as many.
+                if memory == 2 {
+                    scratch_bytes += 1000;
+                }
+                let control = Control { tasks, run, progress: None };
+                let (mut index, mut scratch) =
+                    (Guarded::new(index_bytes), Guarded::new(scratch_bytes));
+                let same = {
+                    let (index, scratch) = (index.region(), scratch.region());
+                    let grid = Grid::build_with(view, &config(), index, scratch, &control);
+                    grid.unwrap().blob() == expected.bytes()
+                };
+                assert!(same, "mesh {which}, {tasks} tasks, memory for {memory}");
+                assert!(index.around_is_intact() && scratch.around_is_intact());
+            }
+        }
+        // An index that only holds the tree is enough, and then for one task.
+        let control = Control { tasks: 7, run: &on_threads, progress: None };
+        let mut index = Guarded::new(expected.bytes().len());
+        let mut scratch = Guarded::new(bound(7).scratch_bytes);
+        let grid =
+            Grid::build_with(view, &config(), index.region(), scratch.region(), &control).unwrap();
+        assert!(grid.blob() == expected.bytes(), "mesh {which}");
+    }
+}
