@@ -6,7 +6,7 @@ use hgrid_core::{Coherence, Config, Control, Grid, Hit, Method, Ray, Strided, St
 use super::input::Input;
 use super::system::{Bytes, Mode, System, Tracer, Use, each};
 use super::workloads::Workload;
-use crate::measure;
+use crate::regions::{Regions, peak_bytes};
 use crate::tiles::{TILE_RAYS, intersect};
 
 /// One method.
@@ -41,7 +41,7 @@ impl System for GridSystem {
 
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
         let mesh = input.mesh()?;
-        let memory = measure::build(mesh, &self.config)?;
+        let memory = Regions::build(mesh, &self.config)?;
         then(&GridTracer { grid: Grid::open(&memory.index, mesh)?, config: &self.config })
     }
 }
@@ -74,7 +74,7 @@ impl Tracer for GridTracer<'_> {
     }
 
     fn bytes(&self) -> Result<Option<Bytes>> {
-        let peak = measure::peak_bytes(*self.grid.mesh(), self.config, &Control::default())?;
+        let peak = peak_bytes(*self.grid.mesh(), self.config, &Control::default())?;
         Ok(Some(Bytes { index: self.grid.blob_bytes(), peak }))
     }
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::input::Input;
 use super::system::is_hit;
-use crate::measure;
+use crate::regions::Regions;
 use crate::scene::Bounds;
 use crate::shade::normal_of;
 use crate::tiles::Tiles;
@@ -77,7 +77,7 @@ impl Rays {
     pub fn new(input: &Input, bounds: Bounds, tiles: Tiles, count: usize) -> Result<Self> {
         let mesh = input.mesh()?;
         let memory =
-            measure::build(mesh, &Config::new(Method::Brick)).context("no grid for the rays")?;
+            Regions::build(mesh, &Config::new(Method::Brick)).context("no grid for the rays")?;
         let grid = Grid::open(&memory.index, mesh)?;
         let closest = |ray: &Ray| grid.intersect(ray).unwrap_or(Hit::MISS);
 
