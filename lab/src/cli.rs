@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use hgrid_core::{Config, Control, Method};
 
 use crate::camera::{Camera, Point, Up, View};
+use crate::compare::first::COMMAND as FIRST_BUILD;
 use crate::compare::peers::Peer;
 use crate::heat::Counter;
 use crate::scene::Scene;
@@ -124,6 +125,9 @@ pub enum Command {
     /// Measures every method and other ray tracers, its peers, over the same rays
     #[command(after_help = [COMPARE_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
     Compare(CompareArgs),
+    /// Builds once with one system: `compare` starts a new process for each first build
+    #[command(name = FIRST_BUILD, hide = true)]
+    FirstBuild(FirstBuildArgs),
 }
 
 /// What to render and how.
@@ -287,6 +291,15 @@ pub struct CompareArgs {
     /// Draw charts into this folder, as SVG and PNG; it is made if it is missing
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+}
+
+/// What to build once.
+#[derive(Debug, Parser)]
+pub struct FirstBuildArgs {
+    /// A mesh file or procedural:NAME:TRIANGLES
+    pub scene: String,
+    /// A method or a peer
+    pub system: String,
 }
 
 /// Which methods compete, and how often.

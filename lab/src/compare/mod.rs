@@ -14,15 +14,20 @@
 
 pub mod agreement;
 mod charts;
+pub mod first;
 mod grid;
 #[cfg(feature = "peers")]
 mod heap;
 pub mod input;
+pub mod mode;
 pub mod numbers;
 pub mod peers;
 pub mod process;
 pub mod race;
+mod random;
 pub mod ratios;
+mod samples;
+mod stage;
 pub mod system;
 mod tables;
 pub mod workloads;
@@ -30,12 +35,14 @@ pub mod workloads;
 use std::fs;
 use std::io::{self, Write as _};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Error, Result};
+use clap::ValueEnum as _;
 use hgrid_core::{Config, Method};
 
 use crate::cli::CompareArgs;
 use grid::GridSystem;
 use numbers::Comparison;
+use peers::Peer;
 use race::Plan;
 use system::System;
 
@@ -53,7 +60,10 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     process::pin_to_one_core()?;
 
-    let plan = Plan::new(args.repeat);
+    process::keep_heap();
+    let first = first::in_new_process;
+    // As many random rays as a picture of 1024 x 1024 has.
+    let plan = Plan { repeat: args.repeat, random_rays: 1 << 20, first };
     let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, plan)?;
     let text = if args.markdown { comparison.markdown() } else { comparison.text() };
     writeln!(io::stdout(), "{text}")?;
@@ -75,6 +85,18 @@ pub fn methods(methods: &[Method]) -> Vec<Box<dyn System>> {
     methods.iter().map(system).collect()
 }
 
+/// The system with a name: a method or a peer.
+///
+/// # Errors
+/// If there is none, or it does not start.
+pub fn system_named(name: &str) -> Result<Box<dyn System>> {
+    let mut found = match Method::ALL.iter().find(|method| method.name() == name) {
+        Some(&method) => methods(&[method]),
+        None => peers::systems(&[Peer::from_str(name, false).map_err(Error::msg)?])?,
+    };
+    found.pop().context("a name without a system")
+}
+
 #[cfg(test)]
 mod tests {
     use clap::Parser as _;
@@ -85,7 +107,7 @@ mod tests {
     fn compare(systems: &[Box<dyn System>]) -> Comparison {
         let words = ["hgrid", "procedural:knot:2000", "procedural:soup:500", "--size", "48"];
         let args = CompareArgs::parse_from(words);
-        let plan = Plan { repeat: 2, random_rays: 2000 };
+        let plan = Plan { repeat: 2, random_rays: 2000, first: first::in_this_process };
         Comparison::measure(&args.scenes, systems, &args.picture, plan).unwrap()
     }
 
@@ -122,7 +144,8 @@ mod tests {
         let json = serde_json::to_value(compare(&methods(&[Method::Fixed]))).unwrap();
         let system = &json["scenes"][0]["systems"][0];
         assert_eq!(system["system"], "fixed");
-        assert_eq!(system["build_samples"].as_array().unwrap().len(), 2);
+        assert_eq!(system["first_build"]["samples"].as_array().unwrap().len(), 3);
+        assert_eq!(system["rebuild"]["samples"].as_array().unwrap().len(), 2);
         assert_eq!(system["runs"][1]["workload"], "ao");
         assert!(json["machine"]["rustc"].is_string() && json["target"].is_string());
     }
@@ -155,7 +178,7 @@ mod tests {
                     assert_eq!(run.samples.len(), 2);
                 }
             }
-            assert_eq!(scene.ratios.len(), 6);
+            assert_eq!(scene.ratios.len(), 11);
         }
         assert!(comparison.text().contains("time to image / best peer"));
     }

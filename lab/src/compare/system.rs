@@ -5,39 +5,15 @@
 
 use anyhow::Result;
 use hgrid_core::{Hit, INVALID_ID, Ray};
-use serde::Serialize;
 
 use super::input::Input;
+use super::mode::Mode;
 use super::workloads::Workload;
 
 /// Whether an answer is a hit.
 #[must_use]
 pub const fn is_hit(hit: &Hit) -> bool {
     hit.primitive != INVALID_ID
-}
-
-/// How rays are handed to a structure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Mode {
-    /// One after the other.
-    Single,
-    /// Many in one call, for rays that stay together.
-    Coherent,
-    /// Many in one call, for rays that do not.
-    Incoherent,
-}
-
-impl Mode {
-    /// The word that tables use.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Single => "single",
-            Self::Coherent => "coherent",
-            Self::Incoherent => "incoherent",
-        }
-    }
 }
 
 /// Bytes of a structure.
@@ -62,6 +38,11 @@ pub trait System {
         true
     }
 
+    /// The library and its version, if it tells.
+    fn version(&self) -> Option<String> {
+        None
+    }
+
     /// The ways to trace a workload that make sense.
     fn modes(&self, _: Workload) -> &'static [Mode] {
         &[Mode::Single]
@@ -72,6 +53,17 @@ pub trait System {
     /// # Errors
     /// If it cannot be built, and those of `then`.
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()>;
+
+    /// Builds, drops, calls `start`, and builds once more in the memory that was kept; then calls
+    /// `then`. What happens between the two calls is the rebuild.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
+        self.build(input, &mut |_| Ok(()))?;
+        start();
+        self.build(input, then)
+    }
 }
 
 /// A structure that is built.
@@ -79,8 +71,8 @@ pub trait Tracer {
     /// Closest hits; [`Hit::MISS`] where there is none. Both slices are equally long.
     fn intersect(&self, mode: Mode, rays: &[Ray], hits: &mut [Hit]);
 
-    /// Whether there is any hit. Both slices are equally long.
-    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [bool]);
+    /// 1 where there is any hit, 0 where there is none. Both slices are equally long.
+    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [u8]);
 
     /// Its bytes, unless they are all on the heap that the program counts.
     ///

@@ -8,6 +8,7 @@ use core::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 use anyhow::{Result, ensure};
 
 use super::ffi;
+use super::query::Buffers;
 use crate::compare::input::Input;
 use crate::compare::system::Bytes;
 
@@ -58,6 +59,13 @@ impl Device {
         Ok(Self { handle, memory })
     }
 
+    /// The version of the library, as 3.13.5.
+    pub(super) fn version(&self) -> String {
+        // SAFETY: the device is a live one.
+        let number = unsafe { ffi::rtcGetDeviceProperty(self.handle, ffi::PROPERTY_VERSION) };
+        format!("{}.{}.{}", number / 10_000, number / 100 % 100, number % 100)
+    }
+
     /// Builds a scene of one mesh.
     pub(super) fn build<'a>(&'a self, input: &'a Input, quality: Quality) -> Result<Scene<'a>> {
         let quality = match quality {
@@ -69,7 +77,8 @@ impl Device {
 
         // SAFETY: the device is a live one, here and below.
         let handle = unsafe { ffi::rtcNewScene(self.handle) };
-        let scene = Scene { handle, device: self, before, input: PhantomData };
+        let scene =
+            Scene { handle, device: self, before, buffers: Buffers::new(), input: PhantomData };
         // SAFETY: as above.
         let geometry = unsafe { ffi::rtcNewGeometry(self.handle, ffi::GEOMETRY_TYPE_TRIANGLE) };
         ensure!(!handle.is_null() && !geometry.is_null(), "Embree has no memory left");
@@ -125,12 +134,17 @@ pub(super) struct Scene<'a> {
     handle: ffi::Scene,
     device: &'a Device,
     before: isize,
+    buffers: Buffers,
     input: PhantomData<&'a Input>,
 }
 
 impl Scene<'_> {
     pub(super) const fn handle(&self) -> ffi::Scene {
         self.handle
+    }
+
+    pub(super) const fn buffers(&self) -> &Buffers {
+        &self.buffers
     }
 
     /// Bytes since the build began.
