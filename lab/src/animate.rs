@@ -43,7 +43,7 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
             .with_context(|| format!("cannot write into `{}`", folder.display()))?;
     }
     let scene = Scene::load(&args.scene)?;
-    let tiles = args.picture.tiles(&scene);
+    let tiles = args.picture.tiles(&scene)?;
     let config = args.tuning.config(args.method);
     let threads = Threads::new(args.threads)?;
     let mut progress = Progress::new("frames", args.frames.into());

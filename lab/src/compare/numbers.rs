@@ -219,7 +219,7 @@ impl SceneNumbers {
         ensure!(!scene.indices.is_empty(), "no triangles: nothing to measure");
         let bounds = scene.bounds().context("no vertex with finite coordinates")?;
         let facts = SceneFacts::of(&scene);
-        let tiles = picture.tiles(&scene);
+        let tiles = picture.tiles(&scene)?;
         let input = Input::new(scene);
         let rays = Rays::new(&input, bounds, tiles, plan.random_rays)?;
         let first = |system: &dyn System| (plan.first)(spec, system);
