@@ -5,7 +5,8 @@ use hgrid_core::{Coherence, Config, Control, Grid, Hit, Method, Ray, Strided, St
 
 use super::input::Input;
 use super::mode::Mode;
-use super::system::{Bytes, System, Tracer, Use, each};
+use super::points::distance;
+use super::system::{Bytes, System, Tracer, Use, each, one_by_one};
 use super::workloads::Workload;
 use crate::regions::{Regions, peak_bytes};
 use crate::tiles::TILE_RAYS;
@@ -21,8 +22,8 @@ impl GridSystem {
     }
 }
 
-/// Whether a method traces rays together. Those of the paper trace a batch ray by ray.
-const fn traces_together(method: Method) -> bool {
+/// Whether a method is none of the paper's, which trace rays one by one, and take long for points.
+const fn is_of_today(method: Method) -> bool {
     !matches!(method, Method::OneLevel | Method::Variable | Method::Fixed | Method::Recursive)
 }
 
@@ -37,7 +38,8 @@ impl System for GridSystem {
 
     fn modes(&self, workload: Workload) -> &'static [Mode] {
         match workload {
-            _ if !traces_together(self.config.method) => &[Mode::Single],
+            _ if !is_of_today(self.config.method) => one_by_one(workload),
+            Workload::Near | Workload::Far => &[Mode::Single],
             Workload::Primary => &[Mode::Single, Mode::Coherent],
             Workload::Ao | Workload::Bounce => &[Mode::Single, Mode::Coherent, Mode::Batch],
             Workload::Random => &[Mode::Single, Mode::Batch],
@@ -86,6 +88,12 @@ impl Tracer for GridTracer<'_> {
             if self.grid.occluded_n(&Strided::new(rays), answers, call.coherence).is_err() {
                 occluded.fill(0);
             }
+        }
+    }
+
+    fn closest_points(&self, points: &[[f32; 3]], radius: f32, distances: &mut [f32]) {
+        for (&point, place) in points.iter().zip(distances) {
+            *place = distance(&self.grid, point, radius);
         }
     }
 

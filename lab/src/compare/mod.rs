@@ -22,6 +22,7 @@ pub mod input;
 pub mod mode;
 pub mod numbers;
 pub mod peers;
+pub mod points;
 pub mod process;
 pub mod race;
 mod random;
@@ -45,6 +46,7 @@ use numbers::Comparison;
 use peers::Peer;
 use race::Plan;
 use system::System;
+use workloads::Amount;
 
 /// Measures, prints, writes and draws.
 ///
@@ -62,8 +64,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 
     process::keep_heap();
     let first = first::in_new_process;
-    // As many random rays as a picture of 1024 x 1024 has.
-    let plan = Plan { repeat: args.repeat, random_rays: 1 << 20, first };
+    let plan = Plan { repeat: args.repeat, amount: Amount::FULL, first };
     let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, plan)?;
     let text = if args.markdown { comparison.markdown() } else { comparison.text() };
     writeln!(io::stdout(), "{text}")?;
@@ -107,7 +108,8 @@ mod tests {
     fn compare(systems: &[Box<dyn System>]) -> Comparison {
         let words = ["hgrid", "procedural:knot:2000", "procedural:soup:500", "--size", "48"];
         let args = CompareArgs::parse_from(words);
-        let plan = Plan { repeat: 2, random_rays: 2000, first: first::in_this_process };
+        let amount = Amount { random_rays: 2000, near_points: 500, far_points: 50 };
+        let plan = Plan { repeat: 2, amount, first: first::in_this_process };
         Comparison::measure(&args.scenes, systems, &args.picture, plan).unwrap()
     }
 
@@ -119,7 +121,7 @@ mod tests {
             assert!(text.matches(method.name()).count() >= 4, "{text}");
             assert!(markdown.contains(&format!("| {}", method.name())), "{markdown}");
         }
-        assert!(text.contains("knot:2000: 2.00K triangles") && text.contains("rays hit"), "{text}");
+        assert!(text.contains("knot:2000: 2.00K triangles, hits: primary "), "{text}");
         assert!(markdown.contains("### soup:500"), "{markdown}");
         assert!(!text.contains("hgrid / peer"), "{text}");
         for table in markdown.split("\n\n").filter(|part| part.starts_with('|')) {
@@ -178,7 +180,7 @@ mod tests {
                     assert_eq!(run.samples.len(), 2);
                 }
             }
-            assert_eq!(scene.ratios.len(), 11);
+            assert_eq!(scene.ratios.len(), 13);
         }
         assert!(comparison.text().contains("time to image / best peer"));
     }

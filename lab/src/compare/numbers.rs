@@ -104,11 +104,11 @@ pub struct Run {
     pub samples: Vec<f64>,
     /// Pages that were first touched meanwhile: the median.
     pub page_faults: Option<u64>,
-    /// Rays that were traced.
+    /// Rays that were traced, or points that were asked.
     pub rays: u64,
-    /// Rays that hit something.
+    /// Rays that hit something, points that found something.
     pub hits: u64,
-    /// Rays whose answer is not that of hgrid.
+    /// Rays or points whose answer is not that of hgrid.
     pub differing: u64,
 }
 
@@ -221,7 +221,7 @@ impl SceneNumbers {
         let facts = SceneFacts::of(&scene);
         let tiles = picture.tiles(&scene)?;
         let input = Input::new(scene);
-        let rays = Rays::new(&input, bounds, tiles, plan.random_rays)?;
+        let rays = Rays::new(&input, bounds, tiles, plan.amount)?;
         let first = |system: &dyn System| (plan.first)(spec, system);
         let systems = race(&input, &rays, systems, plan.repeat, &first, progress)?;
         let ratios = Ratio::all(&systems);

@@ -20,7 +20,7 @@ use super::numbers::SystemNumbers;
 use super::samples::{Record, RunRecord, Watch};
 use super::stage::Stage;
 use super::system::{Bytes, System};
-use super::workloads::Rays;
+use super::workloads::{Amount, Rays};
 use crate::progress::Progress;
 
 /// First builds of each system, at least.
@@ -31,8 +31,8 @@ const FIRST_BUILDS: u32 = 3;
 pub struct Plan {
     /// Repetitions that times are medians of.
     pub repeat: u32,
-    /// Rays between random points.
-    pub random_rays: usize,
+    /// Questions of each workload.
+    pub amount: Amount,
     /// Builds a scene for the first time.
     pub first: fn(&str, &dyn System) -> Result<FirstBuild>,
 }
@@ -96,7 +96,7 @@ fn turn(
                 let (workload, mode) = (workload.name(), mode.name());
                 ensure!(
                     *is_peer || differing == 0,
-                    "{differing} {workload} rays, traced as {mode}, differ from those of the \
+                    "{differing} {workload} answers, asked as {mode}, differ from those of the \
                      default method: please report this scene"
                 );
             }
@@ -133,7 +133,6 @@ mod tests {
     use crate::compare::methods;
     use crate::compare::mode::Mode;
     use crate::compare::system::{Tracer, Use, each};
-    use crate::compare::workloads::Workload;
     use crate::scene::Scene;
     use crate::tiles::Tiles;
 
@@ -142,7 +141,8 @@ mod tests {
         let bounds = scene.bounds().unwrap();
         let camera = Camera::framing(bounds, View::ThreeQuarter, Up::Y);
         let input = Input::new(scene);
-        let rays = Rays::new(&input, bounds, Tiles { camera, size: 40 }, 1000).unwrap();
+        let amount = Amount { random_rays: 1000, near_points: 100, far_points: 10 };
+        let rays = Rays::new(&input, bounds, Tiles { camera, size: 40 }, amount).unwrap();
         let first = |_: &dyn System| Ok(FirstBuild { seconds: 1.0, page_faults: None });
         race(&input, &rays, systems, repeat, &first, &mut Progress::new("", 0))
     }
@@ -184,10 +184,12 @@ mod tests {
         for numbers in all {
             assert_eq!((numbers.first_build.samples.len(), numbers.rebuild.samples.len()), (3, 3));
             assert!(numbers.index_bytes > 0 && numbers.peak_bytes >= numbers.index_bytes);
-            assert!(numbers.runs.len() >= Workload::ALL.len());
+            assert!(numbers.runs.len() >= 4);
             for run in &numbers.runs {
                 assert_eq!((run.samples.len(), run.differing), (3, 0));
-                assert!(run.seconds > 0.0 && run.hits > 0 && run.hits < run.rays, "{run:?}");
+                let is_all = run.hits == run.rays;
+                assert!(run.seconds > 0.0 && run.hits > 0, "{run:?}");
+                assert_eq!(is_all, run.workload.asks_points(), "{run:?}");
             }
         }
     }
@@ -198,6 +200,6 @@ mod tests {
         assert_eq!((blind[0].first_build.samples.len(), blind[0].rebuild.samples.len()), (3, 1));
         assert!(blind[0].runs.iter().all(|run| run.is_off() && run.hits == 0));
         let error = numbers(&[Box::new(Blind { is_peer: false })], 1).unwrap_err();
-        assert!(format!("{error:#}").contains("primary rays"), "{error:#}");
+        assert!(format!("{error:#}").contains("primary answers"), "{error:#}");
     }
 }

@@ -19,6 +19,12 @@ impl Random {
         ((mixed ^ mixed >> 31) >> 11) as f64 / (1u64 << 53) as f64
     }
 
+    /// A whole number below another, 0 below 0.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below a u32")]
+    pub(super) fn below(&mut self, limit: u32) -> u32 {
+        (self.next() * f64::from(limit)) as u32
+    }
+
     /// A point of a box.
     pub(super) fn point(&mut self, (min, max): Bounds) -> Vector {
         [0, 1, 2].map(|axis| {

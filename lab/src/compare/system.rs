@@ -8,6 +8,7 @@ use hgrid_core::{Hit, INVALID_ID, Ray};
 
 use super::input::Input;
 use super::mode::Mode;
+use super::samples::Watch;
 use super::workloads::Workload;
 
 /// Whether an answer is a hit.
@@ -43,9 +44,9 @@ pub trait System {
         None
     }
 
-    /// The ways to trace a workload that make sense.
-    fn modes(&self, _: Workload) -> &'static [Mode] {
-        &[Mode::Single]
+    /// The ways to ask for a workload that make sense; none if the system does not answer it.
+    fn modes(&self, workload: Workload) -> &'static [Mode] {
+        one_by_one(workload)
     }
 
     /// Builds and calls `then` with the structure. What happens before that call is the build.
@@ -54,16 +55,57 @@ pub trait System {
     /// If it cannot be built, and those of `then`.
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()>;
 
-    /// Builds, drops, calls `start`, and builds once more in the memory that was kept; then calls
-    /// `then`. What happens between the two calls is the rebuild.
+    /// Builds until that takes no new memory, calls `start`, and builds once more in the memory
+    /// that was kept; then calls `then`. What happens between the two calls is the rebuild.
     ///
     /// # Errors
     /// As [`build`](Self::build).
     fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
-        self.build(input, &mut |_| Ok(()))?;
-        start();
-        self.build(input, then)
+        rebuild_anew(self, input, start, then)
     }
+}
+
+/// The modes of a system that takes one ray a call, and no points.
+#[must_use]
+pub const fn one_by_one(workload: Workload) -> &'static [Mode] {
+    if workload.asks_points() { &[] } else { &[Mode::Single] }
+}
+
+/// A rebuild by a system that keeps no more than its heap.
+///
+/// # Errors
+/// Those of its builds.
+pub fn rebuild_anew(
+    system: &(impl System + ?Sized),
+    input: &Input,
+    start: &mut dyn FnMut(),
+    then: &mut Use<'_>,
+) -> Result<()> {
+    warm_up(|| system.build(input, &mut |_| Ok(())))?;
+    start();
+    system.build(input, then)
+}
+
+/// Builds before a rebuild, at most.
+const WARM_UPS: u32 = 4;
+
+/// Pages that a build may touch for the first time and still be one in memory that was kept.
+const FEW_PAGES: u64 = 16;
+
+/// Builds again and again, until that touches no new pages.
+///
+/// # Errors
+/// Those of a build.
+pub fn warm_up(mut build: impl FnMut() -> Result<()>) -> Result<()> {
+    for _ in 0..WARM_UPS {
+        let watch = Watch::start();
+        build()?;
+        let (_, faults) = watch.stop();
+        if faults.is_some_and(|faults| faults <= FEW_PAGES) {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// A structure that is built.
@@ -73,6 +115,12 @@ pub trait Tracer {
 
     /// 1 where there is any hit, 0 where there is none. Both slices are equally long.
     fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [u8]);
+
+    /// Distances to the closest points of the surface; infinite where none is in the radius. Both
+    /// slices are equally long.
+    fn closest_points(&self, _points: &[[f32; 3]], _radius: f32, distances: &mut [f32]) {
+        distances.fill(f32::INFINITY);
+    }
 
     /// Its bytes, unless they are all on the heap that the program counts.
     ///

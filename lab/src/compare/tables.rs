@@ -55,14 +55,15 @@ impl Comparison {
             format!(
                 "ao: a ray from every primary hit, {AO_REACH} of the scene's diagonal long, any \
                  hit; bounce: the same rays without an end, closest hit; random: rays between \
-                 points of the scene's box, closest hit."
+                 points of the scene's box, closest hit; near and far: the closest point of the \
+                 surface to points near to it and far outside."
             ),
             "Bytes per triangle are without the mesh; faults are pages that were first touched, small \
              or large."
                 .to_owned(),
             format!(
-                "Differing rays have another answer than hgrid;{MARK} marks times where more than \
-                 one ray in a thousand does: they count for no ratio."
+                "Differing rays and points have another answer than hgrid;{MARK} marks times where \
+                 more than one in a thousand does: they count for no ratio."
             ),
             "A ratio is the median of those of the single repetitions, not that of the two times \
              beside it."
@@ -90,17 +91,12 @@ impl Comparison {
 impl SceneNumbers {
     fn title(&self) -> String {
         let hits = |workload| {
-            let first = self.systems.first().and_then(|system| system.best(workload));
-            first.map_or_else(String::new, |run| {
-                format!(", {} of {} {} rays hit", run.hits, run.rays, workload.name())
-            })
+            let run = self.systems.iter().find_map(|system| system.best(workload))?;
+            Some(format!("{} {} of {}", workload.name(), run.hits, run.rays))
         };
-        let hits: String = Workload::ALL.into_iter().map(hits).collect();
-        format!(
-            "{}: {} triangles{hits}",
-            display_name(&self.facts.scene),
-            count(self.facts.triangles)
-        )
+        let hits: Vec<_> = Workload::ALL.into_iter().filter_map(hits).collect();
+        let (name, count) = (display_name(&self.facts.scene), count(self.facts.triangles));
+        format!("{name}: {count} triangles, hits: {}", hits.join(", "))
     }
 
     fn tables(&self) -> impl Iterator<Item = Table> + '_ {

@@ -10,6 +10,7 @@ use hgrid_core::{Config, Grid, Hit, Ray, TriangleMesh};
 use serde::Serialize;
 
 use super::input::Input;
+use super::points::Points;
 use super::random::Random;
 use super::system::is_hit;
 use crate::regions::Regions;
@@ -36,11 +37,16 @@ pub enum Workload {
     Bounce,
     /// Rays from one random point of the scene's box toward another, closest hit
     Random,
+    /// Points near the surface, closest point of it
+    Near,
+    /// Points far outside of the scene, closest point of its surface
+    Far,
 }
 
 impl Workload {
     /// In the order in which they are measured.
-    pub const ALL: [Self; 4] = [Self::Primary, Self::Ao, Self::Bounce, Self::Random];
+    pub const ALL: [Self; 6] =
+        [Self::Primary, Self::Ao, Self::Bounce, Self::Random, Self::Near, Self::Far];
 
     /// The word that tables use.
     #[must_use]
@@ -50,8 +56,33 @@ impl Workload {
             Self::Ao => "ao",
             Self::Bounce => "bounce",
             Self::Random => "random",
+            Self::Near => "near",
+            Self::Far => "far",
         }
     }
+
+    /// Whether points are asked, not rays.
+    #[must_use]
+    pub const fn asks_points(self) -> bool {
+        matches!(self, Self::Near | Self::Far)
+    }
+}
+
+/// How many questions there are of the workloads whose numbers do not follow from the picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Amount {
+    /// Rays between random points.
+    pub random_rays: usize,
+    /// Points near the surface.
+    pub near_points: usize,
+    /// Points far outside.
+    pub far_points: usize,
+}
+
+impl Amount {
+    /// As many random rays as a picture of 1024 x 1024 has, and points that take about as long as
+    /// other workloads. Far ones are few, because a grid looks at much of the mesh for each.
+    pub const FULL: Self = Self { random_rays: 1 << 20, near_points: 1 << 16, far_points: 1 << 9 };
 }
 
 /// Questions, and hgrid's answers in their order.
@@ -64,7 +95,7 @@ pub struct Asked<Q, A> {
 }
 
 impl<Q, A> Asked<Q, A> {
-    fn new(questions: Vec<Q>, answer: impl Fn(&Q) -> A) -> Self {
+    pub(super) fn new(questions: Vec<Q>, answer: impl Fn(&Q) -> A) -> Self {
         let answers = questions.iter().map(answer).collect();
         Self { questions, answers }
     }
@@ -83,6 +114,10 @@ pub struct Rays {
     pub bounce: Asked<Ray, Hit>,
     /// From points toward points.
     pub random: Asked<Ray, Hit>,
+    /// Near the surface.
+    pub near: Points,
+    /// Far outside.
+    pub far: Points,
     /// From the smallest to the largest coordinates of the scene.
     pub diagonal: f64,
 }
@@ -92,7 +127,7 @@ impl Rays {
     ///
     /// # Errors
     /// If the grid cannot be built, or the scene has no finite vertex.
-    pub fn new(input: &Input, bounds: Bounds, tiles: Tiles, count: usize) -> Result<Self> {
+    pub fn new(input: &Input, bounds: Bounds, tiles: Tiles, amount: Amount) -> Result<Self> {
         let mesh = input.mesh()?;
         let regions =
             Regions::build(mesh, &Config::default()).context("no structure for the rays")?;
@@ -120,12 +155,14 @@ impl Rays {
             primary_hits,
             ao: Asked::new(ao, |ray| grid.occluded(ray).into()),
             bounce: Asked::new(bounce, closest),
-            random: Asked::new(random_rays(bounds, count), closest),
+            random: Asked::new(random_rays(bounds, amount.random_rays), closest),
+            near: Points::near(&grid, diagonal, amount.near_points),
+            far: Points::far(&grid, bounds, diagonal, amount.far_points),
             diagonal,
         })
     }
 
-    /// How many rays a workload has.
+    /// How many rays or points a workload has.
     #[must_use]
     pub fn count(&self, workload: Workload) -> usize {
         match workload {
@@ -133,6 +170,8 @@ impl Rays {
             Workload::Ao => self.ao.questions.len(),
             Workload::Bounce => self.bounce.questions.len(),
             Workload::Random => self.random.questions.len(),
+            Workload::Near => self.near.asked.questions.len(),
+            Workload::Far => self.far.asked.questions.len(),
         }
     }
 }
@@ -178,7 +217,7 @@ fn random_rays(bounds: Bounds, count: usize) -> Vec<Ray> {
 
 /// The nearest length that a ray can have.
 #[expect(clippy::cast_possible_truncation, reason = "the rounding that is wanted")]
-fn narrow(length: f64) -> f32 {
+pub(super) fn narrow(length: f64) -> f32 {
     length as f32
 }
 
@@ -188,11 +227,12 @@ mod tests {
     use crate::camera::{Camera, Up, View};
     use crate::scene::Scene;
 
-    fn rays(size: u16, count: usize) -> (Rays, Bounds) {
+    fn rays(size: u16, random_rays: usize) -> (Rays, Bounds) {
         let scene = Scene::load("procedural:knot:2000").unwrap();
         let bounds = scene.bounds().unwrap();
         let tiles = Tiles { camera: Camera::framing(bounds, View::ThreeQuarter, Up::Y), size };
-        (Rays::new(&Input::new(scene), bounds, tiles, count).unwrap(), bounds)
+        let amount = Amount { random_rays, near_points: 30, far_points: 20 };
+        (Rays::new(&Input::new(scene), bounds, tiles, amount).unwrap(), bounds)
     }
 
     #[test]
@@ -200,6 +240,7 @@ mod tests {
         let [(a, _), (b, _)] = [rays(40, 100), rays(40, 100)];
         assert_eq!(a.primary_hits, b.primary_hits);
         assert_eq!((a.ao, a.bounce, a.random), (b.ao, b.bounce, b.random));
+        assert_eq!((a.near, a.far), (b.near, b.far));
     }
 
     #[test]
@@ -208,7 +249,7 @@ mod tests {
         let hits = rays.primary_hits.iter().filter(|hit| is_hit(hit)).count();
         assert!((300..900).contains(&hits), "{hits}");
         let counts = Workload::ALL.map(|workload| rays.count(workload));
-        assert_eq!(counts, [43 * 43, hits, hits, 100]);
+        assert_eq!(counts, [43 * 43, hits, hits, 100, 30, 20]);
         assert_eq!((rays.ao.answers.len(), rays.random.answers.len()), (hits, 100));
         let occluded = rays.ao.answers.iter().map(|&is| usize::from(is)).sum();
         let bounced = rays.bounce.answers.iter().filter(|hit| is_hit(hit)).count();

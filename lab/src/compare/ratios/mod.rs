@@ -72,14 +72,12 @@ impl Ratio {
 
 /// Builds, first images and bytes.
 fn builds(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>> {
-    let best = |kind| {
-        let images = peers.iter().filter_map(|peer| Entry::image(peer, kind));
-        images.min_by(|a, b| a.value.total_cmp(&b.value))
-    };
+    let best = |kind| least(peers.iter().filter_map(|peer| Entry::image(peer, kind)));
     let build = |kind, words| {
-        let low = find(peers, Peer::EmbreeLow)?;
-        let what = format!("build / {} LOW: {words}", library(low));
-        Ratio::new(what, &Entry::build(hgrid, kind), &Entry::build(low, kind))
+        let low = [Peer::EmbreeLow, Peer::EmbreeDynamic].into_iter();
+        let low = least(low.filter_map(|peer| Some(Entry::build(find(peers, peer)?, kind))))?;
+        let what = format!("build / {} LOW: {words}", library(low.system));
+        Ratio::new(what, &Entry::build(hgrid, kind), &low)
     };
     let image = |kind, words| {
         let what = format!("time to image / best peer: {words}");
@@ -130,13 +128,25 @@ fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>
             best(Peer::EmbreeLow, "LOW", "random rays in one call", Workload::Random)?;
         Ratio::new(what, &Entry::in_mode(hgrid, Workload::Random, Mode::Batch)?, &theirs)
     };
+    let points = |what: &str, workload| {
+        let peer = find(peers, Peer::EmbreeMedium)?;
+        let what = format!("closest points, {what} / {} MEDIUM, rtcPointQuery", library(peer));
+        Ratio::new(what, &Entry::best(hgrid, workload)?, &Entry::best(peer, workload)?)
+    };
     vec![
         coherent(),
         single(),
         secondary("ambient occlusion", Workload::Ao),
         secondary("diffuse bounces", Workload::Bounce),
         random(),
+        points("near the surface", Workload::Near),
+        points("far outside", Workload::Far),
     ]
+}
+
+/// The least of some numbers.
+fn least<'a>(entries: impl Iterator<Item = Entry<'a>>) -> Option<Entry<'a>> {
+    entries.min_by(|a, b| a.value.total_cmp(&b.value))
 }
 
 /// The numbers of a peer that takes part.

@@ -21,6 +21,10 @@ pub(super) const BUFFER_TYPE_VERTEX: c_uint = 1;
 pub(super) const BUILD_QUALITY_LOW: c_uint = 0;
 pub(super) const BUILD_QUALITY_MEDIUM: c_uint = 1;
 
+/// `RTC_SCENE_FLAG_NONE` and `RTC_SCENE_FLAG_DYNAMIC`.
+pub(super) const SCENE_NONE: c_uint = 0;
+pub(super) const SCENE_DYNAMIC: c_uint = 1;
+
 /// `RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT` and `RTC_INTERSECT_CONTEXT_FLAG_COHERENT`.
 pub(super) const CONTEXT_INCOHERENT: c_uint = 0;
 pub(super) const CONTEXT_COHERENT: c_uint = 1;
@@ -113,6 +117,37 @@ pub(super) struct RayHits<const LANES: usize> {
     pub(super) hits: Hits<LANES>,
 }
 
+/// `RTCPointQuery`.
+#[repr(C, align(16))]
+pub(super) struct PointQuery {
+    pub(super) point: [f32; 3],
+    pub(super) time: f32,
+    pub(super) radius: f32,
+}
+
+/// `RTCPointQueryContext`: transformations, of which there are none.
+#[repr(C, align(16))]
+pub(super) struct PointContext {
+    pub(super) world_to_instance: [f32; 16],
+    pub(super) instance_to_world: [f32; 16],
+    pub(super) inst_id: [c_uint; 1],
+    pub(super) stack_size: c_uint,
+}
+
+/// `RTCPointQueryFunctionArguments`.
+#[repr(C, align(16))]
+pub(super) struct PointArguments {
+    pub(super) query: *mut PointQuery,
+    pub(super) user: *mut c_void,
+    pub(super) primitive: c_uint,
+    pub(super) geometry: c_uint,
+    pub(super) context: *mut PointContext,
+    pub(super) scale: f32,
+}
+
+/// `RTCPointQueryFunction`.
+pub(super) type PointFunction = unsafe extern "C" fn(*mut PointArguments) -> bool;
+
 /// Which rays of a packet are there: -1, or 0 for those that are not.
 #[repr(C, align(64))]
 pub(super) struct Valid<const LANES: usize>(pub(super) [c_int; LANES]);
@@ -127,6 +162,8 @@ pub(super) type OccludedPacket<const LANES: usize> =
 
 // The sizes that the C compiler gives.
 const _: () = assert!(size_of::<Context>() == 24 && size_of::<RayHit1>() == 80);
+const _: () = assert!(size_of::<PointQuery>() == 32 && size_of::<PointContext>() == 144);
+const _: () = assert!(size_of::<PointArguments>() == 48);
 const _: () = assert!(size_of::<Rays<4>>() == 12 * 16 && size_of::<RayHits<4>>() == 20 * 16);
 const _: () = assert!(size_of::<Rays<8>>() == 12 * 32 && size_of::<RayHits<8>>() == 20 * 32);
 const _: () = assert!(size_of::<Rays<16>>() == 12 * 64 && size_of::<RayHits<16>>() == 20 * 64);
@@ -154,14 +191,25 @@ unsafe extern "C" {
         byte_stride: usize,
         item_count: usize,
     );
+    pub(super) fn rtcUpdateGeometryBuffer(geometry: Geometry, kind: c_uint, slot: c_uint);
     pub(super) fn rtcCommitGeometry(geometry: Geometry);
     pub(super) fn rtcReleaseGeometry(geometry: Geometry);
 
     pub(super) fn rtcNewScene(device: Device) -> Scene;
+    pub(super) fn rtcSetSceneFlags(scene: Scene, flags: c_uint);
     pub(super) fn rtcSetSceneBuildQuality(scene: Scene, quality: c_uint);
     pub(super) fn rtcAttachGeometry(scene: Scene, geometry: Geometry) -> c_uint;
+    pub(super) fn rtcGetGeometry(scene: Scene, id: c_uint) -> Geometry;
     pub(super) fn rtcCommitScene(scene: Scene);
     pub(super) fn rtcReleaseScene(scene: Scene);
+
+    pub(super) fn rtcPointQuery(
+        scene: Scene,
+        query: *mut PointQuery,
+        context: *mut PointContext,
+        function: PointFunction,
+        user: *mut c_void,
+    ) -> bool;
 
     pub(super) fn rtcIntersect1(scene: Scene, context: *mut Context, ray: *mut RayHit1);
     pub(super) fn rtcOccluded1(scene: Scene, context: *mut Context, ray: *mut Ray1);

@@ -19,7 +19,7 @@ use hgrid_core::{Hit, Ray};
 use super::Peer;
 use crate::compare::input::Input;
 use crate::compare::mode::{Hint, Lanes, Mode};
-use crate::compare::system::{Bytes, System, Tracer, Use};
+use crate::compare::system::{Bytes, System, Tracer, Use, rebuild_anew, warm_up};
 use crate::compare::workloads::Workload;
 pub(super) use device::Quality;
 use device::{Device, Scene};
@@ -60,12 +60,23 @@ impl System for Embree {
         Some(format!("Embree {}", self.device.version()))
     }
 
-    fn modes(&self, _: Workload) -> &'static [Mode] {
-        MODES
+    fn modes(&self, workload: Workload) -> &'static [Mode] {
+        if workload.asks_points() { &[Mode::Single] } else { MODES }
     }
 
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
         then(&self.device.build(input, self.quality)?)
+    }
+
+    fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
+        if !matches!(self.quality, Quality::Dynamic) {
+            return rebuild_anew(self, input, start, then);
+        }
+        let scene = self.device.build(input, self.quality)?;
+        warm_up(|| scene.rebuild())?;
+        start();
+        scene.rebuild()?;
+        then(&scene)
     }
 }
 
@@ -84,6 +95,10 @@ impl Tracer for Scene<'_> {
             Mode::Stream(hint) => self.occluded_stream(hint, rays, occluded),
             Mode::Single | Mode::Coherent | Mode::Batch => self.occluded_each(rays, occluded),
         }
+    }
+
+    fn closest_points(&self, points: &[[f32; 3]], radius: f32, distances: &mut [f32]) {
+        self.distances(points, radius, distances);
     }
 
     fn bytes(&self) -> Result<Option<Bytes>> {

@@ -4,9 +4,11 @@
 //! single   rtcIntersect1, rtcOccluded1
 //! packet   rtcIntersect4, 8 and 16, rtcOccluded4, 8 and 16
 //! stream   rtcIntersect1M, rtcOccluded1M
+//! point    rtcPointQuery
 //! ```
 
 mod packet;
+mod point;
 mod single;
 mod stream;
 
