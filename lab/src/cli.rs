@@ -10,6 +10,7 @@ use hgrid_core::{Config, Control, Method};
 use crate::camera::{Aim, Camera, Lens, Point, Up, View, named};
 use crate::compare::first::COMMAND as FIRST_BUILD;
 use crate::compare::peers::Peer;
+use crate::compare::workloads::Workload;
 use crate::heat::Counter;
 use crate::scene::Scene;
 use crate::tiles::Tiles;
@@ -71,7 +72,7 @@ every scene and method) as .svg, as .png and, the numbers alone, as .json.";
 const COMPARE_EXAMPLES: &str = "\
 Examples:
   hgrid compare bunny.ply dragon.ply buddha.ply
-  hgrid compare dragon.ply --methods one-level --peers embree-low,embree-medium
+  hgrid compare dragon.ply --peers embree-low,embree-medium --workloads primary,ao,bounce
   hgrid compare sponza.ply --view inside
   hgrid compare bunny.ply dragon.ply --markdown --json compare.json -o pictures
 
@@ -272,6 +273,9 @@ pub struct CompareArgs {
     /// The other structures, between commas [default: all that this program has]
     #[arg(long, value_name = "PEERS", value_delimiter = ',', value_enum)]
     pub peers: Vec<Peer>,
+    /// What is asked of them, between commas [default: all]
+    #[arg(long, value_name = "WORKLOADS", value_delimiter = ',', value_enum)]
+    pub workloads: Vec<Workload>,
     /// Build and trace so many times, taking turns, and report the medians
     #[arg(long, value_name = "TIMES", default_value_t = 5,
           value_parser = clap::value_parser!(u32).range(1..=1000))]

@@ -46,7 +46,7 @@ use numbers::Comparison;
 use peers::Peer;
 use race::Plan;
 use system::System;
-use workloads::Amount;
+use workloads::{Amount, Workload};
 
 /// Measures, prints, writes and draws.
 ///
@@ -64,8 +64,12 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 
     process::keep_heap();
     let first = first::in_new_process;
-    let plan = Plan { repeat: args.repeat, amount: Amount::FULL, first };
-    let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, plan)?;
+    let asked =
+        |workload: &Workload| args.workloads.is_empty() || args.workloads.contains(workload);
+    let workloads: Vec<_> = Workload::ALL.into_iter().filter(asked).collect();
+    let amount = Amount::of(&workloads);
+    let plan = Plan { repeat: args.repeat, workloads, amount, first };
+    let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, &plan)?;
     let text = if args.markdown { comparison.markdown() } else { comparison.text() };
     writeln!(io::stdout(), "{text}")?;
     if let Some(path) = &args.json {
@@ -106,11 +110,20 @@ mod tests {
 
     /// A comparison of all that there is on small scenes.
     fn compare(systems: &[Box<dyn System>]) -> Comparison {
+        compare_on(&Workload::ALL, systems)
+    }
+
+    fn compare_on(workloads: &[Workload], systems: &[Box<dyn System>]) -> Comparison {
         let words = ["hgrid", "procedural:knot:2000", "procedural:soup:500", "--size", "48"];
         let args = CompareArgs::parse_from(words);
         let amount = Amount { random_rays: 2000, near_points: 500, far_points: 50 };
-        let plan = Plan { repeat: 2, amount, first: first::in_this_process };
-        Comparison::measure(&args.scenes, systems, &args.picture, plan).unwrap()
+        let plan = Plan {
+            repeat: 2,
+            workloads: workloads.to_vec(),
+            amount,
+            first: first::in_this_process,
+        };
+        Comparison::measure(&args.scenes, systems, &args.picture, &plan).unwrap()
     }
 
     #[test]
@@ -139,6 +152,17 @@ mod tests {
             assert!(folder.join(name).with_extension("png").exists());
         }
         fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn only_what_is_asked_is_measured() {
+        let comparison = compare_on(&[Workload::Ao], &methods(&[Method::Fixed]));
+        let runs = &comparison.scenes[0].systems[0].runs;
+        assert!(runs.iter().all(|run| run.workload == Workload::Ao) && !runs.is_empty());
+        let text = comparison.text();
+        assert!(text.contains("ao (s)") && !text.contains("random (s)"), "{text}");
+        let Amount { random_rays, near_points, far_points } = Amount::of(&[Workload::Near]);
+        assert!(near_points > 0 && random_rays + far_points == 0);
     }
 
     #[test]

@@ -171,7 +171,7 @@ impl Comparison {
         scenes: &[String],
         systems: &[Box<dyn System>],
         picture: &Picture,
-        plan: Plan,
+        plan: &Plan,
     ) -> Result<Self> {
         let turns = scenes.len() as u64 * systems.len() as u64 * u64::from(plan.repeat);
         let mut progress = Progress::new("starting", turns);
@@ -212,7 +212,7 @@ impl SceneNumbers {
         spec: &str,
         systems: &[Box<dyn System>],
         picture: &Picture,
-        plan: Plan,
+        plan: &Plan,
         progress: &mut Progress,
     ) -> Result<Self> {
         let scene = Scene::load(spec)?;
@@ -223,7 +223,7 @@ impl SceneNumbers {
         let input = Input::new(scene);
         let rays = Rays::new(&input, bounds, tiles, plan.amount)?;
         let first = |system: &dyn System| (plan.first)(spec, system);
-        let systems = race(&input, &rays, systems, plan.repeat, &first, progress)?;
+        let systems = race(&input, &rays, systems, plan, &first, progress)?;
         let ratios = Ratio::all(&systems);
         Ok(Self { facts, systems, ratios })
     }

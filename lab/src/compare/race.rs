@@ -20,17 +20,19 @@ use super::numbers::SystemNumbers;
 use super::samples::{Record, RunRecord, Watch};
 use super::stage::Stage;
 use super::system::{Bytes, System};
-use super::workloads::{Amount, Rays};
+use super::workloads::{Amount, Rays, Workload};
 use crate::progress::Progress;
 
 /// First builds of each system, at least.
 const FIRST_BUILDS: u32 = 3;
 
-/// How often, and how much.
-#[derive(Debug, Clone, Copy)]
+/// What is measured, how often, and how much of it.
+#[derive(Debug, Clone)]
 pub struct Plan {
     /// Repetitions that times are medians of.
     pub repeat: u32,
+    /// What is asked, in this order.
+    pub workloads: Vec<Workload>,
     /// Questions of each workload.
     pub amount: Amount,
     /// Builds a scene for the first time.
@@ -45,12 +47,14 @@ pub fn race(
     input: &Input,
     rays: &Rays,
     systems: &[Box<dyn System>],
-    repeat: u32,
+    plan: &Plan,
     first: &FirstBuilds<'_>,
     progress: &mut Progress,
 ) -> Result<Vec<SystemNumbers>> {
+    let Plan { repeat, ref workloads, .. } = *plan;
     let mut stage = Stage::new(input, rays)?;
-    let mut records: Vec<_> = systems.iter().map(|system| Record::new(system.as_ref())).collect();
+    let records = systems.iter().map(|system| Record::new(system.as_ref(), workloads));
+    let mut records: Vec<_> = records.collect();
     for repetition in 1..=repeat {
         for (system, record) in systems.iter().zip(&mut records) {
             let name = system.name();
@@ -143,8 +147,14 @@ mod tests {
         let input = Input::new(scene);
         let amount = Amount { random_rays: 1000, near_points: 100, far_points: 10 };
         let rays = Rays::new(&input, bounds, Tiles { camera, size: 40 }, amount).unwrap();
-        let first = |_: &dyn System| Ok(FirstBuild { seconds: 1.0, page_faults: None });
-        race(&input, &rays, systems, repeat, &first, &mut Progress::new("", 0))
+        let plan = Plan {
+            repeat,
+            workloads: Workload::ALL.to_vec(),
+            amount,
+            first: |_, _| Ok(FirstBuild { seconds: 1.0, page_faults: None }),
+        };
+        let first = |system: &dyn System| (plan.first)("", system);
+        race(&input, &rays, systems, &plan, &first, &mut Progress::new("", 0))
     }
 
     /// A structure that sees nothing.

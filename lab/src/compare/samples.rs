@@ -75,9 +75,9 @@ impl Watch {
 }
 
 impl Record {
-    /// Nothing yet, for every workload in every mode of the system.
-    pub(super) fn new(system: &dyn System) -> Self {
-        let runs = Workload::ALL.into_iter().flat_map(|workload| {
+    /// Nothing yet, for the workloads in every mode of the system.
+    pub(super) fn new(system: &dyn System, workloads: &[Workload]) -> Self {
+        let runs = workloads.iter().flat_map(|&workload| {
             system.modes(workload).iter().map(move |&mode| RunRecord {
                 workload,
                 mode,

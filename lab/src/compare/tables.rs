@@ -144,13 +144,15 @@ impl SceneNumbers {
 
     /// Something of every run: a row for each mode of each system.
     fn runs(&self, unit: &str, cell: impl Fn(&Run) -> String) -> Table {
-        let columns = Workload::ALL.map(|workload| format!("{} {unit}", workload.name()));
-        let mut table =
-            table(["structure", "mode"].into_iter().chain(columns.iter().map(|c| &**c)));
+        let runs = || self.systems.iter().flat_map(|system| &system.runs);
+        let is_asked = |workload: &Workload| runs().any(|run| run.workload == *workload);
+        let workloads: Vec<_> = Workload::ALL.into_iter().filter(is_asked).collect();
+        let columns = workloads.iter().map(|workload| format!("{} {unit}", workload.name()));
+        let mut table = table(["structure", "mode"].map(str::to_owned).into_iter().chain(columns));
         for system in &self.systems {
             let mut name = &*system.system;
             for mode in modes(system) {
-                let cells = Workload::ALL.map(|workload| {
+                let cells = workloads.iter().map(|&workload| {
                     let run = system.run(workload, mode);
                     run.map_or_else(String::new, |run| {
                         cell(run) + if run.is_off() { MARK } else { "" }

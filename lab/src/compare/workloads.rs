@@ -82,7 +82,18 @@ pub struct Amount {
 impl Amount {
     /// As many random rays as a picture of 1024 x 1024 has, and points that take about as long as
     /// other workloads. Far ones are few, because a grid looks at much of the mesh for each.
-    pub const FULL: Self = Self { random_rays: 1 << 20, near_points: 1 << 16, far_points: 1 << 9 };
+    const FULL: Self = Self { random_rays: 1 << 20, near_points: 1 << 16, far_points: 1 << 9 };
+
+    /// All that the workloads ask, and nothing for the others.
+    #[must_use]
+    pub fn of(workloads: &[Workload]) -> Self {
+        let full = |workload, count| if workloads.contains(&workload) { count } else { 0 };
+        Self {
+            random_rays: full(Workload::Random, Self::FULL.random_rays),
+            near_points: full(Workload::Near, Self::FULL.near_points),
+            far_points: full(Workload::Far, Self::FULL.far_points),
+        }
+    }
 }
 
 /// Questions, and hgrid's answers in their order.
