@@ -22,9 +22,9 @@ impl GridSystem {
     }
 }
 
-/// Whether a method is none of the paper's, which trace rays one by one, and take long for points.
-const fn is_of_today(method: Method) -> bool {
-    !matches!(method, Method::OneLevel | Method::Variable | Method::Fixed | Method::Recursive)
+/// Whether a method is one of the paper's, which trace the rays of a batch one by one.
+const fn is_of_paper(method: Method) -> bool {
+    matches!(method, Method::OneLevel | Method::Variable | Method::Fixed | Method::Recursive)
 }
 
 impl System for GridSystem {
@@ -37,9 +37,12 @@ impl System for GridSystem {
     }
 
     fn modes(&self, workload: Workload) -> &'static [Mode] {
+        let method = self.config.method;
         match workload {
-            _ if !is_of_today(self.config.method) => one_by_one(workload),
-            Workload::Near | Workload::Far => &[Mode::Single],
+            // Far from the mesh, a point can take another method as long as a picture.
+            Workload::Near | Workload::Far if method == Method::default() => &[Mode::Single],
+            Workload::Near | Workload::Far => &[],
+            _ if is_of_paper(method) => one_by_one(workload),
             Workload::Primary => &[Mode::Single, Mode::Coherent],
             Workload::Ao | Workload::Bounce => &[Mode::Single, Mode::Coherent, Mode::Batch],
             Workload::Random => &[Mode::Single, Mode::Batch],

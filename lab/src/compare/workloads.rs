@@ -80,9 +80,9 @@ pub struct Amount {
 }
 
 impl Amount {
-    /// As many random rays as a picture of 1024 x 1024 has, and points that take about as long as
-    /// other workloads. Far ones are few, because a grid looks at much of the mesh for each.
-    const FULL: Self = Self { random_rays: 1 << 20, near_points: 1 << 16, far_points: 1 << 9 };
+    /// As many random rays as a picture of 1024 x 1024 has. Far points are few, because a grid looks
+    /// at much of the mesh for each.
+    const FULL: Self = Self { random_rays: 1 << 20, near_points: 1 << 15, far_points: 1 << 11 };
 
     /// All that the workloads ask, and nothing for the others.
     #[must_use]

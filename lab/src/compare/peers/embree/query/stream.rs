@@ -14,7 +14,7 @@ use crate::compare::peers::embree::device::Scene;
 use crate::compare::peers::embree::ffi::{self, Ray1, RayHit1};
 
 /// Rays in a call.
-const LENGTH: u32 = 256;
+const LENGTH: u32 = 512;
 
 /// Room for the rays of a call, kept from call to call.
 pub(in super::super) struct Buffers {
