@@ -39,9 +39,9 @@ const VIEWS: &[Named] = &[
     between("sponza.ply", "inside", [0.0, 3.0, 0.0], [10.0, 3.0, 0.0]),
     between("sponza.ply", "court", [8.0, 1.5, -0.5], [-8.0, 4.0, 0.5]),
     between("sponza.ply", "gallery", [-11.0, 9.0, -4.5], [10.0, 6.0, 2.0]),
-    between("bunny.ply", "close", [-0.02, 0.1, 0.14], [-0.02, 0.1, 0.0]),
-    between("dragon.ply", "close", [-0.01, 0.11, 0.1], [-0.01, 0.11, 0.0]),
-    between("buddha.ply", "close", [-0.015, 0.16, 0.09], [-0.015, 0.16, 0.0]),
+    between("bunny.ply", "close", [-0.03, 0.09, 0.1], [-0.03, 0.09, 0.0]),
+    between("dragon.ply", "close", [-0.05, 0.08, 0.06], [-0.05, 0.08, 0.0]),
+    between("buddha.ply", "close", [-0.012, 0.13, 0.065], [-0.012, 0.13, 0.0]),
 ];
 
 /// The word itself if a view of any scene has it as its name.
