@@ -54,7 +54,7 @@
 use core::ops::{Add, BitAnd, BitOr, Mul, Neg, Sub};
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, mask32x8};
+use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
 
 use crate::aabb::{Aabb, greater, lesser};
 use crate::mesh::Triangle;
@@ -73,11 +73,15 @@ const UNIT: f64 = 1.0 / (1 << 24) as f64;
 const UP: f64 = 1.0 + 1.0 / (1 << 20) as f64;
 
 /// [`UNIT`], with room for roundings in f32.
-pub(crate) const NEARBY_UNIT: f32 = 1.001 / 16_777_216.0;
+const NEARBY_UNIT: f32 = 1.001 / 16_777_216.0;
 /// [`MOST_REACH`].
-pub(crate) const NEARBY_REACH: f32 = f32::from_bits(0x5d80_0000); // 2^60
+const NEARBY_REACH: f32 = f32::from_bits(0x5d80_0000); // 2^60
 /// What the floor grows by with the square of the distance: 28 * (7 * 2^-53)^2, and a little more.
-pub(crate) const NEARBY_FLOOR: f32 = 2e-29;
+const NEARBY_FLOOR: f32 = 2e-29;
+
+/// Directions that are longer or shorter are not scaled in f32.
+pub(crate) const NEARBY_LONG: f32 = f32::from_bits(0x7e00_0000); // 2^125
+pub(crate) const NEARBY_SHORT: f32 = f32::from_bits(0x0180_0000); // 2^-124
 
 /// Numbers that the filter works on: one f32, or eight.
 pub(crate) trait Lanes:
@@ -249,6 +253,51 @@ impl RayFilter {
     }
 }
 
+impl<S: Simd> Filter<f32x8<S>> {
+    /// The filters of eight rays that start at their own origins, for triangles in a box. In f32: each
+    /// number of [`RayFilter::new`], or a little more.
+    #[inline(always)]
+    pub(crate) fn of_eight(
+        simd: S,
+        origin: [f32x8<S>; 3],
+        direction: [f32x8<S>; 3],
+        bounds: &Aabb,
+    ) -> Self {
+        let [x, y, z] = direction;
+        let longest = x.abs().max(y.abs()).max(z.abs());
+        let exponent = longest.bitcast::<u32x8<S>>() & 0x7f80_0000;
+        let scale = (u32x8::splat(simd, 0x7f00_0000) - exponent).bitcast::<f32x8<S>>();
+        let direction = [x * scale, y * scale, z * scale];
+        let middle = ((bounds.min + bounds.max) * 0.5).to_array();
+        let half = (bounds.size() * 0.5).to_array();
+        let [a, b, c] = origin;
+        let (a, b, c) = ((a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs());
+        let distance = (a + half[0]).max(b + half[1]).max(c + half[2]);
+        let filter = Self::scaled(simd, origin, direction, distance, bounds.size().max_element());
+        // What cannot be scaled is not dropped.
+        let is_scaled = longest.simd_gt(NEARBY_SHORT) & longest.simd_lt(NEARBY_LONG);
+        let none = f32x8::splat(simd, f32::INFINITY);
+        Self { slope: is_scaled.select(filter.slope, none), ..filter }
+    }
+
+    /// The same for directions that are scaled, whose origins no corner is farther from than `distance`.
+    #[inline(always)]
+    pub(crate) fn scaled(
+        simd: S,
+        origin: [f32x8<S>; 3],
+        direction: [f32x8<S>; 3],
+        distance: f32x8<S>,
+        extent: f32,
+    ) -> Self {
+        let sum = direction[0].abs() + direction[1].abs() + direction[2].abs();
+        let slope = sum * (distance * 29.0 + 19.0 * extent) * NEARBY_UNIT;
+        let is_in_range = distance.simd_le(NEARBY_REACH);
+        let slope = is_in_range.select(slope, f32x8::splat(simd, f32::INFINITY));
+        let floor = distance * distance * NEARBY_FLOOR + distance * f32::MIN_POSITIVE;
+        Self { origin, direction, slope, floor: floor + f32::MIN_POSITIVE }
+    }
+}
+
 impl<L: Lanes> Filter<L> {
     /// The lanes whose triangles the f64 test is sure to miss.
     #[inline(always)]
@@ -273,7 +322,6 @@ impl<L: Lanes> Filter<L> {
 }
 
 /// A triangle in all lanes.
-#[allow(dead_code, reason = "so far only tests have rays side by side")]
 #[inline(always)]
 pub(crate) fn splat<S: Simd>(simd: S, [a, b, c]: &Triangle) -> [[f32x8<S>; 3]; 3] {
     let lanes = |number: f32| f32x8::splat(simd, number);

@@ -5,7 +5,8 @@
 //!
 //! For every ray and triangle [`TriangleTest`] decides, so hits have the same bits.
 
-use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8};
 
 use super::bundle::{Bundle, PerRay, RAYS};
 use super::chords::Bounds;
@@ -13,8 +14,9 @@ use super::frusta::Frusta;
 use super::quarters::Format;
 use crate::aabb::greater;
 use crate::eight::{Eight, LANES, first_eight};
-use crate::filter::{RayFilter, Reach};
-use crate::mesh::TriangleMesh;
+use crate::filter::{self, Filter, RayFilter, Reach};
+use crate::mesh::{Triangle, TriangleMesh};
+use crate::pairs;
 use crate::ray::{Hit, Ray};
 use crate::triangle::TriangleTest;
 
@@ -156,15 +158,8 @@ impl Tests {
             let Some(&id) = ids.get(place) else { break };
             let Some(triangle) = mesh.triangle(id) else { continue };
             for (at, bundle) in bundles.iter_mut().enumerate() {
-                let mut rays = self.frusta.rays(simd, at, &triangle) & bundle.alive;
-                while rays != 0 {
-                    let lane = rays.trailing_zeros() as usize % RAYS;
-                    rays &= rays - 1;
-                    let test = bundle.one(lane);
-                    if test.passes(&triangle) {
-                        bundle.take::<ANY>(&test, mesh, id, lane);
-                    }
-                }
+                let rays = self.frusta.rays(simd, at, &triangle) & bundle.alive;
+                bundle.all::<S, ANY>(simd, mesh, id, &triangle, rays);
             }
         }
     }
@@ -196,6 +191,73 @@ impl Bundle {
         }
     }
 
+    /// Tests rays against one triangle, eight at a time.
+    #[inline(always)]
+    fn all<S: Simd, const ANY: bool>(
+        &mut self,
+        simd: S,
+        mesh: &TriangleMesh<'_>,
+        id: u32,
+        triangle: &Triangle,
+        rays: u64,
+    ) {
+        let corners = filter::splat(simd, triangle);
+        let (mut lanes, mut count) = ([0; LANES], 0);
+        for first in (0..RAYS).step_by(LANES) {
+            let some = rays >> first & 0xff;
+            if some == 0 {
+                continue;
+            }
+            let dropped = self.filter(simd, first).drops(&corners).to_bitmask();
+            let mut survivors = some & !dropped;
+            while survivors != 0 {
+                lanes[count % LANES] = first + survivors.trailing_zeros() as usize;
+                count += 1;
+                survivors &= survivors - 1;
+                if count == LANES {
+                    self.decide::<S, ANY>(simd, mesh, id, lanes, count);
+                    count = 0;
+                }
+            }
+        }
+        if count > 0 {
+            self.decide::<S, ANY>(simd, mesh, id, lanes, count);
+        }
+    }
+
+    /// The filters of eight rays.
+    #[inline(always)]
+    fn filter<S: Simd>(&self, simd: S, first: usize) -> Filter<f32x8<S>> {
+        let [a, b, c] = &self.origin;
+        let [d, e, f] = &self.direction;
+        let origin = [eight(simd, a, first), eight(simd, b, first), eight(simd, c, first)];
+        let direction = [eight(simd, d, first), eight(simd, e, first), eight(simd, f, first)];
+        Filter::of_eight(simd, origin, direction, &self.bounds)
+    }
+
+    /// Decides up to eight rays and a triangle at once.
+    #[inline(always)]
+    fn decide<S: Simd, const ANY: bool>(
+        &mut self,
+        simd: S,
+        mesh: &TriangleMesh<'_>,
+        id: u32,
+        lanes: [usize; LANES],
+        count: usize,
+    ) {
+        let ray = |at: usize| self.ray(lanes[at % LANES]);
+        let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
+        let decided = pairs::decide(simd, mesh, &rays, [id; LANES], count);
+        for (at, lane) in lanes.into_iter().enumerate().take(count) {
+            if decided.hits >> at & 1 == 1 {
+                self.keep::<ANY>(decided.hit(at, id), lane % RAYS);
+            } else if decided.unsure >> at & 1 == 1 {
+                let test = TriangleTest::with(&rays[at % LANES], RayFilter::NONE);
+                self.take::<ANY>(&test, mesh, id, lane % RAYS);
+            }
+        }
+    }
+
     /// Keeps the hit of a ray with a triangle if it is closer.
     #[inline(always)]
     fn take<const ANY: bool>(
@@ -209,8 +271,12 @@ impl Bundle {
         if id == self.primitive[lane] || ANY && self.members >> lane & 1 == 0 {
             return;
         }
-        // A miss never takes the place of a hit.
-        let hit = test.decide(mesh, id);
+        self.keep::<ANY>(test.decide(mesh, id), lane);
+    }
+
+    /// Keeps a hit if it is closer. A miss never takes the place of a hit.
+    #[inline(always)]
+    fn keep<const ANY: bool>(&mut self, hit: Hit, lane: usize) {
         let best = Hit { t: self.t_max[lane], primitive: self.primitive[lane], ..Hit::MISS };
         if hit.is_closer(&best) {
             self.t_max[lane] = hit.t;
@@ -227,14 +293,26 @@ impl Bundle {
     /// The test of one ray.
     #[inline(always)]
     fn one(&self, lane: usize) -> TriangleTest {
+        let ray = self.ray(lane);
+        let reach = Reach::of(&self.bounds, ray.origin);
+        let filter = RayFilter::new(ray.direction, ray.origin, 0.0, reach);
+        TriangleTest::with(&ray, filter)
+    }
+
+    /// One ray, as it was given.
+    #[inline(always)]
+    fn ray(&self, lane: usize) -> Ray {
         let lane = lane % RAYS;
         let xyz = |rows: &[PerRay; 3]| [rows[0][lane], rows[1][lane], rows[2][lane]];
         let (origin, direction) = (xyz(&self.origin), xyz(&self.direction));
-        let (t_min, t_max) = (self.t_min[lane], self.last[lane]);
-        let reach = Reach::of(&self.bounds, origin);
-        let filter = RayFilter::new(direction, origin, 0.0, reach);
-        TriangleTest::with(&Ray { origin, t_min, direction, t_max }, filter)
+        Ray { origin, t_min: self.t_min[lane], direction, t_max: self.last[lane] }
     }
+}
+
+/// A number of eight rays.
+#[inline(always)]
+fn eight<S: Simd>(simd: S, row: &PerRay, first: usize) -> f32x8<S> {
+    f32x8::simd_from(simd, row.as_chunks::<LANES>().0[first / LANES % (RAYS / LANES)])
 }
 
 /// How many rays of all bundles these are.

@@ -35,7 +35,11 @@ impl<A: FnMut(usize, &[Hit]), const ANY: bool> Kernel for Groups<'_, A, ANY> {
                 *ray = batch.read(at);
             }
             let mut alone = rays.prepare(simd, count, &bounds);
-            Group::<ANY> { bvh, mesh, rays, stack }.run(simd);
+            if rays.are_scattered(&bounds) {
+                alone |= rays.alive;
+            } else {
+                Group::<ANY> { bvh, mesh, rays, stack }.run(simd);
+            }
             answer(first, rays.hits.get(..count).unwrap_or_default());
             while alone != 0 {
                 answer(first + alone.trailing_zeros() as usize, &[]);

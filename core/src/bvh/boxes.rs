@@ -109,7 +109,7 @@ impl<S: Simd> Boxes<S> {
             far = far.min(a.max(b).max(c.max(d)));
         }
         let far = (far * f32x8::splat(simd, WIDER)).min(beam.end);
-        !near.simd_gt(far).to_bitmask() as u32 & 0xff
+        bits(!near.simd_gt(far))
     }
 }
 
@@ -117,4 +117,11 @@ impl<S: Simd> Boxes<S> {
 #[inline(always)]
 pub(crate) fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
     [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)]
+}
+
+/// A mask as bits.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "eight bits")]
+pub(crate) fn bits<S: Simd>(mask: mask32x8<S>) -> u32 {
+    mask.to_bitmask() as u32
 }

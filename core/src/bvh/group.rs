@@ -21,7 +21,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};
 
 use super::Bvh;
-use super::boxes::Boxes;
+use super::boxes::{Boxes, bits};
 use super::node::{Child, WIDTH};
 use super::rays::{GROUP, OCTETS, Rays};
 use super::walk::STACK;
@@ -101,12 +101,12 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                     };
                     // Push what is met, the nearest last.
                     let base = top;
-                    for slot in 0..WIDTH {
-                        if masks[slot] == 0 {
+                    for (slot, (&rays, &near)) in (0..).zip(masks.iter().zip(&near)) {
+                        if rays == 0 {
                             continue;
                         }
-                        let place = number << 3 | slot as u32;
-                        let waiting = Waiting { place, near: near[slot], rays: masks[slot] };
+                        let place = number << 3 | slot;
+                        let waiting = Waiting { place, near, rays };
                         push::<ANY>(stack, &mut top, base, waiting);
                     }
                 }
@@ -120,7 +120,7 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                             let ray = rest.trailing_zeros();
                             rest &= rest - 1;
                             let filter = rays.filter(simd, ray);
-                            let dropped = filter.drops(&triangles.corners).to_bitmask() as u32;
+                            let dropped = bits(filter.drops(&triangles.corners));
                             let mut survivors = !dropped & triangles.used;
                             while survivors != 0 {
                                 let lane = survivors.trailing_zeros();
@@ -133,16 +133,15 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                         for &id in ids {
                             let Some(triangle) = mesh.triangle(id) else { continue };
                             let corners = crate::filter::splat(simd, &triangle);
-                            for octet in 0..OCTETS {
-                                let of_octet = (mask >> (8 * octet)) as u8;
+                            for (octet, first) in (0..OCTETS).zip((0..).step_by(8)) {
+                                let of_octet = mask >> (8 * octet) & 0xff;
                                 if of_octet == 0 {
                                     continue;
                                 }
-                                let dropped =
-                                    rays.filters(simd, octet).drops(&corners).to_bitmask();
-                                let mut survivors = !dropped as u8 & of_octet;
+                                let dropped = bits(rays.filters(simd, octet).drops(&corners));
+                                let mut survivors = of_octet & !u64::from(dropped);
                                 while survivors != 0 {
-                                    let ray = 8 * octet as u32 + survivors.trailing_zeros();
+                                    let ray = first + survivors.trailing_zeros();
                                     survivors &= survivors - 1;
                                     rays.candidate::<S, ANY>(simd, mesh, ray, id);
                                 }
@@ -185,13 +184,13 @@ fn one_by_one<S: Simd>(
     let far_away = f32x8::splat(simd, f32::INFINITY);
     let mut least = far_away;
     let mut halves = [zero; 2];
-    for (half, met_by) in halves.iter_mut().enumerate() {
-        let mut rest = (mask >> (32 * half)) as u32;
+    for (first, met_by) in (0..).step_by(32).zip(&mut halves) {
+        let mut rest = mask >> first & 0xffff_ffff;
         while rest != 0 {
             let bit = rest.trailing_zeros();
             rest &= rest - 1;
-            let (near, met) = boxes.meet(simd, &rays.slab(simd, 32 * half as u32 + bit));
-            *met_by = *met_by | met.select(u32x8::splat(simd, 1 << bit), zero);
+            let (near, met) = boxes.meet(simd, &rays.slab(simd, first + bit));
+            *met_by |= met.select(u32x8::splat(simd, 1 << bit), zero);
             least = least.min(met.select(near, far_away));
         }
     }
@@ -227,7 +226,7 @@ fn eight_by_eight<S: Simd>(
                 continue;
             }
             let (near, met) = child.meet(simd, &rays.slabs(simd, octet));
-            masks[slot] |= (met.to_bitmask() as u64 & of_octet) << (8 * octet);
+            masks[slot] |= (u64::from(bits(met)) & of_octet) << (8 * octet);
             least = least.min(met.select(near, far_away));
         }
         let lanes: [f32; 8] = least.into();

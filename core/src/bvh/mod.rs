@@ -44,7 +44,7 @@ pub(crate) use layout::MOST_TRIANGLES;
 use node::{LEAF, Node};
 pub(crate) use slab::Slab;
 pub(crate) use validate::proof_bytes;
-pub(crate) use walk::{OneRay, SMALL_STACK, STACK, Waiting};
+pub(crate) use walk::{OneRay, SMALL_STACK, STACK};
 
 /// Levels of nodes, at most: 20 by SAH and 9 that halve roots ([`top`]), 32 of a subtree, whose nodes take
 /// seven triangles each ([`subtree`]).

@@ -120,30 +120,6 @@ impl Node {
         Child::Leaf { first, count: (counts >> shift & 0xff) as u32 }
     }
 
-    /// The box of child `slot`, rounded outwards.
-    pub(crate) fn child_box(&self, slot: usize) -> Aabb {
-        let side = |sides: &[[u8; WIDTH]]| {
-            let bound = |axis: usize| {
-                let bound = sides.get(axis).and_then(|row| row.get(slot));
-                f32::from(bound.copied().unwrap_or(0))
-            };
-            Vec3A::new(bound(0), bound(1), bound(2))
-        };
-        let (low, high) = self.bounds.split_at(3);
-        let (origin, step) = (Vec3A::from_array(self.origin()), Vec3A::from_array(self.steps()));
-        let [min, max] = [side(low) * step + origin, side(high) * step + origin];
-        Aabb {
-            min: Vec3A::from_array(min.to_array().map(f32::next_down)),
-            max: Vec3A::from_array(max.to_array().map(f32::next_up)),
-        }
-    }
-
-    /// How many ids its leaves have.
-    pub(crate) fn id_count(&self) -> u32 {
-        let counts = u64::from_le_bytes(self.counts);
-        (counts.wrapping_mul(0x0101_0101_0101_0101) >> 56) as u32
-    }
-
     /// Writes the boxes of the children that there are, which `bounds` holds. No step is smaller than
     /// that of a box of size `least`.
     pub(crate) fn set_boxes(&mut self, bounds: &Aabb, boxes: &[Aabb; WIDTH], least: f32) {

@@ -3,12 +3,12 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};
 
-use super::boxes::{Beam, Slabs, splat};
-use super::slab::{LONG, SHORT, STEEP, TINY, WIDER};
+use super::boxes::{Beam, Slabs, bits, splat};
+use super::slab::{STEEP, TINY, WIDER};
 use crate::aabb::Aabb;
 use crate::approach::FAR_EXTENTS;
 use crate::eight::columns;
-use crate::filter::{Filter, NEARBY_FLOOR, NEARBY_REACH, NEARBY_UNIT, RayFilter};
+use crate::filter::{Filter, NEARBY_LONG, NEARBY_SHORT, RayFilter};
 use crate::mesh::TriangleMesh;
 use crate::pairs;
 use crate::ray::{Hit, INVALID_ID, Ray};
@@ -43,12 +43,15 @@ pub(crate) struct Rays {
     floor: Row,
     /// From `t` to distances.
     scale: Row,
-    rays: [Ray; GROUP],
+    given: [Ray; GROUP],
     pub(crate) hits: [Hit; GROUP],
     /// Pairs of a ray and a triangle that passed the filter.
     pairs: [(u32, u32); PAIRS],
     pair_count: usize,
 }
+
+/// The spread of scattered rays, in extents of the scene: that of origins a quarter of it apart.
+const SCATTERED: f32 = 8.0 * UNIT / 4.0;
 
 /// Pairs that are decided at once.
 const PAIRS: usize = 8;
@@ -74,7 +77,7 @@ impl Rays {
             slope: ZEROS,
             floor: ZEROS,
             scale: ZEROS,
-            rays: [ray; GROUP],
+            given: [ray; GROUP],
             hits: [Hit::MISS; GROUP],
             pairs: [(0, 0); PAIRS],
             pair_count: 0,
@@ -83,12 +86,7 @@ impl Rays {
 
     /// Where rays are put before [`prepare`](Self::prepare).
     pub(crate) fn slots(&mut self) -> &mut [Ray] {
-        &mut self.rays
-    }
-
-    /// A ray of the group.
-    pub(crate) fn ray(&self, at: usize) -> &Ray {
-        &self.rays[at % GROUP]
+        &mut self.given
     }
 
     /// Makes the first `count` rays ready, to be asked about triangles in a box. Returns those that must be
@@ -106,7 +104,7 @@ impl Rays {
         self.hits = [Hit::MISS; GROUP];
         self.pair_count = 0;
         for octet in 0..count.div_ceil(8).min(OCTETS) {
-            let rays = self.rays.as_chunks::<8>().0[octet];
+            let rays = self.given.as_chunks::<8>().0[octet];
             let (origin, t_min, direction, t_max) = columns(simd, &rays);
             let [x, y, z] = direction;
             let longest = x.abs().max(y.abs()).max(z.abs());
@@ -123,11 +121,11 @@ impl Rays {
             let is_valid = is_finite & longest.simd_gt(zero) & t_min.simd_le(t_max);
             let [a, b, c] = [(a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs()];
             let is_near = a.max(b).max(c).simd_le(near)
-                & longest.simd_gt(f32x8::splat(simd, SHORT))
-                & longest.simd_lt(f32x8::splat(simd, LONG));
+                & longest.simd_gt(f32x8::splat(simd, NEARBY_SHORT))
+                & longest.simd_lt(f32x8::splat(simd, NEARBY_LONG));
             let of_count = bits_below(count - 8 * octet);
-            let valid = is_valid.to_bitmask() as u64 & of_count;
-            let ready = (is_valid & is_near).to_bitmask() as u64 & of_count;
+            let valid = u64::from(bits(is_valid)) & of_count;
+            let ready = u64::from(bits(is_valid & is_near)) & of_count;
             *alive |= ready << (8 * octet);
             *special |= (valid & !ready) << (8 * octet);
 
@@ -154,24 +152,25 @@ impl Rays {
 
             // What the filter may be wrong by: see its proof.
             let distance = (a + half[0]).max(b + half[1]).max(c + half[2]);
-            let [u, v, w] = [scaled[0].abs(), scaled[1].abs(), scaled[2].abs()];
-            let reach = distance * 29.0 + 19.0 * extent;
-            let slope = (u + v + w) * reach * NEARBY_UNIT;
-            let is_in_range = distance.simd_le(f32x8::splat(simd, NEARBY_REACH));
-            self.slope[octet] = is_in_range.select(slope, finite).into();
-            self.floor[octet] =
-                (distance * distance * NEARBY_FLOOR + distance * TINY + TINY).into();
+            let filter = Filter::scaled(simd, origin, scaled, distance, extent);
+            self.slope[octet] = filter.slope.into();
+            self.floor[octet] = filter.floor.into();
         }
         self.alive = *alive;
         self.settle();
         *special
     }
 
+    /// Returns true if origins lie so far apart that rays share little: alone they are faster.
+    pub(crate) fn are_scattered(&self, bounds: &Aabb) -> bool {
+        self.spread > SCATTERED * bounds.size().max_element()
+    }
+
     /// Measures origins from that of the first ray.
     #[inline(always)]
     fn settle(&mut self) {
         let first = self.alive.trailing_zeros() as usize % GROUP;
-        self.center = self.rays[first].origin;
+        self.center = self.given[first].origin;
         let mut farthest = 0.0_f32;
         for axis in 0..3 {
             let center = self.center[axis];
@@ -236,7 +235,7 @@ impl Rays {
     pub(crate) fn filter<S: Simd>(&self, simd: S, ray: u32) -> Filter<f32x8<S>> {
         let [d, e, f] = &self.direction;
         Filter {
-            origin: splat(simd, self.rays[ray as usize % GROUP].origin),
+            origin: splat(simd, self.given[ray as usize % GROUP].origin),
             direction: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
             slope: f32x8::splat(simd, get(&self.slope, ray)),
             floor: f32x8::splat(simd, get(&self.floor, ray)),
@@ -258,12 +257,12 @@ impl Rays {
     #[inline(always)]
     pub(crate) fn ending_behind<S: Simd>(&self, simd: S, distance: f32) -> u64 {
         let distance = f32x8::splat(simd, distance);
-        let mut bits = 0;
+        let mut behind = 0;
         for (octet, end) in self.end.iter().enumerate() {
-            let is_behind = f32x8::simd_from(simd, *end).simd_ge(distance).to_bitmask();
-            bits |= (is_behind as u64 & 0xff) << (8 * octet);
+            let is_behind = bits(f32x8::simd_from(simd, *end).simd_ge(distance));
+            behind |= u64::from(is_behind) << (8 * octet);
         }
-        bits
+        behind
     }
 
     /// Notes a pair that passed the filter.
@@ -305,7 +304,7 @@ impl Rays {
         count: usize,
     ) {
         let pairs = self.pairs;
-        let ray = |at: usize| self.rays[pairs[at].0 as usize % GROUP];
+        let ray = |at: usize| self.given[pairs[at].0 as usize % GROUP];
         let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
         let id = |at: usize| pairs[at].1;
         let ids = [id(0), id(1), id(2), id(3), id(4), id(5), id(6), id(7)];
@@ -328,7 +327,7 @@ impl Rays {
     #[inline(never)]
     fn decide_one<const ANY: bool>(&mut self, mesh: &TriangleMesh<'_>, ray: u32, id: u32) {
         let at = ray as usize % GROUP;
-        let test = TriangleTest::with(&self.rays[at], RayFilter::NONE);
+        let test = TriangleTest::with(&self.given[at], RayFilter::NONE);
         let hit = test.decide(mesh, id);
         if hit.primitive != INVALID_ID {
             self.found::<ANY>(ray, hit);

@@ -22,7 +22,7 @@
 
 use crate::aabb::{Aabb, greater};
 use crate::approach::{Approach, FAR_EXTENTS};
-use crate::filter::RayFilter;
+use crate::filter::{NEARBY_LONG, NEARBY_SHORT, RayFilter};
 use crate::ray::{Ray, round};
 
 /// The inverse of a direction that is zero, or as good as zero.
@@ -33,10 +33,6 @@ pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 
 /// More than what underflows on the way to a distance.
 pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
-
-/// Directions that are longer or shorter are not divided by in f32.
-pub(crate) const LONG: f32 = f32::from_bits(0x7e00_0000); // 2^125
-pub(crate) const SHORT: f32 = f32::from_bits(0x0180_0000); // 2^-124
 
 /// A ray, ready for boxes.
 #[derive(Debug, Clone, Copy)]
@@ -68,7 +64,7 @@ impl Slab {
         let (a, b, c) = (away(a, 0), away(b, 1), away(c, 2));
         let limit = FAR_EXTENTS * size.max_element();
         let is_near = a <= limit && b <= limit && c <= limit;
-        let is_ray = longest > SHORT && longest < LONG && begin <= ray.t_max;
+        let is_ray = longest > NEARBY_SHORT && longest < NEARBY_LONG && begin <= ray.t_max;
         // A NaN may hide beside the longest component.
         let is_number = x + y + z <= f32::MAX;
         if !(is_near && is_ray && is_number) {

@@ -86,8 +86,8 @@ impl<S: Simd> Wide<S> {
     fn meet(&self, simd: S, node: &Node, end: f32) -> (u32, f32x8<S>) {
         let origin = node.origin();
         let word = u32x8::splat(simd, node.word);
-        let near = self.sides(simd, node, self.near);
-        let far = self.sides(simd, node, self.far);
+        let near = sides(simd, node, self.near);
+        let far = sides(simd, node, self.far);
         // The exponents of x, y and z stand in the three low bytes.
         let steps = [word << 23, word << 15, word << 7];
         let mut distances = [(near[0], far[0]); 3];
@@ -108,16 +108,19 @@ impl<S: Simd> Wide<S> {
         let met = !missed as u32 & 0xff;
         (met, near)
     }
+}
 
-    /// Three rows of sides as numbers.
-    #[inline(always)]
-    fn sides(&self, simd: S, node: &Node, rows: [usize; 3]) -> [f32x8<S>; 3] {
-        let row = |row: usize| node.bounds.get(row).copied().unwrap_or([0; WIDTH]);
-        let [x, y, z] = [row(rows[0]), row(rows[1]), row(rows[2])];
-        let (x, y) = bytes(simd, x, y);
-        let (z, _) = bytes(simd, z, z);
-        [x, y, z]
-    }
+/// Three rows of sides as numbers.
+#[inline(always)]
+fn sides<S: Simd>(simd: S, node: &Node, [x, y, z]: [usize; 3]) -> [f32x8<S>; 3] {
+    let (x, y) = bytes(simd, row(node, x), row(node, y));
+    let (z, _) = bytes(simd, row(node, z), row(node, z));
+    [x, y, z]
+}
+
+#[inline(always)]
+fn row(node: &Node, row: usize) -> [u8; WIDTH] {
+    node.bounds.get(row).copied().unwrap_or([0; WIDTH])
 }
 
 /// Twice eight bytes as numbers.
@@ -235,7 +238,8 @@ impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
                 let Some(below) = top.checked_sub(1) else { return true };
                 top = below;
                 let Some(&waiting) = stack.get(top) else { return true };
-                if !(f32::from_bits((waiting >> 32) as u32) > end) {
+                let is_behind = f32::from_bits((waiting >> 32) as u32) > end;
+                if !is_behind {
                     #[expect(clippy::cast_possible_truncation, reason = "the low half")]
                     let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
                     child =
