@@ -197,12 +197,10 @@ pub unsafe extern "C" fn hgrid_closest_point(
 /// }
 /// ```
 ///
-/// How far above the plane a start lies follows from what a triangle test may round: 1 / 2^20 of the
-/// distance to the triangle's farthest corner. A ray nearly along the plane may still hit the triangle,
-/// as the normal is rounded, and so may one whose direction is 10^38 times as long as that. A larger
-/// neighbour, from twice the size on, may be hit beside the common edge. A triangle without area,
-/// or a needle thinner than 1e-9 of its length, has no normal to rely on: without any it is the
-/// one that faces the ray. `is_front` is what `cull` goes by, but for triangles seen nearly edge-on.
+/// A start lies above the plane by 1 / 2^20 of the distance to the triangle's farthest corner, far more
+/// than a test may be off. A ray nearly along the plane may still hit the triangle, as the normal is
+/// rounded. A triangle without area, or a needle thinner than 1e-9 of its length, has no normal to
+/// rely on: without any it is the one that faces the ray. `is_front` is what `cull` goes by, but for triangles seen nearly edge-on.
 ///
 /// Threads: any number of calls and queries on the same grid at once.
 ///

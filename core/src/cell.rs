@@ -3,20 +3,21 @@
 //! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis (the
 //! only cell of a brick grid on an axis may be thicker than the box). A triangle is inserted into
 //! every cell that its own box, grown by a margin, overlaps. The margin is what makes float error
-//! harmless everywhere else: the walk may be a few roundings off at a border, and the hit a few
-//! roundings off the triangle, and still the cell lists the triangle.
+//! harmless everywhere else: the walk may be a few roundings off at a border, and the ray that the
+//! triangle test sees a few roundings off the walk's, and still the cell lists the triangle.
 //!
 //! ```text
 //! error of             bound, in box extents E        why
 //! spreading             4 * 2^-24                     v - min, * cells per unit, + margin
-//! the triangle test    25 * 2^-24                     vertex - origin at up to 5 extents, shear
+//! the triangle test     8 * 2^-24                     a hit's t outside of the range (triangle.rs)
+//! a far origin         16 * 2^-24                     2^-49 of 2^29 extents (approach.rs)
 //! the walk              4 * 2^-24                     base, cell * delta, their sum
 //! quarters of a cell    4 * 2^-24                     position + rate * t (two margins: a line's, a
 //!                                                     triangle's)
 //! a tile's lines       60 * 2^-24                     start - slope * zero, origin 4.5 extents off (two
 //!                                                     margins: a line's, a triangle's)
 //! the planes of a tile 16 * 2^-24                     slope * k + start (likewise)
-//! a moved far origin   1/2 ulp of the coordinate      see approach.rs
+//! a moved far origin   1 ulp of the coordinate        half an ulp on two axes (approach.rs)
 //! margin               64 * 2^-24 + 1 ulp of the largest coordinate (pad: twice the margin)
 //! ```
 

@@ -84,8 +84,8 @@ impl Line {
     /// The line of a ray that was brought to the lattice's box; `None` if it ends before.
     #[inline]
     pub(crate) fn new(lattice: &Lattice, ray: &Ray, approach: &Approach) -> Option<Self> {
-        // A `t` is rounded to f32 before it is compared: what it was
-        // before may lie half an ulp out.
+        // Hits are sought from a reported `t` on, too, which was rounded
+        // to f32: before, it may lie half an ulp out.
         let start = approach.near.max(f64::from(ray.t_min.next_down()) - approach.t);
         let end = approach.far.min(f64::from(ray.t_max.next_up()) - approach.t);
         if start > end {

@@ -44,7 +44,8 @@
 //!
 //! ```text
 //! slope     u D (29 R + 19 X) + 32 slack       29 and 19 for 28 and 18: higher orders, 32 * 7 * 2^-53 R
-//! floor     28 s^2 + 2^-140 (R + 1)            underflow: 18 R + 21 products, each off by 2^-150
+//! floor     28 s^2 + 2^-120 (R + 1)            underflow: 18 R + 21 products, each off by 2^-126 at most,
+//!                                              denormal or flushed to zero
 //! ```
 //!
 //! With R <= 2^60 nothing overflows: no intermediate value exceeds 12 * 2^122 + 24 * 2^121 < 2^127.
@@ -63,7 +64,7 @@ use crate::ray::round;
 const MOST_REACH: f64 = f64::from_bits(0x43b0_0000_0000_0000); // 2^60
 
 /// More than all that underflows, for each unit of distance.
-const LEAST: f64 = f64::from_bits(0x3730_0000_0000_0000); // 2^-140
+const LEAST: f64 = f64::from_bits(0x3870_0000_0000_0000); // 2^-120
 
 /// 2^-24: how much rounding to f32 changes a number, in parts of it.
 const UNIT: f64 = 1.0 / (1 << 24) as f64;

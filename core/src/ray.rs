@@ -9,7 +9,7 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// A ray, or the part of it between `t_min` and `t_max`: 32 bytes in DXR order.
 ///
 /// The direction has any length, and every `t` is a multiple of it. A hit is accepted for
-/// `t_min <= t <= t_max`, closed at both ends. A ray with a NaN anywhere, an infinite origin or
+/// `t_min <= t <= t_max`, closed at both ends, and decided exactly: see [`Hit`]. A ray with a NaN anywhere, an infinite origin or
 /// direction, a zero direction or `t_min > t_max` hits nothing.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -51,7 +51,21 @@ impl Ray {
 /// Where a ray meets a triangle: 16 bytes.
 ///
 /// The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
-/// triangle's vertices `a`, `b`, `c`, up to rounding.
+/// triangle's vertices `a`, `b`, `c`, up to rounding. A hit is a function of the ray and the triangle
+/// alone: other triangles, the method and the box of the grid do not change a bit of it.
+///
+/// There is no epsilon. Let L be the largest difference of a coordinate between the origin and a
+/// vertex, Z the range of `t` between the vertices. The hit is that of a triangle whose vertices lie
+/// up to 2^-50 L across the ray from where they are. Of this hit `u` and `v` are off by no more than
+/// (2^-24 + 2^-38) of their value, `t` by no more than 2^-24 |t| + 2^-38 (|t| + Z); below 1.2e-38 by
+/// 2^-149. Triangles that share a vertex share the place where it lies, so nothing slips between them.
+///
+/// The range is decided exactly, for all finite numbers, by the point where the ray's line meets the
+/// plane of the vertices as they are: a ray that starts above a plane and leaves it does not hit it,
+/// however close it starts. Of a triangle whose vertices all lie inside the range nothing else is
+/// asked. The `t` that is reported lies in the range, too. The proof is the head of `triangle.rs`. An
+/// origin more than 2^50 times as far away as a triangle is large cannot tell the vertices apart, and
+/// misses it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Hit {

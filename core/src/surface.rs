@@ -1,17 +1,17 @@
 //! Where a ray met the mesh, and where the next one starts.
 //!
 //! A hit's point is on its triangle but for rounding, so a ray that starts there may hit the triangle
-//! that it leaves. How far above the plane a start has to lie follows from what the triangle test
-//! rounds, and so depends on the triangle alone, not on the scene's scale:
+//! that it leaves. A start above the plane does not: the triangle test decides exactly on which side
+//! of `t_min` the plane is met. How far above depends on the triangle alone, not on the scene's scale:
 //!
 //! ```text
 //! corners relative to the start, L the largest coordinate of these:
-//!   corner - start, shear, shear * z and their difference, in f32        6 * 2^-24 L on each of two axes
-//!   so t belongs to a point of the plane that is off the ray by at most  8.5 * 2^-24 L
-//!   what a start is lifted by                                            16 * 2^-24 L
+//!   the point, in f64, is off the plane by                    6 * 2^-53 L
+//!   a triangle seen edge on may be hit from as far off as     2^-50 L      (triangle.rs)
+//!   what a start is lifted by                                 2^-20 L
 //! ```
 //!
-//! What is above the plane by more than the test is off, sees the plane behind it: `t` is negative. The
+//! The lift is larger than it has to be: it is also there for renderers that round the start again. The
 //! start is rounded away from the plane on each axis, so rounding takes nothing from the lift.
 
 use glam::DVec3;
@@ -47,9 +47,7 @@ impl TriangleMesh<'_> {
     ///
     /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from
     /// `below` to the other side: with `t_min` 0, at any scale, in single queries and batches. Rays
-    /// nearly along the plane may, as the normal is rounded, and so may directions 10^38 times as long
-    /// as the lift, for which `t` is rounded to 0. A larger neighbour, from twice the size on, may be
-    /// hit beside the common edge, within the rounding of its own size.
+    /// nearly along the plane may, as the normal is rounded.
     ///
     /// A triangle without area, or a needle thinner than 1e-9 of its length, has no normal that could
     /// be relied on; without any the normal is the one that faces the ray. `is_front` is what

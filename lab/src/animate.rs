@@ -14,14 +14,14 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result};
-use hgrid_core::{Config, Error, Grid, Hit, Region, TriangleMesh, sizes_with};
-use memmap2::MmapMut;
+use hgrid_core::{Config, Grid, Hit, TriangleMesh};
 use serde::Serialize;
 
 use crate::cli::AnimateArgs;
 use crate::image;
-use crate::measure::{median, memory};
+use crate::measure::median;
 use crate::progress::Progress;
+use crate::regions::Regions;
 use crate::scene::{Bounds, Scene};
 use crate::shade::{Rgb, Shader, normal_of};
 use crate::threads::Threads;
@@ -43,7 +43,7 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
             .with_context(|| format!("cannot write into `{}`", folder.display()))?;
     }
     let scene = Scene::load(&args.scene)?;
-    let tiles = args.picture.tiles(&scene);
+    let tiles = args.picture.tiles(&scene)?;
     let config = args.tuning.config(args.method);
     let threads = Threads::new(args.threads)?;
     let mut progress = Progress::new("frames", args.frames.into());
@@ -156,22 +156,22 @@ fn animate(
     let wave = Wave::new(scene);
     let mut positions = scene.positions.clone();
     let mut pixels = vec![[0; 3]; plan.tiles.pixels()];
-    let mut arena = None;
+    let mut kept = None;
     let (mut frames, mut index_bytes, mut grown) = (Vec::new(), 0, 0);
     for number in 0..plan.frames {
         let start = Instant::now();
         wave.at(scene, f64::from(number) / f64::from(plan.frames), &mut positions);
         let mesh = TriangleMesh::new(&positions, &scene.indices)?;
-        let mut memory = match arena.take() {
-            Some(memory) => memory,
-            None => Memory::of(&mesh, plan)?,
+        let mut regions = match kept.take() {
+            Some(regions) => regions,
+            None => plan.threads.parallel(|all| Regions::empty(&mesh, &plan.config, all))?,
         };
 
         let building = Instant::now();
-        grown += memory.build(mesh, plan)?;
+        grown += plan.threads.parallel(|all| regions.rebuild(mesh, &plan.config, all))?;
         let build_ms = milliseconds(building);
 
-        let grid = Grid::open(&memory.index, mesh)?;
+        let grid = Grid::open(&regions.index, mesh)?;
         index_bytes = index_bytes.max(grid.blob_bytes());
         let rendering = Instant::now();
         render(&grid, plan, &mut pixels);
@@ -181,7 +181,7 @@ fn animate(
             frame_ms: milliseconds(start),
         });
         show(number, &pixels)?;
-        arena = Some(memory);
+        kept = Some(regions);
         progress.advance(1);
     }
     let middle = |time: fn(&Frame) -> f64| median(&frames.iter().map(time).collect::<Vec<_>>());
@@ -204,40 +204,6 @@ fn animate(
 
 fn milliseconds(start: Instant) -> f64 {
     1000.0 * start.elapsed().as_secs_f64()
-}
-
-/// The memory of all frames.
-struct Memory {
-    index: MmapMut,
-    scratch: MmapMut,
-}
-
-impl Memory {
-    /// Enough for a mesh as it is now.
-    fn of(mesh: &TriangleMesh<'_>, plan: &Plan<'_>) -> Result<Self> {
-        let sizes = plan.threads.parallel(|all| sizes_with(mesh, &plan.config, &mut [], all))?;
-        Ok(Self { index: memory(sizes.index_bytes)?, scratch: memory(sizes.scratch_bytes)? })
-    }
-
-    /// Builds, in larger memory if a frame needs it; how often that was so.
-    fn build(&mut self, mesh: TriangleMesh<'_>, plan: &Plan<'_>) -> Result<u32> {
-        let mut grown = 0;
-        loop {
-            let Self { index, scratch } = self;
-            let built = plan.threads.parallel(|all| {
-                Grid::build_with(mesh, &plan.config, index, scratch, all).map(drop)
-            });
-            match built {
-                Ok(()) => return Ok(grown),
-                Err(Error::OutOfMemory { region, needed_bytes, .. }) => {
-                    let larger = memory(usize::try_from(needed_bytes)?)?;
-                    *(if region == Region::Index { index } else { scratch }) = larger;
-                    grown += 1;
-                }
-                Err(error) => return Err(error.into()),
-            }
-        }
-    }
 }
 
 /// Traces and shades all pixels, a band of tiles at a time.

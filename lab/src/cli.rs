@@ -2,12 +2,15 @@
 
 use std::path::PathBuf;
 
+use anyhow::Result;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use hgrid_core::{Config, Control, Method};
 
-use crate::camera::{Camera, Point, Up, View};
+use crate::camera::{Aim, Camera, Lens, Point, Up, View, named};
+use crate::compare::first::COMMAND as FIRST_BUILD;
 use crate::compare::peers::Peer;
+use crate::compare::workloads::Workload;
 use crate::heat::Counter;
 use crate::scene::Scene;
 use crate::tiles::Tiles;
@@ -42,13 +45,14 @@ Examples:
   hgrid render bunny.ply --shading heat --counter primitive-tests --heat-top 50
   hgrid render procedural:stage --view 40,15
   hgrid render stadium.ply --up z --view three-quarter
-  hgrid render sponza.ply --eye 0,3,0 --target 10,3,0
+  hgrid render sponza.ply --view inside      the same as --eye 0,3,0 --target 10,3,0
   hgrid render bunny.ply --repeat 9 --json   medians, for programs";
 
 const TABLE_EXAMPLES: &str = "\
 Examples:
   hgrid table bunny.ply dragon.ply buddha.ply
   hgrid table procedural:knot:100K --size 512 --repeat 9
+  hgrid table sponza.ply --eye 0,3,0 --target 10,3,0 --fov 60
   hgrid table dragon.ply --methods one-level,fixed --macrocell-factor 4
   hgrid table dragon.ply --markdown > table.md
   hgrid table dragon.ply --json > table.json     every single time, and the machine
@@ -68,7 +72,8 @@ every scene and method) as .svg, as .png and, the numbers alone, as .json.";
 const COMPARE_EXAMPLES: &str = "\
 Examples:
   hgrid compare bunny.ply dragon.ply buddha.ply
-  hgrid compare dragon.ply --methods one-level --peers embree-low,embree-medium
+  hgrid compare dragon.ply --peers embree-low,embree-medium --workloads primary,ao,bounce
+  hgrid compare sponza.ply --view inside
   hgrid compare bunny.ply dragon.ply --markdown --json compare.json -o pictures
 
 This needs a program with the peers in it; lab/COMPARE.md tells how they are set up and measured:
@@ -95,7 +100,15 @@ const VIEWS: &str = "\
 Views:
   front, back, left, right, top, bottom, three-quarter,
   or AZIMUTH,ELEVATION in degrees: 0,0 is the front, 90,0 the right, 0,90 the top.
-  Without one, scenes are seen from the front and flat ones from above.";
+  Without one, scenes are seen from the front and flat ones from above.
+  Instead of a view: a point to look --eye from, and one to look at (--target).
+Named views:
+";
+
+/// What is said about views, and the named ones.
+fn views() -> String {
+    VIEWS.to_owned() + &named::list()
+}
 
 /// Hashed grids for ray tracing: build, render, measure.
 #[derive(Debug, Parser)]
@@ -110,20 +123,23 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Renders a scene with one thread and one ray per pixel, and prints what it took
-    #[command(after_help = [RENDER_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
+    #[command(after_help = [RENDER_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Render(RenderArgs),
     /// Measures every method on every scene: the paper's Table 1
-    #[command(after_help = [TABLE_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
+    #[command(after_help = [TABLE_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Table(TableArgs),
     /// Measures and draws the paper's figures: times against density, and bars for every method
-    #[command(after_help = [FIGURES_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
+    #[command(after_help = [FIGURES_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Figures(FiguresArgs),
     /// Deforms a mesh and builds and renders it again for every frame, in the same memory
-    #[command(after_help = [ANIMATE_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
+    #[command(after_help = [ANIMATE_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Animate(AnimateArgs),
     /// Measures every method and other ray tracers, its peers, over the same rays
-    #[command(after_help = [COMPARE_EXAMPLES, SCENES, VIEWS].join("\n\n"))]
+    #[command(after_help = [COMPARE_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Compare(CompareArgs),
+    /// Builds once with one system: `compare` starts a new process for each first build
+    #[command(name = FIRST_BUILD, hide = true)]
+    FirstBuild(FirstBuildArgs),
 }
 
 /// What to render and how.
@@ -147,12 +163,6 @@ pub struct RenderArgs {
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub picture: Picture,
-    /// Look from this point instead, as X,Y,Z
-    #[arg(long, value_name = "X,Y,Z", conflicts_with = "view", allow_hyphen_values = true)]
-    pub eye: Option<Point>,
-    /// Look at this point [default: the middle of the scene]
-    #[arg(long, value_name = "X,Y,Z", requires = "eye", allow_hyphen_values = true)]
-    pub target: Option<Point>,
     /// What the colours mean
     #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
     pub shading: Shading,
@@ -180,14 +190,6 @@ impl RenderArgs {
     pub fn config(&self) -> Config {
         let config = self.tuning.config(self.method);
         Config { density: self.density.unwrap_or(config.density), ..config }
-    }
-
-    /// The picture that the words ask for.
-    #[must_use]
-    pub fn tiles(&self, scene: &Scene) -> Tiles {
-        let Some(eye) = self.eye else { return self.picture.tiles(scene) };
-        let target = self.target.unwrap_or_else(|| Point::centre_of(scene.framed_bounds()));
-        Tiles { camera: Camera::between(eye, target, self.picture.up), size: self.picture.size }
     }
 }
 
@@ -271,6 +273,9 @@ pub struct CompareArgs {
     /// The other structures, between commas [default: all that this program has]
     #[arg(long, value_name = "PEERS", value_delimiter = ',', value_enum)]
     pub peers: Vec<Peer>,
+    /// What is asked of them, between commas [default: all]
+    #[arg(long, value_name = "WORKLOADS", value_delimiter = ',', value_enum)]
+    pub workloads: Vec<Workload>,
     /// Build and trace so many times, taking turns, and report the medians
     #[arg(long, value_name = "TIMES", default_value_t = 5,
           value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -287,6 +292,15 @@ pub struct CompareArgs {
     /// Draw charts into this folder, as SVG and PNG; it is made if it is missing
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+}
+
+/// What to build once.
+#[derive(Debug, Parser)]
+pub struct FirstBuildArgs {
+    /// A mesh file or procedural:NAME:TRIANGLES
+    pub scene: String,
+    /// A method or a peer
+    pub system: String,
 }
 
 /// Which methods compete, and how often.
@@ -367,21 +381,38 @@ pub struct Picture {
     #[arg(long, value_name = "PIXELS", default_value_t = 1024,
           value_parser = clap::value_parser!(u16).range(1..=16_384))]
     pub size: u16,
-    /// From which side to look
+    /// From which side to look, or a named view of the scene
     #[arg(long, allow_hyphen_values = true)]
-    pub view: Option<View>,
+    pub view: Option<Aim>,
+    /// Look from this point instead, as X,Y,Z
+    #[arg(long, value_name = "X,Y,Z", conflicts_with = "view", allow_hyphen_values = true)]
+    pub eye: Option<Point>,
+    /// Look at this point [default: the middle of the scene]
+    #[arg(long, value_name = "X,Y,Z", requires = "eye", allow_hyphen_values = true)]
+    pub target: Option<Point>,
+    /// Degrees that the picture covers, from edge to edge [default: 40]
+    #[arg(long, value_name = "DEGREES")]
+    pub fov: Option<Lens>,
     /// Which axis of the scene is up
     #[arg(long, value_enum, default_value_t = Up::Y)]
     pub up: Up,
 }
 
 impl Picture {
-    /// The picture of a whole scene.
-    #[must_use]
-    pub fn tiles(&self, scene: &Scene) -> Tiles {
+    /// The picture of a scene: of all of it unless the words say otherwise.
+    ///
+    /// # Errors
+    /// If the scene has no view of that name.
+    pub fn tiles(&self, scene: &Scene) -> Result<Tiles> {
         let bounds = scene.framed_bounds();
-        let view = self.view.unwrap_or_else(|| View::of(bounds, self.up));
-        Tiles { camera: Camera::framing(bounds, view, self.up), size: self.size }
+        let (up, lens) = (self.up, self.fov.unwrap_or_default());
+        let camera = if let Some(eye) = self.eye {
+            Camera::between(eye, self.target.unwrap_or(Point::centre_of(bounds)), up, lens)
+        } else {
+            let aim = self.view.unwrap_or_else(|| Aim::Side(View::of(bounds, up)));
+            aim.camera(scene, up, lens)?
+        };
+        Ok(Tiles { camera, size: self.size })
     }
 }
 
@@ -431,6 +462,8 @@ mod tests {
             "render --eye 1,2",
             "render --target 1,2,3",
             "render --eye 1,2,3 --view top",
+            "render --fov 0",
+            "compare a.ply --eye 1,2,3 --view inside",
             "render --density many",
             "render --method bvh",
             "render --macrocell-factor -1",
@@ -450,7 +483,12 @@ mod tests {
 
     #[test]
     fn negative_values_are_values() {
-        for words in ["--view -30,-20", "--eye -1,-2,-3 --target -1,0,0", "--density -1"] {
+        for words in [
+            "--view -30,-20",
+            "--eye -1,-2,-3 --target -1,0,0 --fov 60",
+            "--view inside --fov 20.5",
+            "--density -1",
+        ] {
             let words = ["hgrid", "render"].into_iter().chain(words.split(' '));
             Cli::try_parse_from(words).unwrap();
         }

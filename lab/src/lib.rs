@@ -24,6 +24,7 @@ pub mod machine;
 pub mod measure;
 mod plot;
 pub mod progress;
+mod regions;
 pub mod render;
 pub mod report;
 pub mod resident;

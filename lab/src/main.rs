@@ -14,6 +14,7 @@ fn main() -> ExitCode {
         Some(Command::Figures(args)) => figures::run(&args),
         Some(Command::Animate(args)) => animate::run(&args),
         Some(Command::Compare(args)) => compare::run(&args),
+        Some(Command::FirstBuild(args)) => compare::first::run(&args),
         None => render::run(&RenderArgs::parse_from(["hgrid"])).and_then(|()| {
             let next = "next: hgrid render YOUR.ply, or hgrid render --help";
             Ok(writeln!(std::io::stdout(), "{next}")?)

@@ -23,17 +23,11 @@
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{
-    Config, Control, Counters, Grid, Hit, Method, QueryOptions, Ray, Sizes, TriangleMesh,
-    sizes_with,
-};
-#[cfg(target_os = "linux")]
-use memmap2::Advice;
-use memmap2::{MmapMut, MmapOptions};
+use hgrid_core::{Config, Counters, Grid, Hit, Method, QueryOptions, Ray, TriangleMesh};
 use serde::Serialize;
 
 use crate::progress::Progress;
-use crate::resident::resident_bytes;
+use crate::regions::{Regions, peak_bytes};
 use crate::scene::Scene;
 use crate::shade::{Rgb, Shade, Shader};
 use crate::threads::Threads;
@@ -202,10 +196,10 @@ pub fn measure(
             threads.wake();
             let start = Instant::now();
             let built = threads
-                .parallel(|parallel| build_with(mesh, config, parallel, memory))
+                .parallel(|parallel| Regions::fresh(mesh, config, parallel))
                 .with_context(|| format!("cannot build the {name} grid"))?;
             builds.push(start.elapsed().as_secs_f64());
-            let Built { index, scratch } = built;
+            let Regions { index, scratch } = built;
             let asked = [index.len(), scratch.len()];
             drop(scratch);
             let grid = Grid::open(&index, mesh)?;
@@ -239,87 +233,6 @@ pub fn measure(
         }
     }
     Ok(outcome)
-}
-
-/// A grid's memory.
-pub(crate) struct Built {
-    pub(crate) index: MmapMut,
-    pub(crate) scratch: MmapMut,
-}
-
-/// Builds as a user does who has nothing but the mesh: ask for sizes, get memory, build.
-pub(crate) fn build(mesh: TriangleMesh<'_>, config: &Config) -> Result<Built> {
-    Threads::new(1)?.parallel(|parallel| build_with(mesh, config, parallel, memory))
-}
-
-/// Bytes of index and scratch that a build writes, in whole small pages; where the system does not
-/// tell, the bytes of the grid and of all scratch.
-pub(crate) fn peak_bytes(
-    mesh: TriangleMesh<'_>,
-    config: &Config,
-    parallel: &Control<'_>,
-) -> Result<usize> {
-    let Built { index, scratch } = build_with(mesh, config, parallel, small_pages)?;
-    match resident_bytes(&index).zip(resident_bytes(&scratch)) {
-        Some((index, scratch)) => Ok(index + scratch),
-        None => Ok(Grid::open(&index, mesh)?.blob_bytes() + scratch.len()),
-    }
-}
-
-/// The same on threads, in memory from where the caller says.
-fn build_with(
-    mesh: TriangleMesh<'_>,
-    config: &Config,
-    parallel: &Control<'_>,
-    pages: fn(usize) -> Result<MmapMut>,
-) -> Result<Built> {
-    // A brick grid's bound follows from the number of triangles, and
-    // what is not written costs nothing.
-    let bound = match config.method {
-        Method::Brick => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
-        _ => None,
-    };
-    let sizes = match bound {
-        Some(bound) => bound,
-        None => sizes_with(&mesh, config, &mut [], parallel)?,
-    };
-    let (mut index, mut scratch) = (pages(sizes.index_bytes)?, pages(sizes.scratch_bytes)?);
-    Grid::build_with(mesh, config, &mut index, &mut scratch, parallel)?;
-    Ok(Built { index, scratch })
-}
-
-/// From here on large pages are asked for: eight of 2 MiB.
-#[cfg(target_os = "linux")]
-const MANY_BYTES: usize = 16 << 20;
-
-/// Pages that the system provides when they are first written, large ones if it has them: a build
-/// of a million triangles is sooner done with those, and Embree asks for them, too. A small build
-/// would write little of each, and wait until the system has cleared all of it.
-pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
-    let memory = map(bytes)?;
-    // Who cannot give them gives small ones.
-    #[cfg(target_os = "linux")]
-    if bytes >= MANY_BYTES {
-        let _ = memory.advise(Advice::HugePage);
-    }
-    Ok(memory)
-}
-
-/// The same in pages of the usual size: as many bytes as are written, and few more.
-fn small_pages(bytes: usize) -> Result<MmapMut> {
-    let memory = map(bytes)?;
-    #[cfg(target_os = "linux")]
-    let _ = memory.advise(Advice::NoHugePage);
-    Ok(memory)
-}
-
-fn map(bytes: usize) -> Result<MmapMut> {
-    let mut options = MmapOptions::new();
-    options
-        .len(bytes.max(1))
-        .no_reserve_swap()
-        .map_anon()
-        .with_context(|| format!("cannot get {bytes} bytes of memory"))
 }
 
 /// Bytes that a build asked for, and the most that it used.
@@ -443,18 +356,6 @@ mod tests {
 
     use super::*;
     use crate::camera::{Camera, Up, View};
-
-    #[test]
-    fn small_pages_are_small() {
-        const LARGE: usize = 1 << 21;
-        let mut memory = small_pages(32 * LARGE).unwrap();
-        for byte in memory.iter_mut().step_by(LARGE) {
-            *byte = 1;
-        }
-        if let Some(bytes) = resident_bytes(&memory) {
-            assert!((32 * 4096..=32 * LARGE / 8).contains(&bytes), "{bytes}");
-        }
-    }
 
     fn race(configs: &[Config], repeat: u32) -> Outcome {
         let scene = Scene::load("procedural:knot:2000").unwrap();

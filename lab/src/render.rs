@@ -33,7 +33,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let size = args.picture.size;
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
     let threads = Threads::new(args.builders.threads)?;
-    let subject = Subject { mesh, tiles: args.tiles(&scene), threads: &threads };
+    let subject = Subject { mesh, tiles: args.picture.tiles(&scene)?, threads: &threads };
     let shade: Shade = match args.shading {
         Shading::Normals => |shader, rays, hits, colors| shader.normals(rays, hits, colors),
         Shading::Diffuse | Shading::Heat => {

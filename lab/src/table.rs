@@ -177,7 +177,7 @@ pub(crate) fn measure_diffuse(
 ) -> Result<Vec<Measurement>> {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
     let threads = Threads::new(race.builders.threads)?;
-    let subject = Subject { mesh, tiles: race.picture.tiles(scene), threads: &threads };
+    let subject = Subject { mesh, tiles: race.picture.tiles(scene)?, threads: &threads };
     let cost = |_: &Counters| 0;
     let shade: Shade = |shader, rays, hits, colors| shader.diffuse(rays, hits, colors);
     Ok(measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements)

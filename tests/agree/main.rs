@@ -4,6 +4,8 @@ mod batches;
 mod closest;
 mod exact;
 mod forms;
+mod hits;
+mod range;
 mod scans;
 mod snapped;
 mod surfaces;

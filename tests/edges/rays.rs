@@ -90,13 +90,24 @@ fn origins_far_away() {
     let mesh = ball(6, 1.0);
     let mut random = Random(41);
     let mut rays = Vec::new();
-    for distance in [5.0, 100.0, 1e4, 1e8, 1e20, 1e30] {
-        for _ in 0..200 {
+    // 2^29 extents are 1e9. Around that, and to the end of f32.
+    let near = [5.0, 100.0, 1e4, 1e8, 3e8, 1e9, 1.1e9, 2e9, 1e10];
+    let far = [1e20, 1e30, 1e31, 1e32, 1e35, 2e38];
+    for distance in near.into_iter().chain(far) {
+        for i in 0..100 {
             let (target, towards) = (random.point().map(|c| c * 0.5), random.point());
             let origin = std::array::from_fn(|k| target[k] - towards[k] * distance);
             rays.push(Ray::new(origin, towards));
             rays.push(Ray::new(origin, std::array::from_fn(|k| target[k] - origin[k])));
             rays.push(Ray { t_min: distance, ..Ray::new(origin, towards) });
+            // Along an axis and along a diagonal, where nothing is lost on the way.
+            let mut along = [0.0; 3];
+            along[i % 3] = if i % 2 == 0 { -1.0 } else { 1.0 };
+            let origin = std::array::from_fn(|k| target[k] - along[k] * distance);
+            rays.push(Ray::new(origin, along));
+            let along = towards.map(f32::signum);
+            let origin = std::array::from_fn(|k| -along[k] * distance);
+            rays.push(Ray::new(origin, along));
         }
     }
     assert!(ask(&mesh, rays) > 1000);

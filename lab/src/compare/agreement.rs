@@ -22,6 +22,22 @@ pub fn differing_hits(expected: &[Hit], found: &[Hit], diagonal: f64) -> u64 {
     count(expected.iter().zip(found), |(a, b)| !is_same(a, b))
 }
 
+/// Distances that differ: one is none and the other is not, or they are too far apart.
+#[must_use]
+pub fn differing_distances(expected: &[f32], found: &[f32], diagonal: f64) -> u64 {
+    let is_same = |a: f32, b: f32| match (a.is_finite(), b.is_finite()) {
+        (true, true) => (f64::from(a) - f64::from(b)).abs() <= TOLERANCE * diagonal,
+        (a, b) => a == b,
+    };
+    count(expected.iter().zip(found), |(&a, &b)| !is_same(a, b))
+}
+
+/// Distances that are finite.
+#[must_use]
+pub fn finite(distances: &[f32]) -> u64 {
+    count(distances.iter(), |distance| distance.is_finite())
+}
+
 /// Answers that are not the same to the last bit.
 #[must_use]
 pub fn unequal<T: PartialEq>(expected: &[T], found: &[T]) -> u64 {
@@ -57,6 +73,14 @@ mod tests {
         assert_eq!(differing_hits(&expected, &found, 2000.0), 2);
         assert_eq!(hits(&expected), 3);
         assert_eq!((unequal(&expected, &found), unequal(&found, &found)), (4, 0));
+    }
+
+    #[test]
+    fn other_distances_differ() {
+        let (none, expected) = (f32::INFINITY, [1.0, 1.0, 1.0, f32::INFINITY, f32::INFINITY]);
+        let found = [1.000_01, 1.1, none, 1.0, none];
+        assert_eq!(differing_distances(&expected, &found, 1.0), 3);
+        assert_eq!((finite(&expected), finite(&found)), (3, 3));
     }
 
     #[test]

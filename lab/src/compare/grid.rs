@@ -4,10 +4,12 @@ use anyhow::Result;
 use hgrid_core::{Coherence, Config, Control, Grid, Hit, Method, Ray, Strided, StridedMut};
 
 use super::input::Input;
-use super::system::{Bytes, Mode, System, Tracer, Use, each};
+use super::mode::Mode;
+use super::points::distance;
+use super::system::{Bytes, System, Tracer, Use, each, one_by_one};
 use super::workloads::Workload;
-use crate::measure;
-use crate::tiles::{TILE_RAYS, intersect};
+use crate::regions::{Regions, peak_bytes};
+use crate::tiles::TILE_RAYS;
 
 /// One method.
 pub(super) struct GridSystem {
@@ -20,6 +22,11 @@ impl GridSystem {
     }
 }
 
+/// Whether a method is one of the paper's, which trace the rays of a batch one by one.
+const fn is_of_paper(method: Method) -> bool {
+    matches!(method, Method::OneLevel | Method::Variable | Method::Fixed | Method::Recursive)
+}
+
 impl System for GridSystem {
     fn name(&self) -> String {
         self.config.method.name().to_owned()
@@ -30,19 +37,30 @@ impl System for GridSystem {
     }
 
     fn modes(&self, workload: Workload) -> &'static [Mode] {
-        // The other methods trace a batch ray by ray.
+        let method = self.config.method;
         match workload {
-            Workload::Primary | Workload::Ao if self.config.method == Method::Brick => {
-                &[Mode::Single, Mode::Coherent]
-            }
-            _ => &[Mode::Single],
+            // Far from the mesh, a point can take another method as long as a picture.
+            Workload::Near | Workload::Far if method == Method::default() => &[Mode::Single],
+            Workload::Near | Workload::Far => &[],
+            _ if is_of_paper(method) => one_by_one(workload),
+            Workload::Primary => &[Mode::Single, Mode::Coherent],
+            Workload::Ao | Workload::Bounce => &[Mode::Single, Mode::Coherent, Mode::Batch],
+            Workload::Random => &[Mode::Single, Mode::Batch],
         }
     }
 
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
         let mesh = input.mesh()?;
-        let memory = measure::build(mesh, &self.config)?;
-        then(&GridTracer { grid: Grid::open(&memory.index, mesh)?, config: &self.config })
+        let regions = Regions::build(mesh, &self.config)?;
+        then(&GridTracer { grid: Grid::open(&regions.index, mesh)?, config: &self.config })
+    }
+
+    fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
+        let mesh = input.mesh()?;
+        let mut regions = Regions::build(mesh, &self.config)?;
+        start();
+        regions.rebuild(mesh, &self.config, &Control::default())?;
+        then(&GridTracer { grid: Grid::open(&regions.index, mesh)?, config: &self.config })
     }
 }
 
@@ -53,28 +71,55 @@ struct GridTracer<'a> {
 
 impl Tracer for GridTracer<'_> {
     fn intersect(&self, mode: Mode, rays: &[Ray], hits: &mut [Hit]) {
-        if mode == Mode::Coherent {
-            return intersect(&self.grid, rays, hits);
-        }
-        each(rays, hits, |ray| self.grid.intersect(ray).unwrap_or(Hit::MISS));
-    }
-
-    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [bool]) {
-        if mode != Mode::Coherent {
-            return each(rays, occluded, |ray| self.grid.occluded(ray));
-        }
-        let mut bytes = [0_u8; TILE_RAYS];
-        for (rays, occluded) in rays.chunks(TILE_RAYS).zip(occluded.chunks_mut(TILE_RAYS)) {
-            let answers = &mut StridedMut::new(&mut bytes[..rays.len()]);
-            match self.grid.occluded_n(&Strided::new(rays), answers, Coherence::Coherent) {
-                Ok(()) => occluded.iter_mut().zip(&bytes).for_each(|(to, &byte)| *to = byte != 0),
-                Err(_) => each(rays, occluded, |ray| self.grid.occluded(ray)),
+        let Some(call) = Call::of(mode) else {
+            return each(rays, hits, |ray| self.grid.intersect(ray).unwrap_or(Hit::MISS));
+        };
+        for (rays, hits) in rays.chunks(call.rays).zip(hits.chunks_mut(call.rays)) {
+            let answers = &mut StridedMut::new(&mut *hits);
+            if self.grid.intersect_n(&Strided::new(rays), answers, call.coherence).is_err() {
+                hits.fill(Hit::MISS);
             }
         }
     }
 
+    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [u8]) {
+        let Some(call) = Call::of(mode) else {
+            return each(rays, occluded, |ray| self.grid.occluded(ray).into());
+        };
+        for (rays, occluded) in rays.chunks(call.rays).zip(occluded.chunks_mut(call.rays)) {
+            let answers = &mut StridedMut::new(&mut *occluded);
+            if self.grid.occluded_n(&Strided::new(rays), answers, call.coherence).is_err() {
+                occluded.fill(0);
+            }
+        }
+    }
+
+    fn closest_points(&self, points: &[[f32; 3]], radius: f32, distances: &mut [f32]) {
+        for (&point, place) in points.iter().zip(distances) {
+            *place = distance(&self.grid, point, radius);
+        }
+    }
+
     fn bytes(&self) -> Result<Option<Bytes>> {
-        let peak = measure::peak_bytes(*self.grid.mesh(), self.config, &Control::default())?;
+        let peak = peak_bytes(*self.grid.mesh(), self.config, &Control::default())?;
         Ok(Some(Bytes { index: self.grid.blob_bytes(), peak }))
+    }
+}
+
+/// How `intersect_n` and `occluded_n` are called.
+struct Call {
+    /// Rays in a call, at most.
+    rays: usize,
+    coherence: Coherence,
+}
+
+impl Call {
+    /// The calls of a mode; none if it hands rays over one by one.
+    const fn of(mode: Mode) -> Option<Self> {
+        match mode {
+            Mode::Coherent => Some(Self { rays: TILE_RAYS, coherence: Coherence::Coherent }),
+            Mode::Batch => Some(Self { rays: usize::MAX, coherence: Coherence::Incoherent }),
+            _ => None,
+        }
     }
 }

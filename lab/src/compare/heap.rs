@@ -69,6 +69,21 @@ pub(super) fn since(before: usize) -> Bytes {
     }
 }
 
+/// Keeps what is freed: heaps ask the system for no page twice.
+pub(super) fn keep() {
+    // SAFETY: the calls set numbers of the allocator, which it locks.
+    let is_set = unsafe { libc::mallopt(libc::M_MMAP_MAX, 0) }
+        // SAFETY: as above; -1 is never.
+        & unsafe { libc::mallopt(libc::M_TRIM_THRESHOLD, -1) };
+    debug_assert_eq!(is_set, 1, "the allocator knows both");
+}
+
+/// Gives the system what is free.
+pub(super) fn give_back() {
+    // SAFETY: the call takes a number and locks what it changes.
+    let _ = unsafe { libc::malloc_trim(0) };
+}
+
 /// Bytes in use on the heap of C, where that of Rust is too.
 pub(super) fn in_use() -> usize {
     // SAFETY: the call takes nothing and locks what it reads.

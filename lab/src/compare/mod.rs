@@ -14,15 +14,21 @@
 
 pub mod agreement;
 mod charts;
+pub mod first;
 mod grid;
 #[cfg(feature = "peers")]
 mod heap;
 pub mod input;
+pub mod mode;
 pub mod numbers;
 pub mod peers;
+pub mod points;
 pub mod process;
 pub mod race;
+mod random;
 pub mod ratios;
+mod samples;
+mod stage;
 pub mod system;
 mod tables;
 pub mod workloads;
@@ -30,14 +36,17 @@ pub mod workloads;
 use std::fs;
 use std::io::{self, Write as _};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Error, Result};
+use clap::ValueEnum as _;
 use hgrid_core::{Config, Method};
 
 use crate::cli::CompareArgs;
 use grid::GridSystem;
 use numbers::Comparison;
+use peers::Peer;
 use race::Plan;
 use system::System;
+use workloads::{Amount, Workload};
 
 /// Measures, prints, writes and draws.
 ///
@@ -53,8 +62,14 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     process::pin_to_one_core()?;
 
-    let plan = Plan::new(args.repeat);
-    let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, plan)?;
+    process::keep_heap();
+    let first = first::in_new_process;
+    let asked =
+        |workload: &Workload| args.workloads.is_empty() || args.workloads.contains(workload);
+    let workloads: Vec<_> = Workload::ALL.into_iter().filter(asked).collect();
+    let amount = Amount::of(&workloads);
+    let plan = Plan { repeat: args.repeat, workloads, amount, first };
+    let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, &plan)?;
     let text = if args.markdown { comparison.markdown() } else { comparison.text() };
     writeln!(io::stdout(), "{text}")?;
     if let Some(path) = &args.json {
@@ -75,6 +90,18 @@ pub fn methods(methods: &[Method]) -> Vec<Box<dyn System>> {
     methods.iter().map(system).collect()
 }
 
+/// The system with a name: a method or a peer.
+///
+/// # Errors
+/// If there is none, or it does not start.
+pub fn system_named(name: &str) -> Result<Box<dyn System>> {
+    let mut found = match Method::ALL.iter().find(|method| method.name() == name) {
+        Some(&method) => methods(&[method]),
+        None => peers::systems(&[Peer::from_str(name, false).map_err(Error::msg)?])?,
+    };
+    found.pop().context("a name without a system")
+}
+
 #[cfg(test)]
 mod tests {
     use clap::Parser as _;
@@ -83,10 +110,20 @@ mod tests {
 
     /// A comparison of all that there is on small scenes.
     fn compare(systems: &[Box<dyn System>]) -> Comparison {
+        compare_on(&Workload::ALL, systems)
+    }
+
+    fn compare_on(workloads: &[Workload], systems: &[Box<dyn System>]) -> Comparison {
         let words = ["hgrid", "procedural:knot:2000", "procedural:soup:500", "--size", "48"];
         let args = CompareArgs::parse_from(words);
-        let plan = Plan { repeat: 2, random_rays: 2000 };
-        Comparison::measure(&args.scenes, systems, &args.picture, plan).unwrap()
+        let amount = Amount { random_rays: 2000, near_points: 500, far_points: 50 };
+        let plan = Plan {
+            repeat: 2,
+            workloads: workloads.to_vec(),
+            amount,
+            first: first::in_this_process,
+        };
+        Comparison::measure(&args.scenes, systems, &args.picture, &plan).unwrap()
     }
 
     #[test]
@@ -97,7 +134,7 @@ mod tests {
             assert!(text.matches(method.name()).count() >= 4, "{text}");
             assert!(markdown.contains(&format!("| {}", method.name())), "{markdown}");
         }
-        assert!(text.contains("knot:2000: 2.00K triangles") && text.contains("rays hit"), "{text}");
+        assert!(text.contains("knot:2000: 2.00K triangles, hits: primary "), "{text}");
         assert!(markdown.contains("### soup:500"), "{markdown}");
         assert!(!text.contains("hgrid / peer"), "{text}");
         for table in markdown.split("\n\n").filter(|part| part.starts_with('|')) {
@@ -118,11 +155,23 @@ mod tests {
     }
 
     #[test]
+    fn only_what_is_asked_is_measured() {
+        let comparison = compare_on(&[Workload::Ao], &methods(&[Method::Fixed]));
+        let runs = &comparison.scenes[0].systems[0].runs;
+        assert!(runs.iter().all(|run| run.workload == Workload::Ao) && !runs.is_empty());
+        let text = comparison.text();
+        assert!(text.contains("ao (s)") && !text.contains("random (s)"), "{text}");
+        let Amount { random_rays, near_points, far_points } = Amount::of(&[Workload::Near]);
+        assert!(near_points > 0 && random_rays + far_points == 0);
+    }
+
+    #[test]
     fn json_has_every_sample() {
         let json = serde_json::to_value(compare(&methods(&[Method::Fixed]))).unwrap();
         let system = &json["scenes"][0]["systems"][0];
         assert_eq!(system["system"], "fixed");
-        assert_eq!(system["build_samples"].as_array().unwrap().len(), 2);
+        assert_eq!(system["first_build"]["samples"].as_array().unwrap().len(), 3);
+        assert_eq!(system["rebuild"]["samples"].as_array().unwrap().len(), 2);
         assert_eq!(system["runs"][1]["workload"], "ao");
         assert!(json["machine"]["rustc"].is_string() && json["target"].is_string());
     }
@@ -155,7 +204,7 @@ mod tests {
                     assert_eq!(run.samples.len(), 2);
                 }
             }
-            assert_eq!(scene.ratios.len(), 6);
+            assert_eq!(scene.ratios.len(), 13);
         }
         assert!(comparison.text().contains("time to image / best peer"));
     }

@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::agreement::is_off;
 use super::input::Input;
+use super::mode::Mode;
 use super::process::target;
 use super::race::{Plan, race};
 use super::ratios::Ratio;
-use super::system::{Mode, System};
+use super::system::System;
 use super::workloads::{Rays, Workload};
 use super::{charts, tables};
 use crate::cli::Picture;
@@ -52,14 +53,14 @@ pub struct SceneNumbers {
 pub struct SystemNumbers {
     /// Its name.
     pub system: String,
+    /// The library and its version, if it tells.
+    pub version: Option<String>,
     /// Whether it is not hgrid.
     pub is_peer: bool,
-    /// From the mesh to a structure that answers.
-    pub build_seconds: f64,
-    /// The builds that the time is the median of, one for each repetition.
-    pub build_samples: Vec<f64>,
-    /// Pages that were first touched meanwhile: the median.
-    pub build_page_faults: Option<u64>,
+    /// The first build in a new process.
+    pub first_build: Build,
+    /// The build in memory that was kept from a build before.
+    pub rebuild: Build,
     /// Triangles of the scene.
     pub triangles: u64,
     /// Bytes that are kept for queries, without the mesh.
@@ -68,6 +69,26 @@ pub struct SystemNumbers {
     pub peak_bytes: u64,
     /// Every workload in every mode that makes sense.
     pub runs: Vec<Run>,
+}
+
+/// From the mesh to a structure that answers.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Build {
+    /// The median.
+    pub seconds: f64,
+    /// What it is the median of, one for each repetition.
+    pub samples: Vec<f64>,
+    /// Pages that were first touched meanwhile: the median.
+    pub page_faults: Option<u64>,
+}
+
+/// Which of the two builds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The first in a new process.
+    First,
+    /// Another one, in memory that was kept.
+    Rebuild,
 }
 
 /// One way to trace one workload.
@@ -83,11 +104,11 @@ pub struct Run {
     pub samples: Vec<f64>,
     /// Pages that were first touched meanwhile: the median.
     pub page_faults: Option<u64>,
-    /// Rays that were traced.
+    /// Rays that were traced, or points that were asked.
     pub rays: u64,
-    /// Rays that hit something.
+    /// Rays that hit something, points that found something.
     pub hits: u64,
-    /// Rays whose answer is not that of hgrid.
+    /// Rays or points whose answer is not that of hgrid.
     pub differing: u64,
 }
 
@@ -113,10 +134,19 @@ impl SystemNumbers {
         runs.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
     }
 
+    /// The builds of a kind.
+    #[must_use]
+    pub const fn build(&self, kind: Kind) -> &Build {
+        match kind {
+            Kind::First => &self.first_build,
+            Kind::Rebuild => &self.rebuild,
+        }
+    }
+
     /// Build and primary rays: from a mesh in memory to a picture.
     #[must_use]
-    pub fn time_to_image(&self) -> Option<f64> {
-        self.best(Workload::Primary).map(|run| self.build_seconds + run.seconds)
+    pub fn time_to_image(&self, kind: Kind) -> Option<f64> {
+        self.best(Workload::Primary).map(|run| self.build(kind).seconds + run.seconds)
     }
 
     /// Bytes kept for each triangle.
@@ -141,7 +171,7 @@ impl Comparison {
         scenes: &[String],
         systems: &[Box<dyn System>],
         picture: &Picture,
-        plan: Plan,
+        plan: &Plan,
     ) -> Result<Self> {
         let turns = scenes.len() as u64 * systems.len() as u64 * u64::from(plan.repeat);
         let mut progress = Progress::new("starting", turns);
@@ -182,17 +212,18 @@ impl SceneNumbers {
         spec: &str,
         systems: &[Box<dyn System>],
         picture: &Picture,
-        plan: Plan,
+        plan: &Plan,
         progress: &mut Progress,
     ) -> Result<Self> {
         let scene = Scene::load(spec)?;
         ensure!(!scene.indices.is_empty(), "no triangles: nothing to measure");
         let bounds = scene.bounds().context("no vertex with finite coordinates")?;
         let facts = SceneFacts::of(&scene);
-        let tiles = picture.tiles(&scene);
+        let tiles = picture.tiles(&scene)?;
         let input = Input::new(scene);
-        let rays = Rays::new(&input, bounds, tiles, plan.random_rays)?;
-        let systems = race(&input, &rays, systems, plan.repeat, progress)?;
+        let rays = Rays::new(&input, bounds, tiles, plan.amount)?;
+        let first = |system: &dyn System| (plan.first)(spec, system);
+        let systems = race(&input, &rays, systems, plan, &first, progress)?;
         let ratios = Ratio::all(&systems);
         Ok(Self { facts, systems, ratios })
     }

@@ -38,6 +38,19 @@ pub fn pin_to_one_core() -> Result<()> {
     Ok(())
 }
 
+/// Lets the heap keep what is freed, so that a build can use the memory of the one before. (It gives
+/// large blocks back to the system otherwise.)
+pub fn keep_heap() {
+    #[cfg(feature = "peers")]
+    super::heap::keep();
+}
+
+/// Gives the system what the heap does not use.
+pub fn give_back_heap() {
+    #[cfg(feature = "peers")]
+    super::heap::give_back();
+}
+
 /// What the program was compiled for: the architecture and the widest vectors that it may use.
 #[must_use]
 pub fn target() -> String {

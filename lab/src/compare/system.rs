@@ -5,39 +5,16 @@
 
 use anyhow::Result;
 use hgrid_core::{Hit, INVALID_ID, Ray};
-use serde::Serialize;
 
 use super::input::Input;
+use super::mode::Mode;
+use super::samples::Watch;
 use super::workloads::Workload;
 
 /// Whether an answer is a hit.
 #[must_use]
 pub const fn is_hit(hit: &Hit) -> bool {
     hit.primitive != INVALID_ID
-}
-
-/// How rays are handed to a structure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Mode {
-    /// One after the other.
-    Single,
-    /// Many in one call, for rays that stay together.
-    Coherent,
-    /// Many in one call, for rays that do not.
-    Incoherent,
-}
-
-impl Mode {
-    /// The word that tables use.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Single => "single",
-            Self::Coherent => "coherent",
-            Self::Incoherent => "incoherent",
-        }
-    }
 }
 
 /// Bytes of a structure.
@@ -62,9 +39,14 @@ pub trait System {
         true
     }
 
-    /// The ways to trace a workload that make sense.
-    fn modes(&self, _: Workload) -> &'static [Mode] {
-        &[Mode::Single]
+    /// The library and its version, if it tells.
+    fn version(&self) -> Option<String> {
+        None
+    }
+
+    /// The ways to ask for a workload that make sense; none if the system does not answer it.
+    fn modes(&self, workload: Workload) -> &'static [Mode] {
+        one_by_one(workload)
     }
 
     /// Builds and calls `then` with the structure. What happens before that call is the build.
@@ -72,6 +54,58 @@ pub trait System {
     /// # Errors
     /// If it cannot be built, and those of `then`.
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()>;
+
+    /// Builds until that takes no new memory, calls `start`, and builds once more in the memory
+    /// that was kept; then calls `then`. What happens between the two calls is the rebuild.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
+        rebuild_anew(self, input, start, then)
+    }
+}
+
+/// The modes of a system that takes one ray a call, and no points.
+#[must_use]
+pub const fn one_by_one(workload: Workload) -> &'static [Mode] {
+    if workload.asks_points() { &[] } else { &[Mode::Single] }
+}
+
+/// A rebuild by a system that keeps no more than its heap.
+///
+/// # Errors
+/// Those of its builds.
+pub fn rebuild_anew(
+    system: &(impl System + ?Sized),
+    input: &Input,
+    start: &mut dyn FnMut(),
+    then: &mut Use<'_>,
+) -> Result<()> {
+    warm_up(|| system.build(input, &mut |_| Ok(())))?;
+    start();
+    system.build(input, then)
+}
+
+/// Builds before a rebuild, at most.
+const WARM_UPS: u32 = 4;
+
+/// Pages that a build may touch for the first time and still be one in memory that was kept.
+const FEW_PAGES: u64 = 16;
+
+/// Builds again and again, until that touches no new pages.
+///
+/// # Errors
+/// Those of a build.
+pub fn warm_up(mut build: impl FnMut() -> Result<()>) -> Result<()> {
+    for _ in 0..WARM_UPS {
+        let watch = Watch::start();
+        build()?;
+        let (_, faults) = watch.stop();
+        if faults.is_some_and(|faults| faults <= FEW_PAGES) {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// A structure that is built.
@@ -79,8 +113,14 @@ pub trait Tracer {
     /// Closest hits; [`Hit::MISS`] where there is none. Both slices are equally long.
     fn intersect(&self, mode: Mode, rays: &[Ray], hits: &mut [Hit]);
 
-    /// Whether there is any hit. Both slices are equally long.
-    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [bool]);
+    /// 1 where there is any hit, 0 where there is none. Both slices are equally long.
+    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [u8]);
+
+    /// Distances to the closest points of the surface; infinite where none is in the radius. Both
+    /// slices are equally long.
+    fn closest_points(&self, _points: &[[f32; 3]], _radius: f32, distances: &mut [f32]) {
+        distances.fill(f32::INFINITY);
+    }
 
     /// Its bytes, unless they are all on the heap that the program counts.
     ///

@@ -1,10 +1,10 @@
-//! A comparison as tables: times and memory, page faults and differing rays, and ratios.
+//! A comparison as tables: builds and memory, times of rays, differing rays, and ratios.
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{Cell, CellAlignment, Table, presets};
 
-use super::numbers::{Comparison, Run, SceneNumbers, SystemNumbers};
+use super::mode::Mode;
+use super::numbers::{Comparison, Kind, Run, SceneNumbers, SystemNumbers};
 use super::ratios::Ratio;
-use super::system::Mode;
 use super::workloads::{AO_REACH, Workload};
 use crate::table::{count, display_name, markdown as as_markdown, seconds, times};
 
@@ -47,23 +47,40 @@ impl Comparison {
     /// What the numbers mean.
     fn notes(&self) -> Vec<String> {
         let Self { size, repeats, .. } = self;
-        vec![
+        let mut notes = vec![
             format!("{size} x {size} pixels, one ray each, diffuse shading; {}.", times(*repeats)),
+            "First build: in a new process. Rebuild: in memory that is kept from a build before. An \
+             image is a build and the primary rays in the mode beside the name."
+                .to_owned(),
             format!(
                 "ao: a ray from every primary hit, {AO_REACH} of the scene's diagonal long, any \
-                 hit; random: rays between points of the scene's box, closest hit."
+                 hit; bounce: the same rays without an end, closest hit; random: rays between \
+                 points of the scene's box, closest hit; near and far: the closest point of the \
+                 surface to points near to it and far outside."
             ),
             "Bytes per triangle are without the mesh; faults are pages that were first touched, small \
              or large."
                 .to_owned(),
             format!(
-                "Differing rays have another answer than hgrid;{MARK} marks times where more than \
-                 one ray in a thousand does: they count for no ratio."
+                "Differing rays and points have another answer than hgrid;{MARK} marks times where \
+                 more than one in a thousand does: they count for no ratio."
             ),
             "A ratio is the median of those of the single repetitions, not that of the two times \
              beside it."
                 .to_owned(),
-        ]
+        ];
+        notes.extend(self.versions());
+        notes
+    }
+
+    /// Which systems are of which version of a library.
+    fn versions(&self) -> Option<String> {
+        let systems = &self.scenes.first()?.systems;
+        let told = |system: &SystemNumbers| {
+            Some(format!("{} is {}", system.system, system.version.as_ref()?))
+        };
+        let told: Vec<_> = systems.iter().filter_map(told).collect();
+        (!told.is_empty()).then(|| format!("{}.", told.join("; ")))
     }
 
     fn source(&self) -> String {
@@ -74,114 +91,99 @@ impl Comparison {
 impl SceneNumbers {
     fn title(&self) -> String {
         let hits = |workload| {
-            let first = self.systems.first().and_then(|system| system.best(workload));
-            first.map_or_else(String::new, |run| {
-                format!(", {} of {} {} rays hit", run.hits, run.rays, workload.name())
-            })
+            let run = self.systems.iter().find_map(|system| system.best(workload))?;
+            Some(format!("{} {} of {}", workload.name(), run.hits, run.rays))
         };
-        let hits: String = Workload::ALL.into_iter().map(hits).collect();
-        format!(
-            "{}: {} triangles{hits}",
-            display_name(&self.facts.scene),
-            count(self.facts.triangles)
-        )
+        let hits: Vec<_> = Workload::ALL.into_iter().filter_map(hits).collect();
+        let (name, count) = (display_name(&self.facts.scene), count(self.facts.triangles));
+        format!("{name}: {count} triangles, hits: {}", hits.join(", "))
     }
 
     fn tables(&self) -> impl Iterator<Item = Table> + '_ {
         let ratios = (!self.ratios.is_empty()).then(|| ratios(&self.ratios));
-        [self.times(), self.checks()].into_iter().chain(ratios)
+        let time = |run: &Run| seconds(run.seconds);
+        let differing = |run: &Run| run.differing.to_string();
+        let queries = [self.runs("(s)", time), self.runs("differ", differing)];
+        core::iter::once(self.builds()).chain(queries).chain(ratios)
     }
 
-    /// Times and memory.
-    fn times(&self) -> Table {
-        let mut table = table(&[
+    /// Builds, first images and memory.
+    fn builds(&self) -> Table {
+        let mut table = table([
             "structure",
-            "mode",
-            "build (s)",
-            "primary (s)",
-            "time to image (s)",
-            "ao (s)",
-            "random (s)",
+            "primary rays",
+            "first build (s)",
+            "rebuild (s)",
+            "first image (s)",
+            "image, rebuilt (s)",
             "index (B/tri)",
             "peak (B/tri)",
+            "first faults",
+            "rebuild faults",
         ]);
-        for (system, mode, is_first) in self.rows() {
-            let first = |text: String| if is_first { text } else { String::new() };
-            let run = |workload| system.run(workload, mode);
-            let time = |run: Option<&Run>, more: f64| {
-                run.map_or_else(String::new, |run| {
-                    seconds(run.seconds + more) + if run.is_off() { MARK } else { "" }
-                })
-            };
+        let told = |faults: Option<u64>| faults.map_or_else(|| "-".to_owned(), |f| f.to_string());
+        for system in &self.systems {
+            let image = |kind| system.time_to_image(kind).map(seconds).unwrap_or_default();
+            let mode = system.best(Workload::Primary).map(|run| run.mode.name());
+            let SystemNumbers { first_build, rebuild, .. } = system;
             table.add_row([
-                first(system.system.clone()),
-                mode.name().to_owned(),
-                first(seconds(system.build_seconds)),
-                time(run(Workload::Primary), 0.0),
-                time(run(Workload::Primary), system.build_seconds),
-                time(run(Workload::Ao), 0.0),
-                time(run(Workload::Random), 0.0),
-                first(format!("{:.1}", system.index_bytes_per_triangle())),
-                first(format!("{:.1}", system.peak_bytes_per_triangle())),
+                system.system.clone(),
+                mode.unwrap_or_default().to_owned(),
+                seconds(first_build.seconds),
+                seconds(rebuild.seconds),
+                image(Kind::First),
+                image(Kind::Rebuild),
+                format!("{:.1}", system.index_bytes_per_triangle()),
+                format!("{:.1}", system.peak_bytes_per_triangle()),
+                told(first_build.page_faults),
+                told(rebuild.page_faults),
             ]);
         }
         table
     }
 
-    /// Page faults and differing rays.
-    fn checks(&self) -> Table {
-        let mut table = table(&[
-            "structure",
-            "mode",
-            "build faults",
-            "primary faults",
-            "ao faults",
-            "random faults",
-            "primary differ",
-            "ao differ",
-            "random differ",
-        ]);
-        let told = |faults: Option<u64>| faults.map_or_else(|| "-".to_owned(), |f| f.to_string());
-        for (system, mode, is_first) in self.rows() {
-            let runs = Workload::ALL.map(|workload| system.run(workload, mode));
-            let faults = runs.map(|run| run.map_or_else(String::new, |run| told(run.page_faults)));
-            let differing = runs.map(|run| {
-                run.map_or_else(String::new, |run| {
-                    run.differing.to_string() + if run.is_off() { MARK } else { "" }
-                })
-            });
-            let first = |text: String| if is_first { text } else { String::new() };
-            let row = [
-                first(system.system.clone()),
-                mode.name().to_owned(),
-                first(told(system.build_page_faults)),
-            ];
-            table.add_row(row.into_iter().chain(faults).chain(differing));
+    /// Something of every run: a row for each mode of each system.
+    fn runs(&self, unit: &str, cell: impl Fn(&Run) -> String) -> Table {
+        let runs = || self.systems.iter().flat_map(|system| &system.runs);
+        let is_asked = |workload: &Workload| runs().any(|run| run.workload == *workload);
+        let workloads: Vec<_> = Workload::ALL.into_iter().filter(is_asked).collect();
+        let columns = workloads.iter().map(|workload| format!("{} {unit}", workload.name()));
+        let mut table = table(["structure", "mode"].map(str::to_owned).into_iter().chain(columns));
+        for system in &self.systems {
+            let mut name = &*system.system;
+            for mode in modes(system) {
+                let cells = workloads.iter().map(|&workload| {
+                    let run = system.run(workload, mode);
+                    run.map_or_else(String::new, |run| {
+                        cell(run) + if run.is_off() { MARK } else { "" }
+                    })
+                });
+                table.add_row([name, mode.name()].map(str::to_owned).into_iter().chain(cells));
+                name = "";
+            }
         }
         table
     }
+}
 
-    /// A row for each mode of each system.
-    fn rows(&self) -> impl Iterator<Item = (&SystemNumbers, Mode, bool)> {
-        self.systems.iter().flat_map(|system| {
-            let mut modes: Vec<Mode> = Vec::new();
-            for run in &system.runs {
-                if !modes.contains(&run.mode) {
-                    modes.push(run.mode);
-                }
-            }
-            modes.into_iter().enumerate().map(move |(at, mode)| (system, mode, at == 0))
-        })
+/// The modes of a system.
+fn modes(system: &SystemNumbers) -> Vec<Mode> {
+    let mut modes: Vec<Mode> = Vec::new();
+    for run in &system.runs {
+        if !modes.contains(&run.mode) {
+            modes.push(run.mode);
+        }
     }
+    modes
 }
 
 fn ratios(ratios: &[Ratio]) -> Table {
-    let mut table = table(&["hgrid / peer", "which", "hgrid", "peer", "ratio", "least to most"]);
+    let mut table = table(["hgrid / peer", "which", "hgrid", "peer", "ratio", "least to most"]);
     for Ratio { what, hgrid, value, peer, peer_value, ratio, least, most } in ratios {
         let is_exact = what.contains("bytes");
         let number = |value: &f64| if is_exact { format!("{value:.1}") } else { seconds(*value) };
         table.add_row([
-            (*what).to_owned(),
+            what.clone(),
             format!("{hgrid} / {peer}"),
             number(value),
             number(peer_value),
@@ -193,9 +195,9 @@ fn ratios(ratios: &[Ratio]) -> Table {
 }
 
 /// A table with columns of words, then of numbers.
-fn table(header: &[&str]) -> Table {
+fn table<T: Into<Cell>>(header: impl IntoIterator<Item = T>) -> Table {
     let mut table = Table::new();
-    table.set_header(header);
+    table.set_header(header.into_iter().map(Into::into).collect::<Vec<Cell>>());
     for column in table.column_iter_mut().skip(WORDS) {
         column.set_cell_alignment(CellAlignment::Right);
     }
@@ -208,8 +210,8 @@ mod tests {
 
     #[test]
     fn times_have_a_range_and_bytes_have_none() {
-        let ratio = |what| Ratio {
-            what,
+        let ratio = |what: &str| Ratio {
+            what: String::from(what),
             hgrid: "brick".to_owned(),
             value: 3.0,
             peer: "embree-low".to_owned(),

@@ -1,4 +1,4 @@
-//! The rays that every system traces.
+//! What every system is asked, and the answers that hgrid gives.
 //!
 //! Primary rays are made tile by tile while they are traced, as a renderer does. The others are
 //! made once, beforehand: they are the same for all systems and in none of the times. Nothing here
@@ -6,16 +6,18 @@
 
 use anyhow::{Context as _, Result};
 use clap::ValueEnum;
-use hgrid_core::{Config, Grid, Hit, Method, Ray, TriangleMesh};
+use hgrid_core::{Config, Grid, Hit, Ray, TriangleMesh};
 use serde::Serialize;
 
 use super::input::Input;
+use super::points::Points;
+use super::random::Random;
 use super::system::is_hit;
-use crate::measure;
+use crate::regions::Regions;
 use crate::scene::Bounds;
 use crate::shade::normal_of;
 use crate::tiles::Tiles;
-use crate::vector::{Vector, cross, dot, length, offset, round, unit};
+use crate::vector::{cross, dot, length, offset, round, unit};
 
 /// The length of an ambient occlusion ray, as a part of the diagonal of the scene's box.
 pub const AO_REACH: f64 = 0.1;
@@ -27,17 +29,24 @@ const AO_START: f64 = 1e-5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Workload {
-    /// One ray through every pixel, closest hit, shaded.
+    /// One ray through every pixel, closest hit, shaded
     Primary,
-    /// Ambient occlusion: one short ray from every primary hit, any hit.
+    /// Ambient occlusion: one short ray from every primary hit, any hit
     Ao,
-    /// Rays from one random point of the scene's box toward another, closest hit.
+    /// Diffuse bounces: the rays of ao without an end, closest hit
+    Bounce,
+    /// Rays from one random point of the scene's box toward another, closest hit
     Random,
+    /// Points near the surface, closest point of it
+    Near,
+    /// Points far outside of the scene, closest point of its surface
+    Far,
 }
 
 impl Workload {
     /// In the order in which they are measured.
-    pub const ALL: [Self; 3] = [Self::Primary, Self::Ao, Self::Random];
+    pub const ALL: [Self; 6] =
+        [Self::Primary, Self::Ao, Self::Bounce, Self::Random, Self::Near, Self::Far];
 
     /// The word that tables use.
     #[must_use]
@@ -45,73 +54,141 @@ impl Workload {
         match self {
             Self::Primary => "primary",
             Self::Ao => "ao",
+            Self::Bounce => "bounce",
             Self::Random => "random",
+            Self::Near => "near",
+            Self::Far => "far",
+        }
+    }
+
+    /// Whether points are asked, not rays.
+    #[must_use]
+    pub const fn asks_points(self) -> bool {
+        matches!(self, Self::Near | Self::Far)
+    }
+}
+
+/// How many questions there are of the workloads whose numbers do not follow from the picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Amount {
+    /// Rays between random points.
+    pub random_rays: usize,
+    /// Points near the surface.
+    pub near_points: usize,
+    /// Points far outside.
+    pub far_points: usize,
+}
+
+impl Amount {
+    /// As many random rays as a picture of 1024 x 1024 has. Far points are few, because a grid looks
+    /// at much of the mesh for each.
+    const FULL: Self = Self { random_rays: 1 << 20, near_points: 1 << 15, far_points: 1 << 11 };
+
+    /// All that the workloads ask, and nothing for the others.
+    #[must_use]
+    pub fn of(workloads: &[Workload]) -> Self {
+        let full = |workload, count| if workloads.contains(&workload) { count } else { 0 };
+        Self {
+            random_rays: full(Workload::Random, Self::FULL.random_rays),
+            near_points: full(Workload::Near, Self::FULL.near_points),
+            far_points: full(Workload::Far, Self::FULL.far_points),
         }
     }
 }
 
-/// The rays of a scene, and the answers that hgrid gives.
+/// Questions, and hgrid's answers in their order.
+#[derive(Debug, PartialEq)]
+pub struct Asked<Q, A> {
+    /// Rays or points.
+    pub questions: Vec<Q>,
+    /// What the default method says.
+    pub answers: Vec<A>,
+}
+
+impl<Q, A> Asked<Q, A> {
+    pub(super) fn new(questions: Vec<Q>, answer: impl Fn(&Q) -> A) -> Self {
+        let answers = questions.iter().map(answer).collect();
+        Self { questions, answers }
+    }
+}
+
+/// The workloads of a scene.
 #[derive(Debug)]
 pub struct Rays {
     /// The picture of the primary rays.
     pub tiles: Tiles,
-    /// One from every primary hit.
-    pub ao: Vec<Ray>,
-    /// From points toward points.
-    pub random: Vec<Ray>,
     /// The answers to the primary rays, row by row.
     pub primary_hits: Vec<Hit>,
-    /// The answers to the others, in their order.
-    pub ao_occluded: Vec<bool>,
-    /// The answers to the others, in their order.
-    pub random_hits: Vec<Hit>,
+    /// One from every primary hit, and 1 where something is in its way.
+    pub ao: Asked<Ray, u8>,
+    /// The same without an end.
+    pub bounce: Asked<Ray, Hit>,
+    /// From points toward points.
+    pub random: Asked<Ray, Hit>,
+    /// Near the surface.
+    pub near: Points,
+    /// Far outside.
+    pub far: Points,
     /// From the smallest to the largest coordinates of the scene.
     pub diagonal: f64,
 }
 
 impl Rays {
-    /// Makes the rays with the help of a brick grid, which takes any scene.
+    /// Makes the rays with the help of the default method, which takes any scene.
     ///
     /// # Errors
     /// If the grid cannot be built, or the scene has no finite vertex.
-    pub fn new(input: &Input, bounds: Bounds, tiles: Tiles, count: usize) -> Result<Self> {
+    pub fn new(input: &Input, bounds: Bounds, tiles: Tiles, amount: Amount) -> Result<Self> {
         let mesh = input.mesh()?;
-        let memory =
-            measure::build(mesh, &Config::new(Method::Brick)).context("no grid for the rays")?;
-        let grid = Grid::open(&memory.index, mesh)?;
+        let regions =
+            Regions::build(mesh, &Config::default()).context("no structure for the rays")?;
+        let grid = Grid::open(&regions.index, mesh)?;
         let closest = |ray: &Ray| grid.intersect(ray).unwrap_or(Hit::MISS);
 
         let (min, max) = bounds;
         let extent = [0, 1, 2].map(|axis| f64::from(max[axis]) - f64::from(min[axis]));
         let diagonal = length(extent);
         let mut primary_hits = vec![Hit::MISS; tiles.pixels()];
-        let mut ao = Vec::new();
+        let mut bounce = Vec::new();
         tiles.each(|rays, pixels| {
             for (ray, &pixel) in rays.iter().zip(pixels) {
                 let hit = closest(ray);
                 primary_hits[pixel] = hit;
-                ao.extend(is_hit(&hit).then(|| ao_ray(mesh, ray, &hit, pixel, diagonal)).flatten());
+                let bounced =
+                    is_hit(&hit).then(|| bounce_ray(mesh, ray, &hit, pixel, diagonal)).flatten();
+                bounce.extend(bounced);
             }
         });
-        let random = random_rays(bounds, count);
-        let ao_occluded = ao.iter().map(|ray| grid.occluded(ray)).collect();
-        let random_hits = random.iter().map(closest).collect();
-        Ok(Self { tiles, ao, random, primary_hits, ao_occluded, random_hits, diagonal })
+        let t_max = narrow(AO_REACH * diagonal);
+        let ao = bounce.iter().map(|&ray| Ray { t_max, ..ray }).collect();
+        Ok(Self {
+            tiles,
+            primary_hits,
+            ao: Asked::new(ao, |ray| grid.occluded(ray).into()),
+            bounce: Asked::new(bounce, closest),
+            random: Asked::new(random_rays(bounds, amount.random_rays), closest),
+            near: Points::near(&grid, diagonal, amount.near_points),
+            far: Points::far(&grid, bounds, diagonal, amount.far_points),
+            diagonal,
+        })
     }
 
-    /// How many rays a workload has.
+    /// How many rays or points a workload has.
     #[must_use]
     pub fn count(&self, workload: Workload) -> usize {
         match workload {
             Workload::Primary => self.primary_hits.len(),
-            Workload::Ao => self.ao.len(),
-            Workload::Random => self.random.len(),
+            Workload::Ao => self.ao.questions.len(),
+            Workload::Bounce => self.bounce.questions.len(),
+            Workload::Random => self.random.questions.len(),
+            Workload::Near => self.near.asked.questions.len(),
+            Workload::Far => self.far.asked.questions.len(),
         }
     }
 }
 
 /// A ray from a hit into the half space above its surface, by the cosine of the angle.
-fn ao_ray(
+fn bounce_ray(
     mesh: TriangleMesh<'_>,
     ray: &Ray,
     hit: &Hit,
@@ -123,7 +200,7 @@ fn ao_ray(
     let normal = if dot(normal, direction) > 0.0 { normal.map(|c| -c) } else { normal };
 
     // A point of the unit disk, lifted onto the hemisphere.
-    let mut random = Random(pixel as u64);
+    let mut random = Random::new(pixel as u64);
     let (radius, angle) = (random.next().sqrt(), core::f64::consts::TAU * random.next());
     let height = (1.0 - radius * radius).max(0.0).sqrt();
     let side = if normal[0].abs() < 0.5 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
@@ -134,20 +211,14 @@ fn ao_ray(
 
     let point = offset(ray.origin.map(f64::from), f64::from(hit.t), ray.direction.map(f64::from));
     let origin = offset(point, AO_START * diagonal, normal);
-    Some(Ray { t_max: narrow(AO_REACH * diagonal), ..Ray::new(round(origin), round(direction)) })
+    Some(Ray::new(round(origin), round(direction)))
 }
 
 /// Rays of unit direction from one point of the box toward another, without an end.
-fn random_rays((min, max): Bounds, count: usize) -> Vec<Ray> {
-    let mut random = Random(0);
-    let mut point = || -> Vector {
-        [0, 1, 2].map(|axis| {
-            let (min, max) = (f64::from(min[axis]), f64::from(max[axis]));
-            min + (max - min) * random.next()
-        })
-    };
+fn random_rays(bounds: Bounds, count: usize) -> Vec<Ray> {
+    let mut random = Random::new(0);
     let rays = (0..count).map(|_| {
-        let (from, to) = (point(), point());
+        let (from, to) = (random.point(bounds), random.point(bounds));
         // Two points are the same only in a box without a size; any direction does there.
         let direction = unit(offset(to, -1.0, from)).unwrap_or([0.0, 0.0, 1.0]);
         Ray::new(round(from), round(direction))
@@ -155,22 +226,9 @@ fn random_rays((min, max): Bounds, count: usize) -> Vec<Ray> {
     rays.collect()
 }
 
-/// Numbers from 0 to 1, always the same ones for the same start (`SplitMix64`).
-struct Random(u64);
-
-impl Random {
-    #[expect(clippy::cast_precision_loss, reason = "53 bits are what an f64 has")]
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ mixed >> 31) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 /// The nearest length that a ray can have.
 #[expect(clippy::cast_possible_truncation, reason = "the rounding that is wanted")]
-fn narrow(length: f64) -> f32 {
+pub(super) fn narrow(length: f64) -> f32 {
     length as f32
 }
 
@@ -180,19 +238,20 @@ mod tests {
     use crate::camera::{Camera, Up, View};
     use crate::scene::Scene;
 
-    fn rays(size: u16, count: usize) -> (Rays, Bounds) {
+    fn rays(size: u16, random_rays: usize) -> (Rays, Bounds) {
         let scene = Scene::load("procedural:knot:2000").unwrap();
         let bounds = scene.bounds().unwrap();
         let tiles = Tiles { camera: Camera::framing(bounds, View::ThreeQuarter, Up::Y), size };
-        (Rays::new(&Input::new(scene), bounds, tiles, count).unwrap(), bounds)
+        let amount = Amount { random_rays, near_points: 30, far_points: 20 };
+        (Rays::new(&Input::new(scene), bounds, tiles, amount).unwrap(), bounds)
     }
 
     #[test]
     fn rays_are_the_same_every_time() {
         let [(a, _), (b, _)] = [rays(40, 100), rays(40, 100)];
-        assert_eq!((a.ao, a.random), (b.ao, b.random));
         assert_eq!(a.primary_hits, b.primary_hits);
-        assert_eq!((a.ao_occluded, a.random_hits), (b.ao_occluded, b.random_hits));
+        assert_eq!((a.ao, a.bounce, a.random), (b.ao, b.bounce, b.random));
+        assert_eq!((a.near, a.far), (b.near, b.far));
     }
 
     #[test]
@@ -201,23 +260,29 @@ mod tests {
         let hits = rays.primary_hits.iter().filter(|hit| is_hit(hit)).count();
         assert!((300..900).contains(&hits), "{hits}");
         let counts = Workload::ALL.map(|workload| rays.count(workload));
-        assert_eq!(counts, [43 * 43, hits, 100]);
-        assert_eq!((rays.ao_occluded.len(), rays.random_hits.len()), (hits, 100));
-        let occluded = rays.ao_occluded.iter().filter(|&&is| is).count();
-        assert!((hits / 50..hits).contains(&occluded), "{occluded} of {hits}");
+        assert_eq!(counts, [43 * 43, hits, hits, 100, 30, 20]);
+        assert_eq!((rays.ao.answers.len(), rays.random.answers.len()), (hits, 100));
+        let occluded = rays.ao.answers.iter().map(|&is| usize::from(is)).sum();
+        let bounced = rays.bounce.answers.iter().filter(|hit| is_hit(hit)).count();
+        assert!((hits / 50..bounced).contains(&occluded), "{occluded}, {bounced} of {hits}");
+        assert!(bounced < hits, "{bounced} of {hits}");
     }
 
     #[test]
     fn rays_stay_where_they_belong() {
         let (rays, (min, max)) = rays(24, 500);
-        for ray in &rays.random {
+        for ray in &rays.random.questions {
             assert!((0..3).all(|axis| (min[axis]..=max[axis]).contains(&ray.origin[axis])));
         }
-        for ray in rays.ao.iter().chain(&rays.random) {
+        let Rays { ao, bounce, random, .. } = &rays;
+        for ray in bounce.questions.iter().chain(&random.questions) {
             let direction = ray.direction.map(f64::from);
             assert!((dot(direction, direction) - 1.0).abs() < 1e-5);
         }
         let reach = AO_REACH * rays.diagonal;
-        assert!(rays.ao.iter().all(|ray| (f64::from(ray.t_max) / reach - 1.0).abs() < 1e-6));
+        for (short, long) in ao.questions.iter().zip(&bounce.questions) {
+            assert!((f64::from(short.t_max) / reach - 1.0).abs() < 1e-6);
+            assert_eq!(Ray { t_max: f32::INFINITY, ..*short }, *long);
+        }
     }
 }

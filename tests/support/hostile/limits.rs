@@ -29,8 +29,10 @@ pub fn most(grid: &Grid<'_>) -> Counters {
         Method::Bvh => 9 * nodes(grid) + 1,
         method => panic!("nobody has said what {method:?} may cost"),
     };
-    // Lists hold each word once, but for leaves of a tree, which have eight ids or fewer.
+    // Lists hold each word once, but for leaves of a tree, which have eight ids or fewer; a ray from too
+    // far away for any structure is shown every triangle.
     let primitive_tests = if grid.method() == Method::Bvh { 8 * cell_steps } else { words };
+    let primitive_tests = primitive_tests.max(grid.mesh().triangle_count().into());
     Counters { primitive_tests, cell_steps, grid_steps: cell_steps }
 }
 

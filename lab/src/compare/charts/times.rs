@@ -4,7 +4,7 @@ use plotters::element::{DynElement, IntoDynElement as _};
 use plotters::prelude::*;
 
 use super::{color, find, names};
-use crate::compare::numbers::{Comparison, SystemNumbers};
+use crate::compare::numbers::{Comparison, Kind, SystemNumbers};
 use crate::measure::ratio;
 use crate::plot::{
     Area, AreaResult, Drawing, HEADING, INK, Pen, Scale, Stops, WORDS, Words, chart, heading,
@@ -37,7 +37,7 @@ impl Figure<'_> {
             let (again, at) = (*place / 6, *place % 6);
             *place += 1;
             let points = self.0.scenes.iter().filter_map(|scene| {
-                let time = find(scene, &system.system)?.time_to_image()?;
+                let time = find(scene, &system.system)?.time_to_image(Kind::Rebuild)?;
                 Some((triangles(scene.facts.triangles), time))
             });
             let mut points: Vec<_> = points.collect();
@@ -86,7 +86,8 @@ impl Drawing for Figure<'_> {
         let lines = self.lines();
         let scenes = self.0.scenes.iter().map(|scene| display_name(&scene.facts.scene));
         let scenes = scenes.collect::<Vec<_>>().join(", ");
-        let title = format!("build and render, the fastest mode of each, on {scenes}");
+        let title =
+            format!("rebuild in kept memory and render, the fastest mode of each, on {scenes}");
         let words = Words { title: &title, x: "triangles", y: "seconds" };
         let mut chart = chart(&left, pen, words, self.axes(&lines))?;
         for line in &lines {

@@ -14,7 +14,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::Peer;
 use crate::compare::input::Input;
-use crate::compare::system::{Mode, System, Tracer, Use, each};
+use crate::compare::mode::Mode;
+use crate::compare::system::{System, Tracer, Use, each};
 
 /// Its only builder.
 pub(super) struct BvhSystem(pub(super) Peer);
@@ -108,8 +109,8 @@ impl Tracer for Built {
         each(rays, hits, |ray| self.search(&to_bvh(ray), ray.t_max, false).unwrap_or(Hit::MISS));
     }
 
-    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [bool]) {
-        each(rays, occluded, |ray| self.search(&to_bvh(ray), ray.t_max, true).is_some());
+    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [u8]) {
+        each(rays, occluded, |ray| self.search(&to_bvh(ray), ray.t_max, true).is_some().into());
     }
 }
 

@@ -24,6 +24,8 @@ use super::system::System;
 pub enum Peer {
     /// Embree, build quality LOW (Morton codes)
     EmbreeLow,
+    /// Embree, build quality LOW, a dynamic scene that is kept and committed again
+    EmbreeDynamic,
     /// Embree, build quality MEDIUM (binned SAH)
     EmbreeMedium,
     /// tinybvh, binned SAH, two-wide
@@ -50,6 +52,7 @@ impl Peer {
     pub const fn name(self) -> &'static str {
         match self {
             Self::EmbreeLow => "embree-low",
+            Self::EmbreeDynamic => "embree-dynamic",
             Self::EmbreeMedium => "embree-medium",
             Self::Tinybvh2 => "tinybvh2",
             Self::Tinybvh8 => "tinybvh8",
@@ -77,6 +80,7 @@ impl Peer {
         );
         Ok(match self {
             Self::EmbreeLow => Box::new(embree::Embree::new(self, embree::Quality::Low)?),
+            Self::EmbreeDynamic => Box::new(embree::Embree::new(self, embree::Quality::Dynamic)?),
             Self::EmbreeMedium => Box::new(embree::Embree::new(self, embree::Quality::Medium)?),
             Self::Tinybvh2 => Box::new(tinybvh::Tinybvh2(self)),
             #[cfg(target_feature = "avx2")]

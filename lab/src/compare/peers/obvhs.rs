@@ -17,7 +17,8 @@ use hgrid_core::{Hit, Ray};
 
 use super::Peer;
 use crate::compare::input::Input;
-use crate::compare::system::{Mode, System, Tracer, Use, each};
+use crate::compare::mode::Mode;
+use crate::compare::system::{System, Tracer, Use, each};
 
 /// A preset of its builder.
 pub(super) struct Obvhs {
@@ -80,9 +81,11 @@ impl Tracer for Built {
         });
     }
 
-    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [bool]) {
+    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [u8]) {
         each(rays, occluded, |ray| {
-            !self.bvh.ray_traverse_miss(to_obvhs(ray), |ray, at| self.leaves[at].intersect(ray))
+            let is_free =
+                self.bvh.ray_traverse_miss(to_obvhs(ray), |ray, at| self.leaves[at].intersect(ray));
+            (!is_free).into()
         });
     }
 }

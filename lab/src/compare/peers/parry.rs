@@ -13,7 +13,8 @@ use parry3d::shape::Triangle;
 
 use super::Peer;
 use crate::compare::input::Input;
-use crate::compare::system::{Mode, System, Tracer, Use, each};
+use crate::compare::mode::Mode;
+use crate::compare::system::{System, Tracer, Use, each};
 
 /// One of its builders.
 pub(super) struct Parry {
@@ -75,14 +76,14 @@ impl Tracer for Built<'_> {
         });
     }
 
-    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [bool]) {
+    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [u8]) {
         each(rays, occluded, |ray| {
             let (ray, t_max) = to_parry(ray);
             // There is no query for any hit: a hit that is closer than any box ends the search.
             let hit = self.bvh.cast_ray(&ray, t_max, |id, closest| {
                 self.triangle(id).cast_local_ray(&ray, closest, false).map(|_| f32::MIN)
             });
-            hit.is_some()
+            hit.is_some().into()
         });
     }
 }

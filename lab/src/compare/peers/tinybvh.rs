@@ -12,7 +12,8 @@ use tinybvh_rs::{INFINITE, Intersection, Intersector, Ray as TinyRay, bvh};
 use super::Peer;
 use crate::compare::heap;
 use crate::compare::input::Input;
-use crate::compare::system::{Bytes, Mode, System, Tracer, Use, each};
+use crate::compare::mode::Mode;
+use crate::compare::system::{Bytes, System, Tracer, Use, each};
 
 /// Two nodes below each node, over positions that stay where they are.
 pub(super) struct Tinybvh2(pub(super) Peer);
@@ -89,8 +90,8 @@ impl<T: Intersector> Tracer for Built<T> {
         });
     }
 
-    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [bool]) {
-        each(rays, occluded, |ray| closest(&self.bvh, ray).t < ray.t_max.min(INFINITE));
+    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [u8]) {
+        each(rays, occluded, |ray| (closest(&self.bvh, ray).t < ray.t_max.min(INFINITE)).into());
     }
 
     fn bytes(&self) -> Result<Option<Bytes>> {

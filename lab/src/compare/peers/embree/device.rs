@@ -1,13 +1,13 @@
 //! A device and its scenes, and the bytes that Embree reports for them.
 
 use core::ffi::c_void;
-use core::marker::PhantomData;
 use core::ptr;
 use core::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 
 use anyhow::{Result, ensure};
 
 use super::ffi;
+use super::query::Buffers;
 use crate::compare::input::Input;
 use crate::compare::system::Bytes;
 
@@ -19,6 +19,8 @@ const CONFIG: &core::ffi::CStr = c"threads=1";
 pub(in super::super) enum Quality {
     /// For scenes that change: Morton codes.
     Low,
+    /// The same, in memory that the scene keeps for the next build.
+    Dynamic,
     /// The default: binned SAH.
     Medium,
 }
@@ -58,22 +60,32 @@ impl Device {
         Ok(Self { handle, memory })
     }
 
+    /// The version of the library, as 3.13.5.
+    pub(super) fn version(&self) -> String {
+        // SAFETY: the device is a live one.
+        let number = unsafe { ffi::rtcGetDeviceProperty(self.handle, ffi::PROPERTY_VERSION) };
+        format!("{}.{}.{}", number / 10_000, number / 100 % 100, number % 100)
+    }
+
     /// Builds a scene of one mesh.
     pub(super) fn build<'a>(&'a self, input: &'a Input, quality: Quality) -> Result<Scene<'a>> {
-        let quality = match quality {
-            Quality::Low => ffi::BUILD_QUALITY_LOW,
-            Quality::Medium => ffi::BUILD_QUALITY_MEDIUM,
+        let (quality, flags) = match quality {
+            Quality::Low => (ffi::BUILD_QUALITY_LOW, ffi::SCENE_NONE),
+            Quality::Dynamic => (ffi::BUILD_QUALITY_LOW, ffi::SCENE_DYNAMIC),
+            Quality::Medium => (ffi::BUILD_QUALITY_MEDIUM, ffi::SCENE_NONE),
         };
         let before = self.memory.current.load(Relaxed);
         self.memory.peak.store(before, Relaxed);
 
         // SAFETY: the device is a live one, here and below.
         let handle = unsafe { ffi::rtcNewScene(self.handle) };
-        let scene = Scene { handle, device: self, before, input: PhantomData };
+        let scene = Scene { handle, device: self, before, buffers: Buffers::new(), input };
         // SAFETY: as above.
         let geometry = unsafe { ffi::rtcNewGeometry(self.handle, ffi::GEOMETRY_TYPE_TRIANGLE) };
         ensure!(!handle.is_null() && !geometry.is_null(), "Embree has no memory left");
         // SAFETY: scene and geometry are live, here and below.
+        unsafe { ffi::rtcSetSceneFlags(handle, flags) };
+        // SAFETY: as above.
         unsafe { ffi::rtcSetSceneBuildQuality(handle, quality) };
         // SAFETY: as above.
         unsafe { ffi::rtcSetGeometryBuildQuality(geometry, quality) };
@@ -87,10 +99,16 @@ impl Device {
         unsafe { ffi::rtcReleaseGeometry(geometry) };
         // SAFETY: as above.
         unsafe { ffi::rtcCommitScene(handle) };
+        self.check()?;
+        Ok(scene)
+    }
+
+    /// What Embree says about the calls so far.
+    fn check(&self) -> Result<()> {
         // SAFETY: the device is a live one.
         let error = unsafe { ffi::rtcGetDeviceError(self.handle) };
         ensure!(error == ffi::ERROR_NONE, "Embree reports error {error}");
-        Ok(scene)
+        Ok(())
     }
 }
 
@@ -125,12 +143,35 @@ pub(super) struct Scene<'a> {
     handle: ffi::Scene,
     device: &'a Device,
     before: isize,
-    input: PhantomData<&'a Input>,
+    buffers: Buffers,
+    input: &'a Input,
 }
 
 impl Scene<'_> {
     pub(super) const fn handle(&self) -> ffi::Scene {
         self.handle
+    }
+
+    /// Builds again, as if all vertices had moved.
+    pub(super) fn rebuild(&self) -> Result<()> {
+        // SAFETY: the scene is a live one and holds the one geometry that was attached to it.
+        let geometry = unsafe { ffi::rtcGetGeometry(self.handle, 0) };
+        // SAFETY: as above, here and below.
+        unsafe { ffi::rtcUpdateGeometryBuffer(geometry, ffi::BUFFER_TYPE_VERTEX, 0) };
+        // SAFETY: as above.
+        unsafe { ffi::rtcCommitGeometry(geometry) };
+        // SAFETY: as above.
+        unsafe { ffi::rtcCommitScene(self.handle) };
+        self.device.check()
+    }
+
+    /// The mesh.
+    pub(super) const fn input(&self) -> &Input {
+        self.input
+    }
+
+    pub(super) const fn buffers(&self) -> &Buffers {
+        &self.buffers
     }
 
     /// Bytes since the build began.

@@ -21,15 +21,19 @@ pub(super) const BUFFER_TYPE_VERTEX: c_uint = 1;
 pub(super) const BUILD_QUALITY_LOW: c_uint = 0;
 pub(super) const BUILD_QUALITY_MEDIUM: c_uint = 1;
 
+/// `RTC_SCENE_FLAG_NONE` and `RTC_SCENE_FLAG_DYNAMIC`.
+pub(super) const SCENE_NONE: c_uint = 0;
+pub(super) const SCENE_DYNAMIC: c_uint = 1;
+
 /// `RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT` and `RTC_INTERSECT_CONTEXT_FLAG_COHERENT`.
 pub(super) const CONTEXT_INCOHERENT: c_uint = 0;
 pub(super) const CONTEXT_COHERENT: c_uint = 1;
 
+/// `RTC_DEVICE_PROPERTY_VERSION`: 31305 is 3.13.5.
+pub(super) const PROPERTY_VERSION: c_uint = 0;
+
 /// `RTC_ERROR_NONE`.
 pub(super) const ERROR_NONE: c_uint = 0;
-
-/// Rays in a packet.
-pub(super) const LANES: usize = 16;
 
 /// `RTCDevice`, `RTCScene`, `RTCGeometry`: what is behind them is Embree's.
 pub(super) type Device = *mut c_void;
@@ -48,6 +52,7 @@ pub(super) struct Context {
 }
 
 /// `RTCRay`.
+#[derive(Clone, Copy)]
 #[repr(C, align(16))]
 pub(super) struct Ray1 {
     pub(super) origin: [f32; 3],
@@ -61,6 +66,7 @@ pub(super) struct Ray1 {
 }
 
 /// `RTCHit`.
+#[derive(Clone, Copy)]
 #[repr(C, align(16))]
 pub(super) struct Hit1 {
     pub(super) normal: [f32; 3],
@@ -72,15 +78,17 @@ pub(super) struct Hit1 {
 }
 
 /// `RTCRayHit`.
+#[derive(Clone, Copy)]
 #[repr(C)]
 pub(super) struct RayHit1 {
     pub(super) ray: Ray1,
     pub(super) hit: Hit1,
 }
 
-/// `RTCRay16`: coordinates of all rays, axis by axis.
+/// `RTCRay4`, `RTCRay8` and `RTCRay16`: coordinates of all rays, axis by axis. C aligns the smaller
+/// ones less.
 #[repr(C, align(64))]
-pub(super) struct Ray16 {
+pub(super) struct Rays<const LANES: usize> {
     pub(super) origin: [[f32; LANES]; 3],
     pub(super) near: [f32; LANES],
     pub(super) direction: [[f32; LANES]; 3],
@@ -91,9 +99,9 @@ pub(super) struct Ray16 {
     pub(super) flags: [u32; LANES],
 }
 
-/// `RTCHit16`.
+/// `RTCHit4`, `RTCHit8` and `RTCHit16`.
 #[repr(C, align(64))]
-pub(super) struct Hit16 {
+pub(super) struct Hits<const LANES: usize> {
     pub(super) normal: [[f32; LANES]; 3],
     pub(super) u: [f32; LANES],
     pub(super) v: [f32; LANES],
@@ -102,24 +110,68 @@ pub(super) struct Hit16 {
     pub(super) instance: [u32; LANES],
 }
 
-/// `RTCRayHit16`.
+/// `RTCRayHit4`, `RTCRayHit8` and `RTCRayHit16`.
 #[repr(C)]
-pub(super) struct RayHit16 {
-    pub(super) ray: Ray16,
-    pub(super) hit: Hit16,
+pub(super) struct RayHits<const LANES: usize> {
+    pub(super) rays: Rays<LANES>,
+    pub(super) hits: Hits<LANES>,
 }
+
+/// `RTCPointQuery`.
+#[repr(C, align(16))]
+pub(super) struct PointQuery {
+    pub(super) point: [f32; 3],
+    pub(super) time: f32,
+    pub(super) radius: f32,
+}
+
+/// `RTCPointQueryContext`: transformations, of which there are none.
+#[repr(C, align(16))]
+pub(super) struct PointContext {
+    pub(super) world_to_instance: [f32; 16],
+    pub(super) instance_to_world: [f32; 16],
+    pub(super) inst_id: [c_uint; 1],
+    pub(super) stack_size: c_uint,
+}
+
+/// `RTCPointQueryFunctionArguments`.
+#[repr(C, align(16))]
+pub(super) struct PointArguments {
+    pub(super) query: *mut PointQuery,
+    pub(super) user: *mut c_void,
+    pub(super) primitive: c_uint,
+    pub(super) geometry: c_uint,
+    pub(super) context: *mut PointContext,
+    pub(super) scale: f32,
+}
+
+/// `RTCPointQueryFunction`.
+pub(super) type PointFunction = unsafe extern "C" fn(*mut PointArguments) -> bool;
 
 /// Which rays of a packet are there: -1, or 0 for those that are not.
 #[repr(C, align(64))]
-pub(super) struct Valid(pub(super) [c_int; LANES]);
+pub(super) struct Valid<const LANES: usize>(pub(super) [c_int; LANES]);
+
+/// `rtcIntersect4`, `rtcIntersect8` or `rtcIntersect16`.
+pub(super) type IntersectPacket<const LANES: usize> =
+    unsafe extern "C" fn(*const c_int, Scene, *mut Context, *mut RayHits<LANES>);
+
+/// `rtcOccluded4`, `rtcOccluded8` or `rtcOccluded16`.
+pub(super) type OccludedPacket<const LANES: usize> =
+    unsafe extern "C" fn(*const c_int, Scene, *mut Context, *mut Rays<LANES>);
 
 // The sizes that the C compiler gives.
 const _: () = assert!(size_of::<Context>() == 24 && size_of::<RayHit1>() == 80);
-const _: () = assert!(size_of::<Ray16>() == 12 * 64 && size_of::<RayHit16>() == 20 * 64);
+const _: () = assert!(size_of::<PointQuery>() == 32 && size_of::<PointContext>() == 144);
+const _: () = assert!(size_of::<PointArguments>() == 48);
+const _: () = assert!(size_of::<Rays<4>>() == 12 * 16 && size_of::<RayHits<4>>() == 20 * 16);
+const _: () = assert!(size_of::<Rays<8>>() == 12 * 32 && size_of::<RayHits<8>>() == 20 * 32);
+const _: () = assert!(size_of::<Rays<16>>() == 12 * 64 && size_of::<RayHits<16>>() == 20 * 64);
 
 unsafe extern "C" {
     pub(super) fn rtcNewDevice(config: *const c_char) -> Device;
     pub(super) fn rtcReleaseDevice(device: Device);
+    pub(super) fn rtcGetDeviceProperty(device: Device, property: c_uint) -> isize;
     pub(super) fn rtcGetDeviceError(device: Device) -> c_uint;
     pub(super) fn rtcSetDeviceMemoryMonitorFunction(
         device: Device,
@@ -139,27 +191,76 @@ unsafe extern "C" {
         byte_stride: usize,
         item_count: usize,
     );
+    pub(super) fn rtcUpdateGeometryBuffer(geometry: Geometry, kind: c_uint, slot: c_uint);
     pub(super) fn rtcCommitGeometry(geometry: Geometry);
     pub(super) fn rtcReleaseGeometry(geometry: Geometry);
 
     pub(super) fn rtcNewScene(device: Device) -> Scene;
+    pub(super) fn rtcSetSceneFlags(scene: Scene, flags: c_uint);
     pub(super) fn rtcSetSceneBuildQuality(scene: Scene, quality: c_uint);
     pub(super) fn rtcAttachGeometry(scene: Scene, geometry: Geometry) -> c_uint;
+    pub(super) fn rtcGetGeometry(scene: Scene, id: c_uint) -> Geometry;
     pub(super) fn rtcCommitScene(scene: Scene);
     pub(super) fn rtcReleaseScene(scene: Scene);
 
+    pub(super) fn rtcPointQuery(
+        scene: Scene,
+        query: *mut PointQuery,
+        context: *mut PointContext,
+        function: PointFunction,
+        user: *mut c_void,
+    ) -> bool;
+
     pub(super) fn rtcIntersect1(scene: Scene, context: *mut Context, ray: *mut RayHit1);
+    pub(super) fn rtcOccluded1(scene: Scene, context: *mut Context, ray: *mut Ray1);
+    pub(super) fn rtcIntersect4(
+        valid: *const c_int,
+        scene: Scene,
+        context: *mut Context,
+        rays: *mut RayHits<4>,
+    );
+    pub(super) fn rtcOccluded4(
+        valid: *const c_int,
+        scene: Scene,
+        context: *mut Context,
+        rays: *mut Rays<4>,
+    );
+    pub(super) fn rtcIntersect8(
+        valid: *const c_int,
+        scene: Scene,
+        context: *mut Context,
+        rays: *mut RayHits<8>,
+    );
+    pub(super) fn rtcOccluded8(
+        valid: *const c_int,
+        scene: Scene,
+        context: *mut Context,
+        rays: *mut Rays<8>,
+    );
     pub(super) fn rtcIntersect16(
         valid: *const c_int,
         scene: Scene,
         context: *mut Context,
-        rays: *mut RayHit16,
+        rays: *mut RayHits<16>,
     );
-    pub(super) fn rtcOccluded1(scene: Scene, context: *mut Context, ray: *mut Ray1);
     pub(super) fn rtcOccluded16(
         valid: *const c_int,
         scene: Scene,
         context: *mut Context,
-        rays: *mut Ray16,
+        rays: *mut Rays<16>,
+    );
+    pub(super) fn rtcIntersect1M(
+        scene: Scene,
+        context: *mut Context,
+        rays: *mut RayHit1,
+        count: c_uint,
+        byte_stride: usize,
+    );
+    pub(super) fn rtcOccluded1M(
+        scene: Scene,
+        context: *mut Context,
+        rays: *mut Ray1,
+        count: c_uint,
+        byte_stride: usize,
     );
 }

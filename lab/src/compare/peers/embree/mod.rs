@@ -3,7 +3,7 @@
 //! ```text
 //! mod     System and Tracer: which query for which mode
 //! device  device and scene, with the bytes that Embree reports
-//! query   rays in, answers out, one or sixteen at a time
+//! query   rays in, answers out: one by one, in packets, in streams
 //! ffi     the C header
 //! ```
 
@@ -18,7 +18,8 @@ use hgrid_core::{Hit, Ray};
 
 use super::Peer;
 use crate::compare::input::Input;
-use crate::compare::system::{Bytes, Mode, System, Tracer, Use};
+use crate::compare::mode::{Hint, Lanes, Mode};
+use crate::compare::system::{Bytes, System, Tracer, Use, rebuild_anew, warm_up};
 use crate::compare::workloads::Workload;
 pub(super) use device::Quality;
 use device::{Device, Scene};
@@ -37,38 +38,67 @@ impl Embree {
     }
 }
 
+/// Every call for rays that Embree has: which one is the fastest depends on scene and machine.
+const MODES: &[Mode] = &[
+    Mode::Single,
+    Mode::Packet(Lanes::Four, Hint::None),
+    Mode::Packet(Lanes::Eight, Hint::None),
+    Mode::Packet(Lanes::Sixteen, Hint::None),
+    Mode::Packet(Lanes::Four, Hint::Coherent),
+    Mode::Packet(Lanes::Eight, Hint::Coherent),
+    Mode::Packet(Lanes::Sixteen, Hint::Coherent),
+    Mode::Stream(Hint::None),
+    Mode::Stream(Hint::Coherent),
+];
+
 impl System for Embree {
     fn name(&self) -> String {
         self.peer.name().to_owned()
     }
 
+    fn version(&self) -> Option<String> {
+        Some(format!("Embree {}", self.device.version()))
+    }
+
     fn modes(&self, workload: Workload) -> &'static [Mode] {
-        match workload {
-            Workload::Primary => &[Mode::Single, Mode::Coherent],
-            Workload::Ao | Workload::Random => &[Mode::Single, Mode::Incoherent],
-        }
+        if workload.asks_points() { &[Mode::Single] } else { MODES }
     }
 
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
         then(&self.device.build(input, self.quality)?)
+    }
+
+    fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
+        if !matches!(self.quality, Quality::Dynamic) {
+            return rebuild_anew(self, input, start, then);
+        }
+        let scene = self.device.build(input, self.quality)?;
+        warm_up(|| scene.rebuild())?;
+        start();
+        scene.rebuild()?;
+        then(&scene)
     }
 }
 
 impl Tracer for Scene<'_> {
     fn intersect(&self, mode: Mode, rays: &[Ray], hits: &mut [Hit]) {
         match mode {
-            Mode::Single => self.intersect_each(rays, hits),
-            Mode::Coherent => self.intersect_packets(ffi::CONTEXT_COHERENT, rays, hits),
-            Mode::Incoherent => self.intersect_packets(ffi::CONTEXT_INCOHERENT, rays, hits),
+            Mode::Packet(lanes, hint) => self.intersect_packets(lanes, hint, rays, hits),
+            Mode::Stream(hint) => self.intersect_stream(hint, rays, hits),
+            Mode::Single | Mode::Coherent | Mode::Batch => self.intersect_each(rays, hits),
         }
     }
 
-    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [bool]) {
+    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [u8]) {
         match mode {
-            Mode::Single => self.occluded_each(rays, occluded),
-            Mode::Coherent => self.occluded_packets(ffi::CONTEXT_COHERENT, rays, occluded),
-            Mode::Incoherent => self.occluded_packets(ffi::CONTEXT_INCOHERENT, rays, occluded),
+            Mode::Packet(lanes, hint) => self.occluded_packets(lanes, hint, rays, occluded),
+            Mode::Stream(hint) => self.occluded_stream(hint, rays, occluded),
+            Mode::Single | Mode::Coherent | Mode::Batch => self.occluded_each(rays, occluded),
         }
+    }
+
+    fn closest_points(&self, points: &[[f32; 3]], radius: f32, distances: &mut [f32]) {
+        self.distances(points, radius, distances);
     }
 
     fn bytes(&self) -> Result<Option<Bytes>> {

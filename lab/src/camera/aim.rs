@@ -1,0 +1,41 @@
+//! What the words of `--view` name: a side of any scene, or a view of one.
+
+use core::str::FromStr;
+
+use anyhow::{Error, Result};
+
+use super::{Camera, Lens, Up, View, named};
+use crate::scene::Scene;
+
+/// A view as it is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Aim {
+    /// All of a scene from a side.
+    Side(View),
+    /// What a scene has under a name.
+    Named(&'static str),
+}
+
+impl Aim {
+    /// The camera for a scene.
+    ///
+    /// # Errors
+    /// If the scene has no view of that name.
+    pub fn camera(self, scene: &Scene, up: Up, lens: Lens) -> Result<Camera> {
+        match self {
+            Self::Side(view) => Ok(Camera::framing_through(lens, scene.framed_bounds(), view, up)),
+            Self::Named(name) => named::camera(scene, name, up, lens),
+        }
+    }
+}
+
+impl FromStr for Aim {
+    type Err = Error;
+
+    fn from_str(word: &str) -> Result<Self> {
+        match named::name(word) {
+            Some(name) => Ok(Self::Named(name)),
+            None => word.parse().map(Self::Side),
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! The first build in a new process.
+//!
+//! A process that has built before has memory, code and tables that it keeps. So `compare` starts
+//! its own program once for every such build; that one loads the scene, builds, and prints the time.
+
+use std::env;
+use std::io::{self, Write as _};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context as _, Result, ensure};
+use serde::{Deserialize, Serialize};
+
+use super::input::Input;
+use super::process::give_back_heap;
+use super::samples::Watch;
+use super::system::System;
+use super::system_named;
+use crate::cli::FirstBuildArgs;
+use crate::scene::Scene;
+
+/// The name of the command that builds once.
+pub const COMMAND: &str = "first-build";
+
+/// How long a first build took.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FirstBuild {
+    /// From the mesh to a structure that answers.
+    pub seconds: f64,
+    /// Pages that were first touched meanwhile.
+    pub page_faults: Option<u64>,
+}
+
+/// Builds for the first time with a system.
+pub type FirstBuilds<'a> = dyn Fn(&dyn System) -> Result<FirstBuild> + 'a;
+
+/// Builds once in this process and prints the time as JSON.
+///
+/// # Errors
+/// If there is no such scene or system, or it cannot be built.
+pub fn run(args: &FirstBuildArgs) -> Result<()> {
+    let system = system_named(&args.system)?;
+    let first = in_this_process(&args.scene, system.as_ref())?;
+    Ok(writeln!(io::stdout(), "{}", serde_json::to_string(&first)?)?)
+}
+
+/// Loads a scene and builds once, whatever this process has done before.
+///
+/// # Errors
+/// If the scene cannot be loaded, or the structure not be built.
+pub fn in_this_process(scene: &str, system: &dyn System) -> Result<FirstBuild> {
+    let input = Input::new(Scene::load(scene)?);
+    // What loading has left behind is nobody's.
+    give_back_heap();
+    let watch = Watch::start();
+    let mut measured = None;
+    system.build(&input, &mut |_| {
+        measured.get_or_insert_with(|| watch.stop());
+        Ok(())
+    })?;
+    let (seconds, page_faults) = measured.context("nothing was built")?;
+    Ok(FirstBuild { seconds, page_faults })
+}
+
+/// The same in a process that is started for it, on the core of this one.
+///
+/// # Errors
+/// If that process fails.
+pub fn in_new_process(scene: &str, system: &dyn System) -> Result<FirstBuild> {
+    let program = env::current_exe().context("this program has no file")?;
+    let mut command = Command::new(program);
+    command.args([COMMAND, scene, &system.name()]).stderr(Stdio::inherit());
+    let output = command.output().context("cannot start a process for a first build")?;
+    ensure!(output.status.success(), "the process for a first build failed");
+    serde_json::from_slice(&output.stdout).context("a first build printed no time")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_first_build_takes_time_and_names_what_is_missing() {
+        let system = system_named("one-level").unwrap();
+        let first = in_this_process("procedural:knot:500", system.as_ref()).unwrap();
+        assert!(first.seconds > 0.0);
+        let json = serde_json::to_string(&first).unwrap();
+        assert_eq!(serde_json::from_str::<FirstBuild>(&json).unwrap(), first);
+        assert!(in_this_process("no/such.ply", system.as_ref()).is_err());
+        let error = system_named("nothing").map(drop).unwrap_err();
+        assert!(error.to_string().contains("nothing"), "{error}");
+    }
+}

@@ -1,0 +1,281 @@
+//! hgrid divided by a peer: the numbers that decide whether it is worth its place.
+//!
+//! Less than one is better in every row. Runs whose answers are off take no part.
+//!
+//! One method of hgrid stands in all rows: the default one, or the first if it takes no part. A
+//! peer stands with its fastest mode in each. Every row of builds has both kinds of them.
+
+mod entry;
+
+use hgrid_core::Method;
+use serde::Serialize;
+
+use super::mode::Mode;
+use super::numbers::{Kind, SystemNumbers};
+use super::peers::Peer;
+use super::workloads::Workload;
+use crate::measure::median;
+use entry::Entry;
+
+/// One number of hgrid against one of a peer.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ratio {
+    /// What is compared.
+    pub what: String,
+    /// The method and mode of hgrid.
+    pub hgrid: String,
+    /// Its number: seconds, the median; or bytes for each triangle.
+    pub value: f64,
+    /// The peer and its mode.
+    pub peer: String,
+    /// Its number.
+    pub peer_value: f64,
+    /// The first divided by the second in each repetition: the median.
+    pub ratio: f64,
+    /// The least of these.
+    pub least: f64,
+    /// The most.
+    pub most: f64,
+}
+
+impl Ratio {
+    /// All that the systems of a scene allow.
+    #[must_use]
+    pub fn all(systems: &[SystemNumbers]) -> Vec<Self> {
+        let (peers, methods): (Vec<_>, Vec<_>) = systems.iter().partition(|system| system.is_peer);
+        let is_default = |system: &&&SystemNumbers| system.system == Method::default().name();
+        let Some(&hgrid) = methods.iter().find(is_default).or(methods.first()) else {
+            return Vec::new();
+        };
+        let builds = builds(hgrid, &peers);
+        builds.into_iter().chain(queries(hgrid, &peers)).flatten().collect()
+    }
+
+    fn new(what: String, ours: &Entry<'_>, theirs: &Entry<'_>) -> Option<Self> {
+        let samples = ours.samples.iter().zip(&theirs.samples);
+        let mut ratios: Vec<_> = samples.map(|(ours, theirs)| ours / theirs).collect();
+        ratios.sort_by(f64::total_cmp);
+        let (&least, &most) = ratios.first().zip(ratios.last())?;
+        let (hgrid, peer) = (ours.name(), theirs.name());
+        ratios.iter().all(|ratio| ratio.is_finite()).then_some(Self {
+            what,
+            hgrid,
+            value: ours.value,
+            peer,
+            peer_value: theirs.value,
+            ratio: median(&ratios),
+            least,
+            most,
+        })
+    }
+}
+
+/// Builds, first images and bytes.
+fn builds(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>> {
+    let best = |kind| least(peers.iter().filter_map(|peer| Entry::image(peer, kind)));
+    let build = |kind, words| {
+        let low = [Peer::EmbreeLow, Peer::EmbreeDynamic].into_iter();
+        let low = least(low.filter_map(|peer| Some(Entry::build(find(peers, peer)?, kind))))?;
+        let what = format!("build / {} LOW: {words}", library(low.system));
+        Ratio::new(what, &Entry::build(hgrid, kind), &low)
+    };
+    let image = |kind, words| {
+        let what = format!("time to image / best peer: {words}");
+        Ratio::new(what, &Entry::image(hgrid, kind)?, &best(kind)?)
+    };
+    let bytes = |what: &str, of: fn(&SystemNumbers) -> f64| {
+        let entries = peers.iter().map(|peer| Entry::number(peer, of));
+        let theirs = least(entries.filter(|entry| entry.value > 0.0))?;
+        let what = format!("{what} per triangle / best peer");
+        Ratio::new(what, &Entry::number(hgrid, of), &theirs)
+    };
+    vec![
+        build(Kind::Rebuild, REBUILD),
+        build(Kind::First, FIRST),
+        image(Kind::First, FIRST),
+        image(Kind::Rebuild, REBUILD),
+        bytes("index bytes", SystemNumbers::index_bytes_per_triangle),
+        bytes("peak bytes", SystemNumbers::peak_bytes_per_triangle),
+    ]
+}
+
+/// The two kinds of builds in words.
+const FIRST: &str = "first in a new process";
+const REBUILD: &str = "rebuild in memory that is kept";
+
+/// Rays against Embree.
+fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>> {
+    let best = |peer: Peer, quality: &str, what: &str, workload| {
+        let peer = find(peers, peer)?;
+        let what = format!("{what} / {} {quality}, best mode", library(peer));
+        Some((what, Entry::best(peer, workload)?))
+    };
+    let medium = |what: &str, workload| best(Peer::EmbreeMedium, "MEDIUM", what, workload);
+    let single = || {
+        let peer = find(peers, Peer::EmbreeMedium)?;
+        let what = format!("single primary rays / {} MEDIUM, rtcIntersect1", library(peer));
+        let entry = |system| Entry::run(system, Workload::Primary, Mode::Single);
+        Ratio::new(what, &entry(hgrid)?, &entry(peer)?)
+    };
+    let coherent = || {
+        let (what, theirs) = medium("coherent primary rays", Workload::Primary)?;
+        Ratio::new(what, &Entry::in_mode(hgrid, Workload::Primary, Mode::Coherent)?, &theirs)
+    };
+    let secondary = |what, workload| {
+        let (what, theirs) = medium(what, workload)?;
+        Ratio::new(what, &Entry::best(hgrid, workload)?, &theirs)
+    };
+    let random = || {
+        let (what, theirs) =
+            best(Peer::EmbreeLow, "LOW", "random rays in one call", Workload::Random)?;
+        Ratio::new(what, &Entry::in_mode(hgrid, Workload::Random, Mode::Batch)?, &theirs)
+    };
+    let points = |what: &str, workload| {
+        let peer = find(peers, Peer::EmbreeMedium)?;
+        let what = format!("closest points, {what} / {} MEDIUM, rtcPointQuery", library(peer));
+        Ratio::new(what, &Entry::best(hgrid, workload)?, &Entry::best(peer, workload)?)
+    };
+    vec![
+        coherent(),
+        single(),
+        secondary("ambient occlusion", Workload::Ao),
+        secondary("diffuse bounces", Workload::Bounce),
+        random(),
+        points("near the surface", Workload::Near),
+        points("far outside", Workload::Far),
+    ]
+}
+
+/// The least of some numbers.
+fn least<'a>(entries: impl Iterator<Item = Entry<'a>>) -> Option<Entry<'a>> {
+    entries.min_by(|a, b| a.value.total_cmp(&b.value))
+}
+
+/// The numbers of a peer that takes part.
+fn find<'a>(peers: &[&'a SystemNumbers], peer: Peer) -> Option<&'a SystemNumbers> {
+    peers.iter().copied().find(|system| system.system == peer.name())
+}
+
+/// The library and its version, or the name of the peer.
+fn library(peer: &SystemNumbers) -> &str {
+    peer.version.as_deref().unwrap_or(&peer.system)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mode::{Hint, Lanes};
+    use super::super::numbers::{Build, Run};
+    use super::*;
+
+    /// Workload, mode, seconds in each repetition, rays that differ.
+    type Timed<'a> = (Workload, Mode, &'a [f64], u64);
+
+    /// A system whose first builds take twice as long as its rebuilds.
+    fn system(name: &str, rebuilds: &[f64], runs: &[Timed<'_>]) -> SystemNumbers {
+        let run = |&(workload, mode, samples, differing): &Timed<'_>| Run {
+            workload,
+            mode,
+            seconds: median(samples),
+            samples: samples.to_vec(),
+            page_faults: None,
+            rays: 1000,
+            hits: 500,
+            differing,
+        };
+        let build = |factor: f64| {
+            let samples: Vec<_> = rebuilds.iter().map(|seconds| factor * seconds).collect();
+            Build { seconds: median(&samples), samples, page_faults: None }
+        };
+        let is_peer = Method::ALL.iter().all(|method| method.name() != name);
+        SystemNumbers {
+            system: name.to_owned(),
+            version: name.starts_with("embree").then(|| "Embree 3.13.5".to_owned()),
+            is_peer,
+            first_build: build(2.0),
+            rebuild: build(1.0),
+            triangles: 100,
+            index_bytes: match name {
+                "tinybvh2" => 4000,
+                _ if is_peer => 8000,
+                _ => 1000,
+            },
+            peak_bytes: 10_000,
+            runs: runs.iter().map(run).collect(),
+        }
+    }
+
+    fn of<'a>(ratios: &'a [Ratio], words: &str) -> &'a Ratio {
+        ratios.iter().find(|ratio| ratio.what.contains(words)).unwrap()
+    }
+
+    #[test]
+    fn repetitions_are_compared_with_each_other() {
+        // A machine that is twice as slow in the second one, and three times for the peer in the third.
+        let with = |name, builds: [f64; 3], renders: [f64; 3]| {
+            system(name, &builds, &[(Workload::Primary, Mode::Single, &renders, 0)])
+        };
+        let systems = [
+            with(Method::default().name(), [1.0, 2.0, 1.0], [2.0, 4.0, 2.0]),
+            with("embree-low", [2.0, 4.0, 6.0], [2.0, 4.0, 6.0]),
+        ];
+        let ratios = Ratio::all(&systems);
+        let Ratio { value, peer_value, ratio, least, most, .. } =
+            *of(&ratios, "time to image / best peer: rebuild");
+        assert_eq!([value, peer_value].map(f64::to_bits), [3.0f64, 8.0].map(f64::to_bits));
+        let expected = [0.25, 0.75, 0.75];
+        assert_eq!([least, ratio, most].map(f64::to_bits), expected.map(f64::to_bits));
+        let first = of(&ratios, "time to image / best peer: first");
+        assert!((first.ratio - 2.0 / 3.0).abs() < 1e-9, "{first:?}");
+    }
+
+    #[test]
+    fn the_default_method_meets_the_best_mode_of_each_peer() {
+        let packet = Mode::Packet(Lanes::Eight, Hint::None);
+        let stream = Mode::Stream(Hint::None);
+        let systems = [
+            system("one-level", &[0.1], &[(Workload::Primary, Mode::Single, &[0.5], 0)]),
+            system(
+                Method::default().name(),
+                &[2.0],
+                &[
+                    (Workload::Primary, Mode::Single, &[2.5], 0),
+                    (Workload::Primary, Mode::Coherent, &[1.0], 0),
+                    (Workload::Ao, Mode::Batch, &[3.0], 0),
+                    (Workload::Random, Mode::Single, &[5.0], 0),
+                    (Workload::Random, Mode::Batch, &[6.0], 0),
+                ],
+            ),
+            system(
+                "embree-medium",
+                &[5.0],
+                &[
+                    (Workload::Primary, Mode::Single, &[2.0], 1),
+                    (Workload::Primary, packet, &[0.5], 0),
+                    (Workload::Ao, Mode::Single, &[2.0], 0),
+                    (Workload::Ao, stream, &[1.0], 0),
+                    (Workload::Ao, packet, &[0.1], 2),
+                ],
+            ),
+            system("embree-low", &[1.0], &[(Workload::Random, packet, &[4.0], 0)]),
+            system("tinybvh2", &[1.0], &[(Workload::Primary, Mode::Single, &[0.1], 900)]),
+        ];
+        let ratios = Ratio::all(&systems);
+        let is = |words: &str, which: [&str; 2], ratio: f64| {
+            let found = of(&ratios, words);
+            assert_eq!([&*found.hgrid, &*found.peer], which, "{words}");
+            assert!((found.ratio - ratio).abs() < 1e-9, "{found:?}");
+        };
+        let name = Method::default().name();
+        let with = |mode: &str| format!("{name}, {mode}");
+        is("image / best peer: rebuild", [&with("coherent"), "embree-medium, packet8"], 3.0 / 5.5);
+        is("image / best peer: first", [&with("coherent"), "embree-medium, packet8"], 5.0 / 10.5);
+        is("build / Embree 3.13.5 LOW: rebuild", [name, "embree-low"], 2.0);
+        is("index bytes", [name, "tinybvh2"], 0.25);
+        is("coherent primary", [&with("coherent"), "embree-medium, packet8"], 2.0);
+        is("single primary", [&with("single"), "embree-medium, single"], 1.25);
+        is("occlusion / Embree 3.13.5 MEDIUM", [&with("batch"), "embree-medium, stream"], 3.0);
+        is("random", [&with("batch"), "embree-low, packet8"], 1.5);
+        assert!(ratios.iter().all(|ratio| !ratio.what.contains("bounces")));
+        assert!(Ratio::all(&systems[2..]).is_empty() && Ratio::all(&systems[..2]).is_empty());
+    }
+}

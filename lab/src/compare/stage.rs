@@ -1,0 +1,122 @@
+//! One system at a time over all workloads: runs that are timed, and their answers.
+
+use core::hint::black_box;
+
+use anyhow::Result;
+use hgrid_core::{Hit, Ray};
+
+use super::agreement::{differing_distances, differing_hits, finite, hits, unequal};
+use super::input::Input;
+use super::mode::Mode;
+use super::points::Points;
+use super::samples::{RunRecord, Watch};
+use super::system::Tracer;
+use super::workloads::{Rays, Workload};
+use crate::shade::{Rgb, Shader};
+use crate::tiles::TILE_RAYS;
+
+/// What all systems share: questions, and room for answers.
+pub(super) struct Stage<'a> {
+    rays: &'a Rays,
+    shader: Shader<'a>,
+    pixels: Vec<Rgb>,
+    hits: Vec<Hit>,
+    occluded: Vec<u8>,
+    distances: Vec<f32>,
+}
+
+impl<'a> Stage<'a> {
+    pub(super) fn new(input: &'a Input, rays: &'a Rays) -> Result<Self> {
+        let pixels = rays.primary_hits.len();
+        Ok(Self {
+            rays,
+            shader: Shader::new(input.mesh()?, &rays.tiles.camera),
+            // Not zero: zeros may come as pages that nobody has touched.
+            pixels: vec![[1; 3]; pixels],
+            hits: vec![Hit::MISS; pixels.max(rays.random.questions.len())],
+            occluded: vec![1; rays.ao.questions.len()],
+            distances: vec![
+                1.0;
+                rays.near.asked.questions.len().max(rays.far.asked.questions.len())
+            ],
+        })
+    }
+
+    /// One timed run.
+    pub(super) fn trace(&mut self, tracer: &dyn Tracer, run: &mut RunRecord) {
+        let Self { rays, shader, pixels, hits, occluded, distances } = self;
+        let mode = run.mode;
+        let watch = Watch::start();
+        match run.workload {
+            Workload::Primary => {
+                let mut hits = [Hit::MISS; TILE_RAYS];
+                rays.tiles.fill(pixels, |rays, colors| {
+                    let hits = &mut hits[..rays.len()];
+                    tracer.intersect(mode, rays, hits);
+                    shader.diffuse(rays, hits, colors);
+                });
+                black_box(&*pixels);
+            }
+            Workload::Ao => tracer.occluded(mode, &rays.ao.questions, occluded),
+            Workload::Bounce => closest_hits(tracer, mode, &rays.bounce.questions, hits),
+            Workload::Random => closest_hits(tracer, mode, &rays.random.questions, hits),
+            Workload::Near => closest_points(tracer, &rays.near, distances),
+            Workload::Far => closest_points(tracer, &rays.far, distances),
+        }
+        let (seconds, faults) = watch.stop();
+        run.samples.add(seconds, faults);
+    }
+
+    /// Compares the answers of the run before, those of hgrid to the last bit.
+    pub(super) fn check(&mut self, tracer: &dyn Tracer, run: &mut RunRecord, is_peer: bool) {
+        let rays = self.rays;
+        match run.workload {
+            Workload::Primary => {
+                // Only their colours were kept.
+                let found = &mut self.hits[..rays.primary_hits.len()];
+                rays.tiles.fill(found, |rays, hits| tracer.intersect(run.mode, rays, hits));
+                self.check_hits(&rays.primary_hits, run, is_peer);
+            }
+            Workload::Ao => {
+                run.hits = self.occluded.iter().map(|&is| u64::from(is)).sum();
+                run.differing = unequal(&rays.ao.answers, &self.occluded);
+            }
+            Workload::Bounce => self.check_hits(&rays.bounce.answers, run, is_peer),
+            Workload::Random => self.check_hits(&rays.random.answers, run, is_peer),
+            Workload::Near => self.check_distances(&rays.near, run, is_peer),
+            Workload::Far => self.check_distances(&rays.far, run, is_peer),
+        }
+    }
+
+    fn check_hits(&self, expected: &[Hit], run: &mut RunRecord, is_peer: bool) {
+        let found = &self.hits[..expected.len()];
+        run.hits = hits(found);
+        run.differing = if is_peer {
+            differing_hits(expected, found, self.rays.diagonal)
+        } else {
+            unequal(expected, found)
+        };
+    }
+
+    fn check_distances(&self, points: &Points, run: &mut RunRecord, is_peer: bool) {
+        let expected = &points.asked.answers;
+        let found = &self.distances[..expected.len()];
+        run.hits = finite(found);
+        run.differing = if is_peer {
+            differing_distances(expected, found, self.rays.diagonal)
+        } else {
+            unequal(expected, found)
+        };
+    }
+}
+
+/// The closest hits of rays, in the first places.
+fn closest_hits(tracer: &dyn Tracer, mode: Mode, rays: &[Ray], hits: &mut [Hit]) {
+    tracer.intersect(mode, rays, &mut hits[..rays.len()]);
+}
+
+/// The distances of points, likewise.
+fn closest_points(tracer: &dyn Tracer, points: &Points, distances: &mut [f32]) {
+    let questions = &points.asked.questions;
+    tracer.closest_points(questions, points.radius, &mut distances[..questions.len()]);
+}

@@ -1,0 +1,174 @@
+//! The two regions of a grid, and builds in them: the first one, in pages that the system has just
+//! given, or another one in regions that are kept.
+
+use anyhow::{Context as _, Result};
+use hgrid_core::{Config, Control, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes_with};
+#[cfg(target_os = "linux")]
+use memmap2::Advice;
+use memmap2::{MmapMut, MmapOptions};
+
+use crate::resident::resident_bytes;
+use crate::threads::Threads;
+
+/// Index and scratch of a grid.
+pub(crate) struct Regions {
+    pub(crate) index: MmapMut,
+    pub(crate) scratch: MmapMut,
+}
+
+impl Regions {
+    /// Builds as a user does who has nothing but the mesh: ask for sizes, get memory, build.
+    pub(crate) fn build(mesh: TriangleMesh<'_>, config: &Config) -> Result<Self> {
+        Threads::new(1)?.parallel(|parallel| Self::fresh(mesh, config, parallel))
+    }
+
+    /// The same on threads.
+    pub(crate) fn fresh(
+        mesh: TriangleMesh<'_>,
+        config: &Config,
+        parallel: &Control<'_>,
+    ) -> Result<Self> {
+        Self::built(mesh, config, parallel, memory)
+    }
+
+    /// The same in memory from where the caller says.
+    fn built(
+        mesh: TriangleMesh<'_>,
+        config: &Config,
+        parallel: &Control<'_>,
+        pages: fn(usize) -> Result<MmapMut>,
+    ) -> Result<Self> {
+        // A brick grid's bound follows from the number of triangles, and
+        // what is not written costs nothing.
+        let bound = match config.method {
+            Method::Brick => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
+            _ => None,
+        };
+        let sizes = match bound {
+            Some(bound) => bound,
+            None => sizes_with(&mesh, config, &mut [], parallel)?,
+        };
+        let (mut index, mut scratch) = (pages(sizes.index_bytes)?, pages(sizes.scratch_bytes)?);
+        Grid::build_with(mesh, config, &mut index, &mut scratch, parallel)?;
+        Ok(Self { index, scratch })
+    }
+
+    /// Maps as much as the mesh needs as it is now.
+    pub(crate) fn empty(
+        mesh: &TriangleMesh<'_>,
+        config: &Config,
+        parallel: &Control<'_>,
+    ) -> Result<Self> {
+        let sizes = sizes_with(mesh, config, &mut [], parallel)?;
+        Ok(Self { index: memory(sizes.index_bytes)?, scratch: memory(sizes.scratch_bytes)? })
+    }
+
+    /// Builds in these regions, in larger ones if the mesh needs it; returns how often they grew.
+    pub(crate) fn rebuild(
+        &mut self,
+        mesh: TriangleMesh<'_>,
+        config: &Config,
+        parallel: &Control<'_>,
+    ) -> Result<u32> {
+        let mut grown = 0;
+        loop {
+            let Self { index, scratch } = self;
+            match Grid::build_with(mesh, config, index, scratch, parallel).map(drop) {
+                Ok(()) => return Ok(grown),
+                Err(Error::OutOfMemory { region, needed_bytes, .. }) => {
+                    let larger = memory(usize::try_from(needed_bytes)?)?;
+                    *(if region == Region::Index { index } else { scratch }) = larger;
+                    grown += 1;
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+}
+
+/// Bytes of index and scratch that a build writes, in whole small pages; where the system does not
+/// tell, the bytes of the grid and of all scratch.
+pub(crate) fn peak_bytes(
+    mesh: TriangleMesh<'_>,
+    config: &Config,
+    parallel: &Control<'_>,
+) -> Result<usize> {
+    let Regions { index, scratch } = Regions::built(mesh, config, parallel, small_pages)?;
+    match resident_bytes(&index).zip(resident_bytes(&scratch)) {
+        Some((index, scratch)) => Ok(index + scratch),
+        None => Ok(Grid::open(&index, mesh)?.blob_bytes() + scratch.len()),
+    }
+}
+
+/// From here on large pages are asked for: eight of 2 MiB.
+#[cfg(target_os = "linux")]
+const MANY_BYTES: usize = 16 << 20;
+
+/// Pages that the system provides when they are first written, large ones if it has them: a build
+/// of a million triangles is sooner done with those, and Embree asks for them, too. A small build
+/// would write little of each, and wait until the system has cleared all of it.
+fn memory(bytes: usize) -> Result<MmapMut> {
+    let memory = map(bytes)?;
+    // Who cannot give them gives small ones.
+    #[cfg(target_os = "linux")]
+    if bytes >= MANY_BYTES {
+        let _ = memory.advise(Advice::HugePage);
+    }
+    Ok(memory)
+}
+
+/// The same in pages of the usual size: as many bytes as are written, and few more.
+fn small_pages(bytes: usize) -> Result<MmapMut> {
+    let memory = map(bytes)?;
+    #[cfg(target_os = "linux")]
+    let _ = memory.advise(Advice::NoHugePage);
+    Ok(memory)
+}
+
+fn map(bytes: usize) -> Result<MmapMut> {
+    let mut options = MmapOptions::new();
+    options
+        .len(bytes.max(1))
+        .no_reserve_swap()
+        .map_anon()
+        .with_context(|| format!("cannot get {bytes} bytes of memory"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn small_pages_are_small() {
+        const LARGE: usize = 1 << 21;
+        let mut memory = small_pages(32 * LARGE).unwrap();
+        for byte in memory.iter_mut().step_by(LARGE) {
+            *byte = 1;
+        }
+        if let Some(bytes) = resident_bytes(&memory) {
+            assert!((32 * 4096..=32 * LARGE / 8).contains(&bytes), "{bytes}");
+        }
+    }
+
+    #[test]
+    fn kept_regions_grow_when_a_mesh_needs_more_and_hold_the_same_grid() {
+        let [small, large] =
+            ["procedural:knot:200", "procedural:knot:3000"].map(|spec| Scene::load(spec).unwrap());
+        let [small, large] = [&small, &large]
+            .map(|scene| TriangleMesh::new(&scene.positions, &scene.indices).unwrap());
+        for config in Method::ALL.iter().copied().map(Config::new) {
+            let expected = Regions::build(large, &config).unwrap();
+            let blob = |regions: &Regions| {
+                let bytes = Grid::open(&regions.index, large).unwrap().blob_bytes();
+                regions.index[..bytes].to_vec()
+            };
+            let control = Control::default();
+            let mut kept = Regions::empty(&small, &config, &control).unwrap();
+            kept.rebuild(small, &config, &control).unwrap();
+            assert!(kept.rebuild(large, &config, &control).unwrap() > 0);
+            assert_eq!(kept.rebuild(large, &config, &control).unwrap(), 0);
+            assert!(blob(&kept) == blob(&expected), "{}", config.method.name());
+        }
+    }
+}

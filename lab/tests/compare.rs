@@ -1,0 +1,40 @@
+//! `hgrid compare` as a program: it starts itself for first builds, which no unit test can see.
+
+use std::io;
+use std::process::{Command, Output};
+
+fn hgrid(words: &str) -> io::Result<Output> {
+    Command::new(env!("CARGO_BIN_EXE_hgrid")).args(words.split(' ')).output()
+}
+
+#[test]
+fn a_first_build_prints_its_time() {
+    let output = hgrid("first-build procedural:knot:500 one-level").unwrap();
+    let first: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(output.status.success() && first["seconds"].as_f64() > Some(0.0), "{first}");
+
+    let output = hgrid("first-build procedural:knot:500 nothing").unwrap();
+    assert!(!output.status.success() && output.stdout.is_empty());
+}
+
+#[cfg(feature = "peers")]
+#[test]
+fn first_builds_have_processes_of_their_own() {
+    let file = std::env::temp_dir().join(format!("hgrid-first-{}.json", std::process::id()));
+    let words = format!(
+        "compare procedural:knot:500 --size 16 --repeat 1 --methods one-level \
+         --peers embree-low,embree-dynamic --workloads primary --json {}",
+        file.display()
+    );
+    let output = hgrid(&words).unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("first in a new process") && text.contains("embree-dynamic is Embree"));
+
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    std::fs::remove_file(&file).unwrap();
+    for system in json["scenes"][0]["systems"].as_array().unwrap() {
+        assert_eq!(system["first_build"]["samples"].as_array().unwrap().len(), 3, "{system}");
+        assert_eq!(system["rebuild"]["samples"].as_array().unwrap().len(), 1, "{system}");
+    }
+}
