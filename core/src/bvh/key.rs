@@ -92,3 +92,86 @@ const fn spread(cell: u32) -> u32 {
     bits = (bits | bits << 4) & 0x030c_30c3;
     (bits | bits << 2) & 0x0924_9249
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::simd::{Kernel, SimdLevel, dispatch};
+
+    struct Eight<'k> {
+        keys: &'k Keys,
+        boxes: [Aabb; 8],
+    }
+
+    impl Kernel for Eight<'_> {
+        type Output = [u32; 8];
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> [u32; 8] {
+            let lanes = |side: fn(&Aabb) -> Vec3A| {
+                [0, 1, 2].map(|axis| f32x8::simd_from(simd, self.boxes.map(|b| side(&b)[axis])))
+            };
+            self.keys.of_eight(simd, lanes(|b| b.min), lanes(|b| b.max)).into()
+        }
+    }
+
+    /// From -1 to 1.
+    fn random(state: &mut u32) -> Vec3A {
+        Vec3A::from_array([0; 3].map(|_| {
+            *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            #[expect(clippy::cast_precision_loss, reason = "24 bits")]
+            let unit = (*state >> 8) as f32 / 8_388_608.0;
+            unit - 1.0
+        }))
+    }
+
+    #[test]
+    fn every_kind_of_vectors_gives_the_same_keys() {
+        let mut state = 1;
+        for scale in [1.0, 1e-38, 1e-30, 1e10, 1e36] {
+            for flat in [Vec3A::ONE, Vec3A::new(1.0, 0.0, 1.0), Vec3A::ZERO] {
+                let centers = Aabb { min: -flat * scale, max: flat * scale };
+                let keys = Keys::new(&centers);
+                for _ in 0..if cfg!(miri) { 2 } else { 200 } {
+                    // Also from beside the box of the centres, as those that are left out.
+                    let boxes = [0; 8].map(|_| {
+                        let (center, half) = (random(&mut state) * 1.2, random(&mut state).abs());
+                        let (center, half) = (center * flat * scale, half * scale * 0.1);
+                        Aabb { min: center - half, max: center + half }
+                    });
+                    let expected = boxes.map(|bounds| keys.of(&bounds));
+                    assert!(expected.iter().all(|&key| key < 1 << KEY_BITS));
+                    for level in SimdLevel::available() {
+                        let keys = dispatch(level, Eight { keys: &keys, boxes });
+                        assert_eq!(keys, expected, "{level:?} {scale}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn keys_are_in_the_order_of_cells() {
+        let centers = Aabb { min: Vec3A::ZERO, max: Vec3A::splat(1024.0) };
+        let keys = Keys::new(&centers);
+        let key = |x: f32, y: f32, z: f32| {
+            let point = Vec3A::new(x, y, z);
+            keys.of(&Aabb { min: point, max: point })
+        };
+        assert_eq!(key(0.0, 0.0, 0.0), 0);
+        assert_eq!([key(0.0, 0.0, 1.5), key(0.0, 1.5, 0.0), key(1.5, 0.0, 0.0)], [1, 2, 4]);
+        assert_eq!(key(1024.0, 1024.0, 1024.0), (1 << KEY_BITS) - 1);
+        let diagonal: Vec<u32> =
+            (0_u8..100).map(|i| key(f32::from(i) * 10.0 + 0.5, 0.5, 0.5)).collect();
+        assert!(diagonal.is_sorted_by(|a, b| a < b));
+    }
+
+    #[test]
+    fn a_point_and_nothing_have_keys() {
+        let point = Aabb { min: Vec3A::splat(7.0), max: Vec3A::splat(7.0) };
+        assert_eq!(Keys::new(&point).of(&point), 0);
+        assert!(Keys::new(&Aabb::EMPTY).of(&point) < 1 << KEY_BITS);
+    }
+}

@@ -196,3 +196,97 @@ const fn step(exponent: u8) -> f32 {
 const fn inverse_step(exponent: u8) -> f32 {
     f32::from_bits((254_u32.saturating_sub(exponent as u32)) << 23)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    /// From -1 to 1.
+    fn random(state: &mut u32) -> Vec3A {
+        Vec3A::from_array([0; 3].map(|_| {
+            *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            #[expect(clippy::cast_precision_loss, reason = "24 bits")]
+            let unit = (*state >> 8) as f32 / 8_388_608.0;
+            unit - 1.0
+        }))
+    }
+
+    /// The quantised box of a child, exactly, and a step.
+    fn quantised(node: &Node, slot: usize) -> [DVec3; 3] {
+        let vector = |all: [f32; 3]| Vec3A::from_array(all).as_dvec3();
+        let (origin, step) = (vector(node.origin()), vector(node.steps()));
+        let side = |first: usize| {
+            DVec3::from_array([0, 1, 2].map(|axis| f64::from(node.bounds[first + axis][slot])))
+        };
+        [origin + side(0) * step, origin + side(3) * step, step]
+    }
+
+    #[test]
+    fn boxes_hold_the_exact_ones_and_a_margin_at_any_scale_and_place() {
+        let mut state = 1;
+        let cases = if cfg!(miri) { 1 } else { 100 };
+        for scale in [1e-38, 1e-30, 1e-10, 1.0, 1e10, 1e30, 1e36] {
+            for place in [0.0, 1.0, 100.0, 1e6] {
+                // Thin ones, too.
+                for flat in [Vec3A::ONE, Vec3A::new(1.0, 1e-6, 1.0), Vec3A::new(0.0, 1.0, 0.0)] {
+                    for _ in 0..cases {
+                        let place = (random(&mut state) * place * scale)
+                            .clamp(Vec3A::splat(-1e36), Vec3A::splat(1e36));
+                        let boxes = [0; WIDTH].map(|_| {
+                            let center = place + random(&mut state) * flat * scale * 0.2;
+                            let half = random(&mut state).abs() * flat * scale * 0.1;
+                            Aabb { min: center - half, max: center + half }
+                        });
+                        let all = boxes.iter().fold(Aabb::EMPTY, |all, child| all.union(child));
+                        let least = all.size().max_element() * 1e-10;
+                        let mut node = Node { counts: [1; WIDTH], ..Node::EMPTY };
+                        node.set_boxes(&all, &boxes, least);
+                        for (slot, exact) in boxes.iter().enumerate() {
+                            let [min, max, step] = quantised(&node, slot);
+                            // Smaller than the margin by the rounding of the build.
+                            let margin = step / 128.0;
+                            let is_held = (min + margin).cmple(exact.min.as_dvec3()).all()
+                                && (max - margin).cmpge(exact.max.as_dvec3()).all();
+                            assert!(is_held, "{scale} {exact:?}: {min} {max} {step}");
+                            // And not much larger, where coordinates have digits to show it.
+                            let slack =
+                                (exact.min.as_dvec3() - min).max(max - exact.max.as_dvec3());
+                            assert!(
+                                slack.cmple(step * 2.0).all(),
+                                "{scale} {exact:?}: {min} {max}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn children_follow_one_another() {
+        let mut node = Node { child: 100, first: 50, ..Node::EMPTY };
+        node.counts = [3, 0, 8, 0, 0, 1, 0, 0];
+        node.set_inner(1);
+        node.set_inner(4);
+        let leaf = |first, count| Child::Leaf { first, count };
+        assert_eq!(
+            [0, 1, 2, 3, 4, 5].map(|slot| node.child(slot)),
+            [
+                leaf(50, 3),
+                Child::Inner(100),
+                leaf(53, 8),
+                leaf(61, 0),
+                Child::Inner(101),
+                leaf(61, 1)
+            ]
+        );
+        // Bytes that no build writes wrap, and say so where they are looked up.
+        node.counts = [0xff; WIDTH];
+        (node.child, node.first) = (u32::MAX, u32::MAX);
+        for slot in 0..8 {
+            let _ = node.child(slot);
+        }
+    }
+}

@@ -79,7 +79,11 @@ mod tests {
                     .map(|id| {
                         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                         // Few different keys, so that many are equal; and the same bits above.
-                        [(state >> 7) % (count / 2 + 1) * 0x0101_0101 % (1 << bits), id]
+                        [
+                            ((state >> 7) % (count / 2 + 1)).wrapping_mul(0x0101_0101)
+                                % (1 << bits),
+                            id,
+                        ]
                     })
                     .collect();
                 let mut expected = entries.clone();

@@ -10,6 +10,9 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "no more than MOST_ROOT triangles")]
 
+use bytemuck::Zeroable;
+use glam::Vec3A;
+
 use crate::aabb::Aabb;
 use crate::mesh::TriangleMesh;
 
@@ -74,11 +77,12 @@ impl Part {
 }
 
 impl Subtree {
-    pub(crate) const fn new() -> Self {
+    /// Zeros, which are written where it lies: anything else would be made elsewhere and copied.
+    pub(crate) fn new() -> Self {
         Self {
-            nodes: [Node::EMPTY; MOST_NODES],
+            nodes: [Node::zeroed(); MOST_NODES],
             ranges: [Part::NONE; MOST_NODES],
-            boxes: [Aabb::EMPTY; MOST_NODES],
+            boxes: [Aabb { min: Vec3A::ZERO, max: Vec3A::ZERO }; MOST_NODES],
             above: [0; MOST_NODES],
             count: 0,
             ids: [0; MOST_ROOT],
@@ -223,13 +227,13 @@ fn parts(range: Part, entries: &[Entry], by: Cut) -> [Part; WIDTH] {
                 Cut::Halves => (part.end - part.start) / 2,
             };
         // The parts behind it make room for its second half.
-        for at in (1..WIDTH).rev().filter(|&at| at > widest) {
-            parts[at] = parts[at - 1];
-        }
-        let halves =
-            [Part::new(entries, part.start, middle, by), Part::new(entries, middle, part.end, by)];
-        for (slot, half) in parts.iter_mut().skip(widest).zip(halves) {
-            *slot = half;
+        let mut next = Part::new(entries, middle, part.end, by);
+        for (at, slot) in parts.iter_mut().enumerate().skip(widest) {
+            if at == widest {
+                *slot = Part::new(entries, part.start, middle, by);
+            } else {
+                next = core::mem::replace(slot, next);
+            }
         }
     }
     parts
@@ -248,4 +252,82 @@ fn split(entries: &[Entry], part: Part) -> u8 {
     // Where keys are in no order, both sides still get some.
     let middle = range.partition_point(|entry| entry[0] & bit == 0);
     middle.clamp(1, range.len().max(2) - 1) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::bvh::layout::{LEAST_ROOT, most_of_root};
+    use crate::bvh::node::Child;
+
+    /// Small triangles, one for each entry.
+    fn mesh(count: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+        let at = |i: usize| {
+            #[expect(clippy::cast_precision_loss, reason = "small")]
+            let x = i as f32;
+            [[x, 0.0, 0.0], [x + 0.5, 0.0, 1.0], [x, 0.5, 0.0]]
+        };
+        let indices = (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
+        ((0..count).flat_map(at).collect(), indices.collect())
+    }
+
+    /// Walks a subtree from its root, whose ids and nodes lie at 1000 and 500; returns the ids.
+    fn walk(subtree: &Subtree, most_levels: u32) -> Vec<u32> {
+        let (ids, below) = (subtree.ids(), subtree.below());
+        let mut met = Vec::new();
+        let mut todo = alloc::vec![(*subtree.root().0, 1)];
+        let mut nodes = 0;
+        while let Some((node, level)) = todo.pop() {
+            nodes += 1;
+            assert!(level <= most_levels);
+            for slot in 0..8 {
+                match node.child(slot) {
+                    Child::Inner(child) => {
+                        todo.push((below[child as usize - 500], level + 1));
+                    }
+                    Child::Leaf { first, count } => {
+                        assert!(count as usize <= LEAF);
+                        met.extend(&ids[first as usize - 1000..][..count as usize]);
+                    }
+                }
+            }
+        }
+        assert_eq!(nodes, below.len() + 1);
+        met
+    }
+
+    #[test]
+    fn every_triangle_stands_in_one_leaf() {
+        let (positions, indices) = mesh(MOST_ROOT);
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        // Far apart, equal, each half of the one before, and in no order.
+        let keys: [fn(u32) -> u32; 4] = [
+            |i| i << 20,
+            |_| 7,
+            |i| (1 << 29) >> (29 - i % 30),
+            |i| i.wrapping_mul(0x9e37) & 0xfff,
+        ];
+        let mut subtree = Subtree::new();
+        for count in (0..=MOST_ROOT).step_by(if cfg!(miri) { 41 } else { 1 }) {
+            for (which, key) in keys.iter().enumerate() {
+                let mut entries: Vec<Entry> = (0..count as u32).map(|id| [key(id), id]).collect();
+                if which < 3 {
+                    entries.sort_by_key(|entry| entry[0]);
+                }
+                for by in [Cut::Keys, Cut::Halves] {
+                    subtree.build(&mesh, &entries, [1000, 500], 1e-6, by);
+                    let mut ids = walk(&subtree, subtree.levels());
+                    ids.sort_unstable();
+                    assert!(ids.iter().copied().eq(0..count as u32), "{count} {which} {by:?}");
+                    let most = count.saturating_sub(1) / 7 + 1;
+                    assert!(subtree.below().len() < most.max(2), "{count} {which} {by:?}");
+                    // Halves are cheap enough for the bound.
+                    let is_cheap = subtree.below().len() <= most_of_root(count);
+                    assert!(is_cheap || by == Cut::Keys || count < LEAST_ROOT, "{count} {which}");
+                }
+            }
+        }
+    }
 }

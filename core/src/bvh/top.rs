@@ -281,3 +281,92 @@ fn partition(items: &mut [Item], is_first: impl Fn(&Item) -> bool) -> usize {
     }
     count
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::bvh::node::Child;
+
+    /// The tree over items of these boxes, each a root with one level: every item once, in so many levels.
+    fn build_over(boxes: &[Aabb]) -> u32 {
+        let mut items: Vec<Item> = (0..)
+            .zip(boxes)
+            .map(|(record, bounds)| {
+                let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+                Item { min, max, count: 100, record }
+            })
+            .collect();
+        // A root says by its ids which one it is.
+        let leaf = |record: u32| {
+            (Node { first: record, counts: [1, 0, 0, 0, 0, 0, 0, 0], ..Node::EMPTY }, 1)
+        };
+        let most = boxes.len() + 4 * boxes.len() / 7 + 2;
+        let mut nodes = vec![Node::EMPTY; most];
+        let (count, levels) = build(&mut items, leaf, &mut nodes, 1, 1e-6);
+        assert!(count as usize <= most, "{count} nodes over {} roots", boxes.len());
+        let mut met = Vec::new();
+        let mut todo = vec![(0, 1)];
+        while let Some((number, level)) = todo.pop() {
+            let node = nodes[number as usize];
+            assert!(node.word != WAITING && level <= levels);
+            for slot in 0..8 {
+                match node.child(slot) {
+                    Child::Inner(child) => todo.push((child, level + 1)),
+                    Child::Leaf { first, count: 1 } => met.push(first as usize),
+                    Child::Leaf { .. } => {}
+                }
+            }
+        }
+        met.sort_unstable();
+        assert!(met.into_iter().eq(0..boxes.len()));
+        levels
+    }
+
+    fn cube(at: f32, half: f32) -> Aabb {
+        let at = Vec3A::new(at, 0.5 * at, 0.0);
+        Aabb { min: at - half, max: at + half }
+    }
+
+    #[test]
+    fn every_root_is_below_it_once_and_levels_are_bounded() {
+        let most = if cfg!(miri) { 100 } else { 5000 };
+        for count in [2_usize, 3, 7, 8, 9, 64, 65, most] {
+            #[expect(clippy::cast_precision_loss, reason = "small")]
+            let row = |half: f32| (0..count).map(|i| cube(i as f32, half)).collect::<Vec<_>>();
+            for half in [0.0, 0.4, 100.0] {
+                assert!(build_over(&row(half)) <= 2 + count.ilog2());
+            }
+            // All in one place, where nothing tells them apart.
+            build_over(&vec![cube(0.0, 1.0); count]);
+            // Each half as large as the one before: SAH cuts off a few at a time.
+            let nested: Vec<_> = (0..count.min(200))
+                .map(|i| {
+                    #[expect(clippy::cast_possible_truncation, reason = "small")]
+                    #[expect(clippy::cast_possible_wrap, reason = "small")]
+                    let size = power_of_two(-(i as i32));
+                    cube(size, size * 0.1)
+                })
+                .collect();
+            let levels = build_over(&nested);
+            assert!(levels <= DEEP + 9 + 1, "{levels}");
+        }
+    }
+
+    /// Two to the power of this.
+    fn power_of_two(exponent: i32) -> f32 {
+        let exponent = (127 + exponent).clamp(1, 254);
+        f32::from_bits(exponent.cast_unsigned() << 23)
+    }
+
+    #[test]
+    fn scenes_without_a_surface_are_cut_in_halves() {
+        for scale in [1e-38_f32, 1e-20, 1e20, 1e36] {
+            let line: Vec<_> =
+                (0_u8..100).map(|i| cube(f32::from(i) / 100.0 * scale, 0.0)).collect();
+            assert!(build_over(&line) <= 9, "{scale}");
+        }
+    }
+}

@@ -66,3 +66,59 @@ impl Iterator for Units<'_> {
         (end > start).then_some(start..end)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::bvh::layout::MOST_UNIT;
+
+    /// The units of some bins, of which each holds what the layout promises.
+    fn units(sizes: &[u32]) -> Vec<Range<usize>> {
+        let all: usize = sizes.iter().map(|&size| size as usize).sum();
+        let units: Vec<_> = Units::new(sizes).collect();
+        let mut end = 0;
+        let [_, others] = starts(sizes);
+        for unit in &units {
+            assert_eq!(unit.start, end, "{sizes:?}: {units:?}");
+            end = unit.end;
+            // A crowded bin is alone, and what is not crowded is never too much to sort.
+            let is_crowded = unit.start < others as usize;
+            assert_eq!(is_crowded, unit.end <= others as usize);
+            assert!(is_crowded == (unit.len() > CROWD) || unit.len() <= MOST_UNIT);
+            // Only what is left behind crowded bins is too little for a root.
+            let is_small = unit.len() < LEAST_ROOT;
+            assert!(!is_small || units.len() == 1 || unit.end == all && others > 0, "{units:?}");
+        }
+        assert_eq!(end, all, "{sizes:?}: {units:?}");
+        units
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "small")]
+    #[test]
+    fn bins_are_gathered_until_they_are_enough() {
+        let (least, crowd) = (LEAST_ROOT as u32, CROWD as u32);
+        assert_eq!(units(&[]), []);
+        assert_eq!(units(&[0, 0, 0]), []);
+        assert_eq!(units(&[0, 1, 0]), [0..1]);
+        assert_eq!(units(&[least, least]).len(), 2);
+        assert_eq!(units(&[least, least - 1]).len(), 1);
+        assert_eq!(units(&[least - 1, 1, least]).len(), 2);
+        assert_eq!(units(&[crowd, least, crowd]).len(), 3);
+        // Crowded ones come first, and a small rest stays by itself.
+        let more = crowd as usize + 1;
+        assert_eq!(units(&[1, crowd + 1, 2]), [0..more, more..more + 3]);
+        assert_eq!(units(&[least - 1, crowd, least - 1]), [0..CROWD + 2 * (LEAST_ROOT - 1)]);
+        let mut state = 1_u32;
+        for _ in 0..if cfg!(miri) { 20 } else { 2000 } {
+            let mut sizes = [0; 64];
+            for size in &mut sizes {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                *size =
+                    [0, 1, least - 1, least, 100, crowd, crowd + 1, 5000][(state >> 29) as usize];
+            }
+            units(&sizes);
+        }
+    }
+}
