@@ -135,3 +135,72 @@ pub(crate) fn compare(
         Ordering::Greater => Some(ahead.sign()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sum(terms: &[[f32; 4]]) -> Ordering {
+        let mut sum = Sum([0; LIMBS]);
+        for term in terms {
+            let [a, b, c, d] = term.map(Number::new);
+            sum.add(a, b, c, d);
+        }
+        sum.sign()
+    }
+
+    #[test]
+    fn sums_have_the_sign_of_their_smallest_part() {
+        let (huge, tiny) = (f32::MAX, f32::from_bits(1));
+        assert_eq!(sum(&[]), Ordering::Equal);
+        assert_eq!(sum(&[[huge; 4], [-huge, huge, huge, huge]]), Ordering::Equal);
+        for sign in [1.0, -1.0] {
+            let order = if sign > 0.0 { Ordering::Greater } else { Ordering::Less };
+            let least = [tiny, tiny, tiny, sign * tiny];
+            assert_eq!(sum(&[least]), order);
+            assert_eq!(sum(&[[huge; 4], least, [huge, -huge, huge, huge]]), order);
+            assert_eq!(sum(&[least, [huge, huge, huge, -sign * huge]]), order.reverse());
+            // As many as there ever are, with carries everywhere.
+            let mut many = alloc::vec![[huge, huge, huge, sign * huge]; 21];
+            many.extend([[huge, -huge, huge, sign * huge]; 21]);
+            assert_eq!(sum(&many), Ordering::Equal);
+            many.push(least);
+            assert_eq!(sum(&many), order);
+            many.rotate_left(20);
+            assert_eq!(sum(&many), order);
+        }
+    }
+
+    /// Against whole numbers of 128 bits, at scales from the smallest to the largest.
+    #[test]
+    fn planes_are_where_whole_numbers_say() {
+        let mut state = 1_u32;
+        let mut number = |width: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            i16::try_from((state >> 8) % (2 * width + 1)).unwrap() - i16::try_from(width).unwrap()
+        };
+        let mut seen = [0; 4];
+        for round in 0..20_000 {
+            let width = [2, 4, 9, 100][round % 4];
+            let mut vector = || [number(width), number(width), number(width)];
+            let [a, b, c, o, d] = core::array::from_fn(|_| vector());
+            let t = number(3);
+            let wide = |v: [i16; 3]| v.map(i64::from);
+            let minus = |a: [i16; 3], b: [i16; 3]| [0, 1, 2].map(|k| wide(a)[k] - wide(b)[k]);
+            let (e, f) = (minus(b, a), minus(c, a));
+            let n =
+                [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+            let dot = |v: [i64; 3]| n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
+            let slope = dot(wide(d));
+            let height = dot([0, 1, 2].map(|k| minus(a, o)[k] - i64::from(t) * wide(d)[k]));
+            let expected = (slope != 0).then(|| (height * slope.signum()).cmp(&0));
+            for scale in [f32::from_bits(1), 1.0, 3.0, f32::from_bits(0x7800_0000)] {
+                let float = |v: [i16; 3]| v.map(|x| f32::from(x) * scale);
+                let found = compare(float(o), float(d), &[a, b, c].map(float), t.into());
+                assert_eq!(found, expected, "{a:?} {b:?} {c:?} {o:?} {d:?} {t} {scale}");
+            }
+            seen[expected.map_or(3, |order| (order as i8 + 1).unsigned_abs().into())] += 1;
+        }
+        assert!(seen.iter().all(|&count| count > 200), "{seen:?}");
+    }
+}

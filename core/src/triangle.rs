@@ -31,7 +31,7 @@
 //! So a hit is that of a triangle whose corners lie up to 2^-50 L across the ray from where they
 //! should be, rounded to f32. Corner and origin are f32: where their exponents differ by no more
 //! than 28, `p - o` is exact. An origin more than 2^50 times as far away as the triangle is large
-//! makes one place of all corners: a miss.
+//! may make one place of all corners: a miss.
 //!
 //! # The range
 //!

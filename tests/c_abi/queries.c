@@ -80,25 +80,36 @@ static void every_triangle_is_hit_in_its_middle(void)
     }
 }
 
-/* The next float, for a positive one. */
-static float next_up(float x)
+/* A float some floats behind a positive one. */
+static float next(float x, int floats)
 {
-    uint32_t bits;
+    int32_t bits;
     memcpy(&bits, &x, sizeof bits);
-    bits++;
+    bits += floats;
     memcpy(&x, &bits, sizeof x);
     return x;
 }
 
-static void the_range_of_a_ray_is_closed(void)
+/* The exact t lies on either side of the rounded one, and no farther than the next floats. */
+static void the_range_of_a_ray_is_decided_by_the_exact_t(void)
 {
     hgrid_ray ray = ray_down(0.4f, 0.3f);
     hgrid_hit hit, again;
     CHECK(hgrid_intersect(&grid, &ray, NULL, &hit));
-    ray.t_min = ray.t_max = hit.t;
+    ray.t_min = next(hit.t, -1);
+    ray.t_max = next(hit.t, 1);
     CHECK(hgrid_intersect(&grid, &ray, NULL, &again) && again.t == hit.t);
     CHECK(hgrid_occluded(&grid, &ray, NULL));
-    ray.t_min = next_up(hit.t);
+    ray.t_max = hit.t;
+    const bool is_before = hgrid_intersect(&grid, &ray, NULL, &again);
+    ray.t_min = hit.t;
+    ray.t_max = next(hit.t, 1);
+    const bool is_behind = hgrid_intersect(&grid, &ray, NULL, &again);
+    CHECK(is_before || is_behind);
+    ray.t_min = 0;
+    ray.t_max = next(hit.t, -1);
+    CHECK(!hgrid_intersect(&grid, &ray, NULL, &again) && !hgrid_occluded(&grid, &ray, NULL));
+    ray.t_min = next(hit.t, 1);
     ray.t_max = FLT_MAX;
     CHECK(!hgrid_intersect(&grid, &ray, NULL, &again) && !hgrid_occluded(&grid, &ray, NULL));
 }
@@ -273,7 +284,7 @@ int main(void)
     rays_leave_the_surface_where_they_start();
     denormal_numbers_may_be_zero();
     every_triangle_is_hit_in_its_middle();
-    the_range_of_a_ray_is_closed();
+    the_range_of_a_ray_is_decided_by_the_exact_t();
     odd_rays_miss();
     a_view_is_a_value();
     a_blob_opens_elsewhere();

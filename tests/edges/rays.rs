@@ -1,6 +1,6 @@
 //! Rays that are no rays miss; rays at the limits of what is one are answered as brute force does.
 
-use hgrid_core::{Config, Grid, Ray};
+use hgrid_core::{Coherence, Config, Grid, Hit, Ray, Strided, StridedMut};
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
@@ -158,4 +158,56 @@ fn rays_along_borders_that_they_hardly_cross() {
         }
     }
     assert!(hits > 3000, "{hits}");
+}
+
+/// Many triangles are hit at t = 0, and the answer is the one with the lowest id, in whichever cells
+/// they are: vertices lie a margin away from borders of cells, where a subgrid reaches farther than
+/// its cell.
+#[test]
+fn origins_on_vertices_that_many_triangles_share() {
+    let mut random = Random(43);
+    let mut ties = 0;
+    for round in 0..60 {
+        let vertices = [8, 100, 200][round % 3];
+        let center = [[0.0; 3], random.point(), [100.0; 3]][round / 3 % 3];
+        let mut mesh = Mesh::default();
+        for _ in 0..vertices {
+            let point = random.point().map(|x| (x * 4.0).round() / 4.0);
+            mesh.positions.push(std::array::from_fn(|k| center[k] + point[k]));
+        }
+        for _ in 0..[253, 60, 500, 20][round % 4] {
+            let a = random.below(vertices);
+            let b = (a + 1 + random.below(4)) % vertices;
+            let c = (b + 1 + random.below(4)) % vertices;
+            mesh.indices.push([a, b, c].map(|vertex| vertex as u32));
+        }
+        let view = mesh.view();
+        let mut rays = Vec::new();
+        for _ in 0..60 {
+            let origin = mesh.positions[random.below(vertices)];
+            let towards = random.point();
+            let along = [towards, towards.map(|x| (x * 2.0).round() / 2.0)][random.below(2)];
+            rays.extend([0.0, -0.5].map(|t_min| Ray { t_min, ..Ray::new(origin, along) }));
+        }
+        for config in methods::configs_with([2.0, 8.0][round % 2]) {
+            for depth in [2, 3] {
+                let owned = Owned::build(&view, &Config { depth, ..config }).unwrap();
+                let grid = owned.open(&view).unwrap();
+                let expected: Vec<Hit> = rays
+                    .iter()
+                    .map(|ray| oracle::brute_force(&grid, ray).unwrap_or(Hit::MISS))
+                    .collect();
+                let mut hits = vec![Hit::MISS; rays.len()];
+                let (from, to) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
+                grid.intersect_n(&from, to, Coherence::Coherent).unwrap();
+                for ((ray, expected), in_batch) in rays.iter().zip(&expected).zip(&hits) {
+                    let hit = grid.intersect(ray).unwrap_or(Hit::MISS);
+                    assert_eq!(in_batch, expected, "{:?} {depth} {ray:?}", config.method);
+                    assert_eq!(hit, *expected, "{:?} {depth} {ray:?}", config.method);
+                    ties += usize::from(hit.t == 0.0);
+                }
+            }
+        }
+    }
+    assert!(ties > 20_000, "{ties}");
 }

@@ -116,18 +116,20 @@ impl<'a> Recursive<'a> {
                     }
                 }
             }
-            // Take a step; where a grid ends, take it in the grid around it.
+            // Take a step; where a grid or the ray ends, take it in the grid around it. A grid reaches
+            // by the margin beyond its cell: what ends there may not end in the cell around it.
             loop {
                 match walk.advance(limit) {
                     Step::Inside => break,
-                    Step::Ended => return,
-                    Step::Outside => match depth.checked_sub(1).and_then(|up| around.get(up)) {
-                        Some(outer) => {
-                            (node, walk) = *outer;
-                            depth -= 1;
+                    Step::Outside | Step::Ended => {
+                        match depth.checked_sub(1).and_then(|up| around.get(up)) {
+                            Some(outer) => {
+                                (node, walk) = *outer;
+                                depth -= 1;
+                            }
+                            None => return,
                         }
-                        None => return,
-                    },
+                    }
                 }
             }
         }

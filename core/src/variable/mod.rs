@@ -112,7 +112,8 @@ impl<'a> Variable<'a> {
                     }
                 }
             }
-            // Take a step; where the subgrid ends, take it around the subgrid.
+            // Take a step; where the subgrid or the ray ends, take it around the subgrid. A subgrid
+            // reaches by the margin beyond its cell: what ends there may not end in the cell.
             loop {
                 let step = match &inside {
                     Some(_) => walk.advance(limit),
@@ -120,8 +121,7 @@ impl<'a> Variable<'a> {
                 };
                 match step {
                     Step::Inside => break,
-                    Step::Ended => return,
-                    Step::Outside => match inside.take() {
+                    Step::Outside | Step::Ended => match inside.take() {
                         Some((_, around)) => walk = around,
                         None => return,
                     },
