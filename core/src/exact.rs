@@ -43,6 +43,7 @@ impl Number {
 
 type Vector = [Number; 3];
 
+#[inline(never)]
 fn vector([x, y, z]: [f32; 3]) -> Vector {
     [Number::new(x), Number::new(y), Number::new(z)]
 }
@@ -55,7 +56,8 @@ const LIMBS: usize = 36;
 struct Sum([i64; LIMBS]);
 
 impl Sum {
-    /// Adds `scale * x * y * z`.
+    /// Adds `scale * x * y * z`. Out of line, as all here: this is about size.
+    #[inline(never)]
     fn add(&mut self, scale: Number, x: Number, y: Number, z: Number) {
         let factor = |number: Number| i128::from(number.mantissa);
         let product = factor(scale) * factor(x) * factor(y) * factor(z);
@@ -78,6 +80,7 @@ impl Sum {
     }
 
     /// Adds a multiple of a determinant.
+    #[inline(never)]
     fn add_determinant(&mut self, scale: Number, x: Vector, y: Vector, z: Vector) {
         if scale.mantissa == 0 {
             return;
@@ -92,6 +95,7 @@ impl Sum {
     }
 
     /// Adds a multiple of the normal's product with a vector.
+    #[inline(never)]
     fn add_across(&mut self, scale: Number, [a, b, c]: [Vector; 3], x: Vector) {
         self.add_determinant(scale, b, c, x);
         self.add_determinant(scale, c, a, x);
@@ -99,6 +103,7 @@ impl Sum {
     }
 
     /// The sum compared with 0.
+    #[inline(never)]
     fn sign(&self) -> Ordering {
         let (mut carry, mut rest) = (0, 0);
         for limb in self.0 {

@@ -134,7 +134,9 @@ impl TriangleTest {
     }
 
     /// The same for a ray that was brought to a box and is asked about triangles in it.
-    #[inline]
+    ///
+    /// Out of line, or each kind of query would have its own: without f64 in hardware two kilobytes.
+    #[inline(never)]
     pub(crate) fn from(ray: &Ray, approach: &Approach) -> Self {
         let Approach { anchor, slack, reach, .. } = *approach;
         Self::with(ray, RayFilter::new(ray.direction, anchor, slack, reach))
