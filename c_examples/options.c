@@ -119,9 +119,9 @@ options parse_options(int count, char **words)
             o.input = word;
         }
     }
-    const uint32_t method = METHODS[o.method].config.method;
-    const bool is_brick = method == HGRID_METHOD_BRICK;
-    if (o.density > 0 && (is_brick || method == HGRID_METHOD_BVH))
+    const uint32_t chosen = METHODS[o.method].config.method;
+    const bool is_brick = chosen == HGRID_METHOD_BRICK;
+    if (o.density > 0 && (is_brick || chosen == HGRID_METHOD_BVH))
         fail("--method %s has no density: leave out --density", METHODS[o.method].name);
     if (o.cell_size > 0 && !is_brick)
         fail("--method %s has no cell size: leave out --cell-size", METHODS[o.method].name);
