@@ -35,7 +35,7 @@ fn bad_arguments_are_refused() {
         (&["--size", "12x"], "not `12x`"),
         (&["--size", "99999999999999999999"], "not `99999999999999999999`"),
         (&["--method"], "--method needs a value"),
-        (&["--method", "octree"], "fixed, variable or recursive, not `octree`"),
+        (&["--method", "octree"], "fixed, variable, recursive or bvh, not `octree`"),
         (&["--density"], "--density needs a value"),
         (&["--density", "0"], "--density is a number above 0, not `0`"),
         (&["--density", "-1"], "not `-1`"),
