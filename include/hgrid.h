@@ -1350,7 +1350,7 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * index reaches and then go on counting: the report's `index_bytes` is exact (with brick and bvh maybe
  * only enough), and with so many the same call succeeds.
  *
- * A build allocates nothing and needs at most 12 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
+ * A build allocates nothing and needs at most 14 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
  * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 8
  * KiB where it is called; all beside what `run` and `progress` take (measured on x86-64).
  *
@@ -1434,7 +1434,7 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * or with options that break the rules for structs, nothing is hit. A view that nobody initialised,
  * and one whose blob or mesh is gone, is undefined behaviour.
  *
- * A query allocates nothing, needs at most 6 KiB of stack, as all queries of one ray or point do,
+ * A query allocates nothing, needs at most 9 KiB of stack, as all queries of one ray or point do,
  * and always ends: on one level after no more steps than the three resolutions sum up to.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
@@ -1625,7 +1625,7 @@ bool hgrid_surface_at(const struct hgrid_grid *grid,
  * `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`,
  * `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no error: it misses.
  *
- * The call allocates nothing and needs at most 24 KiB of stack.
+ * The call allocates nothing and needs at most 36 KiB of stack.
  *
  * Threads: any number of queries on the same grid at once; each thread with hits and counters of
  * its own.

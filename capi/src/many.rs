@@ -49,7 +49,7 @@ use crate::types::hgrid_grid;
 /// `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`,
 /// `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no error: it misses.
 ///
-/// The call allocates nothing and needs at most 24 KiB of stack.
+/// The call allocates nothing and needs at most 36 KiB of stack.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with hits and counters of
 /// its own.

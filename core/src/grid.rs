@@ -34,7 +34,7 @@ use crate::visit::{Ids, Visitor};
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
 /// number of threads may query it at once. Queries never fail, never allocate and never panic;
 /// their steps are bounded by the resolutions (one level: by their sum). A single query's stack is
-/// below 6 KiB, a batch's below 24 KiB.
+/// below 9 KiB, a batch's below 36 KiB.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,
@@ -60,7 +60,7 @@ impl<'a> Grid<'a> {
     /// `index` keeps the grid, `scratch` is free again when the build returns; both start at a
     /// multiple of [`ALIGNMENT`](crate::ALIGNMENT) and may hold anything. [`sizes`](crate::sizes)
     /// tells how large they must be; more is not used. The same mesh and configuration give the
-    /// same bits, on every machine of the same byte order. The stack of a build is below 12 KiB,
+    /// same bits, on every machine of the same byte order. The stack of a build is below 14 KiB,
     /// with more than one task ([`Control`]) below 96 KiB, that of a task below 8 KiB, beside what
     /// the caller's own functions take.
     ///

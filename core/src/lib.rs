@@ -26,9 +26,9 @@
 //! ```
 //!
 //! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `approach`, `triangle`,
-//! `simd`, `eight`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`,
+//! `simd`, `eight`, `filter`, `exact`, `pairs`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`,
 //! `hash`, `cell`, `spans`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure
-//! above them (`one_level`; `fixed` and `variable` on top of it; `recursive`; `brick`), and `grid`:
+//! above them (`one_level`; `fixed` and `variable` on top of it; `recursive`; `brick`; `bvh`), and `grid`:
 //! the view that queries run on. Then the questions: `sizes`, `options`, `batch`, `closest`,
 //! `surface`, `inspect`, `packed`. core/DESIGN.md tells how it all works and what was left out.
 //!

@@ -468,7 +468,7 @@ mod tests {
             "render --method bvh",
             "render --macrocell-factor -1",
             "table",
-            "table a.ply --methods fixed,bvh",
+            "table a.ply --methods fixed,octree",
             "table a.ply --json --markdown",
             "compare",
             "compare a.ply --peers optix",

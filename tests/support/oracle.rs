@@ -36,7 +36,7 @@ pub fn brute_force(grid: &Grid<'_>, ray: &Ray) -> Option<Hit> {
 pub fn check(grid: &Grid<'_>, ray: &Ray) {
     let all = all_hits(grid, ray, Cull::None);
     let expected = all.first().copied();
-    assert_eq!(grid.intersect(ray), expected, "intersect {ray:?}");
+    assert_eq!(grid.intersect(ray), expected, "intersect {:?} {ray:?}", grid.method());
     assert_eq!(grid.occluded(ray), expected.is_some(), "occluded {ray:?}");
 
     // Ranges that end at the hit, or next to it: the exact t lies on either side of the rounded one.

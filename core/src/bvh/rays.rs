@@ -4,7 +4,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};
 
 use super::boxes::{Beam, Slabs, bits, splat};
-use super::slab::{STEEP, TINY, WIDER};
+use super::slab::{EARLIER, STEEP, TINY, WIDER};
 use crate::aabb::Aabb;
 use crate::approach::FAR_EXTENTS;
 use crate::eight::columns;
@@ -146,7 +146,7 @@ impl Rays {
                 self.anchor[axis][octet] = origin[axis].into();
             }
             let (start, end) = (t_min * scale, t_max * scale);
-            self.start[octet] = (start - (start.abs() * (WIDER - 1.0) + TINY)).into();
+            self.start[octet] = (start - (start.abs() * EARLIER + TINY)).into();
             self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + TINY)).into();
             self.scale[octet] = scale.into();
 
@@ -345,7 +345,8 @@ impl Rays {
         if ANY {
             self.alive &= !(1 << at);
         } else {
-            let end = hit.t * get(&self.scale, ray);
+            // What rounds to the same t may lie farther away.
+            let end = hit.t.next_up() * get(&self.scale, ray);
             put(&mut self.end, at, end + (end.abs() * (WIDER - 1.0) + TINY));
         }
     }

@@ -31,6 +31,10 @@ pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0
 /// What errors are relative to: 1 + 2^-20.
 pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 
+/// By how much a ray starts earlier, in parts of its start: more than far sides with a negative distance
+/// come nearer by.
+pub(crate) const EARLIER: f32 = 2.0 * (WIDER - 1.0);
+
 /// More than what underflows on the way to a distance.
 pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
 
@@ -79,12 +83,13 @@ impl Slab {
             if inverse.abs() <= STEEP { inverse } else { STEEP.copysign(d) }
         };
         let inverse = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
-        let (start, end) = (begin * scale, ray.t_max * scale);
+        // A t stands for all that round to it: where t is tiny, for much of the scene.
+        let (start, end) = (begin.next_down() * scale, ray.t_max.next_up() * scale);
         let slab = Self {
             origin_near: ray.origin,
             origin_far: ray.origin,
             inverse,
-            start: start - (start.abs() * (WIDER - 1.0) + TINY),
+            start: start - (start.abs() * EARLIER + TINY),
             end: end + (end.abs() * (WIDER - 1.0) + TINY),
             t: 0.0,
             scale: f64::from(scale),
@@ -135,7 +140,7 @@ impl Slab {
     /// A distance no farther than a `t` and all that rounds to it.
     fn earliest(&self, t: f32) -> f32 {
         let distance = round((f64::from(t.next_down()) - self.t) * self.scale);
-        (distance - distance.abs() * (WIDER - 1.0)) - TINY
+        (distance - distance.abs() * EARLIER) - TINY
     }
 
     /// A distance no nearer than a `t` and all that rounds to it.
