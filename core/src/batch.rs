@@ -3,7 +3,8 @@
 //! A batch answers each ray as [`Grid::intersect`] or [`Grid::occluded`] would, bit for bit. What
 //! the caller knows about the rays says how: neighbours, as those of a tile of pixels, share
 //! their way through the grid; rays without order go one after the other (several at a time in
-//! flight were slower: core/DESIGN.md).
+//! flight were slower: core/DESIGN.md). A tree ([`Method::Bvh`](crate::Method::Bvh)) takes rays of both
+//! kinds in groups of 64, and one by one where their origins lie far apart.
 
 use bytemuck::{Pod, bytes_of, pod_read_unaligned};
 

@@ -132,7 +132,7 @@ fn build_in<const N: usize>(
         available_bytes: index_available,
     };
     let available_bytes = scratch.len() as u64;
-    // Whether bins are crowded is not known yet.
+    // Ask for a bench that holds all entries: the census, which tells if bins are crowded, comes later.
     let needed_bytes = scratch_bytes(all, 1, all);
     let scratch_error =
         Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
@@ -316,7 +316,7 @@ fn scatter<const N: usize>(
     Ok(())
 }
 
-/// What the steps on top of the bins know.
+/// The inputs that the steps after binning share.
 struct Work<'w> {
     mesh: &'w TriangleMesh<'w>,
     least: f32,
@@ -326,7 +326,7 @@ struct Work<'w> {
     shift: u32,
 }
 
-/// Units with about as many entries as those of the other tasks, and what is made of them.
+/// A task: its share of the units, and the memory for their subtrees.
 struct Task<'w> {
     work: &'w Work<'w>,
     /// The entries of the units among all.
@@ -340,7 +340,7 @@ struct Task<'w> {
     counts: &'w mut [u32],
 }
 
-/// How many nodes and roots a task made, and of which entries.
+/// The numbers of nodes and roots that a task made, and where its entries and nodes start.
 #[derive(Clone, Copy, Default)]
 struct Made {
     first: u32,
@@ -423,7 +423,7 @@ impl Work<'_> {
             all.nodes += made.nodes;
             all.roots += made.roots;
             if made.roots == 1 {
-                // Its few entries may have had no room for it.
+                // Write the record again: a root of a few entries had no room for it in them.
                 all.last = last;
                 all.last.node.child -= moved;
                 all.last.write(entries.get_mut(to..));
@@ -487,7 +487,7 @@ impl Work<'_> {
     }
 }
 
-/// What all tasks made together.
+/// The sums over all tasks.
 struct All {
     /// Nodes, with one for the root of all.
     nodes: u32,

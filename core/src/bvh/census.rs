@@ -15,7 +15,7 @@ use crate::tasks::run;
 
 use super::key::{KEY_BITS, Keys, NO_KEY};
 
-/// What a census finds, but for keys and counts.
+/// The totals of a census; keys and counts are in the caller's arrays.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Census {
     /// Triangles that go into the tree.

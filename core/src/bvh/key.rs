@@ -27,7 +27,7 @@ pub(crate) struct Keys {
 
 /// The last cell of an axis, and a part of it.
 const END: f32 = 1023.5;
-/// What is added to round to a whole number, which then stands in the low bits.
+/// Adding this rounds a small number to a whole one and leaves that in the low bits.
 const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 const CELL_BITS: u32 = 0x3ff;
 

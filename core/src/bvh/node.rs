@@ -174,7 +174,7 @@ const MARGIN: f32 = 1.0 / 64.0;
 /// A box is at least this part of its coordinates wide, so that a quarter of a step is no less than
 /// their rounding.
 const LEAST_STEPS: f32 = 254.0 / 2_097_152.0;
-/// What is added to round to a whole number, which then stands in the low bits.
+/// Adding this rounds a small number to a whole one and leaves that in the low bits.
 const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 
 /// The exponent bits of the smallest power of two of which 254 make up an extent.

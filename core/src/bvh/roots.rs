@@ -1,5 +1,5 @@
-//! From bins of entries to roots: subtrees over a hundred to two hundred triangles each, which the tree
-//! on top ([`top`](super::top)) then treats as one thing.
+//! From bins of entries to roots: subtrees over LEAST_ROOT to MOST_ROOT triangles each. The
+//! tree on top ([`top`](super::top)) treats each as one item.
 //!
 //! ```text
 //! for each unit (a crowded bin, or bins side by side with LEAST_ROOT entries or more):
@@ -10,9 +10,9 @@
 //! bench   |                            | the same unit, while it is binned again |
 //! ```
 //!
-//! A unit's entries lie in one of the two arrays, and binning moves them to the other. What a root leaves
-//! behind is 112 bytes, written over entries that were used up: a root takes 896 bytes of them or more, and
-//! a smaller one comes behind a crowded bin.
+//! A unit's entries lie in one of the two arrays, and binning moves them to the other. The record
+//! of a root is 112 bytes, written over entries that were used up. A root uses up 320 bytes or more; a
+//! smaller one comes behind a crowded bin.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
 
@@ -32,7 +32,7 @@ use super::sort::sort;
 use super::subtree::{Cut, Subtree};
 use super::units::starts;
 
-/// What is known of a root.
+/// The record of a root: its node, its box and its counts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(crate) struct Record {
