@@ -1,4 +1,4 @@
-//! From bins of entries to roots: subtrees over LEAST_ROOT to MOST_ROOT triangles each. The
+//! From bins of entries to roots: subtrees over `LEAST_ROOT` to `MOST_ROOT` triangles each. The
 //! tree on top ([`top`](super::top)) treats each as one item.
 //!
 //! ```text
