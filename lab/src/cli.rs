@@ -465,7 +465,7 @@ mod tests {
             "render --fov 0",
             "compare a.ply --eye 1,2,3 --view inside",
             "render --density many",
-            "render --method bvh",
+            "render --method octree",
             "render --macrocell-factor -1",
             "table",
             "table a.ply --methods fixed,octree",
