@@ -78,6 +78,8 @@ const NEARBY_UNIT: f32 = 1.001 / 16_777_216.0;
 const NEARBY_REACH: f32 = f32::from_bits(0x5d80_0000); // 2^60
 /// What the floor grows by with the square of the distance: 28 * (7 * 2^-53)^2, and a little more.
 const NEARBY_FLOOR: f32 = 2e-29;
+/// Distances count as no less: so nothing is denormal on the way to the floor, which takes long.
+const NEARBY_LEAST: f32 = 1.0 / 32_768.0;
 
 /// Directions that are longer or shorter are not scaled in f32.
 pub(crate) const NEARBY_LONG: f32 = f32::from_bits(0x7e00_0000); // 2^125
@@ -223,8 +225,9 @@ impl RayFilter {
     ) -> Self {
         let slope = sum * (distance * 29.0 + extent * 19.0) * NEARBY_UNIT;
         let slope = if distance <= NEARBY_REACH { slope } else { f32::INFINITY };
-        let floor = distance * distance * NEARBY_FLOOR + distance * f32::MIN_POSITIVE;
-        Self { origin, direction, slope, floor: floor + f32::MIN_POSITIVE }
+        let distance = greater(distance, NEARBY_LEAST);
+        let floor = distance * (distance * NEARBY_FLOOR + f32::MIN_POSITIVE) + f32::MIN_POSITIVE;
+        Self { origin, direction, slope, floor }
     }
 
     /// The same ray in all lanes.
@@ -287,8 +290,9 @@ impl<S: Simd> Filter<f32x8<S>> {
         let slope = sum * (distance * 29.0 + 19.0 * extent) * NEARBY_UNIT;
         let is_in_range = distance.simd_le(NEARBY_REACH);
         let slope = is_in_range.select(slope, f32x8::splat(simd, f32::INFINITY));
-        let floor = distance * distance * NEARBY_FLOOR + distance * f32::MIN_POSITIVE;
-        Self { origin, direction, slope, floor: floor + f32::MIN_POSITIVE }
+        let distance = distance.max(f32x8::splat(simd, NEARBY_LEAST));
+        let floor = distance * (distance * NEARBY_FLOOR + f32::MIN_POSITIVE) + f32::MIN_POSITIVE;
+        Self { origin, direction, slope, floor }
     }
 }
 

@@ -324,14 +324,14 @@ impl<'a> Grid<'a> {
         let mesh = &self.mesh;
         if bvh.is_shallow() {
             let stack = &mut [0; bvh::SMALL_STACK];
-            let ray =
+            let mut ray =
                 bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
-            dispatch(self.simd, ray)
+            dispatch(self.simd, &mut ray)
         } else {
             let stack = &mut [0; bvh::STACK];
-            let ray =
+            let mut ray =
                 bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
-            dispatch(self.simd, ray)
+            dispatch(self.simd, &mut ray)
         }
     }
 

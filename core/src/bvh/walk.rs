@@ -141,112 +141,108 @@ fn numbers<S: Simd>(half: u16x8<S>) -> f32x8<S> {
 /// A point in vectors.
 #[inline(always)]
 fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
-    [opaque(simd, x), opaque(simd, y), opaque(simd, z)]
+    [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)]
 }
 
-/// A number in all lanes, hidden from the compiler: it would subtract and multiply one lane and spread
-/// the result, which makes the way from one node to the next longer.
-#[inline(always)]
-fn opaque<S: Simd>(simd: S, number: f32) -> f32x8<S> {
-    f32x8::simd_from(simd, core::hint::black_box([number; WIDTH]))
-}
-
-impl<F: Search, T: Tally> Kernel for OneRay<'_, F, T> {
+impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
     /// Returns false if the ray comes from afar, and nothing was done.
     type Output = bool;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> bool {
-        let Self { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack } = self;
+        let OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack } = self;
+        let (begin, cull, afar) = (*begin, *cull, *afar);
         let nearby = if afar.is_none() { Slab::nearby(ray, begin, bounds) } else { afar.copied() };
         let Some((slab, filter)) = nearby else { return false };
         let slab = &slab;
         let filter = filter.splat(simd);
         let mut test = None;
-        let (given, ray) = (ray, Wide::new(simd, slab));
+        let (given, wide) = (ray, Wide::new(simd, slab));
+        // Hidden from the compiler: it would subtract and multiply in one lane and spread the result, which
+        // makes the way from one node to the next longer.
+        let ray = core::hint::black_box(&wide);
         let mut end = slab.end;
         let mut top = 0;
         // Damaged bytes may lead in circles; a tree's nodes are entered once.
         let mut budget = bvh.budget();
         let mut child = Child::Inner(0);
         loop {
-            match child {
-                Child::Inner(number) => {
-                    tally.grid_step();
-                    let node = bvh.nodes.get(number as usize);
-                    let rest = budget.checked_sub(1);
-                    let (Some(node), Some(rest)) = (node, rest) else { return true };
-                    budget = rest;
-                    let (met, near) = ray.meet(simd, node, end);
-                    if met != 0 {
-                        let first = met.trailing_zeros();
-                        let others = met & (met - 1);
-                        if others == 0 {
-                            child = node.child(first);
-                            continue;
-                        }
-                        // Descend into the nearest, push the others.
-                        let near: [f32; WIDTH] = near.into();
-                        let at = |slot: u32| near[slot as usize % WIDTH];
-                        let second = others.trailing_zeros();
-                        let mut rest = others & (others - 1);
-                        let (mut nearest, mut other) = (first, second);
-                        if at(second) < at(first) {
-                            (nearest, other) = (second, first);
-                        }
-                        let base = top;
-                        push(stack, &mut top, base, number, other, at(other));
-                        while rest != 0 {
-                            let mut slot = rest.trailing_zeros();
-                            rest &= rest - 1;
-                            if at(slot) < at(nearest) {
-                                core::mem::swap(&mut slot, &mut nearest);
-                            }
-                            push(stack, &mut top, base, number, slot, at(slot));
-                        }
-                        child = node.child(nearest);
-                        continue;
-                    }
+            while let Child::Inner(number) = child {
+                tally.grid_step();
+                let node = bvh.nodes.get(number as usize);
+                let rest = budget.checked_sub(1);
+                let (Some(node), Some(rest)) = (node, rest) else { return true };
+                budget = rest;
+                let (met, near) = ray.meet(simd, node, end);
+                if met == 0 {
+                    let Some(next) = pop(bvh, stack, &mut top, end) else { return true };
+                    child = next;
+                    continue;
                 }
-                Child::Leaf { first, count } => {
-                    let ids = bvh.leaf(first, count);
-                    let rest = budget.checked_sub(1);
-                    let Some(rest) = rest else { return true };
-                    budget = rest;
-                    tally.cell_step();
-                    tally.primitive_tests(ids.len());
-                    let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
-                    let triangles = Eight::of(simd, mesh, lanes, ids.len());
-                    #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
-                    let dropped = filter.drops(&triangles.corners).to_bitmask() as u32;
-                    let mut survivors = !dropped & triangles.used;
-                    while survivors != 0 {
-                        let lane = survivors.trailing_zeros() as usize;
-                        survivors &= survivors - 1;
-                        let Some(&id) = ids.get(lane) else { break };
-                        let test = test.get_or_insert_with(|| exact(given, cull));
-                        match search.decide(test, mesh, id) {
-                            Outcome::Unchanged => {}
-                            Outcome::EndsAt(t) => end = slab.latest(t),
-                            Outcome::Done => return true,
-                        }
+                let first = met.trailing_zeros();
+                let others = met & (met - 1);
+                if others == 0 {
+                    child = node.child(first);
+                    continue;
+                }
+                // Descend into the nearest, push the others.
+                let near: [f32; WIDTH] = near.into();
+                let at = |slot: u32| near[slot as usize % WIDTH];
+                let second = others.trailing_zeros();
+                let mut rest = others & (others - 1);
+                let base = top;
+                if rest == 0 {
+                    // A branch, where a choice would wait for the distances.
+                    if at(second) < at(first) {
+                        push(stack, &mut top, base, number, first, at(first));
+                        child = node.child(second);
+                    } else {
+                        push(stack, &mut top, base, number, second, at(second));
+                        child = node.child(first);
                     }
+                    continue;
+                }
+                let (mut nearest, mut other) = (first, second);
+                if at(second) < at(first) {
+                    (nearest, other) = (second, first);
+                }
+                push(stack, &mut top, base, number, other, at(other));
+                while rest != 0 {
+                    let mut slot = rest.trailing_zeros();
+                    rest &= rest - 1;
+                    if at(slot) < at(nearest) {
+                        core::mem::swap(&mut slot, &mut nearest);
+                    }
+                    push(stack, &mut top, base, number, slot, at(slot));
+                }
+                child = node.child(nearest);
+            }
+
+            // Test the triangles of a leaf at once, and decide what passes.
+            let Child::Leaf { first, count } = child else { continue };
+            let ids = bvh.leaf(first, count);
+            let Some(rest) = budget.checked_sub(1) else { return true };
+            budget = rest;
+            tally.cell_step();
+            tally.primitive_tests(ids.len());
+            let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
+            let triangles = Eight::of(simd, mesh, lanes, ids.len());
+            #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
+            let dropped = filter.drops(&triangles.corners).to_bitmask() as u32;
+            let mut survivors = !dropped & triangles.used;
+            while survivors != 0 {
+                let lane = survivors.trailing_zeros() as usize;
+                survivors &= survivors - 1;
+                let Some(&id) = ids.get(lane) else { break };
+                let test = test.get_or_insert_with(|| exact(given, cull));
+                match search.decide(test, mesh, id) {
+                    Outcome::Unchanged => {}
+                    Outcome::EndsAt(t) => end = slab.latest(t),
+                    Outcome::Done => return true,
                 }
             }
-            // Pop what is not behind the end.
-            loop {
-                let Some(below) = top.checked_sub(1) else { return true };
-                top = below;
-                let Some(&waiting) = stack.get(top) else { return true };
-                let is_behind = f32::from_bits((waiting >> 32) as u32) > end;
-                if !is_behind {
-                    #[expect(clippy::cast_possible_truncation, reason = "the low half")]
-                    let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
-                    child =
-                        bvh.nodes.get(node as usize).map_or(Child::NONE, |node| node.child(slot));
-                    break;
-                }
-            }
+            let Some(next) = pop(bvh, stack, &mut top, end) else { return true };
+            child = next;
         }
     }
 }
@@ -275,5 +271,20 @@ fn push(stack: &mut [Waiting], top: &mut usize, base: usize, node: u32, slot: u3
     }
     if let Some(slot) = stack.get_mut(at) {
         *slot = waiting;
+    }
+}
+
+/// Pops the next child that does not begin behind the end of the ray.
+#[inline(always)]
+fn pop(bvh: &Bvh<'_>, stack: &[Waiting], top: &mut usize, end: f32) -> Option<Child> {
+    loop {
+        *top = top.checked_sub(1)?;
+        let waiting = *stack.get(*top)?;
+        let is_behind = f32::from_bits((waiting >> 32) as u32) > end;
+        if !is_behind {
+            #[expect(clippy::cast_possible_truncation, reason = "the low half")]
+            let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
+            return Some(bvh.nodes.get(node as usize).map_or(Child::NONE, |node| node.child(slot)));
+        }
     }
 }
