@@ -9,18 +9,18 @@ use super::walk::bytes;
 
 /// Sides of eight boxes, or of one box in all lanes, by axis.
 #[derive(Clone, Copy)]
-pub(crate) struct Boxes<S: Simd> {
-    low: [f32x8<S>; 3],
-    high: [f32x8<S>; 3],
+pub(crate) struct Boxes<V> {
+    low: [V; 3],
+    high: [V; 3],
 }
 
-/// Rays for slab tests: one in all lanes, or eight.
+/// Rays for slab tests: one in all lanes, or one a lane.
 #[derive(Clone, Copy)]
-pub(crate) struct Slabs<S: Simd> {
-    pub(crate) origin: [f32x8<S>; 3],
-    pub(crate) inverse: [f32x8<S>; 3],
-    pub(crate) start: f32x8<S>,
-    pub(crate) end: f32x8<S>,
+pub(crate) struct Slabs<V> {
+    pub(crate) origin: [V; 3],
+    pub(crate) inverse: [V; 3],
+    pub(crate) start: V,
+    pub(crate) end: V,
 }
 
 /// All rays of a group as intervals, in all lanes. On an axis on which directions have both signs, the
@@ -34,7 +34,7 @@ pub(crate) struct Beam<S: Simd> {
     pub(crate) end: f32x8<S>,
 }
 
-impl<S: Simd> Boxes<S> {
+impl<S: Simd> Boxes<f32x8<S>> {
     /// The eight boxes of a node relative to a point, grown on each side.
     #[inline(always)]
     pub(crate) fn decode(simd: S, node: &Node, center: [f32; 3], growth: f32) -> Self {
@@ -62,35 +62,6 @@ impl<S: Simd> Boxes<S> {
         [a.into(), b.into(), c.into(), d.into(), e.into(), f.into()]
     }
 
-    /// One of the boxes in all lanes.
-    #[inline(always)]
-    pub(crate) fn one(simd: S, sides: &[[f32; WIDTH]; 6], slot: usize) -> Self {
-        let slot = slot % WIDTH;
-        let [a, b, c, d, e, f] = sides;
-        Self {
-            low: splat(simd, [a[slot], b[slot], c[slot]]),
-            high: splat(simd, [d[slot], e[slot], f[slot]]),
-        }
-    }
-
-    /// Where rays enter the boxes, and which of them they meet.
-    #[inline(always)]
-    pub(crate) fn meet(&self, simd: S, rays: &Slabs<S>) -> (f32x8<S>, mask32x8<S>) {
-        let (x, y, z) = (self.cross(rays, 0), self.cross(rays, 1), self.cross(rays, 2));
-        let near = x.0.max(y.0).max(z.0.max(rays.start));
-        let far = x.1.min(y.1).min(z.1) * f32x8::splat(simd, WIDER);
-        let far = far.min(rays.end);
-        (near, !near.simd_gt(far))
-    }
-
-    /// Where rays cross the near and the far sides on an axis.
-    #[inline(always)]
-    fn cross(&self, rays: &Slabs<S>, axis: usize) -> (f32x8<S>, f32x8<S>) {
-        let low = (self.low[axis] - rays.origin[axis]) * rays.inverse[axis];
-        let high = (self.high[axis] - rays.origin[axis]) * rays.inverse[axis];
-        (low.min(high), low.max(high))
-    }
-
     /// The boxes that a beam meets, as bits.
     #[inline(always)]
     pub(crate) fn meet_beam(&self, simd: S, beam: &Beam<S>) -> u32 {
@@ -110,6 +81,46 @@ impl<S: Simd> Boxes<S> {
         }
         let far = (far * f32x8::splat(simd, WIDER)).min(beam.end);
         bits(!near.simd_gt(far))
+    }
+}
+
+impl<V> Boxes<V> {
+    /// One of the boxes in all lanes.
+    #[inline(always)]
+    pub(crate) fn one<S: Simd>(simd: S, sides: &[[f32; WIDTH]; 6], slot: usize) -> Self
+    where
+        V: SimdFloat<S, Element = f32>,
+    {
+        let slot = slot % WIDTH;
+        let [a, b, c, d, e, f] = sides;
+        Self {
+            low: [V::splat(simd, a[slot]), V::splat(simd, b[slot]), V::splat(simd, c[slot])],
+            high: [V::splat(simd, d[slot]), V::splat(simd, e[slot]), V::splat(simd, f[slot])],
+        }
+    }
+
+    /// Where rays enter the boxes, and which of them they meet.
+    #[inline(always)]
+    pub(crate) fn meet<S: Simd>(&self, simd: S, rays: &Slabs<V>) -> (V, V::Mask)
+    where
+        V: SimdFloat<S, Element = f32>,
+    {
+        let (x, y, z) = (self.cross(rays, 0), self.cross(rays, 1), self.cross(rays, 2));
+        let near = x.0.max(y.0).max(z.0.max(rays.start));
+        let far = x.1.min(y.1).min(z.1) * V::splat(simd, WIDER);
+        let far = far.min(rays.end);
+        (near, !near.simd_gt(far))
+    }
+
+    /// Where rays cross the near and the far sides on an axis.
+    #[inline(always)]
+    fn cross<S: Simd>(&self, rays: &Slabs<V>, axis: usize) -> (V, V)
+    where
+        V: SimdFloat<S, Element = f32>,
+    {
+        let low = (self.low[axis] - rays.origin[axis]) * rays.inverse[axis];
+        let high = (self.high[axis] - rays.origin[axis]) * rays.inverse[axis];
+        (low.min(high), low.max(high))
     }
 }
 

@@ -18,7 +18,7 @@
 //! The rays may go anywhere: rays of a camera share most nodes, rays from a surface share the first ones.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u32x8};
+use fearless_simd::{Simd, f32x8, f32x16, u32x8};
 
 use super::Bvh;
 use super::boxes::{Boxes, bits};
@@ -97,7 +97,7 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                     let (masks, near) = if count <= octets(mask) * met.count_ones() {
                         one_by_one(simd, &boxes, rays, mask)
                     } else {
-                        eight_by_eight(simd, &boxes, rays, mask, met)
+                        side_by_side(simd, &boxes, rays, mask, met)
                     };
                     // Push what is met, the nearest last.
                     let base = top;
@@ -176,7 +176,7 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
 #[inline(always)]
 fn one_by_one<S: Simd>(
     simd: S,
-    boxes: &Boxes<S>,
+    boxes: &Boxes<f32x8<S>>,
     rays: &Rays,
     mask: u64,
 ) -> ([u64; WIDTH], [f32; WIDTH]) {
@@ -202,35 +202,34 @@ fn one_by_one<S: Simd>(
     (masks, least.into())
 }
 
-/// Intersects many rays with the boxes of a node that their beam meets, eight rays at a time.
+/// Intersects many rays with the boxes of a node that their beam meets, sixteen rays at a time.
 #[inline(always)]
-fn eight_by_eight<S: Simd>(
+fn side_by_side<S: Simd>(
     simd: S,
-    boxes: &Boxes<S>,
+    boxes: &Boxes<f32x8<S>>,
     rays: &Rays,
     mask: u64,
     met: u32,
 ) -> ([u64; WIDTH], [f32; WIDTH]) {
-    let far_away = f32x8::splat(simd, f32::INFINITY);
+    let far_away = f32x16::splat(simd, f32::INFINITY);
     let sides = boxes.sides();
     let (mut masks, mut nearest) = ([0; WIDTH], [f32::INFINITY; WIDTH]);
     let mut rest = met;
     while rest != 0 {
         let slot = rest.trailing_zeros() as usize % WIDTH;
         rest &= rest - 1;
-        let child = Boxes::one(simd, &sides, slot);
+        let child = Boxes::<f32x16<S>>::one(simd, &sides, slot);
         let mut least = far_away;
-        for octet in 0..OCTETS {
-            let of_octet = mask >> (8 * octet) & 0xff;
-            if of_octet == 0 {
+        for which in 0..GROUP / 16 {
+            let of_sixteen = mask >> (16 * which) & 0xffff;
+            if of_sixteen == 0 {
                 continue;
             }
-            let (near, met) = child.meet(simd, &rays.slabs(simd, octet));
-            masks[slot] |= (u64::from(bits(met)) & of_octet) << (8 * octet);
+            let (near, met) = child.meet(simd, &rays.sixteen(simd, which));
+            masks[slot] |= (met.to_bitmask() & of_sixteen) << (16 * which);
             least = least.min(met.select(near, far_away));
         }
-        let lanes: [f32; 8] = least.into();
-        nearest[slot] = lanes.into_iter().fold(f32::INFINITY, |a, b| if b < a { b } else { a });
+        nearest[slot] = least.reduce_min();
     }
     (masks, nearest)
 }

@@ -1,7 +1,7 @@
 //! The rays of a group, number by number side by side, and what was found for each.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u32x8};
+use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};
 
 use super::boxes::{Beam, Slabs, bits, splat};
 use super::slab::{EARLIER, STEEP, TINY, WIDER};
@@ -157,7 +157,7 @@ impl Rays {
             self.floor[octet] = filter.floor.into();
         }
         self.alive = *alive;
-        self.settle();
+        self.settle(simd);
         *special
     }
 
@@ -166,50 +166,61 @@ impl Rays {
         self.spread > SCATTERED * bounds.size().max_element()
     }
 
-    /// Measures origins from that of the first ray.
+    /// Measures origins from that of the first ray. A ray that is not on its way gets what the first one
+    /// has, so that it widens no interval.
     #[inline(always)]
-    fn settle(&mut self) {
-        let first = self.alive.trailing_zeros() as usize % GROUP;
-        self.center = self.given[first].origin;
-        let mut farthest = 0.0_f32;
+    fn settle<S: Simd>(&mut self, simd: S) {
+        let first = self.alive.trailing_zeros();
+        self.center = self.given[first as usize % GROUP].origin;
+        let mut farthest = f32x8::splat(simd, 0.0);
         for axis in 0..3 {
-            let center = self.center[axis];
-            for (octet, origin) in self.origin[axis].iter_mut().enumerate() {
-                for (lane, origin) in origin.iter_mut().enumerate() {
-                    *origin -= center;
-                    let is_alive = self.alive >> (8 * octet + lane) & 1 == 1;
-                    let distance = if is_alive { origin.abs() } else { 0.0 };
-                    farthest = if distance > farthest { distance } else { farthest };
-                }
+            let center = f32x8::splat(simd, self.center[axis]);
+            let inverse_of_first = f32x8::splat(simd, get(&self.inverse[axis], first));
+            for octet in 0..OCTETS {
+                let is_alive = mask32x8::from_bitmask(simd, self.alive >> (8 * octet));
+                let origin = f32x8::simd_from(simd, self.origin[axis][octet]) - center;
+                let origin = is_alive.select(origin, f32x8::splat(simd, 0.0));
+                let inverse = f32x8::simd_from(simd, self.inverse[axis][octet]);
+                farthest = farthest.max(origin.abs());
+                self.origin[axis][octet] = origin.into();
+                self.inverse[axis][octet] = is_alive.select(inverse, inverse_of_first).into();
             }
         }
-        self.spread = farthest * 8.0 * UNIT;
+        self.spread = farthest.reduce_max() * 8.0 * UNIT;
     }
 
-    /// All rays as one beam.
+    /// All rays as one beam, before any of them is done.
     #[inline(always)]
     pub(crate) fn beam<S: Simd>(&self, simd: S) -> Beam<S> {
-        let alive = self.alive;
         let [a, b, c] = &self.origin;
         let [d, e, f] = &self.inverse;
-        let inverses = [interval(d, alive), interval(e, alive), interval(f, alive)];
+        let inverses = [interval(simd, d), interval(simd, e), interval(simd, f)];
         let [d, e, f] = inverses;
+        let first = f32x8::splat(simd, get(&self.start, self.alive.trailing_zeros()));
+        let (mut start, mut end) = (first, first);
+        for octet in 0..OCTETS {
+            let is_alive = mask32x8::from_bitmask(simd, self.alive >> (8 * octet));
+            let from = f32x8::simd_from(simd, self.start[octet]);
+            let to = f32x8::simd_from(simd, self.end[octet]);
+            start = start.min(is_alive.select(from, first));
+            end = end.max(is_alive.select(to, first));
+        }
         Beam {
             origin: [
-                ends(simd, interval(a, alive)),
-                ends(simd, interval(b, alive)),
-                ends(simd, interval(c, alive)),
+                ends(simd, interval(simd, a)),
+                ends(simd, interval(simd, b)),
+                ends(simd, interval(simd, c)),
             ],
             inverse: [ends(simd, d), ends(simd, e), ends(simd, f)],
             is_bounded: inverses.map(|[low, high]| low > 0.0 || high < 0.0),
-            start: f32x8::splat(simd, interval(&self.start, alive)[0]),
-            end: f32x8::splat(simd, interval(&self.end, alive)[1]),
+            start: f32x8::splat(simd, start.reduce_min()),
+            end: f32x8::splat(simd, end.reduce_max()),
         }
     }
 
     /// One ray in all lanes.
     #[inline(always)]
-    pub(crate) fn slab<S: Simd>(&self, simd: S, ray: u32) -> Slabs<S> {
+    pub(crate) fn slab<S: Simd>(&self, simd: S, ray: u32) -> Slabs<f32x8<S>> {
         let ([a, b, c], [d, e, f]) = (&self.origin, &self.inverse);
         Slabs {
             origin: splat(simd, [get(a, ray), get(b, ray), get(c, ray)]),
@@ -219,14 +230,15 @@ impl Rays {
         }
     }
 
-    /// Eight rays.
+    /// Sixteen rays.
     #[inline(always)]
-    pub(crate) fn slabs<S: Simd>(&self, simd: S, octet: usize) -> Slabs<S> {
+    pub(crate) fn sixteen<S: Simd>(&self, simd: S, which: usize) -> Slabs<f32x16<S>> {
+        let ([a, b, c], [d, e, f]) = (&self.origin, &self.inverse);
         Slabs {
-            origin: octet_of(simd, &self.origin, octet),
-            inverse: octet_of(simd, &self.inverse, octet),
-            start: f32x8::simd_from(simd, self.start[octet % OCTETS]),
-            end: f32x8::simd_from(simd, self.end[octet % OCTETS]),
+            origin: [sixteen(simd, a, which), sixteen(simd, b, which), sixteen(simd, c, which)],
+            inverse: [sixteen(simd, d, which), sixteen(simd, e, which), sixteen(simd, f, which)],
+            start: sixteen(simd, &self.start, which),
+            end: sixteen(simd, &self.end, which),
         }
     }
 
@@ -358,18 +370,16 @@ const fn bits_below(count: usize) -> u64 {
     if count >= 8 { 0xff } else { (1 << count) - 1 }
 }
 
-/// The least and the greatest number of some rays.
+/// The least and the greatest number of a row.
 #[inline(always)]
-fn interval(row: &Row, rays: u64) -> [f32; 2] {
-    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-    let mut rest = rays;
-    while rest != 0 {
-        let number = get(row, rest.trailing_zeros());
-        rest &= rest - 1;
-        low = if number < low { number } else { low };
-        high = if number > high { number } else { high };
+fn interval<S: Simd>(simd: S, row: &Row) -> [f32; 2] {
+    let first = f32x8::simd_from(simd, row[0]);
+    let (mut low, mut high) = (first, first);
+    for octet in row.iter().skip(1) {
+        let numbers = f32x8::simd_from(simd, *octet);
+        (low, high) = (low.min(numbers), high.max(numbers));
     }
-    [low, high]
+    [low.reduce_min(), high.reduce_max()]
 }
 
 #[inline(always)]
@@ -387,6 +397,13 @@ fn octet_of<S: Simd>(simd: S, rows: &[Row; 3], octet: usize) -> [f32x8<S>; 3] {
         f32x8::simd_from(simd, b[octet]),
         f32x8::simd_from(simd, c[octet]),
     ]
+}
+
+/// Sixteen rays of a row.
+#[inline(always)]
+fn sixteen<S: Simd>(simd: S, row: &Row, which: usize) -> f32x16<S> {
+    let rows: &[[f32; 16]; OCTETS / 2] = bytemuck::cast_ref(row);
+    f32x16::simd_from(simd, rows[which % (OCTETS / 2)])
 }
 
 #[inline(always)]
