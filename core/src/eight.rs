@@ -179,15 +179,24 @@ pub(crate) fn transpose<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
 #[expect(clippy::type_complexity, reason = "the fields of a ray")]
 pub(crate) fn columns<S: Simd>(
     simd: S,
-    rays: &[Ray; 8],
+    rays: [&Ray; 8],
 ) -> ([f32x8<S>; 3], f32x8<S>, [f32x8<S>; 3], f32x8<S>) {
-    let rows: [[[u8; 16]; 2]; 8] = bytemuck::cast(*rays);
-    let [q, r, s, t, u, v, w, x] = &rows;
+    let [q, r, s, t, u, v, w, x] = rays;
+    let ([q, r, s, t], [u, v, w, x]) = (
+        [halves(q), halves(r), halves(s), halves(t)],
+        [halves(u), halves(v), halves(w), halves(x)],
+    );
     let ([a, b, c, d], [e, f, g, h]) =
         (transpose(rows_of(simd, [q, r, s, t], 0)), transpose(rows_of(simd, [u, v, w, x], 0)));
     let ([i, j, k, l], [m, n, o, p]) =
         (transpose(rows_of(simd, [q, r, s, t], 1)), transpose(rows_of(simd, [u, v, w, x], 1)));
     (join([a, b, c], [e, f, g]), d.combine(h), join([i, j, k], [m, n, o]), l.combine(p))
+}
+
+/// A ray as two rows.
+#[inline(always)]
+fn halves(ray: &Ray) -> &[Row; 2] {
+    bytemuck::cast_ref(ray)
 }
 
 /// One half of four rays.

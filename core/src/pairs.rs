@@ -10,7 +10,7 @@ use fearless_simd::{Simd, f32x8, f64x8, mask32x8, mask64x8};
 
 use crate::eight::{Eight, LANES, columns};
 use crate::mesh::TriangleMesh;
-use crate::ray::{Hit, Ray, round};
+use crate::ray::{Hit, Ray};
 use crate::triangle::{OUTSIDE, SMALL};
 
 /// What is known of eight pairs.
@@ -19,11 +19,9 @@ pub(crate) struct Decided {
     pub(crate) hits: u32,
     /// Lanes that have to be decided alone.
     pub(crate) unsure: u32,
-    t: [f64; LANES],
-    u: [f64; LANES],
-    v: [f64; LANES],
-    t_min: [f32; LANES],
-    t_max: [f32; LANES],
+    t: [f32; LANES],
+    u: [f32; LANES],
+    v: [f32; LANES],
 }
 
 impl Decided {
@@ -31,8 +29,7 @@ impl Decided {
     #[inline(always)]
     pub(crate) fn hit(&self, lane: usize, primitive: u32) -> Hit {
         let lane = lane % LANES;
-        let t = round(self.t[lane]).max(self.t_min[lane]).min(self.t_max[lane]) + 0.0;
-        Hit { t, u: round(self.u[lane]), v: round(self.v[lane]), primitive }
+        Hit { t: self.t[lane], u: self.u[lane], v: self.v[lane], primitive }
     }
 }
 
@@ -41,7 +38,7 @@ impl Decided {
 pub(crate) fn decide<S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'_>,
-    rays: &[Ray; LANES],
+    rays: [&Ray; LANES],
     ids: [u32; LANES],
     count: usize,
 ) -> Decided {
@@ -99,11 +96,9 @@ pub(crate) fn decide<S: Simd>(
     Decided {
         hits: bits(candidates & sure) & of_count,
         unsure: bits(candidates & !sure) & of_count,
-        t: (depth / dz).into(),
-        u: weights[1].into(),
-        v: weights[2].into(),
-        t_min: t_min.into(),
-        t_max: t_max.into(),
+        t: (rounded(depth / dz).max(t_min).min(t_max) + 0.0).into(),
+        u: rounded(weights[1]).into(),
+        v: rounded(weights[2]).into(),
     }
 }
 
@@ -166,6 +161,13 @@ fn bits<S: Simd>(mask: mask64x8<S>) -> u32 {
 fn numbers<S: Simd>(lanes: f32x8<S>) -> f64x8<S> {
     let (low, high) = lanes.widen();
     low.combine(high)
+}
+
+/// The nearest f32s.
+#[inline(always)]
+fn rounded<S: Simd>(lanes: f64x8<S>) -> f32x8<S> {
+    let (low, high) = lanes.split();
+    low.narrow(high)
 }
 
 #[inline(always)]

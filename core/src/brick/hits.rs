@@ -247,7 +247,7 @@ impl Bundle {
     ) {
         let ray = |at: usize| self.ray(lanes[at % LANES]);
         let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
-        let decided = pairs::decide(simd, mesh, &rays, [id; LANES], count);
+        let decided = pairs::decide(simd, mesh, rays.each_ref(), [id; LANES], count);
         for (at, lane) in lanes.into_iter().enumerate().take(count) {
             if decided.hits >> at & 1 == 1 {
                 self.keep::<ANY>(decided.hit(at, id), lane % RAYS);

@@ -46,7 +46,8 @@ pub(crate) struct Rays {
     given: [Ray; GROUP],
     pub(crate) hits: [Hit; GROUP],
     /// Pairs of a ray and a triangle that passed the filter.
-    pairs: [(u32, u32); PAIRS],
+    pair_rays: [u32; PAIRS],
+    pair_ids: [u32; PAIRS],
     pair_count: usize,
 }
 
@@ -79,7 +80,8 @@ impl Rays {
             scale: ZEROS,
             given: [ray; GROUP],
             hits: [Hit::MISS; GROUP],
-            pairs: [(0, 0); PAIRS],
+            pair_rays: [0; PAIRS],
+            pair_ids: [0; PAIRS],
             pair_count: 0,
         }
     }
@@ -105,7 +107,7 @@ impl Rays {
         self.pair_count = 0;
         for octet in 0..count.div_ceil(8).min(OCTETS) {
             let rays = self.given.as_chunks::<8>().0[octet];
-            let (origin, t_min, direction, t_max) = columns(simd, &rays);
+            let (origin, t_min, direction, t_max) = columns(simd, rays.each_ref());
             let [x, y, z] = direction;
             let longest = x.abs().max(y.abs()).max(z.abs());
 
@@ -146,8 +148,9 @@ impl Rays {
                 self.anchor[axis][octet] = origin[axis].into();
             }
             let (start, end) = (t_min * scale, t_max * scale);
-            self.start[octet] = (start - (start.abs() * EARLIER + TINY)).into();
-            self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + TINY)).into();
+            let tiny = scale.max(f32x8::splat(simd, 1.0)) * TINY;
+            self.start[octet] = (start - (start.abs() * EARLIER + tiny)).into();
+            self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + tiny)).into();
             self.scale[octet] = scale.into();
 
             // What the filter may be wrong by: see its proof.
@@ -286,7 +289,8 @@ impl Rays {
         ray: u32,
         id: u32,
     ) {
-        self.pairs[self.pair_count % PAIRS] = (ray, id);
+        self.pair_rays[self.pair_count % PAIRS] = ray;
+        self.pair_ids[self.pair_count % PAIRS] = id;
         self.pair_count += 1;
         if self.pair_count == PAIRS {
             self.decide::<S, ANY>(simd, mesh);
@@ -299,8 +303,7 @@ impl Rays {
         let count = core::mem::take(&mut self.pair_count);
         if count <= FEW_PAIRS {
             for at in 0..count {
-                let (ray, id) = self.pairs[at % PAIRS];
-                self.decide_one::<ANY>(mesh, ray, id);
+                self.decide_one::<ANY>(mesh, self.pair_rays[at % PAIRS], self.pair_ids[at % PAIRS]);
             }
             return;
         }
@@ -315,23 +318,26 @@ impl Rays {
         mesh: &TriangleMesh<'_>,
         count: usize,
     ) {
-        let pairs = self.pairs;
-        let ray = |at: usize| self.given[pairs[at].0 as usize % GROUP];
+        // Repeat the first pair where there are fewer: it is read already.
+        for at in count..PAIRS {
+            self.pair_rays[at] = self.pair_rays[0];
+            self.pair_ids[at] = self.pair_ids[0];
+        }
+        let (of, ids) = (self.pair_rays, self.pair_ids);
+        let ray = |at: usize| &self.given[of[at] as usize % GROUP];
         let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
-        let id = |at: usize| pairs[at].1;
-        let ids = [id(0), id(1), id(2), id(3), id(4), id(5), id(6), id(7)];
-        let decided = pairs::decide(simd, mesh, &rays, ids, count);
+        let decided = pairs::decide(simd, mesh, rays, ids, count);
         let mut hits = decided.hits;
         while hits != 0 {
             let lane = hits.trailing_zeros() as usize % PAIRS;
             hits &= hits - 1;
-            self.found::<ANY>(pairs[lane].0, decided.hit(lane, pairs[lane].1));
+            self.found::<ANY>(of[lane], decided.hit(lane, ids[lane]));
         }
         let mut unsure = decided.unsure;
         while unsure != 0 {
             let lane = unsure.trailing_zeros() as usize % PAIRS;
             unsure &= unsure - 1;
-            self.decide_one::<ANY>(mesh, pairs[lane].0, pairs[lane].1);
+            self.decide_one::<ANY>(mesh, of[lane], ids[lane]);
         }
     }
 
@@ -357,9 +363,10 @@ impl Rays {
         if ANY {
             self.alive &= !(1 << at);
         } else {
-            // What rounds to the same t may lie farther away.
-            let end = hit.t.next_up() * get(&self.scale, ray);
-            put(&mut self.end, at, end + (end.abs() * (WIDER - 1.0) + TINY));
+            // What rounds to the same t may lie farther away: see `Slab::nearby`.
+            let scale = get(&self.scale, ray);
+            let (end, tiny) = (hit.t * scale, TINY * scale.max(1.0));
+            put(&mut self.end, at, end + (end.abs() * (WIDER - 1.0) + tiny));
         }
     }
 }
