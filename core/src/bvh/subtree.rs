@@ -31,8 +31,9 @@ pub(crate) struct Subtree {
     /// Levels above each node.
     above: [u8; MOST_NODES],
     count: usize,
-    /// The ids of the leaves, one leaf behind the other.
+    /// The ids of the leaves, one leaf behind the other, and the boxes of their triangles.
     ids: [u32; MOST_ROOT],
+    of_ids: [Aabb; MOST_ROOT],
     id_count: usize,
 }
 
@@ -86,6 +87,7 @@ impl Subtree {
             above: [0; MOST_NODES],
             count: 0,
             ids: [0; MOST_ROOT],
+            of_ids: [Aabb { min: Vec3A::ZERO, max: Vec3A::ZERO }; MOST_ROOT],
             id_count: 0,
         }
     }
@@ -129,9 +131,17 @@ impl Subtree {
             self.cut(at, entries, by);
             at += 1;
         }
+        // Look at all triangles in one go: so their loads from memory overlap.
+        for (&id, bounds) in self.ids.iter().zip(&mut self.of_ids).take(self.id_count) {
+            let corners = mesh.corners(id);
+            *bounds = corners.map_or(Aabb::EMPTY, |[a, b, c]| Aabb {
+                min: a.min(b).min(c),
+                max: a.max(b).max(c),
+            });
+        }
         // Quantise, children before parents.
         for at in (0..self.count).rev() {
-            self.quantise(at, mesh, least);
+            self.quantise(at, least);
         }
         // Name ids and nodes by where they lie in the index.
         for node in self.nodes.iter_mut().take(self.count) {
@@ -173,7 +183,7 @@ impl Subtree {
     }
 
     /// Finds the boxes of a node's children, and its own.
-    fn quantise(&mut self, at: usize, mesh: &TriangleMesh<'_>, least: f32) {
+    fn quantise(&mut self, at: usize, least: f32) {
         let Some(node) = self.nodes.get_mut(at) else { return };
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let mut child = node.child as usize;
@@ -185,11 +195,9 @@ impl Subtree {
                 *bounds_of = self.boxes.get(child).copied().unwrap_or(Aabb::EMPTY);
                 child += 1;
             } else if count > 0 {
-                let leaf = self.ids.get(first..first + count).unwrap_or_default();
-                for &id in leaf {
-                    let Some([a, b, c]) = mesh.corners(id) else { continue };
-                    bounds_of.min = bounds_of.min.min(a.min(b).min(c));
-                    bounds_of.max = bounds_of.max.max(a.max(b).max(c));
+                let leaf = self.of_ids.get(first..first + count).unwrap_or_default();
+                for of_id in leaf {
+                    *bounds_of = bounds_of.union(of_id);
                 }
                 first += count;
             } else {
