@@ -46,7 +46,7 @@ pub(crate) struct Rays {
     given: [Ray; GROUP],
     pub(crate) hits: [Hit; GROUP],
     /// Pairs of a ray and a triangle that passed the filter.
-    pair_rays: [u32; PAIRS],
+    pair_places: [u32; PAIRS],
     pair_ids: [u32; PAIRS],
     pair_count: usize,
 }
@@ -80,7 +80,7 @@ impl Rays {
             scale: ZEROS,
             given: [ray; GROUP],
             hits: [Hit::MISS; GROUP],
-            pair_rays: [0; PAIRS],
+            pair_places: [0; PAIRS],
             pair_ids: [0; PAIRS],
             pair_count: 0,
         }
@@ -289,7 +289,7 @@ impl Rays {
         ray: u32,
         id: u32,
     ) {
-        self.pair_rays[self.pair_count % PAIRS] = ray;
+        self.pair_places[self.pair_count % PAIRS] = ray;
         self.pair_ids[self.pair_count % PAIRS] = id;
         self.pair_count += 1;
         if self.pair_count == PAIRS {
@@ -303,7 +303,11 @@ impl Rays {
         let count = core::mem::take(&mut self.pair_count);
         if count <= FEW_PAIRS {
             for at in 0..count {
-                self.decide_one::<ANY>(mesh, self.pair_rays[at % PAIRS], self.pair_ids[at % PAIRS]);
+                self.decide_one::<ANY>(
+                    mesh,
+                    self.pair_places[at % PAIRS],
+                    self.pair_ids[at % PAIRS],
+                );
             }
             return;
         }
@@ -320,10 +324,10 @@ impl Rays {
     ) {
         // Repeat the first pair where there are fewer: it is read already.
         for at in count..PAIRS {
-            self.pair_rays[at] = self.pair_rays[0];
+            self.pair_places[at] = self.pair_places[0];
             self.pair_ids[at] = self.pair_ids[0];
         }
-        let (of, ids) = (self.pair_rays, self.pair_ids);
+        let (of, ids) = (self.pair_places, self.pair_ids);
         let ray = |at: usize| &self.given[of[at] as usize % GROUP];
         let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
         let decided = pairs::decide(simd, mesh, rays, ids, count);

@@ -1,9 +1,10 @@
 //! The nodes over a few triangles in the order of their keys: what a root stands for.
 //!
 //! ```text
+//! note between which neighbours keys differ first in bit 29, 28, ... 0
 //! ranges = [all]
 //! for each range of more than a leaf, breadth first:
-//!     until it is in eight parts: cut the part whose keys differ in the highest bit, where that bit changes
+//!     cut it in eight where neighbours differ in the highest bits; halve what has equal keys
 //!     parts of a leaf's size or less become leaves, the others nodes
 //! for each node, the last one first: gather the boxes of its leaves, quantise all eight, unite them
 //! ```
@@ -16,6 +17,7 @@ use glam::Vec3A;
 use crate::aabb::Aabb;
 use crate::mesh::TriangleMesh;
 
+use super::key::KEY_BITS;
 use super::layout::{Entry, MOST_ROOT};
 use super::node::{LEAF, Node, WIDTH};
 
@@ -46,35 +48,42 @@ pub(crate) enum Cut {
     Halves,
 }
 
-/// A range of entries, and in which bits the keys of its first and last one differ.
-#[derive(Clone, Copy)]
+/// A range of entries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Part {
     start: u8,
     end: u8,
-    differing: u32,
 }
 
 const _: () = assert!(MOST_ROOT <= u8::MAX as usize);
 
 impl Part {
-    const NONE: Self = Self { start: 0, end: 0, differing: 0 };
-
-    #[inline(always)]
-    fn new(entries: &[Entry], start: u8, end: u8, by: Cut) -> Self {
-        let key = |at: u8| entries.get(usize::from(at)).map_or(0, |entry| entry[0]);
-        // Parts that can be cut have the lowest bit set: those of equal keys come last.
-        let is_cut = u32::from(end > start + 1);
-        let differing = match by {
-            Cut::Keys => key(start) ^ key(end.saturating_sub(1)),
-            Cut::Halves => u32::from(end - start),
-        };
-        let differing = differing << 1 | is_cut;
-        Self { start, end, differing }
-    }
+    const NONE: Self = Self { start: 0, end: 0 };
 
     const fn count(self) -> usize {
         (self.end - self.start) as usize
     }
+}
+
+/// Where keys change: bit `i` of number `b` says that the keys of entries `i` and `i + 1` differ, and in no
+/// bit above `b`.
+type Changes = [u128; KEY_BITS as usize];
+
+const _: () = assert!(MOST_ROOT <= 1 + u128::BITS as usize);
+
+/// Finds where the keys of entries in order change.
+fn changes(entries: &[Entry]) -> Changes {
+    let mut changes = [0; KEY_BITS as usize];
+    for (at, (one, next)) in entries.iter().zip(entries.iter().skip(1)).enumerate().take(MOST_ROOT)
+    {
+        let differing = one[0] ^ next[0];
+        if let Some(bit) = differing.checked_ilog2()
+            && let Some(change) = changes.get_mut(bit as usize)
+        {
+            *change |= 1 << at;
+        }
+    }
+    changes
 }
 
 impl Subtree {
@@ -124,11 +133,15 @@ impl Subtree {
         least: f32,
         by: Cut,
     ) {
-        self.ranges[0] = Part::new(entries, 0, entries.len().min(MOST_ROOT) as u8, by);
+        let changes = match by {
+            Cut::Keys => changes(entries),
+            Cut::Halves => [0; KEY_BITS as usize],
+        };
+        self.ranges[0] = Part { start: 0, end: entries.len().min(MOST_ROOT) as u8 };
         (self.count, self.id_count) = (1, 0);
         let mut at = 0;
         while at < self.count {
-            self.cut(at, entries, by);
+            self.cut(at, entries, &changes);
             at += 1;
         }
         // Look at all triangles in one go: so their loads from memory overlap.
@@ -152,11 +165,11 @@ impl Subtree {
 
     /// Cuts the range of a node into parts, writes the ids of those that are leaves and adds a node for
     /// each other.
-    fn cut(&mut self, at: usize, entries: &[Entry], by: Cut) {
+    fn cut(&mut self, at: usize, entries: &[Entry], changes: &Changes) {
         let (Some(&range), Some(&above)) = (self.ranges.get(at), self.above.get(at)) else {
             return;
         };
-        let parts = parts(range, entries, by);
+        let parts = parts(range, changes);
         let (child, first) = (self.count as u32, self.id_count as u32);
         let mut node = Node { child, first, ..Node::EMPTY };
         for (slot, part) in parts.iter().enumerate().take_while(|(_, part)| part.count() > 0) {
@@ -212,54 +225,64 @@ impl Subtree {
     }
 }
 
-/// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys.
+/// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys: where
+/// keys change in the highest bits, and in the middle of what is left.
 #[inline(always)]
-fn parts(range: Part, entries: &[Entry], by: Cut) -> [Part; WIDTH] {
+fn parts(range: Part, changes: &Changes) -> [Part; WIDTH] {
     let mut parts = [Part::NONE; WIDTH];
-    parts[0] = range;
-    for count in 1..WIDTH {
-        // The part whose keys differ in the highest bit.
-        let mut widest = 0;
+    let mut start = range.start;
+    let mut count = 0;
+    let mut cuts = highest(range, changes);
+    while cuts != 0 && count < WIDTH - 1 {
+        let end = cuts.trailing_zeros() as u8 + 1;
+        cuts &= cuts - 1;
+        parts[count] = Part { start, end };
+        start = end;
+        count += 1;
+    }
+    parts[count] = Part { start, end: range.end };
+    for count in count + 1..WIDTH {
+        let mut largest = 0;
         for (at, part) in parts.iter().enumerate().take(count) {
-            if part.differing > parts[widest].differing {
-                widest = at;
+            if part.count() > parts[largest].count() {
+                largest = at;
             }
         }
-        let part = parts[widest];
-        if part.count() < 2 {
+        let Part { start, end } = parts[largest];
+        if end < start + 2 {
             break;
         }
-        let middle = part.start
-            + match by {
-                Cut::Keys => split(entries, part),
-                Cut::Halves => (part.end - part.start) / 2,
-            };
         // The parts behind it make room for its second half.
-        let mut next = Part::new(entries, middle, part.end, by);
-        for (at, slot) in parts.iter_mut().enumerate().skip(widest) {
-            if at == widest {
-                *slot = Part::new(entries, part.start, middle, by);
-            } else {
-                next = core::mem::replace(slot, next);
-            }
+        let middle = start + (end - start) / 2;
+        parts[largest].end = middle;
+        let mut next = Part { start: middle, end };
+        for slot in parts.iter_mut().skip(largest + 1) {
+            next = core::mem::replace(slot, next);
         }
     }
     parts
 }
 
-/// How many entries of a part come before the highest bit in which its keys differ is set; half of them
-/// if all keys are equal.
+/// The seven changes in the highest bits inside a range, as bits; all of them if there are fewer.
 #[inline(always)]
-fn split(entries: &[Entry], part: Part) -> u8 {
-    let range = entries.get(usize::from(part.start)..usize::from(part.end)).unwrap_or_default();
-    let differing = part.differing >> 1;
-    if differing == 0 {
-        return (part.end - part.start) / 2;
+fn highest(range: Part, changes: &Changes) -> u128 {
+    // A range of one entry or none has no inside.
+    let Some(last) = range.end.checked_sub(1).filter(|&last| last > range.start) else { return 0 };
+    let inside = (1_u128 << last) - (1 << range.start);
+    let (mut chosen, mut left) = (0, WIDTH as u32 - 1);
+    for change in changes.iter().rev() {
+        let mut here = change & inside;
+        if here.count_ones() >= left {
+            for _ in 0..left {
+                chosen |= here & here.wrapping_neg();
+                here &= here - 1;
+            }
+            break;
+        }
+        left -= here.count_ones();
+        chosen |= here;
     }
-    let bit = 1 << differing.ilog2();
-    // Where keys are in no order, both sides still get some.
-    let middle = range.partition_point(|entry| entry[0] & bit == 0);
-    middle.clamp(1, range.len().max(2) - 1) as u8
+    chosen
 }
 
 #[cfg(test)]
