@@ -13,9 +13,11 @@ pub(crate) const HAS_VARIABLE: bool = cfg!(feature = "variable");
 pub(crate) const HAS_RECURSIVE: bool = cfg!(feature = "recursive");
 pub(crate) const HAS_BRICK: bool = cfg!(feature = "brick");
 pub(crate) const HAS_BVH: bool = cfg!(feature = "bvh");
+/// Whether there are methods with cells; fixed and variable bring one-level along.
+pub(crate) const HAS_GRIDS: bool = HAS_ONE_LEVEL || HAS_RECURSIVE || HAS_BRICK;
 
 const _: () = assert!(
-    HAS_ONE_LEVEL || HAS_RECURSIVE || HAS_BRICK || HAS_BVH,
+    HAS_GRIDS || HAS_BVH,
     "hgrid has no method to build grids with: turn on at least one of the features one-level, fixed, \
      variable, recursive, brick and bvh"
 );

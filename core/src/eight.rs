@@ -147,14 +147,8 @@ impl TriangleTest {
         if HAS_VECTORS {
             self.survivors(simd, &Eight::of(simd, mesh, *ids, count))
         } else {
-            self.one_by_one(mesh, ids.get(..count).unwrap_or(ids))
+            self.filter.survivors(mesh, ids.get(..count).unwrap_or(ids))
         }
-    }
-
-    /// The same of a few triangles.
-    fn one_by_one(&self, mesh: &TriangleMesh<'_>, ids: &[u32]) -> u32 {
-        let passes = |id| mesh.triangle(id).is_some_and(|triangle| self.passes(&triangle));
-        (0..).zip(ids).fold(0, |bits, (lane, &id)| bits | u32::from(passes(id)) << (lane % 32))
     }
 
     /// The lanes whose triangles pass the filter of [`TriangleTest::test`], as bits.
@@ -308,7 +302,7 @@ mod tests {
 
     /// What the triangles give one by one.
     fn expected(test: &TriangleTest, mesh: &TriangleMesh<'_>, ids: &[u32]) -> Answer {
-        let survivors = test.one_by_one(mesh, ids);
+        let survivors = test.filter.survivors(mesh, ids);
         let mut hits = Vec::new();
         for (lane, &id) in ids.iter().enumerate() {
             let Some(triangle) = mesh.triangle(id) else { continue };

@@ -10,7 +10,8 @@ use crate::brick::{self, Brick, OneRay, Tiles};
 use crate::bvh::{self, Bvh};
 use crate::cell::Lattice;
 use crate::config::{
-    Config, HAS_BRICK, HAS_BVH, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
+    Config, HAS_BRICK, HAS_BVH, HAS_FIXED, HAS_GRIDS, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE,
+    Method,
 };
 use crate::control::{Control, Watch};
 use crate::counters::Tally;
@@ -266,6 +267,9 @@ impl<'a> Grid<'a> {
     ) {
         if HAS_BVH && let Structure::Bvh(bvh) = &self.structure {
             return self.search_tree(bvh, ray, begin, cull, search, tally);
+        }
+        if !HAS_GRIDS {
+            return;
         }
         let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
         let test = TriangleTest::from(ray, &approach).culling(cull);

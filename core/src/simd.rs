@@ -294,7 +294,8 @@ mod machine {
         BASE
     }
 
-    #[inline(always)]
+    /// Out of line as on x86: what calls a kernel twice has it once.
+    #[inline(never)]
     pub(super) fn dispatch<K: Kernel>(_: SimdLevel, kernel: K) -> K::Output {
         let simd = token();
         simd.vectorize(

@@ -14,15 +14,15 @@ use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
 use super::Bvh;
 use super::node::{Child, Node, WIDTH};
 use super::slab::Slab;
-use crate::aabb::Aabb;
+use crate::aabb::{Aabb, greater, lesser};
 use crate::counters::Tally;
 use crate::eight::{Eight, first_eight};
-use crate::filter::RayFilter;
+use crate::filter::{Filter, RayFilter};
 use crate::mesh::TriangleMesh;
 use crate::options::Cull;
 use crate::ray::Ray;
 use crate::search::{Outcome, Search};
-use crate::simd::Kernel;
+use crate::simd::{HAS_VECTORS, Kernel};
 use crate::triangle::TriangleTest;
 
 /// Places on the stack of a ray: seven a level, and one.
@@ -64,21 +64,44 @@ struct Wide<S: Simd> {
     /// Which sides are near, and which are far.
     near: [usize; 3],
     far: [usize; 3],
+    filter: Filter<f32x8<S>>,
 }
 
 impl<S: Simd> Wide<S> {
     #[inline(always)]
-    fn new(simd: S, slab: &Slab) -> Self {
-        let [x, y, z] = slab.inverse.map(|inverse| usize::from(inverse < 0.0) * 3);
+    fn new(simd: S, slab: &Slab, filter: &RayFilter) -> Self {
+        let (near, far) = sides_of(slab);
         Self {
             origin_near: splat(simd, slab.origin_near),
             origin_far: splat(simd, slab.origin_far),
             inverse_near: splat(simd, slab.inverse),
             inverse_far: splat(simd, slab.inverse_far()),
             start: f32x8::splat(simd, slab.start),
-            near: [x, y + 1, z + 2],
-            far: [3 - x, 4 - y, 5 - z],
+            near,
+            far,
+            filter: filter.splat(simd),
         }
+    }
+
+    /// Which triangles of a leaf pass the filter, as bits.
+    #[inline(always)]
+    fn survivors(
+        &self,
+        simd: S,
+        bvh: &Bvh<'_>,
+        mesh: &TriangleMesh<'_>,
+        first: u32,
+        ids: &[u32],
+    ) -> u32 {
+        // Without a copy where eight ids follow, of this leaf or not.
+        let lanes = match bvh.eight(first) {
+            Some(lanes) => lanes,
+            None => first_eight(ids),
+        };
+        let triangles = Eight::of(simd, mesh, lanes, ids.len());
+        #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
+        let dropped = self.filter.drops(&triangles.corners).to_bitmask() as u32;
+        !dropped & triangles.used
     }
 
     /// Which boxes of a node the ray meets before its end, as bits, and where it enters each.
@@ -108,6 +131,37 @@ impl<S: Simd> Wide<S> {
         let met = !missed as u32 & 0xff;
         (met, near)
     }
+}
+
+/// The rows of the near sides, and those of the far sides.
+#[inline(always)]
+fn sides_of(slab: &Slab) -> ([usize; 3], [usize; 3]) {
+    let [x, y, z] = slab.inverse.map(|inverse| usize::from(inverse < 0.0) * 3);
+    ([x, y + 1, z + 2], [3 - x, 4 - y, 5 - z])
+}
+
+/// What [`Wide::meet`] finds, box by box: for machines without vectors.
+#[inline(never)]
+fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>) {
+    let (near_rows, far_rows) = sides_of(slab);
+    let (origin, steps, inverse_far) = (node.origin(), node.steps(), slab.inverse_far());
+    let (mut met, mut nearest) = (0, [0.0; WIDTH]);
+    for (slot, nearest) in nearest.iter_mut().enumerate() {
+        let (mut near, mut far) = (slab.start, end);
+        for axis in 0..3 {
+            let bound = |rows: [usize; 3]| f32::from(row(node, rows[axis])[slot % WIDTH]);
+            let at_near = bound(near_rows) * (steps[axis] * slab.inverse[axis])
+                + (origin[axis] - slab.origin_near[axis]) * slab.inverse[axis];
+            let at_far = bound(far_rows) * (steps[axis] * inverse_far[axis])
+                + (origin[axis] - slab.origin_far[axis]) * inverse_far[axis];
+            near = greater(at_near, near);
+            far = lesser(at_far, far);
+        }
+        *nearest = near;
+        let is_missed = near > far;
+        met |= u32::from(!is_missed) << slot;
+    }
+    (met, f32x8::simd_from(simd, nearest))
 }
 
 /// Three rows of sides as numbers.
@@ -155,12 +209,15 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
         let nearby = if afar.is_none() { Slab::nearby(ray, begin, bounds) } else { afar.copied() };
         let Some((slab, filter)) = nearby else { return false };
         let slab = &slab;
-        let filter = filter.splat(simd);
         let mut test = None;
-        let (given, wide) = (ray, Wide::new(simd, slab));
+        let given = ray;
         // Hidden from the compiler: it would subtract and multiply in one lane and spread the result, which
         // makes the way from one node to the next longer.
-        let ray = core::hint::black_box(&wide);
+        let wide = HAS_VECTORS.then(
+            #[inline(always)]
+            || Wide::new(simd, slab, &filter),
+        );
+        let wide = wide.as_ref().map(core::hint::black_box);
         let mut end = slab.end;
         let mut top = 0;
         // Damaged bytes may lead in circles; a tree's nodes are entered once.
@@ -173,7 +230,10 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 let rest = budget.checked_sub(1);
                 let (Some(node), Some(rest)) = (node, rest) else { return true };
                 budget = rest;
-                let (met, near) = ray.meet(simd, node, end);
+                let (met, near) = match wide {
+                    Some(ray) => ray.meet(simd, node, end),
+                    None => meet(simd, slab, node, end),
+                };
                 if met == 0 {
                     let Some(next) = pop(bvh, stack, &mut top, end) else { return true };
                     child = next;
@@ -225,11 +285,10 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
             budget = rest;
             tally.cell_step();
             tally.primitive_tests(ids.len());
-            let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
-            let triangles = Eight::of(simd, mesh, lanes, ids.len());
-            #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
-            let dropped = filter.drops(&triangles.corners).to_bitmask() as u32;
-            let mut survivors = !dropped & triangles.used;
+            let mut survivors = match wide {
+                Some(ray) => ray.survivors(simd, bvh, mesh, first, ids),
+                None => filter.survivors(mesh, ids),
+            };
             while survivors != 0 {
                 let lane = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
@@ -286,5 +345,75 @@ fn pop(bvh: &Bvh<'_>, stack: &[Waiting], top: &mut usize, end: f32) -> Option<Ch
             let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
             return Some(bvh.nodes.get(node as usize).map_or(Child::NONE, |node| node.child(slot)));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::simd::{SimdLevel, dispatch};
+
+    /// A node against a ray, with the vectors of a level.
+    struct Both<'a>(&'a Slab, &'a Node, f32);
+
+    impl Kernel for Both<'_> {
+        type Output = [(u32, [f32; WIDTH]); 2];
+
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let Self(slab, node, end) = self;
+            let wide = Wide::new(simd, slab, &RayFilter::NONE).meet(simd, node, end);
+            let one_by_one = meet(simd, slab, node, end);
+            [wide, one_by_one].map(|(met, near)| (met, near.into()))
+        }
+    }
+
+    fn random(state: &mut u32) -> u32 {
+        *state ^= *state << 13;
+        *state ^= *state >> 17;
+        *state ^= *state << 5;
+        *state
+    }
+
+    #[test]
+    fn boxes_are_met_alike_with_vectors_and_without() {
+        let mut state = 1;
+        let bounds = Aabb { min: glam::Vec3A::splat(-2.0), max: glam::Vec3A::splat(2.0) };
+        let levels: Vec<_> = SimdLevel::available().collect();
+        let mut met_some = 0;
+        for _ in 0..if cfg!(miri) { 20 } else { 2000 } {
+            let mut number = || {
+                let [a, b, ..] = random(&mut state).to_le_bytes();
+                f32::from(u16::from_le_bytes([a, b])) / 16_384.0 - 2.0
+            };
+            let origin = [number(), number(), number()];
+            let mut direction = [number(), number(), number()];
+            if origin[0] > 1.5 {
+                direction[1] = 0.0;
+            }
+            let ray = Ray { t_min: 0.0, t_max: 3.0, ..Ray::new(origin, direction) };
+            let mut node = Node { origin: [(-1.0_f32).to_bits(); 3], ..Node::EMPTY };
+            // Steps of 2^-7: boxes within two units of the origin.
+            node.word = node.word & 0xff00_0000 | 0x0078_7878;
+            for slot in 0..WIDTH {
+                for axis in 0..3 {
+                    let [a, b, ..] = random(&mut state).to_le_bytes();
+                    node.bounds[axis][slot] = a.min(b);
+                    node.bounds[axis + 3][slot] = a.max(b);
+                }
+            }
+            let Some((slab, _)) = Slab::nearby(&ray, 0.0, &bounds) else { continue };
+            for &level in &levels {
+                let [(wide, near_wide), (met, near)] =
+                    dispatch(level, Both(&slab, &node, slab.end));
+                assert_eq!(wide, met, "{level:?} {ray:?} {node:?}");
+                for slot in (0..WIDTH).filter(|slot| met >> slot & 1 == 1) {
+                    assert_eq!(near_wide[slot].to_bits(), near[slot].to_bits());
+                    met_some += 1;
+                }
+            }
+        }
+        assert!(met_some > 100);
     }
 }
