@@ -17,7 +17,8 @@
  * are about memory: enough for any mesh, for this one, and the best grid for a budget. A build on
  * threads of yours, with progress, is a matter of hgrid_config. hgrid_surface_at knows the normal of a
  * hit, and where rays start that leave it. For grids that are stored there are hgrid_open, hgrid_peek,
- * hgrid_pack, hgrid_mesh_of and hgrid_validate, and hgrid_inspect looks at all of one.
+ * hgrid_pack, hgrid_mesh_of and hgrid_validate, and hgrid_inspect looks at all of one. hgrid_refit moves a
+ * tree with its vertices.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -874,6 +875,31 @@ typedef struct hgrid_surface {
 typedef uint32_t hgrid_coherence;
 
 /**
+ * What a refit did. Initialise it with `HGRID_REFIT_REPORT_INIT`.
+ *
+ * The costs are those of the surface area heuristic (Goldsmith and Salmon 1987): how many nodes a random line
+ * through the box of the tree visits and how many triangles it tests on average, added up.
+ */
+typedef struct hgrid_refit_report {
+    /**
+     * `sizeof(hgrid_refit_report)`.
+     */
+    uint32_t struct_size;
+    /**
+     * The triangle that is to blame for an error, or `HGRID_INVALID_ID`.
+     */
+    uint32_t triangle;
+    /**
+     * The cost that the tree had; 0 after an error.
+     */
+    double cost_before;
+    /**
+     * The cost that the tree has now; 0 after an error.
+     */
+    double cost_after;
+} hgrid_refit_report;
+
+/**
  * What the header of a blob says. Initialise it with `HGRID_BLOB_INFO_INIT`.
  */
 typedef struct hgrid_blob_info {
@@ -1175,7 +1201,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_TRUNCATED -43
 
 /**
- * The blob was built for a mesh with another number of vertices or triangles.
+ * The blob was built for a mesh with another number of vertices or triangles; or, from `hgrid_refit`, a
+ * triangle that the build left out is finite now.
  */
 #define HGRID_ERROR_MESH_MISMATCH -44
 
@@ -1188,6 +1215,11 @@ typedef struct hgrid_allocator {
  * The blob holds a grid and no mesh, and none was brought.
  */
 #define HGRID_ERROR_NO_MESH -46
+
+/**
+ * The blob is no tree (`HGRID_METHOD_BVH`), or `hgrid_pack` wrote it: refit the tree, then pack it.
+ */
+#define HGRID_ERROR_CANNOT_REFIT -47
 
 /**
  * The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
@@ -1520,14 +1552,16 @@ hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
  * `point` is three floats; it and `closest` may not be NULL.
  *
  * Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts
- * the lists that were looked at, `primitive_tests` the triangles in them. `options` may be
+ * the lists or leaves that were looked at, `primitive_tests` the triangles in them, `grid_steps` the nodes
+ * of a tree. `options` may be
  * NULL: the defaults. With anything that is not as it should be (another NULL, a view of
  * zeros, options that break the rules, a point that is not finite, a distance that is NaN
  * or negative) the answer is false.
  *
- * The call allocates nothing and always ends. How long it takes grows with the triangles in a cube
- * around the point that reaches as far as the answer: it is short near the mesh, and far outside
- * of it that of a loop over a good part of all triangles.
+ * The call allocates nothing and always ends. With `HGRID_METHOD_BVH` it visits the nodes that are no
+ * farther than the answer, wherever the point lies. With the other methods the time grows with the
+ * triangles in a cube around the point that reaches as far as the answer: it is short near the mesh, and
+ * far outside of it that of a loop over a good part of all triangles.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -1718,6 +1752,45 @@ hgrid_status hgrid_open(const void *blob,
                         size_t blob_bytes,
                         const struct hgrid_mesh *mesh,
                         struct hgrid_grid *grid);
+
+/**
+ * Gives a tree (`HGRID_METHOD_BVH`) the boxes of a mesh whose vertices moved: in place, in a fraction of
+ * the time of a build, without scratch.
+ *
+ * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`; `blob_bytes` is its
+ * size, and bytes behind the blob are not touched. `mesh` has the same triangles as the mesh that the tree
+ * was built for, with the vertices where they are now; blob and mesh do not overlap. Queries on the view that
+ * the call writes answer as those of a new build do. Views that were made before the call are of no use
+ * any more: they can be asked without harm, but answer anything.
+ *
+ * The leaves stay as they were built, so rays take longer the more the mesh changes. Remember `cost_before` of
+ * the first refit after a build, and build anew once `cost_after` is well above it: times of rays grow
+ * about as the cost does.
+ *
+ * A triangle that the build left out, because a coordinate was not finite, must not have become finite.
+ *
+ * `mesh`, `blob` and `grid` may not be NULL. `report` may be NULL. Returns `HGRID_OK` and writes the view
+ * to `grid`; or returns the reason, and blob and `grid` are as they were:
+ * - `HGRID_ERROR_CANNOT_REFIT` for a blob of another method, and for one that `hgrid_pack` wrote;
+ * - `HGRID_ERROR_MESH_MISMATCH` for a mesh with other counts, and if a triangle became finite;
+ * - `HGRID_ERROR_NON_FINITE` if a triangle of a leaf is not finite any more, whatever the flags of the build;
+ * - `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_NULL_ARGUMENT`,
+ *   `HGRID_ERROR_STRUCT_SIZE`;
+ * - what `hgrid_open` returns.
+ *
+ * The report is written in both cases. The call allocates nothing, and takes the stack of a build.
+ *
+ * Threads: any number of calls at once, each with a blob, a view and a report of its own. No query may run
+ * on the blob during the call.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_refit(const struct hgrid_mesh *mesh,
+                         void *blob,
+                         size_t blob_bytes,
+                         struct hgrid_grid *grid,
+                         struct hgrid_refit_report *report);
 
 /**
  * Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.
@@ -1999,6 +2072,11 @@ bool hgrid_has_method(uint32_t method);
  * The header of a blob before it is read.
  */
 #define HGRID_BLOB_INFO_INIT {sizeof(hgrid_blob_info), 0, 0, 0, 0, 0, 0, 0}
+
+/**
+ * The report of a refit before its call.
+ */
+#define HGRID_REFIT_REPORT_INIT {sizeof(hgrid_refit_report), HGRID_INVALID_ID, 0, 0}
 
 /**
  * Statistics before their call.

@@ -88,6 +88,8 @@ struct report : ::hgrid_report {
 };
 /// What a look at a whole grid found out. See `hgrid_statistics`.
 using statistics = ::hgrid_statistics;
+/// What a refit did. See `hgrid_refit_report`.
+using refit_report = ::hgrid_refit_report;
 /// What the first bytes of a blob say. See `hgrid_blob_info`.
 using blob_info = ::hgrid_blob_info;
 /// A point or a direction: x, y, z.
@@ -207,6 +209,8 @@ enum class [[nodiscard]] status : std::int32_t {
     corrupt = HGRID_ERROR_CORRUPT,
     /// `HGRID_ERROR_NO_MESH`
     no_mesh = HGRID_ERROR_NO_MESH,
+    /// `HGRID_ERROR_CANNOT_REFIT`
+    cannot_refit = HGRID_ERROR_CANNOT_REFIT,
     /// `HGRID_ERROR_INVALID_RAYS`
     invalid_rays = HGRID_ERROR_INVALID_RAYS,
     /// `HGRID_ERROR_INVALID_ANSWERS`
@@ -1111,6 +1115,19 @@ public:
         static_cast<view &>(*this) = std::exchange(static_cast<view &>(other), view());
         blob_ = std::move(other.blob_);
         return *this;
+    }
+
+    /// Gives a tree the boxes of a mesh whose vertices moved, in place; other views of it are of no use any
+    /// more. After an error the grid is as it was. Errors are those of `hgrid_refit`.
+    result<refit_report> refit(const mesh &of) noexcept
+    {
+        refit_report found = HGRID_REFIT_REPORT_INIT;
+        ::hgrid_grid fresh = HGRID_GRID_INIT;
+        const status answer{::hgrid_refit(&of.c(), blob_.data(), blob_.size(), &fresh, &found)};
+        if (answer != status::ok)
+            return answer;
+        static_cast<view &>(*this) = view(fresh);
+        return found;
     }
 
     /// The blob: bytes without pointers, to be stored or sent, and opened elsewhere.

@@ -139,14 +139,16 @@ pub unsafe extern "C" fn hgrid_intersect_all(
 /// `point` is three floats; it and `closest` may not be NULL.
 ///
 /// Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts
-/// the lists that were looked at, `primitive_tests` the triangles in them. `options` may be
+/// the lists or leaves that were looked at, `primitive_tests` the triangles in them, `grid_steps` the nodes
+/// of a tree. `options` may be
 /// NULL: the defaults. With anything that is not as it should be (another NULL, a view of
 /// zeros, options that break the rules, a point that is not finite, a distance that is NaN
 /// or negative) the answer is false.
 ///
-/// The call allocates nothing and always ends. How long it takes grows with the triangles in a cube
-/// around the point that reaches as far as the answer: it is short near the mesh, and far outside
-/// of it that of a loop over a good part of all triangles.
+/// The call allocates nothing and always ends. With `HGRID_METHOD_BVH` it visits the nodes that are no
+/// farther than the answer, wherever the point lies. With the other methods the time grows with the
+/// triangles in a cube around the point that reaches as far as the answer: it is short near the mesh, and
+/// far outside of it that of a loop over a good part of all triangles.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///

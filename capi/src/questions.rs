@@ -6,8 +6,8 @@
 use core::ffi::c_void;
 
 use hgrid_core::{
-    BlobInfo, ClosestPoint, Coherence, Counters, Cull, Hit, INVALID_ID, Ray, Statistics, Surface,
-    Verdict,
+    BlobInfo, ClosestPoint, Coherence, Counters, Cull, Error, Hit, INVALID_ID, Ray, Refit,
+    Statistics, Surface, Verdict,
 };
 
 use crate::status::{HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_CULL, hgrid_status};
@@ -213,6 +213,23 @@ pub struct hgrid_surface {
     pub is_front: u32,
 }
 
+/// What a refit did. Initialise it with `HGRID_REFIT_REPORT_INIT`.
+///
+/// The costs are those of the surface area heuristic (Goldsmith and Salmon 1987): how many nodes a random line
+/// through the box of the tree visits and how many triangles it tests on average, added up.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_refit_report {
+    /// `sizeof(hgrid_refit_report)`.
+    pub struct_size: u32,
+    /// The triangle that is to blame for an error, or `HGRID_INVALID_ID`.
+    pub triangle: u32,
+    /// The cost that the tree had; 0 after an error.
+    pub cost_before: f64,
+    /// The cost that the tree has now; 0 after an error.
+    pub cost_after: f64,
+}
+
 /// What the header of a blob says. Initialise it with `HGRID_BLOB_INFO_INIT`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -348,6 +365,24 @@ pub(crate) const fn verdict(verdict: hgrid_verdict) -> Verdict {
         HGRID_ACCEPT => Verdict::Accept,
         HGRID_ACCEPT_AND_STOP => Verdict::AcceptAndStop,
         _ => Verdict::Reject,
+    }
+}
+
+impl hgrid_refit_report {
+    /// The report of a call that did nothing.
+    pub(crate) const fn empty(struct_size: u32) -> Self {
+        Self { struct_size, triangle: INVALID_ID, cost_before: 0.0, cost_after: 0.0 }
+    }
+
+    /// Notes what came out of a refit, or of a call that did not get so far.
+    pub(crate) fn note(&mut self, refitted: &Result<Refit, Error>) {
+        (self.triangle, self.cost_before, self.cost_after) = match *refitted {
+            Ok(Refit { cost_before, cost_after }) => (INVALID_ID, cost_before, cost_after),
+            Err(Error::IndexOutOfRange { triangle } | Error::NonFiniteTriangle { triangle }) => {
+                (triangle, 0.0, 0.0)
+            }
+            Err(_) => (INVALID_ID, 0.0, 0.0),
+        };
     }
 }
 

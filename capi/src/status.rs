@@ -108,7 +108,8 @@ pub const HGRID_ERROR_UNSUPPORTED_VERSION: hgrid_status = -42;
 /// The bytes end before the blob does.
 pub const HGRID_ERROR_TRUNCATED: hgrid_status = -43;
 
-/// The blob was built for a mesh with another number of vertices or triangles.
+/// The blob was built for a mesh with another number of vertices or triangles; or, from `hgrid_refit`, a
+/// triangle that the build left out is finite now.
 pub const HGRID_ERROR_MESH_MISMATCH: hgrid_status = -44;
 
 /// The blob contradicts itself or its mesh.
@@ -116,6 +117,9 @@ pub const HGRID_ERROR_CORRUPT: hgrid_status = -45;
 
 /// The blob holds a grid and no mesh, and none was brought.
 pub const HGRID_ERROR_NO_MESH: hgrid_status = -46;
+
+/// The blob is no tree (`HGRID_METHOD_BVH`), or `hgrid_pack` wrote it: refit the tree, then pack it.
+pub const HGRID_ERROR_CANNOT_REFIT: hgrid_status = -47;
 
 /// The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
 pub const HGRID_ERROR_INVALID_RAYS: hgrid_status = -50;
@@ -158,6 +162,7 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
         Error::UnsupportedVersion { .. } => HGRID_ERROR_UNSUPPORTED_VERSION,
         Error::Truncated { .. } => HGRID_ERROR_TRUNCATED,
         Error::MeshMismatch => HGRID_ERROR_MESH_MISMATCH,
+        Error::CannotRefit => HGRID_ERROR_CANNOT_REFIT,
         // The enum may grow for Rust callers; here the two crates are always of one version.
         Error::Corrupt { .. } | _ => HGRID_ERROR_CORRUPT,
     }
@@ -230,6 +235,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_MESH_MISMATCH => {
             c"a blob of another mesh: bring the mesh it was built for, or build it again"
         }
+        HGRID_ERROR_CANNOT_REFIT => c"a blob that cannot be refitted: only trees can, and before they are packed",
         HGRID_ERROR_CORRUPT => c"a damaged blob, or one of another mesh: build it again",
         HGRID_ERROR_INVALID_RAYS => c"invalid rays: check count, and ray_stride (0, or 32 and more)",
         HGRID_ERROR_INVALID_ANSWERS => {

@@ -5,7 +5,7 @@ use core::ptr::NonNull;
 
 use hgrid_core::Grid;
 
-use crate::questions::{hgrid_blob_info, hgrid_statistics};
+use crate::questions::{hgrid_blob_info, hgrid_refit_report, hgrid_statistics};
 use crate::raw;
 use crate::span::Region;
 use crate::status::{
@@ -59,6 +59,58 @@ pub unsafe extern "C" fn hgrid_open(
         }
         Err(status) => status,
     }
+}
+
+/// Gives a tree (`HGRID_METHOD_BVH`) the boxes of a mesh whose vertices moved: in place, in a fraction of
+/// the time of a build, without scratch.
+///
+/// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`; `blob_bytes` is its
+/// size, and bytes behind the blob are not touched. `mesh` has the same triangles as the mesh that the tree
+/// was built for, with the vertices where they are now; blob and mesh do not overlap. Queries on the view that
+/// the call writes answer as those of a new build do. Views that were made before the call are of no use
+/// any more: they can be asked without harm, but answer anything.
+///
+/// The leaves stay as they were built, so rays take longer the more the mesh changes. Remember `cost_before` of
+/// the first refit after a build, and build anew once `cost_after` is well above it: times of rays grow
+/// about as the cost does.
+///
+/// A triangle that the build left out, because a coordinate was not finite, must not have become finite.
+///
+/// `mesh`, `blob` and `grid` may not be NULL. `report` may be NULL. Returns `HGRID_OK` and writes the view
+/// to `grid`; or returns the reason, and blob and `grid` are as they were:
+/// - `HGRID_ERROR_CANNOT_REFIT` for a blob of another method, and for one that `hgrid_pack` wrote;
+/// - `HGRID_ERROR_MESH_MISMATCH` for a mesh with other counts, and if a triangle became finite;
+/// - `HGRID_ERROR_NON_FINITE` if a triangle of a leaf is not finite any more, whatever the flags of the build;
+/// - `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_NULL_ARGUMENT`,
+///   `HGRID_ERROR_STRUCT_SIZE`;
+/// - what `hgrid_open` returns.
+///
+/// The report is written in both cases. The call allocates nothing, and takes the stack of a build.
+///
+/// Threads: any number of calls at once, each with a blob, a view and a report of its own. No query may run
+/// on the blob during the call.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_refit(
+    mesh: *const hgrid_mesh,
+    blob: *mut c_void,
+    blob_bytes: usize,
+    grid: *mut hgrid_grid,
+    report: *mut hgrid_refit_report,
+) -> hgrid_status {
+    let blob = Region { start: blob, bytes: blob_bytes };
+    let call = |report: &mut hgrid_refit_report| {
+        let to = NonNull::new(grid).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        let refitted = unsafe { raw::refit(mesh, blob, report) }?;
+        // SAFETY: the caller's promise.
+        unsafe { raw::write_grid(to, &refitted) };
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting_refit(report, call) }
 }
 
 /// Tells what a blob is from its first 128 bytes: before there is memory for the rest, say.

@@ -1,8 +1,8 @@
 //! The point of a mesh that is closest to a point.
 //!
-//! A box around the point grows until it is sure that nothing outside is closer:
-//! from the cells next to the point on, twice as wide each time, and when something
-//! was found as wide as that is far.
+//! A tree is searched nearest child first ([`bvh`](crate::bvh)). In a grid, a box around the point grows
+//! until nothing outside can be closer: from the cells next to the point on, twice as wide each time, and
+//! once something was found, as wide as that is far.
 //!
 //! ```text
 //! +-----------------------+
@@ -102,12 +102,13 @@ impl Grid<'_> {
     /// The point of the mesh that is closest to a point, and no farther than `max_distance`; where
     /// several triangles are equally close, that of the lowest id.
     ///
-    /// The time grows with the triangles in a cube around the point that reaches
-    /// as far as the answer: it is short near the mesh, and that of a good part of
-    /// all triangles far outside of it.
+    /// [`Method::Bvh`](crate::Method::Bvh) visits the nodes that are no farther than the answer, wherever the
+    /// point lies. With the other methods the time grows with the triangles in a cube around the point that
+    /// reaches as far as the answer: it is short near the mesh, and that of a good part of all triangles far
+    /// outside of it.
     ///
     /// Of the options, mask, the triangle to skip and counters mean something here: a cell step is
-    /// a list that was looked at. A point or a distance that is NaN, an infinite point and a
+    /// a list or a leaf that was looked at, a grid step a node of a tree. A point or a distance that is NaN, an infinite point and a
     /// negative distance find nothing.
     ///
     /// ```
@@ -140,7 +141,33 @@ impl Grid<'_> {
         let farthest =
             ClosestPoint { distance: max_distance, primitive: INVALID_ID, ..ClosestPoint::NONE };
         let mut best = farthest;
+        let test = |id: u32| {
+            if selection.has(id) {
+                let triangle = self.mesh().triangle(id);
+                let found = triangle.and_then(|t| ClosestPoint::on_triangle(&t, id, point));
+                if let Some(found) = found.filter(|found| found.is_closer(&best)) {
+                    best = found;
+                }
+            }
+            best.distance
+        };
+        if !self.approach(point, max_distance, test, &mut work) {
+            self.grow(point, &selection, &mut best, &mut work);
+        }
+        if let Some(counters) = &mut options.counters {
+            counters.add(&work);
+        }
+        (best.primitive != INVALID_ID).then_some(best)
+    }
 
+    /// Looks in boxes around a point that grow until nothing outside can be closer than `best`.
+    fn grow(
+        &self,
+        point: [f32; 3],
+        selection: &Selection<'_>,
+        best: &mut ClosestPoint,
+        work: &mut Counters,
+    ) {
         // Begin with the cells next to where the point is, or would come in.
         let center = DVec3::from_array(point.map(f64::from));
         let (min, max) = self.bounds();
@@ -156,8 +183,8 @@ impl Grid<'_> {
                 for id in ids.iter().filter(|&id| selection.has(id)) {
                     let triangle = self.mesh().triangle(id);
                     let found = triangle.and_then(|t| ClosestPoint::on_triangle(&t, id, point));
-                    if let Some(found) = found.filter(|found| found.is_closer(&best)) {
-                        best = found;
+                    if let Some(found) = found.filter(|found| found.is_closer(best)) {
+                        *best = found;
                     }
                 }
             });
@@ -172,10 +199,6 @@ impl Grid<'_> {
             reach =
                 if best.primitive == INVALID_ID { (outside + inside).min(needed) } else { needed };
         }
-        if let Some(counters) = &mut options.counters {
-            counters.add(&work);
-        }
-        (best.primitive != INVALID_ID).then_some(best)
     }
 }
 

@@ -121,8 +121,11 @@ pub enum Error {
     },
     /// The blob holds a grid and no mesh: bring the mesh it was built for.
     NoMesh,
-    /// The grid was built for a mesh with other triangle or vertex counts.
+    /// The grid was built for a mesh with other triangle or vertex counts; or, in a refit, a triangle became
+    /// finite that the build left out.
     MeshMismatch,
+    /// The grid is no tree, or its mesh is packed behind it: only trees without a mesh can be refitted.
+    CannotRefit,
     /// The grid contradicts itself or its mesh.
     Corrupt {
         /// Where in the blob, in bytes from its start.
@@ -211,6 +214,9 @@ impl fmt::Display for Error {
             }
             Self::NoMesh => f.write_str("the blob holds a grid and no mesh: bring its mesh"),
             Self::MeshMismatch => f.write_str("the grid was built for another mesh"),
+            Self::CannotRefit => {
+                f.write_str("only a tree can be refitted, and only without a packed mesh")
+            }
             Self::Corrupt { offset } => write!(f, "the grid is damaged at byte {offset}"),
         }
     }

@@ -7,7 +7,7 @@ use crate::approach::Approach;
 use crate::arena::check_alignment;
 use crate::blob::{Header, corrupt};
 use crate::brick::{self, Brick, OneRay, Tiles};
-use crate::bvh::{self, Bvh};
+use crate::bvh::{self, Bvh, Nearest};
 use crate::cell::Lattice;
 use crate::config::{
     Config, HAS_BRICK, HAS_BVH, HAS_FIXED, HAS_GRIDS, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE,
@@ -419,6 +419,32 @@ impl<'a> Grid<'a> {
             | Structure::Brick(_)
             | Structure::Bvh(_) => true,
         };
+    }
+
+    /// Shows `test` the triangles that may be within a distance of a point, the nearest first, where the
+    /// structure can; tells whether it does. `test` answers within which distance triangles matter.
+    pub(crate) fn approach<T: Tally>(
+        &self,
+        point: [f32; 3],
+        within: f32,
+        test: impl FnMut(u32) -> f32,
+        tally: &mut T,
+    ) -> bool {
+        let Structure::Bvh(bvh) = &self.structure else { return false };
+        if !HAS_BVH {
+            return false;
+        }
+        let (mesh, bounds) = (&self.mesh, &self.lattice.bounds());
+        if bvh.is_shallow() {
+            let stack = &mut [0; bvh::SMALL_STACK];
+            let nearest = Nearest { bvh, mesh, bounds, point, within, test, tally, stack };
+            dispatch(self.simd, nearest);
+        } else {
+            let stack = &mut [0; bvh::STACK];
+            let nearest = Nearest { bvh, mesh, bounds, point, within, test, tally, stack };
+            dispatch(self.simd, nearest);
+        }
+        true
     }
 
     /// The extent of a cell on each axis.

@@ -30,7 +30,7 @@
 //! `hash`, `cell`, `spans`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure
 //! above them (`one_level`; `fixed` and `variable` on top of it; `recursive`; `brick`; `bvh`), and `grid`:
 //! the view that queries run on. Then the questions: `sizes`, `options`, `batch`, `closest`,
-//! `surface`, `inspect`, `packed`. core/DESIGN.md tells how it all works and what was left out.
+//! `surface`, `inspect`, `packed`, `refit`. core/DESIGN.md tells how it all works and what was left out.
 //!
 //! Each structure has a feature of the package (`one-level`, `fixed`, `variable`, `recursive` and
 //! `brick`, `bvh`, all on by default), so that a program with little flash takes the ones it needs:
@@ -82,6 +82,7 @@ mod packed;
 mod pairs;
 mod ray;
 mod recursive;
+mod refit;
 mod search;
 mod simd;
 mod sizes;
@@ -110,6 +111,7 @@ pub use options::{Cull, QueryOptions, Verdict};
 pub use packed::BlobInfo;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use recursive::MAX_DEPTH;
+pub use refit::{Refit, refit};
 pub use simd::SimdLevel;
 pub use sizes::{Sizes, fit, sizes, sizes_with};
 pub use surface::Surface;

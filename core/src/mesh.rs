@@ -229,6 +229,21 @@ impl<'a> TriangleMesh<'a> {
         Some(self.vertices_of(triangle)?.map(|vertex| vertex as u32))
     }
 
+    /// The first triangle that names a vertex that there is not.
+    pub(crate) fn first_without_vertices(&self) -> Option<u32> {
+        let count = self.vertex_count();
+        let has_all = |id| self.vertices_of(id).is_some_and(|all| all.iter().all(|&at| at < count));
+        (0..self.triangle_count()).find(|&id| !has_all(id))
+    }
+
+    /// Whether all coordinates of all vertices, used or not, are finite and no larger than
+    /// `MAX_COORDINATE`.
+    pub(crate) fn is_finite(&self) -> bool {
+        let limit = MAX_COORDINATE;
+        (0..self.vertex_count())
+            .all(|at| self.vertex(at).is_some_and(|xyz| xyz.iter().all(|c| c.abs() <= limit)))
+    }
+
     /// The corners of a triangle as vectors.
     #[inline(always)]
     pub(crate) fn corners(&self, triangle: u32) -> Option<[Vec3A; 3]> {

@@ -1,6 +1,8 @@
 //! The closest point, as a loop over all triangles finds it, and as a search by halving does.
 
-use hgrid_core::{ClosestPoint, Counters, Grid, INVALID_ID, QueryOptions, Strided};
+use hgrid_core::{
+    ClosestPoint, Config, Counters, Grid, INVALID_ID, Method, QueryOptions, SimdLevel, Strided,
+};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::methods::configs;
 use hgrid_tests::owned::Owned;
@@ -88,6 +90,99 @@ fn every_method_finds_what_a_loop_finds() {
                 check(&grid, point, within);
             }
         }
+    }
+}
+
+/// Asks a tree at every level of vectors: the same answer, and the same work.
+fn check_levels(grid: &Grid<'_>, point: [f32; 3], within: f32) {
+    let expected = brute_force(grid, point, within, |_| true);
+    let mut work = None;
+    for level in SimdLevel::available() {
+        let mut counters = Counters::default();
+        let mut options = QueryOptions::counting(&mut counters);
+        let found = grid.with_simd(level).closest_point(point, within, &mut options);
+        assert_eq!(found, expected, "{level:?} {point:?} within {within}");
+        assert_eq!(*work.get_or_insert(counters), counters, "{level:?} {point:?}");
+    }
+}
+
+#[test]
+fn trees_find_it_with_all_vectors_wherever_the_point_is() {
+    // Each triangle three times: the lowest id of equals counts, not the first that is met.
+    let mut thrice = ball(10, 1.0);
+    let once = thrice.indices.clone();
+    (0..2).for_each(|_| thrice.indices.extend(once.iter().rev()));
+    // Tiny triangles among some that are far larger.
+    let mut mixed = soup(300, 0.1, 5).scaled(1e-12);
+    mixed.append(&soup(20, 1.0, 6).scaled(1e12));
+    // Slivers, which have no normal to speak of.
+    let slivers = soup(500, 0.2, 8).map(|[x, y, z]| [x, y * 1e-7, z * 1e-7]);
+    // Triangles that are not finite are in no leaf.
+    let mut holed = soup(200, 0.1, 9);
+    for (at, value) in [(0, f32::NAN), (100, f32::INFINITY), (200, -1e37)] {
+        holed.positions[at][1] = value;
+    }
+    let scan = soup(4000, 0.02, 7);
+    let scales = [1e-38, 1e-25, 1e-10, 1e20, 1e35];
+    let scaled = scales.map(|scale| soup(300, 0.1, 10).scaled(scale));
+    let away = [1e3, 1e7].map(|far| soup(300, 0.1, 11).map(|[x, y, z]| [x + far, y, z - far]));
+    let meshes = [ball(20, 1.0), ball(9, 0.0), thrice, mixed, slivers, holed, scan];
+    let mut random = Random(23);
+    for mesh in meshes.iter().chain(&scaled).chain(&away) {
+        let view = mesh.view();
+        let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let (min, max) = grid.bounds();
+        let extent = (0..3).map(|axis| max[axis] - min[axis]).fold(0.0, f32::max);
+        for round in 0..120 {
+            let width = [0.5, 1.0, 10.0, 1e3, 1e6][round % 5];
+            let mut point: [f32; 3] = std::array::from_fn(|axis| {
+                let center = 0.5 * min[axis] + 0.5 * max[axis];
+                let point = center + extent * width * (2.0 * random.unit() - 1.0);
+                point.clamp(-f32::MAX, f32::MAX)
+            });
+            // On the surface, and straight above a corner.
+            let triangle = view.triangle(random.below(mesh.indices.len()) as u32).unwrap();
+            let is_finite = triangle.iter().flatten().all(|c| c.abs() < 1e36);
+            match round % 8 {
+                0 if is_finite => point = triangle[round % 3],
+                1 if is_finite => {
+                    point = std::array::from_fn(|k| triangle.iter().map(|p| p[k] / 3.0).sum());
+                }
+                2 if is_finite => point[..2].copy_from_slice(&triangle[0][..2]),
+                3 => point = std::array::from_fn(|axis| 0.5 * min[axis] + 0.5 * max[axis]),
+                _ => {}
+            }
+            let expected = brute_force(&grid, point, f32::INFINITY, |_| true);
+            let distance = expected.map_or(0.0, |closest| closest.distance);
+            for within in [f32::INFINITY, distance, distance.next_down().max(0.0), extent] {
+                check_levels(&grid, point, within);
+            }
+        }
+        for point in [[f32::MAX; 3], [-f32::MAX, 0.0, f32::MAX], [0.0; 3], [1e-45; 3]] {
+            check_levels(&grid, point, f32::INFINITY);
+        }
+    }
+}
+
+#[test]
+fn a_tree_looks_at_little_near_the_surface_and_far_outside() {
+    let mesh = ball(60, 1.0).map(|[x, y, z]| [x, 0.7 * y, 0.5 * z]);
+    let owned = Owned::build(&mesh.view(), &Config::new(Method::Bvh)).unwrap();
+    let grid = owned.open(&mesh.view()).unwrap();
+    let mut random = Random(31);
+    for width in [1.0_f32, 3.0, 30.0] {
+        let mut counters = Counters::default();
+        for _ in 0..100 {
+            let point = random.point();
+            let length = point.iter().map(|c| c * c).sum::<f32>().sqrt();
+            let point = point.map(|c| c / length * width.max(1.1));
+            let mut options = QueryOptions::counting(&mut counters);
+            assert!(grid.closest_point(point, f32::INFINITY, &mut options).is_some());
+        }
+        // Each of a hundred questions could ask about 43 200 triangles.
+        assert!(counters.primitive_tests < 100 * 600, "{width} {counters:?}");
+        assert!(counters.grid_steps + counters.cell_steps < 100 * 300, "{width} {counters:?}");
     }
 }
 

@@ -6,6 +6,7 @@ mod exact;
 mod forms;
 mod hits;
 mod range;
+mod refit;
 mod scans;
 mod snapped;
 mod surfaces;

@@ -79,6 +79,11 @@ static void layout(void)
     OFFSET(hgrid_surface, above);
     OFFSET(hgrid_surface, below);
     OFFSET(hgrid_surface, is_front);
+    SIZE(hgrid_refit_report);
+    OFFSET(hgrid_refit_report, struct_size);
+    OFFSET(hgrid_refit_report, triangle);
+    OFFSET(hgrid_refit_report, cost_before);
+    OFFSET(hgrid_refit_report, cost_after);
     SIZE(hgrid_blob_info);
     OFFSET(hgrid_blob_info, struct_size);
     OFFSET(hgrid_blob_info, version);
@@ -174,6 +179,7 @@ static void constants(void)
     NUMBER(HGRID_ERROR_MESH_MISMATCH);
     NUMBER(HGRID_ERROR_CORRUPT);
     NUMBER(HGRID_ERROR_NO_MESH);
+    NUMBER(HGRID_ERROR_CANNOT_REFIT);
     NUMBER(HGRID_ERROR_INVALID_RAYS);
     NUMBER(HGRID_ERROR_INVALID_ANSWERS);
     NUMBER(HGRID_ERROR_INVALID_COHERENCE);
@@ -199,6 +205,7 @@ static void defaults(void)
     const hgrid_query_options o = HGRID_QUERY_OPTIONS_INIT;
     const hgrid_report r = HGRID_REPORT_INIT;
     const hgrid_blob_info b = HGRID_BLOB_INFO_INIT;
+    const hgrid_refit_report f = HGRID_REFIT_REPORT_INIT;
     const hgrid_statistics s = HGRID_STATISTICS_INIT;
     const hgrid_allocator a = HGRID_ALLOCATOR_INIT;
     printf("mesh %lu %lu %d %zu %zu %d %zu %zu %d %zu\n", (unsigned long)m.struct_size,
@@ -214,6 +221,8 @@ static void defaults(void)
            (unsigned long)r.reference_count, (double)r.density, (unsigned long)r.resolution[0],
            (unsigned long)r.resolution[1], (unsigned long)r.resolution[2],
            (unsigned long)r.reserved);
+    printf("refit_report %lu %#lx %g %g\n", (unsigned long)f.struct_size,
+           (unsigned long)f.triangle, f.cost_before, f.cost_after);
     printf("blob_info %lu %lu %lu %lu %llu %llu %llu %llu\n", (unsigned long)b.struct_size,
            (unsigned long)b.version, (unsigned long)b.method, (unsigned long)b.has_mesh,
            (unsigned long long)b.vertex_count, (unsigned long long)b.triangle_count,

@@ -26,6 +26,7 @@ int main(void)
     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
     hgrid_report report = HGRID_REPORT_INIT;
     hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
+    hgrid_refit_report refit = HGRID_REFIT_REPORT_INIT;
     hgrid_statistics statistics = HGRID_STATISTICS_INIT;
     hgrid_allocator allocator = HGRID_ALLOCATOR_INIT;
     hgrid_grid grid = HGRID_GRID_INIT;
@@ -44,6 +45,8 @@ int main(void)
                              &grid, &report);
     if (status == HGRID_OK)
         status = hgrid_validate(&grid, proof, sizeof proof);
+    if (status == HGRID_OK)
+        status = hgrid_refit(&mesh, tree, sizeof tree, &grid, &refit);
     for (size_t i = 0; i < sizeof others / sizeof *others && status == HGRID_OK; i++)
         status = hgrid_sizes(&mesh, &others[i], NULL, 0, &report);
     if (status == HGRID_OK)

@@ -13,12 +13,14 @@ static hgrid_query_options options;
 static void *blob;
 static size_t blob_bytes;
 static unsigned char *index_region, *scratch, *packed;
-static size_t index_bytes, scratch_bytes, packed_bytes;
+static void *tree;
+static size_t index_bytes, scratch_bytes, packed_bytes, tree_bytes;
 static hgrid_ray rays[RAYS];
 static const float point[3] = {0.5f, 0.5f, 1};
 static hgrid_report report = HGRID_REPORT_INIT;
+static hgrid_refit_report refit_report = HGRID_REFIT_REPORT_INIT;
 
-/* All that calls write but the report, which is written in any case. */
+/* All that calls write but the reports, which are written in any case. */
 typedef struct {
     hgrid_grid grid;
     hgrid_hit hits[RAYS];
@@ -90,6 +92,8 @@ static void prepare(void)
     packed_bytes = (size_t)bytes;
     packed = (unsigned char *)guarded(packed_bytes);
     EXPECT(HGRID_OK, hgrid_pack(&grid, packed, packed_bytes, &bytes));
+    const hgrid_config bvh = HGRID_CONFIG_INIT_BVH;
+    build_exactly(&mesh, &bvh, &tree, &tree_bytes);
     for (int i = 0; i < RAYS; i++)
         rays[i] = ray_down(0.3f + 0.1f * (float)i, 0.4f);
     reset(&before);
@@ -265,6 +269,14 @@ static void stored_grids(void)
     REFUSED(hgrid_open.mesh, HGRID_ERROR_NO_MESH, hgrid_open(blob, blob_bytes, NULL, &out.grid));
     ALLOWED(hgrid_open.mesh, hgrid_open(packed, packed_bytes, NULL, &out.grid));
     REFUSED(hgrid_open.grid, HGRID_ERROR_NULL_ARGUMENT, hgrid_open(blob, blob_bytes, &mesh, NULL));
+
+    REFUSED(hgrid_refit.mesh, HGRID_ERROR_NULL_ARGUMENT,
+            hgrid_refit(NULL, tree, tree_bytes, &out.grid, &refit_report));
+    REFUSED(hgrid_refit.blob, HGRID_ERROR_NULL_ARGUMENT,
+            hgrid_refit(&mesh, NULL, tree_bytes, &out.grid, &refit_report));
+    REFUSED(hgrid_refit.grid, HGRID_ERROR_NULL_ARGUMENT,
+            hgrid_refit(&mesh, tree, tree_bytes, NULL, &refit_report));
+    ALLOWED(hgrid_refit.report, hgrid_refit(&mesh, tree, tree_bytes, &out.grid, NULL));
 
     REFUSED(hgrid_peek.blob, HGRID_ERROR_NULL_ARGUMENT, hgrid_peek(NULL, 128, &out.info));
     REFUSED(hgrid_peek.blob, HGRID_ERROR_NOT_A_GRID, hgrid_peek(NULL, 0, &out.info));

@@ -20,7 +20,7 @@ use crate::header::DIALECTS;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
 /// flavour of the library that they need.
-const PROGRAMS: [(&str, Flavour); 16] = [
+const PROGRAMS: [(&str, Flavour); 17] = [
     ("queries", Flavour::NoStd),
     ("options", Flavour::NoStd),
     ("batches", Flavour::NoStd),
@@ -36,6 +36,7 @@ const PROGRAMS: [(&str, Flavour); 16] = [
     ("refusals", Flavour::NoStd),
     ("blobs", Flavour::NoStd),
     ("stored", Flavour::NoStd),
+    ("refits", Flavour::NoStd),
     ("create", Flavour::Std),
 ];
 

@@ -7,8 +7,8 @@ static sheet mesh_data;
 static hgrid_mesh mesh;
 static hgrid_grid grid;
 static hgrid_config config;
-static void *blob;
-static size_t blob_bytes, index_bytes, scratch_bytes;
+static void *blob, *tree;
+static size_t blob_bytes, tree_bytes, index_bytes, scratch_bytes;
 static unsigned char *index_region, *scratch;
 static const hgrid_report new_report = HGRID_REPORT_INIT;
 
@@ -19,6 +19,8 @@ static void prepare(void)
     const hgrid_config what_null_means = HGRID_CONFIG_INIT;
     config = what_null_means;
     grid = build_exactly(&mesh, &config, &blob, &blob_bytes);
+    const hgrid_config bvh = HGRID_CONFIG_INIT_BVH;
+    build_exactly(&mesh, &bvh, &tree, &tree_bytes);
     hgrid_report need = HGRID_REPORT_INIT;
     /* Fitting takes as much scratch as is said without any. */
     EXPECT(HGRID_OK, hgrid_sizes(&mesh, &config, NULL, 0, &need));
@@ -40,6 +42,8 @@ static void meshes(void)
                    hgrid_build(it, NULL, index_region, index_bytes, scratch, scratch_bytes, &view,
                                NULL));
     CHECK_VERSIONS(hgrid_open.mesh, hgrid_mesh, mesh, hgrid_open(blob, blob_bytes, it, &view));
+    CHECK_VERSIONS(hgrid_refit.mesh, hgrid_mesh, mesh,
+                   hgrid_refit(it, tree, tree_bytes, &view, NULL));
     CHECK_VERSIONS(hgrid_mesh_of.mesh, hgrid_mesh, mesh, hgrid_mesh_of(&grid, it));
 }
 
@@ -77,6 +81,7 @@ static void configurations(void)
 static void results(void)
 {
     const hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
+    const hgrid_refit_report refit = HGRID_REFIT_REPORT_INIT;
     const hgrid_statistics statistics = HGRID_STATISTICS_INIT;
     hgrid_config fitted = config;
     hgrid_grid view;
@@ -88,6 +93,8 @@ static void results(void)
     CHECK_VERSIONS(hgrid_build.report, hgrid_report, new_report,
                    hgrid_build(&mesh, NULL, index_region, index_bytes, scratch, scratch_bytes,
                                &view, it));
+    CHECK_VERSIONS(hgrid_refit.report, hgrid_refit_report, refit,
+                   hgrid_refit(&mesh, tree, tree_bytes, &view, it));
     CHECK_VERSIONS(hgrid_peek.info, hgrid_blob_info, info, hgrid_peek(blob, blob_bytes, it));
     CHECK_VERSIONS(hgrid_inspect.statistics, hgrid_statistics, statistics,
                    hgrid_inspect(&grid, it));

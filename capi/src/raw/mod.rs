@@ -35,6 +35,7 @@ use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 pub(crate) use ask::{batch, closest, query, query_all, surface};
 
 use crate::input::Input;
+use crate::questions::hgrid_refit_report;
 use crate::span::{Region, Span};
 use crate::status::{
     HGRID_ERROR_NOT_A_GRID, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,
@@ -308,6 +309,53 @@ pub(crate) unsafe fn open(
     // SAFETY: the caller's promise.
     let blob = unsafe { bytes(blob, blob_bytes) }?;
     Grid::open(blob, mesh).map_err(status_of)
+}
+
+/// Gives the tree in a blob the boxes of a mesh, notes what that did, and opens it.
+///
+/// # Safety
+/// The caller's promise.
+pub(crate) unsafe fn refit(
+    description: *const hgrid_mesh,
+    blob: Region,
+    report: &mut hgrid_refit_report,
+) -> Result<Grid<'static>, hgrid_status> {
+    if blob.start.is_null() {
+        return Err(HGRID_ERROR_NULL_ARGUMENT);
+    }
+    // SAFETY: the caller's promise.
+    let description = unsafe { read_sized(description) }?;
+    // SAFETY: the caller's promise.
+    let mesh = unsafe { mesh(&description) }?;
+    let none = Region { start: null_mut(), bytes: 0 };
+    // SAFETY: the caller's promise.
+    let [blob, _] = unsafe { regions(&description, [blob, none]) }?;
+    let refitted = hgrid_core::refit(blob, &mesh);
+    report.note(&refitted);
+    refitted.and_then(|_| Grid::open(blob, mesh)).map_err(status_of)
+}
+
+/// Runs a refit that tells what it did, in a report that may be NULL.
+///
+/// # Safety
+/// The caller's promise.
+pub(crate) unsafe fn reporting_refit(
+    report: *mut hgrid_refit_report,
+    call: impl FnOnce(&mut hgrid_refit_report) -> Result<(), hgrid_status>,
+) -> hgrid_status {
+    let mut noted = hgrid_refit_report::empty(0);
+    let Some(to) = NonNull::new(report) else {
+        return call(&mut noted).err().unwrap_or(HGRID_OK);
+    };
+    // SAFETY: the caller's promise.
+    match unsafe { read_sized(report) } {
+        Ok(given) => noted.struct_size = given.struct_size,
+        Err(status) => return status,
+    }
+    let result = call(&mut noted);
+    // SAFETY: the caller's promise.
+    unsafe { write(to, noted) };
+    result.err().unwrap_or(HGRID_OK)
 }
 
 /// What the header of a blob says.

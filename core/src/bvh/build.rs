@@ -209,12 +209,7 @@ fn build_in<const N: usize>(
     let (ids, _) = split_mut::<u32>(ids, finite.into()).unwrap_or_default();
     let nodes = whole::<Node>(nodes);
     let scene = Lattice::pad(&bounds);
-    let work = Work {
-        mesh,
-        least: scene.size().max_element() * LEAST_NODE,
-        sizes,
-        shift: KEY_BITS - bits,
-    };
+    let work = Work { mesh, least: least_node(&scene), sizes, shift: KEY_BITS - bits };
     let made = work.roots::<N>(entries, bench, ids, nodes, &mut counts, control)?;
 
     // Build the tree on top of them.
@@ -246,6 +241,11 @@ const LEAST_TASK: usize = 16_384;
 /// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
 /// axis has an inverse direction that is finite ([`slab`](super::slab)).
 const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
+
+/// The smallest box of a scene that steps are made for.
+pub(crate) fn least_node(scene: &Aabb) -> f32 {
+    scene.size().max_element() * LEAST_NODE
+}
 
 /// The whole elements of some bytes.
 fn whole<T: Pod>(bytes: &mut [u8]) -> &mut [T] {

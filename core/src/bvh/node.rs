@@ -99,6 +99,16 @@ impl Node {
         self.word >> 24
     }
 
+    /// The children that there are, as bits.
+    #[inline(always)]
+    pub(crate) const fn used(&self) -> u32 {
+        let counts = u64::from_le_bytes(self.counts);
+        // Set the high bit of each byte that is not zero, then gather the high bits.
+        let high = ((counts & 0x7f7f_7f7f_7f7f_7f7f) + 0x7f7f_7f7f_7f7f_7f7f) | counts;
+        let bits = (high >> 7 & 0x0101_0101_0101_0101).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+        self.inner() | bits as u32
+    }
+
     /// Makes child `slot` a node.
     pub(crate) const fn set_inner(&mut self, slot: usize) {
         self.word |= 1 << (24 + slot % WIDTH);
@@ -202,6 +212,25 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+
+    #[test]
+    fn used_children_are_nodes_and_leaves_with_ids() {
+        let mut state = 1_u32;
+        for _ in 0..if cfg!(miri) { 100 } else { 10_000 } {
+            let mut node = Node::EMPTY;
+            let mut expected = 0;
+            for slot in 0..WIDTH {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                match state >> 30 {
+                    0 => node.set_inner(slot),
+                    1 => node.counts[slot] = (state >> 8 & 0xff) as u8,
+                    _ => continue,
+                }
+                expected |= u32::from(state >> 30 == 0 || node.counts[slot] > 0) << slot;
+            }
+            assert_eq!(node.used(), expected, "{node:?}");
+        }
+    }
 
     /// From -1 to 1.
     fn random(state: &mut u32) -> Vec3A {

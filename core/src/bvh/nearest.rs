@@ -1,0 +1,296 @@
+//! The triangles that may be closest to a point: nearest child first.
+//!
+//! ```text
+//! node = root
+//! loop: bound the distances from the point to the eight boxes of the node
+//!       descend into the nearest child within reach, push the others
+//!       a leaf: bound the distances to its triangles at once, test those within reach in f64, nearest first
+//!       pop what is still within reach
+//! ```
+//!
+//! Distances are squared and in f32. A bound must never drop a triangle that the test in f64 would report:
+//!
+//! - **Range.** Coordinates are scaled by a power of two, so that the farthest side of the scene is one to
+//!   two away. No square overflows, and what underflows in one is below [`TINY`].
+//! - **Boxes.** A side relative to the point has two roundings. Where the node lies within 2^9 steps of the
+//!   point, they are below 2^-13 steps, which the margin of quantised boxes absorbs
+//!   ([`node`](super::node)). Elsewhere terms lose no more than a bit by cancelling: 3 * 2^-24 of the side,
+//!   9 * 2^-24 of the squared distance.
+//! - **Triangles.** A scalar product of corners with a direction has four roundings a term ([`DOTS`] is
+//!   twice that), and what follows has eight.
+//! - **Reach.** Five roundings: with those above they are below 2^-20 ([`WIDER`]).
+//! - **The test** reports a point that is off the triangle by less than 2^-45 of the largest coordinate. So
+//!   the distance that it reports may be smaller by that, and the reach grows by `slack`.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, u32x8};
+
+use super::Bvh;
+use super::boxes::{bits, splat};
+use super::node::{Child, Node, WIDTH};
+use super::walk::{Waiting, bytes};
+use crate::aabb::{Aabb, greater};
+use crate::counters::Tally;
+use crate::eight::{Eight, first_eight};
+use crate::mesh::TriangleMesh;
+use crate::simd::Kernel;
+
+/// By how much the reach is wider than errors of 2^-20 ask for: see above.
+const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
+/// More than what underflows in a squared distance.
+const TINY: f32 = f32::MIN_POSITIVE;
+/// How far a scalar product may be off, in parts of the vectors' sums of magnitudes.
+const DOTS: f32 = 1.0 / 2_097_152.0; // 2^-21
+/// By how much the test in f64 may report a point as too near, in parts of the largest coordinate.
+const SLACK: f32 = 1.0 / 1_048_576.0 / 1_048_576.0; // 2^-40
+
+/// A point, and what is looked for.
+pub(crate) struct Nearest<'r, F, T> {
+    pub(crate) bvh: &'r Bvh<'r>,
+    pub(crate) mesh: &'r TriangleMesh<'r>,
+    /// The box of the scene.
+    pub(crate) bounds: &'r Aabb,
+    pub(crate) point: [f32; 3],
+    /// Triangles that are farther do not matter.
+    pub(crate) within: f32,
+    /// Tests a triangle; returns how far triangles matter from then on.
+    pub(crate) test: F,
+    pub(crate) tally: &'r mut T,
+    pub(crate) stack: &'r mut [Waiting],
+}
+
+/// A point that distances are measured from.
+#[derive(Clone, Copy)]
+struct Point {
+    at: [f32; 3],
+    /// A power of two by which coordinates are multiplied.
+    scale: f32,
+    slack: f32,
+}
+
+impl Point {
+    #[inline(always)]
+    fn new(point: [f32; 3], bounds: &Aabb) -> Self {
+        let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+        // Of all corners of the scene, and the largest coordinate.
+        let (mut farthest, mut largest) = (0.0, 0.0);
+        for axis in 0..3 {
+            // A quarter, which does not overflow.
+            let [at, min, max] = [point[axis], min[axis], max[axis]].map(|side| 0.25 * side);
+            farthest = greater(farthest, greater((at - min).abs(), (at - max).abs()));
+            largest = greater(largest, greater(min.abs(), max.abs()));
+        }
+        // One over the power of two below the farthest quarter.
+        let exponent = (farthest.to_bits() >> 23).clamp(1, 253);
+        let scale = f32::from_bits((254 - exponent) << 23) * 0.25;
+        Self { at: point.map(|at| at * scale), scale, slack: largest * scale * (4.0 * SLACK) }
+    }
+
+    /// The square of a distance, or more than that of all distances that round to it.
+    #[inline(always)]
+    fn reach(&self, distance: f32) -> f32 {
+        let distance = distance.next_up() * self.scale + self.slack;
+        distance * distance * WIDER + TINY
+    }
+}
+
+/// The squared distances from the point to the boxes of a node.
+#[inline(always)]
+fn boxes<S: Simd>(simd: S, node: &Node, point: &Point) -> f32x8<S> {
+    let origin = node.origin();
+    let word = u32x8::splat(simd, node.word);
+    let steps = [word << 23, word << 15, word << 7];
+    let scale = f32x8::splat(simd, point.scale);
+    let [a, b, c, d, e, f] = node.bounds;
+    let rows = [bytes(simd, a, d), bytes(simd, b, e), bytes(simd, c, f)];
+    let mut away = [scale; 3];
+    for axis in 0..3 {
+        let step = (steps[axis] & 0x7f80_0000).bitcast::<f32x8<S>>() * scale;
+        let base = f32x8::splat(simd, origin[axis] * point.scale - point.at[axis]);
+        let (low, high) = rows[axis];
+        away[axis] = outside(simd, low * step + base, high * step + base);
+    }
+    dot(away, away)
+}
+
+/// Eight vectors, by axis.
+type Vectors<S> = [f32x8<S>; 3];
+
+/// Lower bounds of the squared distances from the point to eight triangles.
+///
+/// A triangle lies behind the plane through its nearest corner across any direction. Two directions are
+/// tried: to the nearest point of an edge, and the triangle's normal. One of them is that of the closest
+/// point, so the bound is as good as rounding allows; and however wrong they are, it is a bound.
+#[inline(always)]
+fn triangles<S: Simd>(simd: S, corners: &[Vectors<S>; 3], point: &Point) -> f32x8<S> {
+    let (scale, at) = (f32x8::splat(simd, point.scale), splat(simd, point.at));
+    let [a, b, c] = *corners;
+    let a = [a[0] * scale - at[0], a[1] * scale - at[1], a[2] * scale - at[2]];
+    let b = [b[0] * scale - at[0], b[1] * scale - at[1], b[2] * scale - at[2]];
+    let c = [c[0] * scale - at[0], c[1] * scale - at[1], c[2] * scale - at[2]];
+    let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
+    let edge = nearer(nearer(on_edge(simd, a, ab), on_edge(simd, a, ac)), on_edge(simd, b, bc));
+    let normal = [
+        ab[1] * ac[2] - ab[2] * ac[1],
+        ab[2] * ac[0] - ab[0] * ac[2],
+        ab[0] * ac[1] - ab[1] * ac[0],
+    ];
+    let far = sum(a).max(sum(b)).max(sum(c)) * f32x8::splat(simd, DOTS);
+    let corners = [a, b, c];
+    across(simd, edge, &corners, far).max(across(simd, normal, &corners, far))
+}
+
+/// The point of an edge that is closest to zero, about.
+#[inline(always)]
+fn on_edge<S: Simd>(simd: S, from: Vectors<S>, along: Vectors<S>) -> Vectors<S> {
+    let share = -dot(from, along) / dot(along, along);
+    let share = share.max(f32x8::splat(simd, 0.0)).min(f32x8::splat(simd, 1.0));
+    let [x, y, z] = along;
+    [from[0] + share * x, from[1] + share * y, from[2] + share * z]
+}
+
+/// The vector that is shorter, in each lane.
+#[inline(always)]
+fn nearer<S: Simd>(one: Vectors<S>, other: Vectors<S>) -> Vectors<S> {
+    let is_other = dot(other, other).simd_lt(dot(one, one));
+    [
+        is_other.select(other[0], one[0]),
+        is_other.select(other[1], one[1]),
+        is_other.select(other[2], one[2]),
+    ]
+}
+
+/// Lower bounds of the squared distances from zero to triangles: to the planes across a direction of which
+/// the triangles lie on the other side. `far` is [`DOTS`] of the distance of their corners.
+#[inline(always)]
+fn across<S: Simd>(
+    simd: S,
+    direction: Vectors<S>,
+    [a, b, c]: &[Vectors<S>; 3],
+    far: f32x8<S>,
+) -> f32x8<S> {
+    let (a, b, c) = (dot(direction, *a), dot(direction, *b), dot(direction, *c));
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    let gap = low.max(-high) - sum(direction) * far;
+    let gap = gap.max(f32x8::splat(simd, 0.0));
+    (gap * gap - f32x8::splat(simd, 64.0 * TINY)) / dot(direction, direction)
+}
+
+#[inline(always)]
+fn minus<S: Simd>([x, y, z]: Vectors<S>, [u, v, w]: Vectors<S>) -> Vectors<S> {
+    [x - u, y - v, z - w]
+}
+
+#[inline(always)]
+fn dot<S: Simd>([x, y, z]: Vectors<S>, [u, v, w]: Vectors<S>) -> f32x8<S> {
+    x * u + y * v + z * w
+}
+
+/// The sum of the magnitudes of the components.
+#[inline(always)]
+fn sum<S: Simd>([x, y, z]: Vectors<S>) -> f32x8<S> {
+    x.abs() + y.abs() + z.abs()
+}
+
+/// How far zero lies outside of intervals.
+#[inline(always)]
+fn outside<S: Simd>(simd: S, low: f32x8<S>, high: f32x8<S>) -> f32x8<S> {
+    low.max(-high).max(f32x8::splat(simd, 0.0))
+}
+
+/// A child to come back to.
+#[inline(always)]
+fn waiting(node: u32, slot: u32, away: f32) -> Waiting {
+    u64::from(away.to_bits()) << 32 | u64::from(node << 3 | slot)
+}
+
+impl<F: FnMut(u32) -> f32, T: Tally> Kernel for Nearest<'_, F, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { bvh, mesh, bounds, point, within, mut test, tally, stack } = self;
+        let point = Point::new(point, bounds);
+        let mut reach = point.reach(within);
+        let mut top = 0;
+        // Damaged bytes may lead in circles; a tree's nodes are entered once.
+        let mut budget = bvh.budget();
+        let mut child = Child::Inner(0);
+        loop {
+            let Some(rest) = budget.checked_sub(1) else { return };
+            budget = rest;
+            match child {
+                Child::Inner(number) => {
+                    tally.grid_step();
+                    let Some(node) = bvh.nodes.get(number as usize) else { return };
+                    let away = boxes(simd, node, &point);
+                    let beyond = away.simd_gt(f32x8::splat(simd, reach));
+                    let mut rest = !bits(beyond) & node.used();
+                    if rest != 0 {
+                        let away: [f32; WIDTH] = away.into();
+                        let at = |slot: u32| away[slot as usize % WIDTH];
+                        // Descend into the nearest, push the others in any order: few of them are within
+                        // reach when they are popped.
+                        let mut nearest = rest.trailing_zeros();
+                        rest &= rest - 1;
+                        while rest != 0 {
+                            let slot = rest.trailing_zeros();
+                            rest &= rest - 1;
+                            let is_nearer = at(slot) < at(nearest);
+                            let other = if is_nearer { nearest } else { slot };
+                            nearest = if is_nearer { slot } else { nearest };
+                            let Some(place) = stack.get_mut(top) else { return };
+                            *place = waiting(number, other, at(other));
+                            top += 1;
+                        }
+                        child = node.child(nearest);
+                        continue;
+                    }
+                }
+                Child::Leaf { first, count } => {
+                    let ids = bvh.leaf(first, count);
+                    tally.cell_step();
+                    tally.primitive_tests(ids.len());
+                    let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
+                    let eight = Eight::of(simd, mesh, lanes, ids.len());
+                    let away = triangles(simd, &eight.corners, &point);
+                    let mut rest = !bits(away.simd_gt(f32x8::splat(simd, reach))) & eight.used;
+                    let away: [f32; WIDTH] = away.into();
+                    while rest != 0 {
+                        // The nearest first: it may show that the others are too far.
+                        let mut lane = rest.trailing_zeros() as usize;
+                        let mut others = rest & (rest - 1);
+                        while others != 0 {
+                            let other = others.trailing_zeros() as usize;
+                            others &= others - 1;
+                            if away[other % WIDTH] < away[lane % WIDTH] {
+                                lane = other;
+                            }
+                        }
+                        rest &= !(1 << lane);
+                        // Go on with others: a bound may be NaN, which says nothing.
+                        if away[lane % WIDTH] > reach {
+                            continue;
+                        }
+                        let Some(&id) = ids.get(lane) else { break };
+                        reach = point.reach(test(id));
+                    }
+                }
+            }
+            // Pop what is within reach.
+            loop {
+                let Some(below) = top.checked_sub(1) else { return };
+                top = below;
+                let Some(&waiting) = stack.get(top) else { return };
+                let is_beyond = f32::from_bits((waiting >> 32) as u32) > reach;
+                if !is_beyond {
+                    #[expect(clippy::cast_possible_truncation, reason = "the low half")]
+                    let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
+                    child =
+                        bvh.nodes.get(node as usize).map_or(Child::NONE, |node| node.child(slot));
+                    break;
+                }
+            }
+        }
+    }
+}

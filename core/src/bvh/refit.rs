@@ -1,0 +1,275 @@
+//! Refit: new boxes for a tree whose triangles moved, in place.
+//!
+//! ```text
+//! check   the mesh has the triangles of the tree; walking down from the root meets each node once
+//! refit   depth first: the boxes of a node's leaves, then those of its child nodes, which are on the stack
+//!         once these are done; quantise all eight, hand their union to the parent
+//! ```
+//!
+//! The check finds all errors, so nothing is written before an error. The boxes are those of a build with
+//! the same leaves.
+
+use glam::Vec3A;
+
+use super::build::least_node;
+use super::node::{Child, LEAF, Node, WIDTH};
+use super::walk::FEW_LEVELS;
+use super::{Bvh, LEVELS};
+use crate::aabb::Aabb;
+use crate::arena::{section_bytes, split_mut};
+use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::cell::Lattice;
+use crate::config::BuildFlags;
+use crate::control::Watch;
+use crate::error::Error;
+use crate::mesh::TriangleMesh;
+use crate::survey::Survey;
+
+/// Gives a tree the boxes of a mesh that moved, in a blob that opens; returns the SAH costs before and after.
+pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2], Error> {
+    let mut header = Header::read(blob, mesh)?;
+    check_mesh(&header, mesh)?;
+    let (levels, before) = Bvh::open(&header, blob)?.check(&header, mesh)?;
+    let scene = Lattice::pad(&mesh.vertex_bounds(0..mesh.vertex_count()));
+    let sections = blob.get_mut(HEADER_BYTES..).and_then(|behind| {
+        let (ids, behind) = split_mut::<u32>(behind, header.reference_count.into())?;
+        Some((&*ids, split_mut::<Node>(behind, header.node_count.into())?.0))
+    });
+    let (ids, nodes) = sections.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
+    let tree = Tree { mesh, ids, nodes, least: least_node(&scene) };
+    let (bounds, after) = if levels <= FEW_LEVELS {
+        tree.refit::<{ FEW_LEVELS as usize }>()
+    } else {
+        tree.refit::<{ LEVELS as usize }>()
+    };
+    let scene = Lattice::pad(&bounds);
+    (header.bounds_min, header.bounds_max) = (scene.min.to_array(), scene.max.to_array());
+    if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>() {
+        *head = header.to_bytes();
+    }
+    Ok([before, after])
+}
+
+impl Bvh<'_> {
+    /// Finds all that could be wrong with nodes and ids; returns the levels of nodes and the SAH cost.
+    fn check(&self, header: &Header, mesh: &TriangleMesh<'_>) -> Result<(u32, f64), Error> {
+        let at = |byte: u64| corrupt(usize::try_from(byte).unwrap_or(usize::MAX));
+        let ids_at = HEADER_BYTES as u64;
+        let nodes_at = ids_at + section_bytes::<u32>(self.ids.len() as u64);
+        let node_at = |node: u32| at(nodes_at + u64::from(node) * size_of::<Node>() as u64);
+        let triangles = mesh.triangle_count();
+        if let Some(word) = self.ids.iter().position(|&id| id >= triangles) {
+            return Err(at(ids_at + word as u64 * size_of::<u32>() as u64));
+        }
+        // Triangles were left out, so some of those in leaves may be new among those that are not finite.
+        if header.skipped_count > 0 {
+            for &triangle in self.ids {
+                if mesh.corners(triangle).and_then(Aabb::of).is_none() {
+                    return Err(Error::NonFiniteTriangle { triangle });
+                }
+            }
+        }
+        // Every node on the way down, and its child nodes that are still to be looked at.
+        let mut path = [(0, 0); LEVELS as usize];
+        let (mut depth, mut deepest) = (0, 1);
+        let mut unmet = self.nodes.len();
+        let mut cost = Cost::default();
+        let mut next = Some(0_u32);
+        loop {
+            if let Some(number) = next.take() {
+                let node = self.nodes.get(number as usize).ok_or(node_at(number))?;
+                unmet = unmet.checked_sub(1).ok_or(node_at(number))?;
+                for slot in 0..8 {
+                    let Child::Leaf { first, count } = node.child(slot) else { continue };
+                    let end = u64::from(first) + u64::from(count);
+                    let is_inside = count == 0 || end <= self.ids.len() as u64;
+                    if count as usize > LEAF || !is_inside {
+                        return Err(node_at(number));
+                    }
+                }
+                *path.get_mut(depth).ok_or(node_at(number))? = (number, node.inner());
+                depth += 1;
+                deepest = deepest.max(depth);
+                cost.add(node, number == 0);
+            }
+            let above = depth.checked_sub(1).and_then(|above| path.get_mut(above));
+            let Some((number, rest)) = above else { break };
+            if *rest == 0 {
+                depth -= 1;
+                continue;
+            }
+            let slot = rest.trailing_zeros();
+            *rest &= *rest - 1;
+            let node = self.nodes.get(*number as usize).ok_or(node_at(*number))?;
+            if let Child::Inner(child) = node.child(slot) {
+                next = Some(child);
+            }
+        }
+        if unmet > 0 {
+            return Err(corrupt(core::mem::offset_of!(Header, node_count)));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "no more than LEVELS")]
+        Ok((deepest as u32, cost.total()))
+    }
+}
+
+/// A tree that gets new boxes.
+struct Tree<'b> {
+    mesh: &'b TriangleMesh<'b>,
+    ids: &'b [u32],
+    nodes: &'b mut [Node],
+    /// No step of a node is smaller than that of a box of this size.
+    least: f32,
+}
+
+/// The corners of a box, tight.
+type Corners = [[f32; 3]; 2];
+
+/// A node whose children get their boxes.
+#[derive(Clone, Copy)]
+struct Level {
+    number: u32,
+    /// Child nodes that have no box yet, and the one that is about to get it.
+    rest: u32,
+    slot: u32,
+    boxes: [Corners; WIDTH],
+}
+
+impl Tree<'_> {
+    /// Writes the boxes of all nodes, in no more than `N` levels; returns the root's and the SAH cost.
+    #[inline(never)]
+    fn refit<const N: usize>(self) -> (Aabb, f64) {
+        let Self { mesh, ids, nodes, least } = self;
+        let none = [[0.0; 3]; 2];
+        let mut levels = [Level { number: 0, rest: 0, slot: 0, boxes: [none; WIDTH] }; N];
+        let mut cost = Cost::default();
+        let (mut depth, mut next) = (0, Some(0_u32));
+        while let Some(level) = levels.get_mut(depth) {
+            if let Some(number) = next.take() {
+                level.number = number;
+                let Some(node) = nodes.get(number as usize) else { break };
+                level.rest = node.inner();
+                for (slot, corners) in (0..).zip(&mut level.boxes) {
+                    let mut bounds = Aabb::EMPTY;
+                    if let Child::Leaf { first, count } = node.child(slot) {
+                        let first = first as usize;
+                        let leaf = ids.get(first..first.saturating_add(count as usize));
+                        for &id in leaf.unwrap_or_default() {
+                            let Some([a, b, c]) = mesh.corners(id) else { continue };
+                            bounds.min = bounds.min.min(a.min(b).min(c));
+                            bounds.max = bounds.max.max(a.max(b).max(c));
+                        }
+                    }
+                    *corners = [bounds.min.to_array(), bounds.max.to_array()];
+                }
+            }
+            let Some(node) = nodes.get_mut(level.number as usize) else { break };
+            if level.rest != 0 {
+                level.slot = level.rest.trailing_zeros();
+                level.rest &= level.rest - 1;
+                if let Child::Inner(child) = node.child(level.slot) {
+                    next = Some(child);
+                    depth += 1;
+                }
+                continue;
+            }
+            let boxes = level.boxes.map(|[min, max]| Aabb {
+                min: Vec3A::from_array(min),
+                max: Vec3A::from_array(max),
+            });
+            let bounds = boxes.iter().fold(Aabb::EMPTY, |all, child| all.union(child));
+            if node.used() != 0 {
+                node.set_boxes(&bounds, &boxes, least);
+            }
+            cost.add(node, level.number == 0);
+            let Some(above) = depth.checked_sub(1) else { return (bounds, cost.total()) };
+            depth = above;
+            if let Some(Level { slot, boxes, .. }) = levels.get_mut(above)
+                && let Some(corners) = boxes.get_mut(*slot as usize)
+            {
+                *corners = [bounds.min.to_array(), bounds.max.to_array()];
+            }
+        }
+        // Not reached: the check has walked the same way.
+        (Aabb::EMPTY, cost.total())
+    }
+}
+
+/// Checks that the triangles of a mesh are those of a tree: each has its vertices, and as many as then have
+/// none that are not finite.
+fn check_mesh(header: &Header, mesh: &TriangleMesh<'_>) -> Result<(), Error> {
+    // Most meshes are finite, which vertices tell sooner than triangles.
+    if header.skipped_count == 0 && mesh.is_finite() {
+        return match mesh.first_without_vertices() {
+            Some(triangle) => Err(Error::IndexOutOfRange { triangle }),
+            None => Ok(()),
+        };
+    }
+    let strict = if header.skipped_count == 0 { BuildFlags::STRICT } else { BuildFlags::empty() };
+    let survey = Survey::of(mesh, strict, &Watch::none())?;
+    if survey.skipped_count < header.skipped_count {
+        return Err(Error::MeshMismatch);
+    }
+    Ok(())
+}
+
+/// The SAH cost of a tree: the nodes visited and triangles tested by a random line that meets its box, on
+/// average (Goldsmith and Salmon 1987).
+#[derive(Default)]
+struct Cost {
+    /// Half the surfaces of children, weighted.
+    sum: f64,
+    /// Half the surface of the root.
+    area: f64,
+}
+
+impl Cost {
+    #[inline(always)]
+    fn add(&mut self, node: &Node, is_root: bool) {
+        self.sum += node.weight();
+        if is_root {
+            self.area = node.surface();
+        }
+    }
+
+    fn total(&self) -> f64 {
+        // The root itself is visited.
+        if self.area > 0.0 { 1.0 + self.sum / self.area } else { 1.0 }
+    }
+}
+
+impl Node {
+    /// Half the surfaces of the children's boxes, each times what it costs to enter it: one for a node, and
+    /// one for each triangle of a leaf.
+    fn weight(&self) -> f64 {
+        let mut sums = [0_u32; 3];
+        for slot in 0..WIDTH {
+            let is_inner = self.inner() >> slot & 1;
+            let cost = is_inner + u32::from(self.counts[slot]);
+            let [x, y, z] = [0, 1, 2].map(|axis| {
+                u32::from(self.bounds[axis + 3][slot].saturating_sub(self.bounds[axis][slot]))
+            });
+            sums[0] += cost * x * y;
+            sums[1] += cost * y * z;
+            sums[2] += cost * z * x;
+        }
+        self.area(sums)
+    }
+
+    /// Half the surface of the box around all children.
+    fn surface(&self) -> f64 {
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let low = self.bounds[axis].iter().min().copied().unwrap_or(0);
+            let high = self.bounds[axis + 3].iter().max().copied().unwrap_or(0);
+            u32::from(high.saturating_sub(low))
+        });
+        self.area([x * y, y * z, z * x])
+    }
+
+    /// Products of steps in x and y, y and z, z and x, as a surface.
+    fn area(&self, products: [u32; 3]) -> f64 {
+        let [x, y, z] = self.steps().map(f64::from);
+        let [xy, yz, zx] = products.map(f64::from);
+        xy * (x * y) + yz * (y * z) + zx * (z * x)
+    }
+}
