@@ -94,20 +94,20 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                     if count > FEW_RAYS {
                         met = boxes.meet_beam(simd, &beam);
                     }
-                    let (masks, near) = if count <= octets(mask) * met.count_ones() {
-                        one_by_one(simd, &boxes, rays, mask)
-                    } else {
-                        side_by_side(simd, &boxes, rays, mask, met)
-                    };
+                    let Met { mut slots, rays: by, near } =
+                        if count <= octets(mask) * met.count_ones() {
+                            one_by_one(simd, &boxes, rays, mask)
+                        } else {
+                            side_by_side(simd, &boxes, rays, mask, met)
+                        };
                     // Push what is met, the nearest last.
                     let base = top;
-                    for (slot, (&rays, &near)) in (0..).zip(masks.iter().zip(&near)) {
-                        if rays == 0 {
-                            continue;
-                        }
+                    while slots != 0 {
+                        let slot = slots.trailing_zeros();
+                        slots &= slots - 1;
+                        let (rays, near) = (by[slot as usize % WIDTH], near[slot as usize % WIDTH]);
                         let place = number << 3 | slot;
-                        let waiting = Waiting { place, near, rays };
-                        push::<ANY>(stack, &mut top, base, waiting);
+                        push::<ANY>(stack, &mut top, base, Waiting { place, near, rays });
                     }
                 }
                 Child::Leaf { first, count } => {
@@ -158,7 +158,7 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                 let Some(waiting) = stack.get(top) else { return };
                 mask = waiting.rays & rays.alive;
                 if !ANY && mask != 0 {
-                    mask &= rays.ending_behind(simd, waiting.near);
+                    mask = rays.ending_behind(simd, waiting.near, mask);
                 }
                 if mask != 0 {
                     let (node, slot) = (waiting.place >> 3, waiting.place & 7);
@@ -171,15 +171,18 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
     }
 }
 
-/// Intersects few rays with all boxes of a node: for each box the rays that meet it, and where the first
-/// one enters.
+/// What rays met of the boxes of a node.
+struct Met {
+    /// The boxes that any of them met, as bits.
+    slots: u32,
+    /// For each box the rays that met it, as bits, and where the first one enters.
+    rays: [u64; WIDTH],
+    near: [f32; WIDTH],
+}
+
+/// Intersects few rays with all boxes of a node.
 #[inline(always)]
-fn one_by_one<S: Simd>(
-    simd: S,
-    boxes: &Boxes<f32x8<S>>,
-    rays: &Rays,
-    mask: u64,
-) -> ([u64; WIDTH], [f32; WIDTH]) {
+fn one_by_one<S: Simd>(simd: S, boxes: &Boxes<f32x8<S>>, rays: &Rays, mask: u64) -> Met {
     let zero = u32x8::splat(simd, 0);
     let far_away = f32x8::splat(simd, f32::INFINITY);
     let mut least = far_away;
@@ -194,12 +197,13 @@ fn one_by_one<S: Simd>(
             least = least.min(met.select(near, far_away));
         }
     }
+    let slots = !(halves[0] | halves[1]).simd_eq(zero);
     let [low, high]: [[u32; WIDTH]; 2] = [halves[0].into(), halves[1].into()];
     let mut masks = [0; WIDTH];
     for ((mask, low), high) in masks.iter_mut().zip(low).zip(high) {
         *mask = u64::from(low) | u64::from(high) << 32;
     }
-    (masks, least.into())
+    Met { slots: bits(slots), rays: masks, near: least.into() }
 }
 
 /// Intersects many rays with the boxes of a node that their beam meets, sixteen rays at a time.
@@ -210,10 +214,10 @@ fn side_by_side<S: Simd>(
     rays: &Rays,
     mask: u64,
     met: u32,
-) -> ([u64; WIDTH], [f32; WIDTH]) {
+) -> Met {
     let far_away = f32x16::splat(simd, f32::INFINITY);
     let sides = boxes.sides();
-    let (mut masks, mut nearest) = ([0; WIDTH], [f32::INFINITY; WIDTH]);
+    let (mut slots, mut masks, mut nearest) = (0, [0; WIDTH], [f32::INFINITY; WIDTH]);
     let mut rest = met;
     while rest != 0 {
         let slot = rest.trailing_zeros() as usize % WIDTH;
@@ -230,8 +234,9 @@ fn side_by_side<S: Simd>(
             least = least.min(met.select(near, far_away));
         }
         nearest[slot] = least.reduce_min();
+        slots |= u32::from(masks[slot] != 0) << slot;
     }
-    (masks, nearest)
+    Met { slots, rays: masks, near: nearest }
 }
 
 /// Pushes a child; for closest hits behind those of the same node that begin farther away.

@@ -268,16 +268,18 @@ impl Rays {
         }
     }
 
-    /// The rays that do not end before a distance.
+    /// Those of some rays that do not end before a distance.
     #[inline(always)]
-    pub(crate) fn ending_behind<S: Simd>(&self, simd: S, distance: f32) -> u64 {
-        let distance = f32x8::splat(simd, distance);
+    pub(crate) fn ending_behind<S: Simd>(&self, simd: S, distance: f32, rays: u64) -> u64 {
+        let distance = f32x16::splat(simd, distance);
         let mut behind = 0;
-        for (octet, end) in self.end.iter().enumerate() {
-            let is_behind = bits(f32x8::simd_from(simd, *end).simd_ge(distance));
-            behind |= u64::from(is_behind) << (8 * octet);
+        for which in 0..GROUP / 16 {
+            if rays >> (16 * which) & 0xffff != 0 {
+                let is_behind = sixteen(simd, &self.end, which).simd_ge(distance);
+                behind |= is_behind.to_bitmask() << (16 * which);
+            }
         }
-        behind
+        behind & rays
     }
 
     /// Notes a pair that passed the filter.
