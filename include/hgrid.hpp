@@ -135,6 +135,11 @@ inline constexpr std::size_t bvh_scratch_bound(std::size_t triangles) noexcept
 {
     return HGRID_BVH_SCRATCH_BOUND(triangles);
 }
+/// The same with `quality::high`, bytes of scratch.
+inline constexpr std::size_t bvh_high_scratch_bound(std::size_t triangles) noexcept
+{
+    return HGRID_BVH_HIGH_SCRATCH_BOUND(triangles);
+}
 /// Bytes of scratch that are enough for `view::validate` with so many triangles.
 inline constexpr std::size_t validate_bound(std::size_t triangles) noexcept
 {
@@ -195,6 +200,8 @@ enum class [[nodiscard]] status : std::int32_t {
     cancelled = HGRID_ERROR_CANCELLED,
     /// `HGRID_ERROR_METHOD_LEFT_OUT`
     method_left_out = HGRID_ERROR_METHOD_LEFT_OUT,
+    /// `HGRID_ERROR_INVALID_QUALITY`
+    invalid_quality = HGRID_ERROR_INVALID_QUALITY,
     /// `HGRID_ERROR_NOT_A_GRID`
     not_a_grid = HGRID_ERROR_NOT_A_GRID,
     /// `HGRID_ERROR_WRONG_BYTE_ORDER`
@@ -249,6 +256,14 @@ enum class coherence : std::uint32_t {
     incoherent = HGRID_COHERENCE_INCOHERENT,
     /// Neighbours follow one another: `HGRID_COHERENCE_COHERENT`
     coherent = HGRID_COHERENCE_COHERENT,
+};
+
+/// How much time a build of `method::bvh` takes for rays that are faster.
+enum class quality : std::uint32_t {
+    /// The shortest build: `HGRID_QUALITY_FAST`
+    fast = HGRID_QUALITY_FAST,
+    /// The fastest rays: `HGRID_QUALITY_HIGH`
+    high = HGRID_QUALITY_HIGH,
 };
 
 /// Triangles that are not hit from one of their sides.
@@ -649,6 +664,11 @@ public:
     }
     /// Levels of grids. For recursive.
     config &depth(std::uint32_t levels) noexcept { return raw_.depth = levels, *this; }
+    /// How much time the build takes for rays that are faster. For bvh.
+    config &quality(hgrid::quality of) noexcept
+    {
+        return raw_.quality = static_cast<std::uint32_t>(of), *this;
+    }
     /// Whether triangles that are not finite are an error, or left out.
     config &strict(bool is_strict) noexcept
     {

@@ -17,8 +17,8 @@ pub const HGRID_OK: hgrid_status = 0;
 pub const HGRID_ERROR_NULL_ARGUMENT: hgrid_status = -1;
 
 /// A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
-/// and what is behind the known fields is not zero; or a `reserved` field of a configuration or an
-/// allocator is not 0. The usual cause is a struct that was not initialised with its `_INIT` macro.
+/// and what is behind the known fields is not zero; or the `reserved` field of an allocator is
+/// not 0. The usual cause is a struct that was not initialised with its `_INIT` macro.
 pub const HGRID_ERROR_STRUCT_SIZE: hgrid_status = -2;
 
 /// The index, the scratch, the blob or the room for one does not start at a multiple of
@@ -95,6 +95,9 @@ pub const HGRID_ERROR_CANCELLED: hgrid_status = -37;
 /// The method of the configuration, or of the blob, is none that this library was built with:
 /// `hgrid_has_method` tells which are.
 pub const HGRID_ERROR_METHOD_LEFT_OUT: hgrid_status = -38;
+
+/// The configuration's `quality` is none that this version knows, and the method is `HGRID_METHOD_BVH`.
+pub const HGRID_ERROR_INVALID_QUALITY: hgrid_status = -39;
 
 /// The bytes, or the view, are not a grid.
 pub const HGRID_ERROR_NOT_A_GRID: hgrid_status = -40;
@@ -222,6 +225,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_METHOD_LEFT_OUT => {
             c"a method that this library was built without: take one that it has, or build the library with it"
         }
+        HGRID_ERROR_INVALID_QUALITY => c"unknown quality: use one of HGRID_QUALITY_...",
         HGRID_ERROR_NO_MESH => {
             c"a blob without its mesh: bring the mesh it was built for, or pack both with hgrid_pack"
         }

@@ -18,7 +18,7 @@ use crate::aabb::Aabb;
 use crate::arena::{self, ALIGNMENT};
 use crate::bits::halves;
 use crate::cell::{Lattice, MAX_RESOLUTION};
-use crate::config::{BuildFlags, Config, Method};
+use crate::config::{BuildFlags, Config, Method, Quality};
 use crate::control::Watch;
 use crate::error::{Error, Region};
 use crate::hash::Hash;
@@ -76,7 +76,8 @@ pub(crate) struct Header {
     pub(crate) node_count: u32,
     /// Levels of nodes.
     pub(crate) levels: u32,
-    reserved: u32,
+    /// The quality of a tree, as [`Quality`] numbers them; 0 for a method without nodes.
+    pub(crate) quality: u32,
     /// Over all bytes before it: a header is what a build wrote, or `open` refuses it.
     checksum: u32,
 }
@@ -109,6 +110,7 @@ impl Header {
             },
             subdivide_above: if config.method.has_subgrids() { config.subdivide_above } else { 0 },
             depth: if config.method.has_depth() { config.depth } else { 0 },
+            quality: if config.method.has_nodes() { config.quality as u32 } else { 0 },
             cell_size: if config.method.has_cell_size() { config.cell_size } else { 0.0 },
             triangle_count: mesh.triangle_count(),
             vertex_count: mesh.vertex_count() as u64,
@@ -234,6 +236,9 @@ impl Header {
         if config.method.has_depth() {
             config.depth = self.depth;
         }
+        if config.method.has_nodes() {
+            config.quality = Quality::from_u32(self.quality).unwrap_or_default();
+        }
         config
     }
 
@@ -280,7 +285,7 @@ impl Header {
             && (method.has_cell_size() || self.cell_size.to_bits() == 0)
             && (method.has_density() || self.density.to_bits() == 0)
             && (method.has_nodes() || (self.node_count, self.levels) == (0, 0))
-            && self.reserved == 0
+            && (method.has_nodes() || self.quality == 0)
     }
 }
 

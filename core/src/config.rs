@@ -134,6 +134,44 @@ impl Method {
     }
 }
 
+/// How much time a build of [`Method::Bvh`] takes for rays that are faster.
+///
+/// Trees of both qualities have the same format, and the same rays have the same hits.
+#[non_exhaustive]
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// Triangles are binned by centre, and SAH chooses the nodes above small groups of them: the shortest build.
+    #[default]
+    Fast = 0,
+    /// SAH chooses every node, each triangle on its own: for scenes that are traced for long.
+    High = 1,
+}
+
+impl Quality {
+    /// All qualities, the shortest build first.
+    pub const ALL: &[Self] = &[Self::Fast, Self::High];
+
+    /// The name that commands and tables use.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::High => "high",
+        }
+    }
+
+    /// The quality that a number in a blob or from C means.
+    #[must_use]
+    pub const fn from_u32(value: u32) -> Option<Self> {
+        match value {
+            0 => Some(Self::Fast),
+            1 => Some(Self::High),
+            _ => None,
+        }
+    }
+}
+
 bitflags! {
     /// Choices that are either on or off.
     #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -159,6 +197,8 @@ pub struct Config {
     pub depth: u32,
     /// For [`Method::Brick`]: the width of a cell in multiples of the one that suits the triangles.
     pub cell_size: f32,
+    /// For [`Method::Bvh`]: how much time the build takes for rays that are faster.
+    pub quality: Quality,
     /// Choices that are either on or off.
     pub flags: BuildFlags,
 }
@@ -174,6 +214,7 @@ impl Config {
             subdivide_above: 16,
             depth: 3,
             cell_size: 1.0,
+            quality: Quality::Fast,
             flags: BuildFlags::empty(),
         }
     }

@@ -526,7 +526,7 @@ impl<'a> Grid<'a> {
             Structure::OneLevel(_) | Structure::Fixed(_) => one_level::scratch_bytes(resolution),
             Structure::Recursive(_) => recursive::scratch_bytes(triangles, &self.config()),
             Structure::Brick(_) => brick::scratch_bytes_at_most(resolution, triangles),
-            Structure::Bvh(_) => bvh::bound(triangles, 1).1,
+            Structure::Bvh(_) => bvh::bound(triangles, self.config().quality, 1).1,
             Structure::Variable(_) => {
                 variable::scratch_bytes_at_most(resolution, triangles, self.density())
             }

@@ -100,7 +100,7 @@ pub use batch::{Coherence, StridedMut};
 pub use blob::BLOB_VERSION;
 pub use cell::MAX_RESOLUTION;
 pub use closest::ClosestPoint;
-pub use config::{BuildFlags, Config, Method};
+pub use config::{BuildFlags, Config, Method, Quality};
 pub use control::Control;
 pub use counters::Counters;
 pub use error::{BatchField, ConfigField, Error, MeshField, Region};

@@ -65,7 +65,7 @@ impl Sizes {
             Method::Recursive if HAS_RECURSIVE => recursive::bound(triangles, config),
             Method::Brick if HAS_BRICK => brick::bound(triangles, tasks),
             Method::Bvh if HAS_BVH && triangles <= bvh::MOST_TRIANGLES => {
-                bvh::bound(triangles, tasks)
+                bvh::bound(triangles, config.quality, tasks)
             }
             Method::OneLevel
             | Method::Fixed

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use hgrid_core::{Config, Control, Method};
+use hgrid_core::{Config, Control, Method, Quality};
 
 use crate::camera::{Aim, Camera, Lens, Point, Up, View, named};
 use crate::compare::first::COMMAND as FIRST_BUILD;
@@ -270,6 +270,10 @@ pub struct CompareArgs {
     /// The structures of hgrid, between commas [default: all]
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
     pub methods: Vec<Method>,
+    /// For `bvh`: `high` builds longer for rays that are faster
+    #[arg(long, value_name = "QUALITY", value_parser = quality_parser(),
+          default_value = Quality::default().name())]
+    pub quality: Quality,
     /// The other structures, between commas [default: all that this program has]
     #[arg(long, value_name = "PEERS", value_delimiter = ',', value_enum)]
     pub peers: Vec<Peer>,
@@ -357,6 +361,9 @@ pub struct Tuning {
     /// suits the triangles [default: 1]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub cell_size: Option<f32>,
+    /// For `bvh`: `high` builds longer for rays that are faster [default: fast]
+    #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
+    pub quality: Option<Quality>,
 }
 
 impl Tuning {
@@ -369,6 +376,7 @@ impl Tuning {
             subdivide_above: self.subdivide_above.unwrap_or(default.subdivide_above),
             depth: self.depth.unwrap_or(default.depth),
             cell_size: self.cell_size.unwrap_or(default.cell_size),
+            quality: self.quality.unwrap_or(default.quality),
             ..default
         }
     }
@@ -441,6 +449,15 @@ fn method_parser() -> impl TypedValueParser<Value = Method> {
     })
 }
 
+/// A quality by its name.
+fn quality_parser() -> impl TypedValueParser<Value = Quality> {
+    let names = Quality::ALL.iter().copied().map(Quality::name);
+    PossibleValuesParser::new(names).try_map(|word| {
+        let quality = Quality::ALL.iter().copied().find(|quality| quality.name() == word);
+        quality.ok_or("no such quality")
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory as _;
@@ -510,13 +527,15 @@ mod tests {
 
     #[test]
     fn parameters_reach_the_configuration() {
-        let words = "hgrid --macrocell-factor 4 --subdivide-above 9 --depth 2 --density 2";
+        let words =
+            "hgrid --macrocell-factor 4 --subdivide-above 9 --depth 2 --density 2 --quality high";
         let config = RenderArgs::parse_from(words.split(' ')).config();
         let expected = Config {
             macrocell_factor: 4,
             subdivide_above: 9,
             depth: 2,
             density: 2.0,
+            quality: Quality::High,
             ..Config::default()
         };
         assert_eq!(config, expected);

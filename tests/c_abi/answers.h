@@ -294,6 +294,7 @@ static void check_config(table *t, const test_case *c, bool is_scattered)
     const size_t config_bytes = offsetof(hgrid_config, tasks) - offsetof(hgrid_config, method);
     static hgrid_counters expected[GROUPS_AT_MOST][2], work[GROUPS_AT_MOST][2];
     memcpy(&config.method, next(t, config_bytes), config_bytes);
+    config.quality = next_word(t);
     const size_t blob_bytes = next_word(t);
     memcpy(expected, next(t, c->group_count * sizeof *expected),
            c->group_count * sizeof *expected);

@@ -83,6 +83,11 @@ static void macros_are_no_less_than_the_function(void)
         const hgrid_report of_tree = bound_of(count, &tree);
         CHECK(HGRID_BVH_INDEX_BOUND(count) / 64 * 64 >= of_tree.index_bytes);
         CHECK(HGRID_BVH_SCRATCH_BOUND(count) / 64 * 64 >= of_tree.scratch_bytes);
+        hgrid_config high = HGRID_CONFIG_INIT_BVH;
+        high.quality = HGRID_QUALITY_HIGH;
+        const hgrid_report of_high = bound_of(count, &high);
+        CHECK(HGRID_BVH_INDEX_BOUND(count) / 64 * 64 >= of_high.index_bytes);
+        CHECK(HGRID_BVH_HIGH_SCRATCH_BOUND(count) / 64 * 64 >= of_high.scratch_bytes);
     }
     bound_of(4294967294u, NULL);
     hgrid_report bound = new_report;

@@ -9,10 +9,11 @@
 #define SIZE(type) printf(#type " %zu\n", sizeof(type))
 #define OFFSET(type, field) printf(#type "." #field " %zu\n", offsetof(type, field))
 #define BOUNDS(count) \
-    printf("bounds %lu %zu %zu %zu %zu %zu %zu %zu\n", (unsigned long)(count), \
+    printf("bounds %lu %zu %zu %zu %zu %zu %zu %zu %zu %zu\n", (unsigned long)(count), \
            HGRID_VALIDATE_BOUND(count), HGRID_INDEX_BOUND(count), HGRID_SCRATCH_BOUND(count), \
            HGRID_INDEX_BOUND_ONE_LEVEL(count), HGRID_SCRATCH_BOUND_ONE_LEVEL(count), \
-           HGRID_BVH_INDEX_BOUND(count), HGRID_BVH_SCRATCH_BOUND(count))
+           HGRID_BVH_INDEX_BOUND(count), HGRID_BVH_SCRATCH_BOUND(count), \
+           HGRID_BVH_INDEX_BOUND(count), HGRID_BVH_HIGH_SCRATCH_BOUND(count))
 
 static void layout(void)
 {
@@ -55,7 +56,7 @@ static void layout(void)
     OFFSET(hgrid_config, cell_size);
     OFFSET(hgrid_config, flags);
     OFFSET(hgrid_config, tasks);
-    OFFSET(hgrid_config, reserved);
+    OFFSET(hgrid_config, quality);
     OFFSET(hgrid_config, context);
     OFFSET(hgrid_config, run);
     OFFSET(hgrid_config, progress);
@@ -137,6 +138,8 @@ static void constants(void)
     NUMBER(HGRID_METHOD_RECURSIVE);
     NUMBER(HGRID_METHOD_BRICK);
     NUMBER(HGRID_METHOD_BVH);
+    NUMBER(HGRID_QUALITY_FAST);
+    NUMBER(HGRID_QUALITY_HIGH);
     NUMBER(HGRID_MAX_DEPTH);
     NUMBER(HGRID_BUILD_STRICT);
     NUMBER(HGRID_MAX_TASKS);
@@ -172,6 +175,7 @@ static void constants(void)
     NUMBER(HGRID_ERROR_PARALLEL_FOR);
     NUMBER(HGRID_ERROR_CANCELLED);
     NUMBER(HGRID_ERROR_METHOD_LEFT_OUT);
+    NUMBER(HGRID_ERROR_INVALID_QUALITY);
     NUMBER(HGRID_ERROR_NOT_A_GRID);
     NUMBER(HGRID_ERROR_WRONG_BYTE_ORDER);
     NUMBER(HGRID_ERROR_UNSUPPORTED_VERSION);
@@ -240,7 +244,7 @@ static void defaults(void)
                (unsigned long)c->struct_size, (double)c->density,
                (unsigned long)c->macrocell_factor, (unsigned long)c->subdivide_above,
                (unsigned long)c->depth, (double)c->cell_size, (unsigned long)c->flags,
-               (unsigned long)c->tasks, (unsigned long)c->reserved, c->context != NULL,
+               (unsigned long)c->tasks, (unsigned long)c->quality, c->context != NULL,
                c->run != NULL, c->progress != NULL);
     }
 }

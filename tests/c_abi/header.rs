@@ -5,7 +5,7 @@ use std::fs;
 use std::process::Command;
 use std::sync::OnceLock;
 
-use hgrid_core::{Config, Method, Sizes};
+use hgrid_core::{Config, Method, Quality, Sizes};
 use hgrid_tests::artefact::{Flavour, compiler, compilers, is_cpp, root, run, static_library};
 use tempfile::TempDir;
 
@@ -282,7 +282,9 @@ fn bounds_are_no_less_than_those_of_core() {
         let least = triangles.div_ceil(32) * 4;
         assert!((least..=least + 4).contains(proof), "{line}");
         let triangles = u32::try_from(*triangles).unwrap();
-        let configs = [Config::default(), Config::new(Method::OneLevel), Config::new(Method::Bvh)];
+        let tree = Config::new(Method::Bvh);
+        let high = Config { quality: Quality::High, ..tree };
+        let configs = [Config::default(), Config::new(Method::OneLevel), tree, high];
         assert_eq!(all.len(), 2 * configs.len());
         for (config, macros) in configs.iter().zip(all.chunks(2)) {
             let is_too_many = config.method == Method::Bvh && triangles > 1 << 31;

@@ -82,6 +82,9 @@ static void unknown_values_are_errors(void)
             hgrid_config flags = HGRID_CONFIG_INIT_ONE_LEVEL;
             flags.flags = unknown[i];
             refuse_config(HGRID_ERROR_INVALID_FLAGS, &flags);
+            hgrid_config quality = HGRID_CONFIG_INIT_BVH;
+            quality.quality = unknown[i];
+            refuse_config(HGRID_ERROR_INVALID_QUALITY, &quality);
             hgrid_mesh input = mesh;
             input.index_type = unknown[i];
             refuse_mesh(HGRID_ERROR_INVALID_INDEX_TYPE, &input);

@@ -9,7 +9,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use hgrid_core::{Config, Counters, Method, QueryOptions, Statistics};
+use hgrid_core::{Config, Counters, Method, Quality, QueryOptions, Statistics};
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_lab::scene::Scene;
 use hgrid_tests::copy::hash;
@@ -23,9 +23,9 @@ const SIZE: u16 = 64;
 const HEADER_BYTES: usize = 128;
 
 /// A line for a method on a scene.
-fn line(name: &str, mesh: &Mesh, method: Method) -> String {
+fn line(name: &str, mesh: &Mesh, config: &Config) -> String {
     let view = mesh.view();
-    let owned = Owned::build(&view, &Config::new(method)).unwrap();
+    let owned = Owned::build(&view, config).unwrap();
     let grid = owned.open(&view).unwrap();
     let camera = Camera::framing(grid.bounds(), View::ThreeQuarter, Up::Y);
     let mut counters = Counters::default();
@@ -43,9 +43,12 @@ fn line(name: &str, mesh: &Mesh, method: Method) -> String {
     let Statistics { longest_list, content_hash, .. } = grid.inspect();
     let [x, y, z] = grid.resolution();
     let resolution = format!("{x}x{y}x{z}");
+    let method = match config.quality {
+        Quality::High => "bvh-high",
+        _ => config.method.name(),
+    };
     format!(
-        "{name:8} {:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6} {longest_list:>7} {content_hash:016x} {:016x}",
-        method.name(),
+        "{name:8} {method:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6} {longest_list:>7} {content_hash:016x} {:016x}",
         grid.blob_bytes(),
         hash(&grid.blob()[HEADER_BYTES..]),
     )
@@ -67,8 +70,9 @@ fn work_is_what_it_was() {
         "scene    method     resolution    bytes  hits   tests   steps  grids longest content          words\n",
     );
     for (name, mesh) in &scenes {
-        for &method in Method::ALL {
-            writeln!(table, "{}", line(name, mesh, method)).unwrap();
+        let high = Config { quality: Quality::High, ..Config::new(Method::Bvh) };
+        for config in Method::ALL.iter().map(|&method| Config::new(method)).chain([high]) {
+            writeln!(table, "{}", line(name, mesh, &config)).unwrap();
         }
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/counters.txt");

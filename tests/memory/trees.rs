@@ -2,7 +2,9 @@
 
 use std::thread;
 
-use hgrid_core::{Config, Control, Error, Grid, Method, Region, Sizes, Task, TriangleMesh, sizes};
+use hgrid_core::{
+    Config, Control, Error, Grid, Method, Quality, Region, Sizes, Task, TriangleMesh, sizes,
+};
 use hgrid_tests::copy::word;
 use hgrid_tests::guarded::Guarded;
 use hgrid_tests::meshes::{Mesh, soup};
@@ -12,8 +14,8 @@ use hgrid_tests::owned::{Owned, prove};
 const NODE_COUNT: usize = 112;
 const LEVELS: usize = 116;
 
-fn config() -> Config {
-    Config::new(Method::Bvh)
+fn config(quality: Quality) -> Config {
+    Config { quality, ..Config::new(Method::Bvh) }
 }
 
 /// Builds with every size of one region, from 0 to a little more than enough, the other ample.
@@ -46,7 +48,8 @@ pub(crate) fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) 
         assert_eq!(build(&mut Guarded::new(enough), &mut scratch), Ok(()), "{bytes} bytes");
     }
 
-    for bytes in (0..scratch_bytes + 200).step_by(step).chain([scratch_bytes - 1, scratch_bytes]) {
+    let ends = [scratch_bytes.saturating_sub(1), scratch_bytes];
+    for bytes in (0..scratch_bytes + 200).step_by(step).chain(ends) {
         let (mut index, mut scratch) = (Guarded::new(exact), Guarded::new(bytes));
         let answer = sizes(mesh, config, scratch.region()).unwrap();
         assert!(scratch.around_is_intact());
@@ -115,15 +118,15 @@ fn many_nested(count: usize) -> Mesh {
 }
 
 /// Builds in the memory that is enough for so many triangles, and returns nodes and levels.
-fn builds_in_its_bound(mesh: &Mesh) -> [u32; 2] {
-    let view = mesh.view();
-    let bound = Sizes::bound(view.triangle_count(), &config()).unwrap();
+fn builds_in_its_bound(mesh: &Mesh, quality: Quality) -> [u32; 2] {
+    let (view, config) = (mesh.view(), config(quality));
+    let bound = Sizes::bound(view.triangle_count(), &config).unwrap();
     let (mut index, mut scratch) =
         (Guarded::new(bound.index_bytes), Guarded::new(bound.scratch_bytes));
-    let exact = sizes(&view, &config(), scratch.region()).unwrap();
+    let exact = sizes(&view, &config, scratch.region()).unwrap();
     assert!(exact.is_exact && exact.index_bytes <= bound.index_bytes, "{exact:?} {bound:?}");
     let told = {
-        let grid = Grid::build(view, &config(), index.region(), scratch.region()).unwrap();
+        let grid = Grid::build(view, &config, index.region(), scratch.region()).unwrap();
         assert_eq!(grid.blob_bytes(), exact.index_bytes);
         prove(&grid).unwrap();
         [NODE_COUNT, LEVELS].map(|at| word(grid.blob(), at))
@@ -137,7 +140,7 @@ fn builds_in_its_bound(mesh: &Mesh) -> [u32; 2] {
 fn the_worst_meshes_stay_within_the_bound() {
     for count in 0..=300 {
         for mesh in [one_centre(count), one_by_one(count), soup(count, 0.01, count as u64)] {
-            let [nodes, _] = builds_in_its_bound(&mesh);
+            let [nodes, _] = builds_in_its_bound(&mesh, Quality::Fast);
             let (least, most) = (count.div_ceil(56), 1 + count / 7 + 4);
             assert!((least..=most).contains(&(nodes as usize)), "{nodes} for {count}");
         }
@@ -148,7 +151,7 @@ fn the_worst_meshes_stay_within_the_bound() {
         meshes.extend((1..8).map(|depth| nested(count, depth)));
         for mesh in meshes {
             assert_eq!(mesh.indices.len(), count);
-            let [nodes, levels] = builds_in_its_bound(&mesh);
+            let [nodes, levels] = builds_in_its_bound(&mesh, Quality::Fast);
             assert!((nodes as usize) < count / 7 + count / 40 + 20, "{nodes} for {count}");
             deepest = deepest.max(levels);
         }
@@ -156,10 +159,50 @@ fn the_worst_meshes_stay_within_the_bound() {
     assert!(deepest > 8, "{deepest}");
 }
 
+/// The most nodes of a tree of high quality.
+fn most_nodes(count: usize) -> u32 {
+    count.saturating_sub(2).div_euclid(7).max(1) as u32
+}
+
+#[test]
+fn the_worst_meshes_of_high_quality_reach_the_bound() {
+    let build = |mesh: &Mesh| {
+        let count = mesh.indices.len();
+        let [nodes, levels] = builds_in_its_bound(mesh, Quality::High);
+        assert!((count.div_ceil(64)..=most_nodes(count) as usize).contains(&(nodes as usize)));
+        [nodes, levels]
+    };
+    for count in 1..=300 {
+        for mesh in [one_centre(count), one_by_one(count), soup(count, 0.01, count as u64)] {
+            build(&mesh);
+        }
+    }
+    // SAH cuts off one triangle at a time.
+    for count in [9, 16, 23, 30, 37] {
+        let mut mesh = Mesh::default();
+        for i in 0..count {
+            let at = 2_f32.powi(110 - 6 * i);
+            around(&mut mesh, [at, 0.0, 0.0], at * 1e-3);
+        }
+        let [nodes, levels] = build(&mesh);
+        assert_eq!([nodes, nodes], [most_nodes(mesh.indices.len()), levels], "{count}");
+    }
+    // Triangles that nothing tells apart: all leaves but one of the last nodes have one.
+    let mut same = Mesh::default();
+    (0..9 * 8_usize.pow(4)).for_each(|_| around(&mut same, [1.0; 3], 1.0));
+    assert_eq!(build(&same), [4681, 5]);
+    for count in [4096, 8192, 20_000] {
+        build(&one_centre(count));
+        build(&one_by_one(count));
+        build(&many_nested(count));
+        (1..8).for_each(|depth| assert!(build(&nested(count, depth))[1] < 20));
+    }
+}
+
 /// The chain of the powers of two that f32 has, around which there are too few triangles to cut.
 #[test]
 fn trees_are_no_deeper_than_queries_are_prepared_for() {
-    let mut deepest = 0;
+    let (mut deepest, mut deepest_high) = (0, 0);
     for (copies, factor) in
         [(1, 0.5_f32), (113, 0.5), (225, 0.5), (225, 0.125), (113, 0.8), (450, 1e-2)]
     {
@@ -169,8 +212,10 @@ fn trees_are_no_deeper_than_queries_are_prepared_for() {
             (0..copies).for_each(|_| around(&mut mesh, [at, 0.0, 0.0], at * 1e-3));
             at *= factor;
         }
-        deepest = deepest.max(builds_in_its_bound(&mesh)[1]);
+        deepest = deepest.max(builds_in_its_bound(&mesh, Quality::Fast)[1]);
+        deepest_high = deepest_high.max(builds_in_its_bound(&mesh, Quality::High)[1]);
     }
+    assert!((8..=35).contains(&deepest_high), "{deepest_high}");
     assert!((12..=64).contains(&deepest), "{deepest}");
 }
 
@@ -192,11 +237,14 @@ fn tasks_do_not_show() {
     let mut mixed = soup(COUNT / 2, 0.01, 3);
     mixed.append(&many_nested(COUNT - COUNT / 2));
     let meshes = [soup(COUNT, 0.01, 1), behind, mixed, one_centre(COUNT), nested(COUNT, 4)];
-    for (which, mesh) in meshes.iter().enumerate() {
+    let qualities = Quality::ALL.iter().map(|&quality| config(quality));
+    let all = meshes.iter().enumerate();
+    for ((which, mesh), config) in all.flat_map(|mesh| qualities.clone().map(move |of| (mesh, of)))
+    {
         assert_eq!(mesh.indices.len(), COUNT);
         let view = mesh.view();
-        let expected = Owned::build(&view, &config()).unwrap();
-        let bound = |tasks| Sizes::bound_parallel(COUNT as u32, &config(), tasks).unwrap();
+        let expected = Owned::build(&view, &config).unwrap();
+        let bound = |tasks| Sizes::bound_parallel(COUNT as u32, &config, tasks).unwrap();
         for (tasks, run) in [2, 3, 7, 64].into_iter().zip([on_threads, backwards].iter().cycle()) {
             for memory in [tasks, 2, 1] {
                 let (index_bytes, mut scratch_bytes) =
@@ -210,7 +258,7 @@ fn tasks_do_not_show() {
                     (Guarded::new(index_bytes), Guarded::new(scratch_bytes));
                 let same = {
                     let (index, scratch) = (index.region(), scratch.region());
-                    let grid = Grid::build_with(view, &config(), index, scratch, &control);
+                    let grid = Grid::build_with(view, &config, index, scratch, &control);
                     grid.unwrap().blob() == expected.bytes()
                 };
                 assert!(same, "mesh {which}, {tasks} tasks, memory for {memory}");
@@ -222,7 +270,7 @@ fn tasks_do_not_show() {
         let mut index = Guarded::new(expected.bytes().len());
         let mut scratch = Guarded::new(bound(7).scratch_bytes);
         let grid =
-            Grid::build_with(view, &config(), index.region(), scratch.region(), &control).unwrap();
+            Grid::build_with(view, &config, index.region(), scratch.region(), &control).unwrap();
         assert!(grid.blob() == expected.bytes(), "mesh {which}");
     }
 }

@@ -29,6 +29,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::Simd;
 
 use super::census::{Census, count, share, take};
+use super::high;
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
     CROWD, Entry, MOST_TRIANGLES, bin_bits, index_bytes, most_below, most_nodes, scratch_bytes,
@@ -43,7 +44,7 @@ use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split_mut};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
-use crate::config::Config;
+use crate::config::{Config, Quality};
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
@@ -52,7 +53,14 @@ use crate::sizes::Sizes;
 use crate::tasks::{Shared, run, task_count};
 
 /// The memory that any mesh with so many triangles and a build with so many tasks needs.
-pub(crate) const fn bound(triangles: u32, tasks: u32) -> (u64, u64) {
+pub(crate) const fn bound(triangles: u32, quality: Quality, tasks: u32) -> (u64, u64) {
+    match quality {
+        Quality::Fast => fast_bound(triangles, tasks),
+        Quality::High => high::bound(triangles),
+    }
+}
+
+const fn fast_bound(triangles: u32, tasks: u32) -> (u64, u64) {
     let triangles = triangles as u64;
     let tasks = if tasks < 1 { 1 } else { tasks } as u64;
     (index_bytes(triangles, most_nodes(triangles)), scratch_bytes(triangles, tasks, triangles))
@@ -66,10 +74,11 @@ pub(crate) fn sizes(
     control: &Control<'_>,
 ) -> Result<Sizes, Error> {
     check_count(mesh)?;
-    let (index, needed) = bound(mesh.triangle_count(), control.tasks.clamp(1, Control::MAX_TASKS));
+    let (index, needed) =
+        bound(mesh.triangle_count(), config.quality, control.tasks.clamp(1, Control::MAX_TASKS));
     if control.tasks <= 1 && scratch.len() as u64 >= needed {
         let watch = &Watch::none();
-        let header = build_in::<1>(mesh, config, None, scratch, &Control::SERIAL, watch)?;
+        let header = header_of::<1>(mesh, config, None, scratch, &Control::SERIAL, watch)?;
         return Sizes::new(header.blob_bytes, needed, true);
     }
     Sizes::new(index, needed, false)
@@ -92,9 +101,9 @@ pub(crate) fn build<'a>(
     // Room on the stack for as many tasks as there may be, or for one.
     let header = if control.tasks > 1 {
         const MOST: usize = Control::MAX_TASKS as usize;
-        build_in::<MOST>(mesh, config, Some(&mut *index), scratch, control, watch)
+        header_of::<MOST>(mesh, config, Some(&mut *index), scratch, control, watch)
     } else {
-        build_in::<1>(mesh, config, Some(&mut *index), scratch, control, watch)
+        header_of::<1>(mesh, config, Some(&mut *index), scratch, control, watch)
     }?;
     let available_bytes = index.len() as u64;
     let needed_bytes = header.blob_bytes;
@@ -105,6 +114,21 @@ pub(crate) fn build<'a>(
         *head = header.to_bytes();
     }
     Ok(blob)
+}
+
+/// Builds all but the header by the method that the quality names.
+fn header_of<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: Option<&mut [u8]>,
+    scratch: &mut [u8],
+    control: &Control<'_>,
+    watch: &Watch<'_>,
+) -> Result<Header, Error> {
+    match config.quality {
+        Quality::Fast => build_in::<N>(mesh, config, index, scratch, control, watch),
+        Quality::High => high::build_in::<N>(mesh, config, index, scratch, control, watch),
+    }
 }
 
 /// How far the steps of a build are, about.
@@ -143,7 +167,7 @@ fn build_in<const N: usize>(
         1 => available_bytes >= scratch_bytes(all, 1, small_bench(all)),
         _ => {
             available_bytes >= scratch_bytes(all, tasks.into(), all)
-                && index_available >= bound(triangles, tasks).0
+                && index_available >= fast_bound(triangles, tasks).0
         }
     };
     while tasks > 1 && !fits(tasks) {
@@ -178,7 +202,7 @@ fn build_in<const N: usize>(
     } else {
         // There are fewer ids than keys if triangles are skipped.
         let keys = bytemuck::cast_slice_mut(bench).get_mut(..triangles as usize);
-        keys.filter(|_| has_whole_bench).ok_or(index_error(bound(triangles, 1).0))?
+        keys.filter(|_| has_whole_bench).ok_or(index_error(fast_bound(triangles, 1).0))?
     };
 
     // Find the box, then every triangle's key.
@@ -240,7 +264,7 @@ const LEAST_TASK: usize = 16_384;
 
 /// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
 /// axis has an inverse direction that is finite ([`slab`](super::slab)).
-const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
+pub(super) const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
 
 /// The smallest box of a scene that steps are made for.
 pub(crate) fn least_node(scene: &Aabb) -> f32 {
@@ -248,7 +272,7 @@ pub(crate) fn least_node(scene: &Aabb) -> f32 {
 }
 
 /// The whole elements of some bytes.
-fn whole<T: Pod>(bytes: &mut [u8]) -> &mut [T] {
+pub(super) fn whole<T: Pod>(bytes: &mut [u8]) -> &mut [T] {
     let used = bytes.len() / size_of::<T>() * size_of::<T>();
     let bytes = bytes.get_mut(..used).unwrap_or_default();
     bytemuck::try_cast_slice_mut(bytes).unwrap_or_default()

@@ -21,6 +21,7 @@ mod boxes;
 mod build;
 mod census;
 mod group;
+mod high;
 mod key;
 mod layout;
 mod nearest;

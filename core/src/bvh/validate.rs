@@ -14,6 +14,7 @@ use crate::aabb::Aabb;
 use crate::arena::section_bytes;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::Lattice;
+use crate::config::Quality;
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
 
@@ -54,6 +55,9 @@ impl Bvh<'_> {
         let survey = header.survey(lattice, mesh)?;
         if header.resolution != [1; 3] {
             return Err(corrupt(core::mem::offset_of!(Header, resolution)));
+        }
+        if Quality::from_u32(header.quality).is_none() {
+            return Err(corrupt(core::mem::offset_of!(Header, quality)));
         }
         if header.hash_count != 0 {
             return Err(corrupt(core::mem::offset_of!(Header, hash_count)));

@@ -1,7 +1,9 @@
 //! hgrid itself.
 
 use anyhow::Result;
-use hgrid_core::{Coherence, Config, Control, Grid, Hit, Method, Ray, Strided, StridedMut};
+use hgrid_core::{
+    Coherence, Config, Control, Grid, Hit, Method, Quality, Ray, Strided, StridedMut,
+};
 
 use super::input::Input;
 use super::mode::Mode;
@@ -10,6 +12,9 @@ use super::system::{Bytes, System, Tracer, Use, each, one_by_one};
 use super::workloads::Workload;
 use crate::regions::{Regions, peak_bytes};
 use crate::tiles::TILE_RAYS;
+
+/// What the name of a tree of high quality ends with.
+pub(super) const HIGH: &str = "-high";
 
 /// One method.
 pub(super) struct GridSystem {
@@ -29,7 +34,9 @@ const fn is_of_paper(method: Method) -> bool {
 
 impl System for GridSystem {
     fn name(&self) -> String {
-        self.config.method.name().to_owned()
+        let Config { method, quality, .. } = self.config;
+        let is_high = method == Method::Bvh && quality == Quality::High;
+        method.name().to_owned() + if is_high { HIGH } else { "" }
     }
 
     fn is_peer(&self) -> bool {

@@ -38,10 +38,10 @@ use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Error, Result};
 use clap::ValueEnum as _;
-use hgrid_core::{Config, Method};
+use hgrid_core::{Config, Method, Quality};
 
 use crate::cli::CompareArgs;
-use grid::GridSystem;
+use grid::{GridSystem, HIGH};
 use numbers::Comparison;
 use peers::Peer;
 use race::Plan;
@@ -54,7 +54,7 @@ use workloads::{Amount, Workload};
 /// If this program was built without the peers, a scene cannot be loaded, a structure cannot be
 /// built, two methods of hgrid disagree, or a file cannot be written.
 pub fn run(args: &CompareArgs) -> Result<()> {
-    let mut systems = methods(&args.methods);
+    let mut systems = methods_of(&args.methods, args.quality);
     systems.extend(peers::systems(&args.peers)?);
     if let Some(folder) = &args.output {
         fs::create_dir_all(folder)
@@ -85,8 +85,14 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 /// A system for each method, at the density that it has by itself; for all if none is named.
 #[must_use]
 pub fn methods(methods: &[Method]) -> Vec<Box<dyn System>> {
+    methods_of(methods, Quality::default())
+}
+
+/// The same with trees of a quality.
+fn methods_of(methods: &[Method], quality: Quality) -> Vec<Box<dyn System>> {
     let methods = if methods.is_empty() { Method::ALL } else { methods };
-    let system = |&method| Box::new(GridSystem::new(Config::new(method))) as Box<dyn System>;
+    let config = |method| Config { quality, ..Config::new(method) };
+    let system = |&method| Box::new(GridSystem::new(config(method))) as Box<dyn System>;
     methods.iter().map(system).collect()
 }
 
@@ -95,8 +101,12 @@ pub fn methods(methods: &[Method]) -> Vec<Box<dyn System>> {
 /// # Errors
 /// If there is none, or it does not start.
 pub fn system_named(name: &str) -> Result<Box<dyn System>> {
-    let mut found = match Method::ALL.iter().find(|method| method.name() == name) {
-        Some(&method) => methods(&[method]),
+    let (of, quality) = match name.strip_suffix(HIGH) {
+        Some(of) => (of, Quality::High),
+        None => (name, Quality::Fast),
+    };
+    let mut found = match Method::ALL.iter().find(|method| method.name() == of) {
+        Some(&method) => methods_of(&[method], quality),
         None => peers::systems(&[Peer::from_str(name, false).map_err(Error::msg)?])?,
     };
     found.pop().context("a name without a system")

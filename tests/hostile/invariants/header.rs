@@ -50,11 +50,12 @@ fn fields(seed: &Seed) -> Vec<Case<'static>> {
     }
     // What lies behind the last known field, and fields of other methods.
     let unused = RESERVED - 20..RESERVED + 12;
-    // A tree counts its nodes and their levels there: see bvh.rs.
-    let used = if method == Method::Bvh { 2 } else { 0 };
+    // A tree counts its nodes and their levels there (see bvh.rs), and tells its quality.
+    let is_tree = method == Method::Bvh;
+    let used = if is_tree { 2 } else { 0 };
     for reserved in [0, 4, 8].map(|at| RESERVED + at).into_iter().skip(used) {
         cases.push(case("a field that nobody knows", unused.clone(), move |b| {
-            b.set_word(reserved, 1);
+            b.set_word(reserved, if is_tree { 2 } else { 1 });
         }));
     }
     let of_others = [

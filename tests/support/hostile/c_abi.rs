@@ -208,7 +208,7 @@ impl Caller<'_> {
             cell_size: chosen.cell_size,
             flags: chosen.flags.bits(),
             tasks: u32::from(u8::arbitrary(u)? % 80),
-            reserved: u32::from(rarely(u, 48)?),
+            quality: chosen.quality as u32 + if rarely(u, 48)? { 7 } else { 0 },
             context: control.as_ptr().cast(),
             run: if rarely(u, 32)? { None } else { Some(run_tasks) },
             progress: if bool::arbitrary(u)? { Some(progress) } else { None },

@@ -3,7 +3,7 @@
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_core::{
-    BuildFlags, Config, Error, IndexType, MAX_COORDINATE, Method, Strided, TriangleMesh,
+    BuildFlags, Config, Error, IndexType, MAX_COORDINATE, Method, Quality, Strided, TriangleMesh,
 };
 
 use super::memory::rarely;
@@ -225,7 +225,9 @@ impl Count {
 
 /// The configuration that the bytes describe.
 pub(super) fn config(u: &mut Unstructured<'_>) -> Result<Config> {
-    let method = Method::ALL[usize::from(u8::arbitrary(u)?) % Method::ALL.len()];
+    let which = usize::from(u8::arbitrary(u)?);
+    let method = Method::ALL[which % Method::ALL.len()];
+    let quality = Quality::ALL[which / Method::ALL.len() % Quality::ALL.len()];
     let default = Config::new(method);
     let mut count = |default| Count::arbitrary(u).map(|count| count.or(default));
     let [macrocell_factor, subdivide_above, depth] = [count(3)?, count(4)?, count(default.depth)?];
@@ -237,5 +239,6 @@ pub(super) fn config(u: &mut Unstructured<'_>) -> Result<Config> {
         _ => u32::arbitrary(u)?,
     };
     let flags = BuildFlags::from_bits_retain(flags);
-    Ok(Config { macrocell_factor, subdivide_above, depth, density, cell_size, flags, ..default })
+    let chosen = Config { macrocell_factor, subdivide_above, depth, ..default };
+    Ok(Config { density, cell_size, quality, flags, ..chosen })
 }

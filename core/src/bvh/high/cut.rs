@@ -1,0 +1,274 @@
+//! Cuts a range of triangles in two where the SAH cost is least (Wald 2007).
+//!
+//! ```text
+//! for each triangle:  bin of its centre on each axis; grow the bins' boxes, count
+//! for each axis:      sweep from both ends; cost of a cut = area * count of either side
+//! for each triangle:  swap it to the first part, or leave it; grow the box of its part's centres
+//! ```
+//!
+//! A box is one vector: least x, y, z and minus greatest x, y, z. So the union of two boxes is one minimum,
+//! and the vector minus itself with its halves swapped is twice the centre.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
+
+/// A triangle in the making, as bits: the least corner of its box, its id, minus the greatest corner, 0.
+pub(super) type Item = [u32; 8];
+
+/// Where the id stands in an item.
+pub(super) const ID: usize = 3;
+
+/// Least x, y, z, nothing, minus greatest x, y, z, nothing: a box, or twice the box of centres.
+pub(super) type Sides = [f32; 8];
+
+/// The box of nothing.
+pub(super) const NOTHING: Sides = [f32::INFINITY; 8];
+
+/// The boxes of some triangles, and of twice their centres.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    pub(super) bounds: Sides,
+    pub(super) centers: Sides,
+}
+
+impl Extent {
+    pub(super) const NOTHING: Self = Self { bounds: NOTHING, centers: NOTHING };
+
+    /// The extent of some triangles.
+    #[inline(always)]
+    pub(super) fn of<S: Simd>(simd: S, items: &[Item]) -> Self {
+        let mut bounds = f32x8::splat(simd, f32::INFINITY);
+        let mut centers = bounds;
+        for item in items {
+            let sides = load(simd, item);
+            bounds = bounds.min(sides);
+            centers = centers.min(center(sides));
+        }
+        Self { bounds: bounds.into(), centers: centers.into() }
+    }
+}
+
+/// Bins of an axis, at most.
+const BINS: usize = 32;
+
+/// The bins of a range on each axis.
+pub(super) struct Bins {
+    boxes: [[Sides; BINS]; 3],
+    counts: [[u32; BINS]; 3],
+}
+
+/// The box of an item: without its id, which would be a number too small for fast arithmetic.
+#[inline(always)]
+fn load<S: Simd>(simd: S, item: &Item) -> f32x8<S> {
+    let word = u32::MAX;
+    let mask = u32x8::simd_from(simd, [word, word, word, 0, word, word, word, 0]);
+    (u32x8::simd_from(simd, *item) & mask).bitcast()
+}
+
+/// Twice the centre of a box, and minus that.
+#[inline(always)]
+fn center<S: Simd>(sides: f32x8<S>) -> f32x8<S> {
+    let (low, high) = sides.split();
+    (low - high).combine(high - low)
+}
+
+/// Adding this rounds a small number to a whole one and leaves that in the low bits.
+const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
+
+/// Half the surface of a box in units that suit the scene.
+#[inline(always)]
+pub(super) fn area<S: Simd>(simd: S, sides: f32x8<S>, unit: f32) -> f32 {
+    let (low, high) = sides.split();
+    let size: [f32; 4] = ((low + high) * f32x4::splat(simd, unit)).into();
+    size[0] * size[1] + size[1] * size[2] + size[2] * size[0]
+}
+
+/// The cost of so many triangles.
+#[inline(always)]
+#[expect(clippy::cast_precision_loss, reason = "a cost")]
+const fn as_cost(count: u32) -> f32 {
+    count as f32
+}
+
+/// How centres become bins.
+struct Rule {
+    /// The least corner of the box of twice the centres.
+    low: [f32; 3],
+    /// Bins for each unit; as large as can be where all centres have the same coordinate.
+    scale: [f32; 3],
+    /// Bins of each axis.
+    count: usize,
+}
+
+impl Rule {
+    #[inline(always)]
+    fn new(items: usize, centers: &Sides) -> Self {
+        let count = bin_count(items);
+        let [x, y, z, _, nx, ny, nz, _] = *centers;
+        // No centre's place reaches the number of bins, with all rounding.
+        #[expect(clippy::cast_precision_loss, reason = "a few")]
+        let bins = count as f32 * 0.999;
+        let [a, b, c] = [bins / -(x + nx), bins / -(y + ny), bins / -(z + nz)];
+        let scale = [a.min(f32::MAX), b.min(f32::MAX), c.min(f32::MAX)];
+        Self { low: [x, y, z], scale, count }
+    }
+
+    /// The bins of an item on each axis.
+    #[inline(always)]
+    fn bins_of<S: Simd>(&self, simd: S, sides: f32x8<S>) -> [usize; 3] {
+        let ([x, y, z], [a, b, c]) = (self.low, self.scale);
+        let (min, max) = sides.split();
+        let low = f32x4::simd_from(simd, [x, y, z, 0.0]);
+        let scale = f32x4::simd_from(simd, [a, b, c, 0.0]);
+        let places = ((min - max) - low) * scale - f32x4::splat(simd, 0.5);
+        let [x, y, z, _]: [f32; 4] = (places + f32x4::splat(simd, SHIFT)).into();
+        [bin(x), bin(y), bin(z)]
+    }
+
+    /// The bin of an item on one axis.
+    #[inline(always)]
+    fn bin_of(&self, item: &Item, axis: usize) -> usize {
+        let twice = f32::from_bits(item[axis % 3]) - f32::from_bits(item[4 + axis % 3]);
+        let place = (twice - self.low[axis % 3]) * self.scale[axis % 3] - 0.5;
+        bin(place + SHIFT)
+    }
+}
+
+/// The low bits of a number that was rounded.
+#[inline(always)]
+const fn bin(place: f32) -> usize {
+    place.to_bits() as usize % BINS
+}
+
+/// Where a range is cut: bins of an axis from this one on are the second part.
+#[derive(Clone, Copy)]
+struct Place {
+    axis: usize,
+    bin: usize,
+    cost: f32,
+}
+
+impl Bins {
+    pub(super) const fn new() -> Self {
+        Self { boxes: [[NOTHING; BINS]; 3], counts: [[0; BINS]; 3] }
+    }
+
+    /// Cuts some items in two and returns how many are in the first part, and the extents of both; nothing
+    /// where no bins tell them apart. `unit` times a length suits the scene.
+    #[inline(always)]
+    pub(super) fn cut<S: Simd>(
+        &mut self,
+        simd: S,
+        items: &mut [Item],
+        centers: &Sides,
+        unit: f32,
+    ) -> Option<(usize, [Extent; 2])> {
+        let rule = Rule::new(items.len(), centers);
+        self.fill(simd, items, &rule);
+        let place = self.best(simd, &rule, unit)?;
+        let mut bounds = [f32x8::splat(simd, f32::INFINITY); 2];
+        for (at, bin) in self.boxes[place.axis % 3].iter().enumerate().take(rule.count) {
+            let side = &mut bounds[usize::from(at >= place.bin)];
+            *side = side.min(f32x8::simd_from(simd, *bin));
+        }
+        let (middle, [first, second]) = partition(simd, items, &rule, &place);
+        let [a, b] = bounds;
+        let extents = [
+            Extent { bounds: a.into(), centers: first.into() },
+            Extent { bounds: b.into(), centers: second.into() },
+        ];
+        (middle > 0 && middle < items.len()).then_some((middle, extents))
+    }
+
+    /// Grows the boxes of the bins, and counts.
+    #[inline(always)]
+    fn fill<S: Simd>(&mut self, simd: S, items: &[Item], rule: &Rule) {
+        for (boxes, counts) in self.boxes.iter_mut().zip(&mut self.counts) {
+            for (bin, counted) in boxes.iter_mut().zip(counts).take(rule.count) {
+                (*bin, *counted) = (NOTHING, 0);
+            }
+        }
+        for item in items {
+            let sides = load(simd, item);
+            let [x, y, z] = rule.bins_of(simd, sides);
+            for (axis, at) in [(0, x), (1, y), (2, z)] {
+                let bin = &mut self.boxes[axis][at % BINS];
+                *bin = f32x8::simd_from(simd, *bin).min(sides).into();
+                self.counts[axis][at % BINS] += 1;
+            }
+        }
+    }
+
+    /// Sweeps over each axis from both ends, for the cut of least cost.
+    #[inline(always)]
+    fn best<S: Simd>(&self, simd: S, rule: &Rule, unit: f32) -> Option<Place> {
+        let mut best = Place { axis: 0, bin: 0, cost: f32::INFINITY };
+        for (axis, (boxes, counts)) in self.boxes.iter().zip(&self.counts).enumerate() {
+            if rule.scale[axis % 3] >= f32::MAX {
+                continue;
+            }
+            // Costs of what is before each bin; infinite where nothing is.
+            let mut costs = [f32::INFINITY; BINS];
+            let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
+            let bins = boxes.iter().zip(counts).take(rule.count);
+            for ((bin, counted), cost) in bins.zip(&mut costs) {
+                if sum > 0 {
+                    *cost = area(simd, all, unit) * as_cost(sum);
+                }
+                all = all.min(f32x8::simd_from(simd, *bin));
+                sum += counted;
+            }
+            // Then of what is behind.
+            let (mut all, mut sum) = (f32x8::splat(simd, f32::INFINITY), 0);
+            for bin in (1..rule.count).rev() {
+                let places = (boxes.get(bin), counts.get(bin), costs.get(bin));
+                let (Some(bounds), Some(counted), Some(before)) = places else { continue };
+                all = all.min(f32x8::simd_from(simd, *bounds));
+                sum += counted;
+                let cost = before + area(simd, all, unit) * as_cost(sum);
+                if sum > 0 && cost < best.cost {
+                    best = Place { axis, bin, cost };
+                }
+            }
+        }
+        (best.cost < f32::INFINITY).then_some(best)
+    }
+}
+
+/// Brings the items before a cut to the front; returns how many there are, and the boxes of twice the centres.
+#[inline(always)]
+fn partition<S: Simd>(
+    simd: S,
+    items: &mut [Item],
+    rule: &Rule,
+    cut: &Place,
+) -> (usize, [f32x8<S>; 2]) {
+    let nothing = f32x8::splat(simd, f32::INFINITY);
+    let (mut first, mut second, mut middle) = (nothing, nothing, 0);
+    for at in 0..items.len() {
+        let (Some(&item), Some(&other)) = (items.get(at), items.get(middle)) else { break };
+        // No branch: which side an item is on is as good as random.
+        let is_first = rule.bin_of(&item, cut.axis) < cut.bin;
+        let mask = mask32x8::splat(simd, is_first);
+        let center = center(load(simd, &item));
+        first = first.min(mask.select(center, nothing));
+        second = second.min(mask.select(nothing, center));
+        if let Some(slot) = items.get_mut(at) {
+            *slot = if is_first { other } else { item };
+        }
+        if let Some(slot) = items.get_mut(middle) {
+            *slot = if is_first { item } else { other };
+        }
+        middle += usize::from(is_first);
+    }
+    (middle, [first, second])
+}
+
+/// Bins of each axis for so many items.
+const fn bin_count(items: usize) -> usize {
+    match items {
+        0..=32 => 8,
+        33..=256 => 16,
+        _ => BINS,
+    }
+}

@@ -1,0 +1,315 @@
+//! Grows the nodes over a range of triangles from the root down, each with eight children.
+
+use bytemuck::Zeroable;
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8};
+use glam::Vec3A;
+
+use super::cut::{Bins, Extent, ID, Item, Sides, area};
+use crate::aabb::Aabb;
+use crate::bvh::LEVELS;
+use crate::bvh::node::{LEAF, Node, WIDTH};
+use crate::simd::Kernel;
+
+/// Levels from which on ranges are halved.
+const DEEP: u32 = 24;
+
+/// Levels of nodes, at most: halves of halves of halves are an eighth, so ten levels halve any range to leaves.
+pub(super) const MOST_LEVELS: u32 = DEEP + 11;
+
+const _: () = assert!(MOST_LEVELS <= LEVELS);
+
+/// A range of triangles over which nodes are to be made.
+pub(super) struct Grow<'w> {
+    /// The triangles, in any order that the mesh alone determines.
+    pub(super) items: &'w mut [Item],
+    /// Levels of nodes above.
+    pub(super) level: u32,
+    /// Ranges of no more triangles wait in their node, if there is room for it.
+    pub(super) wait: u32,
+    /// Where the nodes below the root go.
+    pub(super) nodes: &'w mut [Node],
+    /// The number of the first of them in the index.
+    pub(super) child: u32,
+    /// Where the ids of leaves go.
+    pub(super) ids: &'w mut [u32],
+    /// Where the first of them lies in the index.
+    pub(super) first: u32,
+    /// What a length is multiplied by before areas are made of lengths.
+    pub(super) unit: f32,
+    /// No step of a node is smaller than that of a box of this size.
+    pub(super) least: f32,
+}
+
+/// What grew.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grown {
+    pub(super) root: Node,
+    /// Nodes below the root, whether or not there was room for them.
+    pub(super) nodes: u32,
+    /// Ids in leaves.
+    pub(super) ids: u32,
+    /// Levels of nodes, with those above.
+    pub(super) levels: u32,
+}
+
+/// A node to be made.
+#[derive(Clone, Copy)]
+struct Job {
+    /// Where it goes: 0 for the root, otherwise one more than its place.
+    place: u32,
+    start: u32,
+    end: u32,
+    level: u32,
+}
+
+/// Jobs that wait, at most.
+const STACK: usize = (WIDTH - 1) * MOST_LEVELS as usize + 1;
+
+/// A part of a range, which becomes a child.
+#[derive(Clone, Copy)]
+struct Part {
+    start: u32,
+    end: u32,
+    extent: Extent,
+    area: f32,
+}
+
+impl Part {
+    const NONE: Self = Self { start: 0, end: 0, extent: Extent::NOTHING, area: 0.0 };
+
+    const fn count(&self) -> u32 {
+        self.end - self.start
+    }
+}
+
+/// The exponents of a node that waits for its children; no other node has them.
+pub(super) const WAITING: u32 = 0;
+
+/// A node that waits: the range it will hold, and the levels above it.
+fn waiting(job: &Job) -> Node {
+    #[expect(clippy::cast_possible_truncation, reason = "below 64")]
+    let level = job.level as u8;
+    Node {
+        word: WAITING,
+        child: job.start,
+        first: job.end,
+        counts: [level, 0, 0, 0, 0, 0, 0, 0],
+        ..Node::EMPTY
+    }
+}
+
+/// A box as two corners.
+fn corners(sides: &Sides) -> Aabb {
+    let [x, y, z, _, nx, ny, nz, _] = *sides;
+    Aabb { min: Vec3A::new(x, y, z), max: Vec3A::new(-nx, -ny, -nz) }
+}
+
+impl Kernel for Grow<'_> {
+    type Output = Grown;
+
+    #[inline(always)]
+    fn run<S: Simd>(mut self, simd: S) -> Grown {
+        let mut grown = Grown { root: Node::EMPTY, nodes: 0, ids: 0, levels: self.level + 1 };
+        let mut bins = Bins::new();
+        let mut stack = [Job { place: 0, start: 0, end: 0, level: 0 }; STACK];
+        #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
+        let end = self.items.len() as u32;
+        stack[0] = Job { place: 0, start: 0, end, level: self.level };
+        let mut jobs = 1;
+        while let Some(job) = usize::checked_sub(jobs, 1).and_then(|last| stack.get(last)).copied()
+        {
+            jobs -= 1;
+            grown.levels = grown.levels.max(job.level + 1);
+            let parts = self.parts(simd, &mut bins, &job);
+            let mut node = Node {
+                child: self.child + grown.nodes,
+                first: self.first + grown.ids,
+                ..Node::EMPTY
+            };
+            let mut boxes = [Aabb::EMPTY; WIDTH];
+            let mut bounds = Aabb::EMPTY;
+            let jobs_before = jobs;
+            for (slot, part) in parts.iter().enumerate() {
+                if part.count() == 0 {
+                    break;
+                }
+                boxes[slot] = corners(&part.extent.bounds);
+                bounds = bounds.union(&boxes[slot]);
+                if part.count() <= LEAF as u32 {
+                    #[expect(clippy::cast_possible_truncation, reason = "eight at most")]
+                    let count = part.count() as u8;
+                    node.counts[slot] = count;
+                    let items = self.items.get(part.start as usize..part.end as usize);
+                    let ids = self.ids.get_mut(grown.ids as usize..).unwrap_or_default();
+                    for (id, item) in ids.iter_mut().zip(items.unwrap_or_default()) {
+                        *id = item[ID];
+                    }
+                    grown.ids += part.count();
+                    continue;
+                }
+                node.set_inner(slot);
+                let place = grown.nodes;
+                grown.nodes += 1;
+                let (start, end) = (part.start, part.end);
+                let below = Job { place: place + 1, start, end, level: job.level + 1 };
+                match self.nodes.get_mut(place as usize) {
+                    Some(node) if part.count() <= self.wait => *node = waiting(&below),
+                    _ => {
+                        if let Some(slot) = stack.get_mut(jobs) {
+                            *slot = below;
+                            jobs += 1;
+                        }
+                    }
+                }
+            }
+            // The first child comes next.
+            if let Some(pushed) = stack.get_mut(jobs_before..jobs) {
+                pushed.reverse();
+            }
+            node.set_boxes(&bounds, &boxes, self.least);
+            match job.place.checked_sub(1) {
+                None => grown.root = node,
+                Some(place) => {
+                    if let Some(slot) = self.nodes.get_mut(place as usize) {
+                        *slot = node;
+                    }
+                }
+            }
+        }
+        grown
+    }
+}
+
+impl Grow<'_> {
+    /// Cuts a range into eight parts in the order of its items, or into single triangles if there are fewer.
+    #[inline(always)]
+    fn parts<S: Simd>(&mut self, simd: S, bins: &mut Bins, job: &Job) -> [Part; WIDTH] {
+        let mut parts = [Part::NONE; WIDTH];
+        let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
+        let extent = Extent::of(simd, all);
+        parts[0] = Part { start: job.start, end: job.end, extent, area: 0.0 };
+        let halve = job.level >= DEEP;
+        for count in 1..WIDTH {
+            let Some(at) = choose(&parts, halve) else { break };
+            let part = parts[at];
+            let range = part.start as usize..part.end as usize;
+            let Some(items) = self.items.get_mut(range) else { break };
+            let found = if halve || items.len() < 3 {
+                None
+            } else {
+                bins.cut(simd, items, &part.extent.centers, self.unit)
+            };
+            let (middle, extents) =
+                if let Some(found) = found { found } else { halves(simd, items) };
+            #[expect(clippy::cast_possible_truncation, reason = "no more than ids have values")]
+            let middle = part.start + middle as u32;
+            let [first, second] = extents;
+            let area =
+                |extent: &Extent| area(simd, f32x8::simd_from(simd, extent.bounds), self.unit);
+            // The parts behind it make room for its second half.
+            let mut next =
+                Part { start: middle, end: part.end, extent: second, area: area(&second) };
+            parts[at] = Part { start: part.start, end: middle, extent: first, area: area(&first) };
+            for slot in parts.iter_mut().take(count + 1).skip(at + 1) {
+                core::mem::swap(slot, &mut next);
+            }
+        }
+        parts
+    }
+}
+
+/// The extents of the first and the second half of some items.
+#[inline(always)]
+fn halves<S: Simd>(simd: S, items: &[Item]) -> (usize, [Extent; 2]) {
+    let middle = items.len() / 2;
+    let (first, second) = items.split_at_checked(middle).unwrap_or_default();
+    (middle, [Extent::of(simd, first), Extent::of(simd, second)])
+}
+
+/// Which part to cut next.
+#[inline(always)]
+fn choose(parts: &[Part; WIDTH], halve: bool) -> Option<usize> {
+    let mut best = None;
+    let mut most = (false, -1.0, 0);
+    for (at, part) in parts.iter().enumerate() {
+        if part.count() < 2 {
+            continue;
+        }
+        let is_node = part.count() > LEAF as u32;
+        #[expect(clippy::cast_precision_loss, reason = "a priority")]
+        let priority = match (halve, is_node) {
+            (true, _) => part.count() as f32,
+            (false, true) => part.area,
+            (false, false) => part.area * part.count() as f32,
+        };
+        let priority = (is_node, priority, part.count());
+        if priority > most {
+            (best, most) = (Some(at), priority);
+        }
+    }
+    best
+}
+
+/// The nodes that wait in a tree, in the order of their triangles.
+#[derive(Clone, Copy)]
+pub(super) struct Cursor {
+    /// Siblings that are still to be looked at: the first, and where they end.
+    levels: [[u32; 2]; MOST_LEVELS as usize + 1],
+    depth: usize,
+}
+
+/// A node that waits: its number, its range and the levels above it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Waiter {
+    pub(super) place: u32,
+    pub(super) start: u32,
+    pub(super) end: u32,
+    pub(super) level: u32,
+}
+
+impl Cursor {
+    /// Before the first.
+    pub(super) fn new() -> Self {
+        let mut levels = [[0; 2]; MOST_LEVELS as usize + 1];
+        levels[0] = [0, 1];
+        Self { levels, depth: 1 }
+    }
+
+    /// The next node that waits among the first nodes of a tree.
+    pub(super) fn next(&mut self, nodes: &[Node]) -> Option<Waiter> {
+        loop {
+            let level = self.levels.get_mut(self.depth.checked_sub(1)?)?;
+            let [place, end] = *level;
+            if place >= end {
+                self.depth -= 1;
+                continue;
+            }
+            level[0] += 1;
+            let Some(node) = nodes.get(place as usize) else { continue };
+            if node.word == WAITING {
+                let (start, end, level) = (node.child, node.first, u32::from(node.counts[0]));
+                return Some(Waiter { place, start, end, level });
+            }
+            let below = [node.child, node.child + node.inner().count_ones()];
+            *self.levels.get_mut(self.depth)? = below;
+            self.depth += 1;
+        }
+    }
+}
+
+/// What a task leaves of a range in the place of its first triangles.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, bytemuck::Pod, Zeroable)]
+pub(super) struct Record {
+    pub(super) root: Node,
+    /// Nodes below the root.
+    pub(super) nodes: u32,
+    pub(super) levels: u32,
+    pub(super) unused: [u32; 2],
+}
+
+/// A record in items.
+pub(super) const RECORD: usize = size_of::<Record>() / size_of::<Item>();
+
+const _: () = assert!(size_of::<Record>() == RECORD * size_of::<Item>() && RECORD <= LEAF);

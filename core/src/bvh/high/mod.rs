@@ -1,0 +1,441 @@
+//! The build for trees that are traced for long: SAH from the root down, each triangle on its own.
+//!
+//! ```text
+//! boxes     the box of each triangle, with its id: an item                  (mod.rs)
+//! top       nodes over all items, until ranges are small enough for tasks   (grow.rs, cut.rs)
+//! below     the nodes over each of these ranges
+//!
+//! index   | header | ids: of top nodes' leaves, then of each range | nodes: top | below each range |
+//! scratch | items: 32 B a triangle, those of a range that is done make way for its record  |
+//! ```
+//!
+//! A node cuts the range of its triangles until it has eight children, and only a range of nine or more is a node.
+//! So `n` triangles have one node, or (n - 2) / 7 at most. By induction: of the eight children `j` are nodes over
+//! all triangles but 8 - j or more; for `j` = 0 one node is enough, and otherwise there are
+//! 1 + (n - (8 - j) - 2 j) / 7 = (n - 1 - j) / 7 at most. A chain of nodes with seven leaves of one triangle has
+//! as many.
+//!
+//! The tree does not depend on the number of tasks: the ranges that tasks take are the same for any number, and
+//! their nodes end up side by side in the order of the triangles.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "numbers of triangles and nodes, which fit into 32 bits"
+)]
+
+mod cut;
+mod grow;
+
+use fearless_simd::Simd;
+use glam::Vec3A;
+
+use super::census::{share, take};
+use super::layout::index_bytes;
+use super::node::Node;
+use crate::aabb::Aabb;
+use crate::arena::{section_bytes, split_mut};
+use crate::blob::{HEADER_BYTES, Header};
+use crate::cell::Lattice;
+use crate::config::{BuildFlags, Config};
+use crate::control::{Control, Watch};
+use crate::error::{Error, Region};
+use crate::mesh::TriangleMesh;
+use crate::simd::{Kernel, SimdLevel, dispatch};
+use crate::tasks::{run, task_count};
+use cut::Item;
+use grow::{Cursor, Grow, Grown, RECORD, Record};
+
+/// The most nodes of a tree over so many triangles.
+const fn most_nodes(triangles: u64) -> u64 {
+    let nodes = triangles.saturating_sub(2) / 7;
+    if nodes < 1 { 1 } else { nodes }
+}
+
+/// The memory that any mesh with so many triangles needs, for a build with any number of tasks.
+pub(crate) const fn bound(triangles: u32) -> (u64, u64) {
+    let triangles = triangles as u64;
+    (index_bytes(triangles, most_nodes(triangles)), section_bytes::<Item>(triangles))
+}
+
+/// Triangles of the ranges that tasks take, at most: a part of all, so that there are enough for many tasks.
+fn most_of_range(triangles: usize) -> u32 {
+    (triangles / 64).max(4096) as u32
+}
+
+/// How far the steps of a build are, about.
+const BOXES: f32 = 0.02;
+const TOP: f32 = 0.1;
+const BELOW: f32 = 0.35;
+const DONE: f32 = 0.98;
+
+/// No task has fewer triangles.
+const LEAST_TASK: usize = 4096;
+
+/// No step of a node is smaller than that of a box of this part of the scene's extent.
+const LEAST_NODE: f32 = super::build::LEAST_NODE;
+
+/// Builds all but the header, which it returns; without an index it only finds out how large that is.
+#[inline(never)]
+pub(super) fn build_in<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    mut index: Option<&mut [u8]>,
+    scratch: &mut [u8],
+    control: &Control<'_>,
+    watch: &Watch<'_>,
+) -> Result<Header, Error> {
+    let triangles = mesh.triangle_count();
+    let index_available = index.as_ref().map_or(0, |index| index.len()) as u64;
+    let (index_bound, needed_bytes) = bound(triangles);
+    let available_bytes = scratch.len() as u64;
+    let items = match split_mut::<Item>(scratch, triangles.into()) {
+        Some((items, _)) => items,
+        // Nothing may lie anywhere.
+        None if triangles == 0 => &mut [],
+        None => {
+            let region = Region::Scratch;
+            return Err(Error::OutOfMemory { region, needed_bytes, available_bytes });
+        }
+    };
+    // Tasks fill their parts of the index side by side: there is room for that, or there is one.
+    let mut tasks = task_count::<N>(control, triangles as usize / LEAST_TASK);
+    if index_available < index_bound {
+        tasks = 1;
+    }
+    let behind = index.as_mut().and_then(|index| {
+        // No header in front of what is not its tree, should the build end early.
+        index.first_chunk_mut::<HEADER_BYTES>()?.fill(0);
+        index.get_mut(HEADER_BYTES..)
+    });
+
+    // Find the boxes.
+    watch.at(BOXES)?;
+    let (finite, bounds) = boxes::<N>(mesh, config.flags, items, tasks, control)?;
+    let items = items.get_mut(..finite).unwrap_or_default();
+
+    // Cut the index.
+    let ids_bytes = section_bytes::<u32>(finite as u64) as usize;
+    let parts = behind.and_then(|behind| behind.split_at_mut_checked(ids_bytes));
+    let (ids, nodes) = parts.unwrap_or_default();
+    let (ids, _) = split_mut::<u32>(ids, finite as u64).unwrap_or_default();
+    let nodes = super::build::whole::<Node>(nodes);
+
+    // Make the nodes.
+    watch.at(TOP)?;
+    let scene = Lattice::pad(&bounds);
+    let extent = scene.size().max_element();
+    let work = Work { least: extent * LEAST_NODE, unit: inverse_power(extent), tasks };
+    let (node_count, levels) = work.make::<N>(items, ids, nodes, control, watch)?;
+
+    watch.at(DONE)?;
+    let needed_bytes = index_bytes(finite as u64, node_count.into());
+    if let Some(index) = index {
+        if needed_bytes > index_available {
+            return Err(Error::OutOfMemory {
+                region: Region::Index,
+                needed_bytes,
+                available_bytes: index_available,
+            });
+        }
+        let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
+        if let Some(padding) = index.get_mut(used..needed_bytes as usize) {
+            padding.fill(0);
+        }
+    }
+    let lattice = Lattice::new(scene, [1; 3]);
+    let mut header = Header::new(config, mesh, &lattice);
+    header.skipped_count = triangles - finite as u32;
+    header.reference_count = finite as u32;
+    header.node_count = node_count;
+    header.levels = levels;
+    header.blob_bytes = needed_bytes;
+    Ok(header)
+}
+
+/// A power of two near the inverse of a length.
+const fn inverse_power(length: f32) -> f32 {
+    let exponent = length.to_bits() >> 23 & 0xff;
+    let inverse = if exponent > 252 { 1 } else { 253 - exponent };
+    f32::from_bits(if inverse < 1 { 1 } else { inverse } << 23)
+}
+
+/// A task of the first pass: some triangles, and room for their items.
+struct Boxes<'w> {
+    mesh: &'w TriangleMesh<'w>,
+    flags: BuildFlags,
+    first: u32,
+    items: &'w mut [Item],
+}
+
+/// Writes the items of all triangles that are finite, and returns how many there are and the box around them.
+fn boxes<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    flags: BuildFlags,
+    items: &mut [Item],
+    tasks: u32,
+    control: &Control<'_>,
+) -> Result<(usize, Aabb), Error> {
+    let (all, tasks) = (items.len(), tasks as usize);
+    let mut rest = &mut *items;
+    let parts = (0..tasks).map(|task| {
+        let (first, end) = (share(all, task, tasks), share(all, task + 1, tasks));
+        Boxes { mesh, flags, first: first as u32, items: take(&mut rest, end - first) }
+    });
+    let level = SimdLevel::detect();
+    let results = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
+    let mut bounds = Aabb::EMPTY;
+    let mut finite = 0;
+    for (task, result) in results.into_iter().flatten().enumerate() {
+        let (count, bounds_of) = result?;
+        let first = share(all, task, tasks);
+        // Those of a task stand behind those that others left out.
+        if finite < first {
+            items.copy_within(first..first + count, finite);
+        }
+        finite += count;
+        bounds = bounds.union(&bounds_of);
+    }
+    Ok((finite, bounds))
+}
+
+impl Kernel for Boxes<'_> {
+    type Output = Result<(usize, Aabb), Error>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Self::Output {
+        let Self { mesh, flags, first, items } = self;
+        let mut bounds = Aabb::EMPTY;
+        let mut count = 0;
+        for triangle in (first..).take(items.len()) {
+            let Some(corners) = mesh.corners(triangle) else {
+                return Err(Error::IndexOutOfRange { triangle });
+            };
+            let Some(box_of) = Aabb::of(corners) else {
+                if flags.contains(BuildFlags::STRICT) {
+                    return Err(Error::NonFiniteTriangle { triangle });
+                }
+                continue;
+            };
+            bounds = bounds.union(&box_of);
+            // Of the two zeros the positive one, whatever the order of a union.
+            let [x, y, z] = (box_of.min + Vec3A::ZERO).to_array().map(f32::to_bits);
+            let [nx, ny, nz] = (-(box_of.max + Vec3A::ZERO)).to_array().map(f32::to_bits);
+            if let Some(item) = items.get_mut(count) {
+                *item = [x, y, z, triangle, nx, ny, nz, 0];
+            }
+            count += 1;
+        }
+        Ok((count, bounds))
+    }
+}
+
+/// What the steps after the first pass share.
+struct Work {
+    least: f32,
+    unit: f32,
+    tasks: u32,
+}
+
+/// The work of a task: ranges that wait.
+struct Part<'w> {
+    work: &'w Work,
+    /// Before the first of its ranges.
+    cursor: Cursor,
+    /// The nodes at the top.
+    top: &'w [Node],
+    /// How many ranges.
+    ranges: u32,
+    /// Which of all items its own start with.
+    start: u32,
+    items: &'w mut [Item],
+    ids: &'w mut [u32],
+    /// Where its ids lie in the index.
+    first: u32,
+}
+
+/// Ranges that follow one another.
+#[derive(Debug, Clone, Copy, Default)]
+struct Ranges {
+    count: u32,
+    /// Where the last one ends.
+    end: u32,
+    /// Triangles in them.
+    triangles: u32,
+    /// Nodes below their roots, at most.
+    nodes: u32,
+}
+
+impl Ranges {
+    /// Takes ranges until one ends at `goal` or behind it.
+    fn until(goal: u32, cursor: &mut Cursor, top: &[Node]) -> Self {
+        let mut all = Self::default();
+        while all.end < goal
+            && let Some(waiter) = cursor.next(top)
+        {
+            let triangles = waiter.end - waiter.start;
+            all.count += 1;
+            all.end = waiter.end;
+            all.triangles += triangles;
+            all.nodes += most_nodes(triangles.into()) as u32 - 1;
+        }
+        all
+    }
+}
+
+impl Part<'_> {
+    /// Makes the nodes over its ranges into `nodes`, which lie in the index from `child` on, and leaves a record
+    /// in the place of each range; returns how many nodes are below their roots.
+    fn make(self, nodes: &mut [Node], child: u32) -> u32 {
+        let Self { work, mut cursor, top, ranges, start, items, ids, first } = self;
+        let level = SimdLevel::detect();
+        let (mut node_count, mut id_count) = (0, 0);
+        for _ in 0..ranges {
+            let Some(waiter) = cursor.next(top) else { break };
+            let range = (waiter.start - start) as usize..(waiter.end - start) as usize;
+            let Some(items) = items.get_mut(range) else { break };
+            let grow = Grow {
+                items,
+                level: waiter.level,
+                wait: 0,
+                nodes: nodes.get_mut(node_count as usize..).unwrap_or_default(),
+                child: child + node_count,
+                ids: ids.get_mut(id_count as usize..).unwrap_or_default(),
+                first: first + id_count,
+                unit: work.unit,
+                least: work.least,
+            };
+            let Grown { root, nodes, ids, levels } = dispatch(level, grow);
+            node_count += nodes;
+            id_count += ids;
+            if let Some(place) = items.first_chunk_mut::<RECORD>() {
+                *place = bytemuck::cast(Record { root, nodes, levels, unused: [0; 2] });
+            }
+        }
+        node_count
+    }
+}
+
+impl Work {
+    /// Makes all nodes and ids; returns how many nodes and levels there are.
+    fn make<const N: usize>(
+        &self,
+        items: &mut [Item],
+        ids: &mut [u32],
+        nodes: &mut [Node],
+        control: &Control<'_>,
+        watch: &Watch<'_>,
+    ) -> Result<(u32, u32), Error> {
+        let all = items.len() as u32;
+        if all == 0 {
+            if let Some(root) = nodes.first_mut() {
+                *root = Node::EMPTY;
+            }
+            return Ok((1, 1));
+        }
+        let grow = Grow {
+            items,
+            level: 0,
+            wait: most_of_range(all as usize),
+            nodes: nodes.get_mut(1..).unwrap_or_default(),
+            child: 1,
+            ids,
+            first: 0,
+            unit: self.unit,
+            least: self.least,
+        };
+        let level = SimdLevel::detect();
+        let Grown { root, nodes: below, ids: top_ids, mut levels } = dispatch(level, grow);
+        if let Some(slot) = nodes.first_mut() {
+            *slot = root;
+        }
+        let top_count = below + 1;
+        watch.at(BELOW)?;
+
+        // Make the nodes over each range.
+        let (top, mut rest) = nodes.split_at_mut((top_count as usize).min(nodes.len()));
+        let mut ids = ids.get_mut(top_ids as usize..).unwrap_or_default();
+        let mut plans = [Plan::default(); N];
+        let (mut first, mut start, mut cursor, mut items_left) =
+            (top_ids, 0, Cursor::new(), &mut *items);
+        let mut next = |goal: u32| {
+            let before = cursor;
+            let ranges = Ranges::until(goal, &mut cursor, top);
+            let end = ranges.end.max(start);
+            let part = Part {
+                work: self,
+                cursor: before,
+                top,
+                ranges: ranges.count,
+                start,
+                items: take(&mut items_left, (end - start) as usize),
+                ids: take(&mut ids, ranges.triangles as usize),
+                first,
+            };
+            first += ranges.triangles;
+            start = end;
+            (part, ranges)
+        };
+        if self.tasks == 1 {
+            let mut made = 0;
+            plans[0].child = top_count;
+            for step in 1..=STEPS {
+                let (part, ranges) = next(share(all as usize, step, STEPS) as u32);
+                let nodes = rest.get_mut(made as usize..).unwrap_or_default();
+                plans[0].ranges += ranges.count;
+                made += part.make(nodes, top_count + made);
+                watch.between(step as u32, STEPS as u32, [BELOW, DONE])?;
+            }
+        } else {
+            let mut child = top_count;
+            let tasks = self.tasks as usize;
+            let parts = plans.iter_mut().take(tasks).enumerate().map(|(task, plan)| {
+                let (part, ranges) = next(share(all as usize, task + 1, tasks) as u32);
+                let nodes = take(&mut rest, ranges.nodes as usize);
+                *plan = Plan { ranges: ranges.count, child };
+                child += ranges.nodes;
+                (part, nodes, plan.child)
+            });
+            run::<N, _, _>(control, parts, |(part, nodes, child)| part.make(nodes, child))?;
+        }
+
+        // Move them together, and the root of each range to where it waits.
+        let mut cursor = Cursor::new();
+        let mut count = top_count;
+        for Plan { ranges, mut child } in plans {
+            for _ in 0..ranges {
+                let top = nodes.get(..(top_count as usize).min(nodes.len())).unwrap_or_default();
+                let Some(waiter) = cursor.next(top) else { break };
+                let behind = items.get(waiter.start as usize..).unwrap_or_default();
+                let Some(record) = behind.first_chunk::<RECORD>() else { break };
+                let Record { mut root, nodes: below, levels: levels_of, .. } =
+                    bytemuck::cast(*record);
+                let moved = child - count;
+                let from = child as usize..(child + below) as usize;
+                if moved > 0 && from.end <= nodes.len() {
+                    for node in nodes.get_mut(from.clone()).unwrap_or_default() {
+                        node.child -= moved;
+                    }
+                    nodes.copy_within(from, count as usize);
+                }
+                root.child -= moved;
+                if let Some(slot) = nodes.get_mut(waiter.place as usize) {
+                    *slot = root;
+                }
+                child += below;
+                count += below;
+                levels = levels.max(levels_of);
+            }
+        }
+        Ok((count, levels))
+    }
+}
+
+/// Parts of the work of a single task, after each of which the caller is asked whether to go on.
+const STEPS: usize = 64;
+
+/// The ranges of a task, and where their nodes lie.
+#[derive(Debug, Clone, Copy, Default)]
+struct Plan {
+    ranges: u32,
+    child: u32,
+}
