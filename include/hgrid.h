@@ -543,7 +543,8 @@ typedef struct hgrid_config {
      * is called on the thread that builds, a few times to a few hundred times; `done` grows from
      * call to call, and in the last call of a build that succeeds it is exactly 1, whatever the
      * answer. After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass
-     * over the mesh is over. It may not be left by `longjmp` or by a C++ exception.
+     * over the mesh is over. It may ask other grids questions and build other grids, but not touch the
+     * regions of this build nor change its mesh, and may not be left by `longjmp` or by a C++ exception.
      */
     bool (*progress)(void *context, float done);
 } hgrid_config;
@@ -724,7 +725,8 @@ typedef uint32_t hgrid_verdict;
  * The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the
  * ray's line meets the plane of the vertices as they are: a ray that starts above a plane and leaves
  * it does not hit it, however close it starts. Of a triangle whose vertices all lie inside the range
- * nothing else is asked. The `t` that is reported lies in the range, too. It is rounded: a range that
+ * nothing else is asked. The `t` that is reported lies in the range, too: of a triangle that the ray
+ * grazes, whose own `t` may be up to 2^-21 Z outside, it is the end. It is rounded: a range that
  * ends at it may leave out the hit that it was reported for. An origin more than 2^50 times as far away
  * as a triangle is large may not tell its vertices apart, and miss it. (The proof is the head of
  * core/src/triangle.rs.)

@@ -244,7 +244,8 @@ pub struct hgrid_config {
     /// is called on the thread that builds, a few times to a few hundred times; `done` grows from
     /// call to call, and in the last call of a build that succeeds it is exactly 1, whatever the
     /// answer. After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass
-    /// over the mesh is over. It may not be left by `longjmp` or by a C++ exception.
+    /// over the mesh is over. It may ask other grids questions and build other grids, but not touch the
+    /// regions of this build nor change its mesh, and may not be left by `longjmp` or by a C++ exception.
     pub progress: Option<unsafe extern "C" fn(context: *mut c_void, done: f32) -> bool>,
 }
 

@@ -2,7 +2,8 @@
 //! origin: a hit is a function of the ray and the triangle, of nothing else.
 //!
 //! ```text
-//! shear = (d.x / d.z, d.y / d.z)              z is the axis along which the direction d is longest
+//! shear = (d.x / d.z, d.y / d.z)              z is the axis along which the direction d is longest,
+//!                                             of equally long ones the last
 //! each corner p:   z = p.z - o.z    x = (p.x - o.x) - shear.x * z    y = (p.y - o.y) - shear.y * z
 //! U = c.x*b.y - c.y*b.x    V = a.x*c.y - a.y*c.x    W = b.x*a.y - b.y*a.x
 //! hit if U, V, W have no two opposite signs, are not all 0, and t is in the range

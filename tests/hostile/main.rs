@@ -2,6 +2,7 @@
 
 mod flips;
 mod invariants;
+mod mutants;
 mod random;
 mod replay;
 mod truncations;

@@ -18,3 +18,14 @@ pub mod scans;
 pub mod symbols;
 #[cfg(feature = "full")]
 pub mod tools;
+
+/// The number in an environment variable, or another one if it is not set.
+///
+/// # Panics
+/// If it is no number.
+#[must_use]
+pub fn setting(name: &str, default: u64) -> u64 {
+    let Some(value) = std::env::var_os(name) else { return default };
+    let number = value.to_str().and_then(|text| text.parse().ok());
+    number.unwrap_or_else(|| panic!("{name}: {} is no number", value.display()))
+}

@@ -6,10 +6,11 @@
 //! and none is listed twice; so there are as many pairs as the ranges have cells if and only if
 //! none is missing. No bitmap, no sorting: one sum against another.
 //!
-//! Two cells with equal lists could still share a slot while another slot stays orphaned: right
-//! answers, but no build's work. A sum of scrambled slot numbers over the cells and one over the
-//! slots with lists tell that apart. Where among the free slots a row came to lie is all that
-//! is left to whoever wrote the blob.
+//! Two cells with equal lists could still share a slot while another slot stays orphaned. A sum of
+//! scrambled slot numbers over the cells and one over the slots with lists tell accidents of that
+//! kind. Somebody who means harm can make the two sums equal, so nothing rests on them: the answers
+//! are right either way, and as the lists of all cells have as many ids as the blob, no query is
+//! shown more. Where among the free slots a row came to lie is left to whoever wrote the blob, too.
 
 use super::spread::count_references;
 use super::triangles::MeshSpread;
@@ -135,6 +136,9 @@ impl OneLevel<'_> {
 
 /// Whether a table is as displaced rows leave it: a row without marked cells has offset 0, every
 /// marked cell has a slot of its own, and of the slots those are full.
+///
+/// Finds accidents. Slot numbers can be chosen so that their scrambled sums agree, so a proof counts
+/// the lists that cells name, too.
 pub(crate) fn slots_are_sound(
     [width, height, depth]: [u32; 3],
     offset: impl Fn(usize) -> Option<i32>,

@@ -1,14 +1,18 @@
 //! Proof that a foreign blob is a variable grid of its mesh.
 //!
-//! The table of the top cuts the pool into the parts of its cells, so everything is read once and
-//! nothing is left over. Then the same sum as for one level, over the cells of the top and of the
-//! subgrids: every listed triangle covers the cell that lists it and none is listed twice, so
-//! there are as many of them as the triangles have cells if and only if none is missing. A
-//! subgrid has the frame and the resolution that a build gives to the primitives in it, and so
-//! many of them that it was worth it.
+//! The same count as for one level, over the cells of the top and of the subgrids: every listed
+//! triangle covers the cell that lists it and none is listed twice, so there are as many of them
+//! as the triangles have cells if and only if none is missing. Only lists that a cell names are
+//! counted. A table may cut out more, and nobody would read it.
 //!
-//! Whether a list is long because nothing would separate its primitives would take memory to prove:
-//! a list may have any length. Queries do not mind.
+//! The words of all cells together are the words of the pool, and those of a subgrid's lists the
+//! words behind its table. Queries rely on that: a query that was shown more words than the pool
+//! has stops, as damaged bytes could keep it busy for ever.
+//!
+//! A subgrid has the frame and the resolution that a build gives to the primitives in it, and so
+//! many of them that it was worth it. Whether a list is long because nothing would separate its
+//! primitives would take memory to prove, so a list may have any length. No answer depends on it:
+//! a query reads a list from its start to its end, however long it is.
 
 use super::subgrid::Subgrid;
 use super::{Content, Variable};
@@ -37,7 +41,7 @@ impl Variable<'_> {
         let at = |words: &[u32]| corrupt(words.as_ptr().addr() - blob.as_ptr().addr());
 
         // Every list ascends, and its triangles cover its cell.
-        let mut listed = 0_u64;
+        let (mut listed, mut words_of_cells) = (0_u64, 0_u64);
         let all = CellRange { min: [0; 3], max: lattice.last() };
         for cell in all.cells() {
             match self.content(cell) {
@@ -52,16 +56,22 @@ impl Variable<'_> {
                         return Err(at(ids));
                     }
                     listed += ids.len() as u64;
+                    words_of_cells += ids.len() as u64;
                 }
                 Some(Content::Subgrid(words)) => {
                     let grid = Subgrid::open(words).ok_or(at(words))?;
                     let inside = Inside { grid, cell, lattice, mesh };
-                    if !inside.covers() || !inside.is_built(header) {
+                    let in_cells = inside.listed().ok_or(at(words))?;
+                    if in_cells != grid.reference_count() as u64 || !inside.is_built(header) {
                         return Err(at(words));
                     }
-                    listed += inside.grid.reference_count() as u64;
+                    listed += in_cells;
+                    words_of_cells += words.len() as u64;
                 }
             }
+        }
+        if words_of_cells != u64::from(header.reference_count) {
+            return Err(at(self.top.lists()));
         }
 
         // There are as many as there must be.
@@ -80,7 +90,7 @@ impl Variable<'_> {
         if listed == expected { Ok(()) } else { Err(at(self.top.lists())) }
     }
 
-    /// Whether the table of the top cuts the pool into parts of which each belongs to one cell.
+    /// Whether the table of the top cuts the pool into parts, as displaced rows leave it.
     fn check_table(&self, header: &Header, lattice: &Lattice, blob: &[u8]) -> Result<(), Error> {
         let at = |section: usize, byte: usize| corrupt(section - blob.as_ptr().addr() + byte);
         let hash = self.top.hash();
@@ -149,9 +159,12 @@ impl Inside<'_> {
         )
     }
 
-    /// Whether every list ascends and its triangles cover its cell.
-    fn covers(&self) -> bool {
-        self.lists().all(|(sub, ids)| {
+    /// The ids in the lists of all cells; `None` unless every list ascends and its triangles cover
+    /// its cell.
+    fn listed(&self) -> Option<u64> {
+        let mut listed = 0;
+        let are_right = self.lists().all(|(sub, ids)| {
+            listed += ids.len() as u64;
             let covers = |&id: &u32| {
                 self.reach(id).is_some_and(|(range, reach)| {
                     range.contains(self.cell)
@@ -159,7 +172,8 @@ impl Inside<'_> {
                 })
             };
             !ids.is_empty() && ascends(ids) && ids.iter().all(covers)
-        })
+        });
+        are_right.then_some(listed)
     }
 
     /// Whether a build makes this subgrid of the triangles in it.

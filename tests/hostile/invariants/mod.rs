@@ -5,6 +5,7 @@
 //! tests/edges/chunks.rs.
 
 mod bvh;
+mod forged;
 mod hashed;
 mod header;
 mod recursive;

@@ -20,14 +20,14 @@ fn crowded() -> Seed {
 
 /// A subgrid: where its sections start, in bytes.
 #[derive(Debug, Clone, Copy)]
-struct Sub {
-    head: usize,
-    rows: usize,
-    bits: usize,
-    hash: usize,
-    ids: usize,
-    end: usize,
-    resolution: [usize; 3],
+pub(super) struct Sub {
+    pub(super) head: usize,
+    pub(super) rows: usize,
+    pub(super) bits: usize,
+    pub(super) hash: usize,
+    pub(super) ids: usize,
+    pub(super) end: usize,
+    pub(super) resolution: [usize; 3],
     slots: usize,
 }
 
@@ -47,7 +47,7 @@ impl Sub {
     }
 }
 
-fn subgrids(seed: &Seed) -> (Hashed, Vec<(Cell, Sub)>) {
+pub(super) fn subgrids(seed: &Seed) -> (Hashed, Vec<(Cell, Sub)>) {
     let s = Hashed::of(&seed.blob);
     let full = s.full(&seed.blob).into_iter();
     let subs = full.filter(|cell| cell.is_grid).map(|cell| (cell, Sub::of(&seed.blob, &s, &cell)));

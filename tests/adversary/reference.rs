@@ -1,0 +1,323 @@
+//! What a ray hits, decided without rounding and without a line of the library.
+//!
+//! The documentation of `Hit` and the head of core/src/triangle.rs are the rule:
+//!
+//! ```text
+//! z is the axis along which the direction is longest, of equally long ones the last
+//! a corner's place     z = p.z - o.z, x = (p.x - o.x) - d.x / d.z * z, y likewise: every operation in f64
+//! inside               the edge functions of the places have no two opposite signs and are not all 0
+//! in the range         t_min <= T <= t_max, T where the line meets the plane of the corners as they are
+//! grazed               nor are all corners outside, nor is the t of the places by more than 2^-21 Z
+//! ```
+//!
+//! The places are data that the rule defines: they come from f64. Everything that follows from them
+//! is decided by f64 with a proved error where that is enough, and by [`Dyadic`] numbers where it is
+//! not. [`Line::holds_places`] shows without rounding that the places are where the documentation
+//! says: up to 2^-50 L from those of the corners.
+
+use std::cmp::Ordering;
+
+use hgrid_core::{Hit, MAX_COORDINATE, Ray};
+
+use super::dyadic::Dyadic;
+
+type Corners = [[f32; 3]; 3];
+
+/// What is known of a ray and a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Answer {
+    Miss,
+    Hit,
+    /// The rule leaves it open: rounding decides, within the errors that are documented.
+    Either,
+}
+
+/// A ray that can hit something.
+#[derive(Debug)]
+pub(crate) struct Line {
+    /// The axes so that the longest is the last.
+    axes: [usize; 3],
+    origin: [f64; 3],
+    direction: [f64; 3],
+    shear: [f64; 2],
+    /// The range, cut to finite numbers.
+    range: [f64; 2],
+}
+
+/// A corner's place across the ray, and how far along it is.
+type Place = [f64; 3];
+
+impl Line {
+    /// `None` for a ray that hits nothing, whatever there is.
+    pub(crate) fn new(ray: &Ray) -> Option<Self> {
+        let Ray { origin, t_min, direction, t_max } = *ray;
+        let is_ray = origin.iter().chain(&direction).all(|c| c.is_finite())
+            && direction.iter().any(|&c| c != 0.0)
+            && t_min <= t_max;
+        if !is_ray {
+            return None;
+        }
+        let longest = direction.iter().map(|c| c.abs()).fold(0.0, f32::max);
+        let last = (0..3).rfind(|&axis| direction[axis].abs() >= longest)?;
+        let axes = [(last + 1) % 3, (last + 2) % 3, last];
+        let [o, d] = [origin, direction].map(|v| axes.map(|axis| f64::from(v[axis])));
+        let range = [f64::from(t_min.max(-f32::MAX)), f64::from(t_max.min(f32::MAX))];
+        Some(Self { axes, origin: o, direction: d, shear: [d[0] / d[2], d[1] / d[2]], range })
+    }
+
+    /// A corner with the ray's axis as the last.
+    fn turned(&self, corner: [f32; 3]) -> [f64; 3] {
+        self.axes.map(|axis| f64::from(corner[axis]))
+    }
+
+    fn place(&self, corner: [f32; 3]) -> Place {
+        let p = self.turned(corner);
+        let z = p[2] - self.origin[2];
+        let across = |k: usize| (p[k] - self.origin[k]) - self.shear[k] * z;
+        [across(0), across(1), z]
+    }
+
+    fn places(&self, corners: &Corners) -> [Place; 3] {
+        corners.map(|corner| self.place(corner))
+    }
+
+    /// What the rule says of a triangle.
+    pub(crate) fn answer(&self, corners: &Corners) -> Answer {
+        // A NaN is not small enough.
+        if !corners.iter().flatten().all(|c| c.abs() <= MAX_COORDINATE) {
+            return Answer::Miss;
+        }
+        let places = self.places(corners);
+        let signs = edges(&places).map(|(p, q)| edge_sign(p, q));
+        let has = |sign| signs.contains(&sign);
+        if has(Ordering::Less) == has(Ordering::Greater) {
+            return Answer::Miss;
+        }
+        self.range_answer(corners, &places)
+    }
+
+    /// Whether a triangle that the line passes through shows its front.
+    pub(crate) fn sees_front(&self, corners: &Corners) -> bool {
+        let signs = edges(&self.places(corners)).map(|(p, q)| edge_sign(p, q));
+        signs.contains(&Ordering::Greater) == (self.direction[2] > 0.0)
+    }
+
+    /// How far along the ray the range and the corners are, growing, in units of the longest axis.
+    fn along(&self, places: &[Place; 3]) -> ([f64; 2], [f64; 3]) {
+        // Products of two f32 numbers: exact.
+        let ends = self.range.map(|t| t * self.direction[2].abs());
+        (ends, places.map(|place| place[2] * self.direction[2].signum()))
+    }
+
+    fn range_answer(&self, corners: &Corners, places: &[Place; 3]) -> Answer {
+        let ([from, to], along) = self.along(places);
+        // Rounding is monotonic and the ends are exact: what these say holds without rounding, too.
+        if along.iter().all(|&z| from < z && z < to) {
+            return Answer::Hit;
+        }
+        if along.iter().all(|&z| z < from) || along.iter().all(|&z| z > to) {
+            return Answer::Miss;
+        }
+        // A corner that was rounded to an end may lie on either side of it.
+        let is_open = corners.iter().zip(along).any(|(corner, z)| {
+            let [p, o] = [self.turned(*corner)[2], self.origin[2]].map(Dyadic::new);
+            (z == from || z == to) && &p - &o != Dyadic::new(self.place(*corner)[2])
+        });
+        let sides = [0, 1].map(|end| self.meets(corners, self.range[end]));
+        let [Some(first), Some(last)] = sides else {
+            // No plane, or one along the line: the places decide.
+            return self.places_answer(places, 0.0);
+        };
+        let is_in = first != Ordering::Less && last != Ordering::Greater;
+        match self.places_answer(places, 1.0 / f64::from(1 << 21)) {
+            _ if is_open => Answer::Either,
+            Answer::Miss => Answer::Miss,
+            _ if !is_in => Answer::Miss,
+            answer => answer,
+        }
+    }
+
+    /// Whether the t of the places lies in the range, or no farther outside than a part of the
+    /// corners' range. That t is rounded: next to the limit either may be.
+    fn places_answer(&self, places: &[Place; 3], outside: f64) -> Answer {
+        let ([from, to], along) = self.along(places);
+        let along = along.map(Dyadic::new);
+        let [low, high] = extremes(&along);
+        let width = &high - &low;
+        let outside = &width * &Dyadic::new(outside);
+        let weights = exact_edges(places).map(Dyadic::abs);
+        let area = &(&weights[0] + &weights[1]) + &weights[2];
+        let depth = dot(&weights, &along);
+        // All of it times the area, which is positive.
+        let least = &(&Dyadic::new(from) - &outside) * &area;
+        let most = &(&Dyadic::new(to) + &outside) * &area;
+        let error = (&depth.clone().abs() + &(&width * &area)).scaled(-38);
+        let margin = &depth - &least;
+        let other = &most - &depth;
+        if margin < -error.clone() || other < -error.clone() {
+            Answer::Miss
+        } else if margin < error || other < error {
+            Answer::Either
+        } else {
+            Answer::Hit
+        }
+    }
+
+    /// Where the line meets the plane of the corners, compared with `t`; `None` if it does not, or not in a point.
+    fn meets(&self, corners: &Corners, t: f64) -> Option<Ordering> {
+        let exact = |v: [f64; 3]| v.map(Dyadic::new);
+        let [a, b, c] = corners.map(|corner| exact(self.turned(corner)));
+        let (origin, direction) = (exact(self.origin), exact(self.direction));
+        let normal = cross(&minus(&b, &a), &minus(&c, &a));
+        let slope = dot(&normal, &direction);
+        // T slope = normal * (a - origin), so T - t has the sign of normal * (a - origin) - t slope.
+        let rest = &dot(&normal, &minus(&a, &origin)) - &(&Dyadic::new(t) * &slope);
+        match slope.sign() {
+            Ordering::Less => Some(rest.sign().reverse()),
+            Ordering::Equal => None,
+            Ordering::Greater => Some(rest.sign()),
+        }
+    }
+
+    /// Whether the numbers of a hit are as exact as they are said to be: `u` and `v` to
+    /// (2^-24 + 2^-38) of their value, `t` to 2^-24 |t| + 2^-38 (|t| + Z), all to 2^-149. The `t` lies
+    /// in the range: of a triangle that is grazed, whose `t` does not, it is the end.
+    pub(crate) fn holds_numbers(&self, corners: &Corners, hit: &Hit) -> bool {
+        let [first, last] = self.range;
+        let t = f64::from(hit.t);
+        let is_in = first <= t && t <= last;
+        let places = self.places(corners);
+        is_in && (self.holds_surely(&places, hit) || self.holds_exactly(&places, hit))
+    }
+
+    /// The same in f64: true if it is so by a margin.
+    ///
+    /// Where no edge function is smaller than 2^-9 of its products, it is off by 2^-43 of its value, and as they
+    /// have one sign so is their sum. A weight is off by 2^-41, and t by 2^-40 of the largest |t| of a
+    /// corner, which is no more than |t| + Z. So half of the error that is allowed to each is enough.
+    fn holds_surely(&self, places: &[Place; 3], hit: &Hit) -> bool {
+        let mut weights = [0.0; 3];
+        for (weight, (p, q)) in weights.iter_mut().zip(edges(places)) {
+            let (one, other) = (p[0] * q[1], p[1] * q[0]);
+            *weight = one - other;
+            if weight.abs() * 512.0 <= one.abs() + other.abs() && one.abs() + other.abs() > 0.0 {
+                return false;
+            }
+        }
+        let area: f64 = weights.iter().sum();
+        let length = self.direction[2];
+        let depths = places.map(|place| place[2]);
+        let t = (0..3).map(|k| weights[k] * depths[k]).sum::<f64>() / area / length;
+        let low = depths.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = depths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let reach = t.abs() + (high - low) / length.abs();
+        let (digit, rest) = (2_f64.powi(-24), 2_f64.powi(-39));
+        // Half of the smallest f32: what is rounded to nearest is off by no more.
+        let least = 2_f64.powi(-150);
+        let is_weight = |found: f32, weight: f64| {
+            let value = weight / area;
+            (f64::from(found) - value).abs() <= digit * value.abs() + rest * value.abs() + least
+        };
+        (f64::from(hit.t) - t).abs() <= digit * t.abs() + rest * reach + least
+            && is_weight(hit.u, weights[1])
+            && is_weight(hit.v, weights[2])
+    }
+
+    fn holds_exactly(&self, places: &[Place; 3], hit: &Hit) -> bool {
+        let weights = exact_edges(places).map(Dyadic::abs);
+        let area = &(&weights[0] + &weights[1]) + &weights[2];
+        let least = Dyadic::new(1.0).scaled(-149);
+        let part = &Dyadic::new(1.0).scaled(-24) + &Dyadic::new(1.0).scaled(-38);
+        // Times the area.
+        let is_weight = |found: f32, weight: &Dyadic| {
+            let off = (&(&Dyadic::new(found.into()) * &area) - weight).abs();
+            off <= &(&part * weight) + &(&least * &area)
+        };
+        // Times the area and the length of the direction.
+        let depths = places.map(|place| Dyadic::new(place[2]));
+        let [low, high] = extremes(&depths);
+        let length = Dyadic::new(self.direction[2]);
+        let scale = &area * &length;
+        let t = dot(&weights, &depths);
+        let width = &(&high - &low) * &area;
+        let off = &(&Dyadic::new(hit.t.into()) * &scale) - &t;
+        let allowed = &(&part * &t.abs()) + &width.scaled(-38);
+        // Growing with t. What lies beyond an end is cut there.
+        let off = if scale.sign() == Ordering::Less { -off } else { off };
+        let is_behind = off > Dyadic::new(0.0);
+        let is_cut = f64::from(hit.t) == self.range[usize::from(!is_behind)];
+        let is_t = is_cut || off.abs() <= &allowed + &(&least * &scale.abs());
+        is_t && is_weight(hit.u, &weights[1]) && is_weight(hit.v, &weights[2])
+    }
+
+    /// Whether the places of a triangle's corners are up to 2^-50 L from where the corners are, L the
+    /// largest difference of a coordinate between the origin and a corner.
+    pub(crate) fn holds_places(&self, corners: &Corners) -> bool {
+        let exact = |v: [f64; 3]| v.map(Dyadic::new);
+        let (origin, direction) = (exact(self.origin), exact(self.direction));
+        let from_origin = corners.map(|corner| minus(&exact(self.turned(corner)), &origin));
+        let differences = from_origin.iter().flatten().map(|c| c.clone().abs());
+        let most = differences.fold(Dyadic::new(0.0), |a, b| if a < b { b } else { a });
+        let allowed = (&most.scaled(-50) * &direction[2]).abs();
+        corners.iter().zip(&from_origin).all(|(corner, p)| {
+            let place = self.place(*corner);
+            (0..2).all(|k| {
+                // Times the direction's longest coordinate.
+                let right = &(&p[k] * &direction[2]) - &(&direction[k] * &p[2]);
+                let found = &Dyadic::new(place[k]) * &direction[2];
+                (&found - &right).abs() <= allowed
+            })
+        })
+    }
+}
+
+/// The corners between which the weights of the three corners are.
+fn edges([a, b, c]: &[Place; 3]) -> [(Place, Place); 3] {
+    [(*c, *b), (*a, *c), (*b, *a)]
+}
+
+/// The sign of `p.x q.y - p.y q.x`.
+///
+/// Two products and a difference are off by 2^-53 of themselves, 2^-52 of the products in all: no
+/// place is smaller than 2^-430 unless it is 0, so nothing underflows.
+fn edge_sign(p: Place, q: Place) -> Ordering {
+    let (one, other) = (p[0] * q[1], p[1] * q[0]);
+    let edge = one - other;
+    let size = one.abs() + other.abs();
+    if edge.abs() > 2_f64.powi(-51) * size || size == 0.0 {
+        return edge.partial_cmp(&0.0).expect("places are finite");
+    }
+    exact_edge(p, q).sign()
+}
+
+fn exact_edge(p: Place, q: Place) -> Dyadic {
+    let ([px, py, _], [qx, qy, _]) = (p.map(Dyadic::new), q.map(Dyadic::new));
+    &(&px * &qy) - &(&py * &qx)
+}
+
+fn exact_edges(places: &[Place; 3]) -> [Dyadic; 3] {
+    edges(places).map(|(p, q)| exact_edge(p, q))
+}
+
+fn extremes([a, b, c]: &[Dyadic; 3]) -> [Dyadic; 2] {
+    let low = if a < b { a } else { b };
+    let high = if a < b { b } else { a };
+    let low = if c < low { c } else { low };
+    let high = if c > high { c } else { high };
+    [low.clone(), high.clone()]
+}
+
+fn minus(a: &[Dyadic; 3], b: &[Dyadic; 3]) -> [Dyadic; 3] {
+    std::array::from_fn(|k| &a[k] - &b[k])
+}
+
+fn dot(a: &[Dyadic; 3], b: &[Dyadic; 3]) -> Dyadic {
+    &(&(&a[0] * &b[0]) + &(&a[1] * &b[1])) + &(&a[2] * &b[2])
+}
+
+fn cross(a: &[Dyadic; 3], b: &[Dyadic; 3]) -> [Dyadic; 3] {
+    std::array::from_fn(|k| {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        &(&a[i] * &b[j]) - &(&a[j] * &b[i])
+    })
+}
