@@ -7,8 +7,9 @@
 #include <pthread.h>
 #include <string.h>
 
-/* Rays are traced by tiles of 16 x 16 pixels, all rays of a tile in one call. */
-enum { TILE = 16, TILE_PIXELS = TILE * TILE };
+/* Rays are traced by tiles of 16 x 16 pixels, all rays of a tile in one call; of those that look for
+ * the sky no more than so many at once. */
+enum { TILE = 16, TILE_PIXELS = TILE * TILE, MOST_PROBES = 4 * TILE_PIXELS };
 
 /* Skies that are partly hidden are brighter, so that one can see what is hidden. */
 static const double OPEN_SKY_GAIN = 2.2;
@@ -66,18 +67,18 @@ static probe probe_of(sample *of, vector toward, float reach)
     return p;
 }
 
-/* Asks for all probes with one call whether they get through. */
-static void send(const shared *s, probe *probes, size_t count, hgrid_coherence coherence,
-                 const hgrid_query_options *options)
+/* Asks for all probes with one call whether they get through. Where they go does not matter: they come
+ * in the order of the tile's pixels, so those that follow one another start near each other. */
+static void send(const shared *s, probe *probes, size_t count, const hgrid_query_options *options)
 {
     if (count == 0)
         return;
     check(hgrid_occluded_n(s->job->grid, &probes->ray, sizeof *probes, &probes->is_occluded,
-                           sizeof *probes, count, coherence, options),
+                           sizeof *probes, count, HGRID_COHERENCE_COHERENT, options),
           NULL);
 }
 
-/* Shadow rays, from where the lamp could shine. They are parallel, so they are neighbours, too. */
+/* Shadow rays, from where the lamp could shine. */
 static void look_for_lamp(const shared *s, sample *tile, size_t count,
                           const hgrid_query_options *options)
 {
@@ -86,9 +87,18 @@ static void look_for_lamp(const shared *s, sample *tile, size_t count,
     for (sample *at = tile; at < tile + count; at++)
         if (is_hit(at) && lamp_on(&s->lights, vector_of(at->at.normal)) > 0)
             probes[probe_count++] = probe_of(at, s->lights.toward_lamp, INFINITY);
-    send(s, probes, probe_count, HGRID_COHERENCE_COHERENT, options);
+    send(s, probes, probe_count, options);
     for (const probe *p = probes; p < probes + probe_count; p++)
         p->of->lit = !p->is_occluded;
+}
+
+/* Sends some of the rays of a tile toward the sky, and adds up what gets there. */
+static void send_to_sky(const shared *s, probe *probes, size_t count,
+                        const hgrid_query_options *options)
+{
+    send(s, probes, count, options);
+    for (const probe *p = probes; p < probes + count; p++)
+        p->of->open += p->is_occluded ? 0 : 1.0 / s->job->sky_rays;
 }
 
 /* Ambient occlusion: the part of the sky and the ground that a hit sees. */
@@ -97,19 +107,20 @@ static void look_for_sky(const shared *s, sample *tile, size_t count,
 {
     const int rays = s->job->sky_rays;
     const float reach = (float)(SKY_REACH * s->job->camera->scene_radius);
-    for (sample *at = tile; at < tile + count; at++)
+    probe probes[MOST_PROBES];
+    size_t probe_count = 0;
+    for (sample *at = tile; at < tile + count; at++) {
         at->open = 0;
-    for (int i = 0; i < rays; i++) {
-        probe probes[TILE_PIXELS];
-        size_t probe_count = 0;
-        for (sample *at = tile; at < tile + count; at++)
-            if (is_hit(at))
-                probes[probe_count++] =
-                    probe_of(at, scatter(vector_of(at->at.normal), at->number, i, rays), reach);
-        send(s, probes, probe_count, HGRID_COHERENCE_INCOHERENT, options);
-        for (const probe *p = probes; p < probes + probe_count; p++)
-            p->of->open += p->is_occluded ? 0 : 1.0 / rays;
+        for (int i = 0; i < rays && is_hit(at); i++) {
+            if (probe_count == MOST_PROBES) {
+                send_to_sky(s, probes, probe_count, options);
+                probe_count = 0;
+            }
+            probes[probe_count++] =
+                probe_of(at, scatter(vector_of(at->at.normal), at->number, i, rays), reach);
+        }
     }
+    send_to_sky(s, probes, probe_count, options);
 }
 
 /* Paints the pixels of a tile; returns how many rays hit. */

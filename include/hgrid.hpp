@@ -250,11 +250,12 @@ enum class method : std::uint32_t {
     bvh = HGRID_METHOD_BVH,
 };
 
-/// What is known about the rays of a batch. It changes how fast the answers come, never the answers.
+/// What is known about the rays of a batch, and so in which order they are traced. It changes how
+/// fast the answers come, never the answers.
 enum class coherence : std::uint32_t {
-    /// Nothing: `HGRID_COHERENCE_INCOHERENT`
+    /// Nothing, they may be sorted: `HGRID_COHERENCE_INCOHERENT`
     incoherent = HGRID_COHERENCE_INCOHERENT,
-    /// Neighbours follow one another: `HGRID_COHERENCE_COHERENT`
+    /// Neighbours follow one another, as given: `HGRID_COHERENCE_COHERENT`
     coherent = HGRID_COHERENCE_COHERENT,
 };
 
@@ -762,6 +763,12 @@ public:
     options &skip(std::uint32_t primitive) noexcept { return raw_.skip = primitive, *this; }
     /// Adds up the work of queries here. Each thread needs its own.
     options &count(counters &work) noexcept { return raw_.counters = &work, *this; }
+    /// Lends memory in which a batch of incoherent rays may be sorted, 16 bytes a ray. Each thread
+    /// needs its own.
+    options &sort_in(span<std::byte> scratch) noexcept
+    {
+        return raw_.scratch = scratch.data(), raw_.scratch_bytes = scratch.size(), *this;
+    }
 
     /// Asks `callable` about each hit, from near to far, each triangle at most once a ray.
     ///

@@ -3,8 +3,8 @@
 //! Rays and answers may lie in the same structs of the caller, `{ray; hit}` after `{ray; hit}`. Two
 //! references, of which one is mutable, to what is between the first and the last of them would be
 //! undefined behaviour in Rust, and so would be one to the caller's other fields, which another
-//! thread may be writing. So there are none: rays are copied into a buffer through their addresses,
-//! one by one, and answers are copied out of another.
+//! thread may be writing. So there are none: rays are read and answers written through their
+//! addresses, one by one.
 
 use core::ffi::c_void;
 
@@ -27,6 +27,8 @@ pub(crate) struct Batch<T> {
     answers: *mut T,
     answer_stride: usize,
     pub(crate) count: usize,
+    /// From the first byte to the last of the rays, and of the answers.
+    spans: [Span; 2],
 }
 
 impl<T> Batch<T> {
@@ -47,7 +49,13 @@ impl<T> Batch<T> {
             return Err(HGRID_ERROR_OVERLAP);
         }
         let (ray_stride, answer_stride) = (ray_elements.stride, answer_elements.stride);
-        Ok(Self { rays, ray_stride, answers, answer_stride, count })
+        let spans = [&ray_elements, &answer_elements].map(span);
+        Ok(Self { rays, ray_stride, answers, answer_stride, count, spans })
+    }
+
+    /// Whether a byte lies between the first and the last of the rays or answers.
+    pub(crate) fn overlaps(&self, other: Span) -> bool {
+        self.spans.iter().any(|span| span.overlaps(other))
     }
 
     /// The address of a ray, of any alignment.
@@ -67,12 +75,16 @@ fn elements<T>(start: *const c_void, stride: usize, count: usize) -> Option<Elem
     Elements::new(start, stride, count, size).filter(|elements| elements.stride >= size)
 }
 
+/// From the first element's first byte to the last element's last.
+fn span(elements: &Elements) -> Span {
+    Span::new(elements.start, elements.bytes)
+}
+
 /// Whether a byte of an answer lies in a ray.
 ///
 /// With one stride for both, the distance from a ray's start to the start of the next answer is the
 /// same everywhere: the answer lies between two rays, or all of them are hit.
 fn overlap(rays: &Elements, answers: &Elements, answer_bytes: usize) -> bool {
-    let span = |elements: &Elements| Span::new(elements.start, elements.bytes);
     if !span(rays).overlaps(span(answers)) {
         return false;
     }

@@ -1,6 +1,6 @@
 //! Questions about many rays, from the caller's structs into the caller's structs.
 
-use hgrid_core::{Grid, Hit, QueryOptions, Ray, Strided, StridedMut};
+use hgrid_core::{Grid, QueryOptions};
 
 use crate::batch::Batch;
 use crate::questions::{self, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray};
@@ -36,17 +36,31 @@ use crate::types::hgrid_grid;
 /// No hit may overlap a ray, its own or another; where the two arrays reach into each other, their
 /// strides are the same. Nor do hits overlap anything else that the call uses.
 ///
-/// `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has
-/// no influence on the hits. With `count` 0 nothing is done. Up to 128 rays are read
-/// before the first hit is written.
+/// `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
+/// the hits. For rays without any order lend memory to sort them in, and pass as many as you have in
+/// one call:
 ///
-/// `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With others
-/// the rays are traced one after the other, which is slower.
+/// ```c
+/// static hgrid_status trace_all(const hgrid_grid *grid, const hgrid_ray *rays, hgrid_hit *hits,
+///                               size_t count, void *scratch, size_t scratch_bytes)
+/// {
+///     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+///     options.scratch = scratch, options.scratch_bytes = scratch_bytes;
+///     return hgrid_intersect_n(grid, rays, 0, hits, 0, count, HGRID_COHERENCE_INCOHERENT, &options);
+/// }
+/// ```
+///
+/// With `count` 0 nothing is done. Rays are read and hits are written in any order, and a
+/// ray perhaps more than once, before its hit is written.
+///
+/// `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for
+/// all rays.
 ///
 /// Returns `HGRID_OK` and has written all hits, or returns the reason and has written none:
 /// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and
 /// `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and
-/// `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`,
+/// `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`
+/// (also of `scratch`),
 /// `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no error: it misses.
 ///
 /// The call allocates nothing and needs at most 36 KiB of stack.
@@ -70,14 +84,13 @@ pub unsafe extern "C" fn hgrid_intersect_n(
     let call = || {
         let batch = Batch::new((rays, ray_stride), (hits, hit_stride), count)?;
         let coherence = questions::coherence(coherence)?;
-        let many = |grid: &Grid<'_>, rays: &[_], hits: &mut [_]| {
-            grid.intersect_n(&Strided::new::<Ray>(rays), &mut StridedMut::new(hits), coherence)
-        };
-        let one = |grid: &Grid<'_>, ray: &_, options: &mut QueryOptions<'_>| {
-            grid.intersect_with(ray, options).unwrap_or(Hit::MISS)
+        let trace = |grid: &Grid<'_>,
+                     rays: &mut raw::Arrays<'_, hgrid_hit>,
+                     options: &mut QueryOptions<'_>| {
+            grid.intersect_batch(rays, coherence, options);
         };
         // SAFETY: the caller's promise.
-        unsafe { raw::batch(grid, &batch, options, Hit::MISS, many, one) }
+        unsafe { raw::batch(grid, &batch, options, trace) }
     };
     call().err().unwrap_or(HGRID_OK)
 }
@@ -87,7 +100,7 @@ pub unsafe extern "C" fn hgrid_intersect_n(
 ///
 /// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
 /// from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that
-/// hold a ray and its byte, coherence, options, stack. `rays` and `occluded` may be
+/// hold a ray and its byte, coherence, options and their `scratch`, stack. `rays` and `occluded` may be
 /// NULL if `count` is 0, `options` may be NULL. Returns `HGRID_OK` and has written all
 /// bytes, or returns what `hgrid_intersect_n` returns and has written none. For the
 /// shadow rays of a tile, towards one light, which start where `hgrid_surface_at` says:
@@ -128,14 +141,12 @@ pub unsafe extern "C" fn hgrid_occluded_n(
     let call = || {
         let batch = Batch::new((rays, ray_stride), (occluded, occluded_stride), count)?;
         let coherence = questions::coherence(coherence)?;
-        let many = |grid: &Grid<'_>, rays: &[_], occluded: &mut [u8]| {
-            grid.occluded_n(&Strided::new::<Ray>(rays), &mut StridedMut::new(occluded), coherence)
-        };
-        let one = |grid: &Grid<'_>, ray: &_, options: &mut QueryOptions<'_>| {
-            u8::from(grid.occluded_with(ray, options))
-        };
+        let trace =
+            |grid: &Grid<'_>, rays: &mut raw::Arrays<'_, u8>, options: &mut QueryOptions<'_>| {
+                grid.occluded_batch(rays, coherence, options);
+            };
         // SAFETY: the caller's promise.
-        unsafe { raw::batch(grid, &batch, options, 0, many, one) }
+        unsafe { raw::batch(grid, &batch, options, trace) }
     };
     call().err().unwrap_or(HGRID_OK)
 }

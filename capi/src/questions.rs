@@ -12,16 +12,20 @@ use hgrid_core::{
 
 use crate::status::{HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_CULL, hgrid_status};
 
-/// What a caller knows about the rays of a batch: one of `HGRID_COHERENCE_...`. It changes how fast
-/// the answers come, never the answers.
+/// What a caller knows about the rays of a batch, and so in which order they are traced: one of
+/// `HGRID_COHERENCE_...`. It changes how fast the answers come, never the answers.
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_coherence = u32;
 
-/// Nothing is known: random rays, rays after a bounce.
+/// Nothing is known: random rays, rays after several bounces. A tree may sort them by origin and
+/// direction, in windows of as many rays as `scratch` of the options holds; rays that follow their
+/// neighbours anyway are left as they are. Other methods trace each ray alone.
 pub const HGRID_COHERENCE_INCOHERENT: hgrid_coherence = 0;
 
-/// Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 128
-/// rays from two tiles of 8 x 8 pixels side by side, each sixteen of them a square of 4 x 4.
+/// Rays that follow one another start near each other: camera rays of a tile, shadow rays and
+/// ambient occlusion from its hits. They are taken as given, with a tree in groups of 64. Best are
+/// runs of 128 rays from two tiles of 8 x 8 pixels side by side, each sixteen of them a square of
+/// 4 x 4.
 pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
 
 /// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.
@@ -117,8 +121,9 @@ pub const HGRID_CULL_FRONT: u32 = 2;
 
 /// What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
 ///
-/// A query with options that are not the defaults is somewhat slower than one without, and
-/// rays of a batch are then traced one by one. Options that break the rules for structs make
+/// A query with options that are not the defaults is somewhat slower than one without. A tree
+/// (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are;
+/// with `filter` or `counters`, and with the other methods, they are traced one by one. Options that break the rules for structs make
 /// a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
 /// returns what is wrong with them.
 #[repr(C)]
@@ -178,8 +183,17 @@ pub struct hgrid_query_options {
             hit: *const hgrid_hit,
         ) -> hgrid_verdict,
     >,
-    /// Where to add up the work, or NULL. Each thread needs its own.
+    /// Where to add up the work, or NULL. Each thread needs its own. The rays of a batch are traced one
+    /// by one to be counted.
     pub counters: *mut hgrid_counters,
+    /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. Of any
+    /// alignment, with anything in it before and after; it may overlap neither rays, answers, mesh
+    /// nor blob, and each thread needs its own. Queries of one ray or point do not look at it.
+    pub scratch: *mut c_void,
+    /// Bytes of `scratch`: 16 for each ray sort a whole batch at once. Less, but 8 KiB or more,
+    /// sorts so many rays after so many; with still less the windows are 512 rays on the stack. The
+    /// larger the window, the sooner the answers, up to millions of rays.
+    pub scratch_bytes: usize,
 }
 
 /// The point of a mesh that is closest to a point: 28 bytes.

@@ -1,27 +1,38 @@
 //! Many rays at once: from the caller's own structs, into the caller's own structs.
 //!
-//! A batch answers each ray as [`Grid::intersect`] or [`Grid::occluded`] would, bit for bit. What
-//! the caller knows about the rays says how: neighbours, as those of a tile of pixels, share
-//! their way through the grid; rays without order go one after the other (several at a time in
-//! flight were slower: core/DESIGN.md). A tree ([`Method::Bvh`](crate::Method::Bvh)) takes rays of both
-//! kinds in groups of 64, and one by one where their origins lie far apart.
+//! A batch answers each ray as [`Grid::intersect`] or [`Grid::occluded`] would, bit for bit. A tree
+//! ([`Method::Bvh`](crate::Method::Bvh)) takes rays of any kind in groups of up to 64, as they are
+//! given or sorted first, and one by one where their origins lie far apart. A brick grid takes
+//! neighbours together; other rays go one after the other there (several at a time in flight were
+//! slower: core/DESIGN.md), as all do with the other methods.
+
+use core::marker::PhantomData;
+use core::ops::Range;
 
 use bytemuck::{Pod, bytes_of, pod_read_unaligned};
 
+use crate::bvh;
+use crate::config::Method;
 use crate::error::{BatchField, Error};
 use crate::grid::Grid;
 use crate::mesh::Strided;
+use crate::options::QueryOptions;
 use crate::ray::{Hit, INVALID_ID, Ray};
 
-/// What the caller knows about the rays of a batch.
+/// What the caller knows about the rays of a batch, and so in which order they are traced. It
+/// changes how fast the answers come, never the answers.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Coherence {
-    /// Nothing: rays after a bounce, random rays. Each is traced alone.
+    /// Nothing: random rays, rays after several bounces. A tree may sort them by origin and
+    /// direction, in windows of as many rays as [`QueryOptions::scratch`] holds, 16 bytes a ray: the
+    /// larger, the sooner the answers, up to millions of rays. With less than
+    /// 8 KiB it sorts windows of 512 rays on the stack. Other methods trace each ray alone.
     #[default]
     Incoherent = 0,
-    /// Rays that follow one another are neighbours: best are runs of 128 from two tiles of 8 x 8
-    /// pixels side by side, each sixteen of them a square of 4 x 4.
+    /// Rays that follow one another start near each other: camera rays of a tile, shadow rays and
+    /// ambient occlusion from its hits. They are taken as given. Best are runs of 128 from two tiles
+    /// of 8 x 8 pixels side by side, each sixteen of them a square of 4 x 4.
     Coherent = 1,
 }
 
@@ -59,18 +70,6 @@ impl<'a> StridedMut<'a> {
             slot.copy_from_slice(bytes_of(value));
         }
     }
-
-    /// Writes elements from `first` on.
-    #[inline(always)]
-    fn write_all<T: Pod>(&mut self, first: usize, values: &[T]) {
-        let bytes = bytemuck::cast_slice(values);
-        let start = first.saturating_mul(self.stride);
-        let slots = self.bytes.get_mut(start..).and_then(|rest| rest.get_mut(..bytes.len()));
-        match slots {
-            Some(slots) if self.stride == size_of::<T>() => slots.copy_from_slice(bytes),
-            _ => (first..).zip(values).for_each(|(index, value)| self.write(index, value)),
-        }
-    }
 }
 
 impl<'a> Strided<'a> {
@@ -101,6 +100,95 @@ impl Hit {
     pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: INVALID_ID };
 }
 
+/// Rays that are asked about together, and places for their answers, wherever they lie.
+///
+/// [`Grid::intersect_n`] takes arrays. This is for rays and answers in the same structs:
+///
+/// ```
+/// # use hgrid_core::*;
+/// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+/// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+/// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+/// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+/// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+/// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+/// struct Shadow {
+///     ray: Ray,
+///     is_lit: bool,
+/// }
+/// struct Shadows<'a>(&'a mut [Shadow]);
+///
+/// impl Batch<bool> for Shadows<'_> {
+///     fn count(&self) -> usize {
+///         self.0.len()
+///     }
+///     fn ray(&self, place: usize) -> Ray {
+///         self.0[place].ray
+///     }
+///     fn answer(&mut self, place: usize, is_occluded: bool) {
+///         self.0[place].is_lit = !is_occluded;
+///     }
+/// }
+///
+/// let shadow = |x| Shadow { ray: Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]), is_lit: false };
+/// let mut shadows = [0.25, 2.0].map(shadow);
+/// let options = &mut QueryOptions::default();
+/// grid.occluded_batch(&mut Shadows(&mut shadows), Coherence::Coherent, options);
+/// assert_eq!(shadows.map(|shadow| shadow.is_lit), [false, true]);
+/// # Ok::<(), Error>(())
+/// ```
+pub trait Batch<A> {
+    /// Number of rays.
+    fn count(&self) -> usize;
+
+    /// Returns the ray at a place below the count: the same one each time.
+    fn ray(&self, place: usize) -> Ray;
+
+    /// Takes the answer to the ray at a place. There is one for each place, in any order.
+    fn answer(&mut self, place: usize, answer: A);
+}
+
+/// Arrays of rays and answers.
+struct Arrays<'r, 'a, 'b> {
+    rays: &'r Strided<'a>,
+    answers: &'r mut StridedMut<'b>,
+}
+
+impl Batch<Hit> for Arrays<'_, '_, '_> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.rays.count
+    }
+
+    #[inline(always)]
+    fn ray(&self, place: usize) -> Ray {
+        self.rays.read(place)
+    }
+
+    #[inline(always)]
+    fn answer(&mut self, place: usize, hit: Hit) {
+        self.answers.write(place, &hit);
+    }
+}
+
+impl Batch<bool> for Arrays<'_, '_, '_> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.rays.count
+    }
+
+    #[inline(always)]
+    fn ray(&self, place: usize) -> Ray {
+        self.rays.read(place)
+    }
+
+    #[inline(always)]
+    fn answer(&mut self, place: usize, is_occluded: bool) {
+        self.answers.write(place, &u8::from(is_occluded));
+    }
+}
+
 impl Grid<'_> {
     /// The closest hit of each ray; [`Hit::MISS`] where there is none.
     ///
@@ -129,15 +217,58 @@ impl Grid<'_> {
         hits: &mut StridedMut<'_>,
         coherence: Coherence,
     ) -> Result<(), Error> {
+        self.intersect_n_with(rays, hits, coherence, &mut QueryOptions::default())
+    }
+
+    /// The closest hit of each ray, of those that the options let count; [`Hit::MISS`] where there
+    /// is none. The options are for all rays.
+    ///
+    /// # Errors
+    /// Those of [`intersect_n`](Self::intersect_n).
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let config = Config::new(Method::Bvh);
+    /// # let sizes = sizes(&mesh, &config, &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
+    /// let along = [0.0, 0.0, -1.0];
+    /// let rays: Vec<_> = (0..1000).map(|i| Ray::new([i as f32 * 1e-3, 0.25, 1.0], along)).collect();
+    /// let mut hits = vec![Hit::MISS; rays.len()];
+    /// let mut scratch = vec![0; 16 * rays.len()];
+    /// let mut options =
+    ///     QueryOptions { cull: Cull::Back, scratch: &mut scratch, ..QueryOptions::default() };
+    /// let (rays, hits) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
+    /// grid.intersect_n_with(&rays, hits, Coherence::Incoherent, &mut options)?;
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn intersect_n_with(
+        &self,
+        rays: &Strided<'_>,
+        hits: &mut StridedMut<'_>,
+        coherence: Coherence,
+        options: &mut QueryOptions<'_>,
+    ) -> Result<(), Error> {
         check(rays, hits, size_of::<Hit>())?;
-        self.each::<false>(rays, coherence, |index, found| {
-            if found.is_empty() {
-                hits.write(index, &self.intersect(&rays.read(index)).unwrap_or(Hit::MISS));
-            } else {
-                hits.write_all(index, found);
-            }
-        });
+        self.intersect_batch(&mut Arrays { rays, answers: hits }, coherence, options);
         Ok(())
+    }
+
+    /// The closest hit of each ray: [`intersect_n_with`](Self::intersect_n_with), wherever rays and
+    /// hits lie.
+    pub fn intersect_batch(
+        &self,
+        batch: &mut impl Batch<Hit>,
+        coherence: Coherence,
+        options: &mut QueryOptions<'_>,
+    ) {
+        let is_plain = options.are_plain();
+        Asked { grid: self, batch, options, is_plain, answers: PhantomData }
+            .trace::<false>(coherence);
     }
 
     /// For each ray a byte: 1 if anything is hit, 0 if not.
@@ -150,32 +281,209 @@ impl Grid<'_> {
         occluded: &mut StridedMut<'_>,
         coherence: Coherence,
     ) -> Result<(), Error> {
+        self.occluded_n_with(rays, occluded, coherence, &mut QueryOptions::default())
+    }
+
+    /// For each ray a byte: 1 if anything is hit that the options let count, 0 if not. The options
+    /// are for all rays.
+    ///
+    /// # Errors
+    /// Those of [`intersect_n`](Self::intersect_n).
+    pub fn occluded_n_with(
+        &self,
+        rays: &Strided<'_>,
+        occluded: &mut StridedMut<'_>,
+        coherence: Coherence,
+        options: &mut QueryOptions<'_>,
+    ) -> Result<(), Error> {
         check(rays, occluded, size_of::<u8>())?;
-        self.each::<true>(rays, coherence, |index, found| {
-            if found.is_empty() {
-                occluded.write(index, &u8::from(self.occluded(&rays.read(index))));
-            }
-            for (index, hit) in (index..).zip(found) {
-                occluded.write(index, &u8::from(hit.primitive != INVALID_ID));
-            }
-        });
+        self.occluded_batch(&mut Arrays { rays, answers: occluded }, coherence, options);
         Ok(())
     }
 
-    /// Shows `answer` the place of every ray, and its hit if the rays were traced together: perhaps
-    /// several at once.
-    #[inline(always)]
-    fn each<const ANY: bool>(
+    /// Whether each ray hits anything: [`occluded_n_with`](Self::occluded_n_with), wherever rays
+    /// and answers lie.
+    pub fn occluded_batch(
         &self,
-        rays: &Strided<'_>,
+        batch: &mut impl Batch<bool>,
         coherence: Coherence,
-        mut answer: impl FnMut(usize, &[Hit]),
+        options: &mut QueryOptions<'_>,
     ) {
-        let is_done = (coherence == Coherence::Coherent
-            || self.method() == crate::config::Method::Bvh)
-            && self.tiles::<ANY>(rays, &mut answer);
-        if !is_done {
-            (0..rays.count).for_each(|index| answer(index, &[]));
+        let is_plain = options.are_plain();
+        Asked { grid: self, batch, options, is_plain, answers: PhantomData }
+            .trace::<true>(coherence);
+    }
+}
+
+/// What a ray is asked for in a batch.
+trait Answer {
+    /// What a ray that was traced with others says.
+    fn of(hit: &Hit) -> Self;
+
+    /// What a ray says alone.
+    fn plain(grid: &Grid<'_>, ray: &Ray) -> Self;
+
+    /// What a ray at a place says alone, with options.
+    fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self;
+}
+
+impl Answer for Hit {
+    #[inline(always)]
+    fn of(hit: &Hit) -> Self {
+        *hit
+    }
+
+    fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
+        grid.intersect(ray).unwrap_or(Self::MISS)
+    }
+
+    fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self {
+        grid.intersect_at(place, ray, options).unwrap_or(Self::MISS)
+    }
+}
+
+impl Answer for bool {
+    #[inline(always)]
+    fn of(hit: &Hit) -> Self {
+        hit.primitive != INVALID_ID
+    }
+
+    fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
+        grid.occluded(ray)
+    }
+
+    fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self {
+        grid.occluded_at(place, ray, options)
+    }
+}
+
+/// A batch as a kernel sees it.
+pub(crate) trait Together {
+    /// Number of rays.
+    fn count(&self) -> usize;
+
+    /// The ray at a place.
+    fn ray(&self, place: usize) -> Ray;
+
+    /// Answers for a ray that was traced with others: its hit or [`Hit::MISS`].
+    fn found(&mut self, place: usize, hit: &Hit);
+
+    /// Traces a ray alone, and answers for it.
+    fn alone(&mut self, place: usize);
+}
+
+/// A batch and what it is asked for.
+struct Asked<'r, 'm, 'q, B, A> {
+    grid: &'r Grid<'m>,
+    batch: &'r mut B,
+    options: &'r mut QueryOptions<'q>,
+    /// The options change nothing.
+    is_plain: bool,
+    answers: PhantomData<A>,
+}
+
+impl<A: Answer, B: Batch<A>> Together for Asked<'_, '_, '_, B, A> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.batch.count()
+    }
+
+    #[inline(always)]
+    fn ray(&self, place: usize) -> Ray {
+        self.batch.ray(place)
+    }
+
+    #[inline(always)]
+    fn found(&mut self, place: usize, hit: &Hit) {
+        self.batch.answer(place, A::of(hit));
+    }
+
+    #[inline(never)]
+    fn alone(&mut self, place: usize) {
+        let ray = self.batch.ray(place);
+        let answer = if self.is_plain {
+            A::plain(self.grid, &ray)
+        } else {
+            A::with(self.grid, place, &ray, self.options)
+        };
+        self.batch.answer(place, answer);
+    }
+}
+
+/// Rays of a tile: as many as a brick grid traces together.
+const TILE: usize = 128;
+
+/// Rays of a window that is sorted on the stack.
+const FEW: usize = 512;
+
+impl<A: Answer, B: Batch<A>> Asked<'_, '_, '_, B, A> {
+    /// Traces all rays, together where the grid can.
+    #[inline(always)]
+    fn trace<const ANY: bool>(&mut self, coherence: Coherence) {
+        let is_one_by_one = self.options.are_for_single_rays();
+        match (self.grid.method(), coherence) {
+            (Method::Bvh, Coherence::Coherent) if !is_one_by_one => self.groups::<ANY>(&mut []),
+            (Method::Bvh, Coherence::Incoherent) if !is_one_by_one => self.sorted::<ANY>(),
+            (Method::Brick, Coherence::Coherent) if self.is_plain => self.tiles::<ANY>(),
+            _ => self.one_by_one(0..self.batch.count()),
+        }
+    }
+
+    fn one_by_one(&mut self, places: Range<usize>) {
+        places.for_each(|place| self.alone(place));
+    }
+
+    /// Traces rays in groups, in the order that a window of them is sorted into.
+    #[inline(always)]
+    fn sorted<const ANY: bool>(&mut self) {
+        let lent = core::mem::take(&mut self.options.scratch);
+        let (_, memory, _) = bytemuck::pod_align_to_mut(lent);
+        if memory.len() < 2 * FEW {
+            self.sorted_on_the_stack::<ANY>();
+        } else {
+            self.groups::<ANY>(memory);
+        }
+        self.options.scratch = lent;
+    }
+
+    /// Out of line: the window takes stack only where it is wanted.
+    #[inline(never)]
+    fn sorted_on_the_stack<const ANY: bool>(&mut self) {
+        self.groups::<ANY>(&mut [0; 2 * FEW]);
+    }
+
+    /// Traces rays in groups, in windows that are sorted in memory or as given.
+    #[inline(never)]
+    fn groups<const ANY: bool>(&mut self, memory: &mut [bvh::Entry]) {
+        let (grid, choice) = (self.grid, self.options.choice());
+        if !grid.groups::<ANY>(choice, memory, self) {
+            self.one_by_one(0..self.batch.count());
+        }
+    }
+
+    /// Traces neighbours together.
+    #[inline(never)]
+    fn tiles<const ANY: bool>(&mut self) {
+        let grid = self.grid;
+        let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE];
+        for first in (0..self.batch.count()).step_by(TILE) {
+            let count = TILE.min(self.batch.count() - first);
+            for (place, ray) in (first..).zip(rays.iter_mut().take(count)) {
+                *ray = self.batch.ray(place);
+            }
+            let rays = rays.get(..count).unwrap_or_default();
+            let answer = |at: usize, hits: &[Hit]| {
+                for (place, hit) in (first + at..).zip(hits) {
+                    self.found(place, hit);
+                }
+                if hits.is_empty() {
+                    self.alone(first + at);
+                }
+            };
+            let is_done = grid.tiles::<ANY>(&Strided::new(rays), answer);
+            if !is_done {
+                self.one_by_one(first..first + count);
+            }
         }
     }
 }

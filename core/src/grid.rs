@@ -5,6 +5,7 @@ use glam::Vec3A;
 use crate::aabb::Aabb;
 use crate::approach::Approach;
 use crate::arena::check_alignment;
+use crate::batch::Together;
 use crate::blob::{Header, corrupt};
 use crate::brick::{self, Brick, OneRay, Tiles};
 use crate::bvh::{self, Bvh, Nearest};
@@ -21,7 +22,7 @@ use crate::filter::RayFilter;
 use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::{Strided, TriangleMesh};
 use crate::one_level::{self, OneLevel};
-use crate::options::Cull;
+use crate::options::{Choice, Cull};
 use crate::ray::{Hit, Ray};
 use crate::recursive::{self, Recursive};
 use crate::search::{Any, Closest, Outcome, Search};
@@ -460,20 +461,29 @@ impl<'a> Grid<'a> {
         rays: &Strided<'_>,
         answer: impl FnMut(usize, &[Hit]),
     ) -> bool {
-        if HAS_BVH
-            && HAS_VECTORS
-            && let Structure::Bvh(bvh) = &self.structure
-        {
-            let (mesh, bounds) = (&self.mesh, self.lattice.bounds());
-            dispatch(self.simd, bvh::Groups::<_, ANY> { bvh, mesh, bounds, rays, answer });
-            return true;
-        }
         if !HAS_VECTORS || !HAS_BRICK {
             return false;
         }
         let Structure::Brick(brick) = &self.structure else { return false };
         let (lattice, mesh) = (&self.lattice, &self.mesh);
         dispatch(self.simd, Tiles::<_, ANY> { brick, lattice, mesh, rays, answer });
+        true
+    }
+
+    /// Traces rays of any kind together where the structure can; tells whether it does. With
+    /// memory they are sorted first.
+    pub(crate) fn groups<const ANY: bool>(
+        &self,
+        choice: Choice,
+        memory: &mut [bvh::Entry],
+        batch: &mut impl Together,
+    ) -> bool {
+        if !HAS_VECTORS || !HAS_BVH {
+            return false;
+        }
+        let Structure::Bvh(bvh) = &self.structure else { return false };
+        let (mesh, bounds) = (&self.mesh, self.lattice.bounds());
+        dispatch(self.simd, bvh::Groups::<_, ANY> { bvh, mesh, bounds, choice, memory, batch });
         true
     }
 

@@ -96,7 +96,7 @@ mod visit;
 
 pub use aabb::MAX_COORDINATE;
 pub use arena::{ALIGNMENT, Block};
-pub use batch::{Coherence, StridedMut};
+pub use batch::{Batch, Coherence, StridedMut};
 pub use blob::BLOB_VERSION;
 pub use cell::MAX_RESOLUTION;
 pub use closest::ClosestPoint;
@@ -107,7 +107,7 @@ pub use error::{BatchField, ConfigField, Error, MeshField, Region};
 pub use grid::Grid;
 pub use inspect::Statistics;
 pub use mesh::{IndexType, MAX_TRIANGLES, Strided, Triangle, TriangleMesh};
-pub use options::{Cull, QueryOptions, Verdict};
+pub use options::{Cull, Filter, QueryOptions, Verdict};
 pub use packed::BlobInfo;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use recursive::MAX_DEPTH;

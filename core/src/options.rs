@@ -44,12 +44,15 @@ pub enum Verdict {
     AcceptAndStop = 2,
 }
 
+/// Says of a hit of the ray at a place of its batch, 0 for a single ray, whether it counts.
+pub type Filter<'q> = dyn FnMut(usize, &Hit) -> Verdict + 'q;
+
 /// What a query may be told. `QueryOptions::default()` changes nothing.
 ///
 /// ```
 /// use hgrid_core::{Cull, QueryOptions, Verdict};
 /// let mut is_window = |primitive: u32| primitive < 10;
-/// let mut filter = |hit: &hgrid_core::Hit| {
+/// let mut filter = |_, hit: &hgrid_core::Hit| {
 ///     if is_window(hit.primitive) { Verdict::Reject } else { Verdict::Accept }
 /// };
 /// let options = QueryOptions {
@@ -69,16 +72,30 @@ pub struct QueryOptions<'q> {
     /// any epsilon. A neighbour across an edge still may be, where the origin was rounded to just
     /// below it. At first [`INVALID_ID`].
     pub skip: u32,
-    /// Says of a hit whether it counts. Asked about hits from near to far, where `t` is equal by
-    /// ascending id, and about each triangle at most once for each ray.
-    pub filter: Option<&'q mut dyn FnMut(&Hit) -> Verdict>,
-    /// Where to add up the work.
+    /// Says of a hit whether it counts: gets the place of the ray in its batch, 0 for a single one,
+    /// and the hit. Asked about hits from near to far, where `t` is equal by ascending id, and about
+    /// each triangle at most once for each ray. The rays of a batch are then traced one by one, in
+    /// their order.
+    pub filter: Option<&'q mut Filter<'q>>,
+    /// Where to add up the work. The rays of a batch are then traced one by one: those of a group
+    /// share their work, and none of it could be told to be one ray's.
     pub counters: Option<&'q mut Counters>,
+    /// Memory in which rays of [`Coherence::Incoherent`](crate::Coherence::Incoherent) may be
+    /// sorted, 16 bytes a ray: see there. It holds anything before and after. Queries of one ray or
+    /// point do not use it.
+    pub scratch: &'q mut [u8],
 }
 
 impl Default for QueryOptions<'_> {
     fn default() -> Self {
-        Self { mask: u32::MAX, cull: Cull::None, skip: INVALID_ID, filter: None, counters: None }
+        Self {
+            mask: u32::MAX,
+            cull: Cull::None,
+            skip: INVALID_ID,
+            filter: None,
+            counters: None,
+            scratch: &mut [],
+        }
     }
 }
 
@@ -90,6 +107,7 @@ impl fmt::Debug for QueryOptions<'_> {
             .field("skip", &self.skip)
             .field("filter", &self.filter.is_some())
             .field("counters", &self.counters)
+            .field("scratch", &self.scratch.len())
             .finish()
     }
 }
@@ -100,25 +118,58 @@ impl<'q> QueryOptions<'q> {
     pub fn counting(counters: &'q mut Counters) -> Self {
         Self { counters: Some(counters), ..Self::default() }
     }
+
+    /// Returns true if rays have to be traced one by one.
+    pub(crate) const fn are_for_single_rays(&self) -> bool {
+        self.filter.is_some() || self.counters.is_some()
+    }
+
+    /// Returns true if they change nothing.
+    pub(crate) fn are_plain(&self) -> bool {
+        self.choice() == Choice::ALL && !self.are_for_single_rays()
+    }
+
+    /// What can be said of triangles without a filter.
+    pub(crate) const fn choice(&self) -> Choice {
+        Choice { mask: self.mask, skip: self.skip, cull: self.cull }
+    }
+}
+
+/// Masks, culling and the triangle to skip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Choice {
+    mask: u32,
+    skip: u32,
+    pub(crate) cull: Cull,
+}
+
+impl Choice {
+    /// All triangles from both sides.
+    pub(crate) const ALL: Self = Self { mask: u32::MAX, skip: INVALID_ID, cull: Cull::None };
+
+    /// Returns true if a triangle is seen, from whichever side.
+    #[inline(always)]
+    pub(crate) fn has(&self, mesh: &TriangleMesh<'_>, primitive: u32) -> bool {
+        let is_masked = self.mask != u32::MAX && mesh.mask(primitive) & self.mask == 0;
+        primitive != self.skip && !is_masked
+    }
 }
 
 /// The triangles that a query sees.
 #[derive(Debug)]
 pub(crate) struct Selection<'q> {
     mesh: &'q TriangleMesh<'q>,
-    mask: u32,
-    skip: u32,
+    choice: Choice,
 }
 
 impl<'q> Selection<'q> {
     pub(crate) const fn new(mesh: &'q TriangleMesh<'q>, options: &QueryOptions<'_>) -> Self {
-        Self { mesh, mask: options.mask, skip: options.skip }
+        Self { mesh, choice: options.choice() }
     }
 
     /// Whether a triangle is one of them.
     pub(crate) fn has(&self, primitive: u32) -> bool {
-        let is_masked = self.mask != u32::MAX && self.mesh.mask(primitive) & self.mask == 0;
-        primitive != self.skip && !is_masked
+        self.choice.has(self.mesh, primitive)
     }
 }
 
@@ -148,8 +199,18 @@ impl Grid<'_> {
     /// ```
     #[must_use]
     pub fn intersect_with(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> Option<Hit> {
+        self.intersect_at(0, ray, options)
+    }
+
+    /// The same for the ray at a place of a batch.
+    pub(crate) fn intersect_at(
+        &self,
+        place: usize,
+        ray: &Ray,
+        options: &mut QueryOptions<'_>,
+    ) -> Option<Hit> {
         let mut closest = None;
-        self.in_order(ray, options, None, 1, |hit| {
+        self.in_order((place, ray), options, None, 1, |hit| {
             closest = Some(*hit);
             false
         });
@@ -159,8 +220,18 @@ impl Grid<'_> {
     /// Whether anything is hit that the options let count.
     #[must_use]
     pub fn occluded_with(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> bool {
+        self.occluded_at(0, ray, options)
+    }
+
+    /// The same for the ray at a place of a batch.
+    pub(crate) fn occluded_at(
+        &self,
+        place: usize,
+        ray: &Ray,
+        options: &mut QueryOptions<'_>,
+    ) -> bool {
         if options.filter.is_some() {
-            return self.intersect_with(ray, options).is_some();
+            return self.intersect_at(place, ray, options).is_some();
         }
         // Nobody is promised an order.
         self.nearest(ray, options, None, &mut [Hit::MISS], true) > 0
@@ -205,7 +276,7 @@ impl Grid<'_> {
                 _ => return count,
             }
         }
-        self.in_order(ray, options, after, ROOM, |hit| {
+        self.in_order((0, ray), options, after, ROOM, |hit| {
             if let Some(slot) = hits.get_mut(count) {
                 *slot = *hit;
             }
@@ -219,7 +290,7 @@ impl Grid<'_> {
     /// enough. The first walk collects `room` hits.
     fn in_order(
         &self,
-        ray: &Ray,
+        (place, ray): (usize, &Ray),
         options: &mut QueryOptions<'_>,
         mut after: Option<Hit>,
         mut room: usize,
@@ -231,7 +302,7 @@ impl Grid<'_> {
             let found = self.nearest(ray, options, after, space, false);
             for hit in buffer.iter().take(found) {
                 let verdict = match &mut options.filter {
-                    Some(filter) => filter(hit),
+                    Some(filter) => filter(place, hit),
                     None => Verdict::Accept,
                 };
                 let is_enough = match verdict {

@@ -19,6 +19,8 @@ pub(crate) struct Decided {
     pub(crate) hits: u32,
     /// Lanes that have to be decided alone.
     pub(crate) unsure: u32,
+    /// Lanes with a hit whose ray comes from the triangle's front.
+    pub(crate) fronts: u32,
     t: [f32; LANES],
     u: [f32; LANES],
     v: [f32; LANES],
@@ -96,6 +98,7 @@ pub(crate) fn decide<S: Simd>(
     Decided {
         hits: bits(candidates & sure) & of_count,
         unsure: bits(candidates & !sure) & of_count,
+        fronts: !(bits(area.simd_gt(zero)) ^ bits(is_forward)),
         t: (rounded(depth / dz).max(t_min).min(t_max) + 0.0).into(),
         u: rounded(weights[1]).into(),
         v: rounded(weights[2]).into(),

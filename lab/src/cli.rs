@@ -166,6 +166,13 @@ pub struct RenderArgs {
     /// What the colours mean
     #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
     pub shading: Shading,
+    /// For diffuse: the lamp casts shadows
+    #[arg(long)]
+    pub shadows: bool,
+    /// For diffuse: ambient occlusion, so many rays from each hit look for sky and ground
+    #[arg(long, value_name = "RAYS", default_value_t = 0,
+          value_parser = clap::value_parser!(u16).range(0..=1024))]
+    pub ao: u16,
     /// For heat: which work is shown [default: cost]
     #[arg(long, value_enum)]
     pub counter: Option<Counter>,

@@ -20,6 +20,7 @@ pub mod compare;
 pub mod figures;
 pub mod heat;
 pub mod image;
+pub mod light;
 pub mod machine;
 pub mod measure;
 mod plot;

@@ -9,6 +9,7 @@ use hgrid_core::{Counters, TriangleMesh};
 use crate::cli::{RenderArgs, Shading};
 use crate::heat::{self, Counter, Picture};
 use crate::image;
+use crate::light::Lights;
 use crate::measure::{SceneFacts, Subject, measure, rows};
 use crate::progress::Progress;
 use crate::report::Report;
@@ -33,7 +34,12 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let size = args.picture.size;
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
     let threads = Threads::new(args.builders.threads)?;
-    let subject = Subject { mesh, tiles: args.picture.tiles(&scene)?, threads: &threads };
+    let lights = Lights { has_shadows: args.shadows, sky_rays: args.ao };
+    ensure!(
+        lights.are_everywhere() || args.shading == Shading::Diffuse,
+        "--shadows and --ao are for --shading diffuse"
+    );
+    let subject = Subject { mesh, tiles: args.picture.tiles(&scene)?, lights, threads: &threads };
     let shade: Shade = match args.shading {
         Shading::Normals => |shader, rays, hits, colors| shader.normals(rays, hits, colors),
         Shading::Diffuse | Shading::Heat => {
@@ -112,6 +118,17 @@ mod tests {
     }
 
     #[test]
+    fn shadows_and_occlusion_give_a_picture() {
+        for method in ["bvh", "brick"] {
+            let words = ["procedural:knot:500", "--size", "20", "--shadows", "--ao", "5"];
+            let words = words.into_iter().chain(["--method", method]).collect::<Vec<_>>();
+            let (result, is_written) = run_words("lights", &words, None);
+            result.unwrap();
+            assert!(is_written);
+        }
+    }
+
+    #[test]
     fn a_scene_without_triangles_gives_a_picture() {
         let header = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
             property float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n";
@@ -124,9 +141,10 @@ mod tests {
     #[test]
     fn failures_leave_no_picture_and_name_the_cause() {
         let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-        let cases: [(&[&str], _, &str); 4] = [
+        let cases: [(&[&str], _, &str); 5] = [
             (&["procedural:teapot"], None, "knot, stage, soup"),
             (&["--method", "fixed", "--density", "-1"], Some(("a.obj", triangle)), "density"),
+            (&["--ao", "4", "--shading", "normals"], Some(("d.obj", triangle)), "diffuse"),
             (&["--density", "8"], Some(("c.obj", triangle)), "brick grid has no density"),
             (&[], Some(("b.ply", triangle)), "not a PLY file"),
         ];

@@ -7,9 +7,10 @@
 //! Pixels are shaded 64 at a time, number by number instead of vector by vector, which the
 //! compiler turns into vectors of several pixels: tracing should be what a picture takes.
 
-use hgrid_core::{Hit, INVALID_ID, Ray, Triangle, TriangleMesh};
+use hgrid_core::{Grid, Hit, INVALID_ID, Ray, Triangle, TriangleMesh};
 
 use crate::camera::Camera;
+use crate::light::Lights;
 use crate::vector::{Vector, cross, length, offset, round, unit};
 
 /// A colour as a PNG holds it.
@@ -22,6 +23,9 @@ const LIGHT: [f32; 3] = [-0.7, 0.8, 1.0];
 const KEY: [f32; 3] = [0.62, 0.60, 0.56];
 const SKY: [f32; 3] = [0.09, 0.11, 0.14];
 const GROUND: [f32; 3] = [0.03, 0.027, 0.024];
+
+/// Sky and ground that are partly hidden are brighter, so that one can see what is hidden.
+const OPEN_SKY_GAIN: f32 = 2.2;
 
 /// The background at the upper and the lower edge, linear.
 const ZENITH: [f32; 3] = [0.008, 0.018, 0.055];
@@ -61,34 +65,54 @@ impl<'a> Shader<'a> {
     /// three are equally long.
     pub fn diffuse(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
         let [_, up, _] = self.axes;
-        self.shade(rays, hits, colors, |normal| {
+        self.shade(rays, hits, colors, |_, normal| {
             let key = dot(normal, self.light).max(0.0);
             let sky = 0.5 + 0.5 * dot(normal, up);
             [0, 1, 2].map(|c| KEY[c] * key + SKY[c] * sky + GROUND[c] * (1.0 - sky))
         });
     }
 
+    /// The same with what is in the way of the light, for the rays of a tile.
+    pub fn lit(
+        &self,
+        grid: &Grid<'_>,
+        lights: &Lights,
+        rays: &[Ray],
+        hits: &[Hit],
+        colors: &mut [Rgb],
+    ) {
+        let reached = lights.reach(grid, self.light, rays, hits);
+        let [_, up, _] = self.axes;
+        let gain = if lights.sky_rays > 0 { OPEN_SKY_GAIN } else { 1.0 };
+        self.shade(rays, hits, colors, |pixel, normal| {
+            let key = reached.lit[pixel] * dot(normal, self.light).max(0.0);
+            let open = gain * reached.open[pixel];
+            let sky = 0.5 + 0.5 * dot(normal, up);
+            [0, 1, 2].map(|c| KEY[c] * key + open * (SKY[c] * sky + GROUND[c] * (1.0 - sky)))
+        });
+    }
+
     /// The normals as colours: red to the right, green up, blue toward the viewer.
     pub fn normals(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
-        self.shade(rays, hits, colors, |normal| {
+        self.shade(rays, hits, colors, |_, normal| {
             let along = self.axes.map(|axis| 0.5 + 0.5 * dot(normal, axis));
             // What a screen takes the root of.
             along.map(|part| part * part)
         });
     }
 
-    /// Shades by the light that a surface with a normal on the viewer's side sends there.
+    /// Shades by the light that the surface of a pixel with a normal on the viewer's side sends there.
     #[inline(always)]
     fn shade(
         &self,
         rays: &[Ray],
         hits: &[Hit],
         colors: &mut [Rgb],
-        surface: impl Fn([f32; 3]) -> [f32; 3],
+        surface: impl Fn(usize, [f32; 3]) -> [f32; 3],
     ) {
         debug_assert!(rays.len() == hits.len() && hits.len() == colors.len());
         let groups = rays.chunks(GROUP).zip(hits.chunks(GROUP)).zip(colors.chunks_mut(GROUP));
-        for ((rays, hits), colors) in groups {
+        for (first, ((rays, hits), colors)) in (0..).step_by(GROUP).zip(groups) {
             let mut directions = [[0.0; GROUP]; 3];
             for (lane, ray) in (0..GROUP).zip(rays) {
                 put(&mut directions, lane, ray.direction);
@@ -104,7 +128,7 @@ impl<'a> Shader<'a> {
                 for lane in 0..GROUP {
                     let (direction, normal) = (at(&directions, lane), at(&normals, lane));
                     let is_away = dot(normal, direction) > 0.0;
-                    let lit = surface(normal.map(|c| if is_away { -c } else { c }));
+                    let lit = surface(first + lane, normal.map(|c| if is_away { -c } else { c }));
                     let sky = at(&light, lane);
                     put(&mut light, lane, if seen.is_hit[lane] { lit } else { sky });
                 }

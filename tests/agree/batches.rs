@@ -4,7 +4,8 @@
 use std::ops::Range;
 
 use hgrid_core::{
-    BatchField, Coherence, Config, Error, Grid, Hit, Method, Ray, SimdLevel, Strided, StridedMut,
+    BatchField, Coherence, Config, Counters, Cull, Error, Grid, Hit, INVALID_ID, Method,
+    QueryOptions, Ray, SimdLevel, Strided, StridedMut, Verdict,
 };
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_tests::meshes::{Mesh, ball, soup};
@@ -196,11 +197,7 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
         let met = expected[LIMITED].iter().filter(|hit| **hit != Hit::MISS).count();
         assert!(limited > 100 && met > 200, "{limited} {met}");
         // Other methods have no vectors in them.
-        let levels = if matches!(config.method, Method::Brick | Method::Bvh) {
-            levels()
-        } else {
-            vec![SimdLevel::detect()]
-        };
+        let levels = levels_of(config.method);
         for (level, coherence) in levels.into_iter().flat_map(|l| COHERENCES.map(|c| (l, c))) {
             let grid = grid.with_simd(level);
             for n in [0, 1, 7, 63, 64, 65, 128, 1000, rays.len() - 37] {
@@ -364,6 +361,192 @@ fn elements_may_lie_anywhere_and_what_is_between_them_stays() {
                     config.method
                 );
             }
+        }
+    }
+}
+
+/// Levels that a method has something to do with.
+fn levels_of(method: Method) -> Vec<SimdLevel> {
+    if matches!(method, Method::Brick | Method::Bvh) { levels() } else { vec![SimdLevel::detect()] }
+}
+
+/// Masks for some bits in turn.
+fn masks(mesh: &Mesh) -> Vec<u32> {
+    (0..mesh.view().triangle_count()).map(|id| 1 << (id % 3)).collect()
+}
+
+#[test]
+fn masks_culling_and_a_triangle_to_skip_agree() {
+    let mesh = scene();
+    let masks = masks(&mesh);
+    let view = mesh.view().with_masks(Strided::new(&masks)).unwrap();
+    for config in methods::configs() {
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        // Tiles, strangers and odd rays.
+        let rays = &rays(grid.bounds())[CLOSE - 256..];
+        let hit = alone(&grid, rays).into_iter().find(|hit| *hit != Hit::MISS);
+        let skip = hit.expect("some hit").primitive;
+        let mut different = 0;
+        for (mask, cull, skip) in [
+            (u32::MAX, Cull::None, skip),
+            (u32::MAX, Cull::Back, INVALID_ID),
+            (u32::MAX, Cull::Front, skip),
+            (5, Cull::None, INVALID_ID),
+            (2, Cull::Back, skip),
+            (8, Cull::None, INVALID_ID),
+            (0, Cull::Front, INVALID_ID),
+        ] {
+            let options = || QueryOptions { mask, cull, skip, ..QueryOptions::default() };
+            let expected: Vec<_> = rays
+                .iter()
+                .map(|ray| grid.intersect_with(ray, &mut options()).unwrap_or(Hit::MISS))
+                .collect();
+            different += usize::from(expected != alone(&grid, rays));
+            for (level, coherence) in
+                levels_of(config.method).into_iter().flat_map(|l| COHERENCES.map(|c| (l, c)))
+            {
+                let grid = grid.with_simd(level);
+                let what = format!("{:?} {level:?} {coherence:?} {mask} {cull:?}", config.method);
+                let strided = Strided::new(rays);
+                let mut hits = vec![Hit { primitive: 7, ..Hit::MISS }; rays.len()];
+                let answers = &mut StridedMut::new(&mut hits);
+                grid.intersect_n_with(&strided, answers, coherence, &mut options()).unwrap();
+                let mut occluded = vec![7_u8; rays.len()];
+                let answers = &mut StridedMut::new(&mut occluded);
+                grid.occluded_n_with(&strided, answers, coherence, &mut options()).unwrap();
+                for (i, expected) in expected.iter().enumerate() {
+                    assert_eq!(bits(&hits[i]), bits(expected), "{what}: ray {i} {:?}", rays[i]);
+                    let is_hit = u8::from(*expected != Hit::MISS);
+                    assert_eq!(occluded[i], is_hit, "{what}: ray {i} {:?}", rays[i]);
+                }
+            }
+        }
+        assert_eq!(different, 7, "{:?}: every option changes something", config.method);
+    }
+}
+
+/// Rays that start around some points in turn and go anywhere; among many points odd ones, too.
+fn scattered(count: usize, points: usize) -> Vec<Ray> {
+    let mut random = Random(91);
+    let points: Vec<_> = (0..points).map(|_| random.point()).collect();
+    let odd = odd_rays();
+    let ray = |i: usize| {
+        if points.len() > 2 && i % 50 == 49 {
+            return odd[i / 50 % odd.len()];
+        }
+        let near = random.point();
+        let at = points[i % points.len()];
+        Ray::new(std::array::from_fn(|k| at[k] + 0.03 * near[k]), random.point())
+    };
+    (0..count).map(ray).collect()
+}
+
+/// Rays are sorted in memory of any size and place, and no byte beside it is written.
+#[test]
+fn rays_in_any_order_agree_with_any_scratch() {
+    let mesh = scene();
+    let view = mesh.view();
+    for config in [Config::new(Method::Bvh), Config::new(Method::Brick)] {
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        // Few points are enough for windows on the stack, many are not; and all kinds of rays.
+        for rays in [scattered(3000, 2), scattered(9000, 40), rays(grid.bounds())] {
+            let expected = alone(&grid, &rays);
+            let all = 16 * rays.len();
+            for level in levels() {
+                let grid = grid.with_simd(level);
+                for bytes in [0, 1, 8191, 8192, 8200, 16 * 1000, 16 * 2049 + 5, all, all + 100] {
+                    for from in [0, 3] {
+                        let mut memory = vec![0xa5_u8; from + bytes + 9];
+                        let scratch = &mut memory[from..from + bytes];
+                        let mut options = QueryOptions { scratch, ..QueryOptions::default() };
+                        let strided = Strided::new(&rays);
+                        let mut hits = vec![Hit { primitive: 7, ..Hit::MISS }; rays.len()];
+                        let answers = &mut StridedMut::new(&mut hits);
+                        grid.intersect_n_with(
+                            &strided,
+                            answers,
+                            Coherence::Incoherent,
+                            &mut options,
+                        )
+                        .unwrap();
+                        assert_eq!(options.scratch.len(), bytes, "lent again");
+                        let mut occluded = vec![7_u8; rays.len()];
+                        let answers = &mut StridedMut::new(&mut occluded);
+                        grid.occluded_n_with(
+                            &strided,
+                            answers,
+                            Coherence::Incoherent,
+                            &mut options,
+                        )
+                        .unwrap();
+                        for (i, expected) in expected.iter().enumerate() {
+                            let what = format!("{level:?} {bytes} {from}: ray {i} {:?}", rays[i]);
+                            assert_eq!(bits(&hits[i]), bits(expected), "{what}");
+                            assert_eq!(occluded[i], u8::from(*expected != Hit::MISS), "{what}");
+                        }
+                        let (before, rest) = memory.split_at(from);
+                        let around = before.iter().chain(&rest[bytes..]);
+                        assert!(around.copied().all(|byte| byte == 0xa5));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Filters see each ray's place and the rays in order; counters count as single rays do.
+#[test]
+fn filters_and_counters_are_those_of_single_rays() {
+    let mesh = scene();
+    let view = mesh.view();
+    for config in methods::configs() {
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let rays = &rays(grid.bounds())[CLOSE..][..300];
+        for coherence in COHERENCES {
+            let (mut shown, mut expected_shown) = (Vec::new(), Vec::new());
+            let (mut work, mut expected_work) = (Counters::default(), Counters::default());
+            let mut expected = Vec::new();
+            let verdict = |hit: &Hit| {
+                if hit.primitive.is_multiple_of(3) { Verdict::Accept } else { Verdict::Reject }
+            };
+            for (place, ray) in rays.iter().enumerate() {
+                let mut filter = |at: usize, hit: &Hit| {
+                    assert_eq!(at, 0);
+                    expected_shown.push((place, *hit));
+                    verdict(hit)
+                };
+                let options = QueryOptions::counting(&mut expected_work);
+                let mut options = QueryOptions { filter: Some(&mut filter), ..options };
+                expected.push(grid.intersect_with(ray, &mut options).unwrap_or(Hit::MISS));
+            }
+            let mut filter = |place: usize, hit: &Hit| {
+                shown.push((place, *hit));
+                verdict(hit)
+            };
+            let mut scratch = vec![0; 16 * rays.len()];
+            let options = QueryOptions::counting(&mut work);
+            let mut options =
+                QueryOptions { filter: Some(&mut filter), scratch: &mut scratch, ..options };
+            let mut hits = vec![Hit::MISS; rays.len()];
+            let answers = &mut StridedMut::new(&mut hits);
+            grid.intersect_n_with(&Strided::new(rays), answers, coherence, &mut options).unwrap();
+            assert!(hits == expected && shown == expected_shown, "{:?}", config.method);
+            assert_eq!(work, expected_work);
+
+            // Without a filter.
+            let (mut work, mut expected_work) = (Counters::default(), Counters::default());
+            let expected = rays.iter().map(|ray| {
+                grid.occluded_with(ray, &mut QueryOptions::counting(&mut expected_work))
+            });
+            let expected: Vec<_> = expected.map(u8::from).collect();
+            let mut occluded = vec![7_u8; rays.len()];
+            let answers = &mut StridedMut::new(&mut occluded);
+            let options = &mut QueryOptions::counting(&mut work);
+            grid.occluded_n_with(&Strided::new(rays), answers, coherence, options).unwrap();
+            assert_eq!((occluded, work), (expected, expected_work), "{:?}", config.method);
         }
     }
 }

@@ -193,6 +193,120 @@ static void counters_add_up(hgrid_coherence coherence)
     CHECK(memcmp(hits, expected, sizeof hits) == 0);
 }
 
+/* Rays that start near two corners in turn, and go anywhere. */
+static void scatter(hgrid_ray *mixed, size_t count)
+{
+    uint32_t state = 1;
+    for (size_t i = 0; i < count; i++) {
+        const float corner = i % 2 == 0 ? 0.1f : 0.8f;
+        float numbers[4];
+        for (int k = 0; k < 4; k++) {
+            state = state * 1664525u + 1013904223u;
+            numbers[k] = (float)(state >> 8) / 16777216.0f;
+        }
+        mixed[i] = ray_down(corner + numbers[0] / 20, corner + numbers[1] / 20);
+        mixed[i].direction[0] = numbers[2] - 0.5f;
+        mixed[i].direction[1] = numbers[3] - 0.5f;
+    }
+}
+
+/* Of any size and alignment, with nothing around it touched; it changes no answer. */
+static void scratch_may_be_anything(void)
+{
+    enum { MIXED = 3000 };
+    static hgrid_ray mixed[MIXED];
+    static hgrid_hit alone[MIXED], hits[MIXED];
+    static uint8_t occluded[MIXED];
+    const size_t all = 16 * (size_t)MIXED;
+    const size_t sizes[] = {0, 1, 15, 4096, 8191, 8192, 8200, 16 * 1000 + 1, all, all + 77};
+    const uint32_t masks[] = {UINT32_MAX, 1};
+    scatter(mixed, MIXED);
+    for (int m = 0; m < 2; m++) {
+        hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+        options.mask = masks[m], options.skip = 5;
+        for (size_t i = 0; i < MIXED; i++) {
+            const hgrid_hit miss = {INFINITY, 0, 0, HGRID_INVALID_ID};
+            alone[i] = miss;
+            (void)hgrid_intersect(&grid, &mixed[i], &options, &alone[i]);
+        }
+        for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
+            for (size_t off = 0; off < 4; off += 3) {
+                /* Ends where nobody may touch. */
+                unsigned char *room = (unsigned char *)guarded(sizes[s] + off);
+                options.scratch = room + off, options.scratch_bytes = sizes[s];
+                EXPECT(HGRID_OK, hgrid_intersect_n(&grid, mixed, 0, hits, 0, MIXED,
+                                                   HGRID_COHERENCE_INCOHERENT, &options));
+                EXPECT(HGRID_OK, hgrid_occluded_n(&grid, mixed, 0, occluded, 0, MIXED,
+                                                  HGRID_COHERENCE_INCOHERENT, &options));
+                CHECK(memcmp(hits, alone, sizeof hits) == 0);
+                for (size_t i = 0; i < MIXED; i++)
+                    CHECK(occluded[i] == (alone[i].primitive != HGRID_INVALID_ID));
+                CHECK(all_bytes_are(room, off, 0xc7));
+            }
+    }
+}
+
+/* Masks, culling and a triangle to skip: as in single queries. */
+static void options_are_for_all_rays(hgrid_coherence coherence)
+{
+    const uint32_t culls[] = {HGRID_CULL_NONE, HGRID_CULL_BACK, HGRID_CULL_FRONT};
+    static hgrid_hit hits[RAYS];
+    static uint8_t occluded[RAYS];
+    for (int i = 0; i < 6; i++) {
+        hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+        options.cull = culls[i % 3], options.mask = i < 3 ? UINT32_MAX : 1;
+        options.skip = i % 2 == 0 ? HGRID_INVALID_ID : 7;
+        EXPECT(HGRID_OK, hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, coherence, &options));
+        EXPECT(HGRID_OK, hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, coherence, &options));
+        for (int ray = 0; ray < RAYS; ray++) {
+            hgrid_hit hit = {INFINITY, 0, 0, HGRID_INVALID_ID};
+            const bool is_hit = hgrid_intersect(&grid, &rays[ray], &options, &hit);
+            CHECK(memcmp(&hit, &hits[ray], sizeof hit) == 0 && occluded[ray] == is_hit);
+        }
+    }
+}
+
+/* Scratch lies apart from all else that the call uses. */
+static void scratch_is_nobody_elses(void)
+{
+    enum { COUNT = 10 };
+    static struct {
+        unsigned char before[64];
+        hgrid_ray rays[COUNT];
+        hgrid_hit hits[COUNT];
+        unsigned char behind[64];
+    } all;
+    hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+    const struct {
+        hgrid_status status;
+        void *scratch;
+        size_t bytes;
+    } cases[] = {
+        {HGRID_OK, all.before, sizeof all.before},
+        {HGRID_OK, all.behind, sizeof all.behind},
+        {HGRID_ERROR_OVERLAP, all.before, sizeof all.before + 1},
+        {HGRID_ERROR_OVERLAP, &all.rays[3], 1},
+        {HGRID_ERROR_OVERLAP, &all.hits[COUNT - 1], sizeof(hgrid_hit) + 3},
+        {HGRID_ERROR_OVERLAP, mesh_data.positions, 4},
+        {HGRID_ERROR_OVERLAP, mesh_data.indices, 400},
+        {HGRID_OK, all.rays, 0},
+        {HGRID_OK, NULL, 0},
+        {HGRID_ERROR_NULL_ARGUMENT, NULL, 16},
+    };
+    memcpy(all.rays, rays, sizeof all.rays);
+    for (hgrid_coherence c = 0; c < 2; c++)
+        for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+            options.scratch = cases[i].scratch, options.scratch_bytes = cases[i].bytes;
+            memset(all.hits, 0xc7, sizeof all.hits);
+            EXPECT(cases[i].status,
+                   hgrid_intersect_n(&grid, all.rays, 0, all.hits, 0, COUNT, c, &options));
+            CHECK((cases[i].status == HGRID_OK) !=
+                  all_bytes_are(all.hits, sizeof all.hits, 0xc7));
+            /* Queries of one ray do not look at it. */
+            CHECK(hgrid_occluded(&grid, &rays[0], &options) == expected_occluded[0]);
+        }
+}
+
 /* Both calls with one argument wrong must say so and write nothing. */
 typedef struct {
     const hgrid_grid *grid;
@@ -378,8 +492,11 @@ int main(void)
             rays_and_answers_in_one_struct(COHERENCES[c]);
             packed_pairs(COHERENCES[c]);
             counters_add_up(COHERENCES[c]);
+            options_are_for_all_rays(COHERENCES[c]);
         }
+        scratch_may_be_anything();
     }
+    scratch_is_nobody_elses();
     misuse_is_refused();
     impossible_strides_are_refused();
     overlaps_are_refused();

@@ -68,6 +68,8 @@ static void layout(void)
     OFFSET(hgrid_query_options, context);
     OFFSET(hgrid_query_options, filter);
     OFFSET(hgrid_query_options, counters);
+    OFFSET(hgrid_query_options, scratch);
+    OFFSET(hgrid_query_options, scratch_bytes);
     SIZE(hgrid_closest);
     OFFSET(hgrid_closest, position);
     OFFSET(hgrid_closest, distance);
@@ -215,9 +217,9 @@ static void defaults(void)
     printf("mesh %lu %lu %d %zu %zu %d %zu %zu %d %zu\n", (unsigned long)m.struct_size,
            (unsigned long)m.index_type, m.positions != NULL, m.position_stride, m.vertex_count,
            m.indices != NULL, m.index_stride, m.triangle_count, m.masks != NULL, m.mask_stride);
-    printf("query_options %lu %#lx %lu %#lx %d %d %d\n", (unsigned long)o.struct_size,
+    printf("query_options %lu %#lx %lu %#lx %d %d %d %d %zu\n", (unsigned long)o.struct_size,
            (unsigned long)o.mask, (unsigned long)o.cull, (unsigned long)o.skip, o.context != NULL,
-           o.filter != NULL, o.counters != NULL);
+           o.filter != NULL, o.counters != NULL, o.scratch != NULL, o.scratch_bytes);
     printf("report %lu %lu %llu %llu %#lx %lu %lu %g %lu %lu %lu %lu\n",
            (unsigned long)r.struct_size, (unsigned long)r.is_exact,
            (unsigned long long)r.index_bytes, (unsigned long long)r.scratch_bytes,

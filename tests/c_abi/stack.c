@@ -27,7 +27,7 @@ typedef struct {
 static job by_one_task, by_many_tasks;
 
 static hgrid_grid grid;
-static hgrid_ray rays[RAYS];
+static hgrid_ray rays[RAYS], mixed[RAYS];
 static hgrid_hit hits[RAYS];
 static uint8_t occluded[RAYS];
 static hgrid_counters counters;
@@ -78,7 +78,13 @@ static void closest(void)
 static void many(void)
 {
     const hgrid_query_options all = options();
+    hgrid_query_options masked = HGRID_QUERY_OPTIONS_INIT;
+    masked.mask = 1;
     for (hgrid_coherence c = 0; c < 2; c++) {
+        /* Far from each other, some of them to be sorted, some to be traced alone. */
+        CHECK(hgrid_intersect_n(&grid, mixed, 0, hits, 0, RAYS, c, NULL) == HGRID_OK);
+        CHECK(hgrid_intersect_n(&grid, mixed, 0, hits, 0, RAYS, c, &masked) == HGRID_OK);
+        CHECK(hgrid_occluded_n(&grid, mixed, 0, occluded, 0, RAYS, c, &masked) == HGRID_OK);
         CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, c, NULL) == HGRID_OK);
         CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, c, NULL) == HGRID_OK);
         CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, c, &all) == HGRID_OK);
@@ -225,6 +231,12 @@ int main(void)
             rays[i].origin[2] = CENTER[2] + 1.2f * WIDTH[crowd];
             rays[i].direction[0] = i % 7 == 0 ? -3.0f : 0.0f;
         }
+    }
+    for (int i = 0; i < RAYS; i++) {
+        /* The first window starts at two places, the rest anywhere. */
+        const float there = (float)(i % 2) / 2 + (float)(i % 64) / 1000;
+        mixed[i] = i < 512 ? ray_down(0.1f + there, 0.2f) : rays[i * 127 % RAYS];
+        mixed[i].direction[1] = (float)(i % 5) / 10;
     }
     /* The builds come first: the others ask the grid that they leave. */
     struct {

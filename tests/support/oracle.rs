@@ -79,7 +79,7 @@ fn check_order(grid: &Grid<'_>, ray: &Ray, all: &[Hit]) {
     }
     for passed in [0, 1, all.len() / 2, all.len()] {
         let (mut shown, mut again) = (Vec::new(), Vec::new());
-        let mut reject = |hit: &Hit| {
+        let mut reject = |_, hit: &Hit| {
             shown.push(*hit);
             if shown.len() > passed { Verdict::Accept } else { Verdict::Reject }
         };
@@ -87,14 +87,14 @@ fn check_order(grid: &Grid<'_>, ray: &Ray, all: &[Hit]) {
         assert_eq!(grid.intersect_with(ray, &mut options), all.get(passed).copied(), "{ray:?}");
         assert_eq!(shown, all[..(passed + 1).min(all.len())], "shown to the filter {ray:?}");
 
-        let mut stop = |hit: &Hit| {
+        let mut stop = |_, hit: &Hit| {
             again.push(*hit);
             if again.len() > passed { Verdict::AcceptAndStop } else { Verdict::Reject }
         };
         let mut options = QueryOptions { filter: Some(&mut stop), ..QueryOptions::default() };
         assert_eq!(grid.occluded_with(ray, &mut options), passed < all.len(), "{ray:?}");
         again.clear();
-        let mut stop = |hit: &Hit| {
+        let mut stop = |_, hit: &Hit| {
             again.push(*hit);
             if again.len() > passed { Verdict::AcceptAndStop } else { Verdict::Accept }
         };

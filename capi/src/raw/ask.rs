@@ -4,31 +4,40 @@
 
 use core::ptr::NonNull;
 
-use hgrid_core::{
-    ClosestPoint, Counters, Cull, Error, Grid, Hit, QueryOptions, Ray, Surface, Verdict,
-};
+use hgrid_core::{ClosestPoint, Counters, Cull, Grid, Hit, QueryOptions, Ray, Surface, Verdict};
 
-use super::{bytes_mut, grid, read, read_sized, write};
+use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
 use crate::batch::Batch;
 use crate::questions::{hgrid_counters, hgrid_hit, hgrid_query_options, hgrid_ray, verdict};
+use crate::span::Region;
 use crate::status::{
-    HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_NULL_ARGUMENT, hgrid_status, status_of,
+    HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP, hgrid_status,
 };
 use crate::types::{Elements, hgrid_grid};
 
-/// The options of a query, `None` if they are the defaults.
+/// What a caller told a query, `None` if it is nothing but the defaults.
 ///
 /// # Safety
 /// The caller's promise.
 #[inline(always)]
 unsafe fn options(options: *const hgrid_query_options) -> Result<Option<Asked>, hgrid_status> {
+    // SAFETY: the caller's promise.
+    let asked = unsafe { all_options(options) }?;
+    Ok(asked.filter(|asked| !asked.options.are_default()))
+}
+
+/// What a caller told a query, `None` if it is nothing.
+///
+/// # Safety
+/// The caller's promise.
+#[inline(always)]
+unsafe fn all_options(options: *const hgrid_query_options) -> Result<Option<Asked>, hgrid_status> {
     if options.is_null() {
         return Ok(None);
     }
     // SAFETY: the caller's promise.
     let options = unsafe { read_sized(options) }?;
-    let cull = options.cull()?;
-    Ok(if options.are_default() { None } else { Some(Asked { options, cull }) })
+    Ok(Some(Asked { options, cull: options.cull()? }))
 }
 
 /// What a caller told a query.
@@ -38,14 +47,13 @@ struct Asked {
 }
 
 impl Asked {
-    /// Asks a question with the options as core knows them, about the ray at a place of its batch,
-    /// and adds the work to the caller's.
+    /// Asks a question with the options as core knows them, and adds the work to the caller's.
     ///
     /// # Safety
     /// The caller's promise.
-    unsafe fn ask<T>(&self, ray: usize, ask: impl FnOnce(&mut QueryOptions<'_>) -> T) -> T {
+    unsafe fn ask<T>(&self, ask: impl FnOnce(&mut QueryOptions<'_>) -> T) -> T {
         // SAFETY: this function's contract.
-        unsafe { self.ask_and_see(ray, |_| {}, ask) }
+        unsafe { self.ask_and_see(|_| {}, ask) }
     }
 
     /// The same; `see` is shown what the caller's filter accepts.
@@ -54,13 +62,12 @@ impl Asked {
     /// The caller's promise.
     unsafe fn ask_and_see<T>(
         &self,
-        ray: usize,
         mut see: impl FnMut(hgrid_hit),
         ask: impl FnOnce(&mut QueryOptions<'_>) -> T,
     ) -> T {
         let hgrid_query_options { mask, skip, context, filter, counters, .. } = self.options;
         let mut work = Counters::default();
-        let mut offer = |hit: &Hit| {
+        let mut offer = |ray: usize, hit: &Hit| {
             let hit = hgrid_hit::from(*hit);
             let Some(filter) = filter else { return Verdict::Accept };
             // SAFETY: a function of this type by the caller's promise;
@@ -108,7 +115,7 @@ pub(crate) unsafe fn query<T>(
     match unsafe { options(asked) }? {
         None => Ok(plain(grid, &ray)),
         // SAFETY: the caller's promise.
-        Some(asked) => Ok(unsafe { asked.ask(0, |options| with(grid, &ray, options)) }),
+        Some(asked) => Ok(unsafe { asked.ask(|options| with(grid, &ray, options)) }),
     }
 }
 
@@ -146,7 +153,7 @@ pub(crate) unsafe fn query_all(
         };
         let all = |options: &mut QueryOptions<'_>| grid.intersect_all(&ray, options, &mut []);
         // SAFETY: the caller's promise.
-        return Ok(unsafe { asked.ask_and_see(0, see, all) });
+        return Ok(unsafe { asked.ask_and_see(see, all) });
     }
     // SAFETY: the caller's promise; hits overlap nothing else that the call uses.
     let hits = unsafe { bytes_mut(hits.cast(), bytes) }?;
@@ -157,7 +164,7 @@ pub(crate) unsafe fn query_all(
     match asked {
         None => Ok(all(&mut QueryOptions::default())),
         // SAFETY: the caller's promise.
-        Some(asked) => Ok(unsafe { asked.ask(0, all) }),
+        Some(asked) => Ok(unsafe { asked.ask(all) }),
     }
 }
 
@@ -180,7 +187,7 @@ pub(crate) unsafe fn closest(
     match unsafe { options(asked) }? {
         None => Ok(find(&mut QueryOptions::default())),
         // SAFETY: the caller's promise.
-        Some(asked) => Ok(unsafe { asked.ask(0, find) }),
+        Some(asked) => Ok(unsafe { asked.ask(find) }),
     }
 }
 
@@ -202,53 +209,62 @@ pub(crate) unsafe fn surface(
     Ok(grid.mesh().surface(&ray.into(), &hit.into()))
 }
 
-/// How many rays of a batch are read before their answers are written: as many as go through a grid
-/// together. The buffers are 6 KiB.
-const CHUNK: usize = 128;
-
-/// Runs a batch: `many` answers a chunk of rays, or with options `one` a single ray.
-/// `unanswered` is written nowhere.
+/// Runs a batch: `trace` gets the rays as core asks for them, and what the caller told.
 ///
 /// # Safety
 /// That of [`grid`]; and the elements of both arrays are the caller's to be read and written.
-pub(crate) unsafe fn batch<A: Copy, T: From<A>>(
+pub(crate) unsafe fn batch<T>(
     view: *const hgrid_grid,
     batch: &Batch<T>,
     asked: *const hgrid_query_options,
-    unanswered: A,
-    many: impl Fn(&Grid<'static>, &[Ray], &mut [A]) -> Result<(), Error>,
-    one: impl Fn(&Grid<'static>, &Ray, &mut QueryOptions<'_>) -> A,
+    trace: impl FnOnce(&Grid<'static>, &mut Arrays<'_, T>, &mut QueryOptions<'_>),
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let grid = unsafe { grid(view) }?;
     // SAFETY: the caller's promise.
-    let asked = unsafe { options(asked) }?;
-    let mut rays = [Ray::new([0.0; 3], [0.0; 3]); CHUNK];
-    let mut answers = [unanswered; CHUNK];
-    for first in (0..batch.count).step_by(CHUNK) {
-        let count = CHUNK.min(batch.count - first);
-        let rays = rays.get_mut(..count).unwrap_or_default();
-        let answers = answers.get_mut(..count).unwrap_or_default();
-        for (index, ray) in (first..).zip(&mut *rays) {
-            // SAFETY: within the array by its index, readable by this function's contract, and any
-            // bytes are a ray.
-            *ray = unsafe { batch.ray(index).read_unaligned() }.into();
-        }
-        match &asked {
-            None => many(grid, rays, answers).map_err(status_of)?,
-            Some(asked) => {
-                for (index, (ray, answer)) in (first..).zip(rays.iter().zip(&mut *answers)) {
-                    // SAFETY: the caller's promise.
-                    *answer = unsafe { asked.ask(index, |options| one(grid, ray, options)) };
-                }
-            }
-        }
-        for (index, &answer) in (first..).zip(&*answers) {
-            // SAFETY: within the array by its index, writable by this function's contract.
-            unsafe { batch.answer(index).write_unaligned(answer.into()) };
-        }
+    let asked = unsafe { all_options(asked) }?;
+    let mut arrays = Arrays(batch);
+    let Some(asked) = asked else {
+        trace(grid, &mut arrays, &mut QueryOptions::default());
+        return Ok(());
+    };
+    let hgrid_query_options { scratch, scratch_bytes, .. } = asked.options;
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    if batch.overlaps(scratch.span()) {
+        return Err(HGRID_ERROR_OVERLAP);
     }
+    // SAFETY: this function's contract, and no element of the batch lies there.
+    let scratch = unsafe { bytes_beside(grid, scratch) }?;
+    let trace = |options: &mut QueryOptions<'_>| {
+        options.scratch = scratch;
+        trace(grid, &mut arrays, options);
+    };
+    // SAFETY: the caller's promise.
+    unsafe { asked.ask(trace) };
     Ok(())
+}
+
+/// The arrays of a batch while it runs: by [`batch`]'s contract rays may be read and answers written.
+pub(crate) struct Arrays<'b, T>(&'b Batch<T>);
+
+impl<A, T: From<A>> hgrid_core::Batch<A> for Arrays<'_, T> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.0.count
+    }
+
+    #[inline(always)]
+    fn ray(&self, place: usize) -> Ray {
+        // SAFETY: within the array by its place, readable by the contract above, and any bytes are
+        // a ray.
+        unsafe { self.0.ray(place).read_unaligned() }.into()
+    }
+
+    #[inline(always)]
+    fn answer(&mut self, place: usize, answer: A) {
+        // SAFETY: within the array by its place, writable by the contract above.
+        unsafe { self.0.answer(place).write_unaligned(answer.into()) };
+    }
 }
 
 /// Adds the work of queries to the caller's.

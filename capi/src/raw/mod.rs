@@ -32,7 +32,7 @@ use core::slice;
 
 use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
-pub(crate) use ask::{batch, closest, query, query_all, surface};
+pub(crate) use ask::{Arrays, batch, closest, query, query_all, surface};
 
 use crate::input::Input;
 use crate::questions::hgrid_refit_report;

@@ -4,48 +4,66 @@ use fearless_simd::Simd;
 
 use super::Bvh;
 use super::group::{Group, Stack};
+use super::order::{self, Entry};
 use super::rays::{GROUP, Rays};
 use crate::aabb::Aabb;
-use crate::mesh::{Strided, TriangleMesh};
-use crate::ray::Hit;
+use crate::batch::Together;
+use crate::mesh::TriangleMesh;
+use crate::options::Choice;
 use crate::simd::Kernel;
 
-/// The rays of a batch, as given.
-pub(crate) struct Groups<'r, A, const ANY: bool> {
+/// The rays of a batch, which go in groups.
+pub(crate) struct Groups<'r, C, const ANY: bool> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
     pub(crate) bounds: Aabb,
-    pub(crate) rays: &'r Strided<'r>,
-    /// Gets the place of a ray and its hit and perhaps those of the next ones, or no hit for a ray that must
-    /// be traced alone.
-    pub(crate) answer: A,
+    pub(crate) choice: Choice,
+    /// Where rays may be sorted; nothing if they are taken as given.
+    pub(crate) memory: &'r mut [Entry],
+    pub(crate) batch: &'r mut C,
 }
 
-impl<A: FnMut(usize, &[Hit]), const ANY: bool> Kernel for Groups<'_, A, ANY> {
+impl<C: Together, const ANY: bool> Kernel for Groups<'_, C, ANY> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { bvh, mesh, bounds, rays: batch, mut answer } = self;
-        let (rays, stack) = (&mut Rays::new(), &mut Stack::new());
+        let Self { bvh, mesh, bounds, choice, memory, batch } = self;
+        let (rays, stack) = (&mut Rays::new(choice), &mut Stack::new());
+        let mut places = [0; GROUP];
+        let window = order::window(memory);
+        let all = batch.count();
         let mut first = 0;
-        while first < batch.count {
-            let count = (batch.count - first).min(GROUP);
-            for (ray, at) in rays.slots().iter_mut().zip(first..first + count) {
-                *ray = batch.read(at);
-            }
-            let mut alone = rays.prepare(simd, count, &bounds);
-            if rays.are_scattered(&bounds) {
-                alone |= rays.alive;
+        while first < all {
+            // Sort a window of rays, or take all of them as they are.
+            let of_window = if window > 0 { window.min(all - first) } else { all };
+            let order = if window > 0 {
+                order::sort(batch, first, of_window, &bounds, memory)
             } else {
-                Group::<ANY> { bvh, mesh, rays, stack }.run(simd);
+                None
+            };
+            for start in (0..of_window).step_by(GROUP) {
+                let count = (of_window - start).min(GROUP);
+                let slots = (start..).zip(places.iter_mut().zip(rays.slots())).take(count);
+                for (at, (place, ray)) in slots {
+                    *place = first + order.as_ref().map_or(at, |order| order.place(at));
+                    *ray = batch.ray(*place);
+                }
+                let mut alone = rays.prepare(simd, count, &bounds);
+                if rays.are_scattered(&bounds) {
+                    alone |= rays.alive;
+                } else {
+                    Group::<ANY> { bvh, mesh, rays, stack }.run(simd);
+                }
+                for (lane, &place) in places.iter().enumerate().take(count) {
+                    if alone >> lane & 1 == 0 {
+                        batch.found(place, &rays.hits[lane % GROUP]);
+                    } else {
+                        batch.alone(place);
+                    }
+                }
             }
-            answer(first, rays.hits.get(..count).unwrap_or_default());
-            while alone != 0 {
-                answer(first + alone.trailing_zeros() as usize, &[]);
-                alone &= alone - 1;
-            }
-            first += count;
+            first += of_window;
         }
     }
 }

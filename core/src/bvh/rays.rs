@@ -10,6 +10,7 @@ use crate::approach::FAR_EXTENTS;
 use crate::eight::columns;
 use crate::filter::{Filter, NEARBY_LONG, NEARBY_SHORT, RayFilter};
 use crate::mesh::TriangleMesh;
+use crate::options::{Choice, Cull};
 use crate::pairs;
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::triangle::TriangleTest;
@@ -28,6 +29,8 @@ const ZEROS: Row = [[0.0; 8]; OCTETS];
 pub(crate) struct Rays {
     /// Bit `i`: ray `i` is still on its way.
     pub(crate) alive: u64,
+    /// The triangles that they see.
+    choice: Choice,
     /// Where boxes and origins are measured from, and by how much boxes grow for that.
     pub(crate) center: [f32; 3],
     pub(crate) spread: f32,
@@ -63,10 +66,11 @@ const FEW_PAIRS: usize = 2;
 const UNIT: f32 = 1.0 / 16_777_216.0;
 
 impl Rays {
-    pub(crate) const fn new() -> Self {
+    pub(crate) const fn new(choice: Choice) -> Self {
         let ray = Ray { origin: [0.0; 3], t_min: 0.0, direction: [0.0; 3], t_max: 0.0 };
         Self {
             alive: 0,
+            choice,
             center: [0.0; 3],
             spread: 0.0,
             origin: [ZEROS; 3],
@@ -291,6 +295,9 @@ impl Rays {
         ray: u32,
         id: u32,
     ) {
+        if !self.choice.has(mesh, id) {
+            return;
+        }
         self.pair_places[self.pair_count % PAIRS] = ray;
         self.pair_ids[self.pair_count % PAIRS] = id;
         self.pair_count += 1;
@@ -333,7 +340,11 @@ impl Rays {
         let ray = |at: usize| &self.given[of[at] as usize % GROUP];
         let rays = [ray(0), ray(1), ray(2), ray(3), ray(4), ray(5), ray(6), ray(7)];
         let decided = pairs::decide(simd, mesh, rays, ids, count);
-        let mut hits = decided.hits;
+        let mut hits = match self.choice.cull {
+            Cull::None => decided.hits,
+            Cull::Back => decided.hits & decided.fronts,
+            Cull::Front => decided.hits & !decided.fronts,
+        };
         while hits != 0 {
             let lane = hits.trailing_zeros() as usize % PAIRS;
             hits &= hits - 1;
@@ -351,7 +362,7 @@ impl Rays {
     #[inline(never)]
     fn decide_one<const ANY: bool>(&mut self, mesh: &TriangleMesh<'_>, ray: u32, id: u32) {
         let at = ray as usize % GROUP;
-        let test = TriangleTest::with(&self.given[at], RayFilter::NONE);
+        let test = TriangleTest::with(&self.given[at], RayFilter::NONE).culling(self.choice.cull);
         let hit = test.decide(mesh, id);
         if hit.primitive != INVALID_ID {
             self.found::<ANY>(ray, hit);

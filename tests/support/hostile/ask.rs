@@ -131,7 +131,7 @@ fn in_order(grid: &Grid<'_>, ray: &Ray) {
     assert!(count <= grid.mesh().triangle_count() as usize, "{ray:?}");
     assert!(is_ordered(&hits[..count.min(5)]), "{hits:?} {ray:?}");
     let mut shown = Vec::new();
-    let mut filter = |hit: &Hit| {
+    let mut filter = |_, hit: &Hit| {
         shown.push(*hit);
         [Verdict::Reject, Verdict::Reject, Verdict::Accept][shown.len() % 3]
     };

@@ -25,7 +25,11 @@ pub(super) struct Options {
     options: Struct<hgrid_query_options>,
     filter: Lent<Filter>,
     counters: Lent<hgrid_counters>,
+    scratch: Lent<[u8; SCRATCH]>,
 }
+
+/// More than a window on the stack has.
+const SCRATCH: usize = 9000;
 
 /// Says of hit after hit what two bits say, round and round.
 struct Filter {
@@ -74,7 +78,15 @@ impl Options {
             context: context.as_ptr().cast(),
             filter: if has_filter { Some(filter) } else { None },
             counters: if has_counters { counters.as_ptr() } else { null_mut() },
+            scratch: null_mut(),
+            scratch_bytes: 0,
         };
+        let scratch = Lent::new([0xa5; SCRATCH]);
+        if bool::arbitrary(u)? {
+            let from = u.int_in_range(0..=9)?;
+            options.scratch = scratch.as_ptr().cast::<u8>().wrapping_add(from).cast();
+            options.scratch_bytes = u.int_in_range(0..=SCRATCH - from)?;
+        }
         if !is_plain {
             options.mask = u8::arbitrary(u)?.into();
             options.cull = u.int_in_range(0..=2)?;
@@ -83,7 +95,7 @@ impl Options {
         if rarely(u, 32)? {
             options.cull = u32::arbitrary(u)?;
         }
-        Ok(Self { options: Struct::new(u, options)?, filter: context, counters })
+        Ok(Self { options: Struct::new(u, options)?, filter: context, counters, scratch })
     }
 
     /// NULL is fine.
@@ -113,7 +125,7 @@ impl Options {
         let verdicts = self.filter.verdicts;
         let Told { shown, work } = told;
         let again = Filter { verdicts, shown: RefCell::new(std::mem::take(shown)) };
-        let mut offer = |hit: &Hit| match again.ask(ray, bits(hit)) {
+        let mut offer = |_, hit: &Hit| match again.ask(ray, bits(hit)) {
             HGRID_ACCEPT => Verdict::Accept,
             HGRID_ACCEPT_AND_STOP => Verdict::AcceptAndStop,
             _ => Verdict::Reject,
@@ -138,10 +150,9 @@ impl Options {
                 == [work.primitive_tests + 1, work.cell_steps + 2, work.grid_steps + 3]
     }
 
-    /// Whether rays are traced one by one.
-    pub(super) fn are_default(&self) -> bool {
-        let hgrid_query_options { mask, cull, skip, filter, counters, .. } = *self.options.value();
-        let is_plain = mask == u32::MAX && cull == HGRID_CULL_NONE && skip == INVALID_ID;
-        self.options.is_null() || is_plain && filter.is_none() && counters.is_null()
+    /// Whether rays of a batch may be traced together.
+    pub(super) fn let_rays_go_together(&self) -> bool {
+        let hgrid_query_options { filter, counters, .. } = *self.options.value();
+        self.options.is_null() || filter.is_none() && counters.is_null()
     }
 }

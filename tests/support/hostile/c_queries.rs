@@ -267,7 +267,7 @@ impl Caller<'_> {
         }
         assert!(core.is_some() && options.are_sound() && coherence <= HGRID_COHERENCE_COHERENT);
         // Rays that go together may find other triangles in damaged lists.
-        if is_right || !options.are_default() {
+        if is_right || !options.let_rays_go_together() {
             assert!(memory.bytes() == expected, "other answers, or written beside them");
         }
         assert!(options.agree(&told), "shown or counted otherwise");
