@@ -20,7 +20,7 @@ use crate::header::DIALECTS;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
 /// flavour of the library that they need.
-const PROGRAMS: [(&str, Flavour); 16] = [
+const PROGRAMS: [(&str, Flavour); 17] = [
     ("queries", Flavour::NoStd),
     ("options", Flavour::NoStd),
     ("batches", Flavour::NoStd),
@@ -29,6 +29,7 @@ const PROGRAMS: [(&str, Flavour); 16] = [
     ("methods", Flavour::NoStd),
     ("parallel", Flavour::NoStd),
     ("progress", Flavour::NoStd),
+    ("nested", Flavour::NoStd),
     ("threads", Flavour::NoStd),
     ("nulls", Flavour::NoStd),
     ("structs", Flavour::NoStd),
