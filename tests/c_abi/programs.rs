@@ -29,6 +29,7 @@ const PROGRAMS: [(&str, Flavour); 17] = [
     ("methods", Flavour::NoStd),
     ("parallel", Flavour::NoStd),
     ("progress", Flavour::NoStd),
+    ("nested", Flavour::NoStd),
     ("threads", Flavour::NoStd),
     ("nulls", Flavour::NoStd),
     ("structs", Flavour::NoStd),
