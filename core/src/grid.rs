@@ -327,17 +327,15 @@ impl<'a> Grid<'a> {
         tally: &mut T,
     ) -> bool {
         let mesh = &self.mesh;
-        if bvh.is_shallow() {
-            let stack = &mut [0; bvh::SMALL_STACK];
-            let mut ray =
-                bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
-            dispatch(self.simd, &mut ray)
-        } else {
-            let stack = &mut [0; bvh::STACK];
-            let mut ray =
-                bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
-            dispatch(self.simd, &mut ray)
-        }
+        let simd = self.simd;
+        bvh.with_stack(
+            #[inline(always)]
+            |stack| {
+                let mut ray =
+                    bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
+                dispatch(simd, &mut ray)
+            },
+        )
     }
 
     /// Shows a search what a ray hits of all triangles.
@@ -436,15 +434,14 @@ impl<'a> Grid<'a> {
             return false;
         }
         let (mesh, bounds) = (&self.mesh, &self.lattice.bounds());
-        if bvh.is_shallow() {
-            let stack = &mut [0; bvh::SMALL_STACK];
-            let nearest = Nearest { bvh, mesh, bounds, point, within, test, tally, stack };
-            dispatch(self.simd, nearest);
-        } else {
-            let stack = &mut [0; bvh::STACK];
-            let nearest = Nearest { bvh, mesh, bounds, point, within, test, tally, stack };
-            dispatch(self.simd, nearest);
-        }
+        let simd = self.simd;
+        bvh.with_stack(
+            #[inline(always)]
+            |stack| {
+                let mut nearest = Nearest { bvh, mesh, bounds, point, within, test, tally, stack };
+                dispatch(simd, &mut nearest);
+            },
+        );
         true
     }
 

@@ -43,7 +43,7 @@ impl Lights {
 
     /// Asks what reaches the hits of a tile's rays; `lamp` is the direction toward the lamp.
     pub(crate) fn reach(
-        &self,
+        self,
         grid: &Grid<'_>,
         lamp: [f32; 3],
         rays: &[Ray],

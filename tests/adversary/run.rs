@@ -296,7 +296,7 @@ impl Compare<'_> {
         let passed = random.below(hits.len() + 2);
         let is_stopped = random.below(2) == 0;
         let mut shown = Vec::new();
-        let mut filter = |hit: &Hit| {
+        let mut filter = |_: usize, hit: &Hit| {
             shown.push(*hit);
             match () {
                 () if shown.len() <= passed => Verdict::Reject,
@@ -310,7 +310,7 @@ impl Compare<'_> {
         is_right &= are_same(&shown, &hits[..(passed + 1).min(hits.len())]);
 
         let mut count = 0;
-        let mut filter = |_: &Hit| {
+        let mut filter = |_: usize, _: &Hit| {
             count += 1;
             let is_last = is_stopped && count > passed;
             if is_last { Verdict::AcceptAndStop } else { Verdict::Accept }

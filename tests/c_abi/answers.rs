@@ -41,14 +41,16 @@ fn with_options(
     ask: impl FnOnce(&mut QueryOptions<'_>),
 ) {
     let mut asked = 0;
-    let mut filter = |hit: &Hit| {
+    let mut filter = |_: usize, hit: &Hit| {
         assert_eq!(Some(hit), offered.get(asked), "out of order");
         asked += 1;
         verdict(rule, hit.primitive)
     };
-    let filter: Option<&mut dyn FnMut(&Hit) -> Verdict> =
-        if rule == 0 { None } else { Some(&mut filter) };
-    ask(&mut QueryOptions { mask, cull, skip, filter, counters });
+    let mut options = QueryOptions { mask, cull, skip, counters, ..QueryOptions::default() };
+    if rule != 0 {
+        options.filter = Some(&mut filter);
+    }
+    ask(&mut options);
 }
 
 /// One ray in every query that there is for one.

@@ -20,7 +20,7 @@ use crate::header::DIALECTS;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
 /// flavour of the library that they need.
-const PROGRAMS: [(&str, Flavour); 17] = [
+const PROGRAMS: [(&str, Flavour); 18] = [
     ("queries", Flavour::NoStd),
     ("options", Flavour::NoStd),
     ("batches", Flavour::NoStd),

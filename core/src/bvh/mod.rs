@@ -51,7 +51,7 @@ pub(crate) use order::Entry;
 pub(crate) use refit::refit;
 pub(crate) use slab::Slab;
 pub(crate) use validate::proof_bytes;
-pub(crate) use walk::{OneRay, SMALL_STACK, STACK};
+pub(crate) use walk::OneRay;
 
 /// Levels of nodes, at most: 20 by SAH and 9 that halve roots ([`top`]), 32 of a subtree, whose nodes take
 /// seven triangles each ([`subtree`]).
@@ -81,9 +81,15 @@ impl<'a> Bvh<'a> {
         Ok(Self { nodes, ids, levels: header.levels.min(LEVELS) })
     }
 
-    /// Whether a small stack is enough for a ray.
-    pub(crate) const fn is_shallow(&self) -> bool {
-        self.levels <= walk::FEW_LEVELS
+    /// Lends a stack that is enough for a ray or a point: a small one for nearly all trees, which is sooner
+    /// set to zeros.
+    #[inline(always)]
+    pub(crate) fn with_stack<R>(&self, walk: impl FnOnce(&mut [walk::Waiting]) -> R) -> R {
+        if self.levels <= walk::FEW_LEVELS {
+            walk(&mut [0; walk::SMALL_STACK])
+        } else {
+            with_deep_stack(walk)
+        }
     }
 
     /// The ids of all leaves.
@@ -123,4 +129,10 @@ impl<'a> Bvh<'a> {
             })
         })
     }
+}
+
+/// Out of line, or shallow trees would have the large stack, too.
+#[inline(never)]
+fn with_deep_stack<R>(walk: impl FnOnce(&mut [walk::Waiting]) -> R) -> R {
+    walk(&mut [0; walk::STACK])
 }

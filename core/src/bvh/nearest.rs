@@ -204,14 +204,14 @@ fn waiting(node: u32, slot: u32, away: f32) -> Waiting {
     u64::from(away.to_bits()) << 32 | u64::from(node << 3 | slot)
 }
 
-impl<F: FnMut(u32) -> f32, T: Tally> Kernel for Nearest<'_, F, T> {
+impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut Nearest<'_, F, T> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { bvh, mesh, bounds, point, within, mut test, tally, stack } = self;
-        let point = Point::new(point, bounds);
-        let mut reach = point.reach(within);
+        let Nearest { bvh, mesh, bounds, point, within, test, tally, stack } = self;
+        let point = Point::new(*point, bounds);
+        let mut reach = point.reach(*within);
         let mut top = 0;
         // Damaged bytes may lead in circles; a tree's nodes are entered once.
         let mut budget = bvh.budget();

@@ -25,7 +25,8 @@ pub(super) struct Options {
     options: Struct<hgrid_query_options>,
     filter: Lent<Filter>,
     counters: Lent<hgrid_counters>,
-    scratch: Lent<[u8; SCRATCH]>,
+    /// Nobody here reads it; it has to live as long as the options that point to it.
+    _scratch: Lent<[u8; SCRATCH]>,
 }
 
 /// More than a window on the stack has.
@@ -95,7 +96,7 @@ impl Options {
         if rarely(u, 32)? {
             options.cull = u32::arbitrary(u)?;
         }
-        Ok(Self { options: Struct::new(u, options)?, filter: context, counters, scratch })
+        Ok(Self { options: Struct::new(u, options)?, filter: context, counters, _scratch: scratch })
     }
 
     /// NULL is fine.

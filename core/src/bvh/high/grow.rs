@@ -130,16 +130,16 @@ impl Kernel for Grow<'_> {
             let mut boxes = [Aabb::EMPTY; WIDTH];
             let mut bounds = Aabb::EMPTY;
             let jobs_before = jobs;
-            for (slot, part) in parts.iter().enumerate() {
+            for (slot, (part, bounds_of)) in parts.iter().zip(&mut boxes).enumerate() {
                 if part.count() == 0 {
                     break;
                 }
-                boxes[slot] = corners(&part.extent.bounds);
-                bounds = bounds.union(&boxes[slot]);
+                *bounds_of = corners(&part.extent.bounds);
+                bounds = bounds.union(bounds_of);
                 if part.count() <= LEAF as u32 {
                     #[expect(clippy::cast_possible_truncation, reason = "eight at most")]
                     let count = part.count() as u8;
-                    node.counts[slot] = count;
+                    node.counts[slot % WIDTH] = count;
                     let items = self.items.get(part.start as usize..part.end as usize);
                     let ids = self.ids.get_mut(grown.ids as usize..).unwrap_or_default();
                     for (id, item) in ids.iter_mut().zip(items.unwrap_or_default()) {
@@ -192,6 +192,7 @@ impl Grow<'_> {
         let halve = job.level >= DEEP;
         for count in 1..WIDTH {
             let Some(at) = choose(&parts, halve) else { break };
+            let at = at % WIDTH;
             let part = parts[at];
             let range = part.start as usize..part.end as usize;
             let Some(items) = self.items.get_mut(range) else { break };

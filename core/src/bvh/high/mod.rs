@@ -190,7 +190,12 @@ fn boxes<const N: usize>(
         let first = share(all, task, tasks);
         // Those of a task stand behind those that others left out.
         if finite < first {
-            items.copy_within(first..first + count, finite);
+            for at in 0..count {
+                let item = items.get(first + at).copied();
+                if let (Some(item), Some(slot)) = (item, items.get_mut(finite + at)) {
+                    *slot = item;
+                }
+            }
         }
         finite += count;
         bounds = bounds.union(&bounds_of);
