@@ -4,9 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use hgrid_core::{
-    Coherence, Config, Counters, Grid, Hit, QueryOptions, Ray, Strided, StridedMut, Verdict,
-};
+use hgrid_core::{Coherence, Config, Counters, Grid, Hit, QueryOptions, Ray, Strided, StridedMut};
 use hgrid_tests::artefact::{clang, compiler, cpp_compiler, root, run, static_library};
 use hgrid_tests::owned::Owned;
 use tempfile::TempDir;

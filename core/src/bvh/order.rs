@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn rays_that_gain_nothing_stay_as_they_are() {
-        let memory = &mut [0; 6000];
+        let memory = &mut vec![0; 6000];
         // Too few for so many places; near each other; none at all.
         assert!(sort(&scattered(512, 400), 0, 512, &BOUNDS, memory).is_none());
         assert!(sort(&scattered(3000, 1), 0, 3000, &BOUNDS, memory).is_none());
