@@ -1,8 +1,10 @@
 //! hgrid itself.
 
+use core::cell::RefCell;
+
 use anyhow::Result;
 use hgrid_core::{
-    Coherence, Config, Control, Grid, Hit, Method, Quality, Ray, Strided, StridedMut,
+    Coherence, Config, Control, Grid, Hit, Method, Quality, QueryOptions, Ray, Strided, StridedMut,
 };
 
 use super::input::Input;
@@ -59,7 +61,8 @@ impl System for GridSystem {
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
         let mesh = input.mesh()?;
         let regions = Regions::build(mesh, &self.config)?;
-        then(&GridTracer { grid: Grid::open(&regions.index, mesh)?, config: &self.config })
+        let (grid, memory) = (Grid::open(&regions.index, mesh)?, RefCell::default());
+        then(&GridTracer { grid, config: &self.config, memory })
     }
 
     fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
@@ -67,13 +70,16 @@ impl System for GridSystem {
         let mut regions = Regions::build(mesh, &self.config)?;
         start();
         regions.rebuild(mesh, &self.config, &Control::default())?;
-        then(&GridTracer { grid: Grid::open(&regions.index, mesh)?, config: &self.config })
+        let (grid, memory) = (Grid::open(&regions.index, mesh)?, RefCell::default());
+        then(&GridTracer { grid, config: &self.config, memory })
     }
 }
 
 struct GridTracer<'a> {
     grid: Grid<'a>,
     config: &'a Config,
+    /// Where rays are sorted, kept from call to call.
+    memory: RefCell<Vec<u8>>,
 }
 
 impl Tracer for GridTracer<'_> {
@@ -81,9 +87,11 @@ impl Tracer for GridTracer<'_> {
         let Some(call) = Call::of(mode) else {
             return each(rays, hits, |ray| self.grid.intersect(ray).unwrap_or(Hit::MISS));
         };
+        let memory = &mut self.memory.borrow_mut();
+        let options = &mut call.options(rays.len(), memory);
         for (rays, hits) in rays.chunks(call.rays).zip(hits.chunks_mut(call.rays)) {
-            let answers = &mut StridedMut::new(&mut *hits);
-            if self.grid.intersect_n(&Strided::new(rays), answers, call.coherence).is_err() {
+            let (rays, answers) = (&Strided::new(rays), &mut StridedMut::new(&mut *hits));
+            if self.grid.intersect_n_with(rays, answers, call.coherence, options).is_err() {
                 hits.fill(Hit::MISS);
             }
         }
@@ -93,9 +101,11 @@ impl Tracer for GridTracer<'_> {
         let Some(call) = Call::of(mode) else {
             return each(rays, occluded, |ray| self.grid.occluded(ray).into());
         };
+        let memory = &mut self.memory.borrow_mut();
+        let options = &mut call.options(rays.len(), memory);
         for (rays, occluded) in rays.chunks(call.rays).zip(occluded.chunks_mut(call.rays)) {
-            let answers = &mut StridedMut::new(&mut *occluded);
-            if self.grid.occluded_n(&Strided::new(rays), answers, call.coherence).is_err() {
+            let (rays, answers) = (&Strided::new(rays), &mut StridedMut::new(&mut *occluded));
+            if self.grid.occluded_n_with(rays, answers, call.coherence, options).is_err() {
                 occluded.fill(0);
             }
         }
@@ -128,5 +138,14 @@ impl Call {
             Mode::Batch => Some(Self { rays: usize::MAX, coherence: Coherence::Incoherent }),
             _ => None,
         }
+    }
+
+    /// Options that lend memory for sorting so many rays, if the call may sort them.
+    fn options<'m>(&self, rays: usize, memory: &'m mut Vec<u8>) -> QueryOptions<'m> {
+        if self.coherence == Coherence::Incoherent {
+            // Sixteen bytes a ray, and those in front of the first that is aligned.
+            memory.resize(memory.len().max(16 * rays + 16), 0);
+        }
+        QueryOptions { scratch: memory, ..QueryOptions::default() }
     }
 }
