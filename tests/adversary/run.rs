@@ -113,28 +113,13 @@ fn one_mesh(random: &mut Random, name: String, mesh: &Mesh, levels: &[SimdLevel]
         for grid in &grids {
             let grid = grid.with_simd(levels[random.below(levels.len())]);
             let mut compare = Compare { scene: &scene, grid: &grid, done };
-            let all = asked.iter().filter(|one| !is_known(&grid, &one.ray));
-            let asked: Vec<&Asked> = all.collect();
+            let asked: Vec<&Asked> = asked.iter().collect();
             compare.one_by_one(random, &asked);
-            let all = asked.iter().filter(|one| !is_known_in_batches(&grid, &one.ray));
-            compare.batches(&all.copied().collect::<Vec<_>>());
+            compare.batches(&asked);
             done.pairs += asked.len() as u64;
         }
         done.rays += asked.len() as u64;
     }
-}
-
-/// Rays for which trees are known to lose hits: such that reach behind their origin.
-fn is_known(grid: &Grid<'_>, ray: &Ray) -> bool {
-    grid.method() == Method::Bvh && ray.t_min < 0.0
-}
-
-/// Rays whose neighbours in a batch are known to lose hits of trees: such that are none, and those whose
-/// numbers leave the range of f32 on the way.
-fn is_known_in_batches(grid: &Grid<'_>, ray: &Ray) -> bool {
-    let longest = ray.direction.iter().map(|c| c.abs()).fold(0.0, f32::max);
-    let is_usual = (1e-12..1e12).contains(&longest) && ray.t_min * longest < 1e30;
-    grid.method() == Method::Bvh && (!is_usual || Line::new(ray).is_none())
 }
 
 /// All hits of one method, held against the reference: the answer that all others must give.

@@ -18,7 +18,7 @@
 //! The rays may go anywhere: rays of a camera share most nodes, rays from a surface share the first ones.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, f32x16, u32x8};
+use fearless_simd::{Simd, f32x8, f32x16, mask32x16, u32x8};
 
 use super::Bvh;
 use super::boxes::{Boxes, bits};
@@ -230,7 +230,9 @@ fn side_by_side<S: Simd>(
                 continue;
             }
             let (near, met) = child.meet(simd, &rays.sixteen(simd, which));
-            masks[slot] |= (met.to_bitmask() & of_sixteen) << (16 * which);
+            // A ray that is none may have a distance that is no number.
+            let met = met & mask32x16::from_bitmask(simd, of_sixteen);
+            masks[slot] |= met.to_bitmask() << (16 * which);
             least = least.min(met.select(near, far_away));
         }
         nearest[slot] = least.reduce_min();

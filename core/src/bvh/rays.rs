@@ -96,7 +96,8 @@ impl Rays {
     }
 
     /// Makes the first `count` rays ready, to be asked about triangles in a box. Returns those that must be
-    /// traced alone: they come from afar, or their direction is longer or shorter than f32 divides by.
+    /// traced alone: they come from afar, begin behind their origin, or their direction is longer or shorter
+    /// than f32 divides by.
     #[inline(always)]
     pub(crate) fn prepare<S: Simd>(&mut self, simd: S, count: usize, bounds: &Aabb) -> u64 {
         let (alive, special) = (&mut 0, &mut 0);
@@ -126,7 +127,9 @@ impl Rays {
                 & z.simd_eq(z);
             let is_valid = is_finite & longest.simd_gt(zero) & t_min.simd_le(t_max);
             let [a, b, c] = [(a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs()];
+            // Boxes behind the start have margins that groups do not: see `Slab`.
             let is_near = a.max(b).max(c).simd_le(near)
+                & t_min.simd_ge(zero)
                 & longest.simd_gt(f32x8::splat(simd, NEARBY_SHORT))
                 & longest.simd_lt(f32x8::splat(simd, NEARBY_LONG));
             let of_count = bits_below(count - 8 * octet);
@@ -151,7 +154,8 @@ impl Rays {
                 self.origin[axis][octet] = origin[axis].into();
                 self.anchor[axis][octet] = origin[axis].into();
             }
-            let (start, end) = (t_min * scale, t_max * scale);
+            let most = f32x8::splat(simd, f32::MAX);
+            let (start, end) = ((t_min * scale).min(most), t_max * scale);
             let tiny = scale.max(f32x8::splat(simd, 1.0)) * TINY;
             self.start[octet] = (start - (start.abs() * EARLIER + tiny)).into();
             self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + tiny)).into();

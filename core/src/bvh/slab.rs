@@ -20,7 +20,7 @@
 //! The direction is scaled by a power of two so that its largest component lies between 1 and 2, and the
 //! range of the ray with it: distances are about those of the scene, whatever the direction's length.
 
-use crate::aabb::{Aabb, greater};
+use crate::aabb::{Aabb, greater, lesser};
 use crate::approach::{Approach, FAR_EXTENTS};
 use crate::filter::{NEARBY_LONG, NEARBY_SHORT, RayFilter};
 use crate::ray::{Ray, round};
@@ -34,6 +34,14 @@ pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 /// By how much a ray starts earlier, in parts of its start: more than far sides with a negative distance
 /// come nearer by.
 pub(crate) const EARLIER: f32 = 2.0 * (WIDER - 1.0);
+
+/// How much farther back near sides are taken where sides may lie behind the start: a far side with a
+/// negative distance does not go farther by [`WIDER`], it comes nearer. `distance` is that of the scene's
+/// farthest corner.
+#[inline(always)]
+fn behind(distance: f32) -> f32 {
+    2.0 * (WIDER - 1.0) * distance
+}
 
 /// More than what underflows on the way to a distance.
 pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
@@ -86,10 +94,15 @@ impl Slab {
         // A t stands for all that round to it, and a tiny one for all below 2^-149. Nothing here may be
         // denormal where rays are not: some processors take 70 cycles for such a product. `max`, as a choice
         // would be multiplied out, and what is not chosen, too.
-        let (start, end) = (begin * scale, ray.t_max * scale);
+        let start = lesser(begin * scale, f32::MAX);
+        let end = greater(ray.t_max * scale, -f32::MAX);
         let tiny = TINY * scale.max(1.0);
+        let half = (size * 0.5).to_array();
+        let distance = greater(a + half[0], greater(b + half[1], c + half[2]));
+        let slack = if begin < 0.0 { behind(distance) } else { 0.0 };
+        let near = |axis: usize| ray.origin[axis] + slack.copysign(inverse[axis]);
         let slab = Self {
-            origin_near: ray.origin,
+            origin_near: [near(0), near(1), near(2)],
             origin_far: ray.origin,
             inverse,
             start: start - (start.abs() * EARLIER + tiny),
@@ -97,8 +110,6 @@ impl Slab {
             t: 0.0,
             scale: f64::from(scale),
         };
-        let half = (size * 0.5).to_array();
-        let distance = greater(a + half[0], greater(b + half[1], c + half[2]));
         let sum = direction[0].abs() + direction[1].abs() + direction[2].abs();
         let filter = RayFilter::nearby(ray.origin, direction, sum, distance, size.max_element());
         Some((slab, filter))
@@ -117,7 +128,7 @@ impl Slab {
             if inverse.abs() <= STEEP { inverse } else { STEEP.copysign(d) }
         };
         let inverse = [inverse(x), inverse(y), inverse(z)];
-        let slack = approach.slack;
+        let slack = approach.slack + behind(round(approach.reach.distance));
         let near = |axis: usize| {
             let at = approach.anchor[axis];
             if inverse[axis] > 0.0 { (at + slack).next_up() } else { (at - slack).next_down() }
