@@ -773,8 +773,9 @@ typedef struct hgrid_counters {
 /**
  * What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
  *
- * A query with options that are not the defaults is somewhat slower than one without, and
- * rays of a batch are then traced one by one. Options that break the rules for structs make
+ * A query with options that are not the defaults is somewhat slower than one without. A tree
+ * (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are;
+ * with `filter` or `counters`, and with the other methods, they are traced one by one. Options that break the rules for structs make
  * a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
  * returns what is wrong with them.
  */
@@ -840,9 +841,22 @@ typedef struct hgrid_query_options {
      */
     hgrid_verdict (*filter)(void *context, size_t ray, const struct hgrid_hit *hit);
     /**
-     * Where to add up the work, or NULL. Each thread needs its own.
+     * Where to add up the work, or NULL. Each thread needs its own. The rays of a batch are traced one
+     * by one to be counted.
      */
     struct hgrid_counters *counters;
+    /**
+     * Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. Of any
+     * alignment, with anything in it before and after; it may overlap neither rays, answers, mesh
+     * nor blob, and each thread needs its own. Queries of one ray or point do not look at it.
+     */
+    void *scratch;
+    /**
+     * Bytes of `scratch`: 16 for each ray sort a whole batch at once. Less, but 8 KiB or more,
+     * sorts so many rays after so many; with still less the windows are 512 rays on the stack. The
+     * larger the window, the sooner the answers, up to millions of rays.
+     */
+    size_t scratch_bytes;
 } hgrid_query_options;
 
 /**
@@ -898,8 +912,8 @@ typedef struct hgrid_surface {
 } hgrid_surface;
 
 /**
- * What a caller knows about the rays of a batch: one of `HGRID_COHERENCE_...`. It changes how fast
- * the answers come, never the answers.
+ * What a caller knows about the rays of a batch, and so in which order they are traced: one of
+ * `HGRID_COHERENCE_...`. It changes how fast the answers come, never the answers.
  */
 typedef uint32_t hgrid_coherence;
 
@@ -1049,13 +1063,17 @@ typedef struct hgrid_allocator {
 #endif
 
 /**
- * Nothing is known: random rays, rays after a bounce.
+ * Nothing is known: random rays, rays after several bounces. A tree may sort them by origin and
+ * direction, in windows of as many rays as `scratch` of the options holds; rays that follow their
+ * neighbours anyway are left as they are. Other methods trace each ray alone.
  */
 #define HGRID_COHERENCE_INCOHERENT 0
 
 /**
- * Rays that follow one another are neighbours, as those of a tile of pixels. Best are runs of 128
- * rays from two tiles of 8 x 8 pixels side by side, each sixteen of them a square of 4 x 4.
+ * Rays that follow one another start near each other: camera rays of a tile, shadow rays and
+ * ambient occlusion from its hits. They are taken as given, with a tree in groups of 64. Best are
+ * runs of 128 rays from two tiles of 8 x 8 pixels side by side, each sixteen of them a square of
+ * 4 x 4.
  */
 #define HGRID_COHERENCE_COHERENT 1
 
@@ -1680,17 +1698,31 @@ bool hgrid_surface_at(const struct hgrid_grid *grid,
  * No hit may overlap a ray, its own or another; where the two arrays reach into each other, their
  * strides are the same. Nor do hits overlap anything else that the call uses.
  *
- * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has
- * no influence on the hits. With `count` 0 nothing is done. Up to 128 rays are read
- * before the first hit is written.
+ * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
+ * the hits. For rays without any order lend memory to sort them in, and pass as many as you have in
+ * one call:
  *
- * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. With others
- * the rays are traced one after the other, which is slower.
+ * ```c
+ * static hgrid_status trace_all(const hgrid_grid *grid, const hgrid_ray *rays, hgrid_hit *hits,
+ *                               size_t count, void *scratch, size_t scratch_bytes)
+ * {
+ *     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+ *     options.scratch = scratch, options.scratch_bytes = scratch_bytes;
+ *     return hgrid_intersect_n(grid, rays, 0, hits, 0, count, HGRID_COHERENCE_INCOHERENT, &options);
+ * }
+ * ```
+ *
+ * With `count` 0 nothing is done. Rays are read and hits are written in any order, and a
+ * ray perhaps more than once, before its hit is written.
+ *
+ * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for
+ * all rays.
  *
  * Returns `HGRID_OK` and has written all hits, or returns the reason and has written none:
  * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and
  * `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and
- * `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`,
+ * `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`
+ * (also of `scratch`),
  * `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no error: it misses.
  *
  * The call allocates nothing and needs at most 36 KiB of stack.
@@ -1716,7 +1748,7 @@ hgrid_status hgrid_intersect_n(const struct hgrid_grid *grid,
  *
  * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
  * from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that
- * hold a ray and its byte, coherence, options, stack. `rays` and `occluded` may be
+ * hold a ray and its byte, coherence, options and their `scratch`, stack. `rays` and `occluded` may be
  * NULL if `count` is 0, `options` may be NULL. Returns `HGRID_OK` and has written all
  * bytes, or returns what `hgrid_intersect_n` returns and has written none. For the
  * shadow rays of a tile, towards one light, which start where `hgrid_surface_at` says:
@@ -2095,7 +2127,7 @@ bool hgrid_has_method(uint32_t method);
  * The default options of a query.
  */
 #define HGRID_QUERY_OPTIONS_INIT {sizeof(hgrid_query_options), 0xffffffffu, HGRID_CULL_NONE, \
-                                  HGRID_INVALID_ID, NULL, NULL, NULL}
+                                  HGRID_INVALID_ID, NULL, NULL, NULL, NULL, 0}
 
 /**
  * A report before its call.

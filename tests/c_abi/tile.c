@@ -35,6 +35,14 @@ int main(void)
             return 3;
     if (count_lit(&grid, rays, 100) != 100 - 36)
         return 4;
+    /* Any memory will do to sort in: these rays are left as they are. */
+    hgrid_hit all[128];
+    unsigned char memory[64];
+    if (trace_all(&grid, rays, all, 128, memory, sizeof memory))
+        return 10;
+    for (int i = 0; i < 64; i++)
+        if (all[i].t != depth[i])
+            return 11;
     const float half[] = {0.5f, 0.5f};
     if (light_behind(&grid, &rays[0], half) != 0.25f || light_behind(&grid, &rays[63], half) != 1)
         return 7;
