@@ -852,8 +852,8 @@ typedef struct hgrid_query_options {
      */
     void *scratch;
     /**
-     * Bytes of `scratch`: 16 for each ray sort a whole batch at once. Less, but 8 KiB or more,
-     * sorts so many rays after so many; with still less the windows are 512 rays on the stack. The
+     * Bytes of `scratch`: 16 for each ray sort a whole batch at once. Less, but 4 KiB or more,
+     * sorts so many rays after so many; with still less the windows are 256 rays on the stack. The
      * larger the window, the sooner the answers, up to millions of rays.
      */
     size_t scratch_bytes;
@@ -1518,7 +1518,7 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * or with options that break the rules for structs, nothing is hit. A view that nobody initialised,
  * and one whose blob or mesh is gone, is undefined behaviour.
  *
- * A query allocates nothing, needs at most 9 KiB of stack, as all queries of one ray or point do,
+ * A query allocates nothing, needs at most 7 KiB of stack, as all queries of one ray or point do,
  * and always ends: on one level after no more steps than the three resolutions sum up to.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.

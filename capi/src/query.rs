@@ -21,7 +21,7 @@ use crate::types::hgrid_grid;
 /// or with options that break the rules for structs, nothing is hit. A view that nobody initialised,
 /// and one whose blob or mesh is gone, is undefined behaviour.
 ///
-/// A query allocates nothing, needs at most 9 KiB of stack, as all queries of one ray or point do,
+/// A query allocates nothing, needs at most 7 KiB of stack, as all queries of one ray or point do,
 /// and always ends: on one level after no more steps than the three resolutions sum up to.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.

@@ -190,8 +190,8 @@ pub struct hgrid_query_options {
     /// alignment, with anything in it before and after; it may overlap neither rays, answers, mesh
     /// nor blob, and each thread needs its own. Queries of one ray or point do not look at it.
     pub scratch: *mut c_void,
-    /// Bytes of `scratch`: 16 for each ray sort a whole batch at once. Less, but 8 KiB or more,
-    /// sorts so many rays after so many; with still less the windows are 512 rays on the stack. The
+    /// Bytes of `scratch`: 16 for each ray sort a whole batch at once. Less, but 4 KiB or more,
+    /// sorts so many rays after so many; with still less the windows are 256 rays on the stack. The
     /// larger the window, the sooner the answers, up to millions of rays.
     pub scratch_bytes: usize,
 }

@@ -27,7 +27,7 @@ pub enum Coherence {
     /// Nothing: random rays, rays after several bounces. A tree may sort them by origin and
     /// direction, in windows of as many rays as [`QueryOptions::scratch`] holds, 16 bytes a ray: the
     /// larger, the sooner the answers, up to millions of rays. With less than
-    /// 8 KiB it sorts windows of 512 rays on the stack. Other methods trace each ray alone.
+    /// 4 KiB it sorts windows of 256 rays on the stack. Other methods trace each ray alone.
     #[default]
     Incoherent = 0,
     /// Rays that follow one another start near each other: camera rays of a tile, shadow rays and
@@ -414,7 +414,7 @@ impl<A: Answer, B: Batch<A>> Together for Asked<'_, '_, '_, B, A> {
 const TILE: usize = 128;
 
 /// Rays of a window that is sorted on the stack.
-const FEW: usize = 512;
+const FEW: usize = 256;
 
 impl<A: Answer, B: Batch<A>> Asked<'_, '_, '_, B, A> {
     /// Traces all rays, together where the grid can.

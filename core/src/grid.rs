@@ -36,7 +36,7 @@ use crate::visit::{Ids, Visitor};
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
 /// number of threads may query it at once. Queries never fail, never allocate and never panic;
 /// their steps are bounded by the resolutions (one level: by their sum). A single query's stack is
-/// below 9 KiB, a batch's below 36 KiB.
+/// below 7 KiB, a batch's below 36 KiB.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,

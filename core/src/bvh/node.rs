@@ -130,6 +130,13 @@ impl Node {
         Child::Leaf { first, count: (counts >> shift & 0xff) as u32 }
     }
 
+    /// Behind which of the ids of all leaves those of each child end.
+    #[inline(always)]
+    pub(crate) const fn ends(&self) -> [u8; WIDTH] {
+        // Byte s of the product is the sum of the counts up to s.
+        u64::from_le_bytes(self.counts).wrapping_mul(0x0101_0101_0101_0101).to_le_bytes()
+    }
+
     /// Writes the boxes of the children that there are, which `bounds` holds. No step is smaller than
     /// that of a box of size `least`.
     pub(crate) fn set_boxes(&mut self, bounds: &Aabb, boxes: &[Aabb; WIDTH], least: f32) {

@@ -33,9 +33,8 @@ pub(crate) struct Subtree {
     /// Levels above each node.
     above: [u8; MOST_NODES],
     count: usize,
-    /// The ids of the leaves, one leaf behind the other, and the boxes of their triangles.
+    /// The ids of the leaves, one leaf behind the other.
     ids: [u32; MOST_ROOT],
-    of_ids: [Aabb; MOST_ROOT],
     id_count: usize,
 }
 
@@ -96,7 +95,6 @@ impl Subtree {
             above: [0; MOST_NODES],
             count: 0,
             ids: [0; MOST_ROOT],
-            of_ids: [Aabb { min: Vec3A::ZERO, max: Vec3A::ZERO }; MOST_ROOT],
             id_count: 0,
         }
     }
@@ -144,17 +142,9 @@ impl Subtree {
             self.cut(at, entries, &changes);
             at += 1;
         }
-        // Look at all triangles in one go: so their loads from memory overlap.
-        for (&id, bounds) in self.ids.iter().zip(&mut self.of_ids).take(self.id_count) {
-            let corners = mesh.corners(id);
-            *bounds = corners.map_or(Aabb::EMPTY, |[a, b, c]| Aabb {
-                min: a.min(b).min(c),
-                max: a.max(b).max(c),
-            });
-        }
         // Quantise, children before parents.
         for at in (0..self.count).rev() {
-            self.quantise(at, least);
+            self.quantise(at, mesh, least);
         }
         // Name ids and nodes by where they lie in the index.
         for node in self.nodes.iter_mut().take(self.count) {
@@ -196,25 +186,28 @@ impl Subtree {
     }
 
     /// Finds the boxes of a node's children, and its own.
-    fn quantise(&mut self, at: usize, least: f32) {
+    fn quantise(&mut self, at: usize, mesh: &TriangleMesh<'_>, least: f32) {
         let Some(node) = self.nodes.get_mut(at) else { return };
         let mut boxes = [Aabb::EMPTY; WIDTH];
+        // Look at the triangles of all leaves in one loop: so their loads from memory overlap.
+        let ends = node.ends();
+        let mut slot = 0;
+        let ids = self.ids.iter().skip(node.first as usize).take(usize::from(ends[WIDTH - 1]));
+        for (at, &id) in (0..).zip(ids) {
+            while ends[slot % WIDTH] <= at && slot < WIDTH - 1 {
+                slot += 1;
+            }
+            let Some([a, b, c]) = mesh.corners(id) else { continue };
+            let bounds_of = &mut boxes[slot % WIDTH];
+            bounds_of.min = bounds_of.min.min(a.min(b).min(c));
+            bounds_of.max = bounds_of.max.max(a.max(b).max(c));
+        }
         let mut child = node.child as usize;
-        let mut first = node.first as usize;
         let mut bounds = Aabb::EMPTY;
         for (slot, bounds_of) in boxes.iter_mut().enumerate() {
-            let count = usize::from(node.counts[slot]);
             if node.inner() >> slot & 1 == 1 {
                 *bounds_of = self.boxes.get(child).copied().unwrap_or(Aabb::EMPTY);
                 child += 1;
-            } else if count > 0 {
-                let leaf = self.of_ids.get(first..first + count).unwrap_or_default();
-                for of_id in leaf {
-                    *bounds_of = bounds_of.union(of_id);
-                }
-                first += count;
-            } else {
-                break;
             }
             bounds = bounds.union(bounds_of);
         }

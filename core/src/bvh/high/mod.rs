@@ -190,12 +190,7 @@ fn boxes<const N: usize>(
         let first = share(all, task, tasks);
         // Those of a task stand behind those that others left out.
         if finite < first {
-            for at in 0..count {
-                let item = items.get(first + at).copied();
-                if let (Some(item), Some(slot)) = (item, items.get_mut(finite + at)) {
-                    *slot = item;
-                }
-            }
+            move_down(items, first, count, finite);
         }
         finite += count;
         bounds = bounds.union(&bounds_of);
@@ -231,6 +226,16 @@ impl Kernel for Boxes<'_> {
             count += 1;
         }
         Ok((count, bounds))
+    }
+}
+
+/// Copies elements to a place before them; nothing where there are none. (`copy_within` can panic.)
+fn move_down<T: Copy>(all: &mut [T], from: usize, count: usize, to: usize) {
+    for at in 0..count {
+        let element = all.get(from + at).copied();
+        if let (Some(element), Some(slot)) = (element, all.get_mut(to + at)) {
+            *slot = element;
+        }
     }
 }
 
@@ -415,12 +420,12 @@ impl Work {
                 let Record { mut root, nodes: below, levels: levels_of, .. } =
                     bytemuck::cast(*record);
                 let moved = child - count;
-                let from = child as usize..(child + below) as usize;
-                if moved > 0 && from.end <= nodes.len() {
-                    for node in nodes.get_mut(from.clone()).unwrap_or_default() {
+                if moved > 0 {
+                    let from = child as usize..(child + below) as usize;
+                    for node in nodes.get_mut(from).unwrap_or_default() {
                         node.child -= moved;
                     }
-                    nodes.copy_within(from, count as usize);
+                    move_down(nodes, child as usize, below as usize, count as usize);
                 }
                 root.child -= moved;
                 if let Some(slot) = nodes.get_mut(waiter.place as usize) {
