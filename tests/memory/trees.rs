@@ -141,7 +141,7 @@ fn the_worst_meshes_stay_within_the_bound() {
     for count in 0..=300 {
         for mesh in [one_centre(count), one_by_one(count), soup(count, 0.01, count as u64)] {
             let [nodes, _] = builds_in_its_bound(&mesh, Quality::Fast);
-            let (least, most) = (count.div_ceil(56), 1 + count / 7 + 4);
+            let (least, most) = (count.div_ceil(64), 1 + count / 7 + 4);
             assert!((least..=most).contains(&(nodes as usize)), "{nodes} for {count}");
         }
     }

@@ -54,7 +54,9 @@ const fn most_nodes(triangles: u64) -> u64 {
 /// The memory that any mesh with so many triangles needs, for a build with any number of tasks.
 pub(crate) const fn bound(triangles: u32) -> (u64, u64) {
     let triangles = triangles as u64;
-    (index_bytes(triangles, most_nodes(triangles)), section_bytes::<Item>(triangles))
+    // Of nothing, too, there is some scratch: callers allocate it.
+    let items = if triangles < 1 { 1 } else { triangles };
+    (index_bytes(triangles, most_nodes(triangles)), section_bytes::<Item>(items))
 }
 
 /// Triangles of the ranges that tasks take, at most: a part of all, so that there are enough for many tasks.
@@ -88,14 +90,12 @@ pub(super) fn build_in<const N: usize>(
     let index_available = index.as_ref().map_or(0, |index| index.len()) as u64;
     let (index_bound, needed_bytes) = bound(triangles);
     let available_bytes = scratch.len() as u64;
+    if available_bytes < needed_bytes {
+        return Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes });
+    }
     let items = match split_mut::<Item>(scratch, triangles.into()) {
         Some((items, _)) => items,
-        // Nothing may lie anywhere.
-        None if triangles == 0 => &mut [],
-        None => {
-            let region = Region::Scratch;
-            return Err(Error::OutOfMemory { region, needed_bytes, available_bytes });
-        }
+        None => &mut [],
     };
     // Tasks fill their parts of the index side by side: there is room for that, or there is one.
     let mut tasks = task_count::<N>(control, triangles as usize / LEAST_TASK);
