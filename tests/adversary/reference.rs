@@ -128,7 +128,11 @@ impl Line {
             // No plane, or one along the line: the places decide.
             return self.places_answer(places, 0.0);
         };
-        let is_in = first != Ordering::Less && last != Ordering::Greater;
+        // An end that lies beyond all corners is kept by all points between them.
+        let is_ahead = along.iter().all(|&z| from < z);
+        let is_before = along.iter().all(|&z| z < to);
+        let is_in =
+            (is_ahead || first != Ordering::Less) && (is_before || last != Ordering::Greater);
         match self.places_answer(places, 1.0 / f64::from(1 << 21)) {
             _ if is_open => Answer::Either,
             Answer::Miss => Answer::Miss,
