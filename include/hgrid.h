@@ -385,8 +385,8 @@
  * The quality of a tree whose every node SAH chooses, each triangle on its own.
  *
  * Choose it for a scene that is traced for long, above all where large and small triangles mix, as in
- * architecture. Rays take 0.6 to 0.9 of the time, the index a tenth less memory, the build four to five times
- * as long. A build takes 32 bytes of scratch a triangle, whatever the number of tasks:
+ * architecture. Rays are answered sooner and the index is smaller; the build takes four to five times
+ * as long. It takes 32 bytes of scratch a triangle, whatever the number of tasks:
  * `HGRID_BVH_INDEX_BOUND` and `HGRID_BVH_HIGH_SCRATCH_BOUND` hold for it. All queries answer as with the
  * other quality, and the blob has the same format.
  */
@@ -725,8 +725,8 @@ typedef uint32_t hgrid_verdict;
  * The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the
  * ray's line meets the plane of the vertices as they are: a ray that starts above a plane and leaves
  * it does not hit it, however close it starts. Only an end that lies between vertices is
- * asked about: the other one is kept by all points of the triangle. The `t` that is reported lies in the range, too: of a triangle that the ray
- * grazes, whose own `t` may be up to 2^-21 Z outside, it is the end. It is rounded: a range that
+ * asked about: all points of the triangle keep the other one. The `t` that is reported lies in the
+ * range, too: it is the end for a triangle that the ray grazes, whose own `t` may be up to 2^-21 Z outside. It is rounded: a range that
  * ends at it may leave out the hit that it was reported for. An origin more than 2^50 times as far away
  * as a triangle is large may not tell its vertices apart, and miss it. (The proof is the head of
  * core/src/triangle.rs.)
@@ -775,7 +775,8 @@ typedef struct hgrid_counters {
  *
  * A query with options that are not the defaults is somewhat slower than one without. A tree
  * (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are;
- * with `filter` or `counters`, and with the other methods, they are traced one by one. Options that break the rules for structs make
+ * with `filter` or `counters`, and with the other methods, they are traced one by one.
+ * Options that break the rules for structs make
  * a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
  * returns what is wrong with them.
  */
@@ -846,15 +847,15 @@ typedef struct hgrid_query_options {
      */
     struct hgrid_counters *counters;
     /**
-     * Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. Of any
-     * alignment, with anything in it before and after; it may overlap neither rays, answers, mesh
-     * nor blob, and each thread needs its own. Queries of one ray or point do not look at it.
+     * Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. It may have
+     * any alignment and hold anything. It may overlap neither rays, answers, mesh nor blob, and each
+     * thread needs its own. Queries of one ray or point do not look at it.
      */
     void *scratch;
     /**
-     * Bytes of `scratch`: 16 for each ray sort a whole batch at once. Less, but 4 KiB or more,
-     * sorts so many rays after so many; with still less the windows are 256 rays on the stack. The
-     * larger the window, the sooner the answers, up to millions of rays.
+     * Bytes of `scratch`. With 16 bytes for each ray a whole batch is sorted at once. With fewer, but 4
+     * KiB or more, the batch is sorted window by window, as many rays as fit. With still fewer a window is
+     * 256 rays on the stack. Larger windows give the answers sooner, up to millions of rays.
      */
     size_t scratch_bytes;
 } hgrid_query_options;
@@ -912,13 +913,13 @@ typedef struct hgrid_surface {
 } hgrid_surface;
 
 /**
- * What a caller knows about the rays of a batch, and so in which order they are traced: one of
+ * Says what you know about the rays of a batch, so that the library can choose their order: one of
  * `HGRID_COHERENCE_...`. It changes how fast the answers come, never the answers.
  */
 typedef uint32_t hgrid_coherence;
 
 /**
- * What a refit did. Initialise it with `HGRID_REFIT_REPORT_INIT`.
+ * Reports what a refit did. Initialise it with `HGRID_REFIT_REPORT_INIT`.
  *
  * The costs are those of the surface area heuristic (Goldsmith and Salmon 1987): how many nodes a random line
  * through the box of the tree visits and how many triangles it tests on average, added up.

@@ -53,7 +53,7 @@ impl<T> Batch<T> {
         Ok(Self { rays, ray_stride, answers, answer_stride, count, spans })
     }
 
-    /// Whether a byte lies between the first and the last of the rays or answers.
+    /// Returns true if a region overlaps the bytes of the rays or of the answers.
     pub(crate) fn overlaps(&self, other: Span) -> bool {
         self.spans.iter().any(|span| span.overlaps(other))
     }

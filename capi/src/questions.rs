@@ -12,7 +12,7 @@ use hgrid_core::{
 
 use crate::status::{HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_CULL, hgrid_status};
 
-/// What a caller knows about the rays of a batch, and so in which order they are traced: one of
+/// Says what you know about the rays of a batch, so that the library can choose their order: one of
 /// `HGRID_COHERENCE_...`. It changes how fast the answers come, never the answers.
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_coherence = u32;
@@ -62,8 +62,8 @@ pub struct hgrid_ray {
 /// The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the
 /// ray's line meets the plane of the vertices as they are: a ray that starts above a plane and leaves
 /// it does not hit it, however close it starts. Only an end that lies between vertices is
-/// asked about: the other one is kept by all points of the triangle. The `t` that is reported lies in the range, too: of a triangle that the ray
-/// grazes, whose own `t` may be up to 2^-21 Z outside, it is the end. It is rounded: a range that
+/// asked about: all points of the triangle keep the other one. The `t` that is reported lies in the
+/// range, too: it is the end for a triangle that the ray grazes, whose own `t` may be up to 2^-21 Z outside. It is rounded: a range that
 /// ends at it may leave out the hit that it was reported for. An origin more than 2^50 times as far away
 /// as a triangle is large may not tell its vertices apart, and miss it. (The proof is the head of
 /// core/src/triangle.rs.)
@@ -123,7 +123,8 @@ pub const HGRID_CULL_FRONT: u32 = 2;
 ///
 /// A query with options that are not the defaults is somewhat slower than one without. A tree
 /// (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are;
-/// with `filter` or `counters`, and with the other methods, they are traced one by one. Options that break the rules for structs make
+/// with `filter` or `counters`, and with the other methods, they are traced one by one.
+/// Options that break the rules for structs make
 /// a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
 /// returns what is wrong with them.
 #[repr(C)]
@@ -186,13 +187,13 @@ pub struct hgrid_query_options {
     /// Where to add up the work, or NULL. Each thread needs its own. The rays of a batch are traced one
     /// by one to be counted.
     pub counters: *mut hgrid_counters,
-    /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. Of any
-    /// alignment, with anything in it before and after; it may overlap neither rays, answers, mesh
-    /// nor blob, and each thread needs its own. Queries of one ray or point do not look at it.
+    /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. It may have
+    /// any alignment and hold anything. It may overlap neither rays, answers, mesh nor blob, and each
+    /// thread needs its own. Queries of one ray or point do not look at it.
     pub scratch: *mut c_void,
-    /// Bytes of `scratch`: 16 for each ray sort a whole batch at once. Less, but 4 KiB or more,
-    /// sorts so many rays after so many; with still less the windows are 256 rays on the stack. The
-    /// larger the window, the sooner the answers, up to millions of rays.
+    /// Bytes of `scratch`. With 16 bytes for each ray a whole batch is sorted at once. With fewer, but 4
+    /// KiB or more, the batch is sorted window by window, as many rays as fit. With still fewer a window is
+    /// 256 rays on the stack. Larger windows give the answers sooner, up to millions of rays.
     pub scratch_bytes: usize,
 }
 
@@ -228,7 +229,7 @@ pub struct hgrid_surface {
     pub is_front: u32,
 }
 
-/// What a refit did. Initialise it with `HGRID_REFIT_REPORT_INIT`.
+/// Reports what a refit did. Initialise it with `HGRID_REFIT_REPORT_INIT`.
 ///
 /// The costs are those of the surface area heuristic (Goldsmith and Salmon 1987): how many nodes a random line
 /// through the box of the tree visits and how many triangles it tests on average, added up.

@@ -19,7 +19,7 @@ use crate::mesh::Strided;
 use crate::options::QueryOptions;
 use crate::ray::{Hit, INVALID_ID, Ray};
 
-/// What the caller knows about the rays of a batch, and so in which order they are traced. It
+/// Says what the caller knows about the rays of a batch, so that the grid can choose their order. It
 /// changes how fast the answers come, never the answers.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -224,7 +224,7 @@ impl Grid<'_> {
     /// is none. The options are for all rays.
     ///
     /// # Errors
-    /// Those of [`intersect_n`](Self::intersect_n).
+    /// The same as of [`intersect_n`](Self::intersect_n).
     ///
     /// ```
     /// # use hgrid_core::*;
@@ -274,7 +274,7 @@ impl Grid<'_> {
     /// For each ray a byte: 1 if anything is hit, 0 if not.
     ///
     /// # Errors
-    /// Those of [`intersect_n`](Self::intersect_n).
+    /// The same as of [`intersect_n`](Self::intersect_n).
     pub fn occluded_n(
         &self,
         rays: &Strided<'_>,
@@ -288,7 +288,7 @@ impl Grid<'_> {
     /// are for all rays.
     ///
     /// # Errors
-    /// Those of [`intersect_n`](Self::intersect_n).
+    /// The same as of [`intersect_n`](Self::intersect_n).
     pub fn occluded_n_with(
         &self,
         rays: &Strided<'_>,
@@ -377,7 +377,7 @@ struct Asked<'r, 'm, 'q, B, A> {
     grid: &'r Grid<'m>,
     batch: &'r mut B,
     options: &'r mut QueryOptions<'q>,
-    /// The options change nothing.
+    /// Whether the options change nothing.
     is_plain: bool,
     answers: PhantomData<A>,
 }

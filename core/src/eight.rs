@@ -18,6 +18,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 
+use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
 use crate::ray::Ray;
 use crate::simd::HAS_VECTORS;
@@ -131,6 +132,15 @@ fn read(mesh: &TriangleMesh<'_>, ids: [u32; 4]) -> ([[Row; 4]; 3], u32) {
         used |= 1 << lane;
     }
     (rows, used)
+}
+
+impl RayFilter {
+    /// Which of a few triangles are not dropped, as bits, one after the other: for machines without vectors.
+    #[inline(never)]
+    pub(crate) fn survivors(&self, mesh: &TriangleMesh<'_>, ids: &[u32]) -> u32 {
+        let passes = |id| mesh.triangle(id).is_some_and(|triangle| self.passes(&triangle));
+        (0..).zip(ids).fold(0, |bits, (lane, &id)| bits | u32::from(passes(id)) << (lane % 32))
+    }
 }
 
 impl TriangleTest {

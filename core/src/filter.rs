@@ -57,7 +57,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
 
 use crate::aabb::{Aabb, greater, lesser};
-use crate::mesh::{Triangle, TriangleMesh};
+use crate::mesh::Triangle;
 use crate::ray::round;
 
 /// The largest reach with which nothing overflows.
@@ -241,13 +241,6 @@ impl RayFilter {
             slope: lanes(self.slope),
             floor: lanes(self.floor),
         }
-    }
-
-    /// Which of a few triangles are not dropped, as bits.
-    #[inline(never)]
-    pub(crate) fn survivors(&self, mesh: &TriangleMesh<'_>, ids: &[u32]) -> u32 {
-        let passes = |id| mesh.triangle(id).is_some_and(|triangle| self.passes(&triangle));
-        (0..).zip(ids).fold(0, |bits, (lane, &id)| bits | u32::from(passes(id)) << (lane % 32))
     }
 
     /// Returns true unless the triangle is dropped.

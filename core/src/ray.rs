@@ -62,9 +62,9 @@ impl Ray {
 ///
 /// The range is decided exactly, for all finite numbers, by the point where the ray's line meets the
 /// plane of the vertices as they are: a ray that starts above a plane and leaves it does not hit it,
-/// however close it starts. Only an end that lies between vertices is asked about: the other one is
-/// kept by all points of the triangle. The `t` that is reported lies in the range, too: of a triangle that the ray grazes, whose own
-/// `t` may be up to 2^-21 Z outside, it is the end. It is rounded: a range that ends at it may
+/// however close it starts. Only an end that lies between vertices is asked about: all points of
+/// the triangle keep the other one. The `t` that is reported lies in the range, too: it is the end for a
+/// triangle that the ray grazes, whose own `t` may be up to 2^-21 Z outside. It is rounded: a range that ends at it may
 /// leave out the hit that it was reported for. An origin more than 2^50 times as far away as a triangle
 /// is large may not tell its vertices apart, and miss it. The proof is the head of `triangle.rs`.
 #[repr(C)]

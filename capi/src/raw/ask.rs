@@ -15,7 +15,7 @@ use crate::status::{
 };
 use crate::types::{Elements, hgrid_grid};
 
-/// What a caller told a query, `None` if it is nothing but the defaults.
+/// Reads the options of a query; `None` if all of them are the defaults.
 ///
 /// # Safety
 /// The caller's promise.
@@ -26,7 +26,7 @@ unsafe fn options(options: *const hgrid_query_options) -> Result<Option<Asked>, 
     Ok(asked.filter(|asked| !asked.options.are_default()))
 }
 
-/// What a caller told a query, `None` if it is nothing.
+/// Reads the options of a query; `None` if the caller gave none.
 ///
 /// # Safety
 /// The caller's promise.
