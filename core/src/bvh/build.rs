@@ -8,7 +8,7 @@
 //! top       a tree over the subtrees                                            (top.rs)
 //!
 //! index   | header | ids (first the keys)    | nodes: root | subtrees of all tasks | top |
-//! scratch | counts of tasks, sizes of bins | entries (then records of roots, top nodes) | bench |
+//! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | bench |
 //! ```
 //!
 //! The exact size takes a build without an index: keys lie on the bench, ids and nodes are counted. Keys lie
@@ -36,10 +36,10 @@ use super::layout::{
     small_bench,
 };
 use super::node::Node;
-use super::roots::{RECORD, Record, Roots, Side, copy};
+use super::roots::{RECORD, Record, Roots, Side};
 use super::subtree::Subtree;
-use super::top::{self, ITEM, Item};
-use super::units::{Units, starts};
+use super::top::{self, ITEM, Item, Top};
+use super::units::{SEAM, Units, is_seam, starts};
 use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split_mut};
 use crate::blob::{HEADER_BYTES, Header};
@@ -162,7 +162,7 @@ fn build_in<const N: usize>(
         Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
 
     // Fewer tasks where there is no memory for more.
-    let mut tasks = task_count::<N>(control, triangles as usize / LEAST_TASK);
+    let mut tasks = task_count::<N>(control, triangles as usize / SEAM);
     let fits = |tasks: u32| match tasks {
         1 => available_bytes >= scratch_bytes(all, 1, small_bench(all)),
         _ => {
@@ -234,11 +234,12 @@ fn build_in<const N: usize>(
     let nodes = whole::<Node>(nodes);
     let scene = Lattice::pad(&bounds);
     let work = Work { mesh, least: least_node(&scene), sizes, shift: KEY_BITS - bits };
-    let made = work.roots::<N>(entries, bench, ids, nodes, &mut counts, control)?;
+    let made = work.roots::<N>(entries, &mut *bench, ids, nodes, &mut counts, control)?;
 
     // Build the tree on top of them.
     watch.at(TOP)?;
-    let (node_count, levels) = work.top(entries, nodes, &made);
+    let made = work.top(entries, bench, nodes, &made);
+    let (node_count, levels) = made.ok_or(index_error(fast_bound(triangles, 1).0))?;
     let needed_bytes = index_bytes(finite.into(), node_count.into());
     if let Some(index) = index {
         if needed_bytes > index_available {
@@ -258,9 +259,6 @@ fn build_in<const N: usize>(
     header.blob_bytes = needed_bytes;
     Ok(header)
 }
-
-/// No task has fewer triangles.
-const LEAST_TASK: usize = 16_384;
 
 /// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
 /// axis has an inverse direction that is finite ([`slab`](super::slab)).
@@ -461,14 +459,14 @@ impl Work<'_> {
         Ok(all)
     }
 
-    /// Where the units of each task end: about as many entries for each.
+    /// Where the units of each task end, at seams: about as many entries for each.
     fn cut<const N: usize>(&self, ends: &mut [usize; N], tasks: usize, entries: usize) {
         let mut units = Units::new(self.sizes);
         let mut end = 0;
         for (task, slot) in ends.iter_mut().enumerate().take(tasks) {
             let goal = share(entries, task + 1, tasks);
             while end < goal
-                && let Some(unit) = units.next()
+                && let Some(unit) = units.find(|unit| is_seam(unit) || unit.end == entries)
             {
                 end = unit.end;
             }
@@ -476,38 +474,42 @@ impl Work<'_> {
         }
     }
 
-    /// Builds the tree over the roots, behind their nodes; returns how many nodes and levels there are then.
-    fn top(&self, entries: &mut [Entry], nodes: &mut [Node], all: &All) -> (u32, u32) {
+    /// Builds the tree over the roots, behind their nodes, or on the bench if the index has no room;
+    /// returns how many nodes and levels there are then, or `None` if nothing has room.
+    fn top(
+        &self,
+        entries: &mut [Entry],
+        bench: &mut [Entry],
+        nodes: &mut [Node],
+        all: &All,
+    ) -> Option<(u32, u32)> {
         // One root or none is all there is.
         if all.roots < 2 {
             if let Some(root) = nodes.first_mut() {
                 *root = if all.roots == 1 { all.last.node } else { Node::EMPTY };
             }
-            return (all.nodes, all.last.levels.max(1));
+            return Some((all.nodes, all.last.levels.max(1)));
         }
         let roots = all.roots as usize;
-        let made = entries.split_at_mut_checked(roots * RECORD).and_then(|(records, rest)| {
-            let (items, rest) = rest.split_at_mut_checked(roots * ITEM)?;
-            let items = whole::<Item>(bytemuck::cast_slice_mut(items));
-            let records = &*whole::<Record>(bytemuck::cast_slice_mut(records));
+        let (records, rest) = entries.split_at_mut_checked(roots * RECORD)?;
+        let records = &*whole::<Record>(bytemuck::cast_slice_mut(records));
+        let items = whole::<Item>(bytemuck::cast_slice_mut(rest.get_mut(..roots * ITEM)?));
+        let record =
+            |at: u32| records.get(at as usize).map_or((Node::EMPTY, 0), |r| (r.node, r.levels));
+        let mut build = |nodes: &mut [Node]| {
             for (at, (item, record)) in (0..).zip(items.iter_mut().zip(records)) {
                 let Record { min, max, count, .. } = *record;
                 *item = Item { min, max, count, record: at };
             }
-            let record =
-                |at: u32| records.get(at as usize).map_or((Node::EMPTY, 0), |r| (r.node, r.levels));
-            let top = whole::<Node>(bytemuck::cast_slice_mut(rest));
-            let (count, levels) = top::build(items, record, top, all.nodes, self.least);
-            Some((count, levels, &*top))
-        });
-        let Some((count, levels, top)) = made else { return (all.nodes, 0) };
-        let below = all.nodes as usize;
-        let behind = top.get(1..count as usize).unwrap_or_default();
-        copy(behind, nodes.get_mut(below..));
-        if let (Some(to), Some(root)) = (nodes.first_mut(), top.first()) {
-            *to = *root;
+            top::build(items, record, nodes, all.nodes, self.least)
+        };
+        let behind = nodes.get_mut(all.nodes as usize..).and_then(&mut build);
+        let Top { root, count, levels } =
+            behind.or_else(|| build(whole(bytemuck::cast_slice_mut(bench))))?;
+        if let Some(slot) = nodes.first_mut() {
+            *slot = root;
         }
-        (all.nodes + count - 1, levels)
+        Some((all.nodes + count, levels))
     }
 }
 

@@ -11,10 +11,12 @@
 //!   roots. So each node below a root replaces one range of ids by eight: (m - 1) / 7 nodes at most for
 //!   `m` triangles.
 //! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
-//!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`.
-//! - A root of [`LEAST_ROOT`] triangles or more has no more than [`SHARE`] nodes a triangle, with its part of
-//!   those above: one that would have more is built again by halving its entries ([`most_of_root`]).
-//! - A root may be smaller than that behind the crowded bins of the tree, and behind those of each division of a
+//!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. A root and its part of those are
+//!   11 / 7 nodes.
+//! - There is no more than one root for [`PRICE`] triangles ([`units`](super::units)). What is left of
+//!   [`SHARE`] nodes a triangle is for the nodes below roots: a root that would have more is built
+//!   again by halving its entries ([`most_of_root`]).
+//! - One more root may stand behind the crowded bins of the tree, and behind those of each division of a
 //!   crowded bin. A crowded bin has more than [`CROWD`] triangles, and at most [`DIVISIONS`] of them that are
 //!   divided lie inside one another.
 //!
@@ -26,19 +28,27 @@ use crate::blob::HEADER_BYTES;
 
 use super::node::Node;
 
-/// Triangles of a root, at least.
-pub(crate) const LEAST_ROOT: usize = 40;
+/// Triangles for each root, at least, on average.
+pub(crate) const PRICE: usize = 24;
 
 /// Triangles of a root, at most.
 pub(crate) const MOST_ROOT: usize = 128;
 
-/// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above them may cost.
-const SHARE: u64 = 4130;
-const WHOLE: u64 = 28_000;
+/// Triangles of each root of a unit that has more than [`MOST_ROOT`], at least.
+pub(crate) const LEAST_PIECE: usize = 32;
+
+const _: () = assert!(PRICE <= LEAST_PIECE && 2 * LEAST_PIECE <= MOST_ROOT);
+
+/// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above and below them may cost.
+const SHARE: u64 = 24_780;
+const WHOLE: u64 = 168_000;
+
+/// What is left of the share when roots and the nodes above them are paid for.
+const SHARE_BELOW: u64 = SHARE - WHOLE * 11 / 7 / PRICE as u64;
 
 /// The most nodes below a root of so many triangles.
 pub(crate) const fn most_of_root(triangles: usize) -> usize {
-    ((SHARE * triangles as u64).saturating_sub(WHOLE * 4 / 7) / WHOLE) as usize
+    (SHARE_BELOW * triangles as u64 / WHOLE) as usize
 }
 
 /// Bins with more entries are divided again.
@@ -46,7 +56,7 @@ pub(crate) const CROWD: usize = 4096;
 
 /// Entries of a unit of bins that is not divided, at most: a bin, and what is too little for a root before
 /// and behind it.
-pub(crate) const MOST_UNIT: usize = CROWD + 2 * LEAST_ROOT;
+pub(crate) const MOST_UNIT: usize = CROWD + 2 * PRICE;
 
 /// Divisions of a bin inside one another, at most.
 pub(crate) const DIVISIONS: u32 = 5;
@@ -69,20 +79,20 @@ pub(crate) const fn bin_bits(triangles: u64) -> u32 {
     bits
 }
 
-/// Roots with fewer triangles than others, at most.
-const fn small_roots(triangles: u64) -> u64 {
+/// Roots behind crowded bins, at most.
+const fn late_roots(triangles: u64) -> u64 {
     DIVISIONS as u64 * (triangles / (CROWD as u64 + 1)) + 1
 }
 
 /// The most nodes below the roots that hold so many triangles.
 pub(crate) const fn most_below(triangles: u64) -> u64 {
-    triangles / 7 + small_roots(triangles)
+    (triangles * SHARE_BELOW).div_ceil(WHOLE)
 }
 
 /// The most nodes of a tree over so many triangles.
 pub(crate) const fn most_nodes(triangles: u64) -> u64 {
-    // A small root is one more node, and so is the root of all.
-    (triangles * SHARE).div_ceil(WHOLE) + 11 * small_roots(triangles) / 7 + 3
+    // The root of all is one more.
+    (triangles * SHARE).div_ceil(WHOLE) + 11 * late_roots(triangles) / 7 + 3
 }
 
 /// Bytes of an index with so many ids and nodes.

@@ -1,8 +1,8 @@
-//! From bins of entries to roots: subtrees over `LEAST_ROOT` to `MOST_ROOT` triangles each. The
-//! tree on top ([`top`](super::top)) treats each as one item.
+//! From bins of entries to roots: subtrees over up to `MOST_ROOT` triangles each. The tree on top
+//! ([`top`](super::top)) treats each as one item.
 //!
 //! ```text
-//! for each unit (a crowded bin, or bins side by side with LEAST_ROOT entries or more):
+//! for each unit (a crowded bin, or bins side by side that pay for a root):
 //!     crowded: a box of its own around the centres, new keys, new bins; then these
 //!     else:    sort by key, cut where high bits of the key change, make a subtree of each part
 //!
@@ -10,9 +10,9 @@
 //! bench   |                            | the same unit, while it is binned again |
 //! ```
 //!
-//! A unit's entries lie in one of the two arrays, and binning moves them to the other. The record
-//! of a root is 112 bytes, written over entries that were used up. A root uses up 320 bytes or more; a
-//! smaller one comes behind a crowded bin.
+//! A unit's entries lie in one of the two arrays, and binning moves them to the other. The record of
+//! a root is 112 bytes, written over entries that were used up: [`PRICE`](super::layout::PRICE) of them
+//! for each root, 192 bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
 
@@ -25,12 +25,12 @@ use crate::mesh::TriangleMesh;
 
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
-    CROWD, DIVISIONS, Entry, LEAST_ROOT, MOST_ROOT, MOST_UNIT, bin_bits, most_of_root,
+    CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_ROOT, MOST_UNIT, PRICE, bin_bits, most_of_root,
 };
 use super::node::Node;
 use super::sort::sort;
 use super::subtree::{Cut, Subtree};
-use super::units::starts;
+use super::units::{Savings, starts};
 
 /// The record of a root: its node, its box and its counts.
 #[repr(C)]
@@ -48,7 +48,7 @@ pub(crate) struct Record {
 /// A record in entries.
 pub(crate) const RECORD: usize = size_of::<Record>() / size_of::<Entry>();
 
-const _: () = assert!(size_of::<Record>() == 112 && 2 * RECORD <= LEAST_ROOT);
+const _: () = assert!(size_of::<Record>() == 112 && RECORD <= PRICE);
 
 impl Record {
     /// Writes it to the start of some entries, if it has room there.
@@ -173,7 +173,7 @@ impl<'w> Roots<'w> {
         }
     }
 
-    /// Where to cut a range in two, none of them smaller than a root.
+    /// Where to cut a range in two, none of them smaller than a piece.
     fn split(&self, range: Range<usize>, side: Side) -> usize {
         let entries = self.on(side).get(range).unwrap_or_default();
         let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return 0 };
@@ -184,7 +184,7 @@ impl<'w> Roots<'w> {
             let bit = 1 << differing.ilog2();
             entries.partition_point(|entry| entry[0] & bit == 0)
         };
-        middle.min(entries.len().saturating_sub(LEAST_ROOT)).max(LEAST_ROOT)
+        middle.min(entries.len().saturating_sub(LEAST_PIECE)).max(LEAST_PIECE)
     }
 
     /// Makes the subtree of a few entries, and leaves a record of it.
@@ -199,8 +199,7 @@ impl<'w> Roots<'w> {
         let Some(entries) = entries else { return };
         let places = [first, child];
         self.subtree.build(self.mesh, entries, places, self.least, Cut::Keys);
-        let is_costly = self.subtree.below().len() > most_of_root(entries.len());
-        if is_costly && entries.len() >= LEAST_ROOT {
+        if self.subtree.below().len() > most_of_root(entries.len()) {
             self.subtree.build(self.mesh, entries, places, self.least, Cut::Halves);
         }
         copy(self.subtree.ids(), self.ids.get_mut(range));
@@ -260,15 +259,13 @@ impl<'w> Roots<'w> {
         }
 
         // Crowded bins come first, then all others in order.
+        let mut savings = Savings::default();
         let mut start = range.start;
         while start < range.end {
             let mut end = self.bin_end(start..range.end, other, shift);
             if end - start <= CROWD {
-                while end - start < LEAST_ROOT && end < range.end {
+                while end < range.end && !savings.pay(&(start..end), range.end - end) {
                     end = self.bin_end(end..range.end, other, shift);
-                }
-                if range.end - end < LEAST_ROOT {
-                    end = range.end;
                 }
             }
             self.unit(start..end, other, shift, depth + 1);

@@ -91,36 +91,48 @@ impl Part {
     }
 }
 
-/// Makes the nodes over some items into `nodes`, the root first, and returns how many and how many levels
-/// all have. `record` gives the node of a root, which becomes a child, and its levels.
+/// The tree over the roots.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Top {
+    /// The root of all.
+    pub(crate) root: Node,
+    /// The nodes below it, those of the roots included.
+    pub(crate) count: u32,
+    /// Levels of all nodes.
+    pub(crate) levels: u32,
+}
+
+/// Makes the nodes over some items; all but the root of all go into `nodes`. `record` gives the node of
+/// a root, which becomes a child, and its levels. Returns `None` if there is no room for them.
 ///
-/// `child` is where the second node will lie in the index. No step is smaller than
-/// that of a box of size `least`.
+/// `child` is where `nodes` will lie in the index. No step is smaller than that of a box of size
+/// `least`.
 pub(crate) fn build(
     items: &mut [Item],
     record: impl Fn(u32) -> (Node, u32),
     nodes: &mut [Node],
     child: u32,
     least: f32,
-) -> (u32, u32) {
-    let all = items.iter().fold(Aabb::EMPTY, |all, item| all.union(&item.bounds()));
+) -> Option<Top> {
     #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
     let item_count = items.len() as u32;
-    let mut count = 1;
     // A node that waits keeps its range and level where its children will be.
-    let Some(root) = nodes.first_mut() else { return (count, 0) };
-    *root = waiting(0, item_count, 0);
-    let (mut at, mut levels) = (0, 0);
-    while at < count {
-        let Some(node) = nodes.get(at as usize).copied() else { break };
+    let mut root = waiting(0, item_count, 0);
+    let (mut count, mut levels) = (0, 0);
+    // The root of all comes before the first node.
+    for at in (0_usize..).map(|at| at.checked_sub(1)) {
+        let node = match at {
+            None => &root,
+            Some(at) if at < count as usize => nodes.get(at)?,
+            Some(_) => break,
+        };
         if node.word != WAITING {
-            at += 1;
             continue;
         }
         let (start, end, level) = (node.child, node.first, u32::from(node.counts[0]));
-        let bounds = if at == 0 { all } else { bounds_of(items, start, end) };
+        let bounds = bounds_of(items, start, end);
         let parts = parts(items, Part::new(start, end, bounds, level >= DEEP), level >= DEEP);
-        let mut node = Node { child: child + count - 1, ..Node::EMPTY };
+        let mut node = Node { child: child + count, ..Node::EMPTY };
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let parts = parts.iter().zip(&mut boxes).enumerate();
         for (slot, (part, bounds)) in parts.filter(|(_, (part, _))| part.end > part.start) {
@@ -134,18 +146,16 @@ pub(crate) fn build(
                 }
                 _ => waiting(part.start, part.end, level + 1),
             };
-            if let Some(slot) = nodes.get_mut(count as usize) {
-                *slot = below;
-            }
+            *nodes.get_mut(count as usize)? = below;
             count += 1;
         }
         node.set_boxes(&bounds, &boxes, least);
-        if let Some(slot) = nodes.get_mut(at as usize) {
-            *slot = node;
+        match at {
+            None => root = node,
+            Some(at) => *nodes.get_mut(at)? = node,
         }
-        at += 1;
     }
-    (count, levels)
+    Some(Top { root, count, levels })
 }
 
 /// The exponents of a node that waits for its children; no other node has them.
@@ -303,18 +313,19 @@ mod tests {
         let leaf = |record: u32| {
             (Node { first: record, counts: [1, 0, 0, 0, 0, 0, 0, 0], ..Node::EMPTY }, 1)
         };
-        let most = boxes.len() + 4 * boxes.len() / 7 + 2;
-        let mut nodes = vec![Node::EMPTY; most];
-        let (count, levels) = build(&mut items, leaf, &mut nodes, 1, 1e-6);
-        assert!(count as usize <= most, "{count} nodes over {} roots", boxes.len());
+        // A root and its part of the nodes above are 11 / 7 nodes (the layout proves it).
+        let mut nodes = vec![Node::EMPTY; boxes.len() * 11 / 7];
+        let top = build(&mut items, leaf, &mut nodes, 1000, 1e-6).unwrap();
+        let Top { root, count, levels } = top;
+        // One less is too few.
+        assert!(build(&mut items, leaf, &mut nodes[..count as usize - 1], 1000, 1e-6).is_none());
         let mut met = Vec::new();
-        let mut todo = vec![(0, 1)];
-        while let Some((number, level)) = todo.pop() {
-            let node = nodes[number as usize];
+        let mut todo = vec![(root, 1)];
+        while let Some((node, level)) = todo.pop() {
             assert!(node.word != WAITING && level <= levels);
             for slot in 0..8 {
                 match node.child(slot) {
-                    Child::Inner(child) => todo.push((child, level + 1)),
+                    Child::Inner(child) => todo.push((nodes[child as usize - 1000], level + 1)),
                     Child::Leaf { first, count: 1 } => met.push(first as usize),
                     Child::Leaf { .. } => {}
                 }

@@ -1,8 +1,13 @@
 //! Bins gathered into units: what is made into roots in one go.
+//!
+//! A unit is best a single bin: bins that are neighbours in Morton order may lie far apart, and a root
+//! over both has a large box. But memory pays for no more than one root for [`PRICE`] triangles. So
+//! triangles are saved up: each unit adds its own and spends [`PRICE`] a root. A bin that cannot
+//! be paid for joins the next.
 
 use core::ops::Range;
 
-use super::layout::{CROWD, LEAST_ROOT};
+use super::layout::{CROWD, LEAST_PIECE, MOST_ROOT, PRICE};
 
 /// Where the entries of crowded bins start, and where those of the others: crowded bins come first, so
 /// that the others lie side by side.
@@ -10,14 +15,44 @@ pub(crate) fn starts(sizes: &[u32]) -> [u32; 2] {
     [0, sizes.iter().filter(|&&size| size as usize > CROWD).sum()]
 }
 
-/// The units of some bins, given how many entries each bin has: first each crowded bin, then the others,
-/// gathered until a unit has enough entries for a root. What is left over belongs to the last unit.
+/// Triangles that are saved up for roots.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Savings(usize);
+
+impl Savings {
+    /// Pays for the roots of a unit, if that leaves enough for what lies behind it: a root of some more
+    /// triangles, or nothing.
+    pub(crate) fn pay(&mut self, unit: &Range<usize>, rest: usize) -> bool {
+        let count = unit.len();
+        let roots = if count > MOST_ROOT { count / LEAST_PIECE } else { 1 };
+        let Some(left) = (self.0 + count).checked_sub(roots * PRICE) else { return false };
+        let left = if is_seam(unit) { 0 } else { left };
+        let is_paid = rest == 0 || left + rest >= PRICE;
+        if is_paid {
+            self.0 = left;
+        }
+        is_paid
+    }
+}
+
+/// Returns true if a task may end behind this unit. Nothing is saved beyond it, so that a task
+/// pays for its roots with its own triangles.
+pub(crate) const fn is_seam(unit: &Range<usize>) -> bool {
+    unit.end - unit.start > CROWD || unit.start / SEAM != unit.end / SEAM
+}
+
+/// Triangles from one seam to the next, about.
+pub(crate) const SEAM: usize = 16_384;
+
+/// The units of some bins, given how many entries each bin has: first each crowded bin, then the
+/// others, gathered until their root is paid for. What is left over belongs to the last unit.
 #[derive(Clone)]
 pub(crate) struct Units<'s> {
     sizes: &'s [u32],
     bin: usize,
     is_crowded: bool,
     start: usize,
+    savings: Savings,
     /// Entries of all bins.
     all: usize,
 }
@@ -25,7 +60,7 @@ pub(crate) struct Units<'s> {
 impl<'s> Units<'s> {
     pub(crate) fn new(sizes: &'s [u32]) -> Self {
         let all = sizes.iter().map(|&size| size as usize).sum();
-        Self { sizes, bin: 0, is_crowded: true, start: 0, all }
+        Self { sizes, bin: 0, is_crowded: true, start: 0, savings: Savings::default(), all }
     }
 
     /// The size of the next bin of its kind.
@@ -55,10 +90,7 @@ impl Iterator for Units<'_> {
         let mut end = start;
         while let Some(size) = self.next_bin() {
             end += size;
-            let is_enough = end - start >= LEAST_ROOT;
-            // A small rest joins its neighbour, but no crowded bin.
-            let rest = self.all - end;
-            if is_enough && (size > CROWD || rest >= LEAST_ROOT || rest == 0) {
+            if size > CROWD || self.savings.pay(&(start..end), self.all - end) {
                 break;
             }
         }
@@ -79,7 +111,7 @@ mod tests {
     fn units(sizes: &[u32]) -> Vec<Range<usize>> {
         let all: usize = sizes.iter().map(|&size| size as usize).sum();
         let units: Vec<_> = Units::new(sizes).collect();
-        let mut end = 0;
+        let (mut end, mut saved) = (0, 0);
         let [_, others] = starts(sizes);
         for unit in &units {
             assert_eq!(unit.start, end, "{sizes:?}: {units:?}");
@@ -87,10 +119,17 @@ mod tests {
             // A crowded bin is alone, and what is not crowded is never too much to sort.
             let is_crowded = unit.start < others as usize;
             assert_eq!(is_crowded, unit.end <= others as usize);
-            assert!(is_crowded == (unit.len() > CROWD) || unit.len() <= MOST_UNIT);
-            // Only what is left behind crowded bins is too little for a root.
-            let is_small = unit.len() < LEAST_ROOT;
-            assert!(!is_small || units.len() == 1 || unit.end == all && others > 0, "{units:?}");
+            assert!(if is_crowded { unit.len() > CROWD } else { unit.len() <= MOST_UNIT });
+            if is_crowded {
+                continue;
+            }
+            // Triangles pay for all roots but the only one, and one behind crowded bins.
+            let roots = if unit.len() > MOST_ROOT { unit.len() / LEAST_PIECE } else { 1 };
+            let is_last = unit.end == all && (units.len() == 1 || others > 0);
+            assert!(saved + unit.len() >= roots * PRICE || is_last, "{sizes:?}: {units:?}");
+            saved = (saved + unit.len()).saturating_sub(roots * PRICE);
+            // Nothing is saved beyond a seam.
+            saved = if is_seam(unit) { 0 } else { saved };
         }
         assert_eq!(end, all, "{sizes:?}: {units:?}");
         units
@@ -98,26 +137,33 @@ mod tests {
 
     #[expect(clippy::cast_possible_truncation, reason = "small")]
     #[test]
-    fn bins_are_gathered_until_they_are_enough() {
-        let (least, crowd) = (LEAST_ROOT as u32, CROWD as u32);
+    fn triangles_pay_for_roots() {
+        let (price, crowd) = (PRICE as u32, CROWD as u32);
         assert_eq!(units(&[]), []);
         assert_eq!(units(&[0, 0, 0]), []);
         assert_eq!(units(&[0, 1, 0]), vec![0..1]);
-        assert_eq!(units(&[least, least]).len(), 2);
-        assert_eq!(units(&[least, least - 1]).len(), 1);
-        assert_eq!(units(&[least - 1, 1, least]).len(), 2);
-        assert_eq!(units(&[crowd, least, crowd]).len(), 3);
+        assert_eq!(units(&[price, price]).len(), 2);
+        // Too little joins the next, and so does what would leave too little.
+        assert_eq!(units(&[1, price]).len(), 1);
+        assert_eq!(units(&[price, price - 1]).len(), 1);
+        assert_eq!(units(&[price - 1, 1, price]).len(), 2);
+        // A large bin saves for small ones behind it.
+        assert_eq!(units(&[3 * price, 1, 0, 2, price - 3]).len(), 4);
+        assert_eq!(units(&[price, 3 * price, 1, 0, 2, price - 3]).len(), 5);
+        // Bins that are cut spend more.
+        assert_eq!(units(&[5 * 32, 5 * 8 - 1, 1]).len(), 3);
+        assert_eq!(units(&[crowd, price, crowd]).len(), 3);
         // Crowded ones come first, and a small rest stays by itself.
         let more = crowd as usize + 1;
         assert_eq!(units(&[1, crowd + 1, 2]), [0..more, more..more + 3]);
-        assert_eq!(units(&[least - 1, crowd, least - 1]), vec![0..CROWD + 2 * (LEAST_ROOT - 1)]);
+        assert_eq!(units(&[price - 1, crowd, price - 1]).len(), 2);
         let mut state = 1_u32;
         for _ in 0..if cfg!(miri) { 20 } else { 2000 } {
             let mut sizes = [0; 64];
             for size in &mut sizes {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                *size =
-                    [0, 1, least - 1, least, 100, crowd, crowd + 1, 5000][(state >> 29) as usize];
+                let some = [0, 1, price - 1, price, 100, crowd, crowd + 1, 5000];
+                *size = some[(state >> 29) as usize];
             }
             units(&sizes);
         }
