@@ -16,6 +16,8 @@
 //! ([`slab`](super::slab)).
 
 use bytemuck::{Pod, Zeroable};
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x8, u32x4, u32x8};
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
@@ -25,6 +27,10 @@ pub(crate) const WIDTH: usize = 8;
 
 /// Ids in a leaf, at most: one vector of triangles.
 pub(crate) const LEAF: usize = 8;
+
+/// A box in one vector: least x, y, z, nothing, minus greatest x, y, z, nothing. So the union of two is one
+/// minimum.
+pub(crate) type Sides = [f32; 8];
 
 /// Up to eight children and their boxes.
 #[repr(C)]
@@ -130,13 +136,6 @@ impl Node {
         Child::Leaf { first, count: (counts >> shift & 0xff) as u32 }
     }
 
-    /// Behind which of the ids of all leaves those of each child end.
-    #[inline(always)]
-    pub(crate) const fn ends(&self) -> [u8; WIDTH] {
-        // Byte s of the product is the sum of the counts up to s.
-        u64::from_le_bytes(self.counts).wrapping_mul(0x0101_0101_0101_0101).to_le_bytes()
-    }
-
     /// Writes the boxes of the children that there are, which `bounds` holds. No step is smaller than
     /// that of a box of size `least`.
     pub(crate) fn set_boxes(&mut self, bounds: &Aabb, boxes: &[Aabb; WIDTH], least: f32) {
@@ -145,6 +144,58 @@ impl Node {
             if self.inner() >> slot & 1 == 1 || self.counts[slot] > 0 {
                 self.set_box(slot, child);
             }
+        }
+    }
+
+    /// Writes the same bits as [`set_boxes`](Self::set_boxes), all sides of a child at once. The first
+    /// `count` children are there, the others are not.
+    #[inline(always)]
+    pub(crate) fn set_sides<S: Simd>(
+        &mut self,
+        simd: S,
+        bounds: f32x8<S>,
+        children: &[f32x8<S>; WIDTH],
+        count: usize,
+        least: f32,
+    ) {
+        // The frame of three axes at once.
+        let (low, high) = bounds.split();
+        let magnitude = low.abs().max(high.abs());
+        let extent = (f32x4::splat(simd, 0.0) - (low + high))
+            .max(magnitude * LEAST_STEPS)
+            .max(f32x4::splat(simd, least));
+        let bits = (extent * f32x4::splat(simd, 1.0 / 254.0)).bitcast::<u32x4<S>>();
+        let exponent = ((bits >> 23) & 0xff) + 1;
+        let exponent = exponent.max(u32x4::splat(simd, 1)).min(u32x4::splat(simd, 253));
+        let step = (exponent << 23).bitcast::<f32x4<S>>();
+        let inverse = ((u32x4::splat(simd, 254) - exponent) << 23).bitcast::<f32x4<S>>();
+        let origin = low - step * 0.25;
+        let [x, y, z, _]: [u32; 4] = origin.bitcast::<u32x4<S>>().into();
+        self.origin = [x, y, z];
+        let [x, y, z, _]: [u32; 4] = exponent.into();
+        self.word = self.word & 0xff00_0000 | x | y << 8 | z << 16;
+
+        // Quantise: the high sides are those of the mirrored box, so their signs change at the end.
+        let origin = origin.combine(f32x4::splat(simd, 0.0) - origin);
+        let inverse = inverse.combine(inverse);
+        let end = f32x4::splat(simd, 0.0).combine(f32x4::splat(simd, -255.0));
+        let sign = f32x4::splat(simd, 1.0).combine(f32x4::splat(simd, -1.0));
+        let unused = u32x4::splat(simd, 0xff).combine(u32x4::splat(simd, 0));
+        let quantise = |slot: usize| {
+            let at = (children[slot] - origin) * inverse - (0.5 + MARGIN);
+            let bits = (at.max(end) * sign + SHIFT).bitcast::<u32x8<S>>() & 0xff;
+            if slot < count { bits } else { unused }
+        };
+        // Lane by lane, the bytes of four children make one word.
+        let word = |first: usize| {
+            let (a, b) = (quantise(first), quantise(first + 1));
+            let (c, d) = (quantise(first + 2), quantise(first + 3));
+            (a | b << 8) | (c | d << 8) << 16
+        };
+        let first: [u32; 8] = word(0).into();
+        let second: [u32; 8] = word(4).into();
+        for (row, lane) in self.bounds.iter_mut().zip([0, 1, 2, 4, 5, 6]) {
+            *row = (u64::from(first[lane]) | u64::from(second[lane]) << 32).to_le_bytes();
         }
     }
 
@@ -219,6 +270,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::simd::{Kernel, SimdLevel, dispatch};
 
     #[test]
     fn used_children_are_nodes_and_leaves_with_ids() {
@@ -295,6 +347,56 @@ mod tests {
                             );
                         }
                     }
+                }
+            }
+        }
+    }
+
+    struct Set<'n> {
+        node: &'n mut Node,
+        bounds: Aabb,
+        boxes: [Aabb; WIDTH],
+        count: usize,
+        least: f32,
+    }
+
+    impl Kernel for Set<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) {
+            let sides = |bounds: &Aabb| {
+                let ([x, y, z], [u, v, w]) = (bounds.min.to_array(), (-bounds.max).to_array());
+                f32x8::simd_from(simd, [x, y, z, 0.0, u, v, w, 0.0])
+            };
+            let boxes = self.boxes.map(|bounds| sides(&bounds));
+            self.node.set_sides(simd, sides(&self.bounds), &boxes, self.count, self.least);
+        }
+    }
+
+    #[test]
+    fn every_kind_of_vectors_writes_the_same_boxes() {
+        let mut state = 7;
+        for scale in [1e-38, 1e-30, 1.0, 1e10, 1e36] {
+            for count in (1..=WIDTH).step_by(if cfg!(miri) { 7 } else { 1 }) {
+                let boxes = [0; WIDTH].map(|_| {
+                    let (center, half) = (random(&mut state), random(&mut state).abs() * 0.1);
+                    Aabb { min: (center - half) * scale, max: (center + half) * scale }
+                });
+                let used = boxes.iter().take(count);
+                let bounds = used.fold(Aabb::EMPTY, |all, child| all.union(child));
+                let least = bounds.size().max_element() * 1e-10;
+                let mut node = Node { child: 5, first: 6, ..Node::EMPTY };
+                node.set_inner(0);
+                for counted in node.counts.iter_mut().take(count).skip(1) {
+                    *counted = 3;
+                }
+                let mut expected = node;
+                expected.set_boxes(&bounds, &boxes, least);
+                for level in SimdLevel::available() {
+                    let mut node = node;
+                    dispatch(level, Set { node: &mut node, bounds, boxes, count, least });
+                    assert_eq!(node, expected, "{level:?} {scale} {count}");
                 }
             }
         }

@@ -22,14 +22,13 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::aabb::Aabb;
 use crate::mesh::TriangleMesh;
+use crate::simd::{SimdLevel, dispatch};
 
 use super::key::{KEY_BITS, Keys};
-use super::layout::{
-    CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_ROOT, MOST_UNIT, PRICE, bin_bits, most_of_root,
-};
+use super::layout::{CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_ROOT, MOST_UNIT, PRICE, bin_bits};
 use super::node::Node;
 use super::sort::sort;
-use super::subtree::{Cut, Subtree};
+use super::subtree::{Build, Cut, Subtree};
 use super::units::{Savings, starts};
 
 /// The record of a root: its node, its box and its counts.
@@ -86,6 +85,7 @@ pub(crate) struct Roots<'w> {
     /// One for each bin of the tree, so no fewer than any division of it has bins.
     counts: &'w mut [u32],
     subtree: &'w mut Subtree,
+    level: SimdLevel,
     /// Nodes so far, whether or not there was room for them.
     pub(crate) node_count: u32,
     pub(crate) root_count: u32,
@@ -127,6 +127,7 @@ impl<'w> Roots<'w> {
             child,
             counts,
             subtree,
+            level: SimdLevel::detect(),
             node_count,
             root_count,
             last,
@@ -147,7 +148,9 @@ impl<'w> Roots<'w> {
             return;
         }
         let (entries, bench) = match side {
-            Side::Entries => (self.entries.get_mut(range.clone()), bench_for(self.bench, &range)),
+            Side::Entries => {
+                (self.entries.get_mut(range.clone()), bench_for(self.bench, &range, depth))
+            }
             Side::Bench => (self.bench.get_mut(range.clone()), self.entries.get_mut(range.clone())),
         };
         if let (Some(entries), Some(bench)) = (entries, bench) {
@@ -197,18 +200,16 @@ impl<'w> Roots<'w> {
             Side::Bench => self.bench.get(range.clone()),
         };
         let Some(entries) = entries else { return };
-        let places = [first, child];
-        self.subtree.build(self.mesh, entries, places, self.least, Cut::Keys);
-        if self.subtree.below().len() > most_of_root(entries.len()) {
-            self.subtree.build(self.mesh, entries, places, self.least, Cut::Halves);
-        }
+        let subtree = &mut *self.subtree;
+        let (mesh, least, by) = (self.mesh, self.least, Cut::Keys);
+        dispatch(self.level, Build { subtree, mesh, entries, first, child, least, by });
         copy(self.subtree.ids(), self.ids.get_mut(range));
 
         let below = self.subtree.below();
         copy(below, self.nodes.get_mut(self.node_count as usize..));
         self.node_count += below.len() as u32;
-        let (node, bounds) = self.subtree.root();
-        let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+        let (node, &[x, y, z, _, u, v, w, _]) = self.subtree.root();
+        let (min, max) = ([x, y, z], [-u, -v, -w]);
         let levels = self.subtree.levels();
         let record = Record { node: *node, min, max, count, levels };
         let start = self.root_count as usize * RECORD;
@@ -302,11 +303,12 @@ impl<'w> Roots<'w> {
     }
 }
 
-/// The part of a bench that a bin is sorted on: its own place, or the start of a small one.
-fn bench_for<'b>(bench: &'b mut [Entry], range: &Range<usize>) -> Option<&'b mut [Entry]> {
-    if range.end <= bench.len() {
-        bench.get_mut(range.clone())
-    } else {
-        bench.get_mut(..range.len())
-    }
+/// The part of a bench that a bin is sorted on: its start, as few pages as that is, or the bin's own place
+/// while other bins lie there.
+fn bench_for<'b>(
+    bench: &'b mut [Entry],
+    range: &Range<usize>,
+    depth: u32,
+) -> Option<&'b mut [Entry]> {
+    if depth > 0 { bench.get_mut(range.clone()) } else { bench.get_mut(..range.len()) }
 }

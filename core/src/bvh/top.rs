@@ -240,31 +240,40 @@ fn cut(items: &mut [Item], halve: bool) -> usize {
         )
     };
     let mut bins = [[Bin::EMPTY; BINS]; 3];
+    // Bins that are not empty, as bits.
+    let mut used = [0_u32; 3];
     for item in &*items {
         let (bounds, cost) = (item.bounds(), item.cost());
-        for (bins, at) in bins.iter_mut().zip(bin_of(item)) {
-            if let Some(bin) = bins.get_mut(at) {
-                bin.bounds = bin.bounds.union(&bounds);
-                bin.cost += cost;
-            }
+        for ((bins, used), at) in bins.iter_mut().zip(&mut used).zip(bin_of(item)) {
+            let bin = &mut bins[at % BINS];
+            bin.bounds = bin.bounds.union(&bounds);
+            bin.cost += cost;
+            *used |= 1 << (at % BINS);
         }
     }
-    // Sweep over each axis: costs of what is before, then of what is behind.
+    // Sweep over each axis: costs of what is before, then of what is behind. A cut before an empty bin is
+    // one before the next that is not.
     let mut best = (f32::INFINITY, 0, 0);
-    for (axis, bins) in bins.iter().enumerate() {
+    for (axis, (bins, &used)) in bins.iter().zip(&used).enumerate() {
         let mut before = [0.0; BINS];
         let mut all = Bin::EMPTY;
-        for (bin, before) in bins.iter().zip(&mut before) {
-            *before = surface(&all.bounds) * all.cost;
-            all.bounds = all.bounds.union(&bin.bounds);
-            all.cost += bin.cost;
+        let mut rest = used;
+        while rest != 0 {
+            let at = rest.trailing_zeros() as usize % BINS;
+            rest &= rest - 1;
+            before[at] = surface(&all.bounds) * all.cost;
+            all.bounds = all.bounds.union(&bins[at].bounds);
+            all.cost += bins[at].cost;
         }
         let mut all = Bin::EMPTY;
-        for (at, bin) in bins.iter().enumerate().skip(1).rev() {
-            all.bounds = all.bounds.union(&bin.bounds);
-            all.cost += bin.cost;
+        let mut rest = used & !1;
+        while let Some(last) = rest.checked_ilog2() {
+            rest ^= 1 << last;
+            let at = last as usize % BINS;
+            all.bounds = all.bounds.union(&bins[at].bounds);
+            all.cost += bins[at].cost;
             let cost = before[at] + surface(&all.bounds) * all.cost;
-            if before[at] > 0.0 && all.cost > 0.0 && cost < best.0 {
+            if before[at] > 0.0 && cost < best.0 {
                 best = (cost, axis, at);
             }
         }
