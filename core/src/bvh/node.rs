@@ -105,6 +105,16 @@ impl Node {
         self.word >> 24
     }
 
+    /// The mask of inner children, and the first child node, in one load: a second one of the word alone would
+    /// bring the word to vectors by way of a plain register.
+    #[inline(always)]
+    fn inner_and_child(&self) -> (u32, u32) {
+        let bytes = bytemuck::bytes_of(self);
+        let pair = bytes.get(12..20).and_then(|bytes| bytes.first_chunk()).copied();
+        let pair: [u32; 2] = bytemuck::cast(u64::from_ne_bytes(pair.unwrap_or_default()));
+        (pair[0] >> 24, pair[1])
+    }
+
     /// The children that there are, as bits.
     #[inline(always)]
     pub(crate) const fn used(&self) -> u32 {
@@ -122,11 +132,11 @@ impl Node {
 
     /// What child `slot` is. A slot that is not used is a leaf of no ids.
     #[inline(always)]
-    pub(crate) const fn child(&self, slot: u32) -> Child {
+    pub(crate) fn child(&self, slot: u32) -> Child {
         let below = (1_u32 << (slot % 8)) - 1;
-        let inner = self.inner();
+        let (inner, child) = self.inner_and_child();
         if inner >> (slot % 8) & 1 == 1 {
-            return Child::Inner(self.child.wrapping_add((inner & below).count_ones()));
+            return Child::Inner(child.wrapping_add((inner & below).count_ones()));
         }
         // Byte s of the product is the sum of the counts before s.
         let counts = u64::from_le_bytes(self.counts);

@@ -12,6 +12,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
 
 use super::Bvh;
+use super::boxes::bits;
 use super::node::{Child, Node, WIDTH};
 use super::slab::Slab;
 use crate::aabb::{Aabb, greater, lesser};
@@ -61,24 +62,23 @@ struct Wide<S: Simd> {
     inverse_near: [f32x8<S>; 3],
     inverse_far: [f32x8<S>; 3],
     start: f32x8<S>,
-    /// Which sides are near, and which are far.
-    near: [usize; 3],
-    far: [usize; 3],
     filter: Filter<f32x8<S>>,
 }
+
+/// By how many rows of a node the near side of each axis lies behind the first side: 0 or [`FLIP`].
+type Near = [usize; 3];
+/// Rows from a low side to the high one; from one to the other, a mask.
+const FLIP: usize = 3;
 
 impl<S: Simd> Wide<S> {
     #[inline(always)]
     fn new(simd: S, slab: &Slab, filter: &RayFilter) -> Self {
-        let (near, far) = sides_of(slab);
         Self {
             origin_near: splat(simd, slab.origin_near),
             origin_far: splat(simd, slab.origin_far),
             inverse_near: splat(simd, slab.inverse),
             inverse_far: splat(simd, slab.inverse_far()),
             start: f32x8::splat(simd, slab.start),
-            near,
-            far,
             filter: filter.splat(simd),
         }
     }
@@ -106,53 +106,51 @@ impl<S: Simd> Wide<S> {
 
     /// Which boxes of a node the ray meets before its end, as bits, and where it enters each.
     #[inline(always)]
-    fn meet(&self, simd: S, node: &Node, end: f32) -> (u32, f32x8<S>) {
-        let origin = node.origin();
+    fn meet(&self, simd: S, node: &Node, flips: Near, end: f32) -> (u32, f32x8<S>) {
+        // As integers, or numbers are loaded into one lane and then spread.
+        let [x, y, z] = node.origin;
+        let origin = [u32x8::splat(simd, x), u32x8::splat(simd, y), u32x8::splat(simd, z)];
         let word = u32x8::splat(simd, node.word);
-        let near = sides(simd, node, self.near);
-        let far = sides(simd, node, self.far);
         // The exponents of x, y and z stand in the three low bytes.
         let steps = [word << 23, word << 15, word << 7];
-        let mut distances = [(near[0], far[0]); 3];
+        let mut distances = [(self.start, self.start); 3];
         for axis in 0..3 {
+            let near = side(simd, node, axis, flips[axis]);
+            let far = side(simd, node, axis, flips[axis] ^ FLIP);
             let step = (steps[axis] & 0x7f80_0000).bitcast::<f32x8<S>>();
-            let origin = f32x8::splat(simd, origin[axis]);
+            let origin = origin[axis].bitcast::<f32x8<S>>();
             let step_near = step * self.inverse_near[axis];
             let step_far = step * self.inverse_far[axis];
             let base_near = (origin - self.origin_near[axis]) * self.inverse_near[axis];
             let base_far = (origin - self.origin_far[axis]) * self.inverse_far[axis];
-            distances[axis] = (near[axis] * step_near + base_near, far[axis] * step_far + base_far);
+            distances[axis] = (near * step_near + base_near, far * step_far + base_far);
         }
         let [x, y, z] = distances;
         let near = x.0.max(y.0).max(z.0.max(self.start));
         let far = x.1.min(y.1).min(z.1.min(f32x8::splat(simd, end)));
-        let missed = near.simd_gt(far).to_bitmask();
-        #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
-        let met = !missed as u32 & 0xff;
-        (met, near)
+        (bits(!near.simd_gt(far)), near)
     }
 }
 
-/// The rows of the near sides, and those of the far sides.
+/// Where the near sides lie.
 #[inline(always)]
-fn sides_of(slab: &Slab) -> ([usize; 3], [usize; 3]) {
-    let [x, y, z] = slab.inverse.map(|inverse| usize::from(inverse < 0.0) * 3);
-    ([x, y + 1, z + 2], [3 - x, 4 - y, 5 - z])
+fn flips_of(slab: &Slab) -> Near {
+    slab.inverse.map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
 }
 
 /// What [`Wide::meet`] finds, box by box: for machines without vectors.
 #[inline(never)]
 fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>) {
-    let (near_rows, far_rows) = sides_of(slab);
+    let flips = flips_of(slab);
     let (origin, steps, inverse_far) = (node.origin(), node.steps(), slab.inverse_far());
     let (mut met, mut nearest) = (0, [0.0; WIDTH]);
     for (slot, nearest) in nearest.iter_mut().enumerate() {
         let (mut near, mut far) = (slab.start, end);
         for axis in 0..3 {
-            let bound = |rows: [usize; 3]| f32::from(row(node, rows[axis])[slot % WIDTH]);
-            let at_near = bound(near_rows) * (steps[axis] * slab.inverse[axis])
+            let bound = |flip: usize| f32::from(row(node, axis, flip)[slot % WIDTH]);
+            let at_near = bound(flips[axis]) * (steps[axis] * slab.inverse[axis])
                 + (origin[axis] - slab.origin_near[axis]) * slab.inverse[axis];
-            let at_far = bound(far_rows) * (steps[axis] * inverse_far[axis])
+            let at_far = bound(flips[axis] ^ FLIP) * (steps[axis] * inverse_far[axis])
                 + (origin[axis] - slab.origin_far[axis]) * inverse_far[axis];
             near = greater(at_near, near);
             far = lesser(at_far, far);
@@ -164,17 +162,17 @@ fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>)
     (met, f32x8::simd_from(simd, nearest))
 }
 
-/// Three rows of sides as numbers.
+/// A side of eight boxes as numbers.
 #[inline(always)]
-fn sides<S: Simd>(simd: S, node: &Node, [x, y, z]: [usize; 3]) -> [f32x8<S>; 3] {
-    let (x, y) = bytes(simd, row(node, x), row(node, y));
-    let (z, _) = bytes(simd, row(node, z), row(node, z));
-    [x, y, z]
+fn side<S: Simd>(simd: S, node: &Node, axis: usize, flip: usize) -> f32x8<S> {
+    let row = row(node, axis, flip);
+    bytes(simd, row, row).0
 }
 
+/// The row of a side. The mask is for the compiler: it sees that there is such a row.
 #[inline(always)]
-fn row(node: &Node, row: usize) -> [u8; WIDTH] {
-    node.bounds.get(row).copied().unwrap_or([0; WIDTH])
+fn row(node: &Node, axis: usize, flip: usize) -> [u8; WIDTH] {
+    node.bounds[axis % 3 + (flip & FLIP)]
 }
 
 /// Twice eight bytes as numbers.
@@ -218,6 +216,7 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
             || Wide::new(simd, slab, &filter),
         );
         let wide = wide.as_ref().map(core::hint::black_box);
+        let flips = flips_of(slab);
         let mut end = slab.end;
         let mut top = 0;
         // Damaged bytes may lead in circles; a tree's nodes are entered once.
@@ -231,7 +230,7 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 let (Some(node), Some(rest)) = (node, rest) else { return true };
                 budget = rest;
                 let (met, near) = match wide {
-                    Some(ray) => ray.meet(simd, node, end),
+                    Some(ray) => ray.meet(simd, node, flips, end),
                     None => meet(simd, slab, node, end),
                 };
                 if met == 0 {
@@ -363,7 +362,8 @@ mod tests {
 
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let Self(slab, node, end) = self;
-            let wide = Wide::new(simd, slab, &RayFilter::NONE).meet(simd, node, end);
+            let wide =
+                Wide::new(simd, slab, &RayFilter::NONE).meet(simd, node, flips_of(slab), end);
             let one_by_one = meet(simd, slab, node, end);
             [wide, one_by_one].map(|(met, near)| (met, near.into()))
         }
