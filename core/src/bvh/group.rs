@@ -90,9 +90,10 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
                     let boxes = Boxes::decode(simd, node, rays.center, rays.spread);
                     let count = mask.count_ones();
-                    let mut met = 0xff;
+                    // A slab test that sorts each axis' distances meets boxes that are not there.
+                    let mut met = node.used();
                     if count > FEW_RAYS {
-                        met = boxes.meet_beam(simd, &beam);
+                        met &= boxes.meet_beam(simd, &beam);
                     }
                     let Met { mut slots, rays: by, near } =
                         if count <= octets(mask) * met.count_ones() {
@@ -100,6 +101,7 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                         } else {
                             side_by_side(simd, &boxes, rays, mask, met)
                         };
+                    slots &= met;
                     // Push what is met, the nearest last.
                     let base = top;
                     while slots != 0 {
