@@ -115,7 +115,7 @@ inline constexpr std::size_t scratch_bound(std::size_t triangles) noexcept
 {
     return HGRID_SCRATCH_BOUND(triangles);
 }
-/// The same with `method::one_level`, which wants less for arrays of a fixed size: bytes of index.
+/// The same with `method::one_level`: bytes of index.
 inline constexpr std::size_t one_level_index_bound(std::size_t triangles) noexcept
 {
     return HGRID_INDEX_BOUND_ONE_LEVEL(triangles);
@@ -124,16 +124,6 @@ inline constexpr std::size_t one_level_index_bound(std::size_t triangles) noexce
 inline constexpr std::size_t one_level_scratch_bound(std::size_t triangles) noexcept
 {
     return HGRID_SCRATCH_BOUND_ONE_LEVEL(triangles);
-}
-/// The same with `method::bvh`: bytes of index.
-inline constexpr std::size_t bvh_index_bound(std::size_t triangles) noexcept
-{
-    return HGRID_BVH_INDEX_BOUND(triangles);
-}
-/// The same with `method::bvh`, bytes of scratch.
-inline constexpr std::size_t bvh_scratch_bound(std::size_t triangles) noexcept
-{
-    return HGRID_BVH_SCRATCH_BOUND(triangles);
 }
 /// The same with `quality::high`, bytes of scratch.
 inline constexpr std::size_t bvh_high_scratch_bound(std::size_t triangles) noexcept

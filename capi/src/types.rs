@@ -15,8 +15,8 @@ use hgrid_core::{
 use crate::status::{
     HGRID_ERROR_INVALID_FLAGS, HGRID_ERROR_INVALID_INDEX_TYPE, HGRID_ERROR_INVALID_INDICES,
     HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_METHOD, HGRID_ERROR_INVALID_POSITIONS,
-    HGRID_ERROR_INVALID_QUALITY, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_STRUCT_SIZE, HGRID_ERROR_TOO_MANY_TRIANGLES,
-    hgrid_status, status_of,
+    HGRID_ERROR_INVALID_QUALITY, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_STRUCT_SIZE,
+    HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
 };
 
 /// Every memory region starts at a multiple of this many bytes: index, scratch and blob.
@@ -359,15 +359,7 @@ impl hgrid_config {
             Method::Bvh => Quality::from_u32(self.quality).ok_or(HGRID_ERROR_INVALID_QUALITY)?,
             _ => Quality::Fast,
         };
-        Ok(Config {
-            method,
-            density,
-            macrocell_factor,
-            subdivide_above,
-            depth,
-            quality,
-            flags,
-        })
+        Ok(Config { method, density, macrocell_factor, subdivide_above, depth, quality, flags })
     }
 }
 

@@ -184,12 +184,12 @@ mod tests {
     use glam::Vec3A;
 
     use super::*;
-    use crate::triangle::TriangleTest;
     use crate::aabb::Aabb;
     use crate::approach::Approach;
     use crate::mesh::{IndexType, Strided, Triangle};
     use crate::ray::{Hit, Ray, round};
     use crate::simd::{Kernel, SimdLevel, dispatch};
+    use crate::triangle::TriangleTest;
     use alloc::vec::Vec;
 
     /// Random numbers as in Marsaglia's xorshift.
@@ -393,7 +393,8 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
-            let Eight { corners, used } = Eight::of(simd, self.0, first_eight(self.1), self.1.len());
+            let Eight { corners, used } =
+                Eight::of(simd, self.0, first_eight(self.1), self.1.len());
             let lanes: [[[f32; LANES]; 3]; 3] = corners.map(|corner| corner.map(Into::into));
             core::array::from_fn(|lane| {
                 let triangle = lanes.map(|corner| corner.map(|axis| axis[lane]));

@@ -10,8 +10,7 @@ use crate::blob::{Header, corrupt};
 use crate::bvh::{self, Bvh, Nearest};
 use crate::cell::Lattice;
 use crate::config::{
-    Config, HAS_BVH, HAS_FIXED, HAS_GRIDS, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE,
-    Method,
+    Config, HAS_BVH, HAS_FIXED, HAS_GRIDS, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
 };
 use crate::control::{Control, Watch};
 use crate::counters::Tally;

@@ -260,16 +260,14 @@ fn initialisers_are_the_defaults() {
     }
     for config in Method::ALL.iter().copied().map(Config::new) {
         let Config { method, density, macrocell_factor, subdivide_above, depth, .. } = config;
-        let (size, cell_size, flags) =
-            (fact("hgrid_config"), config.cell_size, config.flags.bits());
-        let fields = format!(
-            "{size} {density} {macrocell_factor} {subdivide_above} {depth} {cell_size} {flags}"
-        );
+        let (size, flags) = (fact("hgrid_config"), config.flags.bits());
+        let fields =
+            format!("{size} {density} {macrocell_factor} {subdivide_above} {depth} 0 {flags}");
         // One task, and nobody is asked on the way.
         let fields = format!("{fields} 1 0 0 0 0");
         assert_eq!(fact(&format!("config_{}", method as u32)), fields, "{method:?}");
     }
-    assert_eq!(fact("HGRID_METHOD_BRICK"), (Config::default().method as u32).to_string());
+    assert_eq!(fact("HGRID_METHOD_BVH"), (Config::default().method as u32).to_string());
 }
 
 #[test]

@@ -1,8 +1,6 @@
 //! What happens at the edges: odd meshes, odd rays, odd numbers, damaged bytes?
 
 mod blobs;
-mod bricks;
-mod chunks;
 mod inputs;
 mod packed;
 mod progress;
