@@ -78,7 +78,9 @@ impl Grid<'_> {
             found.reference_count += u64::from(length);
             found.longest_list = found.longest_list.max(length);
             hash.add(length);
-            ids.iter().for_each(|&id| hash.add(id));
+            for &id in ids {
+                hash.add(id);
+            }
         });
         found.content_hash = hash.finish();
         found

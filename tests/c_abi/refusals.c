@@ -77,6 +77,9 @@ static void unknown_values_are_errors(void)
         hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL;
         config.method = unknown[i];
         refuse_config(HGRID_ERROR_INVALID_METHOD, &config);
+        /* This number is that of a method that was removed: it stays unknown. */
+        config.method = 5;
+        refuse_config(HGRID_ERROR_INVALID_METHOD, &config);
         /* All of them have a bit that no flag has. */
         if (unknown[i] != 0) {
             hgrid_config flags = HGRID_CONFIG_INIT_ONE_LEVEL;

@@ -2,6 +2,7 @@
 
 mod blobs;
 mod inputs;
+mod mixed;
 mod packed;
 mod progress;
 mod rays;
