@@ -236,7 +236,7 @@ static void check_blobs()
     const auto grid = hgrid::grid::build(s.mesh(), hgrid::method::bvh);
     CHECK(grid);
     const auto info = hgrid::peek(grid->blob());
-    CHECK(info && info->method == HGRID_METHOD_BRICK && info->triangle_count == s.faces.size());
+    CHECK(info && info->method == HGRID_METHOD_BVH && info->triangle_count == s.faces.size());
     CHECK(!info->has_mesh && hgrid::view::open(grid->blob()).error() == status::no_mesh);
     CHECK(hgrid::peek(grid->blob().subspan(0, 8)).error() == status::truncated);
 
