@@ -6,12 +6,11 @@
 #include <stdlib.h>
 
 const method METHODS[METHOD_COUNT] = {
-    {"brick", HGRID_CONFIG_INIT},
+    {"bvh", HGRID_CONFIG_INIT},
     {"one-level", HGRID_CONFIG_INIT_ONE_LEVEL},
     {"fixed", HGRID_CONFIG_INIT_FIXED},
     {"variable", HGRID_CONFIG_INIT_VARIABLE},
     {"recursive", HGRID_CONFIG_INIT_RECURSIVE},
-    {"bvh", HGRID_CONFIG_INIT_BVH},
 };
 
 void check(hgrid_status status, const hgrid_report *report)

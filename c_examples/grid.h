@@ -14,7 +14,7 @@ typedef struct {
     hgrid_config config;
 } method;
 
-enum { METHOD_COUNT = 6 };
+enum { METHOD_COUNT = 5 };
 extern const method METHODS[METHOD_COUNT];
 
 /* A grid and what there is to know about it. */

@@ -46,7 +46,7 @@ int main()
 
     /* Build. The grid frees its memory by itself. */
     const hgrid::mesh mesh(vertices, hgrid::field(triangles, &triangle::corners));
-    const auto grid = hgrid::grid::build(mesh, hgrid::method::brick);
+    const auto grid = hgrid::grid::build(mesh, hgrid::method::bvh);
     if (!grid)
         return std::fprintf(stderr, "%s\n", hgrid::message(grid.error())), 1;
 

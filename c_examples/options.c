@@ -23,12 +23,11 @@ static const char HELP[] =
     "                     tests (of triangles) or steps (from cell to cell)\n"
     "\n"
     "the grid\n"
-    "  --method NAME      brick, one-level, fixed, variable, recursive or bvh; brick\n"
-    "  --density CELLS    for each triangle; not for brick and bvh\n"
-    "  --cell-size FACTOR 2 makes cells twice as wide as usual; for brick\n"
+    "  --method NAME      bvh, one-level, fixed, variable or recursive; bvh\n"
+    "  --density CELLS    for each triangle; not for bvh\n"
     "\n"
     "the work\n"
-    "  --threads COUNT    that draw and, with brick and bvh, build, 1 to 256; 1. The picture\n"
+    "  --threads COUNT    that draw and, with bvh, build, 1 to 256; 1. The picture\n"
     "                     is the same with any number\n"
     "  --progress         say how far it is, even where nobody sits at a terminal\n"
     "  --help             this text\n"
@@ -67,7 +66,7 @@ static int parse_method(const char *value)
     for (int i = 0; i < METHOD_COUNT; i++)
         if (strcmp(value, METHODS[i].name) == 0)
             return i;
-    fail("--method is brick, one-level, fixed, variable, recursive or bvh, not `%s`", value);
+    fail("--method is bvh, one-level, fixed, variable or recursive, not `%s`", value);
     return 0;
 }
 
@@ -109,8 +108,6 @@ options parse_options(int count, char **words)
             o.method = parse_method(value_of(count, words, &i));
         } else if (is(word, "--density")) {
             o.density = parse_number(word, value_of(count, words, &i));
-        } else if (is(word, "--cell-size")) {
-            o.cell_size = parse_number(word, value_of(count, words, &i));
         } else if (word[0] == '-') {
             fail("unknown option %s: raytracer --help names all of them", word);
         } else if (o.input != NULL) {
@@ -119,11 +116,7 @@ options parse_options(int count, char **words)
             o.input = word;
         }
     }
-    const uint32_t chosen = METHODS[o.method].config.method;
-    const bool is_brick = chosen == HGRID_METHOD_BRICK;
-    if (o.density > 0 && (is_brick || chosen == HGRID_METHOD_BVH))
+    if (o.density > 0 && METHODS[o.method].config.method == HGRID_METHOD_BVH)
         fail("--method %s has no density: leave out --density", METHODS[o.method].name);
-    if (o.cell_size > 0 && !is_brick)
-        fail("--method %s has no cell size: leave out --cell-size", METHODS[o.method].name);
     return o;
 }

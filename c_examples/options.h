@@ -17,7 +17,7 @@ typedef struct {
     heat_kind heat;
     /* An index of METHODS, and density and cell size if they are not the usual ones. */
     int method;
-    float density, cell_size;
+    float density;
 } options;
 
 /* Reads the ray tracer's words; answers --help itself. */

@@ -36,8 +36,6 @@ static hgrid_config config_of(const options *o)
     hgrid_config config = METHODS[o->method].config;
     if (o->density > 0)
         config.density = o->density;
-    if (o->cell_size > 0)
-        config.cell_size = o->cell_size;
     return config;
 }
 
@@ -48,9 +46,7 @@ static void print(const options *o, const scene *s, const hgrid_config *config, 
     printf("triangles      %lu\n", (unsigned long)s->triangle_count);
     printf("skipped        %lu\n", (unsigned long)b->report.skipped_count);
     printf("method         %s\n", METHODS[o->method].name);
-    if (config->method == HGRID_METHOD_BRICK)
-        printf("cell size      %g\n", (double)config->cell_size);
-    else if (config->method != HGRID_METHOD_BVH)
+    if (config->method != HGRID_METHOD_BVH)
         printf("density        %g\n", (double)b->report.density);
     printf("index bytes    %lu\n", (unsigned long)b->report.index_bytes);
     printf("scratch bytes  %lu\n", (unsigned long)b->scratch_bytes);

@@ -68,7 +68,7 @@
  * and no memory: pages that are not touched are never taken. So the shortest way to a grid there is
  * hgrid_bound or hgrid_sizes without scratch, a build in so much, and if you like a copy of the
  * index_bytes that its report tells. With scratch hgrid_sizes is exact, but takes half as long as the
- * build, or as long (brick, bvh, recursive): that is for memory that has to be there, as where there are no pages, or where they
+ * build, or as long (bvh, recursive): that is for memory that has to be there, as where there are no pages, or where they
  * count when they are asked for (Windows, and Linux that may not overcommit).
  *
  * The index is a blob: no pointer in it, so it can be copied to another region at a multiple of 64,
@@ -80,18 +80,16 @@
  *
  * Methods
  * -------
- * A grid is built by one of six methods, which hgrid_config says; all of them answer every ray the
+ * A grid is built by one of five methods, which hgrid_config says; all of them answer every ray the
  * same, hit for hit and bit for bit.
  *
- *   HGRID_METHOD_BRICK       the default: cells as large as triangles, a bit for each: the shortest
- *                            build of scans, and little memory whatever the scene
- *   HGRID_METHOD_ONE_LEVEL   one hashed grid; the least memory for large scans, and for arrays of a
- *                            fixed size
+ *   HGRID_METHOD_BVH         the default: a tree of boxes over a grid of the triangles' centres, for rays of
+ *                            every kind in scenes of every kind; what it takes at most is known from the
+ *                            number of triangles
+ *   HGRID_METHOD_ONE_LEVEL   one hashed grid; the structure that the others are built from
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
  *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
  *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
- *   HGRID_METHOD_BVH         a tree of boxes over a grid of the triangles' centres, for rays of every kind in
- *                            scenes of every kind; what it takes at most is known from the number of triangles
  *
  *   hgrid_config config = HGRID_CONFIG_INIT_VARIABLE;
  *
@@ -101,7 +99,7 @@
  *
  * A library may be built with fewer methods, to be smaller: hgrid_has_method tells which it has, and
  * what needs another one answers HGRID_ERROR_METHOD_LEFT_OUT. NULL for a configuration and
- * HGRID_CONFIG_INIT mean brick, in a library without it, too: name a method there.
+ * HGRID_CONFIG_INIT mean bvh, in a library without it, too: name a method there.
  *
  * Hits
  * ----
@@ -138,7 +136,7 @@
  * need:
  *
  *   hgrid_config config = HGRID_CONFIG_INIT;
- *   config.cell_size = 0.5f;
+ *   config.quality = HGRID_QUALITY_HIGH;
  *
  * Structs do not change within 0.1.x. A later version may add fields at the end, where 0 means what
  * was before. A larger struct from a program that was compiled with a later header is accepted as
@@ -205,24 +203,20 @@
 
 /**
  * Bytes of index that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. A scan takes a thirteenth of it.
- *
- * The argument is evaluated twice. Where `size_t` has 32 bits the result wraps beyond 33 million
- * triangles; `hgrid_bound` answers with an error there.
+ * default configuration: a constant expression. No mesh takes less than a third of it, and a scan takes half.
+ * Where `size_t` has 32 bits the result wraps beyond 268 million triangles; `hgrid_bound` answers with an
+ * error there.
  */
-#define HGRID_INDEX_BOUND(triangles) \
-    ((triangles) < 224 ? (size_t)177 * (triangles) + 3584 : (size_t)129 * (triangles) + 14336)
+#define HGRID_INDEX_BOUND(triangles) ((size_t)16 * (triangles) + 640)
 
 /**
  * Bytes of scratch that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. The argument is evaluated twice here, too; with 32
- * bits the result wraps beyond 66 million triangles.
+ * default configuration: a constant expression. With 32 bits the result wraps beyond 252 million triangles.
  */
-#define HGRID_SCRATCH_BOUND(triangles) \
-    ((triangles) < 129 ? (size_t)41 * (triangles) + 18944 : (size_t)65 * (triangles) + 53568)
+#define HGRID_SCRATCH_BOUND(triangles) ((size_t)17 * (triangles) + 320)
 
 /**
- * The same with `HGRID_CONFIG_INIT_ONE_LEVEL`, which wants less for arrays of a fixed size: bytes of
+ * The same with `HGRID_CONFIG_INIT_ONE_LEVEL`, bytes of
  * index. A scan takes a sixth of it or less. With 32 bits the result wraps beyond 50 million
  * triangles.
  */
@@ -234,19 +228,7 @@
 #define HGRID_SCRATCH_BOUND_ONE_LEVEL(triangles) ((size_t)5 * (triangles) + 1024)
 
 /**
- * The same with `HGRID_CONFIG_INIT_BVH`: bytes of index. No mesh takes less than a third of it, and a scan
- * takes half. With 32 bits the result wraps beyond 268 million triangles.
- */
-#define HGRID_BVH_INDEX_BOUND(triangles) ((size_t)16 * (triangles) + 640)
-
-/**
- * The same with `HGRID_CONFIG_INIT_BVH`, bytes of scratch. With 32 bits the result wraps beyond 252 million
- * triangles.
- */
-#define HGRID_BVH_SCRATCH_BOUND(triangles) ((size_t)17 * (triangles) + 320)
-
-/**
- * The same with `HGRID_QUALITY_HIGH`, bytes of scratch; of index `HGRID_BVH_INDEX_BOUND` is enough. With 32 bits
+ * The same with `HGRID_QUALITY_HIGH`, bytes of scratch; of index `HGRID_INDEX_BOUND` is enough. With 32 bits
  * the result wraps beyond 134 million triangles.
  */
 #define HGRID_BVH_HIGH_SCRATCH_BOUND(triangles) ((size_t)32 * (triangles) + 64)
@@ -315,7 +297,7 @@
  * there.
  *
  * Choose it where detail is uneven but spread over the scene. Where all of it is in one spot of a
- * large scene, two levels are not enough: choose brick. `subdivide_above` belongs to it.
+ * large scene, two levels are not enough: choose bvh. `subdivide_above` belongs to it.
  *
  * Memory: four to seven times that of one level. How much it takes shows only while the index is
  * written: `hgrid_sizes` without scratch answers with a generous bound, with scratch with the
@@ -339,37 +321,21 @@
 #define HGRID_METHOD_RECURSIVE 4
 
 /**
- * A grid of cells as large as triangles: 4 x 4 x 4 cells are a brick, 4 x 4 x 4 bricks a block,
- * and a bit for each says whether anything is in it. Not hashed.
- *
- * Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
- * detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
- * It is the default: the shortest build of scans, the first image, tiles of rays through
- * `hgrid_intersect_n`, and scenes of which nobody knows what is in them. `cell_size`
- * belongs to it, `density` does not.
- *
- * Memory: on scans about 9 bytes a triangle; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND`
- * hold for it. How much index it takes shows only while it is written, and a build may need
- * somewhat more than the blob has in the end. `hgrid_sizes` without scratch answers with what
- * is enough, seven times as much for a scan, and with more scratch than a build takes; with
- * scratch it gives the exact size.
- */
-#define HGRID_METHOD_BRICK 5
-
-/**
  * A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
  * to eight children with tight boxes.
  *
- * Choose it for rays that share nothing with their neighbours, for interiors and for scenes with small
- * detail in one place. `quality` belongs to it. It has no cells, so neither `density` nor `cell_size` means
- * anything to it, and its resolution is 1 x 1 x 1.
+ * It is the default: rays of every kind, scenes of every kind, and the least memory that is known before.
+ * `quality` belongs to it. It has no cells, so `density` means nothing to it, and its resolution is
+ * 1 x 1 x 1.
  *
  * Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
- * alone and is less than twice that: `HGRID_BVH_INDEX_BOUND` and `HGRID_BVH_SCRATCH_BOUND` hold for it
+ * alone and is less than twice that: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it
  * (`HGRID_BVH_HIGH_SCRATCH_BOUND` with `HGRID_QUALITY_HIGH`). `hgrid_sizes` without scratch answers with that
  * bound; with scratch it gives the exact size. With several tasks it answers with the bound in either case:
  * tasks fill their parts of the index side by side, and where there is less, one task builds. A tree has no
  * more than 2^31 triangles.
+ *
+ * The number 5 was that of a method that the library has no more: it is never used for another one.
  */
 #define HGRID_METHOD_BVH 6
 
@@ -387,7 +353,7 @@
  * Choose it for a scene that is traced for long, above all where large and small triangles mix, as in
  * architecture. Rays are answered sooner and the index is smaller; the build takes four to five times
  * as long. It takes 32 bytes of scratch a triangle, whatever the number of tasks:
- * `HGRID_BVH_INDEX_BOUND` and `HGRID_BVH_HIGH_SCRATCH_BOUND` hold for it. All queries answer as with the
+ * `HGRID_INDEX_BOUND` and `HGRID_BVH_HIGH_SCRATCH_BOUND` hold for it. All queries answer as with the
  * other quality, and the blob has the same format.
  */
 #define HGRID_QUALITY_HIGH 1
@@ -476,8 +442,8 @@ typedef struct hgrid_config {
     uint32_t method;
     /**
      * Cells per triangle, above 0: 4 for one level and variable, 32 for fixed, 8 for recursive.
-     * More cells mean fewer tests, more steps, more memory. `HGRID_METHOD_BRICK` has `cell_size`
-     * instead, `HGRID_METHOD_BVH` neither.
+     * More cells mean fewer tests, more steps, more memory. `HGRID_METHOD_BVH` has no cells
+     * and does not look at it.
      */
     float density;
     /**
@@ -495,17 +461,15 @@ typedef struct hgrid_config {
      */
     uint32_t depth;
     /**
-     * For `HGRID_METHOD_BRICK`: the width of a cell, above 0, in multiples of the one that suits
-     * the mesh's triangles, so usually 1. Smaller cells mean fewer tests, more steps, more memory.
-     * Cells are made larger where there would be far more of them than triangles.
+     * 0.
      */
-    float cell_size;
+    uint32_t reserved;
     /**
      * 0 or `HGRID_BUILD_STRICT`.
      */
     uint32_t flags;
     /**
-     * For `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH`: the most tasks that are run at once, usually the
+     * For `HGRID_METHOD_BVH`: the most tasks that are run at once, usually the
      * number of cores; each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
      * `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer, down to one. With 0 and 1 nothing
      * is parallel, and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL,
@@ -568,12 +532,11 @@ typedef struct hgrid_report {
      */
     uint32_t is_exact;
     /**
-     * Bytes that the index region needs; after a build, the size of the blob: with
-     * `HGRID_METHOD_BRICK` the same mesh may need a larger index to be built again.
+     * Bytes that the index region needs; after a build, the size of the blob.
      */
     uint64_t index_bytes;
     /**
-     * Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_BRICK` it
+     * Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it
      * is enough, but not exact, and after a build an upper bound of that. After a build with
      * several tasks, whether it succeeds or fails, it is that of a build with one.
      */
@@ -588,14 +551,14 @@ typedef struct hgrid_report {
      */
     uint32_t skipped_count;
     /**
-     * Triangle ids in all cells or leaves together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`
-     * and `HGRID_METHOD_BRICK` the words of 4 bytes that ids, subgrids and bricks take together.
+     * Triangle ids in all cells or leaves together; for `HGRID_METHOD_VARIABLE` and
+     * `HGRID_METHOD_RECURSIVE` the words of 4 bytes that ids and subgrids take together.
      */
     uint32_t reference_count;
     /**
      * The density of the outermost grid: what was asked for, or a half, a quarter, ... of it where
      * the mesh would have needed more than 16 references for each triangle. 0 for
-     * `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH`, which have none.
+     * `HGRID_METHOD_BVH`, which has none.
      */
     float density;
     /**
@@ -764,7 +727,7 @@ typedef struct hgrid_counters {
      */
     uint64_t cell_steps;
     /**
-     * How often a ray went down a level, into a macrocell, a subgrid, a block, a brick or a node; 0 for a
+     * How often a ray went down a level, into a macrocell, a subgrid or a node; 0 for a
      * grid of one level.
      */
     uint64_t grid_steps;
@@ -1003,8 +966,7 @@ typedef struct hgrid_statistics {
      */
     uint32_t first_bad;
     /**
-     * Lists of triangles: one for each cell that has any, and for each brick or
-     * block that has some of its own; the leaves of a tree.
+     * Lists of triangles: one for each cell that has any; the leaves of a tree.
      */
     uint64_t list_count;
     /**
@@ -1207,12 +1169,6 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_DEPTH -34
 
 /**
- * The configuration's `cell_size` is NaN, infinite or not above 0, or so small that the grid would
- * take more than 8 GiB, and the method is `HGRID_METHOD_BRICK`.
- */
-#define HGRID_ERROR_INVALID_CELL_SIZE -35
-
-/**
  * The configuration's `run` did not run every task exactly once before it returned.
  */
 #define HGRID_ERROR_PARALLEL_FOR -36
@@ -1275,6 +1231,11 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_CANNOT_REFIT -47
 
 /**
+ * An older version built the blob with a method that was removed, brick: build it again with another one.
+ */
+#define HGRID_ERROR_METHOD_REMOVED -48
+
+/**
  * The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
  */
 #define HGRID_ERROR_INVALID_RAYS -50
@@ -1303,9 +1264,9 @@ extern "C" {
  * lie: O(1), nothing is looked at.
  *
  * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
- * as constants, rounded up a little; with brick or bvh and `tasks` above 1 the scratch is larger. How much
- * more than enough it is depends on the method: a scan takes a sixth of it or less with one level, a
- * thirteenth with brick, half with bvh; with recursive it is generous beyond use.
+ * as constants, rounded up a little; with bvh and `tasks` above 1 the scratch is larger. How much
+ * more than enough it is depends on the method: a scan takes a sixth of it or less with one level,
+ * half with bvh; with recursive it is generous beyond use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
  * has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -1314,7 +1275,7 @@ extern "C" {
  * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
  *   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
  *   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
- *   `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_ERROR_INVALID_QUALITY`.
+ *   `HGRID_ERROR_INVALID_QUALITY`.
  *
  * Threads: any number of calls at once, each with a report of its own.
  *
@@ -1331,10 +1292,10 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
  * `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more
  * than enough the index is depends on the method: for a scan up to 2 times with one level, 4 with
- * fixed, 6 with variable, 7 with brick, 2 with bvh; with recursive it is a bound that no mesh comes near.
+ * fixed, 6 with variable, 2 with bvh; with recursive it is a bound that no mesh comes near.
  *
  * With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
- * is 1. That takes about half the time of a build; with recursive, brick and bvh, which have to build
+ * is 1. That takes about half the time of a build; with recursive and bvh, which have to build
  * the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
  *
  * With `tasks` in the configuration the answer is for a build with so many at once: each takes
@@ -1353,7 +1314,7 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
  *   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
  *   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
- *   `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_ERROR_INVALID_QUALITY`, `HGRID_ERROR_PARALLEL_FOR`.
+ *   `HGRID_ERROR_INVALID_QUALITY`, `HGRID_ERROR_PARALLEL_FOR`.
  *
  * Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
  * call starts no thread; tasks are called on those that `run` chooses.
@@ -1370,11 +1331,10 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
 /**
  * Looks for the finest grid that fits into a budget.
  *
- * `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
- * (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no
+ * `fitted` becomes a copy of `config` with a density that is lower, as far as is needed for an index of `index_bytes` bytes, by no
  * more than a step too much: a step is a factor of 1.41 in the number of cells. A tree
  * (`HGRID_METHOD_BVH`) has no cells and fits or does not. It takes a
- * dozen times as long as `hgrid_sizes`, or less. A density, or cells, that would be too fine
+ * dozen times as long as `hgrid_sizes`, or less. A density that would be too fine
  * for a build count as too large here.
  *
  * Bring as much scratch as `hgrid_sizes` without scratch says. With less the grid may get coarser
@@ -1427,12 +1387,11 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * is too small, what both need; or the triangle that is to blame.
  *
  * After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
- * anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
- * `HGRID_ERROR_INVALID_CELL_SIZE` and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`,
- * `HGRID_METHOD_RECURSIVE`, `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH` may have left anything in it, so a
+ * anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`
+ * and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BVH` may have left anything in it, so a
  * grid that lay there before is gone. A view of it (`grid` itself, where a build is repeated) can be asked
  * without harm, but answers anything: set it to `HGRID_GRID_INIT`. These methods write as far as the
- * index reaches and then go on counting: the report's `index_bytes` is exact (with brick and bvh maybe
+ * index reaches and then go on counting: the report's `index_bytes` is exact (with bvh maybe
  * only enough), and with so many the same call succeeds.
  *
  * A build allocates nothing and needs at most 14 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
@@ -1442,7 +1401,7 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * # A build on threads
  *
  * The library knows no threads. With `tasks` and `run` in the configuration, a build with
- * `HGRID_METHOD_BRICK` or `HGRID_METHOD_BVH` is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
+ * `HGRID_METHOD_BVH` is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
  * calls the tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte.
  * With POSIX threads, one for each task:
  *
@@ -1923,7 +1882,7 @@ hgrid_status hgrid_mesh_of(const struct hgrid_grid *grid,
  * Proves that a blob is the grid of its mesh, and so that every answer will be right.
  *
  * Takes at most about the time of a build with one level and fixed, two or three times that with
- * variable, three to five times with recursive, and three times with brick and bvh, whose builds are
+ * variable, three to five times with recursive, and three times with bvh, whose builds are
  * short; on damaged bytes it may take much longer. A grid that was just built needs no
  * proof; a blob from a file, a network or another process may.
  *
@@ -2089,39 +2048,39 @@ bool hgrid_has_method(uint32_t method);
 #define HGRID_MESH_INIT {sizeof(hgrid_mesh), HGRID_INDEX_U32, NULL, 0, 0, NULL, 0, 0, NULL, 0}
 
 /**
- * The default configuration: a brick grid.
+ * The default configuration: a tree.
  */
-#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_BRICK, 4.0f, 6, 16, 3, 1.0f, 0, \
+#define HGRID_CONFIG_INIT {sizeof(hgrid_config), HGRID_METHOD_BVH, 4.0f, 6, 16, 3, 0, 0, \
                            1, 0, NULL, NULL, NULL}
 
 /**
  * The usual configuration of a grid of one level.
  */
-#define HGRID_CONFIG_INIT_ONE_LEVEL {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 6, 16, 3, 1.0f, 0, \
+#define HGRID_CONFIG_INIT_ONE_LEVEL {sizeof(hgrid_config), HGRID_METHOD_ONE_LEVEL, 4.0f, 6, 16, 3, 0, 0, \
                            1, 0, NULL, NULL, NULL}
 
 /**
  * The usual configuration of a fixed grid.
  */
-#define HGRID_CONFIG_INIT_FIXED {sizeof(hgrid_config), HGRID_METHOD_FIXED, 32.0f, 6, 16, 3, 1.0f, 0, \
+#define HGRID_CONFIG_INIT_FIXED {sizeof(hgrid_config), HGRID_METHOD_FIXED, 32.0f, 6, 16, 3, 0, 0, \
                            1, 0, NULL, NULL, NULL}
 
 /**
  * The usual configuration of a variable grid.
  */
-#define HGRID_CONFIG_INIT_VARIABLE {sizeof(hgrid_config), HGRID_METHOD_VARIABLE, 4.0f, 6, 16, 3, 1.0f, 0, \
+#define HGRID_CONFIG_INIT_VARIABLE {sizeof(hgrid_config), HGRID_METHOD_VARIABLE, 4.0f, 6, 16, 3, 0, 0, \
                            1, 0, NULL, NULL, NULL}
 
 /**
  * The usual configuration of a recursive grid.
  */
-#define HGRID_CONFIG_INIT_RECURSIVE {sizeof(hgrid_config), HGRID_METHOD_RECURSIVE, 8.0f, 6, 16, 3, 1.0f, 0, \
+#define HGRID_CONFIG_INIT_RECURSIVE {sizeof(hgrid_config), HGRID_METHOD_RECURSIVE, 8.0f, 6, 16, 3, 0, 0, \
                            1, 0, NULL, NULL, NULL}
 
 /**
  * The configuration of a tree.
  */
-#define HGRID_CONFIG_INIT_BVH {sizeof(hgrid_config), HGRID_METHOD_BVH, 4.0f, 6, 16, 3, 1.0f, 0, \
+#define HGRID_CONFIG_INIT_BVH {sizeof(hgrid_config), HGRID_METHOD_BVH, 4.0f, 6, 16, 3, 0, 0, \
                            1, 0, NULL, NULL, NULL}
 
 /**

@@ -115,7 +115,7 @@ inline constexpr std::size_t scratch_bound(std::size_t triangles) noexcept
 {
     return HGRID_SCRATCH_BOUND(triangles);
 }
-/// The same with `method::one_level`, which wants less for arrays of a fixed size: bytes of index.
+/// The same with `method::one_level`: bytes of index.
 inline constexpr std::size_t one_level_index_bound(std::size_t triangles) noexcept
 {
     return HGRID_INDEX_BOUND_ONE_LEVEL(triangles);
@@ -124,16 +124,6 @@ inline constexpr std::size_t one_level_index_bound(std::size_t triangles) noexce
 inline constexpr std::size_t one_level_scratch_bound(std::size_t triangles) noexcept
 {
     return HGRID_SCRATCH_BOUND_ONE_LEVEL(triangles);
-}
-/// The same with `method::bvh`: bytes of index.
-inline constexpr std::size_t bvh_index_bound(std::size_t triangles) noexcept
-{
-    return HGRID_BVH_INDEX_BOUND(triangles);
-}
-/// The same with `method::bvh`, bytes of scratch.
-inline constexpr std::size_t bvh_scratch_bound(std::size_t triangles) noexcept
-{
-    return HGRID_BVH_SCRATCH_BOUND(triangles);
 }
 /// The same with `quality::high`, bytes of scratch.
 inline constexpr std::size_t bvh_high_scratch_bound(std::size_t triangles) noexcept
@@ -192,8 +182,6 @@ enum class [[nodiscard]] status : std::int32_t {
     invalid_macrocell_factor = HGRID_ERROR_INVALID_MACROCELL_FACTOR,
     /// `HGRID_ERROR_INVALID_DEPTH`
     invalid_depth = HGRID_ERROR_INVALID_DEPTH,
-    /// `HGRID_ERROR_INVALID_CELL_SIZE`
-    invalid_cell_size = HGRID_ERROR_INVALID_CELL_SIZE,
     /// `HGRID_ERROR_PARALLEL_FOR`
     parallel_for = HGRID_ERROR_PARALLEL_FOR,
     /// `HGRID_ERROR_CANCELLED`
@@ -218,6 +206,8 @@ enum class [[nodiscard]] status : std::int32_t {
     no_mesh = HGRID_ERROR_NO_MESH,
     /// `HGRID_ERROR_CANNOT_REFIT`
     cannot_refit = HGRID_ERROR_CANNOT_REFIT,
+    /// `HGRID_ERROR_METHOD_REMOVED`
+    method_removed = HGRID_ERROR_METHOD_REMOVED,
     /// `HGRID_ERROR_INVALID_RAYS`
     invalid_rays = HGRID_ERROR_INVALID_RAYS,
     /// `HGRID_ERROR_INVALID_ANSWERS`
@@ -244,8 +234,6 @@ enum class method : std::uint32_t {
     variable = HGRID_METHOD_VARIABLE,
     /// `HGRID_METHOD_RECURSIVE`
     recursive = HGRID_METHOD_RECURSIVE,
-    /// `HGRID_METHOD_BRICK`
-    brick = HGRID_METHOD_BRICK,
     /// `HGRID_METHOD_BVH`
     bvh = HGRID_METHOD_BVH,
 };
@@ -632,7 +620,7 @@ private:
 class config {
 public:
     /// The usual numbers of a method.
-    config(method of = method::brick) noexcept
+    config(method of = method::bvh) noexcept
     {
         static constexpr ::hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
         static constexpr ::hgrid_config fixed = HGRID_CONFIG_INIT_FIXED;
@@ -645,14 +633,11 @@ public:
         case method::variable: raw_ = variable; break;
         case method::recursive: raw_ = recursive; break;
         case method::bvh: raw_ = bvh; break;
-        case method::brick: break;
         }
     }
 
-    /// Cells for each triangle. Not for brick and bvh.
+    /// Cells for each triangle. Not for bvh.
     config &density(float cells) noexcept { return raw_.density = cells, *this; }
-    /// The width of a cell in multiples of the usual one. For brick.
-    config &cell_size(float factor) noexcept { return raw_.cell_size = factor, *this; }
     /// Cells in a macrocell, along each axis. For fixed.
     config &macrocell_factor(std::uint32_t cells) noexcept
     {
@@ -1171,7 +1156,6 @@ private:
         switch (method{how.raw_.method}) {
         case method::variable: return 96 * triangles + 4096;
         case method::recursive: return 160 * triangles + 4096;
-        case method::brick: return 16 * triangles + 4096;
         default: return std::numeric_limits<std::uint64_t>::max();
         }
     }

@@ -12,9 +12,9 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 /// lie: O(1), nothing is looked at.
 ///
 /// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
-/// as constants, rounded up a little; with brick or bvh and `tasks` above 1 the scratch is larger. How much
-/// more than enough it is depends on the method: a scan takes a sixth of it or less with one level, a
-/// thirteenth with brick, half with bvh; with recursive it is generous beyond use.
+/// as constants, rounded up a little; with bvh and `tasks` above 1 the scratch is larger. How much
+/// more than enough it is depends on the method: a scan takes a sixth of it or less with one level,
+/// half with bvh; with recursive it is generous beyond use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
 /// has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -23,7 +23,7 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 /// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
 ///   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
 ///   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
-///   `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_ERROR_INVALID_QUALITY`.
+///   `HGRID_ERROR_INVALID_QUALITY`.
 ///
 /// Threads: any number of calls at once, each with a report of its own.
 ///
@@ -51,10 +51,10 @@ pub unsafe extern "C" fn hgrid_bound(
 /// Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
 /// `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more
 /// than enough the index is depends on the method: for a scan up to 2 times with one level, 4 with
-/// fixed, 6 with variable, 7 with brick, 2 with bvh; with recursive it is a bound that no mesh comes near.
+/// fixed, 6 with variable, 2 with bvh; with recursive it is a bound that no mesh comes near.
 ///
 /// With `scratch_bytes` of scratch the grid is planned there: `index_bytes` is exact and `is_exact`
-/// is 1. That takes about half the time of a build; with recursive, brick and bvh, which have to build
+/// is 1. That takes about half the time of a build; with recursive and bvh, which have to build
 /// the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
 ///
 /// With `tasks` in the configuration the answer is for a build with so many at once: each takes
@@ -73,7 +73,7 @@ pub unsafe extern "C" fn hgrid_bound(
 /// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
 ///   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
 ///   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
-///   `HGRID_ERROR_INVALID_CELL_SIZE`, `HGRID_ERROR_INVALID_QUALITY`, `HGRID_ERROR_PARALLEL_FOR`.
+///   `HGRID_ERROR_INVALID_QUALITY`, `HGRID_ERROR_PARALLEL_FOR`.
 ///
 /// Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
 /// call starts no thread; tasks are called on those that `run` chooses.
@@ -103,11 +103,10 @@ pub unsafe extern "C" fn hgrid_sizes(
 
 /// Looks for the finest grid that fits into a budget.
 ///
-/// `fitted` becomes a copy of `config` with a density that is lower, or cells that are larger
-/// (`HGRID_METHOD_BRICK`), as far as is needed for an index of `index_bytes` bytes, by no
+/// `fitted` becomes a copy of `config` with a density that is lower, as far as is needed for an index of `index_bytes` bytes, by no
 /// more than a step too much: a step is a factor of 1.41 in the number of cells. A tree
 /// (`HGRID_METHOD_BVH`) has no cells and fits or does not. It takes a
-/// dozen times as long as `hgrid_sizes`, or less. A density, or cells, that would be too fine
+/// dozen times as long as `hgrid_sizes`, or less. A density that would be too fine
 /// for a build count as too large here.
 ///
 /// Bring as much scratch as `hgrid_sizes` without scratch says. With less the grid may get coarser
@@ -155,7 +154,7 @@ pub unsafe extern "C" fn hgrid_fit(
         // SAFETY: the caller's promise.
         let mut config = unsafe { raw::settings(config) }?;
         config.struct_size = struct_size;
-        (config.density, config.cell_size) = (found.density, found.cell_size);
+        config.density = found.density;
         // SAFETY: the caller's promise.
         unsafe { raw::write(to, config) };
         Ok(())
@@ -182,12 +181,11 @@ pub unsafe extern "C" fn hgrid_fit(
 /// is too small, what both need; or the triangle that is to blame.
 ///
 /// After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
-/// anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`,
-/// `HGRID_ERROR_INVALID_CELL_SIZE` and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`,
-/// `HGRID_METHOD_RECURSIVE`, `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH` may have left anything in it, so a
+/// anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`
+/// and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BVH` may have left anything in it, so a
 /// grid that lay there before is gone. A view of it (`grid` itself, where a build is repeated) can be asked
 /// without harm, but answers anything: set it to `HGRID_GRID_INIT`. These methods write as far as the
-/// index reaches and then go on counting: the report's `index_bytes` is exact (with brick and bvh maybe
+/// index reaches and then go on counting: the report's `index_bytes` is exact (with bvh maybe
 /// only enough), and with so many the same call succeeds.
 ///
 /// A build allocates nothing and needs at most 14 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
@@ -197,7 +195,7 @@ pub unsafe extern "C" fn hgrid_fit(
 /// # A build on threads
 ///
 /// The library knows no threads. With `tasks` and `run` in the configuration, a build with
-/// `HGRID_METHOD_BRICK` or `HGRID_METHOD_BVH` is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
+/// `HGRID_METHOD_BVH` is cut into tasks: the library calls `run`, on the thread that calls this function, and `run`
 /// calls the tasks, on the threads of a pool or on new ones. The blob is the same, byte for byte.
 /// With POSIX threads, one for each task:
 ///

@@ -60,8 +60,8 @@ impl Input {
                     if let Ok(enough) = enough {
                         report.note_sizes(&enough);
                     }
-                    // Without room for bins or ids, grids of these methods name a bound.
-                    let is_bound = matches!(config.method, Method::Brick | Method::Bvh);
+                    // Without room for bins or ids, trees name a bound.
+                    let is_bound = config.method == Method::Bvh;
                     let is_exact = region == Region::Index && !is_bound;
                     report.is_exact = is_exact.into();
                 }

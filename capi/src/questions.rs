@@ -89,7 +89,7 @@ pub struct hgrid_counters {
     pub primitive_tests: u64,
     /// Cells and macrocells entered, empty ones included.
     pub cell_steps: u64,
-    /// How often a ray went down a level, into a macrocell, a subgrid, a block, a brick or a node; 0 for a
+    /// How often a ray went down a level, into a macrocell, a subgrid or a node; 0 for a
     /// grid of one level.
     pub grid_steps: u64,
 }
@@ -281,8 +281,7 @@ pub struct hgrid_statistics {
     pub degenerate_count: u32,
     /// The first triangle that is one or the other, or `HGRID_INVALID_ID`.
     pub first_bad: u32,
-    /// Lists of triangles: one for each cell that has any, and for each brick or
-    /// block that has some of its own; the leaves of a tree.
+    /// Lists of triangles: one for each cell that has any; the leaves of a tree.
     pub list_count: u64,
     /// Triangle ids in all lists together.
     pub reference_count: u64,

@@ -82,9 +82,7 @@ pub const HGRID_ERROR_INVALID_MACROCELL_FACTOR: hgrid_status = -33;
 /// `HGRID_METHOD_RECURSIVE`.
 pub const HGRID_ERROR_INVALID_DEPTH: hgrid_status = -34;
 
-/// The configuration's `cell_size` is NaN, infinite or not above 0, or so small that the grid would
-/// take more than 8 GiB, and the method is `HGRID_METHOD_BRICK`.
-pub const HGRID_ERROR_INVALID_CELL_SIZE: hgrid_status = -35;
+// -35 was an invalid cell_size, of a method that is no more.
 
 /// The configuration's `run` did not run every task exactly once before it returned.
 pub const HGRID_ERROR_PARALLEL_FOR: hgrid_status = -36;
@@ -124,6 +122,9 @@ pub const HGRID_ERROR_NO_MESH: hgrid_status = -46;
 /// The blob is no tree (`HGRID_METHOD_BVH`), or `hgrid_pack` wrote it: refit the tree, then pack it.
 pub const HGRID_ERROR_CANNOT_REFIT: hgrid_status = -47;
 
+/// An older version built the blob with a method that was removed, brick: build it again with another one.
+pub const HGRID_ERROR_METHOD_REMOVED: hgrid_status = -48;
+
 /// The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
 pub const HGRID_ERROR_INVALID_RAYS: hgrid_status = -50;
 
@@ -149,12 +150,12 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
         Error::IndexOutOfRange { .. } => HGRID_ERROR_INDEX_OUT_OF_RANGE,
         Error::NonFiniteTriangle { .. } => HGRID_ERROR_NON_FINITE,
         Error::MethodLeftOut(_) => HGRID_ERROR_METHOD_LEFT_OUT,
+        Error::MethodRemoved => HGRID_ERROR_METHOD_REMOVED,
         Error::InvalidConfig(ConfigField::Method) => HGRID_ERROR_INVALID_METHOD,
         Error::InvalidConfig(ConfigField::Density) => HGRID_ERROR_INVALID_DENSITY,
         Error::InvalidConfig(ConfigField::MacrocellFactor) => HGRID_ERROR_INVALID_MACROCELL_FACTOR,
         Error::InvalidConfig(ConfigField::Depth) => HGRID_ERROR_INVALID_DEPTH,
         Error::InvalidConfig(ConfigField::Flags) => HGRID_ERROR_INVALID_FLAGS,
-        Error::InvalidConfig(ConfigField::CellSize) => HGRID_ERROR_INVALID_CELL_SIZE,
         Error::InvalidParallelFor => HGRID_ERROR_PARALLEL_FOR,
         Error::Cancelled => HGRID_ERROR_CANCELLED,
         Error::NoMesh => HGRID_ERROR_NO_MESH,
@@ -215,9 +216,6 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_INVALID_FLAGS => c"unknown flag: use 0 or HGRID_BUILD_...",
         HGRID_ERROR_INVALID_MACROCELL_FACTOR => c"invalid macrocell_factor: 2 or more, usually 6",
         HGRID_ERROR_INVALID_DEPTH => c"invalid depth: 1 to HGRID_MAX_DEPTH, usually 3",
-        HGRID_ERROR_INVALID_CELL_SIZE => {
-            c"invalid cell_size: above 0, usually 1, and larger if the grid would become too large"
-        }
         HGRID_ERROR_PARALLEL_FOR => {
             c"tasks run twice or not at all: let run call each one once and wait for all of them"
         }
@@ -234,6 +232,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_WRONG_BYTE_ORDER => {
             c"a blob of the other byte order: build it again on this machine"
         }
+        HGRID_ERROR_METHOD_REMOVED => c"a blob of a method that was removed, brick: build it again",
         HGRID_ERROR_UNSUPPORTED_VERSION => c"a blob of another version: build it again",
         HGRID_ERROR_TRUNCATED => c"a truncated blob: bring all of its bytes",
         HGRID_ERROR_MESH_MISMATCH => {

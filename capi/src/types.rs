@@ -15,8 +15,8 @@ use hgrid_core::{
 use crate::status::{
     HGRID_ERROR_INVALID_FLAGS, HGRID_ERROR_INVALID_INDEX_TYPE, HGRID_ERROR_INVALID_INDICES,
     HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_METHOD, HGRID_ERROR_INVALID_POSITIONS,
-    HGRID_ERROR_INVALID_QUALITY, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_TOO_MANY_TRIANGLES,
-    hgrid_status, status_of,
+    HGRID_ERROR_INVALID_QUALITY, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_STRUCT_SIZE,
+    HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
 };
 
 /// Every memory region starts at a multiple of this many bytes: index, scratch and blob.
@@ -55,7 +55,7 @@ pub const HGRID_METHOD_FIXED: u32 = 2;
 /// there.
 ///
 /// Choose it where detail is uneven but spread over the scene. Where all of it is in one spot of a
-/// large scene, two levels are not enough: choose brick. `subdivide_above` belongs to it.
+/// large scene, two levels are not enough: choose bvh. `subdivide_above` belongs to it.
 ///
 /// Memory: four to seven times that of one level. How much it takes shows only while the index is
 /// written: `hgrid_sizes` without scratch answers with a generous bound, with scratch with the
@@ -75,35 +75,21 @@ pub const HGRID_METHOD_VARIABLE: u32 = 3;
 /// scratch, which gives the exact size.
 pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 
-/// A grid of cells as large as triangles: 4 x 4 x 4 cells are a brick, 4 x 4 x 4 bricks a block,
-/// and a bit for each says whether anything is in it. Not hashed.
-///
-/// Rays cross empty bricks and blocks in one step, however large the scene is and wherever its
-/// detail lies: crowded cells hold grids of their own, large triangles belong to bricks or blocks.
-/// It is the default: the shortest build of scans, the first image, tiles of rays through
-/// `hgrid_intersect_n`, and scenes of which nobody knows what is in them. `cell_size`
-/// belongs to it, `density` does not.
-///
-/// Memory: on scans about 9 bytes a triangle; `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND`
-/// hold for it. How much index it takes shows only while it is written, and a build may need
-/// somewhat more than the blob has in the end. `hgrid_sizes` without scratch answers with what
-/// is enough, seven times as much for a scan, and with more scratch than a build takes; with
-/// scratch it gives the exact size.
-pub const HGRID_METHOD_BRICK: u32 = 5;
-
 /// A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
 /// to eight children with tight boxes.
 ///
-/// Choose it for rays that share nothing with their neighbours, for interiors and for scenes with small
-/// detail in one place. `quality` belongs to it. It has no cells, so neither `density` nor `cell_size` means
-/// anything to it, and its resolution is 1 x 1 x 1.
+/// It is the default: rays of every kind, scenes of every kind, and the least memory that is known before.
+/// `quality` belongs to it. It has no cells, so `density` means nothing to it, and its resolution is
+/// 1 x 1 x 1.
 ///
 /// Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
-/// alone and is less than twice that: `HGRID_BVH_INDEX_BOUND` and `HGRID_BVH_SCRATCH_BOUND` hold for it
+/// alone and is less than twice that: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it
 /// (`HGRID_BVH_HIGH_SCRATCH_BOUND` with `HGRID_QUALITY_HIGH`). `hgrid_sizes` without scratch answers with that
 /// bound; with scratch it gives the exact size. With several tasks it answers with the bound in either case:
 /// tasks fill their parts of the index side by side, and where there is less, one task builds. A tree has no
 /// more than 2^31 triangles.
+///
+/// The number 5 was that of a method that the library has no more: it is never used for another one.
 pub const HGRID_METHOD_BVH: u32 = 6;
 
 /// The quality of a tree by default: the shortest build, in which triangles are binned by their centres and the
@@ -117,7 +103,7 @@ pub const HGRID_QUALITY_FAST: u32 = 0;
 /// Choose it for a scene that is traced for long, above all where large and small triangles mix, as in
 /// architecture. Rays are answered sooner and the index is smaller; the build takes four to five times
 /// as long. It takes 32 bytes of scratch a triangle, whatever the number of tasks:
-/// `HGRID_BVH_INDEX_BOUND` and `HGRID_BVH_HIGH_SCRATCH_BOUND` hold for it. All queries answer as with the
+/// `HGRID_INDEX_BOUND` and `HGRID_BVH_HIGH_SCRATCH_BOUND` hold for it. All queries answer as with the
 /// other quality, and the blob has the same format.
 pub const HGRID_QUALITY_HIGH: u32 = 1;
 
@@ -136,7 +122,6 @@ const _: () = assert!(HGRID_METHOD_ONE_LEVEL == Method::OneLevel as u32);
 const _: () = assert!(HGRID_METHOD_FIXED == Method::Fixed as u32);
 const _: () = assert!(HGRID_METHOD_VARIABLE == Method::Variable as u32);
 const _: () = assert!(HGRID_METHOD_RECURSIVE == Method::Recursive as u32);
-const _: () = assert!(HGRID_METHOD_BRICK == Method::Brick as u32);
 const _: () = assert!(HGRID_METHOD_BVH == Method::Bvh as u32);
 const _: () = assert!(HGRID_QUALITY_FAST == Quality::Fast as u32);
 const _: () = assert!(HGRID_QUALITY_HIGH == Quality::High as u32);
@@ -190,8 +175,8 @@ pub struct hgrid_config {
     /// The structure to build: one of `HGRID_METHOD_...`, each of which says when to choose it.
     pub method: u32,
     /// Cells per triangle, above 0: 4 for one level and variable, 32 for fixed, 8 for recursive.
-    /// More cells mean fewer tests, more steps, more memory. `HGRID_METHOD_BRICK` has `cell_size`
-    /// instead, `HGRID_METHOD_BVH` neither.
+    /// More cells mean fewer tests, more steps, more memory. `HGRID_METHOD_BVH` has no cells
+    /// and does not look at it.
     pub density: f32,
     /// For `HGRID_METHOD_FIXED`: cells of a level in one macrocell of the level above, on each
     /// axis; 2 or more, usually 6.
@@ -201,13 +186,11 @@ pub struct hgrid_config {
     pub subdivide_above: u32,
     /// For `HGRID_METHOD_RECURSIVE`: levels of grids, 1 to `HGRID_MAX_DEPTH`, usually 3.
     pub depth: u32,
-    /// For `HGRID_METHOD_BRICK`: the width of a cell, above 0, in multiples of the one that suits
-    /// the mesh's triangles, so usually 1. Smaller cells mean fewer tests, more steps, more memory.
-    /// Cells are made larger where there would be far more of them than triangles.
-    pub cell_size: f32,
+    /// 0.
+    pub reserved: u32,
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
-    /// For `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH`: the most tasks that are run at once, usually the
+    /// For `HGRID_METHOD_BVH`: the most tasks that are run at once, usually the
     /// number of cores; each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
     /// `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer, down to one. With 0 and 1 nothing
     /// is parallel, and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL,
@@ -271,10 +254,9 @@ pub struct hgrid_report {
     /// 1 if `index_bytes` is what the index region needs, to the byte; 0 if it is only enough. After a
     /// build it is 1, and `index_bytes` is the size of the blob.
     pub is_exact: u32,
-    /// Bytes that the index region needs; after a build, the size of the blob: with
-    /// `HGRID_METHOD_BRICK` the same mesh may need a larger index to be built again.
+    /// Bytes that the index region needs; after a build, the size of the blob.
     pub index_bytes: u64,
-    /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` and `HGRID_METHOD_BRICK` it
+    /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it
     /// is enough, but not exact, and after a build an upper bound of that. After a build with
     /// several tasks, whether it succeeds or fails, it is that of a build with one.
     pub scratch_bytes: u64,
@@ -283,12 +265,12 @@ pub struct hgrid_report {
     /// Triangles left out because a coordinate is not finite, or beyond 2^120. Known
     /// after a build, as are all below.
     pub skipped_count: u32,
-    /// Triangle ids in all cells or leaves together; for `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE`
-    /// and `HGRID_METHOD_BRICK` the words of 4 bytes that ids, subgrids and bricks take together.
+    /// Triangle ids in all cells or leaves together; for `HGRID_METHOD_VARIABLE` and
+    /// `HGRID_METHOD_RECURSIVE` the words of 4 bytes that ids and subgrids take together.
     pub reference_count: u32,
     /// The density of the outermost grid: what was asked for, or a half, a quarter, ... of it where
     /// the mesh would have needed more than 16 references for each triangle. 0 for
-    /// `HGRID_METHOD_BRICK` and `HGRID_METHOD_BVH`, which have none.
+    /// `HGRID_METHOD_BVH`, which has none.
     pub density: f32,
     /// Cells of the outermost grid on each axis, or of the finest level under macrocells; 1 for
     /// `HGRID_METHOD_BVH`.
@@ -319,8 +301,8 @@ impl hgrid_config {
     /// What NULL means.
     #[expect(clippy::cast_possible_truncation, reason = "64 bytes")]
     pub(crate) const DEFAULT: Self = {
-        let Config { method, density, macrocell_factor, subdivide_above, depth, cell_size, .. } =
-            Config::new(Method::Brick);
+        let Config { method, density, macrocell_factor, subdivide_above, depth, .. } =
+            Config::new(Method::Bvh);
         let (struct_size, method) = (size_of::<Self>() as u32, method as u32);
         Self {
             struct_size,
@@ -329,7 +311,7 @@ impl hgrid_config {
             macrocell_factor,
             subdivide_above,
             depth,
-            cell_size,
+            reserved: 0,
             flags: 0,
             tasks: 1,
             quality: HGRID_QUALITY_FAST,
@@ -359,31 +341,25 @@ impl hgrid_config {
     /// have none, and a field of another method is not looked at.
     pub(crate) const fn task_count(&self) -> Result<u32, hgrid_status> {
         match (self.method, self.tasks, self.run) {
-            (HGRID_METHOD_BRICK | HGRID_METHOD_BVH, 2.., None) => Err(HGRID_ERROR_NULL_ARGUMENT),
-            (HGRID_METHOD_BRICK | HGRID_METHOD_BVH, tasks, _) => Ok(tasks),
+            (HGRID_METHOD_BVH, 2.., None) => Err(HGRID_ERROR_NULL_ARGUMENT),
+            (HGRID_METHOD_BVH, tasks, _) => Ok(tasks),
             _ => Ok(1),
         }
     }
 
     /// The configuration as core knows it. The numbers are core's to judge.
     pub(crate) fn to_core(self) -> Result<Config, hgrid_status> {
-        let Self { density, macrocell_factor, subdivide_above, depth, cell_size, .. } = self;
+        let Self { density, macrocell_factor, subdivide_above, depth, .. } = self;
+        if self.reserved != 0 {
+            return Err(HGRID_ERROR_STRUCT_SIZE);
+        }
         let method = Method::from_u32(self.method).ok_or(HGRID_ERROR_INVALID_METHOD)?;
         let flags = BuildFlags::from_bits(self.flags).ok_or(HGRID_ERROR_INVALID_FLAGS)?;
         let quality = match method {
             Method::Bvh => Quality::from_u32(self.quality).ok_or(HGRID_ERROR_INVALID_QUALITY)?,
             _ => Quality::Fast,
         };
-        Ok(Config {
-            method,
-            density,
-            macrocell_factor,
-            subdivide_above,
-            depth,
-            cell_size,
-            quality,
-            flags,
-        })
+        Ok(Config { method, density, macrocell_factor, subdivide_above, depth, quality, flags })
     }
 }
 

@@ -2,9 +2,8 @@
 //!
 //! A batch answers each ray as [`Grid::intersect`] or [`Grid::occluded`] would, bit for bit. A tree
 //! ([`Method::Bvh`](crate::Method::Bvh)) takes rays of any kind in groups of up to 64, as they are
-//! given or sorted first, and one by one where their origins lie far apart. A brick grid takes
-//! neighbours together; other rays go one after the other there (several at a time in flight were
-//! slower: core/DESIGN.md), as all do with the other methods.
+//! given or sorted first, and one by one where their origins lie far apart. The other methods trace one
+//! ray after the other.
 
 use core::marker::PhantomData;
 use core::ops::Range;
@@ -31,8 +30,8 @@ pub enum Coherence {
     #[default]
     Incoherent = 0,
     /// Rays that follow one another start near each other: camera rays of a tile, shadow rays and
-    /// ambient occlusion from its hits. They are taken as given. Best are runs of 128 from two tiles
-    /// of 8 x 8 pixels side by side, each sixteen of them a square of 4 x 4.
+    /// ambient occlusion from its hits. They are taken as given. Best are runs of 64 from a tile of
+    /// 8 x 8 pixels.
     Coherent = 1,
 }
 
@@ -410,9 +409,6 @@ impl<A: Answer, B: Batch<A>> Together for Asked<'_, '_, '_, B, A> {
     }
 }
 
-/// Rays of a tile: as many as a brick grid traces together.
-const TILE: usize = 128;
-
 /// Rays of a window that is sorted on the stack.
 const FEW: usize = 256;
 
@@ -424,7 +420,6 @@ impl<A: Answer, B: Batch<A>> Asked<'_, '_, '_, B, A> {
         match (self.grid.method(), coherence) {
             (Method::Bvh, Coherence::Coherent) if !is_one_by_one => self.groups::<ANY>(&mut []),
             (Method::Bvh, Coherence::Incoherent) if !is_one_by_one => self.sorted::<ANY>(),
-            (Method::Brick, Coherence::Coherent) if self.is_plain => self.tiles::<ANY>(),
             _ => self.one_by_one(0..self.batch.count()),
         }
     }
@@ -458,32 +453,6 @@ impl<A: Answer, B: Batch<A>> Asked<'_, '_, '_, B, A> {
         let (grid, choice) = (self.grid, self.options.choice());
         if !grid.groups::<ANY>(choice, memory, self) {
             self.one_by_one(0..self.batch.count());
-        }
-    }
-
-    /// Traces neighbours together.
-    #[inline(never)]
-    fn tiles<const ANY: bool>(&mut self) {
-        let grid = self.grid;
-        let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE];
-        for first in (0..self.batch.count()).step_by(TILE) {
-            let count = TILE.min(self.batch.count() - first);
-            for (place, ray) in (first..).zip(rays.iter_mut().take(count)) {
-                *ray = self.batch.ray(place);
-            }
-            let rays = rays.get(..count).unwrap_or_default();
-            let answer = |at: usize, hits: &[Hit]| {
-                for (place, hit) in (first + at..).zip(hits) {
-                    self.found(place, hit);
-                }
-                if hits.is_empty() {
-                    self.alone(first + at);
-                }
-            };
-            let is_done = grid.tiles::<ANY>(&Strided::new(rays), answer);
-            if !is_done {
-                self.one_by_one(first..first + count);
-            }
         }
     }
 }

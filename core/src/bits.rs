@@ -27,16 +27,6 @@ pub(crate) const fn halves(word: u64) -> [u32; 2] {
     [word as u32, (word >> 32) as u32]
 }
 
-/// The places of the ones of a mask, in order.
-#[inline(always)]
-pub(crate) fn ones(mut mask: u64) -> impl Iterator<Item = u32> {
-    core::iter::from_fn(move || {
-        let bit = mask.trailing_zeros();
-        mask &= mask.wrapping_sub(1);
-        (bit < u64::BITS).then_some(bit)
-    })
-}
-
 /// Whether a bit is set; a bit past the end is not.
 #[inline(always)]
 pub(crate) fn is_set(words: &[u64], bit: usize) -> bool {

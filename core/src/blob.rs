@@ -18,7 +18,7 @@ use crate::aabb::Aabb;
 use crate::arena::{self, ALIGNMENT};
 use crate::bits::halves;
 use crate::cell::{Lattice, MAX_RESOLUTION};
-use crate::config::{BuildFlags, Config, Method, Quality};
+use crate::config::{BuildFlags, Config, Method, Quality, REMOVED_METHOD};
 use crate::control::Watch;
 use crate::error::{Error, Region};
 use crate::hash::Hash;
@@ -68,8 +68,8 @@ pub(crate) struct Header {
     pub(crate) subdivide_above: u32,
     /// Levels of grids; 0 for a method without nested grids.
     pub(crate) depth: u32,
-    /// The width of a cell in triangles; 0 for a method that has a density instead.
-    pub(crate) cell_size: f32,
+    /// Always 0.
+    reserved: u32,
     /// Whether the mesh lies behind the grid: see [`HasMesh`].
     mesh: u32,
     /// Nodes of a tree; 0 for a method without nodes.
@@ -111,7 +111,6 @@ impl Header {
             subdivide_above: if config.method.has_subgrids() { config.subdivide_above } else { 0 },
             depth: if config.method.has_depth() { config.depth } else { 0 },
             quality: if config.method.has_nodes() { config.quality as u32 } else { 0 },
-            cell_size: if config.method.has_cell_size() { config.cell_size } else { 0.0 },
             triangle_count: mesh.triangle_count(),
             vertex_count: mesh.vertex_count() as u64,
             bounds_min: lattice.min,
@@ -186,6 +185,9 @@ impl Header {
         if header.checksum != header.sum() {
             return Err(corrupt(core::mem::offset_of!(Self, checksum)));
         }
+        if header.method == REMOVED_METHOD {
+            return Err(Error::MethodRemoved);
+        }
         Ok(header)
     }
 
@@ -213,9 +215,7 @@ impl Header {
         if !self.resolution.iter().all(|r| (1..=MAX_RESOLUTION).contains(r)) {
             return Err(corrupt(core::mem::offset_of!(Self, resolution)));
         }
-        let lattice = Lattice::new(bounds, self.resolution);
-        let has_cubes = Method::from_u32(self.method) == Some(Method::Brick);
-        Ok(if has_cubes { lattice.with_cubes() } else { lattice })
+        Ok(Lattice::new(bounds, self.resolution))
     }
 
     /// The configuration that the grid was built with, where the method has such parameters.
@@ -223,9 +223,6 @@ impl Header {
         let mut config = default;
         if config.method.has_density() {
             config.density = self.density;
-        }
-        if config.method.has_cell_size() {
-            config.cell_size = self.cell_size;
         }
         if config.method.has_macrocells() {
             config.macrocell_factor = self.macrocell_factor;
@@ -282,7 +279,7 @@ impl Header {
         (method.has_macrocells() || self.macrocell_factor == 0)
             && (method.has_subgrids() || self.subdivide_above == 0)
             && (method.has_depth() || self.depth == 0)
-            && (method.has_cell_size() || self.cell_size.to_bits() == 0)
+            && self.reserved == 0
             && (method.has_density() || self.density.to_bits() == 0)
             && (method.has_nodes() || (self.node_count, self.levels) == (0, 0))
             && (method.has_nodes() || self.quality == 0)

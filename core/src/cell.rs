@@ -1,7 +1,6 @@
 //! From scene units to cells and back: how many cells, which ones a triangle overlaps.
 //!
-//! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis (the
-//! only cell of a brick grid on an axis may be thicker than the box). A triangle is inserted into
+//! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis. A triangle is inserted into
 //! every cell that its own box, grown by a margin, overlaps. The margin is what makes float error
 //! harmless everywhere else: the walk may be a few roundings off at a border, and the ray that the
 //! triangle test sees a few roundings off the walk's, and still the cell lists the triangle.
@@ -12,11 +11,6 @@
 //! the triangle test     8 * 2^-24                     a hit's t outside of the range (triangle.rs)
 //! a far origin         16 * 2^-24                     2^-49 of 2^29 extents (approach.rs)
 //! the walk              4 * 2^-24                     base, cell * delta, their sum
-//! quarters of a cell    4 * 2^-24                     position + rate * t (two margins: a line's, a
-//!                                                     triangle's)
-//! a tile's lines       60 * 2^-24                     start - slope * zero, origin 4.5 extents off (two
-//!                                                     margins: a line's, a triangle's)
-//! the planes of a tile 16 * 2^-24                     slope * k + start (likewise)
 //! a moved far origin   1 ulp of the coordinate        half an ulp on two axes (approach.rs)
 //! margin               64 * 2^-24 + 1 ulp of the largest coordinate (pad: twice the margin)
 //! ```
@@ -66,7 +60,7 @@ impl CellRange {
     }
 }
 
-/// A box cut into equal cells, or in one that reaches beyond it. Plain arrays, so that views of
+/// A box cut into equal cells. Plain arrays, so that views of
 /// grids need no special alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lattice {
@@ -128,30 +122,14 @@ impl Lattice {
     /// Cuts a padded box into cells. The same box and resolution give the same bits.
     pub(crate) fn new(bounds: Aabb, resolution: [u32; 3]) -> Self {
         let cells_per_unit = Vec3A::from_array(resolution.map(as_f32)) / bounds.size();
-        Self::of_cells(&bounds, resolution, cells_per_unit)
-    }
-
-    fn of_cells(bounds: &Aabb, resolution: [u32; 3], cells_per_unit: Vec3A) -> Self {
         Self {
             min: bounds.min.to_array(),
             max: bounds.max.to_array(),
             resolution,
             cells_per_unit: cells_per_unit.to_array(),
             units_per_cell: cells_per_unit.to_array().map(|cells| 1.0 / f64::from(cells)),
-            margin: (cells_per_unit * margin(bounds)).to_array(),
+            margin: (cells_per_unit * margin(&bounds)).to_array(),
         }
-    }
-
-    /// The same box; where it is a single cell thick, in one that is no thinner than the widest on
-    /// any axis: it may reach beyond the box.
-    ///
-    /// A cell that is divided alike on all axes must not be a slab: its parts would be slabs, too,
-    /// as thin as triangles long before they hold only a few.
-    pub(crate) fn with_cubes(self) -> Self {
-        let widest = Vec3A::splat(self.scale().min_element());
-        let is_single = Vec3A::from_array(self.resolution.map(as_f32)).cmplt(Vec3A::splat(1.5));
-        let cells_per_unit = Vec3A::select(is_single, widest, self.scale());
-        Self::of_cells(&self.bounds(), self.resolution, cells_per_unit)
     }
 
     /// The box, pad included.

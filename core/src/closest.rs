@@ -180,7 +180,7 @@ impl Grid<'_> {
             self.visit(&around(center, reach), &mut |ids| {
                 work.cell_steps += 1;
                 work.primitive_tests += ids.len() as u64;
-                for id in ids.iter().filter(|&id| selection.has(id)) {
+                for id in ids.iter().copied().filter(|&id| selection.has(id)) {
                     let triangle = self.mesh().triangle(id);
                     let found = triangle.and_then(|t| ClosestPoint::on_triangle(&t, id, point));
                     if let Some(found) = found.filter(|found| found.is_closer(best)) {

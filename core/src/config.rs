@@ -11,16 +11,18 @@ pub(crate) const HAS_ONE_LEVEL: bool = cfg!(feature = "one-level");
 pub(crate) const HAS_FIXED: bool = cfg!(feature = "fixed");
 pub(crate) const HAS_VARIABLE: bool = cfg!(feature = "variable");
 pub(crate) const HAS_RECURSIVE: bool = cfg!(feature = "recursive");
-pub(crate) const HAS_BRICK: bool = cfg!(feature = "brick");
 pub(crate) const HAS_BVH: bool = cfg!(feature = "bvh");
 /// Whether there are methods with cells; fixed and variable bring one-level along.
-pub(crate) const HAS_GRIDS: bool = HAS_ONE_LEVEL || HAS_RECURSIVE || HAS_BRICK;
+pub(crate) const HAS_GRIDS: bool = HAS_ONE_LEVEL || HAS_RECURSIVE;
 
 const _: () = assert!(
     HAS_GRIDS || HAS_BVH,
     "hgrid has no method to build grids with: turn on at least one of the features one-level, fixed, \
-     variable, recursive, brick and bvh"
+     variable, recursive and bvh"
 );
+
+/// The number of a method that the library once had, `brick`. It is never given to another one.
+pub(crate) const REMOVED_METHOD: u32 = 5;
 
 /// The structure to build.
 #[non_exhaustive]
@@ -36,20 +38,17 @@ pub enum Method {
     Variable = 3,
     /// An uncompressed recursive grid, as in the Manta ray tracer: what the paper compares with.
     Recursive = 4,
-    /// Occupancy masks and ranks, cells as large as triangles: this project's own, with the
-    /// shortest build and the least trouble with triangles of all sizes.
-    #[default]
-    Brick = 5,
     /// A wide tree of tight boxes over a grid of the triangles' centres: this project's own, for rays of
     /// every kind in scenes of every kind, in memory that the number of triangles bounds.
-    Bvh = 6,
+    #[default]
+    Bvh = 6, // 5 was brick, which is no more: its number is never given to another method.
 }
 
 impl Method {
     /// All methods, in the order of the paper's Table 1 but for its baseline, which comes last; also
     /// those that this library has not ([`is_available`](Self::is_available)).
     pub const ALL: &[Self] =
-        &[Self::OneLevel, Self::Variable, Self::Fixed, Self::Recursive, Self::Brick, Self::Bvh];
+        &[Self::OneLevel, Self::Variable, Self::Fixed, Self::Recursive, Self::Bvh];
 
     /// The name that commands and tables use.
     #[must_use]
@@ -59,7 +58,6 @@ impl Method {
             Self::Fixed => "fixed",
             Self::Variable => "variable",
             Self::Recursive => "recursive",
-            Self::Brick => "brick",
             Self::Bvh => "bvh",
         }
     }
@@ -72,14 +70,13 @@ impl Method {
             2 => Some(Self::Fixed),
             3 => Some(Self::Variable),
             4 => Some(Self::Recursive),
-            5 => Some(Self::Brick),
             6 => Some(Self::Bvh),
             _ => None,
         }
     }
 
     /// Whether this library has it. A feature of the package that is off leaves its method out, and
-    /// who asks for it gets [`Error::MethodLeftOut`]; the default, brick, is no exception.
+    /// who asks for it gets [`Error::MethodLeftOut`]; the default, `Bvh`, is no exception.
     #[must_use]
     pub const fn is_available(self) -> bool {
         match self {
@@ -87,7 +84,6 @@ impl Method {
             Self::Fixed => HAS_FIXED,
             Self::Variable => HAS_VARIABLE,
             Self::Recursive => HAS_RECURSIVE,
-            Self::Brick => HAS_BRICK,
             Self::Bvh => HAS_BVH,
         }
     }
@@ -110,7 +106,7 @@ impl Method {
     /// Whether [`Config::density`] means something to it.
     #[must_use]
     pub const fn has_density(self) -> bool {
-        !self.has_cell_size() && !self.has_nodes()
+        !self.has_nodes()
     }
 
     /// Whether its index has nodes, not cells.
@@ -118,16 +114,11 @@ impl Method {
         matches!(self, Self::Bvh)
     }
 
-    /// Whether [`Config::cell_size`] means something to it.
-    pub(crate) const fn has_cell_size(self) -> bool {
-        matches!(self, Self::Brick)
-    }
-
     /// The density that the paper uses with this method.
     #[must_use]
     pub const fn default_density(self) -> f32 {
         match self {
-            Self::OneLevel | Self::Variable | Self::Brick | Self::Bvh => 4.0,
+            Self::OneLevel | Self::Variable | Self::Bvh => 4.0,
             Self::Fixed => 32.0,
             Self::Recursive => 8.0,
         }
@@ -195,8 +186,6 @@ pub struct Config {
     pub subdivide_above: u32,
     /// For [`Method::Recursive`]: levels of grids, 1 to [`MAX_DEPTH`](crate::MAX_DEPTH).
     pub depth: u32,
-    /// For [`Method::Brick`]: the width of a cell in multiples of the one that suits the triangles.
-    pub cell_size: f32,
     /// For [`Method::Bvh`]: how much time the build takes for rays that are faster.
     pub quality: Quality,
     /// Choices that are either on or off.
@@ -213,7 +202,6 @@ impl Config {
             macrocell_factor: 6,
             subdivide_above: 16,
             depth: 3,
-            cell_size: 1.0,
             quality: Quality::Fast,
             flags: BuildFlags::empty(),
         }
@@ -232,9 +220,6 @@ impl Config {
         }
         if self.method.has_depth() && (self.depth < 1 || self.depth > MAX_DEPTH) {
             return Err(Error::InvalidConfig(ConfigField::Depth));
-        }
-        if self.method.has_cell_size() && !(self.cell_size > 0.0 && self.cell_size.is_finite()) {
-            return Err(Error::InvalidConfig(ConfigField::CellSize));
         }
         if self.flags.bits() & !BuildFlags::all().bits() != 0 {
             return Err(Error::InvalidConfig(ConfigField::Flags));

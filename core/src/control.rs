@@ -15,7 +15,7 @@ use crate::tasks::Task;
 /// use hgrid_core::{Block, Config, Control, Grid, Method, TriangleMesh, sizes_with};
 /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 /// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-/// let config = Config::new(Method::Brick);
+/// let config = Config::new(Method::Bvh);
 ///
 /// let run = |count: u32, task: &(dyn Fn(u32) + Sync)| {
 ///     std::thread::scope(|scope| {

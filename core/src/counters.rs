@@ -8,8 +8,7 @@ pub struct Counters {
     pub primitive_tests: u64,
     /// Cells and macrocells entered ("cell traversals"), empty ones included.
     pub cell_steps: u64,
-    /// Macrocells, blocks and bricks gone down into and subgrids entered ("grid traversals"); 0 for a
-    /// one-level grid.
+    /// Macrocells gone down into, subgrids and nodes entered ("grid traversals"); 0 for a one-level grid.
     pub grid_steps: u64,
 }
 

@@ -175,33 +175,6 @@ impl Line {
         (near <= far).then(|| self.walk(near, 1.0, [0; 3], last, Vec3A::splat(far)))
     }
 
-    /// Whether the line comes to a box before a distance, or along its border: one that is given in
-    /// cells from a corner on.
-    #[inline(always)]
-    pub(crate) fn meets(&self, reach: &Aabb, corner: [f32; 3], limit: f32) -> bool {
-        let corner = Vec3A::from_array(corner);
-        let [near, far] = self.inside(&Aabb { min: corner + reach.min, max: corner + reach.max });
-        near.max(0.0) <= far.min(limit)
-    }
-
-    /// On which axes the line between two distances does not reach the second quarter of a cell, on
-    /// which it does not reach the third, and the fourth. Likewise, three bits above these, from the
-    /// other side: on which it begins behind the third quarter, the second, the first.
-    #[inline(always)]
-    pub(crate) fn quarters(&self, cell: [u32; 3], near: f32, far: f32) -> [u32; 3] {
-        let middle = Vec3A::from_array(cell.map(as_f32)) + 0.5;
-        let (from, near, far) = (self.position - middle, self.rate * near, self.rate * far);
-        let end = from + near.max(far) + self.margin;
-        let start = -(from + near.min(far)) + self.margin;
-        [-0.25, 0.0, 0.25].map(
-            #[inline(always)]
-            |border| {
-                let border = Vec3A::splat(border);
-                end.cmplt(border).bitmask() | start.cmplt(border).bitmask() << 3
-            },
-        )
-    }
-
     /// From where to where the line is inside a box given in cells, or along its border; the second
     /// is less than the first if it passes the box.
     #[inline(always)]
@@ -374,46 +347,6 @@ mod tests {
 
     fn is_down(axes: usize) -> BVec3A {
         BVec3A::new(axes & 1 != 0, axes & 2 != 0, axes & 4 != 0)
-    }
-
-    /// What [`Line::quarters`] says of a cell for an axis, on which the line runs from one place in
-    /// it to another: up to its end, and from its start.
-    fn quarters(axis: usize, from: f32, to: f32) -> [[u32; 3]; 2] {
-        let mut line = Line {
-            position: Vec3A::splat(3.5),
-            rate: Vec3A::ZERO,
-            delta: Vec3A::ZERO,
-            base: Vec3A::INFINITY,
-            step: Vec3A::ZERO,
-            margin: Vec3A::splat(0.01),
-            end: 2.0,
-            start: 0.0,
-            scale: 1.0,
-        };
-        line.position[axis] = 3.0 + from;
-        line.rate[axis] = (to - from) / 2.0;
-        let bits = line.quarters([3; 3], 0.0, 2.0);
-        [axis, axis + 3].map(|bit| bits.map(|bits| bits >> bit & 1))
-    }
-
-    #[test]
-    fn within_the_margin_of_a_border_no_quarter_is_left_out() {
-        // Of three borders those that lie behind the end, and as seen from the other side.
-        let behind = [[1, 1, 1], [0, 1, 1], [0, 0, 1], [0, 0, 0]];
-        for axis in 0..3 {
-            for (at, border) in [0.25, 0.5, 0.75].into_iter().enumerate() {
-                for (off, is_there) in [(-0.02, 0), (-0.005, 1), (0.005, 1), (0.02, 1)] {
-                    let expected = behind[at + is_there];
-                    assert_eq!(quarters(axis, 0.0, border + off), [expected, [0; 3]]);
-                    assert_eq!(quarters(axis, border + off, 0.0), [expected, [0; 3]]);
-                    assert_eq!(quarters(axis, 1.0, 1.0 - border - off), [[0; 3], expected]);
-                }
-            }
-            assert_eq!(quarters(axis, 0.5, 0.5), [behind[2], behind[2]]);
-            assert_eq!(quarters(axis, 0.4, 0.4), [behind[1], behind[2]]);
-            assert_eq!(quarters(axis, f32::NAN, 0.0), [[0; 3]; 2]);
-            assert_eq!(quarters(axis, 0.0, f32::NAN), [[0; 3]; 2]);
-        }
     }
 
     #[test]

@@ -21,8 +21,6 @@ use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
 use crate::ray::Ray;
-use crate::simd::HAS_VECTORS;
-use crate::triangle::TriangleTest;
 
 /// How many triangles are tested at once.
 pub(crate) const LANES: usize = 8;
@@ -40,14 +38,6 @@ pub(crate) struct Eight<S: Simd> {
 }
 
 impl<S: Simd> Eight<S> {
-    /// The first eight of the triangles with these ids, each in the lane of its place.
-    ///
-    /// The lane of an id without a triangle stays unused.
-    #[inline(always)]
-    pub(crate) fn gather(simd: S, mesh: &TriangleMesh<'_>, ids: &[u32]) -> Self {
-        Self::of(simd, mesh, first_eight(ids), ids.len())
-    }
-
     /// The first `count` of eight triangles; the others are read, too.
     #[inline(always)]
     pub(crate) fn of(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; LANES], count: usize) -> Self {
@@ -143,33 +133,6 @@ impl RayFilter {
     }
 }
 
-impl TriangleTest {
-    /// Which of the first `count` of eight triangles pass the filter of [`TriangleTest::test`], as
-    /// bits: all at once, or where there are no vectors one by one.
-    #[inline(always)]
-    pub(crate) fn survivors_of<S: Simd>(
-        &self,
-        simd: S,
-        mesh: &TriangleMesh<'_>,
-        ids: &[u32; LANES],
-        count: usize,
-    ) -> u32 {
-        if HAS_VECTORS {
-            self.survivors(simd, &Eight::of(simd, mesh, *ids, count))
-        } else {
-            self.filter.survivors(mesh, ids.get(..count).unwrap_or(ids))
-        }
-    }
-
-    /// The lanes whose triangles pass the filter of [`TriangleTest::test`], as bits.
-    #[inline(always)]
-    pub(crate) fn survivors<S: Simd>(&self, simd: S, triangles: &Eight<S>) -> u32 {
-        #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
-        let dropped = self.filter.splat(simd).drops(&triangles.corners).to_bitmask() as u32;
-        !dropped & triangles.used
-    }
-}
-
 /// The numbers of four vectors, those of each place together.
 #[inline(always)]
 pub(crate) fn transpose<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
@@ -226,6 +189,7 @@ mod tests {
     use crate::mesh::{IndexType, Strided, Triangle};
     use crate::ray::{Hit, Ray, round};
     use crate::simd::{Kernel, SimdLevel, dispatch};
+    use crate::triangle::TriangleTest;
     use alloc::vec::Vec;
 
     /// Random numbers as in Marsaglia's xorshift.
@@ -296,7 +260,9 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Answer {
             let Self { ray, mesh, ids } = self;
-            let survivors = ray.survivors(simd, &Eight::gather(simd, mesh, ids));
+            let eight = Eight::of(simd, mesh, first_eight(ids), ids.len());
+            let dropped = ray.filter.splat(simd).drops(&eight.corners).to_bitmask();
+            let survivors = !u32::try_from(dropped).unwrap() & eight.used;
             let lanes = (0..LANES).filter(|lane| survivors >> lane & 1 == 1);
             let hits = lanes.filter_map(|lane| {
                 let hit = ray.decide(mesh, ids[lane]);
@@ -427,7 +393,8 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
-            let Eight { corners, used } = Eight::gather(simd, self.0, self.1);
+            let Eight { corners, used } =
+                Eight::of(simd, self.0, first_eight(self.1), self.1.len());
             let lanes: [[[f32; LANES]; 3]; 3] = corners.map(|corner| corner.map(Into::into));
             core::array::from_fn(|lane| {
                 let triangle = lanes.map(|corner| corner.map(|axis| axis[lane]));

@@ -53,8 +53,6 @@ pub enum ConfigField {
     Depth,
     /// A flag that this version does not know.
     Flags,
-    /// The width of a cell is 0, negative, not finite, or too small for the mesh.
-    CellSize,
 }
 
 /// Why a build or an open was refused. Nothing outside the caller's regions was touched.
@@ -93,6 +91,9 @@ pub enum Error {
     /// This library was built without the method, and can neither build nor open its grids: turn on
     /// the feature of its name.
     MethodLeftOut(Method),
+    /// An older version built the grid with a method that is no more, `brick`: build it again with
+    /// another one.
+    MethodRemoved,
     /// A field of the configuration is outside its range.
     InvalidConfig(ConfigField),
     /// The loop of a parallel build ran a task twice or not at all: see
@@ -180,6 +181,9 @@ impl fmt::Display for Error {
             Self::MethodLeftOut(method) => {
                 write!(f, "this library has no method {0}: turn on its feature {0}", method.name())
             }
+            Self::MethodRemoved => {
+                f.write_str("the grid was built with the method brick, which was removed: build it again")
+            }
             Self::InvalidConfig(ConfigField::Method) => f.write_str("unknown method"),
             Self::InvalidConfig(ConfigField::Density) => write!(
                 f,
@@ -195,9 +199,6 @@ impl fmt::Display for Error {
                 write!(f, "depth must be 1 to {}", crate::MAX_DEPTH)
             }
             Self::InvalidConfig(ConfigField::Flags) => f.write_str("unknown build flag"),
-            Self::InvalidConfig(ConfigField::CellSize) => {
-                f.write_str("cell_size must be above 0, and not so small that a grid takes 2^31 words")
-            }
             Self::InvalidParallelFor => {
                 f.write_str("the parallel_for did not run every task exactly once")
             }

@@ -54,7 +54,7 @@
 use core::ops::{Add, Mul, Sub};
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
+use fearless_simd::{Simd, f32x8, mask32x8};
 
 use crate::aabb::{Aabb, greater, lesser};
 use crate::mesh::Triangle;
@@ -251,33 +251,7 @@ impl RayFilter {
 }
 
 impl<S: Simd> Filter<f32x8<S>> {
-    /// The filters of eight rays that start at their own origins, for triangles in a box. In f32: each
-    /// number of [`RayFilter::new`], or a little more.
-    #[inline(always)]
-    pub(crate) fn of_eight(
-        simd: S,
-        origin: [f32x8<S>; 3],
-        direction: [f32x8<S>; 3],
-        bounds: &Aabb,
-    ) -> Self {
-        let [x, y, z] = direction;
-        let longest = x.abs().max(y.abs()).max(z.abs());
-        let exponent = longest.bitcast::<u32x8<S>>() & 0x7f80_0000;
-        let scale = (u32x8::splat(simd, 0x7f00_0000) - exponent).bitcast::<f32x8<S>>();
-        let direction = [x * scale, y * scale, z * scale];
-        let middle = ((bounds.min + bounds.max) * 0.5).to_array();
-        let half = (bounds.size() * 0.5).to_array();
-        let [a, b, c] = origin;
-        let (a, b, c) = ((a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs());
-        let distance = (a + half[0]).max(b + half[1]).max(c + half[2]);
-        let filter = Self::scaled(simd, origin, direction, distance, bounds.size().max_element());
-        // What cannot be scaled is not dropped.
-        let is_scaled = longest.simd_gt(NEARBY_SHORT) & longest.simd_lt(NEARBY_LONG);
-        let none = f32x8::splat(simd, f32::INFINITY);
-        Self { slope: is_scaled.select(filter.slope, none), ..filter }
-    }
-
-    /// The same for directions that are scaled, whose origins no corner is farther from than `distance`.
+    /// The filters of eight rays with directions that are scaled, whose origins no corner is farther from than `distance`.
     #[inline(always)]
     pub(crate) fn scaled(
         simd: S,

@@ -7,12 +7,10 @@ use crate::approach::Approach;
 use crate::arena::check_alignment;
 use crate::batch::Together;
 use crate::blob::{Header, corrupt};
-use crate::brick::{self, Brick, OneRay, Tiles};
 use crate::bvh::{self, Bvh, Nearest};
 use crate::cell::Lattice;
 use crate::config::{
-    Config, HAS_BRICK, HAS_BVH, HAS_FIXED, HAS_GRIDS, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE,
-    Method,
+    Config, HAS_BVH, HAS_FIXED, HAS_GRIDS, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
 };
 use crate::control::{Control, Watch};
 use crate::counters::Tally;
@@ -20,7 +18,7 @@ use crate::dda::Line;
 use crate::error::{Error, Region};
 use crate::filter::RayFilter;
 use crate::fixed::{Fixed, Macrocells};
-use crate::mesh::{Strided, TriangleMesh};
+use crate::mesh::TriangleMesh;
 use crate::one_level::{self, OneLevel};
 use crate::options::{Choice, Cull};
 use crate::ray::{Hit, Ray};
@@ -29,7 +27,7 @@ use crate::search::{Any, Closest, Outcome, Search};
 use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
 use crate::triangle::TriangleTest;
 use crate::variable::{self, Variable};
-use crate::visit::{Ids, Visitor};
+use crate::visit::Visitor;
 
 /// A built grid and the mesh it was built for, ready for queries.
 ///
@@ -52,7 +50,6 @@ enum Structure<'a> {
     Fixed(Fixed<'a>),
     Variable(Variable<'a>),
     Recursive(Recursive<'a>),
-    Brick(Brick<'a>),
     Bvh(Bvh<'a>),
 }
 
@@ -71,7 +68,7 @@ impl<'a> Grid<'a> {
     /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
     /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field,
     /// [`Error::MethodLeftOut`] the method. After an error the index region is as it was, but for
-    /// variable, recursive and brick grids and trees, which fill it as they go: there it holds nothing of
+    /// variable and recursive grids and trees, which fill it as they go: there it holds nothing of
     /// use.
     /// Either way both regions can be used again.
     ///
@@ -102,7 +99,7 @@ impl<'a> Grid<'a> {
 
     /// Builds a grid on the caller's threads: [`build`](Self::build), and bit by bit the same grid.
     ///
-    /// Only [`Method::Brick`] and [`Method::Bvh`] are cut into tasks; the other methods build on the thread
+    /// Only [`Method::Bvh`] is cut into tasks; the other methods build on the thread
     /// that calls. [`sizes_with`](crate::sizes_with) and
     /// [`Sizes::bound_parallel`](crate::Sizes::bound_parallel) tell how much memory so many tasks
     /// take; where there is less, but enough for fewer, there are fewer.
@@ -135,9 +132,6 @@ impl<'a> Grid<'a> {
             }
             Method::Recursive if HAS_RECURSIVE => {
                 recursive::build(&mesh, config, index, scratch, &watch)?
-            }
-            Method::Brick if HAS_BRICK => {
-                brick::build(&mesh, config, index, scratch, control, &watch)?
             }
             Method::Bvh if HAS_BVH => bvh::build(&mesh, config, index, scratch, control, &watch)?,
             method => return Err(Error::MethodLeftOut(method)),
@@ -177,7 +171,6 @@ impl<'a> Grid<'a> {
             Method::Recursive if HAS_RECURSIVE => {
                 Structure::Recursive(Recursive::open(&header, blob)?)
             }
-            Method::Brick if HAS_BRICK => Structure::Brick(Brick::open(&header, &lattice, blob)?),
             Method::Bvh if HAS_BVH => Structure::Bvh(Bvh::open(&header, blob)?),
             method => return Err(Error::MethodLeftOut(method)),
         };
@@ -213,9 +206,6 @@ impl<'a> Grid<'a> {
             Structure::Recursive(grid) if HAS_RECURSIVE => {
                 grid.validate(&header, &self.lattice, &self.mesh)
             }
-            Structure::Brick(grid) if HAS_BRICK => {
-                grid.validate(&header, &self.lattice, &self.mesh)
-            }
             Structure::Bvh(bvh) if HAS_BVH => {
                 bvh.validate(&header, &self.lattice, &self.mesh, scratch)
             }
@@ -223,7 +213,6 @@ impl<'a> Grid<'a> {
             | Structure::Fixed(_)
             | Structure::Variable(_)
             | Structure::Recursive(_)
-            | Structure::Brick(_)
             | Structure::Bvh(_) => Err(Error::MethodLeftOut(self.method())),
         }
     }
@@ -280,12 +269,7 @@ impl<'a> Grid<'a> {
         // The test has the ray's own range: the same hit, whichever part of the ray is walked.
         let part = Ray { t_min: begin, ..*ray };
         let Some(line) = Line::new(&self.lattice, &part, &approach) else { return };
-        if HAS_BRICK && let Structure::Brick(brick) = &self.structure {
-            let mut ray = OneRay::new(brick, &self.mesh, &line, &test, search, tally);
-            dispatch(self.simd, &mut ray);
-        } else {
-            self.traverse(&line, &test, search, tally);
-        }
+        self.traverse(&line, &test, search, tally);
     }
 
     /// Walks a ray through a tree and shows a search what it hits.
@@ -394,13 +378,12 @@ impl<'a> Grid<'a> {
             | Structure::Fixed(_)
             | Structure::Variable(_)
             | Structure::Recursive(_)
-            | Structure::Brick(_)
             | Structure::Bvh(_) => {}
         }
     }
 
     /// Shows the lists of all cells that a box meets, and perhaps some others.
-    pub(crate) fn visit(&self, bounds: &Aabb, leaf: &mut dyn FnMut(Ids<'_>)) {
+    pub(crate) fn visit(&self, bounds: &Aabb, leaf: &mut dyn FnMut(&[u32])) {
         // What lies outside belongs to the cells at the border.
         let reach = self.lattice.reach(bounds);
         let visitor = &mut Visitor::new(self.list_words(), leaf);
@@ -409,13 +392,11 @@ impl<'a> Grid<'a> {
             Structure::Fixed(grid) if HAS_FIXED => grid.visit(&reach, visitor),
             Structure::Variable(grid) if HAS_VARIABLE => grid.visit(&reach, visitor),
             Structure::Recursive(grid) if HAS_RECURSIVE => grid.visit(&reach, visitor),
-            Structure::Brick(grid) if HAS_BRICK => grid.visit(&reach, visitor),
             Structure::Bvh(bvh) if HAS_BVH => bvh.visit(visitor),
             Structure::OneLevel(_)
             | Structure::Fixed(_)
             | Structure::Variable(_)
             | Structure::Recursive(_)
-            | Structure::Brick(_)
             | Structure::Bvh(_) => true,
         };
     }
@@ -450,23 +431,6 @@ impl<'a> Grid<'a> {
         self.lattice.cell_size()
     }
 
-    /// Traces neighbouring rays together where the structure can; tells whether it does. `answer`
-    /// gets the place of a ray and its hit and perhaps those of the next ones, or no hit for a
-    /// ray that must be traced alone.
-    pub(crate) fn tiles<const ANY: bool>(
-        &self,
-        rays: &Strided<'_>,
-        answer: impl FnMut(usize, &[Hit]),
-    ) -> bool {
-        if !HAS_VECTORS || !HAS_BRICK {
-            return false;
-        }
-        let Structure::Brick(brick) = &self.structure else { return false };
-        let (lattice, mesh) = (&self.lattice, &self.mesh);
-        dispatch(self.simd, Tiles::<_, ANY> { brick, lattice, mesh, rays, answer });
-        true
-    }
-
     /// Traces rays of any kind together where the structure can; tells whether it does. With
     /// memory they are sorted first.
     pub(crate) fn groups<const ANY: bool>(
@@ -498,7 +462,6 @@ impl<'a> Grid<'a> {
             Structure::Fixed(grid) => grid.list_words(),
             Structure::Variable(grid) => grid.list_words(),
             Structure::Recursive(grid) => grid.list_words(),
-            Structure::Brick(grid) => grid.list_words(),
             Structure::Bvh(bvh) => bvh.list_words(),
         }
     }
@@ -532,7 +495,6 @@ impl<'a> Grid<'a> {
         match self.structure {
             Structure::OneLevel(_) | Structure::Fixed(_) => one_level::scratch_bytes(resolution),
             Structure::Recursive(_) => recursive::scratch_bytes(triangles, &self.config()),
-            Structure::Brick(_) => brick::scratch_bytes_at_most(resolution, triangles),
             Structure::Bvh(_) => bvh::bound(triangles, self.config().quality, 1).1,
             Structure::Variable(_) => {
                 variable::scratch_bytes_at_most(resolution, triangles, self.density())
@@ -561,14 +523,13 @@ impl<'a> Grid<'a> {
             Structure::Fixed(_) => Method::Fixed,
             Structure::Variable(_) => Method::Variable,
             Structure::Recursive(_) => Method::Recursive,
-            Structure::Brick(_) => Method::Brick,
             Structure::Bvh(_) => Method::Bvh,
         }
     }
 
     /// The density that the grid has: the configured one, or a half, a quarter, ... of it where the
     /// mesh would have needed more than 16 references a triangle. It
-    /// means nothing for a brick grid or a tree.
+    /// means nothing for a tree.
     #[must_use]
     pub fn density(&self) -> f32 {
         self.config().density
@@ -588,7 +549,7 @@ impl<'a> Grid<'a> {
     }
 
     /// Primitive ids in all cells or leaves together; words of the pool for a
-    /// variable, recursive or brick grid.
+    /// variable or recursive grid.
     #[must_use]
     pub fn reference_count(&self) -> u32 {
         self.header().map_or(0, |header| header.reference_count)

@@ -16,8 +16,7 @@ pub struct Statistics {
     pub degenerate_count: u32,
     /// The first triangle that is one or the other, or [`INVALID_ID`].
     pub first_bad: u32,
-    /// Lists of primitives: one for each cell that has any, and for each brick or block that has
-    /// some of its own.
+    /// Lists of primitives: one for each cell or leaf that has any.
     pub list_count: u64,
     /// Primitive ids in all lists together.
     pub reference_count: u64,
@@ -79,7 +78,9 @@ impl Grid<'_> {
             found.reference_count += u64::from(length);
             found.longest_list = found.longest_list.max(length);
             hash.add(length);
-            ids.iter().for_each(|id| hash.add(id));
+            for &id in ids {
+                hash.add(id);
+            }
         });
         found.content_hash = hash.finish();
         found

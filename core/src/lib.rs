@@ -28,12 +28,12 @@
 //! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `approach`, `triangle`,
 //! `simd`, `eight`, `filter`, `exact`, `pairs`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`,
 //! `hash`, `cell`, `spans`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure
-//! above them (`one_level`; `fixed` and `variable` on top of it; `recursive`; `brick`; `bvh`), and `grid`:
+//! above them (`one_level`; `fixed` and `variable` on top of it; `recursive`; `bvh`), and `grid`:
 //! the view that queries run on. Then the questions: `sizes`, `options`, `batch`, `closest`,
 //! `surface`, `inspect`, `packed`, `refit`. core/DESIGN.md tells how it all works and what was left out.
 //!
 //! Each structure has a feature of the package (`one-level`, `fixed`, `variable`, `recursive` and
-//! `brick`, `bvh`, all on by default), so that a program with little flash takes the ones it needs:
+//! `bvh`, all on by default), so that a program with little flash takes the ones it needs:
 //! [`Method::is_available`] and [`Error::MethodLeftOut`] tell of the others.
 //!
 //! Keys used in these pages: **CP10** Costa, Pereira, Jorge 2010; **LD08** Lagae and Dutré,
@@ -57,7 +57,6 @@ mod arena;
 mod batch;
 mod bits;
 mod blob;
-mod brick;
 mod bump;
 mod bvh;
 mod cell;

@@ -15,8 +15,8 @@ use glam::{Vec3A, Vec4};
 use crate::aabb::{Aabb, MAX_COORDINATE};
 use crate::error::{Error, MeshField};
 
-/// The most triangles a mesh may have: ids are 32 bits and one of them means "none". A brick grid
-/// has no more than 8 GiB, which a scan of 900 million triangles would take.
+/// The most triangles a mesh may have: ids are 32 bits and one of them means "none". A tree
+/// takes half as many.
 pub const MAX_TRIANGLES: usize = u32::MAX as usize - 1;
 
 /// Three corners, in scene units.

@@ -1,9 +1,8 @@
 //! How much memory a build takes, asked before the build.
 
-use crate::brick;
 use crate::bvh;
 use crate::config::{
-    Config, HAS_BRICK, HAS_BVH, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
+    Config, HAS_BVH, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
 };
 use crate::control::Control;
 use crate::error::{ConfigField, Error, Region};
@@ -22,7 +21,7 @@ pub struct Sizes {
     /// For the region that only the build needs.
     pub scratch_bytes: usize,
     /// Whether `index_bytes` is what the build needs, to the byte, or only no less than
-    /// that; the blob of a brick grid may be smaller. `scratch_bytes` is enough; for
+    /// that. `scratch_bytes` is enough; for
     /// one-level and fixed grids it is exact.
     pub is_exact: bool,
 }
@@ -30,7 +29,7 @@ pub struct Sizes {
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A one-level grid of a scan takes a sixth of it or less, a brick grid a thirteenth, a tree half; for
+    /// A one-level grid of a scan takes a sixth of it or less, a tree half; for
     /// recursive grids it is generous beyond use. `None` if no build takes the configuration (its
     /// method is left out, say) or a tree of more than 2^31 triangles, or the sizes do not fit the machine's address space.
     ///
@@ -49,9 +48,8 @@ impl Sizes {
     }
 
     /// Enough for any mesh with so many triangles and a build with so many tasks
-    /// ([`Control::tasks`]). Each task of a brick grid takes scratch for the fullest block, which at the
-    /// worst has all triangles: about 32 bytes a triangle for each task. [`sizes_with`] knows the mesh,
-    /// and asks for far less. A task of a tree takes no more than a byte for four triangles.
+    /// ([`Control::tasks`]). A task of a tree takes no more than a byte of scratch for four triangles; the
+    /// other methods have one task.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "compared before")]
     pub const fn bound_parallel(triangles: u32, config: &Config, tasks: u32) -> Option<Self> {
@@ -63,7 +61,6 @@ impl Sizes {
             Method::Fixed if HAS_FIXED => fixed::bound(triangles, config),
             Method::Variable if HAS_VARIABLE => variable::bound(triangles, config),
             Method::Recursive if HAS_RECURSIVE => recursive::bound(triangles, config),
-            Method::Brick if HAS_BRICK => brick::bound(triangles, tasks),
             Method::Bvh if HAS_BVH && triangles <= bvh::MOST_TRIANGLES => {
                 bvh::bound(triangles, config.quality, tasks)
             }
@@ -71,7 +68,6 @@ impl Sizes {
             | Method::Fixed
             | Method::Variable
             | Method::Recursive
-            | Method::Brick
             | Method::Bvh => return None,
         };
         if index > usize::MAX as u64 || scratch > usize::MAX as u64 {
@@ -106,7 +102,7 @@ impl Sizes {
 ///
 /// With an empty `scratch` the answer takes two passes over the triangles, one more for each
 /// halving of the density, and `index_bytes` is enough: for a scan up to twice what one level
-/// takes, four times what a fixed grid takes, seven times what a brick grid takes, twice what a tree
+/// takes, four times what a fixed grid takes, twice what a tree
 /// takes, for the others a generous multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid
 /// is planned in it and `index_bytes` is exact, for about half the time of a build, up to all of it
 /// for the others. The scratch holds nothing of use afterwards.
@@ -130,10 +126,9 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
 
 /// The memory that a parallel build of this mesh takes: [`sizes`], by the caller's threads.
 ///
-/// More tasks take more scratch, for a brick grid each as much again as the first. The index is filled in
-/// parts, one for each task: a brick grid may take a few bytes more of it than it has in the end, and a
-/// tree as much as any mesh with so many triangles, so the answer for a tree of several tasks is never
-/// exact. Only [`Method::Brick`] and [`Method::Bvh`] build in parallel; for the others this is [`sizes`].
+/// Only [`Method::Bvh`] builds in parallel; for the others this is [`sizes`]. Each task takes scratch of
+/// its own and fills a part of the index: together as much as any mesh with so many triangles takes, so
+/// the answer for several tasks is never exact.
 ///
 /// # Errors
 /// Those of [`Grid::build_with`](crate::Grid::build_with), but for index memory.
@@ -152,15 +147,13 @@ pub fn sizes_with(
         }
         Method::Variable if HAS_VARIABLE => variable::sizes(mesh, config, scratch),
         Method::Recursive if HAS_RECURSIVE => recursive::sizes(mesh, config, scratch),
-        Method::Brick if HAS_BRICK => brick::sizes(mesh, config, scratch, control),
         Method::Bvh if HAS_BVH => bvh::sizes(mesh, config, scratch, control),
         method => Err(Error::MethodLeftOut(method)),
     }
 }
 
 /// The finest grid of a method that fits into so many bytes of index, and what it takes: a
-/// configuration that is the given one, or has a lower density (larger cells for
-/// [`Method::Brick`]), by no more than a step too much. [`Method::Bvh`] has no cells: its tree fits or
+/// configuration that is the given one, or has a lower density, by no more than a step too much. [`Method::Bvh`] has no cells: its tree fits or
 /// does not.
 ///
 /// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls
@@ -191,8 +184,7 @@ pub fn fit(
 ) -> Result<(Config, Sizes), Error> {
     config.check()?;
     // A tree is neither fine nor coarse.
-    let can_coarsen = config.method.has_density() || config.method.has_cell_size();
-    let most_steps = if can_coarsen { MOST_STEPS } else { 0 };
+    let most_steps = if config.method.has_density() { MOST_STEPS } else { 0 };
     let mut try_with = |steps: u32| fits(mesh, &coarsened(config, steps), index_bytes, scratch);
     // The first number of steps of 0, 1, 2, 4, ... that fits, then the smallest one below it.
     let (mut low, mut high) = (0, 0);
@@ -224,10 +216,6 @@ fn coarsened(config: &Config, steps: u32) -> Config {
         let density = f64::from(config.density) * fewer(core::f64::consts::FRAC_1_SQRT_2);
         coarser.density = round(density).max(f32::MIN_POSITIVE);
     }
-    if config.method.has_cell_size() {
-        let cell_size = f64::from(config.cell_size) * fewer(1.122_462_048_309_373); // 2^(1/6)
-        coarser.cell_size = round(cell_size).min(f32::MAX);
-    }
     if steps == 0 { *config } else { coarser }
 }
 
@@ -257,9 +245,5 @@ fn fits(
 
 /// Whether a coarser grid may do: one that would be too fine is one that is too large.
 const fn is_too_large(error: Error) -> bool {
-    matches!(
-        error,
-        Error::OutOfMemory { .. }
-            | Error::InvalidConfig(ConfigField::Density | ConfigField::CellSize)
-    )
+    matches!(error, Error::OutOfMemory { .. } | Error::InvalidConfig(ConfigField::Density))
 }

@@ -6,50 +6,25 @@ use crate::aabb::Aabb;
 pub(crate) const EVERYWHERE: Aabb =
     Aabb { min: glam::Vec3A::NEG_INFINITY, max: glam::Vec3A::INFINITY };
 
-/// A list of primitives: words with an id each, and perhaps something above it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Ids<'l> {
-    words: &'l [u32],
-    /// The bits of an id.
-    mask: u32,
-}
-
-impl Ids<'_> {
-    pub(crate) const fn len(self) -> usize {
-        self.words.len()
-    }
-
-    pub(crate) fn iter(&self) -> impl Iterator<Item = u32> {
-        self.words.iter().map(|word| word & self.mask)
-    }
-}
-
 /// Somebody who looks at lists of primitives.
 pub(crate) struct Visitor<'v> {
     /// What may still be looked at: damaged bytes may list everything in every cell.
     rest: usize,
-    /// The bits of an id.
-    mask: u32,
-    leaf: &'v mut dyn FnMut(Ids<'_>),
+    leaf: &'v mut dyn FnMut(&[u32]),
 }
 
 impl<'v> Visitor<'v> {
     /// Somebody who looks at no more than so many words.
-    pub(crate) fn new(words: usize, leaf: &'v mut dyn FnMut(Ids<'_>)) -> Self {
-        Self { rest: words, mask: u32::MAX, leaf }
+    pub(crate) fn new(words: usize, leaf: &'v mut dyn FnMut(&[u32])) -> Self {
+        Self { rest: words, leaf }
     }
 
     /// Shows a list; `false` if that was enough.
     pub(crate) fn list(&mut self, ids: &[u32]) -> bool {
         self.spend(ids.len()) && {
-            (self.leaf)(Ids { words: ids, mask: self.mask });
+            (self.leaf)(ids);
             true
         }
-    }
-
-    /// Says which bits of the words of all lists are ids.
-    pub(crate) const fn ids_have(&mut self, mask: u32) {
-        self.mask = mask;
     }
 
     /// Pays for looking at words that lead to lists; `false` if that was enough.

@@ -296,16 +296,16 @@ mod tests {
 
     #[test]
     fn a_film_does_not_depend_on_the_method_nor_on_the_threads() {
-        let (report, expected) = film(Method::Brick, 1, 4);
+        let (report, expected) = film(Method::Bvh, 1, 4);
         assert_eq!((report.frames.len(), report.grown), (4, 0));
-        for (method, threads) in [(Method::Brick, 3), (Method::OneLevel, 1), (Method::Fixed, 2)] {
+        for (method, threads) in [(Method::Bvh, 3), (Method::OneLevel, 1), (Method::Fixed, 2)] {
             assert!(film(method, threads, 4).1 == expected, "{method:?}, {threads} threads");
         }
     }
 
     #[test]
     fn it_moves_and_comes_back() {
-        let (_, pictures) = film(Method::Brick, 1, 4);
+        let (_, pictures) = film(Method::Bvh, 1, 4);
         assert!(pictures.windows(2).all(|pair| pair[0] != pair[1]));
         let scene = Scene::load("procedural:knot:3000").unwrap();
         let wave = Wave::new(&scene);
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn a_report_has_a_row_for_each_frame_and_the_medians() {
-        let (report, _) = film(Method::Brick, 2, 3);
+        let (report, _) = film(Method::Bvh, 2, 3);
         let text = report.to_string();
         assert!(text.contains("2 threads") && text.contains("median"), "{text}");
         assert_eq!(text.lines().filter(|line| line.contains('.')).count(), 5, "{text}");
@@ -347,7 +347,7 @@ mod tests {
         let scene = Scene::default();
         let camera = Camera::framing(scene.framed_bounds(), View::Front, Up::Y);
         let threads = Threads::new(1).unwrap();
-        let config = Config::new(Method::Brick);
+        let config = Config::new(Method::Bvh);
         let plan = Plan { frames: 2, config, tiles: Tiles { camera, size: 3 }, threads: &threads };
         let report = animate(&scene, &plan, |_, _| Ok(()), &mut Progress::new("", 0)).unwrap();
         assert_eq!(report.frames.len(), 2);

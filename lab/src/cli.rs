@@ -39,7 +39,7 @@ Examples:
 const RENDER_EXAMPLES: &str = "\
 Examples:
   hgrid render bunny.ply -o bunny.png        a mesh of yours, seen from the front
-  hgrid render bunny.ply --cell-size 0.8     smaller cells: fewer tests, more steps, more memory
+  hgrid render bunny.ply --quality high      a longer build, rays that are faster
   hgrid render bunny.ply --method fixed --macrocell-factor 4
   hgrid render bunny.ply --shading heat      what each ray costs, from blue to red
   hgrid render bunny.ply --shading heat --counter primitive-tests --heat-top 50
@@ -154,7 +154,7 @@ pub struct RenderArgs {
     /// The structure to build
     #[arg(long, value_parser = method_parser(), default_value = Method::default().name())]
     pub method: Method,
-    /// Cells per triangle, for other methods than brick [default: the paper's for the method]
+    /// Cells per triangle, for other methods than bvh [default: the paper's for the method]
     #[arg(long, value_name = "CELLS", allow_negative_numbers = true)]
     pub density: Option<f32>,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
@@ -254,7 +254,7 @@ pub struct AnimateArgs {
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub tuning: Tuning,
-    /// Threads that build, for `brick`, and render
+    /// Threads that build, for `bvh`, and render
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = thread_parser())]
     pub threads: u32,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
@@ -347,7 +347,7 @@ impl Race {
 /// Who builds.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Builders {
-    /// Threads that build, for `brick`; the other methods, and all rays, have one
+    /// Threads that build, for `bvh`; the other methods, and all rays, have one
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = thread_parser())]
     pub threads: u32,
 }
@@ -364,10 +364,6 @@ pub struct Tuning {
     /// For `recursive`: levels of grids [default: the paper's, 3]
     #[arg(long, value_name = "LEVELS")]
     pub depth: Option<u32>,
-    /// For `brick`: the width of a cell in multiples of the one that
-    /// suits the triangles [default: 1]
-    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
-    pub cell_size: Option<f32>,
     /// For `bvh`: `high` builds longer for rays that are faster [default: fast]
     #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
     pub quality: Option<Quality>,
@@ -382,7 +378,6 @@ impl Tuning {
             macrocell_factor: self.macrocell_factor.unwrap_or(default.macrocell_factor),
             subdivide_above: self.subdivide_above.unwrap_or(default.subdivide_above),
             depth: self.depth.unwrap_or(default.depth),
-            cell_size: self.cell_size.unwrap_or(default.cell_size),
             quality: self.quality.unwrap_or(default.quality),
             ..default
         }

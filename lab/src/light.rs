@@ -143,7 +143,7 @@ mod tests {
         let indices = [0, 4, 8].map(|at| [[at, at + 1, at + 2], [at, at + 2, at + 3]]).concat();
         let mesh = TriangleMesh::new(&positions, &indices).unwrap();
         let lights = Lights { has_shadows: true, sky_rays: 64 };
-        for method in [Method::Bvh, Method::Brick, Method::OneLevel] {
+        for method in [Method::Bvh, Method::OneLevel] {
             let regions = Regions::build(mesh, &Config::new(method)).unwrap();
             let grid = Grid::open(&regions.index, mesh).unwrap();
             let rays = [-2.0, 2.0, 9.0].map(|x| Ray::new([x, 0.0, 0.3], [0.0, 0.0, -1.0]));

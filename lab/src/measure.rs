@@ -17,7 +17,7 @@
 //! small ones.
 //!
 //! Rendering is one thread, one ray per pixel, tile by tile: the timed pass hands the rays of a tile
-//! to the grid, as a renderer does, shades them, and moves the progress bar. Brick grids trace them
+//! to the grid, as a renderer does, shades them, and moves the progress bar. Trees trace them
 //! together, the others one by one. The work is counted in a pass of its own, ray by ray.
 
 use std::time::Instant;
@@ -69,8 +69,6 @@ pub struct Measurement {
     pub configured_density: Option<f32>,
     /// Cells per triangle that the grid was built for: fewer where it would hold too many ids.
     pub density: Option<f32>,
-    /// The width of a brick grid's cells, in multiples of the one that suits the triangles.
-    pub cell_size: Option<f32>,
     /// Cells per axis.
     pub resolution: [u32; 3],
     /// Triangle ids in all cells together, for the methods that count them.
@@ -130,14 +128,13 @@ impl Measurement {
     /// Whether the time is that of tiles whose rays were traced together; the work never is.
     #[must_use]
     pub fn is_in_tiles(&self) -> bool {
-        self.method == Method::Brick.name()
+        self.method == Method::Bvh.name()
     }
 
     fn titled(&self, density: Option<f32>) -> String {
-        match (density, self.cell_size) {
-            (Some(density), _) => format!("{}, density {density}", self.method),
-            (None, Some(size)) => format!("{}, cell size {size}", self.method),
-            (None, None) => self.method.to_owned(),
+        match density {
+            Some(density) => format!("{}, density {density}", self.method),
+            None => self.method.to_owned(),
         }
     }
 }
@@ -319,7 +316,6 @@ fn numbers(
         method: grid.method().name(),
         configured_density: has_density.then_some(config.density),
         density: has_density.then(|| grid.density()),
-        cell_size: (!has_density).then_some(config.cell_size),
         resolution: grid.resolution(),
         references: has_references(grid.method()).then(|| grid.reference_count()),
         skipped_triangles: grid.skipped_count(),

@@ -38,10 +38,10 @@ impl Regions {
         parallel: &Control<'_>,
         pages: fn(usize) -> Result<MmapMut>,
     ) -> Result<Self> {
-        // A brick grid's bound follows from the number of triangles, and
+        // A tree's bound follows from the number of triangles, and
         // what is not written costs nothing.
         let bound = match config.method {
-            Method::Brick => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
+            Method::Bvh => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
             _ => None,
         };
         let sizes = match bound {

@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn shadows_and_occlusion_give_a_picture() {
-        for method in ["bvh", "brick"] {
+        for method in ["bvh", "one-level"] {
             let words = ["procedural:knot:500", "--size", "20", "--shadows", "--ao", "5"];
             let words = words.into_iter().chain(["--method", method]).collect::<Vec<_>>();
             let (result, is_written) = run_words("lights", &words, None);
@@ -145,7 +145,7 @@ mod tests {
             (&["procedural:teapot"], None, "knot, stage, soup"),
             (&["--method", "fixed", "--density", "-1"], Some(("a.obj", triangle)), "density"),
             (&["--ao", "4", "--shading", "normals"], Some(("d.obj", triangle)), "diffuse"),
-            (&["--density", "8"], Some(("c.obj", triangle)), "brick grid has no density"),
+            (&["--density", "8"], Some(("c.obj", triangle)), "bvh grid has no density"),
             (&[], Some(("b.ply", triangle)), "not a PLY file"),
         ];
         for (at, (words, file, expected)) in cases.into_iter().enumerate() {

@@ -152,10 +152,10 @@ impl Results {
         ];
         let mut methods = self.scenes.iter().flat_map(|scene| &scene.methods);
         if methods.any(Measurement::is_in_tiles) {
-            notes.push(format!("Brick grids {IN_TILES}."));
+            notes.push(format!("Trees {IN_TILES}."));
         }
         if self.threads > 1 {
-            notes.push(format!("Brick grids were built by {} threads.", self.threads));
+            notes.push(format!("Trees were built by {} threads.", self.threads));
         }
         for scene in &self.scenes {
             let name = display_name(&scene.facts.scene);
@@ -200,7 +200,7 @@ pub(crate) fn markdown(table: &mut Table, words: usize) -> String {
     lines.join("\n")
 }
 
-/// What is special about brick grids, as part of a sentence.
+/// What is special about trees, as part of a sentence.
 pub(crate) const IN_TILES: &str =
     "trace tiles of 8 x 8 rays together; their tests and steps are those of each ray alone";
 

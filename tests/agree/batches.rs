@@ -229,7 +229,7 @@ fn rays_of_any_speed_agree_at_any_scale() {
     for scale in [1e-30_f32, 1e-20, 1e-10, 1.0, 1e10, 1e20, 1e30] {
         let mesh = scene().scaled(scale);
         let view = mesh.view();
-        let owned = Owned::build(&view, &Config::new(Method::Brick)).unwrap();
+        let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
         let grid = owned.open(&view).unwrap();
         let (mut hits, mut counts) = ([Hit::MISS; 64], Vec::new());
         for length in [1e-37_f32, 1e-30, 1e-20, 1e-10, 1.0, 1e10, 1e20, 5e29, 1e37] {
@@ -265,7 +265,7 @@ fn tiles_through_a_flat_scene_agree() {
             p
         });
         let view = mesh.view();
-        let owned = Owned::build(&view, &Config::new(Method::Brick)).unwrap();
+        let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
         let grid = owned.open(&view).unwrap();
         assert_eq!(grid.resolution()[axis], 1);
         let (mut hits, mut count) = ([Hit::MISS; 64], 0);
@@ -296,7 +296,7 @@ fn tiles_through_a_flat_scene_agree() {
 fn single_rays_agree_at_every_level() {
     let mesh = scene();
     let view = mesh.view();
-    let owned = Owned::build(&view, &Config::new(Method::Brick)).unwrap();
+    let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
     let grid = owned.open(&view).unwrap();
     let rays = rays(grid.bounds());
     for level in levels() {
@@ -367,7 +367,7 @@ fn elements_may_lie_anywhere_and_what_is_between_them_stays() {
 
 /// Levels that a method has something to do with.
 fn levels_of(method: Method) -> Vec<SimdLevel> {
-    if matches!(method, Method::Brick | Method::Bvh) { levels() } else { vec![SimdLevel::detect()] }
+    if method == Method::Bvh { levels() } else { vec![SimdLevel::detect()] }
 }
 
 /// Masks for some bits in turn.
@@ -447,7 +447,7 @@ fn scattered(count: usize, points: usize) -> Vec<Ray> {
 fn rays_in_any_order_agree_with_any_scratch() {
     let mesh = scene();
     let view = mesh.view();
-    for config in [Config::new(Method::Bvh), Config::new(Method::Brick)] {
+    for config in [Config::new(Method::Bvh), Config::new(Method::OneLevel)] {
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
         // Few points are enough for windows on the stack, many are not; and all kinds of rays.
@@ -555,7 +555,7 @@ fn filters_and_counters_are_those_of_single_rays() {
 fn arrays_that_cannot_be_are_refused_and_nothing_is_written() {
     let mesh = ball(3, 1.0);
     let view = mesh.view();
-    let owned = Owned::build(&view, &Config::new(Method::Brick)).unwrap();
+    let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
     let grid = owned.open(&view).unwrap();
     let sound = Ray::new([0.1, 0.2, 3.0], [0.0, 0.0, -1.0]);
     let bytes = scatter([sound; 3].iter().map(ray_bytes), 32);

@@ -69,7 +69,6 @@ proptest! {
         method in prop::sample::select(Method::ALL),
         factor in 2..7_u32,
         density in prop_oneof![Just(0.05_f32), Just(1.0), Just(4.0), Just(13.0), Just(64.0)],
-        cell_size in prop_oneof![4 => Just(1.0_f32), 1 => Just(0.5), 1 => Just(2.0), 1 => Just(4.0)],
         scale in prop_oneof![4 => Just(1.0_f32), 1 => Just(1e-30), 1 => Just(1e30), 1 => Just(0.3)],
     ) {
         let mut mesh = Mesh::default();
@@ -79,7 +78,6 @@ proptest! {
         let view = mesh.view().with_masks(Strided::new(&masks)).unwrap();
         let config = Config {
             density,
-            cell_size,
             macrocell_factor: factor,
             subdivide_above: factor,
             ..Config::new(method)

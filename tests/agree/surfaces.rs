@@ -152,7 +152,7 @@ fn a_convex_mesh_hides_nothing_from_itself() {
     for mesh in [ball(24, 0.0), icosahedron()] {
         for (scale, shift) in [(1.0, 0.0), (1e-20, 0.0), (1e20, 0.0), (1.0, 1.0), (1.0, 100.0)] {
             let mesh = mesh.map(|p| p.map(|c| c * scale + shift));
-            for method in [Method::Brick, Method::OneLevel] {
+            for method in [Method::Bvh, Method::OneLevel] {
                 for coherence in [Coherence::Coherent, Coherence::Incoherent] {
                     let count = blocked(&mesh, method, coherence);
                     assert_eq!(count, 0, "{method:?} {coherence:?} {scale} {shift}");
@@ -185,7 +185,7 @@ fn a_miss_has_no_surface_and_a_triangle_without_area_one_that_faces_the_ray() {
 fn a_ray_that_goes_on_meets_the_other_side() {
     let mesh = ball(24, 1.0);
     let mut owned = None;
-    let grid = grid_of(&mut owned, &mesh, Method::Brick);
+    let grid = grid_of(&mut owned, &mesh, Method::Bvh);
     let mut random = Random(7);
     for _ in 0..20_000 {
         let ([x, y, z], to) = (random.point(), random.point().map(|c| c * 0.3));

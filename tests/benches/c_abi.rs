@@ -76,7 +76,7 @@ fn c_abi(criterion: &mut Criterion) {
     let intersect: Symbol<'_, Intersect> =
         unsafe { library.get(b"hgrid_intersect") }.expect("hgrid_intersect");
 
-    for method in [Method::OneLevel, Method::Brick] {
+    for method in [Method::OneLevel, Method::Bvh] {
         let owned = Owned::build(&mesh.view(), &Config::new(method)).expect("a sound mesh");
         let view = mesh.view();
         let grid = owned.open(&view).expect("its mesh");

@@ -43,7 +43,6 @@ hgrid::config config_of(const hgrid_config &c)
 {
     hgrid::config config(hgrid::method{c.method});
     return config.density(c.density)
-        .cell_size(c.cell_size)
         .quality(static_cast<hgrid::quality>(c.quality))
         .macrocell_factor(c.macrocell_factor)
         .subdivide_above(c.subdivide_above)

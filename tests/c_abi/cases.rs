@@ -254,9 +254,9 @@ pub(crate) fn bytes(cases: &[Case], grid: impl Fn(&Case, &Config) -> Built) -> V
         }
         for config in configs {
             let Config { method, density, macrocell_factor, subdivide_above, depth, .. } = *config;
-            let [density, cell_size] = [density, config.cell_size].map(f32::to_bits);
+            let density = density.to_bits();
             out.words(&[method as u32, density, macrocell_factor, subdivide_above, depth]);
-            out.words(&[cell_size, config.flags.bits(), config.quality as u32]);
+            out.words(&[0, config.flags.bits(), config.quality as u32]);
             let Built { blob, counters } = grid(case, config);
             out.count(blob.len());
             counters.iter().for_each(|number| out.0.extend(number.to_ne_bytes()));

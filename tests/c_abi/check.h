@@ -134,13 +134,13 @@ static inline hgrid_mesh mesh_of(const sheet *s)
 }
 
 /* The usual configuration of each method. */
-enum { METHODS = 6 };
+enum { METHODS = 5 };
 
 static inline hgrid_config usual(int method)
 {
     const hgrid_config all[METHODS] = {HGRID_CONFIG_INIT_ONE_LEVEL, HGRID_CONFIG_INIT_FIXED,
                                        HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
-                                       HGRID_CONFIG_INIT, HGRID_CONFIG_INIT_BVH};
+                                       HGRID_CONFIG_INIT};
     return all[method];
 }
 
@@ -159,7 +159,7 @@ static inline hgrid_report exact_sizes(const hgrid_mesh *mesh, const hgrid_confi
     void *scratch = guarded(enough.scratch_bytes);
     EXPECT(HGRID_OK, hgrid_sizes(mesh, config, scratch, enough.scratch_bytes, &exact));
     CHECK(enough.is_exact == 0 && exact.is_exact == 1);
-    if (config == NULL || config->method == HGRID_METHOD_BRICK)
+    if (config == NULL || config->method == HGRID_METHOD_BVH)
         CHECK(exact.scratch_bytes <= enough.scratch_bytes);
     else
         CHECK(exact.scratch_bytes == enough.scratch_bytes);

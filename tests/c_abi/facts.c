@@ -9,11 +9,10 @@
 #define SIZE(type) printf(#type " %zu\n", sizeof(type))
 #define OFFSET(type, field) printf(#type "." #field " %zu\n", offsetof(type, field))
 #define BOUNDS(count) \
-    printf("bounds %lu %zu %zu %zu %zu %zu %zu %zu %zu %zu\n", (unsigned long)(count), \
+    printf("bounds %lu %zu %zu %zu %zu %zu %zu %zu\n", (unsigned long)(count), \
            HGRID_VALIDATE_BOUND(count), HGRID_INDEX_BOUND(count), HGRID_SCRATCH_BOUND(count), \
            HGRID_INDEX_BOUND_ONE_LEVEL(count), HGRID_SCRATCH_BOUND_ONE_LEVEL(count), \
-           HGRID_BVH_INDEX_BOUND(count), HGRID_BVH_SCRATCH_BOUND(count), \
-           HGRID_BVH_INDEX_BOUND(count), HGRID_BVH_HIGH_SCRATCH_BOUND(count))
+           HGRID_INDEX_BOUND(count), HGRID_BVH_HIGH_SCRATCH_BOUND(count))
 
 static void layout(void)
 {
@@ -53,7 +52,7 @@ static void layout(void)
     OFFSET(hgrid_config, macrocell_factor);
     OFFSET(hgrid_config, subdivide_above);
     OFFSET(hgrid_config, depth);
-    OFFSET(hgrid_config, cell_size);
+    OFFSET(hgrid_config, reserved);
     OFFSET(hgrid_config, flags);
     OFFSET(hgrid_config, tasks);
     OFFSET(hgrid_config, quality);
@@ -138,7 +137,6 @@ static void constants(void)
     NUMBER(HGRID_METHOD_FIXED);
     NUMBER(HGRID_METHOD_VARIABLE);
     NUMBER(HGRID_METHOD_RECURSIVE);
-    NUMBER(HGRID_METHOD_BRICK);
     NUMBER(HGRID_METHOD_BVH);
     NUMBER(HGRID_QUALITY_FAST);
     NUMBER(HGRID_QUALITY_HIGH);
@@ -173,7 +171,6 @@ static void constants(void)
     NUMBER(HGRID_ERROR_INVALID_FLAGS);
     NUMBER(HGRID_ERROR_INVALID_MACROCELL_FACTOR);
     NUMBER(HGRID_ERROR_INVALID_DEPTH);
-    NUMBER(HGRID_ERROR_INVALID_CELL_SIZE);
     NUMBER(HGRID_ERROR_PARALLEL_FOR);
     NUMBER(HGRID_ERROR_CANCELLED);
     NUMBER(HGRID_ERROR_METHOD_LEFT_OUT);
@@ -186,6 +183,7 @@ static void constants(void)
     NUMBER(HGRID_ERROR_CORRUPT);
     NUMBER(HGRID_ERROR_NO_MESH);
     NUMBER(HGRID_ERROR_CANNOT_REFIT);
+    NUMBER(HGRID_ERROR_METHOD_REMOVED);
     NUMBER(HGRID_ERROR_INVALID_RAYS);
     NUMBER(HGRID_ERROR_INVALID_ANSWERS);
     NUMBER(HGRID_ERROR_INVALID_COHERENCE);
@@ -242,10 +240,10 @@ static void defaults(void)
            a.context != NULL, a.allocate != NULL, a.release != NULL);
     for (size_t i = 0; i < sizeof configs / sizeof *configs; i++) {
         const hgrid_config *c = &configs[i];
-        printf("config_%lu %lu %g %lu %lu %lu %g %lu %lu %lu %d %d %d\n", (unsigned long)c->method,
+        printf("config_%lu %lu %g %lu %lu %lu %lu %lu %lu %lu %d %d %d\n", (unsigned long)c->method,
                (unsigned long)c->struct_size, (double)c->density,
                (unsigned long)c->macrocell_factor, (unsigned long)c->subdivide_above,
-               (unsigned long)c->depth, (double)c->cell_size, (unsigned long)c->flags,
+               (unsigned long)c->depth, (unsigned long)c->reserved, (unsigned long)c->flags,
                (unsigned long)c->tasks, (unsigned long)c->quality, c->context != NULL,
                c->run != NULL, c->progress != NULL);
     }

@@ -260,16 +260,14 @@ fn initialisers_are_the_defaults() {
     }
     for config in Method::ALL.iter().copied().map(Config::new) {
         let Config { method, density, macrocell_factor, subdivide_above, depth, .. } = config;
-        let (size, cell_size, flags) =
-            (fact("hgrid_config"), config.cell_size, config.flags.bits());
-        let fields = format!(
-            "{size} {density} {macrocell_factor} {subdivide_above} {depth} {cell_size} {flags}"
-        );
+        let (size, flags) = (fact("hgrid_config"), config.flags.bits());
+        let fields =
+            format!("{size} {density} {macrocell_factor} {subdivide_above} {depth} 0 {flags}");
         // One task, and nobody is asked on the way.
         let fields = format!("{fields} 1 0 0 0 0");
         assert_eq!(fact(&format!("config_{}", method as u32)), fields, "{method:?}");
     }
-    assert_eq!(fact("HGRID_METHOD_BRICK"), (Config::default().method as u32).to_string());
+    assert_eq!(fact("HGRID_METHOD_BVH"), (Config::default().method as u32).to_string());
 }
 
 #[test]
@@ -282,9 +280,9 @@ fn bounds_are_no_less_than_those_of_core() {
         let least = triangles.div_ceil(32) * 4;
         assert!((least..=least + 4).contains(proof), "{line}");
         let triangles = u32::try_from(*triangles).unwrap();
-        let tree = Config::new(Method::Bvh);
+        let tree = Config::default();
         let high = Config { quality: Quality::High, ..tree };
-        let configs = [Config::default(), Config::new(Method::OneLevel), tree, high];
+        let configs = [tree, Config::new(Method::OneLevel), high];
         assert_eq!(all.len(), 2 * configs.len());
         for (config, macros) in configs.iter().zip(all.chunks(2)) {
             let is_too_many = config.method == Method::Bvh && triangles > 1 << 31;

@@ -131,10 +131,10 @@ static void is_left_out(const hgrid_config *config, const void *stored, size_t s
     told.progress = is_never_called;
     is_refused(&told, stored, stored_bytes);
     /* There is nothing to repair in it. */
-    told.density = told.cell_size = -1;
+    told.density = -1;
     told.depth = told.macrocell_factor = 0;
     is_refused(&told, stored, stored_bytes);
-    if (config->method == HGRID_METHOD_BRICK)
+    if (config->method == HGRID_METHOD_BVH)
         is_refused(NULL, stored, stored_bytes);
     /* What a blob is can be told by any library. */
     hgrid_blob_info info = HGRID_BLOB_INFO_INIT;

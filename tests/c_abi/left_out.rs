@@ -15,7 +15,7 @@ use crate::programs::{SANITIZERS, compile};
 const LIBRARIES: [(&str, &[Method]); 4] = [
     ("fixed", &[Method::OneLevel, Method::Fixed]),
     ("variable", &[Method::OneLevel, Method::Variable]),
-    ("brick,recursive", &[Method::Brick, Method::Recursive]),
+    ("bvh,recursive", &[Method::Bvh, Method::Recursive]),
     ("bvh", &[Method::Bvh]),
 ];
 

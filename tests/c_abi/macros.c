@@ -12,7 +12,7 @@ static const hgrid_config config = HGRID_CONFIG_INIT;
 static const hgrid_config others[] = {HGRID_CONFIG_INIT_ONE_LEVEL, HGRID_CONFIG_INIT_FIXED,
                                       HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE,
                                       HGRID_CONFIG_INIT_BVH};
-HGRID_ALIGNED static unsigned char tree[HGRID_BVH_INDEX_BOUND(3)], tree_scratch[HGRID_BVH_SCRATCH_BOUND(3)];
+HGRID_ALIGNED static unsigned char tree[HGRID_INDEX_BOUND(3)], tree_scratch[HGRID_BVH_HIGH_SCRATCH_BOUND(3)];
 static unsigned char proof[HGRID_VALIDATE_BOUND(3)];
 
 #if HGRID_VERSION < 0x000100 || HGRID_BLOB_VERSION < 1 || HGRID_ALIGNMENT != 64 || HGRID_MAX_DEPTH < 1 || \

@@ -14,7 +14,6 @@ static hgrid_config deep(hgrid_config config)
     config.macrocell_factor = 2;
     config.subdivide_above = 3;
     config.depth = HGRID_MAX_DEPTH;
-    config.cell_size = 0.7f;
     return config;
 }
 
@@ -27,12 +26,6 @@ static bool is_deep(const hgrid_config *config)
 static bool is_planned(const hgrid_config *config)
 {
     return config->method == HGRID_METHOD_ONE_LEVEL || config->method == HGRID_METHOD_FIXED;
-}
-
-/* A brick grid sorts its triangles in the index, so its blob may be smaller than the index. */
-static bool is_brick(const hgrid_config *config)
-{
-    return config->method == HGRID_METHOD_BRICK;
 }
 
 /* A tree learns how many nodes it has while it writes the index. */
@@ -60,14 +53,13 @@ static built build(const hgrid_config *config)
     hgrid_report report = HGRID_REPORT_INIT;
     EXPECT(HGRID_OK, hgrid_build(&mesh, config, b.index, b.need.index_bytes, b.scratch,
                                  b.need.scratch_bytes, &b.grid, &report));
-    CHECK(is_brick(config) ? report.index_bytes <= b.need.index_bytes
-                           : report.index_bytes == b.need.index_bytes);
+    CHECK(report.index_bytes == b.need.index_bytes);
     CHECK(report.is_exact == 1);
-    CHECK(config->method == HGRID_METHOD_VARIABLE || is_brick(config)
+    CHECK(config->method == HGRID_METHOD_VARIABLE
               ? report.scratch_bytes >= b.need.scratch_bytes
               : report.scratch_bytes == b.need.scratch_bytes);
     CHECK(report.triangle == HGRID_INVALID_ID && report.skipped_count == 0);
-    CHECK(report.density == (is_brick(config) || is_tree(config) ? 0 : config->density));
+    CHECK(report.density == (is_tree(config) ? 0 : config->density));
     CHECK(report.reference_count >= TRIANGLES);
     b.blob_bytes = (size_t)report.index_bytes;
     for (int axis = 0; axis < 3; axis++)
@@ -124,16 +116,13 @@ static void answers_are_those_of_one_level(const built *b)
 /* Builds in the first bytes of a region; what is behind them must stay. */
 static void refuse_index(const built *b, unsigned char *region, size_t region_bytes, size_t bytes)
 {
-    /* What is less than a multiple of 64 may do while a brick grid is sorted. */
-    if (is_brick(&b->config) && bytes + HGRID_ALIGNMENT > b->need.index_bytes)
-        return;
     hgrid_grid grid;
     hgrid_report report = HGRID_REPORT_INIT;
     memset(&grid, 0xc7, sizeof grid);
     memset(region, 0xc7, region_bytes);
     EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_build(&mesh, &b->config, region, bytes, b->scratch,
                                                     b->need.scratch_bytes, &grid, &report));
-    if (is_brick(&b->config) || is_tree(&b->config)) {
+    if (is_tree(&b->config)) {
         CHECK(report.index_bytes >= b->need.index_bytes && report.is_exact == 0);
         CHECK(report.scratch_bytes >= b->need.scratch_bytes);
     } else {
@@ -194,7 +183,7 @@ static void too_small_a_scratch_is_refused(const built *b)
         if (b->config.method == HGRID_METHOD_VARIABLE && part > 0 && status == HGRID_OK)
             return;
         EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL, status);
-        CHECK(is_brick(&b->config) ? report.scratch_bytes >= need : report.scratch_bytes == need);
+        CHECK(report.scratch_bytes == need);
         CHECK(report.is_exact == 0);
         CHECK(report.index_bytes >= b->need.index_bytes);
         CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
@@ -212,8 +201,7 @@ static void what_is_more_than_needed_is_not_touched(const built *b)
     EXPECT(HGRID_OK, hgrid_build(&mesh, &b->config, index, need + more, scratch,
                                  scratch_need + more, &grid, NULL));
     CHECK(memcmp(index, b->index, b->blob_bytes) == 0);
-    if (!is_brick(&b->config))
-        CHECK(all_bytes_are(index + need, more, 0xc7));
+    CHECK(all_bytes_are(index + need, more, 0xc7));
     CHECK(all_bytes_are(scratch + scratch_need, more, 0xc7));
 }
 

@@ -118,7 +118,7 @@ static void questions_for_sizes(void)
     ALLOWED(hgrid_fit.config,
             hgrid_fit(&mesh, NULL, index_bytes, scratch, scratch_bytes, &out.fitted, &report));
     CHECK(memcmp(&out.fitted, &config, sizeof config) == 0);
-    /* With brick, the default, fitting takes scratch. */
+    /* With bvh, the default, fitting takes scratch. */
     const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
     ALLOWED(hgrid_fit.scratch,
             hgrid_fit(&mesh, &one_level, index_bytes, NULL, 0, &out.fitted, &report));

@@ -265,11 +265,11 @@ static void denormal_numbers_may_be_zero(void)
         _mm_setcsr(usual | bits);
         const hgrid_mesh mesh = mesh_of(&mesh_data);
         for (int i = 0; i < 2; i++) {
-            const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL, brick = HGRID_CONFIG_INIT;
+            const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL, tree = HGRID_CONFIG_INIT;
             void *other_blob;
             size_t bytes;
             const hgrid_grid other =
-                build_exactly(&mesh, i == 0 ? &one_level : &brick, &other_blob, &bytes);
+                build_exactly(&mesh, i == 0 ? &one_level : &tree, &other_blob, &bytes);
             CHECK(i > 0 || memcmp(other_blob, blob, bytes) == 0);
             check_same(&other);
         }

@@ -63,10 +63,10 @@ static void what_it_refuses(void)
     inside.positions = tree;
     refuse(HGRID_ERROR_OVERLAP, &inside, tree, tree_bytes);
 
-    const hgrid_config brick = HGRID_CONFIG_INIT;
+    const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
     void *blob;
     size_t bytes;
-    build_exactly(&mesh, &brick, &blob, &bytes);
+    build_exactly(&mesh, &one_level, &blob, &bytes);
     refuse(HGRID_ERROR_CANNOT_REFIT, &mesh, blob, bytes);
 }
 

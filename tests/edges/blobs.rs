@@ -1,7 +1,7 @@
 //! Bytes that are not the grid they claim to be: refused, or answered within bounds; never a crash.
 //! Every single bit and every truncation is in tests/hostile.
 
-use hgrid_core::{BLOB_VERSION, Config, Error, Grid, Ray, Region};
+use hgrid_core::{BLOB_VERSION, BlobInfo, Config, Error, Grid, Method, Ray, Region};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::methods;
@@ -59,6 +59,19 @@ fn what_is_no_grid_is_refused_for_what_it_is() {
     let grid = open(&longer, &mesh).unwrap();
     assert_eq!(grid.blob_bytes(), bytes.len());
     prove(&grid).unwrap();
+}
+
+/// What an older version built by the method that is no more.
+#[test]
+fn a_grid_of_a_removed_method_is_refused_by_name() {
+    let mesh = one_triangle();
+    let owned = built(&mesh);
+    let mut copy = Copy::of(owned.bytes());
+    copy.set_word(40, 5);
+    copy.sign();
+    assert_eq!(open(&copy, &mesh).unwrap_err(), Error::MethodRemoved);
+    assert_eq!(BlobInfo::peek(copy.bytes()), Err(Error::MethodRemoved));
+    assert_eq!(Method::from_u32(5), None);
 }
 
 /// Rays of every kind; what they answer does not matter, that they do does.

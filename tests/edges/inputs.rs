@@ -39,8 +39,7 @@ fn triangles_that_are_not_finite_are_skipped_and_counted() {
                 triangle[corner][axis] = bad;
                 mesh.push(triangle);
                 let view = mesh.view();
-                // Its other coordinates do not stretch the box, but for brick, whose box is that of
-                // the vertices; its id is not used.
+                // Its other coordinates do not stretch the box of a grid; its id is not used.
                 let one_level = Config::new(Method::OneLevel);
                 let [owned, expected] =
                     [&mesh, &sound].map(|mesh| Owned::build(&mesh.view(), &one_level).unwrap());
@@ -90,8 +89,8 @@ fn densities_outside_the_range_are_refused() {
         let config = Config { density, ..Config::new(Method::OneLevel) };
         assert!(Owned::build(&mesh.view(), &config).is_ok());
     }
-    // Brick has none, and does not mind.
-    let config = Config { density: f32::NAN, ..Config::new(Method::Brick) };
+    // A tree has none, and does not mind.
+    let config = Config { density: f32::NAN, ..Config::new(Method::Bvh) };
     assert!(Owned::build(&mesh.view(), &config).is_ok());
 }
 
@@ -108,29 +107,6 @@ fn bounds_grow_with_the_density_however_high() {
         }
         assert!(least > 0);
     }
-}
-
-#[test]
-fn widths_of_cells_outside_the_range_are_refused() {
-    let mesh = ball(4, 1.0);
-    let view = mesh.view();
-    for cell_size in [0.0, -0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let config = Config { cell_size, ..Config::new(Method::Brick) };
-        let error = Error::InvalidConfig(ConfigField::CellSize);
-        assert_eq!(sizes(&view, &config, &mut []), Err(error), "{cell_size}");
-        assert_eq!(Owned::build(&view, &config).unwrap_err(), error, "{cell_size}");
-    }
-    for cell_size in [1e-45, f32::MIN_POSITIVE, 1e-3, 1e3, f32::MAX] {
-        let config = Config { cell_size, ..Config::new(Method::Brick) };
-        let owned = Owned::build(&view, &config).unwrap();
-        let grid = owned.open(&view).unwrap();
-        prove(&grid).unwrap();
-        assert_eq!(grid.config().cell_size.to_bits(), cell_size.to_bits());
-        oracle::check(&grid, &Ray::new([0.1, 0.2, 3.0], [0.0, 0.0, -1.0]));
-    }
-    // No other method minds.
-    let config = Config { cell_size: f32::NAN, ..Config::new(Method::OneLevel) };
-    assert!(Owned::build(&view, &config).is_ok());
 }
 
 #[test]
@@ -182,7 +158,7 @@ fn every_error_says_something_of_its_own() {
         Error::InvalidConfig(ConfigField::Method),
         Error::InvalidConfig(ConfigField::Density),
         Error::InvalidConfig(ConfigField::Flags),
-        Error::InvalidConfig(ConfigField::CellSize),
+        Error::MethodRemoved,
         Error::InvalidBatch(BatchField::Rays),
         Error::InvalidBatch(BatchField::Answers),
         Error::NotAGrid,

@@ -1,9 +1,8 @@
 //! What happens at the edges: odd meshes, odd rays, odd numbers, damaged bytes?
 
 mod blobs;
-mod bricks;
-mod chunks;
 mod inputs;
+mod mixed;
 mod packed;
 mod progress;
 mod rays;

@@ -160,8 +160,8 @@ fn a_mesh_of_spanning_triangles_lowers_the_density() {
     for (config, depth) in
         methods::configs_with(64.0).flat_map(|c| depths.clone().map(move |d| (c, d)))
     {
-        if depth > 1 && config.method != Method::Recursive || config.method == Method::Brick {
-            // Others have no depth; cells as large as triangles have no density, see bricks.rs.
+        if depth > 1 && config.method != Method::Recursive {
+            // Others have no depth.
             continue;
         }
         let owned = Owned::build(&view, &Config { depth, ..config }).unwrap();

@@ -65,7 +65,7 @@ hgrid::status build(const float (*positions)[3], std::size_t vertex_count,
 {
     const hgrid::mesh mesh(hgrid::span<const float[3]>(positions, vertex_count),
                            hgrid::span<const std::uint32_t[3]>(indices, triangle_count));
-    const auto built = hgrid::view::build(mesh, hgrid::method::brick, {index, index_bytes},
+    const auto built = hgrid::view::build(mesh, hgrid::method::bvh, {index, index_bytes},
                                           {scratch, scratch_bytes});
     if (built)
         *grid = *built;

@@ -72,7 +72,7 @@ fn each_pixel_has_the_colour_of_its_work() {
     let dir = TempDir::new().expect("a folder");
     let scene = Scene::load(KNOT).expect("a scene");
     for (method, what) in
-        [(Method::Fixed, "tests"), (Method::Fixed, "steps"), (Method::Brick, "steps")]
+        [(Method::Fixed, "tests"), (Method::Fixed, "steps"), (Method::Bvh, "steps")]
     {
         let picture = drawn(dir.path(), &["--heat", what, "--method", method.name()]);
         let bar = bar(&picture);

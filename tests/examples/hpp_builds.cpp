@@ -34,7 +34,7 @@ void operator delete(void *memory, std::align_val_t, const std::nothrow_t &) noe
 
 static constexpr hgrid::method METHODS[] = {hgrid::method::one_level, hgrid::method::fixed,
                                             hgrid::method::variable, hgrid::method::recursive,
-                                            hgrid::method::brick};
+                                            hgrid::method::bvh};
 
 static void check_grids()
 {
@@ -132,7 +132,7 @@ static void check_views()
     CHECK(bound && bound->index_bytes >= rough.index_bytes);
 
     /* What a build that ran out of memory asks for is enough: with one level to the byte. */
-    for (const hgrid::method method : {hgrid::method::brick, hgrid::method::one_level}) {
+    for (const hgrid::method method : {hgrid::method::bvh, hgrid::method::one_level}) {
         const hgrid::config how(method);
         const auto build = [&](std::size_t bytes, hgrid::report &details) {
             return hgrid::view::build(s.mesh(), how,
@@ -143,7 +143,7 @@ static void check_views()
         hgrid::report details, again;
         CHECK(build(exact.index_bytes, details));
         CHECK(build(exact.index_bytes - 64, details).error() == status::index_too_small);
-        CHECK(method == hgrid::method::brick ? details.index_bytes >= exact.index_bytes
+        CHECK(method == hgrid::method::bvh ? details.index_bytes >= exact.index_bytes
                                              : details.index_bytes == exact.index_bytes);
         CHECK(build(details.index_bytes, again));
     }
@@ -170,9 +170,6 @@ static void check_progress_and_threads()
     for (const hgrid::method method : METHODS) {
         steps.clear();
         hgrid::config config(method);
-        /* Cells that are small enough for a second attempt with more memory. */
-        if (method == hgrid::method::brick)
-            config.cell_size(0.2f);
         const auto plain = hgrid::grid::build(s.mesh(), config);
         config.progress(watch).parallel_for(4, run);
         const auto built = hgrid::grid::build(s.mesh(), config);
@@ -182,8 +179,6 @@ static void check_progress_and_threads()
         CHECK(!steps.empty() && steps.back() >= 1 && steps.back() <= 1);
         for (std::size_t i = 1; i < steps.size(); i++)
             CHECK(steps[i] > steps[i - 1]);
-        if (method == hgrid::method::brick)
-            CHECK(built->blob().size() > 16 * s.faces.size() + 4096);
     }
     CHECK(runs > 0);
 
@@ -192,7 +187,7 @@ static void check_progress_and_threads()
         hgrid::grid::build(s.mesh(), hgrid::config(hgrid::method::variable).progress(cancel));
     CHECK(cancelled.error() == status::cancelled);
     auto lazy = [](std::uint32_t, hgrid::task) {};
-    CHECK(hgrid::grid::build(s.mesh(), hgrid::config(hgrid::method::brick).parallel_for(2, lazy))
+    CHECK(hgrid::grid::build(s.mesh(), hgrid::config(hgrid::method::bvh).parallel_for(2, lazy))
               .error() == status::parallel_for);
 }
 
@@ -214,7 +209,6 @@ static void check_configs()
     CHECK(bytes(method::fixed) < bytes(config(method::fixed).macrocell_factor(2)));
     CHECK(bytes(method::variable) > bytes(config(method::variable).subdivide_above(9999)));
     CHECK(bytes(method::recursive) > bytes(config(method::recursive).depth(1)));
-    CHECK(bytes(method::brick) > bytes(config(method::brick).cell_size(4)));
     CHECK(hgrid::grid::build(s.mesh(), hgrid::config(hgrid::method::recursive).depth(99)).error() ==
           status::invalid_depth);
 
@@ -239,10 +233,10 @@ static void check_configs()
 static void check_blobs()
 {
     const scene s(3);
-    const auto grid = hgrid::grid::build(s.mesh(), hgrid::method::brick);
+    const auto grid = hgrid::grid::build(s.mesh(), hgrid::method::bvh);
     CHECK(grid);
     const auto info = hgrid::peek(grid->blob());
-    CHECK(info && info->method == HGRID_METHOD_BRICK && info->triangle_count == s.faces.size());
+    CHECK(info && info->method == HGRID_METHOD_BVH && info->triangle_count == s.faces.size());
     CHECK(!info->has_mesh && hgrid::view::open(grid->blob()).error() == status::no_mesh);
     CHECK(hgrid::peek(grid->blob().subspan(0, 8)).error() == status::truncated);
 

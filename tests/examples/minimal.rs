@@ -10,7 +10,7 @@ use crate::hpp::HELLO;
 use crate::ppm::Picture;
 use crate::programs::{compile, example};
 
-/// The bytes are those of a brick grid, which NULL stands for.
+/// The bytes are those of a tree, which NULL stands for.
 const PRINTED: &str = "built a grid of 256 bytes\n\
                        hit triangle 0 at t = 1, u = 0.25, v = 0.5\n";
 

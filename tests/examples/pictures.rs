@@ -76,7 +76,6 @@ fn every_method_draws_the_same_picture() {
 
         let owned = Owned::build(&mesh, &config).expect("a sound mesh");
         let cells = match config.method {
-            Method::Brick => format!("cell size      {}\n", config.cell_size),
             Method::Bvh => String::new(),
             _ => format!("density        {}\n", config.density),
         };
@@ -88,11 +87,11 @@ fn every_method_draws_the_same_picture() {
 }
 
 #[test]
-fn density_and_cell_size_are_passed_on() {
+fn density_is_passed_on() {
     let dir = TempDir::new().expect("a folder");
     for (words, lines) in [
         (["--density", "2.5", "fixed"], "method         fixed\ndensity        2.5\n"),
-        (["--cell-size", "3.5", "brick"], "method         brick\ncell size      3.5\n"),
+        (["--density", "3.5", "one-level"], "method         one-level\ndensity        3.5\n"),
     ] {
         let [option, value, method] = words;
         let mut raytracer = raytracer();

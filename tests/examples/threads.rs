@@ -24,7 +24,7 @@ fn any_number_of_threads_draws_the_same_picture() {
     let dir = TempDir::new().expect("a folder");
     for options in [
         // Of these sizes none is a multiple of a tile.
-        &["--size", "100", "--shadows", "--ao", "3", "--method", "brick"][..],
+        &["--size", "100", "--shadows", "--ao", "3", "--method", "bvh"][..],
         &["--size", "61", "--heat", "tests", "--shadows"],
         &["--size", "99", "--heat", "steps", "--ao", "2"],
         &["--size", "3"],
@@ -45,7 +45,7 @@ fn its_threads_do_not_race() {
     let program = raytracer_with(&["-g", "-fsanitize=thread"]);
     let mut raytracer = Command::new(program);
     raytracer.arg(&scene).args(["--size", "90", "--shadows", "--ao", "2", "--threads", "4"]);
-    raytracer.args(["--method", "brick", "--progress", "-o"]).arg(dir.path().join("picture.ppm"));
+    raytracer.args(["--method", "bvh", "--progress", "-o"]).arg(dir.path().join("picture.ppm"));
     let output = output(&mut raytracer);
     let said = String::from_utf8_lossy(&output.stderr);
     if said.contains("unexpected memory mapping") {

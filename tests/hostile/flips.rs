@@ -125,12 +125,6 @@ fn recursive() {
 
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
-fn brick() {
-    flip(Method::Brick);
-}
-
-#[test]
-#[cfg_attr(miri, ignore = "hours")]
 fn bvh() {
     flip(Method::Bvh);
 }

@@ -16,7 +16,7 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
         assert_eq!(fit(&view, &config, whole, scratch).unwrap().0, config);
         assert_eq!(fit(&view, &config, usize::MAX, scratch).unwrap().0, config);
 
-        let has_dial = config.method.has_density() || config.method == Method::Brick;
+        let has_dial = config.method.has_density();
         let mut last = whole;
         for budget in [whole - 1, whole * 9 / 10, whole * 3 / 4] {
             let (fitted, needed) = match fit(&view, &config, budget, scratch) {
@@ -54,17 +54,14 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
     }
     // Too fine to be built at all is too large, not wrong.
     for config in configs().filter(|config| config.method != Method::Bvh) {
-        let finer = Config { density: 1e9, cell_size: 1e-9, ..config };
+        let finer = Config { density: 1e9, ..config };
         let enough = sizes(&view, &config, &mut []).unwrap();
         let mut scratch = vec![Block::ZERO; 2 * Block::count_for(enough.scratch_bytes)];
         let scratch = Block::bytes_mut(&mut scratch);
         let budget = 12 * mesh.indices.len();
         let (fitted, needed) = fit(&view, &finer, budget, scratch).unwrap();
         assert!(needed.index_bytes <= budget, "{config:?}");
-        // What means nothing to the method stays as it was.
-        let is_brick = config.method == Method::Brick;
-        assert!(fitted.density < finer.density || is_brick && fitted.density >= finer.density);
-        assert!(is_brick == (fitted.cell_size > finer.cell_size), "{fitted:?}");
+        assert!(fitted.density < finer.density, "{fitted:?}");
     }
     let nothing = Mesh::default();
     for config in configs() {

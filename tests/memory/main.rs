@@ -55,65 +55,10 @@ fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
     }
 }
 
-/// The same for a brick grid, whose triangles wait in the index until they are sorted: it may take
-/// more than the blob, and what an error asks for may be more than would do.
-fn every_size_of_bricks(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
-    let expected = Owned::build(mesh, config).unwrap();
-    let bound = sizes(mesh, config, &mut []).unwrap();
-    let exact = sizes(mesh, config, Guarded::new(bound.scratch_bytes).region()).unwrap();
-    assert!(exact.is_exact && expected.bytes().len() <= exact.index_bytes);
-    let build = |index: &mut Guarded, scratch: &mut Guarded| {
-        let result = Grid::build(*mesh, config, index.region(), scratch.region())
-            .map(|grid| assert_eq!(grid.blob(), expected.bytes()));
-        assert!(index.around_is_intact() && scratch.around_is_intact());
-        result
-    };
-    let Sizes { index_bytes: least, scratch_bytes, .. } = exact;
-
-    for bytes in (0..least + 200).step_by(step).chain([least - 1, least, least + 1]) {
-        let mut scratch = Guarded::new(scratch_bytes);
-        let result = build(&mut Guarded::new(bytes), &mut scratch);
-        assert_eq!(result.is_ok(), bytes >= least, "{bytes} of {least} bytes");
-        let Err(error) = result else { continue };
-        let Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes } = error
-        else {
-            panic!("{error:?}");
-        };
-        assert_eq!(available_bytes, bytes as u64);
-        assert!(
-            (least as u64..=bound.index_bytes as u64).contains(&needed_bytes),
-            "{needed_bytes}"
-        );
-        let enough = usize::try_from(needed_bytes).unwrap();
-        assert_eq!(build(&mut Guarded::new(enough), &mut scratch), Ok(()), "{bytes} bytes");
-    }
-
-    for bytes in (0..scratch_bytes + 200).step_by(step).chain([scratch_bytes - 1, scratch_bytes]) {
-        let (mut index, mut scratch) = (Guarded::new(least), Guarded::new(bytes));
-        let answer = sizes(mesh, config, scratch.region()).unwrap();
-        assert!(scratch.around_is_intact());
-        assert!(answer.index_bytes == least || !answer.is_exact && answer.index_bytes > least);
-        assert!((scratch_bytes..=bound.scratch_bytes).contains(&answer.scratch_bytes));
-        let result = build(&mut index, &mut scratch);
-        assert_eq!(result.is_ok(), bytes >= scratch_bytes, "{bytes} of {scratch_bytes} bytes");
-        let Err(error) = result else { continue };
-        let Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes } = error
-        else {
-            panic!("{error:?}");
-        };
-        assert_eq!(available_bytes, bytes as u64);
-        assert!(index.is_untouched(), "written before it was known to fit");
-        let enough = usize::try_from(needed_bytes).unwrap();
-        assert!((scratch_bytes..=bound.scratch_bytes).contains(&enough));
-        assert_eq!(build(&mut index, &mut Guarded::new(enough)), Ok(()), "{bytes} bytes");
-    }
-}
-
 #[test]
 fn every_size_from_nothing_to_enough() {
     for config in methods::configs() {
         let every_size = match config.method {
-            Method::Brick => every_size_of_bricks,
             Method::Bvh => trees::every_size,
             _ => every_size,
         };

@@ -76,7 +76,7 @@ fn a_microcontroller_gets_a_static_library() {
         let bytes = fs::read(&archive).expect("the C library");
         assert!(bytes.starts_with(b"!<arch>\n"));
         check_flash("| all | ", &archive);
-        for method in ["one-level", "fixed", "brick", "bvh"] {
+        for method in ["one-level", "fixed", "bvh"] {
             build(target, &["--no-default-features", "--features", method]);
             check_flash(&format!("| `{method}` | "), &archive);
         }

@@ -10,12 +10,7 @@ pub fn configs() -> impl Iterator<Item = Config> {
     usual.chain([high]).map(|config| Config { macrocell_factor: 3, subdivide_above: 4, ..config })
 }
 
-/// The same with another density, or for a method that has none with cells as much
-/// smaller or larger as that makes them.
+/// The same with another density.
 pub fn configs_with(density: f32) -> impl Iterator<Item = Config> {
-    configs().map(move |config| Config {
-        density,
-        cell_size: if density > 0.0 { (4.0 / density).cbrt() } else { 1.0 },
-        ..config
-    })
+    configs().map(move |config| Config { density, ..config })
 }

@@ -1,6 +1,6 @@
 //! A grid and the memory it lives in, and the proof that it is right.
 
-use hgrid_core::{ALIGNMENT, Config, Error, Grid, Method, TriangleMesh, sizes};
+use hgrid_core::{ALIGNMENT, Config, Error, Grid, TriangleMesh, sizes};
 
 /// Aligned memory of zeros. Pages that nobody touches cost nothing.
 #[derive(Debug, Clone)]
@@ -56,9 +56,7 @@ impl Owned {
         let mut index = Region::new(exact.index_bytes);
         let grid = Grid::build(*mesh, config, index.bytes_mut(), scratch.bytes_mut())?;
         let length = grid.blob_bytes();
-        // A brick grid's triangles wait in the index until they are sorted.
-        let is_sorted_in_place = config.method == Method::Brick;
-        assert!(length == exact.index_bytes || is_sorted_in_place && length < exact.index_bytes);
+        assert_eq!(length, exact.index_bytes);
         index.length = length;
         Ok(Self { index })
     }

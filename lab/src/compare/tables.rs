@@ -212,7 +212,7 @@ mod tests {
     fn times_have_a_range_and_bytes_have_none() {
         let ratio = |what: &str| Ratio {
             what: String::from(what),
-            hgrid: "brick".to_owned(),
+            hgrid: "bvh".to_owned(),
             value: 3.0,
             peer: "embree-low".to_owned(),
             peer_value: 8.0,

@@ -93,10 +93,10 @@ impl Drawing for Figure<'_> {
         let title = format!("Memory and times, {size} x {size} rays");
         let built = match threads {
             0 | 1 => String::new(),
-            threads => format!("; brick grids built by {threads} threads"),
+            threads => format!("; trees built by {threads} threads"),
         };
         let tiles =
-            if methods.iter().any(Measurement::is_in_tiles) { "; brick traces tiles" } else { "" };
+            if methods.iter().any(Measurement::is_in_tiles) { "; bvh traces tiles" } else { "" };
         let source = format!("{}; {}{tiles}{built}", machine.summary(), times(*repeats));
         heading(area, pen, [&title, &source], &legend)?;
 

@@ -62,7 +62,7 @@ fn fields(seed: &Seed) -> Vec<Case<'static>> {
         (MACROCELL_FACTOR, method == Method::Fixed),
         (SUBDIVIDE_ABOVE, method == Method::Variable),
         (DEPTH, method == Method::Recursive),
-        (CELL_SIZE, method == Method::Brick),
+        (CELL_SIZE, false),
         (DENSITY, method.has_density()),
     ];
     for (at, _) in of_others.into_iter().filter(|(_, is_used)| !is_used) {
@@ -101,8 +101,6 @@ fn parameters_that_no_build_takes_are_refused() {
     };
     refused(small(Method::Fixed), &[is(MACROCELL_FACTOR, 0), is(MACROCELL_FACTOR, 1)]);
     refused(small(Method::Recursive), &[is(DEPTH, 0), is(DEPTH, 5), is(HASH_COUNT, 1)]);
-    let size = |value: f32| is(CELL_SIZE, value.to_bits());
-    refused(small(Method::Brick), &[size(0.0), size(f32::NAN), size(-1.0), is(HASH_COUNT, 1)]);
 }
 
 /// The bytes between the sections.

@@ -17,9 +17,9 @@ const COHERENCES: [Coherence; 2] = [Coherence::Coherent, Coherence::Incoherent];
 /// Of so many rays everything is asked; of the rest, which are tiles, what tiles answer.
 const ASKED_ALL: usize = 12;
 
-/// The vector levels worth asking for: only brick grids and trees have vectors.
+/// The vector levels worth asking for: only trees have vectors.
 fn levels(grid: &Grid<'_>) -> impl Iterator<Item = SimdLevel> {
-    let all = matches!(grid.method(), Method::Brick | Method::Bvh);
+    let all = grid.method() == Method::Bvh;
     SimdLevel::available().filter(move |level| all || *level == SimdLevel::detect())
 }
 

@@ -205,7 +205,7 @@ impl Caller<'_> {
             macrocell_factor: chosen.macrocell_factor,
             subdivide_above: chosen.subdivide_above,
             depth: chosen.depth,
-            cell_size: chosen.cell_size,
+            reserved: 0,
             flags: chosen.flags.bits(),
             tasks: u32::from(u8::arbitrary(u)? % 80),
             quality: chosen.quality as u32 + if rarely(u, 48)? { 7 } else { 0 },

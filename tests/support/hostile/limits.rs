@@ -20,11 +20,6 @@ pub fn most(grid: &Grid<'_>) -> Counters {
         Method::Variable => cells * (1 + 3 * 255),
         // One step for each entry.
         Method::Recursive => words,
-        // Four bricks on an axis of a block, four cells on one of a brick, each divided twice.
-        Method::Brick => {
-            let bricks = |cell: u64| 10 * (1 + 10 * (1 + cell));
-            sum(grid.resolution().map(|c| c.div_ceil(16))) * (1 + bricks(bricks(bricks(0))))
-        }
         // A node for each node, and eight leaves; one more, and the budget is spent.
         Method::Bvh => 9 * nodes(grid) + 1,
         method => panic!("nobody has said what {method:?} may cost"),

@@ -91,7 +91,7 @@ pub fn nested() -> Mesh {
     mesh
 }
 
-/// A crowd in a crowd, so that cells are divided twice, under triangles for bricks, blocks and all.
+/// A crowd in a crowd, under larger triangles.
 fn crowded() -> Mesh {
     let mut mesh = soup(40, 0.02, 3);
     for size in [0.05, 2e-3] {

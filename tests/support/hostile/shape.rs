@@ -232,7 +232,7 @@ pub(super) fn config(u: &mut Unstructured<'_>) -> Result<Config> {
     let mut count = |default| Count::arbitrary(u).map(|count| count.or(default));
     let [macrocell_factor, subdivide_above, depth] = [count(3)?, count(4)?, count(default.depth)?];
     let mut setting = |default| Setting::arbitrary(u).map(|setting| setting.or(default));
-    let [density, cell_size] = [setting(default.density)?, setting(1.0)?];
+    let density = setting(default.density)?;
     let flags = match u8::arbitrary(u)? {
         0..=199 => 0,
         200..=249 => 1,
@@ -240,5 +240,5 @@ pub(super) fn config(u: &mut Unstructured<'_>) -> Result<Config> {
     };
     let flags = BuildFlags::from_bits_retain(flags);
     let chosen = Config { macrocell_factor, subdivide_above, depth, ..default };
-    Ok(Config { density, cell_size, quality, flags, ..chosen })
+    Ok(Config { density, quality, flags, ..chosen })
 }
