@@ -95,7 +95,7 @@ pub(crate) struct All<'q> {
 }
 
 impl All<'_> {
-    /// Sorts the hits that there was room for.
+    /// Sorts the hits that there was room for, each triangle once.
     pub(crate) fn sort(&mut self) {
         let count = self.count.min(self.hits.len());
         let heap = self.hits.get_mut(..count).unwrap_or_default();
@@ -106,6 +106,22 @@ impl All<'_> {
                 core::mem::swap(first, end);
                 sift_down(rest);
             }
+        }
+        // Damaged bytes may show a triangle again: keep it once.
+        let mut kept = 0_usize;
+        for at in 0..heap.len() {
+            let Some(&hit) = heap.get(at) else { break };
+            let before = kept.checked_sub(1).and_then(|before| heap.get(before));
+            if before.is_some_and(|before| before.primitive == hit.primitive) {
+                continue;
+            }
+            if let Some(slot) = heap.get_mut(kept) {
+                *slot = hit;
+            }
+            kept += 1;
+        }
+        if kept < count {
+            self.count = kept;
         }
     }
 }
