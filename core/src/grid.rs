@@ -454,6 +454,11 @@ impl<'a> Grid<'a> {
         Self { simd, ..self }
     }
 
+    /// Returns true if a ray is shown each triangle at most once.
+    pub(crate) const fn shows_once(&self) -> bool {
+        HAS_BVH && matches!(self.structure, Structure::Bvh(_))
+    }
+
     /// No ray is shown more primitives than this.
     #[inline]
     const fn list_words(&self) -> usize {

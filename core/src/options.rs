@@ -13,7 +13,7 @@ use crate::counters::Counters;
 use crate::grid::Grid;
 use crate::mesh::TriangleMesh;
 use crate::ray::{Hit, INVALID_ID, Ray};
-use crate::search::Nearest;
+use crate::search::{All, Nearest};
 
 /// Which sides of triangles a ray does not hit.
 ///
@@ -240,8 +240,10 @@ impl Grid<'_> {
     /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.
     ///
     /// Writes as many of them as `hits` has room for, the nearest, and returns how many there
-    /// are. With room for more than there are, the ray is walked once. Otherwise, and with a
-    /// filter, it is walked once more for each sixteen hits, from where it got to: so no
+    /// are. [`Method::Bvh`](crate::Method::Bvh) walks the ray once and keeps the nearest in a heap, which takes
+    /// the number of hits times the logarithm of the room; with a filter that is so where there is
+    /// room for all hits. Otherwise, and with the other methods where there is not room for more hits than
+    /// there are, the ray is walked once more for each sixteen hits, from where it got to: so no
     /// memory is taken, whatever their number, but thousands of hits in one cell take long,
     /// as the square of their number.
     ///
@@ -268,6 +270,15 @@ impl Grid<'_> {
     ) -> usize {
         let mut count = 0;
         let mut after = None;
+        if self.shows_once() {
+            let found = self.heap(ray, options, hits);
+            let Some(filter) = &mut options.filter else { return found };
+            if found <= hits.len() {
+                return filtered(hits, found, filter);
+            }
+            // What the filter rejects makes room for others.
+            return self.ordered(ray, options, None, 0, hits);
+        }
         // Without a filter all that is found counts: collect it where it is wanted.
         if options.filter.is_none() && hits.len() > ROOM {
             count = self.nearest(ray, options, None, hits, false);
@@ -276,6 +287,19 @@ impl Grid<'_> {
                 _ => return count,
             }
         }
+        self.ordered(ray, options, after, count, hits)
+    }
+
+    /// Writes the hits that count and lie behind one to where `count` of them are, and returns how many there
+    /// are in all.
+    fn ordered(
+        &self,
+        ray: &Ray,
+        options: &mut QueryOptions<'_>,
+        after: Option<Hit>,
+        mut count: usize,
+        hits: &mut [Hit],
+    ) -> usize {
         self.in_order((0, ray), options, after, ROOM, |hit| {
             if let Some(slot) = hits.get_mut(count) {
                 *slot = *hit;
@@ -284,6 +308,19 @@ impl Grid<'_> {
             true
         });
         count
+    }
+
+    /// Walks a ray through a tree once, and keeps the nearest hits in order; returns how many there are.
+    fn heap(&self, ray: &Ray, options: &mut QueryOptions<'_>, hits: &mut [Hit]) -> usize {
+        let selection = Selection::new(self.mesh(), options);
+        let mut all = All { selection: &selection, hits, count: 0 };
+        let mut work = Counters::default();
+        self.search(ray, ray.t_min, options.cull, &mut all, &mut work);
+        all.sort();
+        if let Some(counters) = &mut options.counters {
+            counters.add(&work);
+        }
+        all.count
     }
 
     /// Shows `take` the hits that count and lie behind one, in order, until it answers that it has
@@ -346,4 +383,24 @@ impl Grid<'_> {
         }
         nearest.count
     }
+}
+
+/// Keeps what a filter accepts of the first `found` hits, in order; returns how many those are.
+fn filtered(hits: &mut [Hit], found: usize, filter: &mut Filter<'_>) -> usize {
+    let mut count = 0;
+    for at in 0..found {
+        let Some(&hit) = hits.get(at) else { break };
+        let verdict = filter(0, &hit);
+        if verdict == Verdict::Reject {
+            continue;
+        }
+        if let Some(slot) = hits.get_mut(count) {
+            *slot = hit;
+        }
+        count += 1;
+        if verdict == Verdict::AcceptAndStop {
+            break;
+        }
+    }
+    count
 }

@@ -85,6 +85,103 @@ pub(crate) struct Nearest<'q> {
     pub(crate) is_any: bool,
 }
 
+/// The nearest hits of a tree, which shows each triangle once, and how many hits there are.
+#[derive(Debug)]
+pub(crate) struct All<'q> {
+    pub(crate) selection: &'q Selection<'q>,
+    /// The nearest so far as a heap, the farthest first.
+    pub(crate) hits: &'q mut [Hit],
+    pub(crate) count: usize,
+}
+
+impl All<'_> {
+    /// Sorts the hits that there was room for, each triangle once.
+    pub(crate) fn sort(&mut self) {
+        let count = self.count.min(self.hits.len());
+        let heap = self.hits.get_mut(..count).unwrap_or_default();
+        for last in (1..heap.len()).rev() {
+            if let Some((end, rest)) = heap.get_mut(..=last).and_then(<[Hit]>::split_last_mut)
+                && let Some(first) = rest.first_mut()
+            {
+                core::mem::swap(first, end);
+                sift_down(rest);
+            }
+        }
+        // Damaged bytes may show a triangle again: keep it once.
+        let mut kept = 0_usize;
+        for at in 0..heap.len() {
+            let Some(&hit) = heap.get(at) else { break };
+            let before = kept.checked_sub(1).and_then(|before| heap.get(before));
+            if before.is_some_and(|before| before.primitive == hit.primitive) {
+                continue;
+            }
+            if let Some(slot) = heap.get_mut(kept) {
+                *slot = hit;
+            }
+            kept += 1;
+        }
+        if kept < count {
+            self.count = kept;
+        }
+    }
+}
+
+impl Search for All<'_> {
+    #[inline(never)]
+    fn show(&mut self, hit: Hit) -> Outcome {
+        if !self.selection.has(hit.primitive) {
+            return Outcome::Unchanged;
+        }
+        let mut place = self.count;
+        self.count += 1;
+        if place >= self.hits.len() {
+            // The farthest falls out.
+            if let Some(farthest) = self.hits.first_mut().filter(|first| hit.is_closer(first)) {
+                *farthest = hit;
+                sift_down(self.hits);
+            }
+            return Outcome::Unchanged;
+        }
+        // Move parents down that are closer.
+        while place > 0
+            && let Some(&parent) = self.hits.get((place - 1) / 2)
+            && parent.is_closer(&hit)
+        {
+            if let Some(slot) = self.hits.get_mut(place) {
+                *slot = parent;
+            }
+            place = (place - 1) / 2;
+        }
+        if let Some(slot) = self.hits.get_mut(place) {
+            *slot = hit;
+        }
+        Outcome::Unchanged
+    }
+}
+
+/// Moves the first hit of a heap down to its place.
+fn sift_down(heap: &mut [Hit]) {
+    let Some(&hit) = heap.first() else { return };
+    let mut place = 0;
+    // Children of a place in a slice of hits, which are 16 bytes each: no overflow.
+    while let Some(&left) = heap.get(2 * place + 1) {
+        let (mut at, mut child) = (2 * place + 1, left);
+        if let Some(&right) = heap.get(at + 1).filter(|right| child.is_closer(right)) {
+            (at, child) = (at + 1, right);
+        }
+        if !hit.is_closer(&child) {
+            break;
+        }
+        if let Some(slot) = heap.get_mut(place) {
+            *slot = child;
+        }
+        place = at;
+    }
+    if let Some(slot) = heap.get_mut(place) {
+        *slot = hit;
+    }
+}
+
 impl Search for Nearest<'_> {
     // Out of line: hits are rare, and the walk keeps its registers.
     #[inline(never)]

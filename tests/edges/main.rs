@@ -1,6 +1,7 @@
 //! What happens at the edges: odd meshes, odd rays, odd numbers, damaged bytes?
 
 mod blobs;
+mod bounds;
 mod inputs;
 mod mixed;
 mod packed;

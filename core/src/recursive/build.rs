@@ -9,6 +9,10 @@
 //! cell becomes a grid, whose own lists stack up behind. When the pool runs out the build goes on
 //! and counts: at the end it knows, exactly, what index it would have needed.
 //!
+//! Nested detail, fans and slabs would make grids look at cells without end: each triangle lies in many cells
+//! of each grid. So a build may look at [`LOOKS`] cells for each triangle, and a grid at a share of what is
+//! left as large as its share of the references. A cell whose grid would take more stays a list.
+//!
 //! Resolution as in Manta: with n primitives at depth d of D, `m = (8 n)^(1 / (2 D + 1 - 2 d))` and
 //! `m * size / cbrt(volume)` cells on each axis, rounded; at least 8 cells.
 
@@ -29,6 +33,16 @@ use crate::mesh::TriangleMesh;
 use crate::one_level::{copy, reference_limit, row};
 use crate::sizes::Sizes;
 use crate::survey::{Survey, boxes};
+
+/// Cells that grids below the root may look at for each triangle: several times what scans take.
+const LOOKS: u64 = 512;
+/// The same for a mesh of a few triangles, in all.
+const LEAST_LOOKS: u64 = 65_536;
+
+/// Cells that all grids below the root together may look at.
+const fn looks(triangles: u32) -> u64 {
+    LOOKS * triangles as u64 + LEAST_LOOKS
+}
 
 /// Words of scratch for one grid of so many primitives: where lists start, and their ids.
 ///
@@ -52,8 +66,14 @@ pub(crate) const fn scratch_bytes(triangles: u32, config: &Config) -> u64 {
 /// The most memory that a mesh with so many triangles can need, or all that a pool can address.
 ///
 /// Grids on one level that share n references, at least 5 each, have at most
-/// `(3.5 * density + 44) n` words and hand down at most `29 n` references.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bound, rounded up")]
+/// `(3.5 * density + 44) n` words and hand down at most `29 n` references. A grid below the root has 8 words,
+/// its entries and at least 5 references; it paid for twice as many cells, at least.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "a bound, rounded up; no more than 2^31"
+)]
 pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
     let mut references = triangles as f64 + 5.0;
     let mut words = 0.0;
@@ -63,7 +83,9 @@ pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
         references *= 29.0;
         depth += 1;
     }
-    let words = if words < GRID as f64 { words as u64 } else { GRID as u64 };
+    let most = scratch_words(triangles, config.density).saturating_add(2 * looks(triangles));
+    let most = if most < GRID as u64 { most } else { GRID as u64 };
+    let words = if words < most as f64 { words as u64 } else { most };
     (HEADER_BYTES as u64 + section_bytes::<u32>(words), scratch_bytes(triangles, config))
 }
 
@@ -164,7 +186,8 @@ fn run(
         *slot = id;
     }
     let root = Aabb { min: Vec3A::ZERO, max: Vec3A::from_array(lattice.resolution.map(as_f32)) };
-    builder.grid(ids, &root, 0, scratch)?;
+    let mut looks = looks(mesh.triangle_count());
+    builder.grid(ids, &root, 0, &mut looks, scratch)?;
     let words = builder.pool.offset()?;
 
     let mut header = Header::new(config, mesh, &lattice);
@@ -290,14 +313,15 @@ impl Placed {
 
     /// Shows `visit` the cells of a grid that the triangle overlaps, with their
     /// numbers: one at least, so that a triangle which only touches a cell is not lost
-    /// in the grid that the cell holds.
-    pub(super) fn each_cell(&self, node: &Node, mut visit: impl FnMut(usize, [u32; 3])) {
+    /// in the grid that the cell holds. Returns how many cells it looked at.
+    pub(super) fn each_cell(&self, node: &Node, mut visit: impl FnMut(usize, [u32; 3])) -> u64 {
         let (origin, scale) = (Vec3A::from_array(node.origin), Vec3A::from_array(node.scale));
         let [width, height, _] = node.resolution;
         let number = |[x, y, z]: [u32; 3]| row(height, y, z) * width as usize + x as usize;
         let range = node.range(&self.reach);
         if range.count() == 1 {
-            return visit(number(range.min), range.min);
+            visit(number(range.min), range.min);
+            return 1;
         }
         let size = 1.0 / scale;
         let half = size * 0.5 + self.margin;
@@ -312,6 +336,7 @@ impl Placed {
         if !is_anywhere {
             visit(number(range.min), range.min);
         }
+        range.count()
     }
 }
 
@@ -336,52 +361,28 @@ impl Builder<'_, '_> {
     ///
     /// Answers `false`, and puts nothing, where a grid separates too little: if the lists of its
     /// cells hold on average more than three quarters of the primitives, as in a pile of equal
-    /// triangles. The root is always put.
+    /// triangles. Likewise where it would look at more than `looks` cells, of which it takes those that
+    /// it looks at. The root is always put.
     fn grid(
         &mut self,
         ids: &[u32],
         bounds: &Aabb,
         depth: u32,
+        looks: &mut u64,
         scratch: &mut [u32],
     ) -> Result<bool, Error> {
         let count = u32::try_from(ids.len()).unwrap_or(u32::MAX);
-        let at = self.pool.offset()?;
 
-        // Count the references of each cell, in coarser grids if they get out of hand.
-        let mut primitives = count;
-        let (node, references) = loop {
-            let resolution = if depth == 0 {
-                Some(self.lattice.resolution)
-            } else {
-                self.rule.within(self.lattice, bounds, primitives, depth)
-            };
-            let is_last = primitives == 0;
-            primitives /= 2;
-            let Some(resolution) = resolution.or(is_last.then_some([1; 3])) else { continue };
-            let node = Node::new(at as usize, bounds.min, bounds.max, resolution);
-            let starts = scratch.get_mut(..=node.cells()).ok_or(TOO_FINE)?;
-            starts.fill(0);
-            let limit = u64::from(reference_limit(count));
-            let mut references = 0_u64;
-            for placed in ids.iter().filter_map(|&id| self.place(id)) {
-                if references > limit && !is_last {
-                    break;
-                }
-                placed.each_cell(&node, |cell, _| {
-                    references += 1;
-                    if let Some(start) = starts.get_mut(cell) {
-                        *start += 1;
-                    }
-                });
-            }
-            if references <= limit || is_last {
-                break (node, references);
-            }
-        };
+        let settled = self.settle(ids, bounds, depth, looks, scratch)?;
+        let Some((node, references, looked)) = settled else { return Ok(false) };
         let starts = scratch.get(..node.cells()).ok_or(TOO_FINE)?;
         let lists = starts.iter().filter(|&&start| start != 0).count() as u64;
         if depth > 0 && 4 * references > 3 * u64::from(count) * lists {
             return Ok(false);
+        }
+
+        if depth > 0 {
+            *looks = looks.saturating_sub(looked);
         }
 
         // Sum up, and fill in reverse: every list ascends by id.
@@ -418,6 +419,7 @@ impl Builder<'_, '_> {
         };
         let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
         let cells = u32::try_from(node.cells()).unwrap_or(u32::MAX);
+        let mut later = references as u64;
         for (number, cell) in all.cells().enumerate() {
             if depth == 0 {
                 self.watch.between(u32::try_from(number).unwrap_or(cells), cells, [0.2, 1.0])?;
@@ -427,7 +429,15 @@ impl Builder<'_, '_> {
             let list = list.unwrap_or_default();
             let start = self.pool.offset()?;
             let is_crowded = list.len() > FEW && depth + 1 < self.rule.depth;
-            if is_crowded && self.grid(list, &self.inside(&node, cell, list), depth + 1, rest)? {
+            let share = (*looks).checked_div(later).unwrap_or(0) * list.len() as u64;
+            later = later.saturating_sub(list.len() as u64);
+            let mut left = share;
+            let is_grid = is_crowded && {
+                let bounds = self.inside(&node, cell, list);
+                self.grid(list, &bounds, depth + 1, &mut left, rest)?
+            };
+            *looks = looks.saturating_sub(share - left);
+            if is_grid {
                 entry(number, start | GRID);
             } else {
                 entry(number, start);
@@ -438,6 +448,66 @@ impl Builder<'_, '_> {
         }
         entry(node.cells(), self.pool.offset()?);
         Ok(true)
+    }
+
+    /// Chooses the resolution of a grid, and counts the references of each cell where their starts will be.
+    ///
+    /// Returns the grid, its references and the cells that its triangles look at; `None` if those are
+    /// more than `looks`, of which it takes what it looked at.
+    fn settle(
+        &self,
+        ids: &[u32],
+        bounds: &Aabb,
+        depth: u32,
+        looks: &mut u64,
+        scratch: &mut [u32],
+    ) -> Result<Option<(Node, u64, u64)>, Error> {
+        let count = u32::try_from(ids.len()).unwrap_or(u32::MAX);
+        let at = self.pool.offset()?;
+        // Count the references of each cell, in coarser grids if they get out of hand.
+        let mut primitives = count;
+        loop {
+            let resolution = if depth == 0 {
+                Some(self.lattice.resolution)
+            } else {
+                self.rule.within(self.lattice, bounds, primitives, depth)
+            };
+            let is_last = primitives == 0;
+            primitives /= 2;
+            let Some(resolution) = resolution.or(is_last.then_some([1; 3])) else { continue };
+            let node = Node::new(at as usize, bounds.min, bounds.max, resolution);
+            if depth > 0 && node.cells() as u64 > *looks {
+                return Ok(None);
+            }
+            let starts = scratch.get_mut(..=node.cells()).ok_or(TOO_FINE)?;
+            starts.fill(0);
+            let limit = u64::from(reference_limit(count));
+            let (mut references, mut looked) = (0_u64, 0_u64);
+            // The cells once, those that triangles look at twice: to count and to fill.
+            let most =
+                if depth == 0 { u64::MAX } else { looks.saturating_sub(node.cells() as u64) / 2 };
+            for placed in ids.iter().filter_map(|&id| self.place(id)) {
+                if looked > most || references > limit && !is_last {
+                    break;
+                }
+                looked += placed.each_cell(&node, |cell, _| {
+                    references += 1;
+                    if let Some(start) = starts.get_mut(cell) {
+                        *start += 1;
+                    }
+                });
+            }
+            if looked > most {
+                *looks = 0;
+                return Ok(None);
+            }
+            if depth > 0 {
+                *looks = looks.saturating_sub(node.cells() as u64 + looked);
+            }
+            if references <= limit || is_last {
+                return Ok(Some((node, references, looked)));
+            }
+        }
     }
 
     /// The part of a cell that its primitives reach.

@@ -1,7 +1,7 @@
 //! What holds of every blob that a build writes, broken one by one: opening or `validate` refuses
 //! it, at a byte that has to do with it, and queries end whatever it is.
 //!
-//! The words are found here from the format's description alone. Those of brick grids are in
+//! The words are found here from the format's description alone.
 //! tests/edges/chunks.rs.
 
 mod bvh;
