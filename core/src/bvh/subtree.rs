@@ -11,8 +11,8 @@
 //! ```
 //!
 //! All of a root's triangles are read in one loop, so that their loads from memory overlap. How many triangles
-//! a leaf has is as good as random: its box is that of two, four or eight of them that may overlap, so no
-//! branch depends on it.
+//! a leaf has is as good as random. Its box is the union of two boxes of one, two or four triangles, which may
+//! overlap: so no branch depends on the number.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more than MOST_ROOT triangles")]
 
@@ -433,7 +433,7 @@ mod tests {
                     let (first, child, least) = (1000, 500, 1e-6);
                     let build = Build { subtree, mesh, entries, first, child, least, by };
                     dispatch(SimdLevel::detect(), build);
-                    let mut ids = walk(&subtree, subtree.levels());
+                    let mut ids = walk(subtree, subtree.levels());
                     ids.sort_unstable();
                     assert!(ids.iter().copied().eq(0..count as u32), "{count} {which} {by:?}");
                     let most = count.saturating_sub(1) / 7 + 1;
