@@ -30,8 +30,20 @@ pub(crate) struct Beam<S: Simd> {
     pub(crate) origin: [[f32x8<S>; 2]; 3],
     pub(crate) inverse: [[f32x8<S>; 2]; 3],
     pub(crate) is_bounded: [bool; 3],
+    /// Whether all directions are positive, on an axis on which they have one sign.
+    pub(crate) is_positive: [bool; 3],
     pub(crate) start: f32x8<S>,
     pub(crate) end: f32x8<S>,
+}
+
+/// The boxes of a node that a beam meets.
+pub(crate) struct BeamMet<S: Simd> {
+    /// The boxes that a ray of it may meet, as bits.
+    pub(crate) some: u32,
+    /// The boxes that every ray of it meets, up to rounding and the rays' ends, as bits.
+    pub(crate) all: u32,
+    /// A distance at which no ray has entered, for each box.
+    pub(crate) enter: f32x8<S>,
 }
 
 impl<S: Simd> Boxes<f32x8<S>> {
@@ -62,25 +74,34 @@ impl<S: Simd> Boxes<f32x8<S>> {
         [a.into(), b.into(), c.into(), d.into(), e.into(), f.into()]
     }
 
-    /// The boxes that a beam meets, as bits.
+    /// Intersects a beam with the boxes.
     #[inline(always)]
-    pub(crate) fn meet_beam(&self, simd: S, beam: &Beam<S>) -> u32 {
-        let (mut near, mut far) = (beam.start, f32x8::splat(simd, f32::INFINITY));
+    pub(crate) fn meet_beam(&self, simd: S, beam: &Beam<S>) -> BeamMet<S> {
+        // When the first and the last ray enter a box, and when they leave it.
+        let (mut enter, mut leave) = (beam.start, f32x8::splat(simd, f32::INFINITY));
+        let (mut all_in, mut first_out) = (beam.start, leave);
         for axis in 0..3 {
             if !beam.is_bounded[axis] {
+                all_in = f32x8::splat(simd, f32::INFINITY);
                 continue;
             }
             let [first, last] = beam.origin[axis];
             let [least, most] = beam.inverse[axis];
-            // The farthest apart that a side and an origin can be, each way.
-            let (low, high) = (self.low[axis] - last, self.high[axis] - first);
-            let (a, b) = (low * least, low * most);
-            let (c, d) = (high * least, high * most);
-            near = near.max(a.min(b).min(c.min(d)));
-            far = far.min(a.max(b).max(c.max(d)));
+            let (low, high) = (self.low[axis], self.high[axis]);
+            let is_positive = beam.is_positive[axis];
+            let (near, far) = if is_positive { (low, high) } else { (high, low) };
+            // An end of the interval of distances lies at ends of those of origins and directions.
+            let (a, b) = ((near - first) * least, (near - first) * most);
+            let (c, d) = ((near - last) * least, (near - last) * most);
+            enter = enter.max(a.min(b).min(c.min(d)));
+            all_in = all_in.max(a.max(b).max(c.max(d)));
+            let (a, b) = ((far - first) * least, (far - first) * most);
+            let (c, d) = ((far - last) * least, (far - last) * most);
+            leave = leave.min(a.max(b).max(c.max(d)));
+            first_out = first_out.min(a.min(b).min(c.min(d)));
         }
-        let far = (far * f32x8::splat(simd, WIDER)).min(beam.end);
-        bits(!near.simd_gt(far))
+        let leave = (leave * f32x8::splat(simd, WIDER)).min(beam.end);
+        BeamMet { some: bits(!enter.simd_gt(leave)), all: bits(all_in.simd_lt(first_out)), enter }
     }
 }
 

@@ -91,17 +91,23 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                     let boxes = Boxes::decode(simd, node, rays.center, rays.spread);
                     let count = mask.count_ones();
                     // A slab test that sorts each axis' distances meets boxes that are not there.
-                    let mut met = node.used();
-                    if count > FEW_RAYS {
-                        met &= boxes.meet_beam(simd, &beam);
-                    }
-                    let Met { mut slots, rays: by, near } =
-                        if count <= octets(mask) * met.count_ones() {
+                    let used = node.used();
+                    let found = if count > FEW_RAYS {
+                        let beam = boxes.meet_beam(simd, &beam);
+                        let some = beam.some & used;
+                        let all = beam.all & some;
+                        if count <= octets(mask) * (some & !all).count_ones() {
                             one_by_one(simd, &boxes, rays, mask)
                         } else {
-                            side_by_side(simd, &boxes, rays, mask, met)
-                        };
-                    slots &= met;
+                            let mut met = side_by_side(simd, &boxes, rays, mask, some & !all);
+                            met.add_all(all, mask, beam.enter);
+                            met
+                        }
+                    } else {
+                        one_by_one(simd, &boxes, rays, mask)
+                    };
+                    let Met { mut slots, rays: by, near } = found;
+                    slots &= used;
                     // Push what is met, the nearest last.
                     let base = top;
                     while slots != 0 {
@@ -180,6 +186,22 @@ struct Met {
     /// For each box the rays that met it, as bits, and where the first one enters.
     rays: [u64; WIDTH],
     near: [f32; WIDTH],
+}
+
+impl Met {
+    /// Adds boxes that all rays met, no sooner than at these distances.
+    #[inline(always)]
+    fn add_all<S: Simd>(&mut self, all: u32, rays: u64, enter: f32x8<S>) {
+        self.slots |= all;
+        let enter: [f32; WIDTH] = enter.into();
+        let mut rest = all;
+        while rest != 0 {
+            let slot = rest.trailing_zeros() as usize % WIDTH;
+            rest &= rest - 1;
+            self.rays[slot] = rays;
+            self.near[slot] = enter[slot];
+        }
+    }
 }
 
 /// Intersects few rays with all boxes of a node.

@@ -224,6 +224,7 @@ impl Rays {
             ],
             inverse: [ends(simd, d), ends(simd, e), ends(simd, f)],
             is_bounded: inverses.map(|[low, high]| low > 0.0 || high < 0.0),
+            is_positive: inverses.map(|[low, _]| low > 0.0),
             start: f32x8::splat(simd, start.reduce_min()),
             end: f32x8::splat(simd, end.reduce_max()),
         }
