@@ -84,7 +84,7 @@ static bool is(const char *word, const char *option)
 
 options parse_options(int count, char **words)
 {
-    options o = {NULL, "raytracer.ppm", DEFAULT_SIZE, 1, false, false, 0, NO_HEAT, 0, 0, 0};
+    options o = {NULL, "raytracer.ppm", DEFAULT_SIZE, 1, false, false, 0, NO_HEAT, 0, 0};
     for (int i = 1; i < count; i++) {
         const char *word = words[i];
         if (is(word, "--help")) {

@@ -15,7 +15,7 @@ typedef struct {
     /* Ambient occlusion: rays at each hit. */
     int sky_rays;
     heat_kind heat;
-    /* An index of METHODS, and density and cell size if they are not the usual ones. */
+    /* An index of METHODS, and the density if it is not the usual one. */
     int method;
     float density;
 } options;

@@ -77,11 +77,11 @@ pub unsafe extern "C" fn hgrid_occluded(
 /// Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
 ///
 /// Writes as many hits as there is room for, the nearest, and to `count` how many there are, which
-/// may be more. A tree is walked once and keeps the nearest in a heap: the number of hits times the
-/// logarithm of the room; with a filter only where there is room for all hits. Otherwise, and for the
-/// other methods where there is not room for more hits than there are, the ray is walked once more for
-/// each sixteen hits, from where it got to: so nothing is allocated, whatever their number, but
-/// thousands of hits in one cell take long, as the square of their number.
+/// may be more. Without a filter a tree is walked once and keeps the nearest in a heap: the number of hits
+/// times the logarithm of the room. With a filter, and for the other methods where there is not room for
+/// more hits than there are, the ray is walked once more for each sixteen hits, from where it got to: so
+/// nothing is allocated, whatever their number, but thousands of hits in one cell take long, as the
+/// square of their number.
 /// Options as with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what
 /// it accepts is written and counted.
 ///

@@ -270,14 +270,8 @@ impl Grid<'_> {
     ) -> usize {
         let mut count = 0;
         let mut after = None;
-        if self.shows_once() {
-            let found = self.heap(ray, options, hits);
-            let Some(filter) = &mut options.filter else { return found };
-            if found <= hits.len() {
-                return filtered(hits, found, filter);
-            }
-            // What the filter rejects makes room for others.
-            return self.ordered(ray, options, None, 0, hits);
+        if options.filter.is_none() && self.shows_once() {
+            return self.heap(ray, options, hits);
         }
         // Without a filter all that is found counts: collect it where it is wanted.
         if options.filter.is_none() && hits.len() > ROOM {
@@ -383,24 +377,4 @@ impl Grid<'_> {
         }
         nearest.count
     }
-}
-
-/// Keeps what a filter accepts of the first `found` hits, in order; returns how many those are.
-fn filtered(hits: &mut [Hit], found: usize, filter: &mut Filter<'_>) -> usize {
-    let mut count = 0;
-    for at in 0..found {
-        let Some(&hit) = hits.get(at) else { break };
-        let verdict = filter(0, &hit);
-        if verdict == Verdict::Reject {
-            continue;
-        }
-        if let Some(slot) = hits.get_mut(count) {
-            *slot = hit;
-        }
-        count += 1;
-        if verdict == Verdict::AcceptAndStop {
-            break;
-        }
-    }
-    count
 }

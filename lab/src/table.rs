@@ -265,8 +265,8 @@ mod tests {
         let text = results.text();
         assert!(text.contains("knot:"), "{text}");
         for method in Method::ALL {
-            let parameter = if method.has_density() { "density" } else { "cell size" };
-            assert!(text.contains(&format!("{}, {parameter}", method.name())), "{text}");
+            let title = if method.has_density() { ", density" } else { "\n" };
+            assert!(text.contains(&format!(" {}{title}", method.name())), "{text}");
         }
         assert_eq!(text.matches("time to image").count(), Method::ALL.len());
         assert!(text.contains("medians of 2 runs"));

@@ -7,8 +7,7 @@ use hgrid_tests::oracle;
 use hgrid_tests::owned::{Owned, prove};
 use proptest::prelude::*;
 
-/// The scene is 4 units wide; at the densities below a cell is 1 unit, half of one, or two. Brick
-/// takes the sizes of its cells instead, likewise powers of two apart.
+/// The scene is 4 units wide; at the densities below a cell is 1 unit, half of one, or two.
 const WIDTH: i32 = 16;
 
 fn snapped() -> impl Strategy<Value = [f32; 3]> {

@@ -309,7 +309,8 @@ int main(void)
     mesh = mesh_of(&mesh_data);
     for (int i = 0; i < METHODS; i++) {
         const hgrid_config config = usual(i);
-        CHECK(config.method == (uint32_t)i + 1);
+        /* 5 was a method that is no more. */
+        CHECK(config.method == (uint32_t)(i < 4 ? i + 1 : 6));
         check_method(&config);
     }
     for (int i = 0; i < METHODS; i++) {

@@ -4,8 +4,8 @@
 
 #include <pthread.h>
 
-/* A sheet large enough that every task gets work. */
-enum { WIDE = 60, WIDE_VERTICES = (WIDE + 1) * (WIDE + 1), WIDE_TRIANGLES = 2 * WIDE * WIDE };
+/* A sheet large enough for four tasks: none has fewer than 16 384 triangles. */
+enum { WIDE = 182, WIDE_VERTICES = (WIDE + 1) * (WIDE + 1), WIDE_TRIANGLES = 2 * WIDE * WIDE };
 
 static float positions[WIDE_VERTICES][3];
 static uint32_t indices[WIDE_TRIANGLES][3];
@@ -149,7 +149,7 @@ static void check_build(const hgrid_config *config)
     void *scratch = guarded(scratch_bytes);
     EXPECT(HGRID_OK,
            hgrid_sizes(&mesh, config, scratch, scratch_bytes, &exact));
-    CHECK(exact.is_exact == 1 && exact.index_bytes <= enough.index_bytes);
+    CHECK(exact.index_bytes <= enough.index_bytes);
     const size_t index_bytes = (size_t)exact.index_bytes;
     void *index = guarded(index_bytes);
     hgrid_grid grid;
@@ -172,7 +172,7 @@ static void any_number_of_tasks_builds_the_same_bytes(void)
             check_build(&config);
             CHECK((p.call_count > 0) == (tasks > 1));
             CHECK(p.most_tasks <= tasks);
-            CHECK(tasks < 2 || tasks > 8 || p.most_tasks == tasks);
+            CHECK(tasks < 2 || p.most_tasks == (tasks < 4 ? tasks : 4));
         }
     }
 }
@@ -257,9 +257,10 @@ static void a_broken_loop_is_an_error(void)
             CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
             CHECK(report.index_bytes == 0 && report.triangle == HGRID_INVALID_ID);
 
+            /* The sizes for several tasks are a bound, for which none is called. */
             p.call_count = 0;
-            EXPECT(HGRID_ERROR_PARALLEL_FOR,
-                   hgrid_sizes(&mesh, &broken, scratch, scratch_bytes, &report));
+            EXPECT(HGRID_OK, hgrid_sizes(&mesh, &broken, scratch, scratch_bytes, &report));
+            CHECK(p.call_count == 0);
             EXPECT(HGRID_OK, hgrid_build(&mesh, &working, index, index_bytes,
                                                   scratch, scratch_bytes, &grid, NULL));
             CHECK(memcmp(index, serial, serial_bytes) == 0);

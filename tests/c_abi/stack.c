@@ -6,7 +6,7 @@
 
 #include <ucontext.h>
 
-enum { RAYS = 768, STACK = 256 * 1024, CROWDS = 2, CROWD = 3000 };
+enum { RAYS = 768, STACK = 256 * 1024, CROWDS = 2, CROWD = 17000 };
 
 /* Where the crowds are, and half their width. */
 static const float CENTER[3] = {0.3f, 0.3f, 0.05f}, WIDTH[CROWDS] = {0.01f, 0.0005f};

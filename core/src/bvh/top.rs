@@ -327,7 +327,8 @@ mod tests {
         let top = build(&mut items, leaf, &mut nodes, 1000, 1e-6).unwrap();
         let Top { root, count, levels } = top;
         // One less is too few.
-        assert!(build(&mut items, leaf, &mut nodes[..count as usize - 1], 1000, 1e-6).is_none());
+        let mut few = vec![Node::EMPTY; count as usize - 1];
+        assert!(build(&mut items, leaf, &mut few, 1000, 1e-6).is_none());
         let mut met = Vec::new();
         let mut todo = vec![(root, 1)];
         while let Some((node, level)) = todo.pop() {

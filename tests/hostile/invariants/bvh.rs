@@ -265,7 +265,7 @@ fn nodes_are_what_a_build_writes() {
             b.set_word(t.at(above, CHILD), u32::MAX);
         }),
         case("a node that nobody has", header.clone(), move |b| {
-            let bytes = [b.bytes(), &[0; 64]].concat();
+            let bytes = [b.bytes(), &[0; 128]].concat();
             let length = (t.at(t.node_count + 1, 0)).next_multiple_of(64);
             *b = Copy::of(&bytes[..length]);
             b.set(BLOB_BYTES, &(length as u64).to_ne_bytes());

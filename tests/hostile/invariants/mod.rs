@@ -2,7 +2,6 @@
 //! it, at a byte that has to do with it, and queries end whatever it is.
 //!
 //! The words are found here from the format's description alone.
-//! tests/edges/chunks.rs.
 
 mod bvh;
 mod forged;
