@@ -24,7 +24,11 @@ static hgrid_report refuse_sizes(hgrid_status expected, const hgrid_mesh *input,
                                  const hgrid_config *config)
 {
     hgrid_report report = HGRID_REPORT_INIT;
-    EXPECT(expected, hgrid_sizes(input, config, NULL, 0, &report));
+    /* The sizes of a tree without scratch are a bound, for which a mesh is not read; and its build keeps
+     * keys in the index before all triangles are known. */
+    const bool is_tree = config == NULL || config->method == HGRID_METHOD_BVH;
+    if (!is_tree)
+        EXPECT(expected, hgrid_sizes(input, config, NULL, 0, &report));
     EXPECT(expected, hgrid_sizes(input, config, region_2, scratch_bytes, &report));
 
     hgrid_grid grid;
@@ -34,7 +38,7 @@ static hgrid_report refuse_sizes(hgrid_status expected, const hgrid_mesh *input,
     EXPECT(expected, hgrid_build(input, config, region_1, index_bytes, region_2, scratch_bytes,
                                  &grid, &report));
     CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
-    CHECK(all_bytes_are(region_1, index_bytes, 0xc7));
+    CHECK(is_tree || all_bytes_are(region_1, index_bytes, 0xc7));
     CHECK(report.struct_size == sizeof report && report.reserved == 0 && report.index_bytes == 0);
     return report;
 }

@@ -156,7 +156,7 @@ fn all_hits_take_one_walk_of_a_tree() {
                 let (mut hits, mut seen) = (vec![Hit::MISS; room], Vec::new());
                 let mut filter = |_: usize, hit: &Hit| {
                     seen.push(*hit);
-                    if hit.primitive % 3 == 0 { Verdict::Accept } else { Verdict::Reject }
+                    if hit.primitive.is_multiple_of(3) { Verdict::Accept } else { Verdict::Reject }
                 };
                 let options =
                     &mut QueryOptions { filter: Some(&mut filter), ..QueryOptions::default() };

@@ -151,8 +151,8 @@ static void check_views()
 
 static void check_progress_and_threads()
 {
-    scene s(4, 40);
-    /* Detail in a corner. */
+    /* Enough triangles for two tasks, and detail in a corner. */
+    scene s(4, 70);
     for (vertex &v : s.vertices)
         if (v.position[2] < 2)
             v.position = {0.02f * v.position[0], 0.02f * v.position[1], 0.001f * v.position[2]};

@@ -11,7 +11,7 @@ use crate::ppm::Picture;
 use crate::programs::{compile, example};
 
 /// The bytes are those of a tree, which NULL stands for.
-const PRINTED: &str = "built a grid of 256 bytes\n\
+const PRINTED: &str = "built a grid of 320 bytes\n\
                        hit triangle 0 at t = 1, u = 0.25, v = 0.5\n";
 
 #[test]

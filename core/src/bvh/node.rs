@@ -191,19 +191,9 @@ impl Node {
         let end = f32x4::splat(simd, 0.0).combine(f32x4::splat(simd, -255.0));
         let sign = f32x4::splat(simd, 1.0).combine(f32x4::splat(simd, -1.0));
         let unused = u32x4::splat(simd, 0xff).combine(u32x4::splat(simd, 0));
-        let quantise = |slot: usize| {
-            let at = (children[slot] - origin) * inverse - (0.5 + MARGIN);
-            let bits = (at.max(end) * sign + SHIFT).bitcast::<u32x8<S>>() & 0xff;
-            if slot < count { bits } else { unused }
-        };
-        // Lane by lane, the bytes of four children make one word.
-        let word = |first: usize| {
-            let (a, b) = (quantise(first), quantise(first + 1));
-            let (c, d) = (quantise(first + 2), quantise(first + 3));
-            (a | b << 8) | (c | d << 8) << 16
-        };
-        let first: [u32; 8] = word(0).into();
-        let second: [u32; 8] = word(4).into();
+        let rule = Rule { origin, inverse, end, sign, unused };
+        let first: [u32; 8] = rule.four(children, 0, count).into();
+        let second: [u32; 8] = rule.four(children, 4, count).into();
         for (row, lane) in self.bounds.iter_mut().zip([0, 1, 2, 4, 5, 6]) {
             *row = (u64::from(first[lane]) | u64::from(second[lane]) << 32).to_le_bytes();
         }
@@ -244,6 +234,36 @@ impl Node {
                 *bound = high;
             }
         }
+    }
+}
+
+/// How the sides of a box become bytes: the three low ones, then the three high ones, mirrored.
+struct Rule<S: Simd> {
+    origin: f32x8<S>,
+    inverse: f32x8<S>,
+    end: f32x8<S>,
+    sign: f32x8<S>,
+    /// The sides of a child that is not there.
+    unused: u32x8<S>,
+}
+
+// Functions, not closures: a closure is compiled for the processor around it only where it is inlined.
+impl<S: Simd> Rule<S> {
+    /// The sides of four children, lane by lane the bytes of one word.
+    #[inline(always)]
+    fn four(&self, children: &[f32x8<S>; WIDTH], first: usize, count: usize) -> u32x8<S> {
+        let a = self.one(children, first, count);
+        let b = self.one(children, first + 1, count);
+        let c = self.one(children, first + 2, count);
+        let d = self.one(children, first + 3, count);
+        (a | b << 8) | (c | d << 8) << 16
+    }
+
+    #[inline(always)]
+    fn one(&self, children: &[f32x8<S>; WIDTH], slot: usize, count: usize) -> u32x8<S> {
+        let at = (children[slot % WIDTH] - self.origin) * self.inverse - (0.5 + MARGIN);
+        let bits = (at.max(self.end) * self.sign + SHIFT).bitcast::<u32x8<S>>() & 0xff;
+        if slot < count { bits } else { self.unused }
     }
 }
 
