@@ -1314,7 +1314,7 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
  *   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
  *   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
- *   `HGRID_ERROR_INVALID_QUALITY`, `HGRID_ERROR_PARALLEL_FOR`.
+ *   `HGRID_ERROR_INVALID_QUALITY`.
  *
  * Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
  * call starts no thread; tasks are called on those that `run` chooses.
@@ -1768,7 +1768,8 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
  * - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
  *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
  * - with the blob: `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
- *   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_LEFT_OUT`, `HGRID_ERROR_CORRUPT`;
+ *   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_REMOVED`, `HGRID_ERROR_METHOD_LEFT_OUT`,
+ *   `HGRID_ERROR_CORRUPT`;
  * - with both: `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`.
  *
  * Threads: any number of calls at once, also on the same blob, each with a view of its own.
@@ -1828,7 +1829,7 @@ hgrid_status hgrid_refit(const struct hgrid_mesh *mesh,
  * Returns `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was:
  * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`,
  * `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
- * `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`.
+ * `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_REMOVED`, `HGRID_ERROR_CORRUPT`.
  *
  * Threads: any number of calls at once, each with an info of its own.
  *

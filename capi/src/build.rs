@@ -73,7 +73,7 @@ pub unsafe extern "C" fn hgrid_bound(
 /// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
 ///   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
 ///   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
-///   `HGRID_ERROR_INVALID_QUALITY`, `HGRID_ERROR_PARALLEL_FOR`.
+///   `HGRID_ERROR_INVALID_QUALITY`.
 ///
 /// Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
 /// call starts no thread; tasks are called on those that `run` chooses.

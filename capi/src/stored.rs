@@ -33,7 +33,8 @@ use crate::types::{hgrid_grid, hgrid_mesh};
 /// - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
 ///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
 /// - with the blob: `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
-///   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_LEFT_OUT`, `HGRID_ERROR_CORRUPT`;
+///   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_REMOVED`, `HGRID_ERROR_METHOD_LEFT_OUT`,
+///   `HGRID_ERROR_CORRUPT`;
 /// - with both: `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`.
 ///
 /// Threads: any number of calls at once, also on the same blob, each with a view of its own.
@@ -120,7 +121,7 @@ pub unsafe extern "C" fn hgrid_refit(
 /// Returns `HGRID_OK` and fills `info`, or returns the reason and leaves it as it was:
 /// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_NOT_A_GRID`,
 /// `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
-/// `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_CORRUPT`.
+/// `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_REMOVED`, `HGRID_ERROR_CORRUPT`.
 ///
 /// Threads: any number of calls at once, each with an info of its own.
 ///

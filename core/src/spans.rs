@@ -1,7 +1,7 @@
 //! The cells of eight triangles at a time: what a pass over a mesh begins with.
 //!
 //! In vectors, and the same bits as [`Lattice::range`] of each of them, or in quarters of cells as
-//! brick's `range`: a gather of corners, a box, an addition that rounds. Whoever spreads triangles
+//! a range of cells: a gather of corners, a box, an addition that rounds. Whoever spreads triangles
 //! over cells asks for the cells of many before the first is spread, because how many cells a
 //! triangle has is as good as random: the branch that depends on it is mispredicted, and then
 //! nothing of the next triangles should have to be done again.

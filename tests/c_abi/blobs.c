@@ -3,7 +3,8 @@
 #include "check.h"
 
 /* Where the header of a blob has its fields (core/src/blob.rs). */
-enum { BYTE_ORDER_AT = 8, VERSION_AT = 12, SIZE_AT = 16, TRIANGLES_AT = 32, RESOLUTION_AT = 72 };
+enum { BYTE_ORDER_AT = 8, VERSION_AT = 12, SIZE_AT = 16, TRIANGLES_AT = 32, METHOD_AT = 40,
+       RESOLUTION_AT = 72, CHECKSUM_AT = 124 };
 
 static sheet mesh_data;
 static hgrid_mesh mesh;
@@ -51,6 +52,27 @@ static void headers_are_checked(void)
     refuse(HGRID_ERROR_CORRUPT, SIZE_AT, &smaller, sizeof smaller);
     refuse(HGRID_ERROR_CORRUPT, TRIANGLES_AT, &zero, sizeof zero);
     refuse(HGRID_ERROR_CORRUPT, RESOLUTION_AT, &zero, sizeof zero);
+}
+
+/* A grid of the method that is no more, with the checksum that its header would have. */
+static void a_removed_method_is_refused_by_name(void)
+{
+    unsigned char *old = (unsigned char *)guarded_copy(blob, blob_bytes);
+    const uint32_t removed = 5;
+    memcpy(old + METHOD_AT, &removed, sizeof removed);
+    uint64_t sum = UINT64_C(0xcbf29ce484222325);
+    for (size_t at = 0; at < CHECKSUM_AT; at += 4) {
+        uint32_t word;
+        memcpy(&word, old + at, sizeof word);
+        sum = (sum ^ word) * UINT64_C(0x100000001b3);
+    }
+    sum ^= sum >> 29;
+    const uint32_t checksum = (uint32_t)sum ^ (uint32_t)(sum >> 32);
+    memcpy(old + CHECKSUM_AT, &checksum, sizeof checksum);
+    hgrid_grid grid;
+    hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
+    EXPECT(HGRID_ERROR_METHOD_REMOVED, hgrid_open(old, blob_bytes, &mesh, &grid));
+    EXPECT(HGRID_ERROR_METHOD_REMOVED, hgrid_peek(old, blob_bytes, &info));
 }
 
 static void every_shorter_blob_is_refused(void)
@@ -136,6 +158,7 @@ int main(void)
 {
     build();
     headers_are_checked();
+    a_removed_method_is_refused_by_name();
     every_shorter_blob_is_refused();
     another_mesh_is_refused();
     a_changed_mesh_is_found();

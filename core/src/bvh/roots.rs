@@ -265,7 +265,11 @@ impl<'w> Roots<'w> {
         while start < range.end {
             let mut end = self.bin_end(start..range.end, other, shift);
             if end - start <= CROWD {
-                while end < range.end && !savings.pay(&(start..end), range.end - end) {
+                // Seams are places in the tree, wherever this task starts.
+                let before = self.first as usize;
+                while end < range.end
+                    && !savings.pay(&(before + start..before + end), range.end - end)
+                {
                     end = self.bin_end(end..range.end, other, shift);
                 }
             }
