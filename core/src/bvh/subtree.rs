@@ -1,7 +1,7 @@
 //! The nodes over a few triangles in the order of their keys: what a root stands for.
 //!
 //! ```text
-//! read the box of each triangle; unite those of two and of four side by side
+//! read the box of each triangle
 //! note in which bit neighbours' keys differ first
 //! ranges = [all]
 //! for each range of more than a leaf, breadth first:
@@ -11,8 +11,7 @@
 //! ```
 //!
 //! All of a root's triangles are read in one loop, so that their loads from memory overlap. How many triangles
-//! a leaf has is as good as random. Its box is the union of two boxes of one, two or four triangles, which may
-//! overlap: so no branch depends on the number.
+//! a leaf has cannot be predicted: its box is always the union of eight, so no branch depends on the number.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more than MOST_ROOT triangles")]
 
@@ -31,10 +30,9 @@ use super::node::{LEAF, Node, Sides, WIDTH};
 /// Nodes of a subtree, at most.
 const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 2;
 
-/// Rows of [`Subtree::boxes`]: the boxes of one, two and four triangles side by side, and those of nodes.
-const ROWS: usize = 4;
-/// The row of the nodes.
-const OF_NODES: usize = 3 * MOST_ROOT;
+/// The boxes of nodes lie behind those of triangles in [`Subtree::boxes`].
+const OF_NODES: usize = MOST_ROOT;
+const BOXES: usize = MOST_ROOT + MOST_NODES;
 
 const _: () = assert!(MOST_NODES <= MOST_ROOT && LEAF <= 8);
 
@@ -48,8 +46,8 @@ pub(crate) struct Subtree {
     /// Levels above each node.
     above: [u8; MOST_NODES],
     count: usize,
-    /// The box of a leaf is the union of two of these, whatever its size.
-    boxes: [Sides; ROWS * MOST_ROOT],
+    /// The boxes of the triangles, then those of the nodes.
+    boxes: [Sides; BOXES],
     /// The ids of the entries, and room to read eight from any of them.
     sources: [u32; MOST_ROOT + LEAF],
     /// The ids of the leaves, one leaf behind the other, and room to write eight behind any of them.
@@ -127,7 +125,7 @@ impl Subtree {
             ranges: [Part::NONE; MOST_NODES],
             above: [0; MOST_NODES],
             count: 0,
-            boxes: [[0.0; 8]; ROWS * MOST_ROOT],
+            boxes: [[0.0; 8]; BOXES],
             sources: [0; MOST_ROOT + LEAF],
             ids: [0; MOST_ROOT + LEAF],
             id_count: 0,
@@ -174,16 +172,6 @@ impl Subtree {
             low.combine(f32x4::splat(simd, 0.0) - high).store_slice(sides);
         }
         let count = entries.len();
-        // Union with what lies one behind, then two behind: behind the last, what is there does not matter.
-        for width in [1, 2] {
-            let row = (width - 1) * MOST_ROOT;
-            for at in 0..count.saturating_sub(2 * width - 1) {
-                let one = f32x8::simd_from(simd, self.boxes[(row + at) % (ROWS * MOST_ROOT)]);
-                let other =
-                    f32x8::simd_from(simd, self.boxes[(row + at + width) % (ROWS * MOST_ROOT)]);
-                self.boxes[(row + MOST_ROOT + at) % (ROWS * MOST_ROOT)] = one.min(other).into();
-            }
-        }
         self.changes = [0; MOST_ROOT];
         for (change, (one, next)) in
             self.changes.iter_mut().zip(entries.iter().zip(entries.iter().skip(1)))
@@ -273,22 +261,24 @@ impl Subtree {
             if count == 0 {
                 break;
             }
-            // No branch: what a child is and how many triangles it has is as good as random.
-            let row = (count.ilog2() as usize).min(2);
-            let last = row * MOST_ROOT + start + count - (1 << row);
+            // Unite eight boxes, the last of a leaf again and again, or the one of a node: what a child is
+            // and how many triangles it has would mispredict as a branch.
             let is_node = count > LEAF;
-            let [one, other] =
-                if is_node { [OF_NODES + child; 2] } else { [row * MOST_ROOT + start, last] };
+            let (first, last) = if is_node { (OF_NODES + child, 0) } else { (start, count - 1) };
             child += usize::from(is_node);
-            let box_of = |at: usize| f32x8::simd_from(simd, self.boxes[at % (ROWS * MOST_ROOT)]);
-            *sides = box_of(one).min(box_of(other));
+            for place in 0..LEAF {
+                let of_one = self.boxes.get(first + place.min(last)).copied();
+                *sides = sides.min(f32x8::simd_from(simd, of_one.unwrap_or([f32::INFINITY; 8])));
+            }
             bounds = bounds.min(*sides);
             used += 1;
         }
         node.set_sides(simd, bounds, &boxes, used, least);
         node.first += places[0];
         node.child = (node.child + places[1]).wrapping_sub(1);
-        self.boxes[(OF_NODES + at) % (ROWS * MOST_ROOT)] = bounds.into();
+        if let Some(slot) = self.boxes.get_mut(OF_NODES + at) {
+            *slot = bounds.into();
+        }
     }
 }
 
