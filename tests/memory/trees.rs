@@ -228,6 +228,17 @@ fn backwards(count: u32, task: &Task<'_>) {
     (0..count).rev().for_each(task);
 }
 
+/// Five crowds far from each other, each dense in its middle: crowded bins with small bins in them.
+fn crowds(count: usize) -> Mesh {
+    let mut mesh = Mesh::default();
+    for crowd in 0..5_u8 {
+        let size = count * usize::from(crowd + 1) / 5 - count * usize::from(crowd) / 5;
+        let place = f32::from(crowd) * 1000.0;
+        mesh.append(&soup(size, 1e-3, crowd.into()).map(|p| p.map(|c| place + c * c * c)));
+    }
+    mesh
+}
+
 /// Any number of tasks makes the same blob, in memory for so many, for fewer, and for one.
 #[test]
 fn tasks_do_not_show() {
@@ -236,7 +247,8 @@ fn tasks_do_not_show() {
     (0..5).for_each(|i| around(&mut behind, [1.0, i as f32, 1.0], 0.01));
     let mut mixed = soup(COUNT / 2, 0.01, 3);
     mixed.append(&many_nested(COUNT - COUNT / 2));
-    let meshes = [soup(COUNT, 0.01, 1), behind, mixed, one_centre(COUNT), nested(COUNT, 4)];
+    let meshes =
+        [soup(COUNT, 0.01, 1), behind, mixed, crowds(COUNT), one_centre(COUNT), nested(COUNT, 4)];
     let qualities = Quality::ALL.iter().map(|&quality| config(quality));
     let all = meshes.iter().enumerate();
     for ((which, mesh), config) in all.flat_map(|mesh| qualities.clone().map(move |of| (mesh, of)))

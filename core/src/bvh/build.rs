@@ -207,8 +207,15 @@ fn build_in<const N: usize>(
 
     // Find the box, then every triangle's key.
     watch.at(CENSUS)?;
-    let rule = Keys::new(&vertex_bounds::<N>(mesh, tasks, control)?);
-    let census = count::<N>(mesh, config.flags, &rule, keys, &mut counts, bits, control)?;
+    let of_vertices = vertex_bounds::<N>(mesh, tasks, control)?;
+    let rule = Keys::new(&of_vertices);
+    let mut census = count::<N>(mesh, config.flags, &rule, keys, &mut counts, bits, control)?;
+    if census.bounds != of_vertices && census.finite > 0 {
+        // Vertices that no triangle has would coarsen the keys: take them from the box of the triangles.
+        counts.iter_mut().flatten().for_each(|counts| counts.fill(0));
+        let rule = Keys::new(&census.bounds);
+        census = count::<N>(mesh, config.flags, &rule, keys, &mut counts, bits, control)?;
+    }
     let Census { finite, skipped, bounds } = census;
 
     // Give each bin its place, and each task its place in it.
