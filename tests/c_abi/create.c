@@ -275,18 +275,24 @@ static void structs_are_checked(void)
 static void what_a_build_refuses_is_refused(void)
 {
     arena a = new_arena();
-    hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL;
+    hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL, grids = HGRID_CONFIG_INIT_ONE_LEVEL;
     config.method = 99;
     refuse(HGRID_ERROR_INVALID_METHOD, &mesh, &config, &a);
     static sheet broken;
     broken = mesh_data;
     broken.indices[77][1] = VERTICES;
     hgrid_mesh input = mesh_of(&broken);
+    /* A grid asks for no memory before it has read the mesh; a tree needs some to read it. */
+    CHECK(refuse(HGRID_ERROR_INDEX_OUT_OF_RANGE, &input, &grids, &a).triangle == 77);
+    CHECK(a.calls == 0);
     CHECK(refuse(HGRID_ERROR_INDEX_OUT_OF_RANGE, &input, NULL, &a).triangle == 77);
+    a = new_arena();
     broken = mesh_data;
     broken.positions[VERTICES - 1][2] = NAN;
     config = usual(4);
-    config.flags = HGRID_BUILD_STRICT;
+    config.flags = grids.flags = HGRID_BUILD_STRICT;
+    CHECK(refuse(HGRID_ERROR_NON_FINITE, &input, &grids, &a).triangle == TRIANGLES - 2);
+    CHECK(a.calls == 0);
     CHECK(refuse(HGRID_ERROR_NON_FINITE, &input, &config, &a).triangle == TRIANGLES - 2);
     hgrid_report report = HGRID_REPORT_INIT;
     report.struct_size = 3;

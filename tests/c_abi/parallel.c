@@ -140,7 +140,7 @@ static void build_serially(void)
     serial_bytes = (size_t)report.index_bytes;
 }
 
-/* A build in memory of exactly the size that was said: the blob must be the serial one. */
+/* A build in memory of the size that was said: the blob must be the serial one. */
 static void check_build(const hgrid_config *config)
 {
     hgrid_report enough = HGRID_REPORT_INIT, exact = HGRID_REPORT_INIT, report = HGRID_REPORT_INIT;

@@ -51,6 +51,10 @@ static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
     hgrid_config fitted = before;
     EXPECT(expected, hgrid_fit(input, config, index_bytes, region_2, scratch_bytes, &fitted, NULL));
     CHECK(memcmp(&fitted, &before, sizeof fitted) == 0);
+    if (config == NULL) {
+        const hgrid_config grids = HGRID_CONFIG_INIT_ONE_LEVEL;
+        refuse_sizes(expected, input, &grids);
+    }
     return refuse_sizes(expected, input, config);
 }
 
