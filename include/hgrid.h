@@ -461,7 +461,8 @@ typedef struct hgrid_config {
      */
     uint32_t depth;
     /**
-     * 0.
+     * 0; older versions had the cell size of a removed method here. Another number is
+     * `HGRID_ERROR_STRUCT_SIZE`.
      */
     uint32_t reserved;
     /**
@@ -1068,8 +1069,8 @@ typedef struct hgrid_allocator {
 
 /**
  * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
- * and what is behind the known fields is not zero; or the `reserved` field of an allocator is
- * not 0. The usual cause is a struct that was not initialised with its `_INIT` macro.
+ * and what is behind the known fields is not zero; or the `reserved` field of an allocator or a
+ * configuration is not 0. The usual cause is a struct that was not initialised with its `_INIT` macro.
  */
 #define HGRID_ERROR_STRUCT_SIZE -2
 
@@ -1394,8 +1395,8 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * index reaches and then go on counting: the report's `index_bytes` is exact (with bvh maybe
  * only enough), and with so many the same call succeeds.
  *
- * A build allocates nothing and needs at most 30 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
- * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 26
+ * A build allocates nothing and needs at most 17 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
+ * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 13
  * KiB where it is called; all beside what `run` and `progress` take (measured on x86-64).
  *
  * # A build on threads

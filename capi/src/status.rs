@@ -17,8 +17,8 @@ pub const HGRID_OK: hgrid_status = 0;
 pub const HGRID_ERROR_NULL_ARGUMENT: hgrid_status = -1;
 
 /// A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
-/// and what is behind the known fields is not zero; or the `reserved` field of an allocator is
-/// not 0. The usual cause is a struct that was not initialised with its `_INIT` macro.
+/// and what is behind the known fields is not zero; or the `reserved` field of an allocator or a
+/// configuration is not 0. The usual cause is a struct that was not initialised with its `_INIT` macro.
 pub const HGRID_ERROR_STRUCT_SIZE: hgrid_status = -2;
 
 /// The index, the scratch, the blob or the room for one does not start at a multiple of

@@ -1,7 +1,7 @@
 //! From scene units to cells and back: how many cells, which ones a triangle overlaps.
 //!
-//! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis. A triangle is inserted into
-//! every cell that its own box, grown by a margin, overlaps. The margin is what makes float error
+//! The box of a grid is the mesh's box grown by a pad, cut into `resolution` cells per axis. A triangle
+//! is inserted into every cell that its own box, grown by a margin, overlaps. The margin is what makes float error
 //! harmless everywhere else: the walk may be a few roundings off at a border, and the ray that the
 //! triangle test sees a few roundings off the walk's, and still the cell lists the triangle.
 //!

@@ -21,7 +21,7 @@ const _: () = assert!(
      variable, recursive and bvh"
 );
 
-/// The number of a method that the library once had, `brick`. It is never given to another one.
+/// The number of `brick`, a removed method. No other method gets it.
 pub(crate) const REMOVED_METHOD: u32 = 5;
 
 /// The structure to build.
@@ -41,7 +41,7 @@ pub enum Method {
     /// A wide tree of tight boxes over a grid of the triangles' centres: this project's own, for rays of
     /// every kind in scenes of every kind, in memory that the number of triangles bounds.
     #[default]
-    Bvh = 6, // 5 was brick, which is no more: its number is never given to another method.
+    Bvh = 6, // 5 was `brick`, a removed method; see `REMOVED_METHOD`.
 }
 
 impl Method {

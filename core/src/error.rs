@@ -91,8 +91,7 @@ pub enum Error {
     /// This library was built without the method, and can neither build nor open its grids: turn on
     /// the feature of its name.
     MethodLeftOut(Method),
-    /// An older version built the grid with a method that is no more, `brick`: build it again with
-    /// another one.
+    /// An older version built the grid with the method `brick`, which was removed: build the grid again.
     MethodRemoved,
     /// A field of the configuration is outside its range.
     InvalidConfig(ConfigField),

@@ -251,7 +251,8 @@ impl RayFilter {
 }
 
 impl<S: Simd> Filter<f32x8<S>> {
-    /// The filters of eight rays with directions that are scaled, whose origins no corner is farther from than `distance`.
+    /// The filters of eight rays. Directions are scaled; no corner is farther than `distance` from its
+    /// ray's origin.
     #[inline(always)]
     pub(crate) fn scaled(
         simd: S,

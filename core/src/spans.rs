@@ -1,10 +1,9 @@
-//! The cells of eight triangles at a time: what a pass over a mesh begins with.
+//! Finds the cells of eight triangles at a time: the first step of a pass over a mesh.
 //!
-//! In vectors, and the same bits as [`Lattice::range`] of each of them, or in quarters of cells as
-//! a range of cells: a gather of corners, a box, an addition that rounds. Whoever spreads triangles
-//! over cells asks for the cells of many before the first is spread, because how many cells a
-//! triangle has is as good as random: the branch that depends on it is mispredicted, and then
-//! nothing of the next triangles should have to be done again.
+//! The result has the same bits as [`Lattice::range`] of each triangle: gather the corners, unite
+//! them to a box, round its sides by an addition. A pass finds the cells of many triangles before
+//! it spreads the first: the number of cells cannot be predicted, so the branch on it mispredicts,
+//! and the work on the next triangles is then done already.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};

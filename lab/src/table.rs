@@ -200,7 +200,7 @@ pub(crate) fn markdown(table: &mut Table, words: usize) -> String {
     lines.join("\n")
 }
 
-/// What is special about trees, as part of a sentence.
+/// Returns how trees trace pictures, as part of a sentence.
 pub(crate) const IN_TILES: &str =
     "trace tiles of 8 x 8 rays together; their tests and steps are those of each ray alone";
 

@@ -61,7 +61,7 @@ fn what_is_no_grid_is_refused_for_what_it_is() {
     prove(&grid).unwrap();
 }
 
-/// What an older version built by the method that is no more.
+/// A blob that an older version built with the removed method `brick`.
 #[test]
 fn a_grid_of_a_removed_method_is_refused_by_name() {
     let mesh = one_triangle();

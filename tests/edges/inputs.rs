@@ -39,7 +39,7 @@ fn triangles_that_are_not_finite_are_skipped_and_counted() {
                 triangle[corner][axis] = bad;
                 mesh.push(triangle);
                 let view = mesh.view();
-                // Its other coordinates do not stretch the box of a grid; its id is not used.
+                // The skipped triangle does not enlarge the box, and no list has its id.
                 let one_level = Config::new(Method::OneLevel);
                 let [owned, expected] =
                     [&mesh, &sound].map(|mesh| Owned::build(&mesh.view(), &one_level).unwrap());

@@ -30,7 +30,7 @@ pub(crate) struct Beam<S: Simd> {
     pub(crate) origin: [[f32x8<S>; 2]; 3],
     pub(crate) inverse: [[f32x8<S>; 2]; 3],
     pub(crate) is_bounded: [bool; 3],
-    /// Whether all directions are positive, on an axis on which they have one sign.
+    /// The sign of the directions on a bounded axis: true if all are positive.
     pub(crate) is_positive: [bool; 3],
     pub(crate) start: f32x8<S>,
     pub(crate) end: f32x8<S>,
@@ -38,11 +38,11 @@ pub(crate) struct Beam<S: Simd> {
 
 /// The boxes of a node that a beam meets.
 pub(crate) struct BeamMet<S: Simd> {
-    /// The boxes that a ray of it may meet, as bits.
+    /// The boxes that at least one ray may meet, as bits.
     pub(crate) some: u32,
-    /// The boxes that every ray of it meets, up to rounding and the rays' ends, as bits.
+    /// The boxes that every ray meets before it ends, up to rounding, as bits; extra rays do no harm.
     pub(crate) all: u32,
-    /// A distance at which no ray has entered, for each box.
+    /// For each box, a distance before which no ray enters it.
     pub(crate) enter: f32x8<S>,
 }
 
@@ -77,7 +77,7 @@ impl<S: Simd> Boxes<f32x8<S>> {
     /// Intersects a beam with the boxes.
     #[inline(always)]
     pub(crate) fn meet_beam(&self, simd: S, beam: &Beam<S>) -> BeamMet<S> {
-        // When the first and the last ray enter a box, and when they leave it.
+        // Bound the distances at which the rays enter the boxes and leave them.
         let (mut enter, mut leave) = (beam.start, f32x8::splat(simd, f32::INFINITY));
         let (mut all_in, mut first_out) = (beam.start, leave);
         for axis in 0..3 {
@@ -90,7 +90,7 @@ impl<S: Simd> Boxes<f32x8<S>> {
             let (low, high) = (self.low[axis], self.high[axis]);
             let is_positive = beam.is_positive[axis];
             let (near, far) = if is_positive { (low, high) } else { (high, low) };
-            // An end of the interval of distances lies at ends of those of origins and directions.
+            // The distance to a side is extreme where origin and direction are.
             let (a, b) = ((near - first) * least, (near - first) * most);
             let (c, d) = ((near - last) * least, (near - last) * most);
             enter = enter.max(a.min(b).min(c.min(d)));

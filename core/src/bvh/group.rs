@@ -189,7 +189,7 @@ struct Met {
 }
 
 impl Met {
-    /// Adds boxes that all rays met, no sooner than at these distances.
+    /// Adds boxes that all rays meet, each with a lower bound of their entry distances.
     #[inline(always)]
     fn add_all<S: Simd>(&mut self, all: u32, rays: u64, enter: f32x8<S>) {
         self.slots |= all;

@@ -13,8 +13,8 @@
 //! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
 //!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. A root and its part of those are
 //!   11 / 7 nodes.
-//! - There is no more than one root for [`PRICE`] triangles ([`units`](super::units)). What is left of
-//!   [`SHARE`] nodes a triangle is for the nodes below roots: a root that would have more is built
+//! - There is no more than one root for [`PRICE`] triangles ([`units`](super::units)). The rest of
+//!   [`SHARE`] nodes a triangle pays for the nodes below roots: a root that would have more is built
 //!   again by halving its entries ([`most_of_root`]).
 //! - One more root may stand behind the crowded bins of the tree, and behind those of each division of a
 //!   crowded bin. A crowded bin has more than [`CROWD`] triangles, and at most [`DIVISIONS`] of them that are
@@ -43,7 +43,7 @@ const _: () = assert!(PRICE <= LEAST_PIECE && 2 * LEAST_PIECE <= MOST_ROOT);
 const SHARE: u64 = 24_780;
 const WHOLE: u64 = 168_000;
 
-/// What is left of the share when roots and the nodes above them are paid for.
+/// The part of [`SHARE`] that pays for the nodes below the roots.
 const SHARE_BELOW: u64 = SHARE - WHOLE * 11 / 7 / PRICE as u64;
 
 /// The most nodes below a root of so many triangles.
@@ -51,7 +51,7 @@ pub(crate) const fn most_of_root(triangles: usize) -> usize {
     (SHARE_BELOW * triangles as u64 / WHOLE) as usize
 }
 
-/// Bins with more entries are divided again.
+/// Bins with more entries are crowded: they come first, and are divided again above [`MOST_UNIT`].
 pub(crate) const CROWD: usize = 4096;
 
 /// Entries of a unit of bins that is not divided, at most: a bin, and what is too little for a root before
