@@ -240,12 +240,12 @@ impl Grid<'_> {
     /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.
     ///
     /// Writes as many of them as `hits` has room for, the nearest, and returns how many there
-    /// are. [`Method::Bvh`](crate::Method::Bvh) walks the ray once and keeps the nearest in a heap, which takes
-    /// the number of hits times the logarithm of the room; with a filter that is so where there is
-    /// room for all hits. Otherwise, and with the other methods where there is not room for more hits than
-    /// there are, the ray is walked once more for each sixteen hits, from where it got to: so no
-    /// memory is taken, whatever their number, but thousands of hits in one cell take long,
-    /// as the square of their number.
+    /// are. Without a filter, a tree ([`Method::Bvh`](crate::Method::Bvh)) is walked once and keeps
+    /// the nearest in a heap, in time of the number of hits times the logarithm of the room. With a
+    /// filter, and with the other methods where there is not room for more hits than there are, the
+    /// ray is walked once more for each sixteen hits, from where it got to: so no memory is taken,
+    /// whatever their number, but thousands of hits in one cell take long, as the square of their
+    /// number.
     ///
     /// ```
     /// # use hgrid_core::*;
@@ -281,19 +281,6 @@ impl Grid<'_> {
                 _ => return count,
             }
         }
-        self.ordered(ray, options, after, count, hits)
-    }
-
-    /// Writes the hits that count and lie behind one to where `count` of them are, and returns how many there
-    /// are in all.
-    fn ordered(
-        &self,
-        ray: &Ray,
-        options: &mut QueryOptions<'_>,
-        after: Option<Hit>,
-        mut count: usize,
-        hits: &mut [Hit],
-    ) -> usize {
         self.in_order((0, ray), options, after, ROOM, |hit| {
             if let Some(slot) = hits.get_mut(count) {
                 *slot = *hit;

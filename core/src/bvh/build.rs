@@ -207,15 +207,7 @@ fn build_in<const N: usize>(
 
     // Find the box, then every triangle's key.
     watch.at(CENSUS)?;
-    let of_vertices = vertex_bounds::<N>(mesh, tasks, control)?;
-    let rule = Keys::new(&of_vertices);
-    let mut census = count::<N>(mesh, config.flags, &rule, keys, &mut counts, bits, control)?;
-    if census.bounds != of_vertices && census.finite > 0 {
-        // Vertices that no triangle has would coarsen the keys: take them from the box of the triangles.
-        counts.iter_mut().flatten().for_each(|counts| counts.fill(0));
-        let rule = Keys::new(&census.bounds);
-        census = count::<N>(mesh, config.flags, &rule, keys, &mut counts, bits, control)?;
-    }
+    let census = find_keys::<N>(mesh, config, keys, &mut counts, bits, control)?;
     let Census { finite, skipped, bounds } = census;
 
     // Give each bin its place, and each task its place in it.
@@ -283,13 +275,35 @@ pub(super) fn whole<T: Pod>(bytes: &mut [u8]) -> &mut [T] {
     bytemuck::try_cast_slice_mut(bytes).unwrap_or_default()
 }
 
+/// Finds the key of every triangle, and counts the triangles of each bin.
+fn find_keys<const N: usize>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    keys: &mut [u32],
+    counts: &mut [Option<&mut [u32]>; N],
+    bits: u32,
+    control: &Control<'_>,
+) -> Result<Census, Error> {
+    let tasks = counts.iter().flatten().count();
+    let vertices = vertex_bounds::<N>(mesh, tasks, control)?;
+    let rule = Keys::new(&vertices);
+    let census = count::<N>(mesh, config.flags, &rule, keys, counts, bits, control)?;
+    if census.bounds == vertices || census.finite == 0 {
+        return Ok(census);
+    }
+    // Vertices that no triangle has would coarsen the keys: take them from the box of the triangles.
+    counts.iter_mut().flatten().for_each(|counts| counts.fill(0));
+    let rule = Keys::new(&census.bounds);
+    count::<N>(mesh, config.flags, &rule, keys, counts, bits, control)
+}
+
 /// The box of all vertices, used or not.
 fn vertex_bounds<const N: usize>(
     mesh: &TriangleMesh<'_>,
-    tasks: u32,
+    tasks: usize,
     control: &Control<'_>,
 ) -> Result<Aabb, Error> {
-    let (vertices, tasks) = (mesh.vertex_count(), tasks as usize);
+    let vertices = mesh.vertex_count();
     let parts =
         (0..tasks).map(|task| share(vertices, task, tasks)..share(vertices, task + 1, tasks));
     let boxes = run::<N, _, _>(control, parts, |part| mesh.vertex_bounds(part))?;

@@ -90,24 +90,23 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
                     let boxes = Boxes::decode(simd, node, rays.center, rays.spread);
                     let count = mask.count_ones();
-                    // A slab test that sorts each axis' distances meets boxes that are not there.
-                    let used = node.used();
-                    let found = if count > FEW_RAYS {
+                    // Leave out children that are not there: this slab test takes either side as the near
+                    // one, so it meets their boxes, which are inside out.
+                    let (mut some, mut all, mut enter) = (node.used(), 0, f32x8::splat(simd, 0.0));
+                    if count > FEW_RAYS {
                         let beam = boxes.meet_beam(simd, &beam);
-                        let some = beam.some & used;
-                        let all = beam.all & some;
-                        if count <= octets(mask) * (some & !all).count_ones() {
-                            one_by_one(simd, &boxes, rays, mask)
-                        } else {
-                            let mut met = side_by_side(simd, &boxes, rays, mask, some & !all);
-                            met.add_all(all, mask, beam.enter);
-                            met
-                        }
-                    } else {
+                        some &= beam.some;
+                        (all, enter) = (some & beam.all, beam.enter);
+                    }
+                    let unsure = some & !all;
+                    let mut met = if count <= octets(mask) * unsure.count_ones() {
                         one_by_one(simd, &boxes, rays, mask)
+                    } else {
+                        side_by_side(simd, &boxes, rays, mask, unsure)
                     };
-                    let Met { mut slots, rays: by, near } = found;
-                    slots &= used;
+                    met.add_all(all, mask, enter);
+                    let Met { slots, rays: by, near } = met;
+                    let mut slots = slots & some;
                     // Push what is met, the nearest last.
                     let base = top;
                     while slots != 0 {
