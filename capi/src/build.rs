@@ -103,11 +103,10 @@ pub unsafe extern "C" fn hgrid_sizes(
 
 /// Looks for the finest grid that fits into a budget.
 ///
-/// `fitted` becomes a copy of `config` with a density that is lower, as far as is needed for an index of `index_bytes` bytes, by no
-/// more than a step too much: a step is a factor of 1.41 in the number of cells. A tree
-/// (`HGRID_METHOD_BVH`) has no cells and fits or does not. It takes a
-/// dozen times as long as `hgrid_sizes`, or less. A density that would be too fine
-/// for a build count as too large here.
+/// `fitted` becomes a copy of `config` whose density is as low as an index of `index_bytes` bytes needs,
+/// and no more than a step lower: a step is a factor of 1.41 in the number of cells. A tree
+/// (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call takes at most a dozen times as long
+/// as `hgrid_sizes`. A density that is too fine for a build counts as one that does not fit.
 ///
 /// Bring as much scratch as `hgrid_sizes` without scratch says. With less the grid may get coarser
 /// than the index had to be: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` it must fit by
@@ -180,10 +179,10 @@ pub unsafe extern "C" fn hgrid_fit(
 /// what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region
 /// is too small, what both need; or the triangle that is to blame.
 ///
-/// After an error `index` is as it was, with these exceptions: after a cancelled build it may hold
-/// anything, and after `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_INVALID_DENSITY`
-/// and `HGRID_ERROR_PARALLEL_FOR`, `HGRID_METHOD_VARIABLE`, `HGRID_METHOD_RECURSIVE` and `HGRID_METHOD_BVH` may have left anything in it, so a
-/// grid that lay there before is gone. A view of it (`grid` itself, where a build is repeated) can be asked
+/// After an error `index` is as it was, with two exceptions. After a cancelled build it may hold
+/// anything. And `HGRID_METHOD_BVH` writes into it before it has read the whole mesh: after any error
+/// of a build that began, a grid that lay there before is gone. So it is with `HGRID_METHOD_VARIABLE` and
+/// `HGRID_METHOD_RECURSIVE` after `HGRID_ERROR_INDEX_TOO_SMALL` and `HGRID_ERROR_INVALID_DENSITY`. A view of it (`grid` itself, where a build is repeated) can be asked
 /// without harm, but answers anything: set it to `HGRID_GRID_INIT`. These methods write as far as the
 /// index reaches and then go on counting: the report's `index_bytes` is exact (with bvh maybe
 /// only enough), and with so many the same call succeeds.

@@ -51,7 +51,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let mut progress = Progress::new(String::new(), rows(size, 1, args.repeat));
     ensure!(
         args.density.is_none() || args.method.has_density(),
-        "a {} grid has no density: --cell-size makes its cells larger or smaller",
+        "{} has no density: leave out --density",
         args.method.name()
     );
     let configs = [args.config()];
@@ -145,7 +145,7 @@ mod tests {
             (&["procedural:teapot"], None, "knot, stage, soup"),
             (&["--method", "fixed", "--density", "-1"], Some(("a.obj", triangle)), "density"),
             (&["--ao", "4", "--shading", "normals"], Some(("d.obj", triangle)), "diffuse"),
-            (&["--density", "8"], Some(("c.obj", triangle)), "bvh grid has no density"),
+            (&["--density", "8"], Some(("c.obj", triangle)), "bvh has no density"),
             (&[], Some(("b.ply", triangle)), "not a PLY file"),
         ];
         for (at, (words, file, expected)) in cases.into_iter().enumerate() {

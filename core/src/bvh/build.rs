@@ -1,7 +1,7 @@
 //! Building a tree: two passes over the triangles, then bin after bin in cache, then a tree on top.
 //!
 //! ```text
-//! bounds    the box of the vertices                                             (mesh.rs)
+//! bounds    the box of the vertices; of the triangles if some vertices are unused  (mesh.rs)
 //! census    each triangle's key, and how many there are in each bin             (census.rs, key.rs)
 //! scatter   each triangle's entry into its bin
 //! roots     bins sorted and cut into subtrees                                   (roots.rs, subtree.rs)
@@ -13,6 +13,8 @@
 //!
 //! The exact size takes a build without an index: keys lie on the bench, ids and nodes are counted. Keys lie
 //! there, too, if the index has no room for them: it holds no ids of skipped triangles.
+//!
+//! While the exact size is sought, the top tree goes to the bench.
 //!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
 //! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up
