@@ -22,7 +22,7 @@ use crate::config::{BuildFlags, Config, Method, Quality, REMOVED_METHOD};
 use crate::control::Watch;
 use crate::error::{Error, Region};
 use crate::hash::Hash;
-use crate::mesh::TriangleMesh;
+use crate::mesh::{Content, TriangleMesh};
 use crate::survey::Survey;
 
 /// The version of the blob format. A blob of another version is refused.
@@ -68,8 +68,8 @@ pub(crate) struct Header {
     pub(crate) subdivide_above: u32,
     /// Levels of grids; 0 for a method without nested grids.
     pub(crate) depth: u32,
-    /// Always 0.
-    reserved: u32,
+    /// What it is built over, as [`Content`] numbers it.
+    content: u32,
     /// Whether the mesh lies behind the grid: see [`HasMesh`].
     mesh: u32,
     /// Nodes of a tree; 0 for a method without nodes.
@@ -113,6 +113,7 @@ impl Header {
             quality: if config.method.has_nodes() { config.quality as u32 } else { 0 },
             triangle_count: mesh.triangle_count(),
             vertex_count: mesh.vertex_count() as u64,
+            content: mesh.content() as u32,
             bounds_min: lattice.min,
             bounds_max: lattice.max,
             resolution: lattice.resolution,
@@ -148,6 +149,9 @@ impl Header {
                 needed_bytes: header.blob_bytes,
                 available_bytes: bytes.len() as u64,
             });
+        }
+        if header.content()? != mesh.content() {
+            return Err(Error::OtherContent(header.content()?));
         }
         if header.triangle_count != mesh.triangle_count()
             || header.vertex_count != mesh.vertex_count() as u64
@@ -189,6 +193,11 @@ impl Header {
             return Err(Error::MethodRemoved);
         }
         Ok(header)
+    }
+
+    /// What it is built over.
+    pub(crate) fn content(&self) -> Result<Content, Error> {
+        Content::from_u32(self.content).ok_or(corrupt(core::mem::offset_of!(Self, content)))
     }
 
     /// Whether the mesh lies behind the grid.
@@ -279,7 +288,6 @@ impl Header {
         (method.has_macrocells() || self.macrocell_factor == 0)
             && (method.has_subgrids() || self.subdivide_above == 0)
             && (method.has_depth() || self.depth == 0)
-            && self.reserved == 0
             && (method.has_density() || self.density.to_bits() == 0)
             && (method.has_nodes() || (self.node_count, self.levels) == (0, 0))
             && (method.has_nodes() || self.quality == 0)

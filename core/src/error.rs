@@ -7,6 +7,7 @@
 use core::fmt;
 
 use crate::config::Method;
+use crate::mesh::Content;
 
 /// Which of the caller's two memory regions an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -124,6 +125,8 @@ pub enum Error {
     /// The grid was built for a mesh with other triangle or vertex counts; or, in a refit, a triangle became
     /// finite that the build left out.
     MeshMismatch,
+    /// The blob is built over something else: over triangles, shapes or instances. Open it as what it is.
+    OtherContent(Content),
     /// The grid is no tree, or its mesh is packed behind it: only trees without a mesh can be refitted.
     CannotRefit,
     /// The grid contradicts itself or its mesh.
@@ -179,6 +182,15 @@ impl fmt::Display for Error {
             ),
             Self::MethodLeftOut(method) => {
                 write!(f, "this library has no method {0}: turn on its feature {0}", method.name())
+            }
+            Self::OtherContent(Content::Triangles) => {
+                f.write_str("the blob is a grid of triangles: open it as a grid")
+            }
+            Self::OtherContent(Content::Shapes) => {
+                f.write_str("the blob is a tree of shapes: open it as shapes")
+            }
+            Self::OtherContent(Content::Instances) => {
+                f.write_str("the blob is a scene of instances: open it as a scene")
             }
             Self::MethodRemoved => {
                 f.write_str("the grid was built with the method brick, which was removed: build it again")

@@ -105,7 +105,7 @@ pub use counters::Counters;
 pub use error::{BatchField, ConfigField, Error, MeshField, Region};
 pub use grid::Grid;
 pub use inspect::Statistics;
-pub use mesh::{IndexType, MAX_TRIANGLES, Strided, Triangle, TriangleMesh};
+pub use mesh::{Content, IndexType, MAX_TRIANGLES, Strided, Triangle, TriangleMesh};
 pub use options::{Cull, Filter, QueryOptions, Verdict};
 pub use packed::BlobInfo;
 pub use ray::{Hit, INVALID_ID, Ray};

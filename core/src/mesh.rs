@@ -41,6 +41,43 @@ impl IndexType {
     }
 }
 
+/// How the corners of a triangle are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Layout {
+    /// By three indices of so many bytes.
+    Indexed(IndexType),
+    /// A "triangle" is a box of six numbers: its least corner, its greatest corner, and that again. So
+    /// whatever builds and proves a tree of triangles does the same for boxes.
+    Boxes(Content),
+}
+
+/// What a blob is built over.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Content {
+    /// The triangles of a mesh: [`Grid`](crate::Grid).
+    Triangles = 0,
+    /// The boxes of the caller's own shapes: [`Shapes`](crate::Shapes).
+    Shapes = 1,
+    /// Instances of other blobs: [`Scene`](crate::Scene).
+    Instances = 2,
+}
+
+impl Content {
+    /// What a number in a blob means.
+    pub(crate) const fn from_u32(value: u32) -> Option<Self> {
+        match value {
+            0 => Some(Self::Triangles),
+            1 => Some(Self::Shapes),
+            2 => Some(Self::Instances),
+            _ => None,
+        }
+    }
+}
+
+/// Bytes of a box: least x, y, z, greatest x, y, z.
+pub(crate) const BOX_BYTES: usize = size_of::<[f32; 6]>();
+
 /// `count` elements in a slice of bytes, one every `stride` bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct Strided<'a> {
@@ -85,9 +122,11 @@ impl<'a> Strided<'a> {
 /// A view of the caller's triangle mesh: vertices of three floats, triangles of three indices.
 #[derive(Debug, Clone, Copy)]
 pub struct TriangleMesh<'a> {
+    /// Vertices, or boxes.
     positions: Strided<'a>,
+    /// For boxes only their number.
     indices: Strided<'a>,
-    index_type: IndexType,
+    layout: Layout,
     /// No elements: every triangle has all bits.
     masks: Strided<'a>,
 }
@@ -138,7 +177,35 @@ impl<'a> TriangleMesh<'a> {
             return Err(Error::TooManyTriangles);
         }
         let masks = Strided { bytes: &[], stride: 0, count: 0 };
-        Ok(Self { positions, indices, index_type, masks })
+        Ok(Self { positions, indices, layout: Layout::Indexed(index_type), masks })
+    }
+
+    /// Boxes in place of triangles.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMesh`] and [`Error::TooManyTriangles`] as those of a mesh.
+    pub(crate) fn of_boxes(boxes: Strided<'a>, content: Content) -> Result<Self, Error> {
+        let positions = boxes.cut(BOX_BYTES).ok_or(Error::InvalidMesh(MeshField::Positions))?;
+        if positions.count > MAX_TRIANGLES {
+            return Err(Error::TooManyTriangles);
+        }
+        let none = Strided { bytes: &[], stride: 0, count: 0 };
+        let indices = Strided { count: positions.count, ..none };
+        Ok(Self { positions, indices, layout: Layout::Boxes(content), masks: none })
+    }
+
+    /// What it is made of.
+    pub(crate) const fn content(&self) -> Content {
+        match self.layout {
+            Layout::Indexed(_) => Content::Triangles,
+            Layout::Boxes(content) => content,
+        }
+    }
+
+    /// The six numbers of a box.
+    #[inline(always)]
+    pub(crate) fn box_bytes(&self, id: u32) -> Option<&'a [u8; BOX_BYTES]> {
+        self.positions.element(id as usize)
     }
 
     /// The same mesh with a mask for each triangle, a `u32`, which queries that have one look at
@@ -178,7 +245,10 @@ impl<'a> TriangleMesh<'a> {
     /// Number of vertices.
     #[must_use]
     pub const fn vertex_count(&self) -> usize {
-        self.positions.count
+        match self.layout {
+            Layout::Indexed(_) => self.positions.count,
+            Layout::Boxes(_) => 2 * self.positions.count,
+        }
     }
 
     /// The corners of a triangle, or `None` if the triangle or one of its vertices does not exist.
@@ -204,7 +274,10 @@ impl<'a> TriangleMesh<'a> {
     /// The width of the vertex indices.
     #[must_use]
     pub const fn index_type(&self) -> IndexType {
-        self.index_type
+        match self.layout {
+            Layout::Indexed(index_type) => index_type,
+            Layout::Boxes(_) => IndexType::U32,
+        }
     }
 
     /// The masks, where the caller has them; none if there are none.
@@ -301,8 +374,8 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     pub(crate) fn wide(&self) -> WideMesh<'a> {
         let stride = |array: &Strided<'_>| u16::try_from(array.stride);
-        match (stride(&self.positions), stride(&self.indices), self.index_type) {
-            (Ok(position_stride), Ok(index_stride), IndexType::U32) => WideMesh {
+        match (stride(&self.positions), stride(&self.indices), self.layout) {
+            (Ok(position_stride), Ok(index_stride), Layout::Indexed(IndexType::U32)) => WideMesh {
                 positions: self.positions.bytes,
                 indices: self.indices.bytes,
                 position_stride,
@@ -314,25 +387,36 @@ impl<'a> TriangleMesh<'a> {
 
     #[inline(always)]
     fn vertices_of(&self, triangle: u32) -> Option<[usize; 3]> {
-        match self.index_type {
-            IndexType::U32 => {
+        match self.layout {
+            Layout::Indexed(IndexType::U32) => {
                 let b = self.indices.element::<12>(triangle as usize)?;
                 let index = |at: usize| {
                     u32::from_ne_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]) as usize
                 };
                 Some([index(0), index(4), index(8)])
             }
-            IndexType::U16 => {
+            Layout::Indexed(IndexType::U16) => {
                 let b = self.indices.element::<6>(triangle as usize)?;
                 let index = |at: usize| usize::from(u16::from_ne_bytes([b[at], b[at + 1]]));
                 Some([index(0), index(2), index(4)])
+            }
+            Layout::Boxes(_) => {
+                let box_at = triangle as usize;
+                let greatest = box_at.checked_mul(2)?.checked_add(1)?;
+                (box_at < self.positions.count).then_some([greatest - 1, greatest, greatest])
             }
         }
     }
 
     #[inline(always)]
     fn vertex(&self, vertex: usize) -> Option<[f32; 3]> {
-        let b = self.positions.element::<12>(vertex)?;
+        let b = match self.layout {
+            Layout::Indexed(_) => self.positions.element::<12>(vertex)?,
+            Layout::Boxes(_) => {
+                let corners = self.positions.element::<BOX_BYTES>(vertex / 2)?.as_chunks::<12>().0;
+                corners.get(vertex % 2)?
+            }
+        };
         let coordinate = |at: usize| f32::from_ne_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]);
         Some([coordinate(0), coordinate(4), coordinate(8)])
     }
