@@ -332,7 +332,9 @@ impl<'a> Grid<'a> {
                 continue;
             }
             tally.primitive_test();
-            if search.decide(test, &self.mesh, id) == Outcome::Done {
+            let outcome =
+                if F::OF_BOXES { search.offer(id) } else { search.decide(test, &self.mesh, id) };
+            if outcome == Outcome::Done {
                 return;
             }
         }

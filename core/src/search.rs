@@ -21,7 +21,16 @@ pub(crate) enum Outcome {
 
 /// What a walk shows its hits to.
 pub(crate) trait Search {
+    /// Leaves hold boxes of the caller's shapes, which are offered, not triangles, which are tested.
+    const OF_BOXES: bool = false;
+
     fn show(&mut self, hit: Hit) -> Outcome;
+
+    /// Takes a shape whose box the ray meets.
+    #[inline(always)]
+    fn offer(&mut self, _: u32) -> Outcome {
+        Outcome::Unchanged
+    }
 
     /// Whether a triangle need not be shown again, as the ray met it in a cell before.
     #[inline(always)]

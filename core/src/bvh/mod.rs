@@ -24,6 +24,7 @@ mod group;
 mod high;
 mod key;
 mod layout;
+mod leaf;
 mod nearest;
 mod node;
 mod order;

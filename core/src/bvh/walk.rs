@@ -13,6 +13,7 @@ use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
 
 use super::Bvh;
 use super::boxes::bits;
+use super::leaf::{boxes_of_leaf, meet_leaf, nearest_of};
 use super::node::{Child, Node, WIDTH};
 use super::slab::Slab;
 use crate::aabb::{Aabb, greater, lesser};
@@ -66,7 +67,7 @@ struct Wide<S: Simd> {
 }
 
 /// By how many rows of a node the near side of each axis lies behind the first side: 0 or [`FLIP`].
-type Near = [usize; 3];
+pub(super) type Near = [usize; 3];
 /// Rows from a low side to the high one; from one to the other, a mask.
 const FLIP: usize = 3;
 
@@ -132,9 +133,37 @@ impl<S: Simd> Wide<S> {
     }
 }
 
+impl<S: Simd> Wide<S> {
+    /// Which boxes of a leaf the ray meets before its end, as bits, and where it enters each.
+    #[inline(always)]
+    fn meet_leaf(
+        &self,
+        simd: S,
+        mesh: &TriangleMesh<'_>,
+        ids: &[u32],
+        flips: Near,
+        end: f32,
+    ) -> (u32, [f32; WIDTH]) {
+        let (low, high) = boxes_of_leaf(simd, mesh, ids);
+        let mut distances = [(self.start, self.start); 3];
+        for axis in 0..3 {
+            let (low, high) = (low[axis], high[axis]);
+            let (near, far) = if flips[axis] == 0 { (low, high) } else { (high, low) };
+            let near = (near - self.origin_near[axis]) * self.inverse_near[axis];
+            let far = (far - self.origin_far[axis]) * self.inverse_far[axis];
+            distances[axis] = (near, far);
+        }
+        let [x, y, z] = distances;
+        let near = x.0.max(y.0).max(z.0.max(self.start));
+        let far = x.1.min(y.1).min(z.1.min(f32x8::splat(simd, end)));
+        let used = (1_u32 << ids.len().min(WIDTH)) - 1;
+        (bits(!near.simd_gt(far)) & used, near.into())
+    }
+}
+
 /// Where the near sides lie.
 #[inline(always)]
-fn flips_of(slab: &Slab) -> Near {
+pub(super) fn flips_of(slab: &Slab) -> Near {
     slab.inverse.map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
 }
 
@@ -284,6 +313,30 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
             budget = rest;
             tally.cell_step();
             tally.primitive_tests(ids.len());
+            if F::OF_BOXES {
+                let (mut met, near) = match wide {
+                    Some(ray) => ray.meet_leaf(simd, mesh, ids, flips, end),
+                    None => meet_leaf(slab, mesh, ids, end),
+                };
+                // Offer the shapes, the nearest first, that do not begin behind the end of the ray.
+                while met != 0 {
+                    let lane = nearest_of(met, &near);
+                    met &= !(1 << lane);
+                    let Some(&id) = ids.get(lane) else { break };
+                    let is_behind = near[lane % WIDTH] > end;
+                    if is_behind {
+                        break;
+                    }
+                    match search.offer(id) {
+                        Outcome::Unchanged => {}
+                        Outcome::EndsAt(t) => end = slab.latest(t),
+                        Outcome::Done => return true,
+                    }
+                }
+                let Some(next) = pop(bvh, stack, &mut top, end) else { return true };
+                child = next;
+                continue;
+            }
             let mut survivors = match wide {
                 Some(ray) => ray.survivors(simd, bvh, mesh, first, ids),
                 None => filter.survivors(mesh, ids),

@@ -1,0 +1,98 @@
+//! Leaves of boxes: a ray against up to eight of them, as it would be tested against the children of a node.
+//!
+//! A box is six numbers in the caller's memory, not quantised, so it has no margin: each side is subtracted,
+//! multiplied and compared with three roundings, which the wider inverse of far sides absorbs
+//! ([`slab`](super::slab)).
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x8};
+
+use super::node::WIDTH;
+use super::slab::Slab;
+use super::walk::flips_of;
+use crate::aabb::{greater, lesser};
+use crate::eight::{Row, first_eight, join, load, transpose};
+use crate::mesh::TriangleMesh;
+
+/// The least and the greatest corners of the boxes of a leaf; the last box again where there are fewer than
+/// eight.
+#[inline(always)]
+pub(super) fn boxes_of_leaf<S: Simd>(
+    simd: S,
+    mesh: &TriangleMesh<'_>,
+    ids: &[u32],
+) -> ([f32x8<S>; 3], [f32x8<S>; 3]) {
+    let [a, b, c, d, e, f, g, h] = first_eight(ids);
+    let (one, other) = four(simd, mesh, [a, b, c, d]);
+    let (one_behind, other_behind) = four(simd, mesh, [e, f, g, h]);
+    let ([a, b, c], [d, e, f]) = (join(one, one_behind), join(other, other_behind));
+    // Corners may come in any order.
+    ([a.min(d), b.min(e), c.min(f)], [a.max(d), b.max(e), c.max(f)])
+}
+
+/// The two corners of four boxes.
+#[inline(always)]
+fn four<S: Simd>(
+    simd: S,
+    mesh: &TriangleMesh<'_>,
+    [a, b, c, d]: [u32; 4],
+) -> ([f32x4<S>; 3], [f32x4<S>; 3]) {
+    let ([a, e], [b, f], [c, g], [d, h]) = (rows(mesh, a), rows(mesh, b), rows(mesh, c), rows(mesh, d));
+    let [x, y, z, _] =
+        transpose([load(simd, &a), load(simd, &b), load(simd, &c), load(simd, &d)]);
+    let [_, far_x, far_y, far_z] =
+        transpose([load(simd, &e), load(simd, &f), load(simd, &g), load(simd, &h)]);
+    ([x, y, z], [far_x, far_y, far_z])
+}
+
+/// A box as two rows of four numbers that overlap: x y z X and z X Y Z. Zeros where there is no such box.
+#[inline(always)]
+fn rows(mesh: &TriangleMesh<'_>, id: u32) -> [Row; 2] {
+    let Some(bytes) = mesh.box_bytes(id) else { return [[0; 16]; 2] };
+    let (Some(first), Some(last)) = (bytes.first_chunk(), bytes.last_chunk()) else {
+        return [[0; 16]; 2];
+    };
+    [*first, *last]
+}
+
+/// Which boxes of a leaf a ray meets before its end, as bits, and where it enters each, box by box: for
+/// machines without vectors.
+#[inline(never)]
+pub(super) fn meet_leaf(
+    slab: &Slab,
+    mesh: &TriangleMesh<'_>,
+    ids: &[u32],
+    end: f32,
+) -> (u32, [f32; WIDTH]) {
+    let (flips, inverse_far) = (flips_of(slab), slab.inverse_far());
+    let (mut met, mut nearest) = (0, [0.0; WIDTH]);
+    for (lane, (&id, nearest)) in ids.iter().zip(&mut nearest).enumerate() {
+        let Some([a, b, _]) = mesh.triangle(id) else { continue };
+        let (mut near, mut far) = (slab.start, end);
+        for axis in 0..3 {
+            let (low, high) = (lesser(a[axis], b[axis]), greater(a[axis], b[axis]));
+            let (first, last) = if flips[axis] == 0 { (low, high) } else { (high, low) };
+            near = greater((first - slab.origin_near[axis]) * slab.inverse[axis], near);
+            far = lesser((last - slab.origin_far[axis]) * inverse_far[axis], far);
+        }
+        *nearest = near;
+        let is_missed = near > far;
+        met |= u32::from(!is_missed) << lane;
+    }
+    (met, nearest)
+}
+
+/// The nearest of the boxes that are met, the first of equals.
+#[inline(always)]
+pub(super) fn nearest_of(met: u32, near: &[f32; WIDTH]) -> usize {
+    let mut nearest = met.trailing_zeros() as usize;
+    let mut rest = met & met.wrapping_sub(1);
+    while rest != 0 {
+        let lane = rest.trailing_zeros() as usize;
+        rest &= rest - 1;
+        if near[lane % WIDTH] < near[nearest % WIDTH] {
+            nearest = lane;
+        }
+    }
+    nearest
+}
