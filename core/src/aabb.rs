@@ -50,11 +50,11 @@ impl Aabb {
     /// The line is given with the inverse of its direction, infinite where that is zero. The box is
     /// a finite one, and so are the origin and every inverse that is used: no product is a NaN.
     #[inline]
-    pub(crate) fn clip(&self, origin: [f32; 3], inverse: [f64; 3]) -> Option<(f64, f64)> {
+    pub(crate) fn clip(&self, origin: [f64; 3], inverse: [f64; 3]) -> Option<(f64, f64)> {
         let (min, max) = (self.min.to_array(), self.max.to_array());
         let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
         for axis in 0..3 {
-            let (origin, inverse) = (f64::from(origin[axis]), inverse[axis]);
+            let (origin, inverse) = (origin[axis], inverse[axis]);
             let (low, high) = (f64::from(min[axis]) - origin, f64::from(max[axis]) - origin);
             if inverse.is_infinite() {
                 if low > 0.0 || high < 0.0 {

@@ -68,7 +68,7 @@ impl Approach {
         let center = (bounds.min + bounds.max) * 0.5;
         let distance = (Vec3A::from_array(ray.origin) - center).abs().max_element();
         if distance <= FAR_EXTENTS * bounds.size().max_element() {
-            let (near, far) = bounds.clip(ray.origin, inverse)?;
+            let (near, far) = bounds.clip(ray.origin.map(f64::from), inverse)?;
             let reach = Reach::of(bounds, ray.origin);
             let anchor = ray.origin;
             return Some(Self {
@@ -82,13 +82,46 @@ impl Approach {
                 is_remote: false,
             });
         }
-        Self::from_afar(ray, bounds, inverse)
+        Self::from_afar(ray, ray.origin.map(f64::from), bounds, inverse)
+    }
+
+    /// Brings a ray whose origin is given in f64 to a box that holds boxes, not triangles. `ray` has the
+    /// rounded origin.
+    #[inline(never)]
+    pub(crate) fn of_wide(ray: &Ray, origin: [f64; 3], bounds: &Aabb) -> Option<Self> {
+        if !ray.is_valid() {
+            return None;
+        }
+        let inverse = ray.direction.map(|d| 1.0 / f64::from(d));
+        let center = ((bounds.min + bounds.max) * 0.5).to_array();
+        let away = |axis: usize| (origin[axis] - f64::from(center[axis])).abs();
+        let distance = greater(away(0), greater(away(1), away(2)));
+        if distance > f64::from(FAR_EXTENTS * bounds.size().max_element()) {
+            return Self::from_afar(ray, origin, bounds, inverse);
+        }
+        let [x, y, z] = ray.origin.map(f32::abs);
+        Some(Self {
+            anchor: ray.origin,
+            t: 0.0,
+            near: 0.0,
+            far: 0.0,
+            inverse,
+            // The origin was rounded by half an ulp of a coordinate.
+            slack: greater(x, greater(y, z)) * f32::EPSILON,
+            reach: Reach::of(bounds, ray.origin),
+            is_remote: false,
+        })
     }
 
     /// The same for a ray whose origin is far away.
     #[cold]
     #[inline(never)]
-    fn from_afar(ray: &Ray, bounds: &Aabb, inverse: [f64; 3]) -> Option<Self> {
+    fn from_afar(
+        ray: &Ray,
+        origin: [f64; 3],
+        bounds: &Aabb,
+        inverse: [f64; 3],
+    ) -> Option<Self> {
         // In f64: the distance may be larger than any f32.
         let from_origin = Reach::of(bounds, ray.origin);
         let off = from_origin.distance * OFF;
@@ -97,7 +130,7 @@ impl Approach {
             let coordinate = bounds.min.abs().max(bounds.max.abs());
             let growth = Vec3A::splat(round(2.0 * off)) + coordinate * (4.0 * f32::EPSILON);
             let bounds = Aabb { min: bounds.min - growth, max: bounds.max + growth };
-            let (near, far) = bounds.clip(ray.origin, inverse)?;
+            let (near, far) = bounds.clip(origin, inverse)?;
             let (anchor, slack) = (ray.origin, round(2.0 * off));
             return Some(Self {
                 anchor,
@@ -110,11 +143,11 @@ impl Approach {
                 is_remote: true,
             });
         }
-        let (t, _) = bounds.clip(ray.origin, inverse)?;
+        let (t, _) = bounds.clip(origin, inverse)?;
         let at =
-            |axis: usize| round(f64::from(ray.origin[axis]) + t * f64::from(ray.direction[axis]));
+            |axis: usize| round(origin[axis] + t * f64::from(ray.direction[axis]));
         let anchor = [at(0), at(1), at(2)];
-        let (near, far) = bounds.clip(anchor, inverse)?;
+        let (near, far) = bounds.clip(anchor.map(f64::from), inverse)?;
         let [x, y, z] = anchor.map(|coordinate| f64::from(coordinate.abs()));
         let slack = greater(x, greater(y, z)) * f64::from(f32::EPSILON) + off;
         // Rounded up.

@@ -127,6 +127,26 @@ pub enum Error {
     MeshMismatch,
     /// The blob is built over something else: over triangles, shapes or instances. Open it as what it is.
     OtherContent(Content),
+    /// An instance of a scene names an object that there is not.
+    InstanceWithoutObject {
+        /// The first such instance.
+        instance: u32,
+    },
+    /// The matrix of an instance has no inverse that f32 can hold, or it is not finite, or it takes its object beyond
+    /// the largest coordinate.
+    InstanceWithoutInverse {
+        /// The first such instance.
+        instance: u32,
+    },
+    /// The instances of a scene name more objects than it was opened with.
+    MissingObjects {
+        /// Objects that the scene needs.
+        needed: u32,
+        /// Objects that there are.
+        available: u32,
+    },
+    /// More scenes stand inside one another than [`MAX_NESTING`](crate::MAX_NESTING).
+    TooDeep,
     /// The grid is no tree, or its mesh is packed behind it: only trees without a mesh can be refitted.
     CannotRefit,
     /// The grid contradicts itself or its mesh.
@@ -191,6 +211,20 @@ impl fmt::Display for Error {
             }
             Self::OtherContent(Content::Instances) => {
                 f.write_str("the blob is a scene of instances: open it as a scene")
+            }
+            Self::InstanceWithoutObject { instance } => {
+                write!(f, "instance {instance} names an object that there is not")
+            }
+            Self::InstanceWithoutInverse { instance } => write!(
+                f,
+                "the matrix of instance {instance} is singular or not finite, or takes its object beyond {:e}",
+                crate::MAX_COORDINATE
+            ),
+            Self::MissingObjects { needed, available } => {
+                write!(f, "the scene needs {needed} objects and was given {available}")
+            }
+            Self::TooDeep => {
+                write!(f, "more than {} scenes stand inside one another", crate::MAX_NESTING)
             }
             Self::MethodRemoved => {
                 f.write_str("the grid was built with the method brick, which was removed: build it again")

@@ -21,7 +21,7 @@ use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{self, OneLevel};
 use crate::options::{Choice, Cull};
-use crate::ray::{Hit, Ray};
+use crate::ray::{Hit, Ray, RayF64};
 use crate::recursive::{self, Recursive};
 use crate::search::{Any, Closest, Outcome, Search};
 use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
@@ -294,6 +294,31 @@ impl<'a> Grid<'a> {
         }
         let afar = (bvh::Slab::new(ray, begin, &approach), test.filter);
         self.walk(bvh, ray, begin, cull, bounds, Some(&afar), search, tally);
+    }
+
+    /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it
+    /// meets.
+    pub(crate) fn search_boxes<F: Search, T: Tally>(
+        &self,
+        ray: &RayF64,
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        let Structure::Bvh(bvh) = &self.structure else { return };
+        let narrow = &ray.rounded();
+        if !HAS_BVH {
+            return;
+        }
+        if narrow.origin.map(f64::from) == ray.origin {
+            return self.search_tree(bvh, narrow, ray.t_min, Cull::None, search, tally);
+        }
+        let bounds = &self.lattice.bounds();
+        let Some(approach) = Approach::of_wide(narrow, ray.origin, bounds) else { return };
+        if approach.is_remote {
+            return self.test_all(&TriangleTest::from(narrow, &approach), search, tally);
+        }
+        let afar = (bvh::Slab::new(narrow, ray.t_min, &approach), RayFilter::NONE);
+        self.walk(bvh, narrow, ray.t_min, Cull::None, bounds, Some(&afar), search, tally);
     }
 
     /// Walks a ray through a tree; false if it comes from afar and must be brought to the box.

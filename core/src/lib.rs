@@ -82,6 +82,7 @@ mod pairs;
 mod ray;
 mod recursive;
 mod refit;
+mod scene;
 mod search;
 mod shapes;
 mod simd;
@@ -109,9 +110,12 @@ pub use inspect::Statistics;
 pub use mesh::{Content, IndexType, MAX_TRIANGLES, Strided, Triangle, TriangleMesh};
 pub use options::{Cull, Filter, QueryOptions, Verdict};
 pub use packed::BlobInfo;
-pub use ray::{Hit, INVALID_ID, Ray};
+pub use ray::{Hit, INVALID_ID, Ray, RayF64};
 pub use recursive::MAX_DEPTH;
 pub use refit::{Refit, refit};
+pub use scene::{
+    Instance, MAX_NESTING, Object, ObjectTest, Scene, SceneFilter, SceneHit, SceneOptions,
+};
 pub use shapes::{Boxes, ShapeHit, ShapeTest, Shapes};
 pub use simd::SimdLevel;
 pub use sizes::{Sizes, fit, sizes, sizes_with};

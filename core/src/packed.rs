@@ -17,20 +17,23 @@ use crate::blob::{BLOB_VERSION, HEADER_BYTES, HasMesh, Header, corrupt};
 use crate::config::Method;
 use crate::error::{Error, Region};
 use crate::grid::Grid;
-use crate::mesh::{IndexType, MAX_TRIANGLES, Strided, TriangleMesh};
+use crate::scene::ends_of;
+use crate::mesh::{Content, IndexType, MAX_TRIANGLES, Strided, TriangleMesh};
 
 /// What the header of a blob says, whether or not the rest of it is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BlobInfo {
     /// The version of the format.
     pub version: u32,
+    /// What it is built over.
+    pub content: Content,
     /// What built it.
     pub method: Method,
     /// Whether it is packed: the mesh is in it.
     pub has_mesh: bool,
-    /// Vertices of its mesh.
+    /// Vertices of its mesh; twice the number of shapes or instances.
     pub vertex_count: u64,
-    /// Triangles of its mesh.
+    /// Triangles of its mesh; shapes or instances.
     pub triangle_count: u32,
     /// Bytes of the grid.
     pub grid_bytes: u64,
@@ -49,10 +52,15 @@ impl BlobInfo {
         let header = Header::peek(bytes)?;
         let method = Method::from_u32(header.method).ok_or(corrupt(offset_of!(Header, method)))?;
         let has_mesh = header.has_mesh()? != HasMesh::No;
-        let total_bytes = Sections::of(&header)?.end;
+        let content = header.content()?;
+        let total_bytes = match content {
+            Content::Instances => ends_of(&header).1,
+            Content::Triangles | Content::Shapes => Sections::of(&header)?.end,
+        };
         let Header { vertex_count, triangle_count, blob_bytes: grid_bytes, .. } = header;
         Ok(Self {
             version: BLOB_VERSION,
+            content,
             method,
             has_mesh,
             vertex_count,
@@ -164,6 +172,9 @@ impl<'a> Grid<'a> {
     pub fn open_packed(blob: &'a [u8]) -> Result<Self, Error> {
         check_alignment(blob, Region::Index)?;
         let header = Header::peek(blob)?;
+        if header.content()? != Content::Triangles {
+            return Err(Error::OtherContent(header.content()?));
+        }
         let has_mesh = header.has_mesh()?;
         if has_mesh == HasMesh::No {
             return Err(Error::NoMesh);

@@ -48,6 +48,46 @@ impl Ray {
     }
 }
 
+/// A ray whose origin is given in f64: 48 bytes, for scenes in which f32 is too coarse for an origin.
+///
+/// At 1e7 units from where it starts, f32 tells places apart that are one unit apart, f64 a billionth.
+/// Direction and range are those of a [`Ray`], and so is what makes a ray miss everything; an origin that f32
+/// cannot hold misses, too.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct RayF64 {
+    /// Where `t` is 0, in scene units.
+    pub origin: [f64; 3],
+    /// Direction, any length but zero.
+    pub direction: [f32; 3],
+    /// Smallest accepted `t`.
+    pub t_min: f32,
+    /// Largest accepted `t`; may be infinite.
+    pub t_max: f32,
+    /// Not read.
+    pub reserved: u32,
+}
+
+impl From<&Ray> for RayF64 {
+    fn from(&Ray { origin, t_min, direction, t_max }: &Ray) -> Self {
+        Self { origin: origin.map(f64::from), direction, t_min, t_max, reserved: 0 }
+    }
+}
+
+impl RayF64 {
+    /// A ray from `origin` along `direction` that accepts every hit at `t >= 0`.
+    #[must_use]
+    pub const fn new(origin: [f64; 3], direction: [f32; 3]) -> Self {
+        Self { origin, direction, t_min: 0.0, t_max: f32::INFINITY, reserved: 0 }
+    }
+
+    /// The same ray from the nearest origin in f32.
+    pub(crate) fn rounded(&self) -> Ray {
+        let Self { origin, direction, t_min, t_max, .. } = *self;
+        Ray { origin: origin.map(round), t_min, direction, t_max }
+    }
+}
+
 /// Where a ray meets a triangle: 16 bytes.
 ///
 /// The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
@@ -96,7 +136,7 @@ pub(crate) const fn round(x: f64) -> f32 {
     x as f32
 }
 
-const _: () = assert!(size_of::<Ray>() == 32 && size_of::<Hit>() == 16);
+const _: () = assert!(size_of::<Ray>() == 32 && size_of::<Hit>() == 16 && size_of::<RayF64>() == 48);
 
 #[cfg(test)]
 mod tests {

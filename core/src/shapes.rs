@@ -229,11 +229,6 @@ impl<'a> Shapes<'a> {
         self.grid.bounds()
     }
 
-    /// The view of the tree as a grid of boxes.
-    pub(crate) const fn grid(&self) -> &Grid<'a> {
-        &self.grid
-    }
-
     /// The closest hit of a ray; where several shapes are hit at the same `t`, the one with the lowest number.
     pub fn intersect(&self, ray: &Ray, test: &mut ShapeTest<'_>) -> Option<Hit> {
         self.intersect_with(ray, &mut QueryOptions::default(), test)

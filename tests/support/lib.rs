@@ -14,6 +14,7 @@ pub mod random;
 pub mod readme;
 #[cfg(feature = "full")]
 pub mod scans;
+pub mod scenes;
 #[cfg(feature = "full")]
 pub mod symbols;
 #[cfg(feature = "full")]

@@ -1,8 +1,9 @@
 //! Leaves of boxes: a ray against up to eight of them, as it would be tested against the children of a node.
 //!
-//! A box is six numbers in the caller's memory, not quantised, so it has no margin: each side is subtracted,
-//! multiplied and compared with three roundings, which the wider inverse of far sides absorbs
-//! ([`slab`](super::slab)).
+//! A box is six numbers in the caller's memory, not quantised, so it has no margin of its own. Each side is
+//! subtracted and multiplied with two roundings, which the wider inverse of far sides absorbs
+//! ([`slab`](super::slab)). A direction that is zero has an inverse that is a number, so a side that the ray
+//! runs along would be met at 0: [`pad_of`] moves it behind the end of the scene.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8};
@@ -10,7 +11,7 @@ use fearless_simd::{Simd, f32x4, f32x8};
 use super::node::WIDTH;
 use super::slab::Slab;
 use super::walk::flips_of;
-use crate::aabb::{greater, lesser};
+use crate::aabb::{Aabb, greater, lesser};
 use crate::eight::{Row, first_eight, join, load, transpose};
 use crate::mesh::TriangleMesh;
 
@@ -55,6 +56,13 @@ fn rows(mesh: &TriangleMesh<'_>, id: u32) -> [Row; 2] {
     [*first, *last]
 }
 
+/// What sides of boxes are moved out by, on the ray's way: a 2^40th of the scene, which times the steepest inverse
+/// is far behind the scene.
+#[inline(always)]
+pub(super) fn pad_of(bounds: &Aabb) -> f32 {
+    (bounds.size().max_element() * (1.0 / (1_u64 << 40) as f32)).max(f32::MIN_POSITIVE)
+}
+
 /// Which boxes of a leaf a ray meets before its end, as bits, and where it enters each, box by box: for
 /// machines without vectors.
 #[inline(never)]
@@ -62,6 +70,7 @@ pub(super) fn meet_leaf(
     slab: &Slab,
     mesh: &TriangleMesh<'_>,
     ids: &[u32],
+    pad: f32,
     end: f32,
 ) -> (u32, [f32; WIDTH]) {
     let (flips, inverse_far) = (flips_of(slab), slab.inverse_far());
@@ -72,8 +81,9 @@ pub(super) fn meet_leaf(
         for axis in 0..3 {
             let (low, high) = (lesser(a[axis], b[axis]), greater(a[axis], b[axis]));
             let (first, last) = if flips[axis] == 0 { (low, high) } else { (high, low) };
-            near = greater((first - slab.origin_near[axis]) * slab.inverse[axis], near);
-            far = lesser((last - slab.origin_far[axis]) * inverse_far[axis], far);
+            let pad = inverse_far[axis].abs() * pad;
+            near = greater((first - slab.origin_near[axis]) * slab.inverse[axis] - pad, near);
+            far = lesser((last - slab.origin_far[axis]) * inverse_far[axis] + pad, far);
         }
         *nearest = near;
         let is_missed = near > far;

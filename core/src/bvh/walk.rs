@@ -13,7 +13,7 @@ use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
 
 use super::Bvh;
 use super::boxes::bits;
-use super::leaf::{boxes_of_leaf, meet_leaf, nearest_of};
+use super::leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
 use super::node::{Child, Node, WIDTH};
 use super::slab::Slab;
 use crate::aabb::{Aabb, greater, lesser};
@@ -142,6 +142,7 @@ impl<S: Simd> Wide<S> {
         mesh: &TriangleMesh<'_>,
         ids: &[u32],
         flips: Near,
+        pad: f32,
         end: f32,
     ) -> (u32, [f32; WIDTH]) {
         let (low, high) = boxes_of_leaf(simd, mesh, ids);
@@ -149,8 +150,9 @@ impl<S: Simd> Wide<S> {
         for axis in 0..3 {
             let (low, high) = (low[axis], high[axis]);
             let (near, far) = if flips[axis] == 0 { (low, high) } else { (high, low) };
-            let near = (near - self.origin_near[axis]) * self.inverse_near[axis];
-            let far = (far - self.origin_far[axis]) * self.inverse_far[axis];
+            let pad = self.inverse_far[axis].abs() * pad;
+            let near = (near - self.origin_near[axis]) * self.inverse_near[axis] - pad;
+            let far = (far - self.origin_far[axis]) * self.inverse_far[axis] + pad;
             distances[axis] = (near, far);
         }
         let [x, y, z] = distances;
@@ -314,9 +316,10 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
             tally.cell_step();
             tally.primitive_tests(ids.len());
             if F::OF_BOXES {
+                let pad = pad_of(bounds);
                 let (mut met, near) = match wide {
-                    Some(ray) => ray.meet_leaf(simd, mesh, ids, flips, end),
-                    None => meet_leaf(slab, mesh, ids, end),
+                    Some(ray) => ray.meet_leaf(simd, mesh, ids, flips, pad, end),
+                    None => meet_leaf(slab, mesh, ids, pad, end),
                 };
                 // Offer the shapes, the nearest first, that do not begin behind the end of the ray.
                 while met != 0 {

@@ -1,0 +1,266 @@
+//! Instances: where an object stands in a scene, and the ray that the object sees.
+//!
+//! ```text
+//! caller  scene = linear * object + translation         9 x f32, 3 x f64
+//! blob    object = inverse * (scene - translation)      the same struct, with the inverse as its nine
+//! ```
+//!
+//! Origins are moved in f64, so that what f32 rounds is the ray near the object, not near the scene's zero.
+//! The direction is scaled by a power of two, which changes no digit, and the `t` of the object's ray with it:
+//!
+//! ```text
+//! t of the object's ray = t * scale - shift
+//! shift   0; for an origin more than four extents away from the object the place where the ray enters its box
+//! ```
+//!
+//! The object's ray is a function of the scene's ray, the instance and the object's box alone, so every path
+//! to an instance asks the object the same.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::aabb::{MAX_COORDINATE, greater, lesser};
+use crate::ray::{Ray, RayF64, round};
+
+/// An object at a place in a scene: 72 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Instance {
+    /// Rows of the matrix that takes the object's directions to the scene's. Mirrors, shears and scales of any
+    /// kind are allowed, as long as the matrix has an inverse.
+    pub linear: [[f32; 3]; 3],
+    /// Which of the scene's objects.
+    pub object: u32,
+    /// Where the object's origin lies in the scene.
+    pub translation: [f64; 3],
+    /// Seen by queries whose mask has a bit of it.
+    pub mask: u32,
+    /// The caller's own, not read.
+    pub id: u32,
+}
+
+impl Instance {
+    /// An object where it is.
+    #[must_use]
+    pub const fn new(object: u32) -> Self {
+        Self {
+            linear: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            object,
+            translation: [0.0; 3],
+            mask: u32::MAX,
+            id: 0,
+        }
+    }
+
+    /// An object moved by a matrix of three rows and four columns, the last of which is the translation.
+    #[must_use]
+    pub fn with_transform(object: u32, [a, b, c]: [[f32; 4]; 3]) -> Self {
+        let row = |[x, y, z, _]: [f32; 4]| [x, y, z];
+        Self {
+            linear: [row(a), row(b), row(c)],
+            translation: [a[3], b[3], c[3]].map(f64::from),
+            ..Self::new(object)
+        }
+    }
+}
+
+/// An instance as a blob has it: `linear` is the inverse.
+#[repr(transparent)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(super) struct Placed(Instance);
+
+/// How far the product of a matrix and its rounded inverse may be from one.
+const RESIDUE: f64 = 1.0 / 1024.0;
+
+/// What an object's box grows by, in parts of its coordinates and extents: more than the rounding of a ray that
+/// starts within a few extents of it.
+const GROWTH: f64 = 1.0 / 524_288.0; // 2^-19
+
+/// What a scene's box grows by, in parts of its coordinates: more than they are rounded by.
+const ROUNDING: f64 = 1.0 / 4_194_304.0; // 2^-22
+
+type Matrix = [[f64; 3]; 3];
+
+impl Placed {
+    /// The instance ready for rays; `None` if its matrix has no inverse in f32 or is not finite.
+    pub(super) fn new(instance: &Instance) -> Option<Self> {
+        let linear = instance.linear.map(|row| row.map(f64::from));
+        let inverse = inverse_of(&linear)?.map(|row| row.map(round));
+        let rounded = inverse.map(|row| row.map(f64::from));
+        for (row, line) in linear.iter().enumerate() {
+            for column in 0..3 {
+                let product: f64 = (0..3).map(|k| line[k] * rounded[k][column]).sum();
+                let expected = if row == column { 1.0 } else { 0.0 };
+                let is_near = (product - expected).abs() <= RESIDUE;
+                if !is_near {
+                    return None;
+                }
+            }
+        }
+        Some(Self(Instance { linear: inverse, ..*instance }))
+    }
+
+    pub(super) const fn object(&self) -> u32 {
+        self.0.object
+    }
+
+    /// The caller's instance, but for the rounding of its matrix.
+    pub(super) fn instance(&self) -> Option<Instance> {
+        let linear = inverse_of(&self.inverse())?.map(|row| row.map(round));
+        Some(Instance { linear, ..self.0 })
+    }
+
+    fn inverse(&self) -> Matrix {
+        self.0.linear.map(|row| row.map(f64::from))
+    }
+
+    /// The box in the scene of an object with this box, least and greatest corner; `None` if it reaches beyond
+    /// the largest coordinate.
+    pub(super) fn bounds(&self, bounds: &([f32; 3], [f32; 3])) -> Option<[f32; 6]> {
+        let (center, half) = grown(bounds);
+        let linear = inverse_of(&self.inverse())?;
+        let mut sides = [0.0; 6];
+        for axis in 0..3 {
+            let row = &linear[axis];
+            let (mut middle, mut reach) = (self.0.translation[axis], 0.0);
+            let mut terms = middle.abs();
+            for k in 0..3 {
+                middle += row[k] * center[k];
+                terms += (row[k] * center[k]).abs();
+                reach += row[k].abs() * half[k];
+            }
+            let growth = (middle.abs() + reach) * ROUNDING + terms * (16.0 * f64::EPSILON);
+            sides[axis] = round(middle - reach - growth).next_down();
+            sides[axis + 3] = round(middle + reach + growth).next_up();
+        }
+        sides.iter().all(|side| side.abs() <= MAX_COORDINATE).then_some(sides)
+    }
+
+    /// A direction that is across the object, as a normal, in the scene.
+    pub(super) fn normal(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let [a, b, c] = self.inverse();
+        [0, 1, 2].map(|axis| a[axis] * x + b[axis] * y + c[axis] * z)
+    }
+
+    /// The ray that the object sees, if the ray has a direction there.
+    pub(super) fn ray(&self, ray: &RayF64) -> Option<Seen> {
+        let inverse = self.inverse();
+        let [x, y, z] = ray.direction.map(f64::from);
+        let direction = inverse.map(|[a, b, c]| a * x + b * y + c * z);
+        let [x, y, z] = [0, 1, 2].map(|axis| ray.origin[axis] - self.0.translation[axis]);
+        let origin = inverse.map(|[a, b, c]| a * x + b * y + c * z);
+        let [x, y, z] = direction.map(f64::abs);
+        let longest = greater(x, greater(y, z));
+        let exponent = longest.to_bits() & 0x7ff0_0000_0000_0000;
+        let scale = f64::from_bits(exponent);
+        // Neither zero nor NaN nor beyond what can be divided by.
+        let is_ray = (1e-300..1e300).contains(&longest);
+        is_ray.then(|| {
+            let unit = 1.0 / scale;
+            Seen { origin, direction: direction.map(|d| round(d * unit)), shift: 0.0, scale }
+        })
+    }
+}
+
+/// Center and half the extent of a box with its growth.
+fn grown((min, max): &([f32; 3], [f32; 3])) -> ([f64; 3], [f64; 3]) {
+    let (min, max) = (min.map(f64::from), max.map(f64::from));
+    let center = [0, 1, 2].map(|axis| 0.5 * (min[axis] + max[axis]));
+    let mut half = [0, 1, 2].map(|axis| 0.5 * (max[axis] - min[axis]));
+    let largest = |[x, y, z]: [f64; 3]| greater(x, greater(y, z));
+    let growth = (largest(center.map(f64::abs)) + 2.0 * largest(half)) * GROWTH;
+    half.iter_mut().for_each(|half| *half += growth);
+    (center, half)
+}
+
+/// The inverse of a matrix; `None` if it has none.
+fn inverse_of([a, b, c]: &Matrix) -> Option<Matrix> {
+    let cross = |u: &[f64; 3], v: &[f64; 3]| {
+        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    };
+    let [p, q, r] = [cross(b, c), cross(c, a), cross(a, b)];
+    let determinant = a[0] * p[0] + a[1] * p[1] + a[2] * p[2];
+    let inverse = 1.0 / determinant;
+    let is_number = inverse.is_finite() && inverse.abs() > 0.0;
+    is_number.then(|| [0, 1, 2].map(|axis| [p[axis] * inverse, q[axis] * inverse, r[axis] * inverse]))
+}
+
+/// A ray as an object sees it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen {
+    origin: [f64; 3],
+    direction: [f32; 3],
+    /// `t` of this ray = `t` of the scene's ray * scale - shift.
+    shift: f64,
+    scale: f64,
+}
+
+/// Objects farther away than so many of their extents are seen from where the ray enters their box.
+const FAR_EXTENTS: f64 = 4.0;
+
+impl Seen {
+    /// The ray as one in f64, with the range of the scene's ray.
+    pub(super) fn wide(&self, ray: &RayF64) -> RayF64 {
+        RayF64 {
+            origin: self.origin,
+            direction: self.direction,
+            t_min: self.inward(ray.t_min),
+            t_max: self.inward(ray.t_max),
+            reserved: 0,
+        }
+    }
+
+    /// The ray in f32 for an object with this box: from near the box. `None` if it passes the box.
+    pub(super) fn narrow(&mut self, ray: &RayF64, bounds: &([f32; 3], [f32; 3])) -> Option<Ray> {
+        let (center, half) = grown(bounds);
+        let away = |axis: usize| (self.origin[axis] - center[axis]).abs();
+        let extent = 2.0 * greater(half[0], greater(half[1], half[2]));
+        let is_far = greater(away(0), greater(away(1), away(2))) > FAR_EXTENTS * extent;
+        if is_far {
+            self.shift = self.entry(&center, &half)?;
+        }
+        let at = |axis: usize| round(self.origin[axis] + self.shift * f64::from(self.direction[axis]));
+        Some(Ray {
+            origin: [at(0), at(1), at(2)],
+            t_min: self.inward(ray.t_min),
+            direction: self.direction,
+            t_max: self.inward(ray.t_max),
+        })
+    }
+
+    /// Where the ray's line enters a box.
+    #[inline(never)]
+    fn entry(&self, center: &[f64; 3], half: &[f64; 3]) -> Option<f64> {
+        let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+        for axis in 0..3 {
+            let direction = f64::from(self.direction[axis]);
+            let away = center[axis] - self.origin[axis];
+            let (low, high) = (away - half[axis], away + half[axis]);
+            if direction.abs() > 0.0 {
+                let (a, b) = (low / direction, high / direction);
+                near = greater(near, lesser(a, b));
+                far = lesser(far, greater(a, b));
+            } else if low > 0.0 || high < 0.0 {
+                return None;
+            }
+        }
+        (near <= far).then_some(near)
+    }
+
+    /// The `t` of the object's ray.
+    fn inward(&self, t: f32) -> f32 {
+        round(f64::from(t) * self.scale - self.shift)
+    }
+
+    /// A `t` of the object's ray that is no nearer than all that stand for this one of the scene's ray.
+    pub(super) fn limit(&self, t: f32) -> f32 {
+        round(f64::from(t.next_up()) * self.scale - self.shift).next_up()
+    }
+
+    /// The `t` of the scene's ray, which lies in that ray's range.
+    pub(super) fn outward(&self, t: f32, ray: &RayF64) -> f32 {
+        let t = round((f64::from(t) + self.shift) / self.scale);
+        lesser(greater(t, ray.t_min), ray.t_max)
+    }
+}
+
+const _: () = assert!(size_of::<Instance>() == 72);

@@ -1,0 +1,228 @@
+//! Scenes: a tree over instances of grids, of trees of shapes, and of other scenes.
+//!
+//! ```text
+//! blob    | tree over the boxes of all instances | table 64 B | boxes, 24 B each | instances, 72 B each |
+//! query   walk the tree; an instance whose box the ray meets: move the ray into its object, ask the object,
+//!         and move the `t` of what is hit back
+//! ```
+//!
+//! The tree is that of [`Shapes`](crate::Shapes): to it, instances are shapes. Objects are named by number and bound when
+//! a scene is opened, so the blob can be moved as every other. An instance keeps the inverse of its matrix
+//! ([`instance`]).
+
+mod instance;
+mod query;
+mod store;
+
+use core::fmt;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::grid::Grid;
+use crate::ray::Ray;
+use crate::shapes::{ShapeHit, Shapes};
+pub use instance::Instance;
+use instance::Placed;
+pub(crate) use store::ends_of;
+pub use query::{SceneFilter, SceneHit, SceneOptions};
+
+/// Scenes inside one another, at most, the outermost included.
+pub const MAX_NESTING: usize = 4;
+
+/// Tests the shapes of an object in a scene, from any number of threads at once. Every function like a
+/// [`ShapeTest`](crate::ShapeTest) that needs no `&mut` is one.
+pub trait ObjectTest: Sync {
+    /// Where a ray hits a shape. The ray is the one that the object sees: in the object's space, with a direction
+    /// and a range of its own, for which the answer is, too.
+    fn test(&self, shape: u32, ray: &Ray) -> Option<ShapeHit>;
+}
+
+impl<F: Fn(u32, &Ray) -> Option<ShapeHit> + Sync> ObjectTest for F {
+    fn test(&self, shape: u32, ray: &Ray) -> Option<ShapeHit> {
+        self(shape, ray)
+    }
+}
+
+/// What an instance shows.
+#[derive(Clone, Copy)]
+pub enum Object<'a> {
+    /// A grid of triangles, by any method.
+    Grid(Grid<'a>),
+    /// Shapes, and the test for them.
+    Shapes(Shapes<'a>, &'a dyn ObjectTest),
+    /// A scene.
+    Scene(Scene<'a>),
+}
+
+impl fmt::Debug for Object<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Grid(grid) => f.debug_tuple("Grid").field(&grid.method()).finish_non_exhaustive(),
+            Self::Shapes(shapes, _) => f.debug_tuple("Shapes").field(shapes).finish_non_exhaustive(),
+            Self::Scene(scene) => scene.fmt(f),
+        }
+    }
+}
+
+impl Object<'_> {
+    /// The least and the greatest corner of its box.
+    fn bounds(&self) -> ([f32; 3], [f32; 3]) {
+        match self {
+            Self::Grid(grid) => grid.bounds(),
+            Self::Shapes(shapes, _) => shapes.bounds(),
+            Self::Scene(scene) => scene.bounds(),
+        }
+    }
+
+    /// Scenes inside one another.
+    const fn levels(&self) -> usize {
+        match self {
+            Self::Scene(scene) => scene.levels,
+            _ => 0,
+        }
+    }
+}
+
+/// A built scene and the objects that it was opened with, ready for queries.
+///
+/// The view is small and can be copied; it borrows the blob and the objects, and any number of threads may
+/// query it at once. A query takes 8 KiB of stack for each scene inside another, and what the object's own takes.
+///
+/// ```
+/// use hgrid_core::{Block, Config, Grid, Instance, Object, RayF64, Scene, TriangleMesh, sizes};
+/// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+/// # let config = Config::default();
+/// # let needed = sizes(&mesh, &config, &mut [])?;
+/// # let mut index = vec![Block::ZERO; Block::count_for(needed.index_bytes)];
+/// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
+/// # let grid = Grid::build(mesh, &config, Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch))?;
+/// let objects = [Object::Grid(grid)];
+/// // Twice the same triangle: where it is, and ten units along x, twice as large.
+/// let matrix = [[2.0, 0.0, 0.0, 10.0], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, 0.0]];
+/// let instances = [Instance::new(0), Instance::with_transform(0, matrix)];
+///
+/// let needed = Scene::bound(2, &config).expect("two are not too many");
+/// let mut index = vec![Block::ZERO; Block::count_for(needed.index_bytes)];
+/// let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
+/// let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+/// let scene = Scene::build(&instances, &objects, &config, index, scratch)?;
+///
+/// let hit = scene.intersect(&RayF64::new([10.5, 0.5, 3.0], [0.0, 0.0, -1.0])).expect("a hit");
+/// assert_eq!((hit.t, hit.u, hit.path[0], hit.primitive), (3.0, 0.25, 1, 0));
+/// # Ok::<(), hgrid_core::Error>(())
+/// ```
+#[derive(Clone, Copy)]
+pub struct Scene<'a> {
+    blob: &'a [u8],
+    tree: Grid<'a>,
+    instances: &'a [Placed],
+    objects: &'a [Object<'a>],
+    /// Scenes inside one another, this one included.
+    levels: usize,
+}
+
+impl fmt::Debug for Scene<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Scene")
+            .field("instances", &self.instance_count())
+            .field("objects", &self.objects.len())
+            .field("blob_bytes", &self.blob.len())
+            .finish_non_exhaustive()
+    }
+}
+
+/// What the blob of a scene says beyond its tree.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+struct Table {
+    /// One more than the largest number of an object that an instance has.
+    object_count: u32,
+    /// Always 0.
+    unused: [u32; 15],
+}
+
+const _: () = assert!(size_of::<Table>() == 64);
+
+impl<'a> Scene<'a> {
+    /// Number of instances.
+    #[must_use]
+    pub const fn instance_count(&self) -> u32 {
+        self.tree.mesh().triangle_count()
+    }
+
+    /// An instance, as the caller gave it but for the rounding of its matrix.
+    #[must_use]
+    pub fn instance(&self, number: u32) -> Option<Instance> {
+        self.instances.get(number as usize)?.instance()
+    }
+
+    /// The objects that it was opened with.
+    #[must_use]
+    pub const fn objects(&self) -> &'a [Object<'a>] {
+        self.objects
+    }
+
+    /// The least and the greatest corner of the box of all instances, and a little more.
+    #[must_use]
+    pub const fn bounds(&self) -> ([f32; 3], [f32; 3]) {
+        self.tree.bounds()
+    }
+
+    /// The scene as bytes: what to copy, store or send in order to [`open`](Self::open) it again. The objects
+    /// are not in it.
+    #[must_use]
+    pub const fn blob(&self) -> &'a [u8] {
+        self.blob
+    }
+
+    /// The object that a hit names, and the scene and number of the instance that shows it.
+    fn holder(&self, hit: &SceneHit) -> Option<(Scene<'a>, usize)> {
+        let mut scene = *self;
+        for level in 0..MAX_NESTING {
+            let number = *hit.path.get(level)? as usize;
+            let object = scene.objects.get(scene.instances.get(number)?.object() as usize)?;
+            match object {
+                Object::Scene(inner) => scene = *inner,
+                _ => return Some((scene, number)),
+            }
+        }
+        None
+    }
+
+    /// The object that a hit names: the grid or the shapes at the end of its path.
+    #[must_use]
+    pub fn object_of(&self, hit: &SceneHit) -> Option<Object<'a>> {
+        let (scene, number) = self.holder(hit)?;
+        scene.objects.get(scene.instances.get(number)?.object() as usize).copied()
+    }
+
+    /// Takes a normal from the space of the object that a hit names to the scene's; of length 1. `None` if the hit
+    /// names none, or the normal is null.
+    #[must_use]
+    pub fn normal_of(&self, hit: &SceneHit, normal: [f32; 3]) -> Option<[f32; 3]> {
+        fn turn(scene: &Scene<'_>, path: &[u32], normal: [f64; 3]) -> Option<[f64; 3]> {
+            let (&number, rest) = path.split_first()?;
+            let placed = scene.instances.get(number as usize)?;
+            let normal = match scene.objects.get(placed.object() as usize)? {
+                Object::Scene(inner) => turn(inner, rest, normal)?,
+                _ => normal,
+            };
+            // Of length 1 on the way, or scales would add up.
+            let turned = placed.normal(normal);
+            glam::DVec3::from_array(turned).try_normalize().map(|normal| normal.to_array())
+        }
+        Some(turn(self, &hit.path, normal.map(f64::from))?.map(crate::ray::round))
+    }
+
+    /// The normal of the triangle that was hit, of length 1, in the scene's space, on the side that the triangle has
+    /// as its front in its mesh. `None` if the hit names no triangle or it has no area.
+    #[must_use]
+    pub fn triangle_normal(&self, hit: &SceneHit) -> Option<[f32; 3]> {
+        let Object::Grid(grid) = self.object_of(hit)? else { return None };
+        let [a, b, c] =
+            grid.mesh().triangle(hit.primitive)?.map(|p| glam::DVec3::from_array(p.map(f64::from)));
+        let normal = (b - a).cross(c - a).try_normalize()?;
+        self.normal_of(hit, normal.to_array().map(crate::ray::round))
+    }
+}

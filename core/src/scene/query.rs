@@ -1,0 +1,307 @@
+//! Questions to a scene.
+
+use core::fmt;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::instance::Seen;
+use super::{MAX_NESTING, Object, Scene};
+use crate::counters::Counters;
+use crate::options::{Cull, QueryOptions, Verdict};
+use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
+use crate::search::{Outcome, Search};
+
+/// Where a ray meets a scene: 32 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct SceneHit {
+    /// Distance in multiples of the ray's direction.
+    pub t: f32,
+    /// Weight of the triangle's second vertex, 0 to 1; of a shape what its test says.
+    pub u: f32,
+    /// Weight of the triangle's third vertex, 0 to 1; of a shape what its test says.
+    pub v: f32,
+    /// Id of the triangle or shape in its object.
+    pub primitive: u32,
+    /// The numbers of the instances on the way to the object, from the outermost scene on; the rest is
+    /// [`INVALID_ID`].
+    pub path: [u32; MAX_NESTING],
+}
+
+impl SceneHit {
+    /// No hit.
+    pub const MISS: Self = Self {
+        t: f32::INFINITY,
+        u: 0.0,
+        v: 0.0,
+        primitive: INVALID_ID,
+        path: [INVALID_ID; MAX_NESTING],
+    };
+
+    /// Whether this hit is reported rather than the other: smaller `t`, then the smaller path, then the smaller id.
+    #[must_use]
+    pub fn is_closer(&self, other: &Self) -> bool {
+        self.t < other.t
+            || (self.t <= other.t && (self.path, self.primitive) < (other.path, other.primitive))
+    }
+}
+
+/// Says of a hit whether it counts: gets the place of the ray in its batch, 0 for a single one, and the hit.
+pub type SceneFilter<'q> = dyn FnMut(usize, &SceneHit) -> Verdict + 'q;
+
+/// What a query of a scene may be told. `SceneOptions::default()` changes nothing.
+pub struct SceneOptions<'q> {
+    /// An instance is seen if a bit of this is set in its mask, too, and so is a triangle in it. At first all bits,
+    /// which sees everything, even what has a mask of 0.
+    pub mask: u32,
+    /// Which sides of triangles are not hit. The front is decided in the space of the triangle's own mesh: an
+    /// instance that mirrors does not turn it round.
+    pub cull: Cull,
+    /// Says of a hit whether it counts. Within an instance it is asked from near to far and about each triangle at most
+    /// once; instances come about from near to far, so a hit that it accepts may still be replaced by a closer one of
+    /// another instance. [`Verdict::AcceptAndStop`] is the same as [`Verdict::Accept`]. Shapes are not shown to it: their
+    /// test decides.
+    pub filter: Option<&'q mut SceneFilter<'q>>,
+    /// Where to add up the work: an instance that is offered is a primitive test.
+    pub counters: Option<&'q mut Counters>,
+}
+
+impl Default for SceneOptions<'_> {
+    fn default() -> Self {
+        Self { mask: u32::MAX, cull: Cull::None, filter: None, counters: None }
+    }
+}
+
+impl fmt::Debug for SceneOptions<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SceneOptions")
+            .field("mask", &self.mask)
+            .field("cull", &self.cull)
+            .field("filter", &self.filter.is_some())
+            .field("counters", &self.counters)
+            .finish()
+    }
+}
+
+impl Scene<'_> {
+    /// The closest hit of a ray. Where several are equally close, that of the first instance, then of the lowest id.
+    #[must_use]
+    pub fn intersect(&self, ray: &RayF64) -> Option<SceneHit> {
+        self.intersect_with(ray, &mut SceneOptions::default())
+    }
+
+    /// Whether anything is hit.
+    #[must_use]
+    pub fn occluded(&self, ray: &RayF64) -> bool {
+        self.occluded_with(ray, &mut SceneOptions::default())
+    }
+
+    /// [`intersect`](Self::intersect) with options.
+    pub fn intersect_with(
+        &self,
+        ray: &RayF64,
+        options: &mut SceneOptions<'_>,
+    ) -> Option<SceneHit> {
+        self.ask(0, ray, options, false)
+    }
+
+    /// [`occluded`](Self::occluded) with options.
+    pub fn occluded_with(&self, ray: &RayF64, options: &mut SceneOptions<'_>) -> bool {
+        self.ask(0, ray, options, true).is_some()
+    }
+
+    /// The answer for the ray at a place of a batch.
+    fn ask(
+        &self,
+        place: usize,
+        ray: &RayF64,
+        options: &mut SceneOptions<'_>,
+        is_any: bool,
+    ) -> Option<SceneHit> {
+        let mut work = options.counters.is_some().then(Counters::default);
+        let question = Question { mask: options.mask, cull: options.cull, is_any };
+        let mut show;
+        let filter: Option<&mut Shown<'_>> = match &mut options.filter {
+            Some(filter) => {
+                show = |hit: &SceneHit| filter(place, hit);
+                Some(&mut show)
+            }
+            None => None,
+        };
+        let hit = self.trace(ray, f32::INFINITY, 0, &question, filter, work.as_mut());
+        if let (Some(counters), Some(work)) = (&mut options.counters, work) {
+            counters.add(&work);
+        }
+        hit
+    }
+
+    /// The closest hit of a ray no farther than a limit, or any; at a level of nesting.
+    fn trace(
+        &self,
+        ray: &RayF64,
+        limit: f32,
+        level: usize,
+        question: &Question,
+        filter: Option<&mut Shown<'_>>,
+        counters: Option<&mut Counters>,
+    ) -> Option<SceneHit> {
+        if level >= MAX_NESTING {
+            return None;
+        }
+        let mut work = counters.is_some().then(Counters::default);
+        let cut = RayF64 { t_max: if limit < ray.t_max { limit } else { ray.t_max }, ..*ray };
+        let mut offered = Offered {
+            scene: self,
+            ray,
+            level,
+            question,
+            best: None,
+            limit,
+            filter,
+            counters: work.as_mut(),
+        };
+        let mut steps = Counters::default();
+        if offered.counters.is_some() {
+            self.tree.search_boxes(&cut, &mut offered, &mut steps);
+        } else {
+            self.tree.search_boxes(&cut, &mut offered, &mut ());
+        }
+        let best = offered.best;
+        if let (Some(counters), Some(work)) = (counters, work) {
+            counters.add(&steps);
+            counters.add(&work);
+        }
+        best
+    }
+}
+
+/// What holds for all instances.
+#[derive(Debug)]
+struct Question {
+    mask: u32,
+    cull: Cull,
+    is_any: bool,
+}
+
+/// A filter of one ray.
+type Shown<'f> = dyn FnMut(&SceneHit) -> Verdict + 'f;
+
+/// Instances are asked as they are met.
+struct Offered<'q, 'f> {
+    scene: &'q Scene<'q>,
+    ray: &'q RayF64,
+    level: usize,
+    question: &'q Question,
+    best: Option<SceneHit>,
+    /// Nothing farther matters.
+    limit: f32,
+    filter: Option<&'q mut Shown<'f>>,
+    counters: Option<&'q mut Counters>,
+}
+
+impl Search for Offered<'_, '_> {
+    const OF_BOXES: bool = true;
+
+    fn show(&mut self, _: Hit) -> Outcome {
+        Outcome::Unchanged
+    }
+
+    // Out of line: the walk keeps its registers.
+    #[inline(never)]
+    fn offer(&mut self, number: u32) -> Outcome {
+        let Some(hit) = self.ask(number) else { return Outcome::Unchanged };
+        if self.best.is_some_and(|best| !hit.is_closer(&best)) {
+            return Outcome::Unchanged;
+        }
+        (self.best, self.limit) = (Some(hit), hit.t);
+        if self.question.is_any { Outcome::Done } else { Outcome::EndsAt(hit.t) }
+    }
+}
+
+impl Offered<'_, '_> {
+    /// What a ray hits in an instance, no farther than what was hit before.
+    fn ask(&mut self, number: u32) -> Option<SceneHit> {
+        let Self { scene, ray, level, question, .. } = *self;
+        let &Question { mask, cull, is_any } = question;
+        if mask != u32::MAX && scene.tree.mesh().mask(number) & mask == 0 {
+            return None;
+        }
+        let placed = scene.instances.get(number as usize)?;
+        let object = scene.objects.get(placed.object() as usize)?;
+        let mut seen = placed.ray(ray)?;
+
+        // Inside a scene the ray keeps its origin in f64, and the hit its path.
+        if let Object::Scene(inner) = object {
+            let inside = seen.wide(ray);
+            let outward = |hit: &SceneHit| {
+                let mut hit = SceneHit { t: seen.outward(hit.t, ray), ..*hit };
+                if let Some(place) = hit.path.get_mut(level) {
+                    *place = number;
+                }
+                hit
+            };
+            let mut show;
+            let filter: Option<&mut Shown<'_>> = match &mut self.filter {
+                Some(filter) => {
+                    show = |hit: &SceneHit| filter(&outward(hit));
+                    Some(&mut show)
+                }
+                None => None,
+            };
+            let limit = seen.limit(self.limit);
+            let counters = self.counters.as_deref_mut();
+            let hit = inner.trace(&inside, limit, level + 1, question, filter, counters)?;
+            return Some(outward(&hit));
+        }
+
+        let bounds = object.bounds();
+        let mut inside = seen.narrow(ray, &bounds)?;
+        let limit = seen.limit(self.limit);
+        inside.t_max = if limit < inside.t_max { limit } else { inside.t_max };
+        let outward = |hit: &Hit| outward(&seen, ray, level, number, hit);
+        let mut show;
+        let mut options =
+            QueryOptions { mask, cull, counters: self.counters.as_deref_mut(), ..QueryOptions::default() };
+        let hit = match object {
+            Object::Grid(grid) => {
+                if let Some(filter) = &mut self.filter {
+                    show = |_: usize, hit: &Hit| filter(&outward(hit));
+                    options.filter = Some(&mut show);
+                }
+                let is_plain = options.are_plain();
+                match (is_any, is_plain) {
+                    (false, true) => grid.intersect(&inside),
+                    (true, true) => {
+                        grid.occluded(&inside).then_some(Hit { t: inside.t_min, ..Hit::MISS })
+                    }
+                    (false, false) => grid.intersect_with(&inside, &mut options),
+                    (true, false) => grid
+                        .occluded_with(&inside, &mut options)
+                        .then_some(Hit { t: inside.t_min, ..Hit::MISS }),
+                }
+            }
+            Object::Shapes(shapes, test) => {
+                let mut test = |id: u32, ray: &Ray| test.test(id, ray);
+                if is_any {
+                    let hit = shapes.occluded_with(&inside, &mut options, &mut test);
+                    hit.then_some(Hit { t: inside.t_min, ..Hit::MISS })
+                } else {
+                    shapes.intersect_with(&inside, &mut options, &mut test)
+                }
+            }
+            Object::Scene(_) => None,
+        }?;
+        Some(outward(&hit))
+    }
+}
+
+/// A hit of an object as one of the scene at a level.
+fn outward(seen: &Seen, ray: &RayF64, level: usize, number: u32, hit: &Hit) -> SceneHit {
+    let mut path = [INVALID_ID; MAX_NESTING];
+    if let Some(place) = path.get_mut(level) {
+        *place = number;
+    }
+    SceneHit { t: seen.outward(hit.t, ray), u: hit.u, v: hit.v, primitive: hit.primitive, path }
+}
+
+const _: () = assert!(size_of::<SceneHit>() == 32);

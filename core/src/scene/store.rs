@@ -1,0 +1,302 @@
+//! Building, opening, proving and moving scenes.
+
+use core::mem::offset_of;
+
+use super::instance::{Instance, Placed};
+use super::{MAX_NESTING, Object, Scene, Table};
+use crate::arena::{align_up, check_alignment, section_bytes, split, split_mut};
+use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::config::{Config, Method};
+use crate::control::Control;
+use crate::error::{ConfigField, Error, Region};
+use crate::grid::Grid;
+use crate::mesh::{BOX_BYTES, Content, Strided, TriangleMesh};
+use crate::refit::{Refit, refit_content};
+use crate::sizes::Sizes;
+
+type Sides = [f32; 6];
+
+/// Bytes behind the tree: table, boxes and instances.
+const fn behind_bytes(instances: u64) -> u64 {
+    section_bytes::<Table>(1) + section_bytes::<Sides>(instances) + section_bytes::<Placed>(instances)
+}
+
+/// Where the tree of a scene ends and its table starts, and the bytes of all of it.
+pub(crate) fn ends_of(header: &Header) -> (u64, u64) {
+    let start = align_up(header.blob_bytes);
+    (start, start.saturating_add(behind_bytes(header.triangle_count.into())))
+}
+
+/// Refuses all methods but the tree.
+const fn check(config: &Config) -> Result<(), Error> {
+    match config.method {
+        Method::Bvh => Ok(()),
+        _ => Err(Error::InvalidConfig(ConfigField::Method)),
+    }
+}
+
+/// The boxes of instances as the tree sees them.
+fn boxes_of<'a>(sides: &'a [Sides], placed: &'a [Placed]) -> Result<TriangleMesh<'a>, Error> {
+    let bytes = bytemuck::cast_slice(sides);
+    let boxes = Strided { bytes, stride: BOX_BYTES, count: sides.len() };
+    let bytes = bytemuck::cast_slice(placed).get(offset_of!(Instance, mask)..).unwrap_or_default();
+    let masks = Strided { bytes, stride: size_of::<Placed>(), count: placed.len() };
+    TriangleMesh::of_boxes(boxes, Content::Instances)?.with_masks(masks)
+}
+
+/// Gives every instance its inverse and its box; nothing is written before an error if `is_trial`.
+fn place(
+    instances: &[Instance],
+    objects: &[Object<'_>],
+    mut to: Option<(&mut [Sides], &mut [Placed])>,
+) -> Result<(), Error> {
+    for (number, instance) in (0_u32..).zip(instances) {
+        let Some(object) = objects.get(instance.object as usize) else {
+            return Err(Error::InstanceWithoutObject { instance: number });
+        };
+        let placed = Placed::new(instance);
+        let bounds = placed.and_then(|placed| placed.bounds(&object.bounds()));
+        let (Some(placed), Some(bounds)) = (placed, bounds) else {
+            return Err(Error::InstanceWithoutInverse { instance: number });
+        };
+        if let Some((sides, all)) = &mut to
+            && let (Some(side), Some(place)) =
+                (sides.get_mut(number as usize), all.get_mut(number as usize))
+        {
+            (*side, *place) = (bounds, placed);
+        }
+    }
+    Ok(())
+}
+
+/// Scenes inside one another, with one around the objects.
+fn levels_over(objects: &[Object<'_>]) -> Result<usize, Error> {
+    let levels = 1 + objects.iter().map(Object::levels).max().unwrap_or(0);
+    if levels > MAX_NESTING { Err(Error::TooDeep) } else { Ok(levels) }
+}
+
+impl<'a> Scene<'a> {
+    /// Enough memory for any scene of so many instances: O(1), usable in a constant. `None` as for
+    /// [`Sizes::bound`], and for a method that is not [`Method::Bvh`].
+    #[must_use]
+    pub const fn bound(instances: u32, config: &Config) -> Option<Sizes> {
+        Self::bound_parallel(instances, config, 1)
+    }
+
+    /// Enough memory for a build with so many tasks.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "compared before")]
+    pub const fn bound_parallel(instances: u32, config: &Config, tasks: u32) -> Option<Sizes> {
+        if !matches!(config.method, Method::Bvh) {
+            return None;
+        }
+        let Some(sizes) = Sizes::bound_parallel(instances, config, tasks) else { return None };
+        let index = align_up(sizes.index_bytes as u64).saturating_add(behind_bytes(instances as u64));
+        if index > usize::MAX as u64 {
+            return None;
+        }
+        Some(Sizes { index_bytes: index as usize, ..sizes })
+    }
+
+    /// Builds a scene in memory that the caller brings, as [`Grid::build`] does, in O(n).
+    ///
+    /// The instances are copied; the objects are not, and are read at every query.
+    ///
+    /// # Errors
+    /// [`Error::InstanceWithoutObject`] and [`Error::InstanceWithoutInverse`] name the instance;
+    /// [`Error::TooDeep`] for more than [`MAX_NESTING`] scenes inside one another; [`Error::OutOfMemory`],
+    /// [`Error::Misaligned`], [`Error::TooManyTriangles`] for more instances than ids, and [`Error::InvalidConfig`] if the
+    /// method is not [`Method::Bvh`]. After an error the index holds nothing of use.
+    pub fn build(
+        instances: &[Instance],
+        objects: &'a [Object<'a>],
+        config: &Config,
+        index: &'a mut [u8],
+        scratch: &mut [u8],
+    ) -> Result<Self, Error> {
+        Self::build_with(instances, objects, config, index, scratch, &Control::SERIAL)
+    }
+
+    /// Builds a scene with its tree made on the caller's threads: bit by bit the same scene.
+    ///
+    /// # Errors
+    /// Those of [`build`](Self::build) and of [`Grid::build_with`].
+    pub fn build_with(
+        instances: &[Instance],
+        objects: &'a [Object<'a>],
+        config: &Config,
+        index: &'a mut [u8],
+        scratch: &mut [u8],
+        control: &Control<'_>,
+    ) -> Result<Self, Error> {
+        check(config)?;
+        check_alignment(index, Region::Index)?;
+        levels_over(objects)?;
+        let count = instances.len() as u64;
+        if u32::try_from(count).is_err() {
+            return Err(Error::TooManyTriangles);
+        }
+        let (behind, available_bytes) = (behind_bytes(count), index.len() as u64);
+        let short = |tree: u64| Error::OutOfMemory {
+            region: Region::Index,
+            needed_bytes: align_up(tree).saturating_add(behind),
+            available_bytes,
+        };
+
+        // Put boxes and instances at the end of the index, and the tree at its start.
+        let space = usize::try_from(behind).ok();
+        let room = (index.len() & !(crate::ALIGNMENT - 1)).checked_sub(space.unwrap_or(usize::MAX));
+        let room = room.ok_or(short(HEADER_BYTES as u64))?;
+        let (head, tail) = index.split_at_mut_checked(room).ok_or(short(0))?;
+        let sections = split_mut::<Table>(tail, 1).and_then(|(table, rest)| {
+            let (sides, rest) = split_mut::<Sides>(rest, count)?;
+            Some((table, sides, split_mut::<Placed>(rest, count)?.0))
+        });
+        let (table, sides, placed) = sections.ok_or(short(0))?;
+        place(instances, objects, Some((&mut *sides, &mut *placed)))?;
+        let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
+        if let Some(table) = table.first_mut() {
+            *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };
+        }
+        let boxes = boxes_of(sides, placed)?;
+        let tree = Grid::build_with(boxes, config, head, scratch, control);
+        let tree_bytes = match tree {
+            Ok(tree) => tree.blob_bytes(),
+            Err(Error::OutOfMemory { region: Region::Index, needed_bytes, .. }) => {
+                return Err(short(needed_bytes));
+            }
+            Err(error) => return Err(error),
+        };
+
+        // Close the gap.
+        close_gap(index, tree_bytes, room);
+        Self::open(index, objects)
+    }
+
+    /// Opens a scene that was built earlier or elsewhere; bytes behind it are ignored. O(1), but for a look at each
+    /// object.
+    ///
+    /// The objects must be those that it was built with, in their order. What is not checked is not trusted: on
+    /// damaged bytes, or with other objects, queries may answer wrongly, but they stay inside the blob and end.
+    ///
+    /// # Errors
+    /// [`Error::MissingObjects`] if instances name more objects than there are; [`Error::TooDeep`];
+    /// [`Error::OtherContent`] for a blob that is no scene; those of [`Grid::open`].
+    pub fn open(blob: &'a [u8], objects: &'a [Object<'a>]) -> Result<Self, Error> {
+        check_alignment(blob, Region::Index)?;
+        let header = Header::peek(blob)?;
+        let content = header.content()?;
+        if content != Content::Instances {
+            return Err(Error::OtherContent(content));
+        }
+        let (start, end) = ends_of(&header);
+        let available_bytes = blob.len() as u64;
+        let bytes = usize::try_from(end).ok().and_then(|end| blob.get(..end));
+        let blob = bytes.ok_or(Error::Truncated { needed_bytes: end, available_bytes })?;
+        let behind = usize::try_from(start).ok().and_then(|start| blob.get(start..));
+        let count = u64::from(header.triangle_count);
+        let sections = behind.and_then(|behind| {
+            let (table, behind) = split::<Table>(behind, 1)?;
+            let (sides, behind) = split::<Sides>(behind, count)?;
+            Some((*table.first()?, sides, split::<Placed>(behind, count)?.0))
+        });
+        let (table, sides, instances) =
+            sections.ok_or(corrupt(offset_of!(Header, triangle_count)))?;
+        let tree = Grid::open(blob, boxes_of(sides, instances)?)?;
+        if table.object_count as usize > objects.len() {
+            return Err(Error::MissingObjects {
+                needed: table.object_count,
+                available: u32::try_from(objects.len()).unwrap_or(u32::MAX),
+            });
+        }
+        let levels = levels_over(objects)?;
+        Ok(Self { blob, tree, instances, objects, levels })
+    }
+
+    /// Proves that the scene is one of its objects: the tree, and the box of every instance.
+    /// O(instances); the objects have proofs of their own.
+    ///
+    /// # Errors
+    /// Those of [`Grid::validate`].
+    pub fn validate(&self, scratch: &mut [u8]) -> Result<(), Error> {
+        let header = Header::peek(self.blob)?;
+        let (start, _) = ends_of(&header);
+        let at = |byte: u64| corrupt(usize::try_from(byte).unwrap_or(usize::MAX));
+        self.tree.validate(scratch)?;
+        let table_bytes = section_bytes::<Table>(1);
+        let instances_at =
+            start + table_bytes + section_bytes::<Sides>(header.triangle_count.into());
+        let mut object_count = 0;
+        for (number, placed) in (0_u32..).zip(self.instances) {
+            let instance_at = instances_at + u64::from(number) * size_of::<Placed>() as u64;
+            let object = self.objects.get(placed.object() as usize).ok_or(at(instance_at))?;
+            let bounds = placed.bounds(&object.bounds()).ok_or(at(instance_at))?;
+            object_count = object_count.max(placed.object().saturating_add(1));
+            let stored = self.tree.mesh().box_bytes(number);
+            if stored.is_none_or(|stored| *stored != bytemuck::cast::<_, [u8; BOX_BYTES]>(bounds)) {
+                return Err(at(start + table_bytes + u64::from(number) * BOX_BYTES as u64));
+            }
+        }
+        let table = Table { object_count, unused: [0; 15] };
+        let start = usize::try_from(start).unwrap_or(usize::MAX);
+        let stored = self.blob.get(start..).and_then(|bytes| bytes.first_chunk::<64>());
+        if stored.is_none_or(|stored| *stored != bytemuck::cast::<_, [u8; 64]>(table)) {
+            return Err(corrupt(start));
+        }
+        Ok(())
+    }
+
+    /// Bytes of scratch that [`validate`](Self::validate) takes.
+    #[must_use]
+    pub const fn validate_bytes(&self) -> usize {
+        self.tree.validate_bytes()
+    }
+
+    /// Gives a built scene the instances of another moment: in place, O(n), without scratch. Their number is
+    /// that of the build. [`refit`](crate::refit) says when to build anew; [`open`](Self::open) the scene again afterwards.
+    ///
+    /// # Errors
+    /// [`Error::MeshMismatch`] for another number of instances; [`Error::InstanceWithoutObject`] and
+    /// [`Error::InstanceWithoutInverse`]; those of [`open`](Self::open). After these the scene is as it was; after
+    /// [`Error::Corrupt`] it holds nothing of use.
+    pub fn refit(
+        index: &mut [u8],
+        instances: &[Instance],
+        objects: &[Object<'_>],
+    ) -> Result<Refit, Error> {
+        let scene = Scene::open(index, objects)?;
+        if scene.instance_count() as usize != instances.len() {
+            return Err(Error::MeshMismatch);
+        }
+        let (start, _) = ends_of(&Header::peek(index)?);
+        place(instances, objects, None)?;
+        let count = instances.len() as u64;
+        let start = usize::try_from(start).unwrap_or(usize::MAX);
+        let damaged = corrupt(offset_of!(Header, triangle_count));
+        let (head, tail) = index.split_at_mut_checked(start).ok_or(damaged)?;
+        let sections = split_mut::<Table>(tail, 1).and_then(|(table, rest)| {
+            let (sides, rest) = split_mut::<Sides>(rest, count)?;
+            Some((table, sides, split_mut::<Placed>(rest, count)?.0))
+        });
+        let (table, sides, placed) = sections.ok_or(damaged)?;
+        place(instances, objects, Some((&mut *sides, &mut *placed)))?;
+        let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
+        if let Some(table) = table.first_mut() {
+            *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };
+        }
+        refit_content(head, &boxes_of(sides, placed)?)
+    }
+}
+
+/// Moves the bytes from `from` on down to `to`, which is before it; both and the end are multiples of 64.
+fn close_gap(bytes: &mut [u8], to: usize, from: usize) {
+    let count = bytes.len().saturating_sub(from) / 64;
+    for block in 0..count {
+        let block_at = |start: usize| start + 64 * block..start + 64 * (block + 1);
+        let moved: Option<[u8; 64]> =
+            bytes.get(block_at(from)).and_then(|bytes| bytes.first_chunk()).copied();
+        if let (Some(moved), Some(place)) = (moved, bytes.get_mut(block_at(to))) {
+            place.copy_from_slice(&moved);
+        }
+    }
+}

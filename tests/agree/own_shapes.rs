@@ -1,0 +1,195 @@
+//! Shapes of the caller's own: every query agrees with a loop over all of them.
+
+use std::collections::HashSet;
+
+use hgrid_core::{
+    Boxes, Config, Counters, Quality, QueryOptions, Ray, ShapeHit, Shapes, Strided,
+};
+use hgrid_tests::random::Random;
+use hgrid_tests::scenes::Built;
+
+/// A sphere: center and radius.
+type Sphere = [f32; 4];
+
+fn spheres(count: usize, size: f32, seed: u64) -> Vec<Sphere> {
+    let mut random = Random(seed);
+    (0..count)
+        .map(|_| {
+            let [x, y, z] = random.point();
+            [x, y, z, size * (0.1 + random.unit())]
+        })
+        .collect()
+}
+
+fn box_of([x, y, z, r]: Sphere) -> [f32; 6] {
+    let out = |c: f32, r: f32| if r > 0.0 { (c + r).next_up() } else { (c + r).next_down() };
+    [out(x, -r), out(y, -r), out(z, -r), out(x, r), out(y, r), out(z, r)]
+}
+
+/// The first of the two places where a ray meets a sphere that lies in its range.
+fn meet([x, y, z, r]: Sphere, ray: &Ray) -> Option<ShapeHit> {
+    let at = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - f64::from([x, y, z][k]));
+    let d = ray.direction.map(f64::from);
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let (a, b, c) = (dot(d, d), dot(at, d), dot(at, at) - f64::from(r) * f64::from(r));
+    let root = (b * b - a * c).sqrt();
+    let places = [(-b - root) / a, (-b + root) / a].map(|t| t as f32);
+    let t = places.into_iter().find(|t| (ray.t_min..=ray.t_max).contains(t))?;
+    Some(ShapeHit { t, u: r, v: x })
+}
+
+fn ray(random: &mut Random, round: usize) -> Ray {
+    let far = [0.5, 3.0, 50.0, 400.0][round % 4];
+    let (from, to) = (random.point().map(|c| c * far), random.point());
+    let direction = std::array::from_fn(|k| to[k] - from[k]);
+    let mut ray = Ray::new(from, direction);
+    match round % 5 {
+        1 => ray.t_min = -0.5,
+        2 => ray.t_max = 1.0,
+        3 => ray.direction[round % 3] = 0.0,
+        _ => {}
+    }
+    ray
+}
+
+#[test]
+fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
+    for (count, size) in [(0, 1.0), (1, 1.0), (9, 0.3), (400, 0.1), (3000, 0.02)] {
+        let all = spheres(count, size, 3);
+        let boxes: Vec<_> = all.iter().copied().map(box_of).collect();
+        let masks: Vec<u32> = (0..count).map(|id| 1 << (id % 3)).collect();
+        let boxes = Boxes::new(&boxes).unwrap().with_masks(Strided::new(&masks)).unwrap();
+        for quality in [Quality::Fast, Quality::High] {
+            let config = Config { quality, ..Config::default() };
+            let built = Built::shapes(boxes, &config).unwrap();
+            let shapes = Shapes::open(built.bytes(), boxes).unwrap();
+            assert_eq!(shapes.count() as usize, count);
+            let mut random = Random(5);
+            for round in 0..400 {
+                let ray = ray(&mut random, round);
+                let mask = [u32::MAX, 1, 6][round % 3];
+                let seen = |id: usize| mask == u32::MAX || masks[id] & mask != 0;
+                let hits = all.iter().enumerate().filter(|(id, _)| seen(*id)).filter_map(
+                    |(id, sphere)| meet(*sphere, &ray).map(|hit| (hit.t, id as u32)),
+                );
+                let expected = hits.reduce(|a, b| if b < a { b } else { a });
+
+                let mut asked = HashSet::new();
+                let mut test = |id: u32, part: &Ray| {
+                    assert!(asked.insert(id), "each shape once");
+                    assert_eq!((part.origin, part.direction), (ray.origin, ray.direction));
+                    assert!(part.t_min == ray.t_min && part.t_max <= ray.t_max);
+                    meet(all[id as usize], part)
+                };
+                let mut work = Counters::default();
+                let mut options = QueryOptions { mask, ..QueryOptions::counting(&mut work) };
+                let hit = shapes.intersect_with(&ray, &mut options, &mut test);
+                assert_eq!(hit.map(|hit| (hit.t, hit.primitive)), expected, "{ray:?}");
+                if let Some(hit) = hit {
+                    assert_eq!([hit.v, hit.u], [all[hit.primitive as usize][0], all[hit.primitive as usize][3]]);
+                }
+                assert!(work.primitive_tests as usize <= count && asked.len() <= count);
+                let mut options = QueryOptions { mask, ..QueryOptions::default() };
+                let mut test = |id: u32, part: &Ray| meet(all[id as usize], part);
+                let is_hit = shapes.occluded_with(&ray, &mut options, &mut test);
+                assert_eq!(is_hit, expected.is_some(), "{ray:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn shapes_whose_boxes_a_ray_touches_are_offered() {
+    // Boxes on a lattice of quarters, some flat: rays run along their faces, edges and corners.
+    let mut random = Random(11);
+    let mut quarter = || (random.below(9) as f32 - 4.0) * 0.25;
+    let boxes: Vec<[f32; 6]> = (0..500)
+        .map(|_| {
+            let [x, y, z] = [quarter(), quarter(), quarter()];
+            let [a, b, c] = [quarter(), quarter(), quarter()].map(|side| side.abs() * 0.5);
+            // Corners in any order.
+            if a < 0.2 { [x, y, z, x + a, y + b, z + c] } else { [x + a, y, z + c, x, y + b, z] }
+        })
+        .collect();
+    let view = Boxes::new(&boxes).unwrap();
+    let built = Built::shapes(view, &Config::default()).unwrap();
+    let shapes = Shapes::open(built.bytes(), view).unwrap();
+    for round in 0..2000 {
+        let mut from = [quarter(), quarter(), quarter()];
+        let mut direction = [quarter(), quarter(), quarter()];
+        if round % 3 == 0 {
+            direction[round % 2] = 0.0;
+        }
+        if round % 4 == 0 {
+            from[2] = -8.0;
+            direction = [0.0, 0.0, 1.0];
+        }
+        if direction == [0.0; 3] {
+            continue;
+        }
+        let ray = Ray { t_max: [f32::INFINITY, 1.0][round % 2], ..Ray::new(from, direction) };
+        let mut offered = vec![false; boxes.len()];
+        let mut test = |id: u32, _: &Ray| {
+            offered[id as usize] = true;
+            None
+        };
+        assert!(shapes.intersect(&ray, &mut test).is_none());
+        for (id, sides) in boxes.iter().enumerate() {
+            // Quarters and their quotients by these directions: exact but for thirds, which f64 tells apart.
+            let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
+            for k in 0..3 {
+                let (low, high) = (sides[k].min(sides[k + 3]), sides[k].max(sides[k + 3]));
+                let [low, high] = [low, high].map(|side| f64::from(side - from[k]));
+                let d = f64::from(direction[k]);
+                if d == 0.0 {
+                    if low > 0.0 || high < 0.0 {
+                        far = f64::NEG_INFINITY;
+                    }
+                } else {
+                    near = near.max((low / d).min(high / d));
+                    far = far.min((low / d).max(high / d));
+                }
+            }
+            assert!(near > far || offered[id], "shape {id} {sides:?} {ray:?}");
+        }
+    }
+}
+
+#[test]
+fn an_answer_outside_the_range_is_no_hit() {
+    let boxes = [[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]];
+    let view = Boxes::new(&boxes).unwrap();
+    let built = Built::shapes(view, &Config::default()).unwrap();
+    let shapes = Shapes::open(built.bytes(), view).unwrap();
+    let ray = Ray { t_max: 2.0, ..Ray::new([0.5, 0.5, -1.0], [0.0, 0.0, 1.0]) };
+    for t in [-1.0, 2.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut test = |_: u32, _: &Ray| Some(ShapeHit { t, u: 0.0, v: 0.0 });
+        assert_eq!(shapes.intersect(&ray, &mut test), None, "{t}");
+        assert!(!shapes.occluded(&ray, &mut test), "{t}");
+    }
+    for t in [0.0, 1.5, 2.0] {
+        let mut test = |_: u32, _: &Ray| Some(ShapeHit { t, u: 0.0, v: 0.0 });
+        assert_eq!(shapes.intersect(&ray, &mut test).map(|hit| hit.t), Some(t));
+    }
+}
+
+#[test]
+fn moved_shapes_are_found_after_a_refit() {
+    let all = spheres(700, 0.05, 9);
+    let boxes: Vec<_> = all.iter().copied().map(box_of).collect();
+    let mut built = Built::shapes(Boxes::new(&boxes).unwrap(), &Config::default()).unwrap();
+    let moved: Vec<Sphere> = all.iter().map(|&[x, y, z, r]| [y * 2.0, z - x, x, r]).collect();
+    let boxes: Vec<_> = moved.iter().copied().map(box_of).collect();
+    let view = Boxes::new(&boxes).unwrap();
+    Shapes::refit(built.bytes_mut(), &view).unwrap();
+    let shapes = Shapes::open(built.bytes(), view).unwrap();
+    shapes.validate(&mut vec![0; shapes.validate_bytes()]).unwrap();
+    let mut random = Random(2);
+    for round in 0..200 {
+        let ray = ray(&mut random, round);
+        let hits = moved.iter().filter_map(|sphere| meet(*sphere, &ray).map(|hit| hit.t));
+        let expected = hits.reduce(f32::min);
+        let mut test = |id: u32, part: &Ray| meet(moved[id as usize], part);
+        assert_eq!(shapes.intersect(&ray, &mut test).map(|hit| hit.t), expected);
+    }
+}

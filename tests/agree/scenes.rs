@@ -1,0 +1,387 @@
+//! Scenes: every query agrees with a loop over all instances, and with the triangles moved in f64.
+
+use hgrid_core::{
+    Block, Boxes, Config, Counters, Grid, Instance, Method, Object, Quality, Ray, RayF64, Scene,
+    SceneHit, SceneOptions, ShapeHit, Shapes, TriangleMesh, Verdict,
+};
+use hgrid_tests::meshes::{Mesh, ball, soup};
+use hgrid_tests::owned::Owned;
+use hgrid_tests::random::Random;
+use hgrid_tests::scenes::{Built, scattered};
+
+/// Objects to show: grids of some methods.
+fn with_grids(run: impl FnOnce(&[Object<'_>], &[Mesh])) {
+    let meshes = [ball(6, 1.0), soup(200, 0.2, 5), soup(60, 0.5, 6).scaled(0.1)];
+    let methods = [Method::Bvh, Method::OneLevel, Method::Bvh];
+    let views: Vec<TriangleMesh<'_>> = meshes.iter().map(Mesh::view).collect();
+    let owned: Vec<Owned> = views
+        .iter()
+        .zip(methods)
+        .map(|(mesh, method)| Owned::build(mesh, &Config::new(method)).unwrap())
+        .collect();
+    let objects: Vec<Object<'_>> = owned
+        .iter()
+        .zip(&views)
+        .map(|(owned, mesh)| Object::Grid(owned.open(mesh).unwrap()))
+        .collect();
+    run(&objects, &meshes);
+}
+
+fn ray(random: &mut Random, round: usize, width: f32) -> RayF64 {
+    let far = [0.5, 2.0, 30.0, 3e4, 1e9][round % 5] * width;
+    let (from, to) = (random.point().map(|c| c * far), random.point().map(|c| c * width));
+    let mut ray = Ray::new(from, std::array::from_fn(|k| to[k] - from[k]));
+    match round % 7 {
+        1 => ray.t_min = -0.5,
+        2 => ray.t_max = 1.0,
+        3 => ray.direction[round % 3] = 0.0,
+        4 => ray.direction = ray.direction.map(|d| d * 1e-12),
+        5 => ray.direction = ray.direction.map(|d| d * 1e9),
+        _ => {}
+    }
+    let mut ray = RayF64::from(&ray);
+    if round % 2 == 1 {
+        // An origin that f32 does not have.
+        ray.origin = ray.origin.map(|c| c * (1.0 + 1e-9) + 1e-9);
+    }
+    ray
+}
+
+/// The instances of a scene, each in a scene of its own.
+struct Alone(Vec<Built>);
+
+impl Alone {
+    fn new(instances: &[Instance], objects: &[Object<'_>]) -> Self {
+        let alone = |instance: &Instance| {
+            Built::scene(std::slice::from_ref(instance), objects, &Config::default()).unwrap()
+        };
+        Self(instances.iter().map(alone).collect())
+    }
+
+    /// The closest hit of all.
+    fn closest<'o>(
+        &self,
+        objects: &'o [Object<'o>],
+        ray: &RayF64,
+        mut ask: impl FnMut(u32, &Scene<'_>, &RayF64) -> Option<SceneHit>,
+    ) -> Option<SceneHit> {
+        let hits = (0..).zip(&self.0).filter_map(|(number, built)| {
+            let mut hit = ask(number, &built.open(objects).unwrap(), ray)?;
+            hit.path[0] = number;
+            Some(hit)
+        });
+        hits.reduce(|a, b| if b.is_closer(&a) { b } else { a })
+    }
+}
+
+#[test]
+fn a_scene_answers_as_each_of_its_instances_alone() {
+    with_grids(|objects, _| {
+        for (count, width) in [(0, 1.0), (1, 1.0), (7, 3.0), (60, 6.0), (150, 200.0)] {
+            let mut instances = scattered(count, 3, width, 8);
+            instances.iter_mut().for_each(|instance| instance.mask = 1 << (instance.id % 3));
+            // The same place twice: the first of them is reported.
+            if let [first, .., last] = &mut instances[..] {
+                *last = Instance { id: last.id, ..*first };
+            }
+            let alone = Alone::new(&instances, objects);
+            for quality in [Quality::Fast, Quality::High] {
+                let config = Config { quality, ..Config::default() };
+                let built = Built::scene(&instances, objects, &config).unwrap();
+                let scene = built.open(objects).unwrap();
+                let mut random = Random(5);
+                let mut hits = 0;
+                for round in 0..300 {
+                    let ray = ray(&mut random, round, width as f32);
+                    let expected = alone.closest(objects, &ray, |_, scene, ray| scene.intersect(ray));
+                    let hit = scene.intersect(&ray);
+                    assert_eq!(hit, expected, "{ray:?}");
+                    assert_eq!(scene.occluded(&ray), expected.is_some(), "{ray:?}");
+                    hits += usize::from(hit.is_some());
+
+                    let mask = [1, 2, 6][round % 3];
+                    let with_mask = |scene: &Scene<'_>, ray: &RayF64| {
+                        let mut work = Counters::default();
+                        let counters = Some(&mut work);
+                        let mut options = SceneOptions { mask, counters, ..SceneOptions::default() };
+                        scene.intersect_with(ray, &mut options)
+                    };
+                    let expected =
+                        alone.closest(objects, &ray, |_, scene, ray| with_mask(scene, ray));
+                    assert_eq!(with_mask(&scene, &ray), expected);
+                    let mut options = SceneOptions { mask, ..SceneOptions::default() };
+                    assert_eq!(scene.occluded_with(&ray, &mut options), expected.is_some());
+                }
+                assert!(count < 7 || width > 10.0 || hits > 20, "{hits} hits");
+            }
+        }
+    });
+}
+
+#[test]
+fn a_scene_answers_as_triangles_that_were_moved_in_f64() {
+    with_grids(|objects, meshes| {
+        let width = 4.0;
+        let instances = scattered(40, 3, width, 21);
+        let built = Built::scene(&instances, objects, &Config::default()).unwrap();
+        let scene = built.open(objects).unwrap();
+        let moved: Vec<(u32, u32, [[f64; 3]; 3])> = (0..)
+            .zip(&instances)
+            .flat_map(|(number, instance)| {
+                let mesh = meshes[instance.object as usize].view();
+                (0..mesh.triangle_count()).map(move |id| {
+                    let corners = mesh.triangle(id).unwrap().map(|p| {
+                        std::array::from_fn(|k| {
+                            let row = instance.linear[k];
+                            let sum: f64 =
+                                (0..3).map(|j| f64::from(row[j]) * f64::from(p[j])).sum();
+                            sum + instance.translation[k]
+                        })
+                    });
+                    (number, id, corners)
+                })
+            })
+            .collect();
+        let mut random = Random(6);
+        let mut hits = 0;
+        for round in 0..400 {
+            let ray = ray(&mut random, 5 * (round / 4) + round % 3, width as f32);
+            let hit = scene.intersect(&ray);
+            let mut is_confirmed = hit.is_none();
+            for (number, id, corners) in &moved {
+                let Some((t, inside)) = meet(corners, &ray) else { continue };
+                let slack = 1e-4 * (1.0 + t.abs());
+                if let Some(hit) = hit
+                    && (hit.path[0], hit.primitive) == (*number, *id)
+                {
+                    is_confirmed |= inside > -1e-3 && (f64::from(hit.t) - t).abs() <= slack;
+                }
+                let (least, most) = (f64::from(ray.t_min) + slack, f64::from(ray.t_max) - slack);
+                let end = hit.map_or(f64::INFINITY, |hit| f64::from(hit.t));
+                assert!(
+                    inside < 1e-3 || t < least || t > most || end <= t + slack,
+                    "instance {number} triangle {id} at {t}, found {hit:?} {ray:?}"
+                );
+            }
+            assert!(is_confirmed, "{hit:?} {ray:?}");
+            hits += usize::from(hit.is_some());
+        }
+        assert!(hits > 50, "{hits}");
+    });
+}
+
+/// Where a line meets the plane of a triangle, and how far inside, as the least weight of a corner; `None` if it
+/// runs along the plane.
+fn meet([a, b, c]: &[[f64; 3]; 3], ray: &RayF64) -> Option<(f64, f64)> {
+    let minus = |a: &[f64; 3], b: &[f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
+    let d = ray.direction.map(f64::from);
+    let (ab, ac, from) = (minus(b, a), minus(c, a), minus(&ray.origin, a));
+    let (p, q) = (cross(d, ac), cross(from, ab));
+    let determinant = dot(ab, p);
+    let size = (dot(ab, ab) * dot(ac, ac) * dot(d, d)).sqrt();
+    if determinant.abs() < 1e-4 * size {
+        return None;
+    }
+    let (u, v) = (dot(from, p) / determinant, dot(d, q) / determinant);
+    Some((dot(ac, q) / determinant, u.min(v).min(1.0 - u - v)))
+}
+
+#[test]
+fn far_from_the_origin_a_scene_answers_as_at_the_origin() {
+    with_grids(|objects, _| {
+        // Places that f64 holds with any of these offsets.
+        let rounded = |c: f64| (c * 1024.0).round() / 1024.0;
+        let mut instances = scattered(50, 3, 5.0, 4);
+        for instance in &mut instances {
+            instance.translation = instance.translation.map(rounded);
+        }
+        let here = Built::scene(&instances, objects, &Config::default()).unwrap();
+        for offset in [1e4, 1e7, 1e12] {
+            let mut moved = instances.clone();
+            for instance in &mut moved {
+                instance.translation = instance.translation.map(|c| c + offset);
+            }
+            let there = Built::scene(&moved, objects, &Config::default()).unwrap();
+            let mut random = Random(3);
+            let mut hits = 0;
+            for round in 0..200 {
+                let mut ray = ray(&mut random, 5 * round + round % 2, 5.0);
+                ray.origin = ray.origin.map(rounded);
+                let far = RayF64 { origin: ray.origin.map(|c| c + offset), ..ray };
+                let expected = here.open(objects).unwrap().intersect(&ray);
+                assert_eq!(there.open(objects).unwrap().intersect(&far), expected, "{offset}");
+                hits += usize::from(expected.is_some());
+            }
+            assert!(hits > 20);
+        }
+    });
+}
+
+#[test]
+fn scenes_in_scenes_name_the_way_to_the_hit() {
+    with_grids(|objects, _| {
+        let inner = scattered(5, 3, 2.0, 31);
+        let inner_built = Built::scene(&inner, objects, &Config::default()).unwrap();
+        let inner_scene = inner_built.open(objects).unwrap();
+        let middle_objects = [Object::Scene(inner_scene), objects[0]];
+        let middle = scattered(4, 2, 5.0, 32);
+        let middle_built = Built::scene(&middle, &middle_objects, &Config::default()).unwrap();
+        let outer_objects = [Object::Scene(middle_built.open(&middle_objects).unwrap()), objects[1]];
+        let outer = scattered(16, 2, 6.0, 33);
+        let built = Built::scene(&outer, &outer_objects, &Config::default()).unwrap();
+        let scene = built.open(&outer_objects).unwrap();
+        let alone = Alone::new(&outer, &outer_objects);
+        let mut random = Random(9);
+        let mut depths = [0; 4];
+        for round in 0..1500 {
+            let ray = ray(&mut random, 5 * round + round % 4, 6.0);
+            let expected = alone.closest(&outer_objects, &ray, |_, scene, ray| scene.intersect(ray));
+            let hit = scene.intersect(&ray);
+            assert_eq!(hit, expected, "{ray:?}");
+            assert_eq!(scene.occluded(&ray), hit.is_some());
+            let Some(hit) = hit else { continue };
+            let depth = hit.path.iter().filter(|&&number| number != u32::MAX).count();
+            depths[depth] += 1;
+            let Some(Object::Grid(grid)) = scene.object_of(&hit) else { panic!("a grid") };
+            assert!(hit.primitive < grid.mesh().triangle_count());
+            let normal = scene.triangle_normal(&hit).unwrap();
+            let length: f32 = normal.iter().map(|c| c * c).sum();
+            assert!((length - 1.0).abs() < 1e-5);
+        }
+        assert!(depths[1..].iter().all(|&hits| hits > 2), "{depths:?}");
+
+        // One more around it is allowed, two are not.
+        let once = [Object::Scene(scene)];
+        let built = Built::scene(&[Instance::new(0)], &once, &Config::default()).unwrap();
+        let twice = [Object::Scene(built.open(&once).unwrap())];
+        let error = Built::scene(&[Instance::new(0)], &twice, &Config::default()).unwrap_err();
+        assert_eq!(error, hgrid_core::Error::TooDeep);
+    });
+}
+
+#[test]
+fn filters_see_the_hits_of_the_scene() {
+    with_grids(|objects, _| {
+        let instances = scattered(30, 3, 3.0, 12);
+        let built = Built::scene(&instances, objects, &Config::default()).unwrap();
+        let scene = built.open(objects).unwrap();
+        let alone = Alone::new(&instances, objects);
+        let keeps = |hit: &SceneHit, number: u32| (hit.primitive + number) % 3 == 0;
+        let mut random = Random(14);
+        let mut changed = 0;
+        for round in 0..300 {
+            let ray = ray(&mut random, round, 3.0);
+            let expected = alone.closest(objects, &ray, |number, scene, ray| {
+                let mut filter = |_: usize, hit: &SceneHit| {
+                    if keeps(hit, number) { Verdict::Accept } else { Verdict::Reject }
+                };
+                let filter = Some(&mut filter as &mut _);
+                scene.intersect_with(ray, &mut SceneOptions { filter, ..SceneOptions::default() })
+            });
+            let mut filter = |place: usize, hit: &SceneHit| {
+                assert_eq!(place, 0);
+                if keeps(hit, hit.path[0]) { Verdict::Accept } else { Verdict::Reject }
+            };
+            let mut options =
+                SceneOptions { filter: Some(&mut filter), ..SceneOptions::default() };
+            let hit = scene.intersect_with(&ray, &mut options);
+            assert_eq!(hit, expected);
+            assert_eq!(scene.occluded_with(&ray, &mut options), expected.is_some());
+            changed += usize::from(hit != scene.intersect(&ray));
+        }
+        assert!(changed > 10);
+    });
+}
+
+#[test]
+fn shapes_stand_in_scenes() {
+    let boxes = [[-1.0, -1.0, -1.0, 1.0, 1.0, 1.0], [3.0, -1.0, -1.0, 5.0, 1.0, 1.0]];
+    let view = Boxes::new(&boxes).unwrap();
+    let tree = Built::shapes(view, &Config::default()).unwrap();
+    // The box itself is the shape: its entry, in f64.
+    let test = |id: u32, ray: &Ray| {
+        let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
+        for k in 0..3 {
+            let d = f64::from(ray.direction[k]);
+            let at = |side: usize| (f64::from(boxes[id as usize][side]) - f64::from(ray.origin[k])) / d;
+            let (a, b) = (at(k), at(k + 3));
+            near = near.max(a.min(b));
+            far = far.min(a.max(b));
+        }
+        (near <= far).then_some(ShapeHit { t: near as f32, u: 0.5, v: 0.25 })
+    };
+    let objects = [Object::Shapes(Shapes::open(tree.bytes(), view).unwrap(), &test)];
+    let instances = scattered(20, 1, 20.0, 2);
+    let built = Built::scene(&instances, &objects, &Config::default()).unwrap();
+    let scene = built.open(&objects).unwrap();
+    let alone = Alone::new(&instances, &objects);
+    let mut random = Random(1);
+    let mut hits = 0;
+    for round in 0..400 {
+        let ray = ray(&mut random, 5 * round + round % 4, 20.0);
+        let hit = scene.intersect(&ray);
+        assert_eq!(hit, alone.closest(&objects, &ray, |_, scene, ray| scene.intersect(ray)));
+        assert_eq!(scene.occluded(&ray), hit.is_some());
+        if let Some(hit) = hit {
+            assert_eq!([hit.u, hit.v], [0.5, 0.25]);
+            assert!(ray.t_min <= hit.t && hit.t <= ray.t_max);
+            hits += 1;
+        }
+    }
+    assert!(hits > 40, "{hits}");
+}
+
+#[test]
+fn moved_instances_are_found_after_a_refit() {
+    with_grids(|objects, _| {
+        let first = scattered(80, 3, 10.0, 41);
+        let second = scattered(80, 3, 10.0, 42);
+        let mut built = Built::scene(&first, objects, &Config::default()).unwrap();
+        let before = built.bytes().to_vec();
+        let still = Scene::refit(built.bytes_mut(), &first, objects).unwrap();
+        assert_eq!(still.cost_before.to_bits(), still.cost_after.to_bits());
+        assert!(built.bytes() == before, "instances that did not move");
+        let moved = Scene::refit(built.bytes_mut(), &second, objects).unwrap();
+        assert!(moved.cost_after > moved.cost_before);
+        let anew = Built::scene(&second, objects, &Config::default()).unwrap();
+        let scene = built.open(objects).unwrap();
+        scene.validate(&mut vec![0; scene.validate_bytes()]).unwrap();
+        let mut random = Random(3);
+        for round in 0..200 {
+            let ray = ray(&mut random, round, 10.0);
+            assert_eq!(scene.intersect(&ray), anew.open(objects).unwrap().intersect(&ray));
+        }
+    });
+}
+
+#[test]
+fn tasks_and_places_in_memory_do_not_change_a_scene() {
+    with_grids(|objects, _| {
+        let instances = scattered(300, 3, 10.0, 4);
+        let config = Config::default();
+        let one = Built::scene(&instances, objects, &config).unwrap();
+        let scene = one.open(objects).unwrap();
+        // As much memory as it takes, and no more.
+        let mut exact = vec![Block::ZERO; Block::count_for(scene.blob().len())];
+        let sizes = Scene::bound(300, &config).unwrap();
+        let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+        let again = Scene::build(
+            &instances,
+            objects,
+            &config,
+            Block::bytes_mut(&mut exact),
+            Block::bytes_mut(&mut scratch),
+        )
+        .unwrap();
+        assert!(again.blob() == scene.blob());
+        let grid: &Grid<'_> = match &objects[0] {
+            Object::Grid(grid) => grid,
+            _ => panic!("a grid"),
+        };
+        assert!(Scene::open(grid.blob(), objects).is_err());
+    });
+}

@@ -1,0 +1,102 @@
+//! Scenes and trees of shapes with the memory they live in, and instances to put into them.
+
+use hgrid_core::{Block, Boxes, Config, Error, Instance, Object, Scene, Shapes, Sizes};
+
+use crate::random::Random;
+
+/// Memory with a built scene, or a tree of shapes, in it.
+#[derive(Debug)]
+pub struct Built {
+    index: Vec<Block>,
+}
+
+fn memory(sizes: Option<Sizes>) -> Result<(Vec<Block>, Vec<Block>), Error> {
+    let sizes = sizes.ok_or(Error::TooManyTriangles)?;
+    let blocks = |bytes| vec![Block::ZERO; Block::count_for(bytes)];
+    Ok((blocks(sizes.index_bytes), blocks(sizes.scratch_bytes)))
+}
+
+impl Built {
+    /// Builds a scene in as much memory as any of its size takes, and proves it.
+    ///
+    /// # Errors
+    /// Those of the build and of the proof.
+    pub fn scene(
+        instances: &[Instance],
+        objects: &[Object<'_>],
+        config: &Config,
+    ) -> Result<Self, Error> {
+        let count = u32::try_from(instances.len()).expect("not so many");
+        let (mut index, mut scratch) = memory(Scene::bound(count, config))?;
+        let scratch = Block::bytes_mut(&mut scratch);
+        let scene = Scene::build(instances, objects, config, Block::bytes_mut(&mut index), scratch)?;
+        scene.validate(&mut vec![0xa5; scene.validate_bytes()])?;
+        Ok(Self { index })
+    }
+
+    /// Builds a tree of shapes, and proves it.
+    ///
+    /// # Errors
+    /// Those of the build and of the proof.
+    pub fn shapes(boxes: Boxes<'_>, config: &Config) -> Result<Self, Error> {
+        let (mut index, mut scratch) = memory(Sizes::bound(boxes.count(), config))?;
+        let scratch = Block::bytes_mut(&mut scratch);
+        let shapes = Shapes::build(boxes, config, Block::bytes_mut(&mut index), scratch)?;
+        shapes.validate(&mut vec![0xa5; shapes.validate_bytes()])?;
+        Ok(Self { index })
+    }
+
+    /// The view that queries run on.
+    ///
+    /// # Errors
+    /// Those of opening.
+    pub fn open<'a>(&'a self, objects: &'a [Object<'a>]) -> Result<Scene<'a>, Error> {
+        Scene::open(self.bytes(), objects)
+    }
+
+    /// All bytes.
+    pub fn bytes(&self) -> &[u8] {
+        Block::bytes(&self.index)
+    }
+
+    /// All bytes, to be changed.
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        Block::bytes_mut(&mut self.index)
+    }
+}
+
+/// A matrix of some kind: a rotation, a mirror, a scale that is not the same on all axes, a shear.
+pub fn matrix(random: &mut Random) -> [[f32; 3]; 3] {
+    let size = 0.2 + 2.0 * random.unit();
+    let [x, y, z] = random.point();
+    match random.below(5) {
+        0 => [[size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]],
+        // A quaternion as a rotation, with a scale.
+        1 => {
+            let length = (x * x + y * y + z * z + 1.0).sqrt();
+            let [w, x, y, z] = [1.0, x, y, z].map(|c| c / length);
+            [
+                [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+                [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+            ]
+            .map(|row| row.map(|c| c * size))
+        }
+        2 => [[-size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]],
+        3 => [[size, 0.0, 0.0], [0.0, 0.05 * size, 0.0], [0.0, 0.0, 3.0 * size]],
+        _ => [[size, x, y], [0.0, size, z], [0.0, 0.0, size]],
+    }
+}
+
+/// Instances of the first `objects` objects all over a cube.
+pub fn scattered(count: usize, objects: u32, width: f64, seed: u64) -> Vec<Instance> {
+    let mut random = Random(seed);
+    (0..count)
+        .map(|number| Instance {
+            linear: matrix(&mut random),
+            translation: random.point().map(|c| f64::from(c) * width),
+            id: u32::try_from(number).expect("not so many"),
+            ..Instance::new(u32::try_from(random.below(objects as usize)).expect("an object"))
+        })
+        .collect()
+}
