@@ -72,7 +72,7 @@ impl Input {
 }
 
 /// Shows `visit` how a build is run.
-fn controlled<T>(caller: Caller, visit: impl FnOnce(&Control<'_>) -> T) -> T {
+pub(crate) fn controlled<T>(caller: Caller, visit: impl FnOnce(&Control<'_>) -> T) -> T {
     let run = |count: u32, task: &Task<'_>| caller.run(count, task);
     let progress = |done: f32| caller.progress(done);
     let progress: Option<&dyn Fn(f32) -> bool> =

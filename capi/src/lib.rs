@@ -3,7 +3,7 @@
 //! Every function checks what it was given, calls core, and writes the answer. The docs of all that
 //! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
 //! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
-//! structs and threads that they rely on. `build`, `stored`, `query` and `many` hold the functions,
+//! structs and threads that they rely on. `build`, `stored`, `query`, `many`, `shapes` and `scene` hold the functions,
 //! `types` and `questions` the structs, and `raw` every use of a caller's pointer.
 //!
 //! There is no allocation, no state and no thread here, and no panic that a caller could reach; a
@@ -27,6 +27,10 @@ mod many;
 
 mod stored;
 
+mod shapes;
+
+mod scene;
+
 #[cfg(feature = "std")]
 mod create;
 
@@ -48,6 +52,8 @@ pub use crate::create::*;
 pub use crate::many::*;
 pub use crate::query::*;
 pub use crate::questions::*;
+pub use crate::scene::*;
+pub use crate::shapes::*;
 pub use crate::status::*;
 pub use crate::stored::*;
 pub use crate::types::*;

@@ -304,6 +304,12 @@ const _: () = assert!(HGRID_CULL_NONE == Cull::None as u32);
 const _: () = assert!(HGRID_CULL_BACK == Cull::Back as u32);
 const _: () = assert!(HGRID_CULL_FRONT == Cull::Front as u32);
 
+impl From<Ray> for hgrid_ray {
+    fn from(Ray { origin, t_min, direction, t_max }: Ray) -> Self {
+        Self { origin, t_min, direction, t_max }
+    }
+}
+
 impl From<hgrid_ray> for Ray {
     fn from(ray: hgrid_ray) -> Self {
         let hgrid_ray { origin, t_min, direction, t_max } = ray;
@@ -365,12 +371,17 @@ impl hgrid_query_options {
 
     /// The sides that are not hit.
     pub(crate) const fn cull(&self) -> Result<Cull, hgrid_status> {
-        match self.cull {
-            HGRID_CULL_NONE => Ok(Cull::None),
-            HGRID_CULL_BACK => Ok(Cull::Back),
-            HGRID_CULL_FRONT => Ok(Cull::Front),
-            _ => Err(HGRID_ERROR_INVALID_CULL),
-        }
+        cull(self.cull)
+    }
+}
+
+/// Sides as core knows them.
+pub(crate) const fn cull(cull: u32) -> Result<Cull, hgrid_status> {
+    match cull {
+        HGRID_CULL_NONE => Ok(Cull::None),
+        HGRID_CULL_BACK => Ok(Cull::Back),
+        HGRID_CULL_FRONT => Ok(Cull::Front),
+        _ => Err(HGRID_ERROR_INVALID_CULL),
     }
 }
 

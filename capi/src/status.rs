@@ -125,6 +125,22 @@ pub const HGRID_ERROR_CANNOT_REFIT: hgrid_status = -47;
 /// An older version built the blob with a method that was removed, brick: build it again with another one.
 pub const HGRID_ERROR_METHOD_REMOVED: hgrid_status = -48;
 
+/// The blob is built over something else: a grid, a tree of shapes or a scene. `hgrid_peek` tells which.
+pub const HGRID_ERROR_OTHER_CONTENT: hgrid_status = -49;
+
+/// An instance names an object that there is not. The report's `triangle` says which instance.
+pub const HGRID_ERROR_INSTANCE_OBJECT: hgrid_status = -60;
+
+/// The matrix of an instance has no inverse that float can hold, is not finite, or takes its object beyond 2^120. The
+/// report's `triangle` says which instance.
+pub const HGRID_ERROR_INSTANCE_MATRIX: hgrid_status = -61;
+
+/// The instances of a scene name more objects than were brought.
+pub const HGRID_ERROR_MISSING_OBJECTS: hgrid_status = -62;
+
+/// More scenes stand inside one another than `HGRID_MAX_NESTING`.
+pub const HGRID_ERROR_TOO_DEEP: hgrid_status = -63;
+
 /// The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
 pub const HGRID_ERROR_INVALID_RAYS: hgrid_status = -50;
 
@@ -167,6 +183,11 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
         Error::Truncated { .. } => HGRID_ERROR_TRUNCATED,
         Error::MeshMismatch => HGRID_ERROR_MESH_MISMATCH,
         Error::CannotRefit => HGRID_ERROR_CANNOT_REFIT,
+        Error::OtherContent(_) => HGRID_ERROR_OTHER_CONTENT,
+        Error::InstanceWithoutObject { .. } => HGRID_ERROR_INSTANCE_OBJECT,
+        Error::InstanceWithoutInverse { .. } => HGRID_ERROR_INSTANCE_MATRIX,
+        Error::MissingObjects { .. } => HGRID_ERROR_MISSING_OBJECTS,
+        Error::TooDeep => HGRID_ERROR_TOO_DEEP,
         // The enum may grow for Rust callers; here the two crates are always of one version.
         Error::Corrupt { .. } | _ => HGRID_ERROR_CORRUPT,
     }
@@ -239,6 +260,15 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
             c"a blob of another mesh: bring the mesh it was built for, or build it again"
         }
         HGRID_ERROR_CANNOT_REFIT => c"a blob that cannot be refitted: only trees can, and before they are packed",
+        HGRID_ERROR_OTHER_CONTENT => {
+            c"a blob of another kind: open grids with hgrid_open, shapes with hgrid_open_shapes, scenes with hgrid_open_scene"
+        }
+        HGRID_ERROR_INSTANCE_OBJECT => c"an instance of no object: repair the report's triangle, which is its number",
+        HGRID_ERROR_INSTANCE_MATRIX => {
+            c"a matrix without an inverse: repair the instance that the report's triangle names"
+        }
+        HGRID_ERROR_MISSING_OBJECTS => c"too few objects: bring those that the scene was built with",
+        HGRID_ERROR_TOO_DEEP => c"too many scenes inside one another: HGRID_MAX_NESTING at most",
         HGRID_ERROR_CORRUPT => c"a damaged blob, or one of another mesh: build it again",
         HGRID_ERROR_INVALID_RAYS => c"invalid rays: check count, and ray_stride (0, or 32 and more)",
         HGRID_ERROR_INVALID_ANSWERS => {

@@ -9,7 +9,7 @@ use core::ptr::{null, null_mut};
 
 use hgrid_core::{
     BuildFlags, Config, Control, Error, Grid, INVALID_ID, IndexType, MAX_TRIANGLES, Method,
-    Quality, Region, Sizes, Strided, TriangleMesh, sizes,
+    Quality, Region, Scene, Sizes, Strided, TriangleMesh, sizes,
 };
 
 use crate::status::{
@@ -338,6 +338,23 @@ impl hgrid_config {
         Ok(())
     }
 
+    /// Notes how much memory is enough for a scene of so many instances.
+    pub(crate) fn scene_bound(
+        self,
+        instance_count: usize,
+        report: &mut hgrid_report,
+    ) -> Result<(), hgrid_status> {
+        let (config, tasks) = (self.to_core()?, self.task_count()?);
+        if config.method != Method::Bvh {
+            return Err(HGRID_ERROR_INVALID_METHOD);
+        }
+        self.bound(instance_count, report)?;
+        let count = u32::try_from(instance_count).ok();
+        let bound = count.and_then(|count| Scene::bound_parallel(count, &config, tasks));
+        report.note_sizes(&bound.ok_or(HGRID_ERROR_TOO_MANY_TRIANGLES)?);
+        Ok(())
+    }
+
     /// How many tasks may run at once; more than one need someone who runs them. The other methods
     /// have none, and a field of another method is not looked at.
     pub(crate) const fn task_count(&self) -> Result<u32, hgrid_status> {
@@ -399,6 +416,16 @@ impl hgrid_report {
         self.resolution = grid.resolution();
     }
 
+    /// Notes what a build over shapes or instances made.
+    pub(crate) const fn note_built(&mut self, blob: &[u8], bound: Option<Sizes>) {
+        self.is_exact = 1;
+        self.index_bytes = blob.len() as u64;
+        self.resolution = [1; 3];
+        if let Some(sizes) = bound {
+            self.scratch_bytes = sizes.scratch_bytes as u64;
+        }
+    }
+
     /// Notes what was missing or which triangle is to blame, and passes the error on.
     pub(crate) const fn note_error(&mut self, error: Error) -> hgrid_status {
         match error {
@@ -408,9 +435,10 @@ impl hgrid_report {
             Error::OutOfMemory { region: Region::Scratch, needed_bytes, .. } => {
                 self.scratch_bytes = needed_bytes;
             }
-            Error::IndexOutOfRange { triangle } | Error::NonFiniteTriangle { triangle } => {
-                self.triangle = triangle;
-            }
+            Error::IndexOutOfRange { triangle: number }
+            | Error::NonFiniteTriangle { triangle: number }
+            | Error::InstanceWithoutObject { instance: number }
+            | Error::InstanceWithoutInverse { instance: number } => self.triangle = number,
             _ => {}
         }
         status_of(error)

@@ -19,11 +19,9 @@ fn with_grids(run: impl FnOnce(&[Object<'_>], &[Mesh])) {
         .zip(methods)
         .map(|(mesh, method)| Owned::build(mesh, &Config::new(method)).unwrap())
         .collect();
-    let objects: Vec<Object<'_>> = owned
-        .iter()
-        .zip(&views)
-        .map(|(owned, mesh)| Object::Grid(owned.open(mesh).unwrap()))
-        .collect();
+    let grids: Vec<Grid<'_>> =
+        owned.iter().zip(&views).map(|(owned, mesh)| owned.open(mesh).unwrap()).collect();
+    let objects: Vec<Object<'_>> = grids.iter().map(Object::Grid).collect();
     run(&objects, &meshes);
 }
 
@@ -227,10 +225,11 @@ fn scenes_in_scenes_name_the_way_to_the_hit() {
         let inner = scattered(5, 3, 2.0, 31);
         let inner_built = Built::scene(&inner, objects, &Config::default()).unwrap();
         let inner_scene = inner_built.open(objects).unwrap();
-        let middle_objects = [Object::Scene(inner_scene), objects[0]];
+        let middle_objects = [Object::Scene(&inner_scene), objects[0]];
         let middle = scattered(4, 2, 5.0, 32);
         let middle_built = Built::scene(&middle, &middle_objects, &Config::default()).unwrap();
-        let outer_objects = [Object::Scene(middle_built.open(&middle_objects).unwrap()), objects[1]];
+        let middle_scene = middle_built.open(&middle_objects).unwrap();
+        let outer_objects = [Object::Scene(&middle_scene), objects[1]];
         let outer = scattered(16, 2, 6.0, 33);
         let built = Built::scene(&outer, &outer_objects, &Config::default()).unwrap();
         let scene = built.open(&outer_objects).unwrap();
@@ -255,9 +254,10 @@ fn scenes_in_scenes_name_the_way_to_the_hit() {
         assert!(depths[1..].iter().all(|&hits| hits > 2), "{depths:?}");
 
         // One more around it is allowed, two are not.
-        let once = [Object::Scene(scene)];
+        let once = [Object::Scene(&scene)];
         let built = Built::scene(&[Instance::new(0)], &once, &Config::default()).unwrap();
-        let twice = [Object::Scene(built.open(&once).unwrap())];
+        let scene = built.open(&once).unwrap();
+        let twice = [Object::Scene(&scene)];
         let error = Built::scene(&[Instance::new(0)], &twice, &Config::default()).unwrap_err();
         assert_eq!(error, hgrid_core::Error::TooDeep);
     });
@@ -314,7 +314,8 @@ fn shapes_stand_in_scenes() {
         }
         (near <= far).then_some(ShapeHit { t: near as f32, u: 0.5, v: 0.25 })
     };
-    let objects = [Object::Shapes(Shapes::open(tree.bytes(), view).unwrap(), &test)];
+    let shapes = Shapes::open(tree.bytes(), view).unwrap();
+    let objects = [Object::Shapes(&shapes, &test)];
     let instances = scattered(20, 1, 20.0, 2);
     let built = Built::scene(&instances, &objects, &Config::default()).unwrap();
     let scene = built.open(&objects).unwrap();

@@ -31,7 +31,7 @@ unsafe fn options(options: *const hgrid_query_options) -> Result<Option<Asked>, 
 /// # Safety
 /// The caller's promise.
 #[inline(always)]
-unsafe fn all_options(options: *const hgrid_query_options) -> Result<Option<Asked>, hgrid_status> {
+pub(super) unsafe fn all_options(options: *const hgrid_query_options) -> Result<Option<Asked>, hgrid_status> {
     if options.is_null() {
         return Ok(None);
     }
@@ -41,7 +41,7 @@ unsafe fn all_options(options: *const hgrid_query_options) -> Result<Option<Aske
 }
 
 /// What a caller told a query.
-struct Asked {
+pub(super) struct Asked {
     options: hgrid_query_options,
     cull: Cull,
 }
@@ -51,7 +51,7 @@ impl Asked {
     ///
     /// # Safety
     /// The caller's promise.
-    unsafe fn ask<T>(&self, ask: impl FnOnce(&mut QueryOptions<'_>) -> T) -> T {
+    pub(super) unsafe fn ask<T>(&self, ask: impl FnOnce(&mut QueryOptions<'_>) -> T) -> T {
         // SAFETY: this function's contract.
         unsafe { self.ask_and_see(|_| {}, ask) }
     }
@@ -271,7 +271,7 @@ impl<A, T: From<A>> hgrid_core::Batch<A> for Arrays<'_, T> {
 ///
 /// # Safety
 /// The caller's promise.
-unsafe fn add(to: NonNull<hgrid_counters>, work: &Counters) {
+pub(super) unsafe fn add(to: NonNull<hgrid_counters>, work: &Counters) {
     // SAFETY: the caller's promise: not NULL, so aligned and readable.
     let mut sum = Counters::from(unsafe { to.read() });
     sum.add(work);

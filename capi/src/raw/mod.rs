@@ -25,6 +25,7 @@
 //! calls nothing here looks at them.
 
 mod ask;
+mod scene;
 
 use core::ffi::c_void;
 use core::ptr::{NonNull, null_mut};
@@ -33,6 +34,10 @@ use core::slice;
 use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
 pub(crate) use ask::{Arrays, batch, closest, query, query_all, surface};
+pub(crate) use scene::{
+    build_scene, build_shapes, open_scene, open_shapes, query_scene, query_shapes, refit_scene,
+    refit_shapes, scene, scene_normal, shapes, validate_scene, validate_shapes, write_object,
+};
 
 use crate::input::Input;
 use crate::questions::hgrid_refit_report;

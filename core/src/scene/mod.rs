@@ -47,11 +47,11 @@ impl<F: Fn(u32, &Ray) -> Option<ShapeHit> + Sync> ObjectTest for F {
 #[derive(Clone, Copy)]
 pub enum Object<'a> {
     /// A grid of triangles, by any method.
-    Grid(Grid<'a>),
+    Grid(&'a Grid<'a>),
     /// Shapes, and the test for them.
-    Shapes(Shapes<'a>, &'a dyn ObjectTest),
+    Shapes(&'a Shapes<'a>, &'a dyn ObjectTest),
     /// A scene.
-    Scene(Scene<'a>),
+    Scene(&'a Scene<'a>),
 }
 
 impl fmt::Debug for Object<'_> {
@@ -97,7 +97,7 @@ impl Object<'_> {
 /// # let mut index = vec![Block::ZERO; Block::count_for(needed.index_bytes)];
 /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
 /// # let grid = Grid::build(mesh, &config, Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch))?;
-/// let objects = [Object::Grid(grid)];
+/// let objects = [Object::Grid(&grid)];
 /// // Twice the same triangle: where it is, and ten units along x, twice as large.
 /// let matrix = [[2.0, 0.0, 0.0, 10.0], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, 0.0]];
 /// let instances = [Instance::new(0), Instance::with_transform(0, matrix)];
@@ -183,7 +183,7 @@ impl<'a> Scene<'a> {
             let number = *hit.path.get(level)? as usize;
             let object = scene.objects.get(scene.instances.get(number)?.object() as usize)?;
             match object {
-                Object::Scene(inner) => scene = *inner,
+                Object::Scene(inner) => scene = **inner,
                 _ => return Some((scene, number)),
             }
         }

@@ -44,13 +44,15 @@ fn boxes_of<'a>(sides: &'a [Sides], placed: &'a [Placed]) -> Result<TriangleMesh
     TriangleMesh::of_boxes(boxes, Content::Instances)?.with_masks(masks)
 }
 
-/// Gives every instance its inverse and its box; nothing is written before an error if `is_trial`.
+/// Gives every instance its inverse and its box.
 fn place(
     instances: &[Instance],
     objects: &[Object<'_>],
-    mut to: Option<(&mut [Sides], &mut [Placed])>,
+    sides: &mut [Sides],
+    places: &mut [Placed],
 ) -> Result<(), Error> {
-    for (number, instance) in (0_u32..).zip(instances) {
+    let to = sides.iter_mut().zip(places);
+    for (number, (instance, to)) in (0_u32..).zip(instances.iter().zip(to)) {
         let Some(object) = objects.get(instance.object as usize) else {
             return Err(Error::InstanceWithoutObject { instance: number });
         };
@@ -59,12 +61,7 @@ fn place(
         let (Some(placed), Some(bounds)) = (placed, bounds) else {
             return Err(Error::InstanceWithoutInverse { instance: number });
         };
-        if let Some((sides, all)) = &mut to
-            && let (Some(side), Some(place)) =
-                (sides.get_mut(number as usize), all.get_mut(number as usize))
-        {
-            (*side, *place) = (bounds, placed);
-        }
+        (*to.0, *to.1) = (bounds, placed);
     }
     Ok(())
 }
@@ -153,7 +150,7 @@ impl<'a> Scene<'a> {
             Some((table, sides, split_mut::<Placed>(rest, count)?.0))
         });
         let (table, sides, placed) = sections.ok_or(short(0))?;
-        place(instances, objects, Some((&mut *sides, &mut *placed)))?;
+        place(instances, objects, sides, placed)?;
         let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
         if let Some(table) = table.first_mut() {
             *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };
@@ -256,8 +253,8 @@ impl<'a> Scene<'a> {
     /// that of the build. [`refit`](crate::refit) says when to build anew; [`open`](Self::open) the scene again afterwards.
     ///
     /// # Errors
-    /// [`Error::MeshMismatch`] for another number of instances; [`Error::InstanceWithoutObject`] and
-    /// [`Error::InstanceWithoutInverse`]; those of [`open`](Self::open). After these the scene is as it was; after
+    /// [`Error::MeshMismatch`] for another number of instances; those of [`open`](Self::open), after which the
+    /// scene is as it was. After [`Error::InstanceWithoutObject`], [`Error::InstanceWithoutInverse`] and
     /// [`Error::Corrupt`] it holds nothing of use.
     pub fn refit(
         index: &mut [u8],
@@ -269,7 +266,6 @@ impl<'a> Scene<'a> {
             return Err(Error::MeshMismatch);
         }
         let (start, _) = ends_of(&Header::peek(index)?);
-        place(instances, objects, None)?;
         let count = instances.len() as u64;
         let start = usize::try_from(start).unwrap_or(usize::MAX);
         let damaged = corrupt(offset_of!(Header, triangle_count));
@@ -279,7 +275,7 @@ impl<'a> Scene<'a> {
             Some((table, sides, split_mut::<Placed>(rest, count)?.0))
         });
         let (table, sides, placed) = sections.ok_or(damaged)?;
-        place(instances, objects, Some((&mut *sides, &mut *placed)))?;
+        place(instances, objects, sides, placed)?;
         let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
         if let Some(table) = table.first_mut() {
             *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };

@@ -1,0 +1,477 @@
+//! Scenes of instances.
+
+use core::ffi::c_void;
+use core::mem::MaybeUninit;
+use core::ptr::{NonNull, null_mut};
+
+use hgrid_core::{Cull, Instance, MAX_NESTING, Object, RayF64, SceneHit};
+
+use crate::questions::{cull, hgrid_counters, hgrid_refit_report, hgrid_verdict};
+use crate::raw;
+use crate::shapes::hgrid_shapes;
+use crate::span::Region;
+use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};
+use crate::types::{hgrid_config, hgrid_grid, hgrid_report};
+
+/// Scenes inside one another, at most, the outermost included.
+pub const HGRID_MAX_NESTING: usize = 4;
+
+const _: () = assert!(HGRID_MAX_NESTING == MAX_NESTING);
+
+/// An object at a place in a scene: 72 bytes. Initialise it with `HGRID_INSTANCE_INIT`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_instance {
+    /// Rows of the matrix that takes the object's directions to the scene's: `scene = linear * object + translation`.
+    /// Rotations, mirrors, shears and scales of any kind, as long as the matrix has an inverse.
+    pub linear: [[f32; 3]; 3],
+    /// Which of the scene's objects, from 0.
+    pub object: u32,
+    /// Where the object's origin lies in the scene. Places are computed in double: far from the scene's origin rays are
+    /// traced as exactly as near it.
+    pub translation: [f64; 3],
+    /// Queries see the instance if their mask has a bit of it.
+    pub mask: u32,
+    /// Yours: not read.
+    pub id: u32,
+}
+
+/// What instances show: a grid, a tree of shapes or a scene, by the address of its view. `hgrid_object_grid`,
+/// `hgrid_object_shapes` and `hgrid_object_scene` make it.
+///
+/// The view stays where it is, with all that it refers to, for as long as scenes that show it are queried.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_object {
+    /// Private.
+    pub opaque: [MaybeUninit<usize>; 4],
+}
+
+const _: () = assert!(size_of::<Object<'_>>() == size_of::<hgrid_object>());
+const _: () = assert!(align_of::<Object<'_>>() <= align_of::<hgrid_object>());
+
+/// A built scene and its objects, ready for queries: a view, held by value as a `hgrid_grid`. It holds the addresses of its
+/// blob and of the array of its objects.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_scene {
+    /// Private; some of its bytes may never have been written.
+    pub opaque: [MaybeUninit<u64>; 64],
+}
+
+impl hgrid_scene {
+    /// What means nothing.
+    pub const NONE: Self = Self { opaque: [MaybeUninit::zeroed(); 64] };
+}
+
+/// A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. All else is as in
+/// `hgrid_ray`; an origin beyond the range of float misses.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_ray_f64 {
+    /// Where `t` is 0, in scene units.
+    pub origin: [f64; 3],
+    /// The direction, any length but zero.
+    pub direction: [f32; 3],
+    /// The smallest `t` that is accepted.
+    pub t_min: f32,
+    /// The largest `t` that is accepted.
+    pub t_max: f32,
+    /// Not read.
+    pub reserved: u32,
+}
+
+/// Where a ray meets a scene: 32 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_scene_hit {
+    /// Distance in multiples of the ray's direction.
+    pub t: f32,
+    /// Weight of the triangle's second vertex, 0 to 1; of a shape what its test says.
+    pub u: f32,
+    /// Weight of the triangle's third vertex, 0 to 1; of a shape what its test says.
+    pub v: f32,
+    /// The triangle or shape in its object.
+    pub primitive: u32,
+    /// The instance in the outermost scene, in the scene that it shows, and so on; the rest is `HGRID_INVALID_ID`.
+    pub path: [u32; HGRID_MAX_NESTING],
+}
+
+/// What a query of a scene may be told. Initialise it with `HGRID_SCENE_OPTIONS_INIT`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_scene_options {
+    /// `sizeof(hgrid_scene_options)`.
+    pub struct_size: u32,
+    /// An instance is seen if its mask and this have a bit in common, and so are triangles and shapes in it. With all bits,
+    /// the default, everything is seen.
+    pub mask: u32,
+    /// Which sides of triangles are not hit: one of `HGRID_CULL_...`. The front is that of the triangle in its own mesh: an
+    /// instance that mirrors does not turn it round.
+    pub cull: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Yours: passed on to `filter`.
+    pub context: *mut c_void,
+    /// Says of a `hit` whether it counts; or NULL: all do. Within an instance it is asked from near to far and about each
+    /// triangle at most once; instances come about from near to far, so a hit that it accepts may be replaced by a closer
+    /// one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it.
+    pub filter: Option<
+        unsafe extern "C" fn(context: *mut c_void, hit: *const hgrid_scene_hit) -> hgrid_verdict,
+    >,
+    /// Where to add up the work, or NULL. An instance that a ray is offered counts as a test.
+    pub counters: *mut hgrid_counters,
+}
+
+impl hgrid_scene_options {
+    /// What NULL means.
+    #[expect(clippy::cast_possible_truncation, reason = "a few words")]
+    pub(crate) const DEFAULT: Self = Self {
+        struct_size: size_of::<Self>() as u32,
+        mask: u32::MAX,
+        cull: 0,
+        reserved: 0,
+        context: null_mut(),
+        filter: None,
+        counters: null_mut(),
+    };
+
+    /// The sides as core knows them.
+    pub(crate) fn cull(&self) -> Result<Cull, hgrid_status> {
+        cull(self.cull)
+    }
+}
+
+const _: () = assert!(size_of::<hgrid_instance>() == size_of::<Instance>());
+const _: () = assert!(size_of::<hgrid_ray_f64>() == size_of::<RayF64>());
+const _: () = assert!(size_of::<hgrid_scene_hit>() == size_of::<SceneHit>());
+
+impl From<SceneHit> for hgrid_scene_hit {
+    fn from(SceneHit { t, u, v, primitive, path }: SceneHit) -> Self {
+        Self { t, u, v, primitive, path }
+    }
+}
+
+impl From<hgrid_scene_hit> for SceneHit {
+    fn from(hgrid_scene_hit { t, u, v, primitive, path }: hgrid_scene_hit) -> Self {
+        Self { t, u, v, primitive, path }
+    }
+}
+
+impl From<hgrid_ray_f64> for RayF64 {
+    fn from(ray: hgrid_ray_f64) -> Self {
+        let hgrid_ray_f64 { origin, direction, t_min, t_max, .. } = ray;
+        Self { t_min, t_max, ..Self::new(origin, direction) }
+    }
+}
+
+/// Makes an object of a grid.
+///
+/// Neither argument may be NULL. Returns `HGRID_OK`, `HGRID_ERROR_NULL_ARGUMENT`, or `HGRID_ERROR_NOT_A_GRID` for a view
+/// of zeros.
+///
+/// Threads: any number of calls at once.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_object_grid(
+    grid: *const hgrid_grid,
+    object: *mut hgrid_object,
+) -> hgrid_status {
+    // SAFETY: the caller's promise.
+    let made = unsafe { raw::grid(grid) }.and_then(|grid| {
+        let to = NonNull::new(object).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        unsafe { raw::write_object(to, Object::Grid(grid)) };
+        Ok(())
+    });
+    made.err().unwrap_or(HGRID_OK)
+}
+
+/// Makes an object of a tree of shapes, which brings its test.
+///
+/// The test gets the ray as the object sees it, in the object's space, with a direction and a range of its own, and answers
+/// for that ray. Any number of threads may call it at once. Returns what `hgrid_object_grid` returns.
+///
+/// Threads: any number of calls at once.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_object_shapes(
+    shapes: *const hgrid_shapes,
+    object: *mut hgrid_object,
+) -> hgrid_status {
+    // SAFETY: the caller's promise.
+    let made = unsafe { raw::shapes(shapes) }.and_then(|tested| {
+        let to = NonNull::new(object).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        unsafe { raw::write_object(to, Object::Shapes(&tested.shapes, tested)) };
+        Ok(())
+    });
+    made.err().unwrap_or(HGRID_OK)
+}
+
+/// Makes an object of a scene, to be shown in another one. Returns what `hgrid_object_grid` returns.
+///
+/// Threads: any number of calls at once.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_object_scene(
+    scene: *const hgrid_scene,
+    object: *mut hgrid_object,
+) -> hgrid_status {
+    // SAFETY: the caller's promise.
+    let made = unsafe { raw::scene(scene) }.and_then(|scene| {
+        let to = NonNull::new(object).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        unsafe { raw::write_object(to, Object::Scene(scene)) };
+        Ok(())
+    });
+    made.err().unwrap_or(HGRID_OK)
+}
+
+/// Tells how much memory is enough for any scene of so many instances: `hgrid_bound` for scenes. `HGRID_SCENE_BOUND` and
+/// `HGRID_SCRATCH_BOUND` are the same as constants, rounded up a little.
+///
+/// `config` may be NULL: the defaults. `report` may not be NULL. Returns what `hgrid_bound` returns, and
+/// `HGRID_ERROR_INVALID_METHOD` for another method than bvh.
+///
+/// Threads: any number of calls at once, each with a report of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_scene_bound(
+    instance_count: usize,
+    config: *const hgrid_config,
+    report: *mut hgrid_report,
+) -> hgrid_status {
+    if report.is_null() {
+        return HGRID_ERROR_NULL_ARGUMENT;
+    }
+    let call = |report: &mut hgrid_report| {
+        // SAFETY: the caller's promise.
+        unsafe { raw::settings(config) }?.scene_bound(instance_count, report)
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting(report, call) }
+}
+
+/// Builds a scene: a tree over instances of objects, in O(n).
+///
+/// The instances are copied. The array of objects is not: it stays where it is, with the views that it names, for as long
+/// as the scene is queried. An object may be shown by any number of instances. Scenes may be shown in scenes,
+/// `HGRID_MAX_NESTING` deep. The index is a blob as that of every build: it names objects by number, and `hgrid_open_scene`
+/// opens it elsewhere with the same objects.
+///
+/// ```c
+/// static hgrid_status put_twice(const hgrid_grid *grid, void *index, size_t index_bytes, void *scratch,
+///                               size_t scratch_bytes, hgrid_object *object, hgrid_scene *scene)
+/// {
+///     hgrid_instance two[2] = {HGRID_INSTANCE_INIT, HGRID_INSTANCE_INIT};
+///     hgrid_status status = hgrid_object_grid(grid, object);
+///     if (status != HGRID_OK)
+///         return status;
+///     two[1].translation[0] = 10;
+///     return hgrid_build_scene(two, 2, object, 1, NULL, index, index_bytes, scratch, scratch_bytes, scene,
+///                              NULL);
+/// }
+/// ```
+///
+/// `instances` may be NULL if there are none, and `objects` likewise; `index`, `scratch` and `scene` may not be NULL.
+/// `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and writes
+/// the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
+/// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
+///   `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+/// - with an instance, whose number is the report's `triangle`: `HGRID_ERROR_INSTANCE_OBJECT`,
+///   `HGRID_ERROR_INSTANCE_MATRIX`;
+/// - with the objects: `HGRID_ERROR_TOO_DEEP`;
+/// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, also for another method than bvh, and what `hgrid_build`
+///   returns;
+/// - with the memory: `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_SCRATCH_TOO_SMALL`.
+///
+/// Threads: as for `hgrid_build`.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_build_scene(
+    instances: *const hgrid_instance,
+    instance_count: usize,
+    objects: *const hgrid_object,
+    object_count: usize,
+    config: *const hgrid_config,
+    index: *mut c_void,
+    index_bytes: usize,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+    scene: *mut hgrid_scene,
+    report: *mut hgrid_report,
+) -> hgrid_status {
+    let index = Region { start: index, bytes: index_bytes };
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let call = |report: &mut hgrid_report| {
+        let to = NonNull::new(scene).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        let (instances, objects) = ((instances, instance_count), (objects, object_count));
+        // SAFETY: the caller's promise.
+        unsafe { raw::build_scene(instances, objects, config, [index, scratch], to, report) }
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting(report, call) }
+}
+
+/// Opens a scene that was built earlier, with the same objects in the same order: `hgrid_open` for scenes.
+///
+/// `blob` and `scene` may not be NULL; `objects` may be if there are none. Returns `HGRID_OK` and writes the view to
+/// `scene`; or returns what `hgrid_open` returns, `HGRID_ERROR_OTHER_CONTENT` for a blob that is no scene,
+/// `HGRID_ERROR_MISSING_OBJECTS` or `HGRID_ERROR_TOO_DEEP`, and leaves `scene` as it was.
+///
+/// Threads: any number of calls at once, also on the same blob, each with a view of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_open_scene(
+    blob: *const c_void,
+    blob_bytes: usize,
+    objects: *const hgrid_object,
+    object_count: usize,
+    scene: *mut hgrid_scene,
+) -> hgrid_status {
+    let (false, Some(to)) = (blob.is_null(), NonNull::new(scene)) else {
+        return HGRID_ERROR_NULL_ARGUMENT;
+    };
+    // SAFETY: the caller's promise.
+    let opened = unsafe { raw::open_scene((blob, blob_bytes), (objects, object_count), to) };
+    opened.err().unwrap_or(HGRID_OK)
+}
+
+/// Gives a built scene the instances of another moment: in place, without scratch, in less than the time of a build.
+///
+/// There are as many instances as in the build; `hgrid_refit` says when to build anew. Arguments are as those of
+/// `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the
+/// reason: `HGRID_ERROR_MESH_MISMATCH` for another number of instances, what `hgrid_open_scene` returns, and
+/// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are as they
+/// were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX`, after which the blob holds nothing of use.
+///
+/// Threads: as for `hgrid_refit`.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_refit_scene(
+    instances: *const hgrid_instance,
+    instance_count: usize,
+    objects: *const hgrid_object,
+    object_count: usize,
+    blob: *mut c_void,
+    blob_bytes: usize,
+    scene: *mut hgrid_scene,
+    report: *mut hgrid_refit_report,
+) -> hgrid_status {
+    let blob = Region { start: blob, bytes: blob_bytes };
+    let call = |report: &mut hgrid_refit_report| {
+        let to = NonNull::new(scene).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        let (instances, objects) = ((instances, instance_count), (objects, object_count));
+        // SAFETY: the caller's promise.
+        unsafe { raw::refit_scene(instances, objects, blob, to, report) }
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting_refit(report, call) }
+}
+
+/// Proves that a scene is one of its objects, in `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch: the tree and the
+/// box of every instance. The objects have proofs of their own.
+///
+/// Returns what `hgrid_validate_shapes` returns.
+///
+/// Threads: any number of calls and queries on the same scene at once, each with scratch of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_validate_scene(
+    scene: *const hgrid_scene,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+) -> hgrid_status {
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    // SAFETY: the caller's promise.
+    unsafe { raw::validate_scene(scene, scratch) }.err().unwrap_or(HGRID_OK)
+}
+
+/// Finds the closest thing in a scene that a ray hits.
+///
+/// Returns true and writes `hit`; or returns false and writes nothing. Where several are hit at the same `t`, that of the
+/// first instance is reported, and in it the lowest number. `options` may be NULL: the defaults. With another NULL, a view
+/// of zeros, or options that break the rules for structs nothing is hit.
+///
+/// A query allocates nothing and always ends. It takes up to 8 KiB of stack for the scene and for each scene inside it, and 7 KiB for a grid.
+///
+/// Threads: any number of queries on the same scene at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_intersect_scene(
+    scene: *const hgrid_scene,
+    ray: *const hgrid_ray_f64,
+    options: *const hgrid_scene_options,
+    hit: *mut hgrid_scene_hit,
+) -> bool {
+    let Some(to) = NonNull::new(hit) else { return false };
+    // SAFETY: the caller's promise.
+    let Ok(Some(found)) = (unsafe { raw::query_scene(scene, ray, options, false) }) else {
+        return false;
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::write(to, found.into()) };
+    true
+}
+
+/// Tells whether a ray hits anything in a scene: what `hgrid_intersect_scene` would return, but sooner.
+///
+/// Threads: any number of queries on the same scene at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluded_scene(
+    scene: *const hgrid_scene,
+    ray: *const hgrid_ray_f64,
+    options: *const hgrid_scene_options,
+) -> bool {
+    // SAFETY: the caller's promise.
+    matches!(unsafe { raw::query_scene(scene, ray, options, true) }, Ok(Some(_)))
+}
+
+/// Takes a normal from the space of the object that a hit names to the scene's, of length 1.
+///
+/// `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit, cross(b - a,
+/// c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing: the hit names nothing in
+/// the scene, or the normal is null, or it is NULL and the hit names no triangle.
+///
+/// Threads: any number of calls and queries on the same scene at once.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_scene_normal(
+    scene: *const hgrid_scene,
+    hit: *const hgrid_scene_hit,
+    object_normal: *const f32,
+    normal: *mut f32,
+) -> bool {
+    let Some(to) = NonNull::new(normal.cast::<[f32; 3]>()) else { return false };
+    // SAFETY: the caller's promise.
+    let Ok(Some(found)) = (unsafe { raw::scene_normal(scene, hit, object_normal) }) else {
+        return false;
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::write(to, found) };
+    true
+}

@@ -1,0 +1,272 @@
+//! Trees over the boxes of the caller's own shapes.
+
+use core::ffi::c_void;
+use core::mem::MaybeUninit;
+use core::ptr::NonNull;
+
+use hgrid_core::ShapeHit;
+
+use crate::questions::{hgrid_hit, hgrid_query_options, hgrid_ray, hgrid_refit_report};
+use crate::raw;
+use crate::span::Region;
+use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};
+use crate::types::{hgrid_config, hgrid_report};
+
+/// Where a ray hits a shape, as the caller's test says: 12 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_shape_hit {
+    /// Distance in multiples of the ray's direction.
+    pub t: f32,
+    /// Yours: handed on in the hit.
+    pub u: f32,
+    /// Yours: handed on in the hit.
+    pub v: f32,
+}
+
+/// Tests a shape: writes `hit` and returns true if `ray` hits shape number `shape`.
+///
+/// `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
+/// NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
+/// others, about from near to far but not exactly, and for each shape at most once for each ray. It may query this
+/// tree and others, and may not be left by `longjmp` or by a C++ exception.
+#[allow(non_camel_case_types, reason = "the C name")]
+pub type hgrid_shape_test = unsafe extern "C" fn(
+    context: *mut c_void,
+    shape: u32,
+    ray: *const hgrid_ray,
+    hit: *mut hgrid_shape_hit,
+) -> bool;
+
+/// The boxes of your own shapes (spheres, curves, height fields) and the test for them. Initialise it with
+/// `HGRID_BOXES_INIT`.
+///
+/// The arrays are read where they lie, as those of a mesh, and stay unchanged for as long as the tree is queried.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_boxes {
+    /// `sizeof(hgrid_boxes)`.
+    pub struct_size: u32,
+    /// 0.
+    pub reserved: u32,
+    /// The first box: six floats, two opposite corners, x, y, z each. It should hold all of its shape. A box with a
+    /// number that is not finite, or beyond 2^120, leaves its shape out. NULL only without boxes.
+    pub boxes: *const c_void,
+    /// Bytes from one box to the next, at least 24; 0 means 24.
+    pub box_stride: usize,
+    /// Number of boxes, at most 2^31.
+    pub count: usize,
+    /// The first shape's mask, a `uint32_t`, or NULL, as those of a mesh.
+    pub masks: *const c_void,
+    /// Bytes from one mask to the next, at least 4; 0 means 4.
+    pub mask_stride: usize,
+    /// Tests a shape. May be NULL for calls that only build: then nothing is hit.
+    pub test: Option<hgrid_shape_test>,
+    /// Yours: passed on to `test`.
+    pub context: *mut c_void,
+}
+
+/// A built tree of shapes, their boxes and their test, ready for queries: a view, held by value as a `hgrid_grid`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_shapes {
+    /// Private; some of its bytes may never have been written.
+    pub opaque: [MaybeUninit<u64>; 64],
+}
+
+impl hgrid_shapes {
+    /// What means nothing.
+    pub const NONE: Self = Self { opaque: [MaybeUninit::zeroed(); 64] };
+}
+
+impl From<hgrid_shape_hit> for ShapeHit {
+    fn from(hgrid_shape_hit { t, u, v }: hgrid_shape_hit) -> Self {
+        Self { t, u, v }
+    }
+}
+
+/// Builds a tree over the boxes of your own shapes: `hgrid_build` for shapes.
+///
+/// Memory is that of a build of as many triangles: `HGRID_INDEX_BOUND`, `HGRID_SCRATCH_BOUND`, `hgrid_bound`. The
+/// method is `HGRID_METHOD_BVH`; quality, tasks and progress are as for a mesh.
+///
+/// `boxes`, `index`, `scratch` and `shapes` may not be NULL; `config` may be: the defaults. `report` may be NULL.
+/// Returns `HGRID_OK` and writes the view to `shapes`; or returns the reason and leaves `shapes` as it was:
+/// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
+///   `HGRID_ERROR_OVERLAP`;
+/// - with the boxes: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_MASKS`,
+///   `HGRID_ERROR_TOO_MANY_TRIANGLES`, `HGRID_ERROR_NON_FINITE` with `HGRID_BUILD_STRICT`;
+/// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, also for another method than bvh, and what
+///   `hgrid_build` returns;
+/// - with the memory: `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_SCRATCH_TOO_SMALL`.
+///
+/// The report is written in both cases; its `triangle` is the number of a shape.
+///
+/// Threads: as for `hgrid_build`.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_build_shapes(
+    boxes: *const hgrid_boxes,
+    config: *const hgrid_config,
+    index: *mut c_void,
+    index_bytes: usize,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+    shapes: *mut hgrid_shapes,
+    report: *mut hgrid_report,
+) -> hgrid_status {
+    let index = Region { start: index, bytes: index_bytes };
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let call = |report: &mut hgrid_report| {
+        let to = NonNull::new(shapes).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        unsafe { raw::build_shapes(boxes, config, [index, scratch], to, report) }
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting(report, call) }
+}
+
+/// Opens a tree of shapes that was built earlier: `hgrid_open` for shapes.
+///
+/// No argument may be NULL. Returns `HGRID_OK` and writes the view to `shapes`; or returns what `hgrid_open` returns
+/// (`HGRID_ERROR_OTHER_CONTENT` for a blob that is no tree of shapes), or `HGRID_ERROR_INVALID_POSITIONS` and
+/// `HGRID_ERROR_INVALID_MASKS` for the boxes, and leaves `shapes` as it was.
+///
+/// Threads: any number of calls at once, also on the same blob, each with a view of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_open_shapes(
+    blob: *const c_void,
+    blob_bytes: usize,
+    boxes: *const hgrid_boxes,
+    shapes: *mut hgrid_shapes,
+) -> hgrid_status {
+    let (false, Some(to)) = (blob.is_null(), NonNull::new(shapes)) else {
+        return HGRID_ERROR_NULL_ARGUMENT;
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::open_shapes(blob, blob_bytes, boxes, to) }.err().unwrap_or(HGRID_OK)
+}
+
+/// Gives a tree of shapes the boxes of shapes that moved: `hgrid_refit` for shapes.
+///
+/// `boxes`, `blob` and `shapes` may not be NULL; `report` may be. Returns `HGRID_OK` and writes the view to
+/// `shapes`, or returns what `hgrid_refit` returns, and blob and `shapes` are as they were.
+///
+/// Threads: as for `hgrid_refit`.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_refit_shapes(
+    boxes: *const hgrid_boxes,
+    blob: *mut c_void,
+    blob_bytes: usize,
+    shapes: *mut hgrid_shapes,
+    report: *mut hgrid_refit_report,
+) -> hgrid_status {
+    let blob = Region { start: blob, bytes: blob_bytes };
+    let call = |report: &mut hgrid_refit_report| {
+        let to = NonNull::new(shapes).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
+        // SAFETY: the caller's promise.
+        unsafe { raw::refit_shapes(boxes, blob, to, report) }
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::reporting_refit(report, call) }
+}
+
+/// Proves that a blob is a tree of its boxes: `hgrid_validate` for shapes, in `HGRID_VALIDATE_BOUND(count)` bytes of
+/// scratch.
+///
+/// Returns `HGRID_OK`, `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_NOT_A_GRID` for a view of
+/// zeros (`HGRID_SHAPES_INIT`), or `HGRID_ERROR_NULL_ARGUMENT`. The scratch overlaps nothing that the tree refers to.
+///
+/// Threads: any number of calls and queries on the same tree at once, each with scratch of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_validate_shapes(
+    shapes: *const hgrid_shapes,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+) -> hgrid_status {
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    // SAFETY: the caller's promise.
+    unsafe { raw::validate_shapes(shapes, scratch) }.err().unwrap_or(HGRID_OK)
+}
+
+/// Finds the closest shape that a ray hits.
+///
+/// Returns true and writes `hit`, with the number of the shape as `primitive` and `t`, `u` and `v` as the test said; or
+/// returns false and writes nothing. Where several shapes are hit at the same `t`, the one with the lowest number is
+/// reported. Of the options `mask`, `skip` and `counters` are looked at: sides and filters are the test's own business.
+/// `options` may be NULL. With another NULL, a view of zeros, a tree without a test, or options that break the rules for
+/// structs nothing is hit.
+///
+/// A field of spheres:
+///
+/// ```c
+/// typedef struct {
+///     float x, y, z, r;
+/// } sphere;
+///
+/// static bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
+/// {
+///     const sphere *s = (const sphere *)context + shape;
+///     const float *o = ray->origin, *d = ray->direction;
+///     const float p[3] = {o[0] - s->x, o[1] - s->y, o[2] - s->z};
+///     const float a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+///     const float b = p[0] * d[0] + p[1] * d[1] + p[2] * d[2];
+///     const float c = p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - s->r * s->r;
+///     const float root = b * b - a * c;
+///     if (root < 0)
+///         return false;
+///     hit->t = (-b - sqrtf(root)) / a;
+///     if (hit->t < ray->t_min)
+///         hit->t = (-b + sqrtf(root)) / a;
+///     hit->u = hit->v = 0;
+///     return true;
+/// }
+/// ```
+///
+/// Threads: any number of queries on the same tree at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_intersect_shapes(
+    shapes: *const hgrid_shapes,
+    ray: *const hgrid_ray,
+    options: *const hgrid_query_options,
+    hit: *mut hgrid_hit,
+) -> bool {
+    let Some(to) = NonNull::new(hit) else { return false };
+    // SAFETY: the caller's promise.
+    let Ok(Some(found)) = (unsafe { raw::query_shapes(shapes, ray, options, false) }) else {
+        return false;
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::write(to, found.into()) };
+    true
+}
+
+/// Tells whether a ray hits any shape: what `hgrid_intersect_shapes` would return, but sooner.
+///
+/// Threads: any number of queries on the same tree at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluded_shapes(
+    shapes: *const hgrid_shapes,
+    ray: *const hgrid_ray,
+    options: *const hgrid_query_options,
+) -> bool {
+    // SAFETY: the caller's promise.
+    matches!(unsafe { raw::query_shapes(shapes, ray, options, true) }, Ok(Some(_)))
+}
