@@ -239,6 +239,12 @@
 #define HGRID_VALIDATE_BOUND(triangles) ((size_t)(triangles) / 32 * 4 + 4)
 
 /**
+ * Bytes of index that are enough for any scene of so many instances, with the default configuration; of scratch
+ * `HGRID_SCRATCH_BOUND` is enough. With 32 bits the result wraps beyond 38 million instances.
+ */
+#define HGRID_SCENE_BOUND(instances) ((size_t)112 * (instances) + 896)
+
+/**
  * The id that no triangle has.
  */
 #define HGRID_INVALID_ID UINT32_MAX
@@ -388,6 +394,11 @@
  * counter-clockwise.
  */
 #define HGRID_CULL_FRONT 2
+
+/**
+ * Scenes inside one another, at most, the outermost included.
+ */
+#define HGRID_MAX_NESTING 4
 
 /**
  * Raised when programs must change to go on working.
@@ -990,6 +1001,231 @@ typedef struct hgrid_statistics {
     uint64_t content_hash;
 } hgrid_statistics;
 
+/**
+ * Where a ray hits a shape, as the caller's test says: 12 bytes.
+ */
+typedef struct hgrid_shape_hit {
+    /**
+     * Distance in multiples of the ray's direction.
+     */
+    float t;
+    /**
+     * Yours: handed on in the hit.
+     */
+    float u;
+    /**
+     * Yours: handed on in the hit.
+     */
+    float v;
+} hgrid_shape_hit;
+
+/**
+ * The boxes of your own shapes (spheres, curves, height fields) and the test for them. Initialise it with
+ * `HGRID_BOXES_INIT`.
+ *
+ * The arrays are read where they lie, as those of a mesh, and stay unchanged for as long as the tree is queried.
+ */
+typedef struct hgrid_boxes {
+    /**
+     * `sizeof(hgrid_boxes)`.
+     */
+    uint32_t struct_size;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+    /**
+     * The first box: six floats, two opposite corners, x, y, z each. It should hold all of its shape. A box with a
+     * number that is not finite, or beyond 2^120, leaves its shape out. NULL only without boxes.
+     */
+    const void *boxes;
+    /**
+     * Bytes from one box to the next, at least 24; 0 means 24.
+     */
+    size_t box_stride;
+    /**
+     * Number of boxes, at most 2^31.
+     */
+    size_t count;
+    /**
+     * The first shape's mask, a `uint32_t`, or NULL, as those of a mesh.
+     */
+    const void *masks;
+    /**
+     * Bytes from one mask to the next, at least 4; 0 means 4.
+     */
+    size_t mask_stride;
+    /**
+     * Tests a shape: writes `hit` and returns true if `ray` hits shape number `shape`. May be NULL: then nothing is hit.
+     *
+     * `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
+     * NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
+     * others, about from near to far but not exactly, and for each shape at most once for each ray. It may query this
+     * tree and others, and may not be left by `longjmp` or by a C++ exception.
+     */
+    bool (*test)(void *context,
+                 uint32_t shape,
+                 const struct hgrid_ray *ray,
+                 struct hgrid_shape_hit *hit);
+    /**
+     * Yours: passed on to `test`.
+     */
+    void *context;
+} hgrid_boxes;
+
+/**
+ * A built tree of shapes, their boxes and their test, ready for queries: a view, held by value as a `hgrid_grid`.
+ */
+typedef struct hgrid_shapes {
+    /**
+     * Private; some of its bytes may never have been written.
+     */
+    uint64_t opaque[64];
+} hgrid_shapes;
+
+/**
+ * What instances show: a grid, a tree of shapes or a scene, by the address of its view. `hgrid_object_grid`,
+ * `hgrid_object_shapes` and `hgrid_object_scene` make it.
+ *
+ * The view stays where it is, with all that it refers to, for as long as scenes that show it are queried.
+ */
+typedef struct hgrid_object {
+    /**
+     * Private.
+     */
+    size_t opaque[4];
+} hgrid_object;
+
+/**
+ * A built scene and its objects, ready for queries: a view, held by value as a `hgrid_grid`. It holds the addresses of its
+ * blob and of the array of its objects.
+ */
+typedef struct hgrid_scene {
+    /**
+     * Private; some of its bytes may never have been written.
+     */
+    uint64_t opaque[64];
+} hgrid_scene;
+
+/**
+ * An object at a place in a scene: 72 bytes. Initialise it with `HGRID_INSTANCE_INIT`.
+ */
+typedef struct hgrid_instance {
+    /**
+     * Rows of the matrix that takes the object's directions to the scene's: `scene = linear * object + translation`.
+     * Rotations, mirrors, shears and scales of any kind, as long as the matrix has an inverse.
+     */
+    float linear[3][3];
+    /**
+     * Which of the scene's objects, from 0.
+     */
+    uint32_t object;
+    /**
+     * Where the object's origin lies in the scene. Places are computed in double: far from the scene's origin rays are
+     * traced as exactly as near it.
+     */
+    double translation[3];
+    /**
+     * Queries see the instance if their mask has a bit of it.
+     */
+    uint32_t mask;
+    /**
+     * Yours: not read.
+     */
+    uint32_t id;
+} hgrid_instance;
+
+/**
+ * A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. All else is as in
+ * `hgrid_ray`; an origin beyond the range of float misses.
+ */
+typedef struct hgrid_ray_f64 {
+    /**
+     * Where `t` is 0, in scene units.
+     */
+    double origin[3];
+    /**
+     * The direction, any length but zero.
+     */
+    float direction[3];
+    /**
+     * The smallest `t` that is accepted.
+     */
+    float t_min;
+    /**
+     * The largest `t` that is accepted.
+     */
+    float t_max;
+    /**
+     * Not read.
+     */
+    uint32_t reserved;
+} hgrid_ray_f64;
+
+/**
+ * Where a ray meets a scene: 32 bytes.
+ */
+typedef struct hgrid_scene_hit {
+    /**
+     * Distance in multiples of the ray's direction.
+     */
+    float t;
+    /**
+     * Weight of the triangle's second vertex, 0 to 1; of a shape what its test says.
+     */
+    float u;
+    /**
+     * Weight of the triangle's third vertex, 0 to 1; of a shape what its test says.
+     */
+    float v;
+    /**
+     * The triangle or shape in its object.
+     */
+    uint32_t primitive;
+    /**
+     * The instance in the outermost scene, in the scene that it shows, and so on; the rest is `HGRID_INVALID_ID`.
+     */
+    uint32_t path[HGRID_MAX_NESTING];
+} hgrid_scene_hit;
+
+/**
+ * What a query of a scene may be told. Initialise it with `HGRID_SCENE_OPTIONS_INIT`.
+ */
+typedef struct hgrid_scene_options {
+    /**
+     * `sizeof(hgrid_scene_options)`.
+     */
+    uint32_t struct_size;
+    /**
+     * An instance is seen if its mask and this have a bit in common, and so are triangles and shapes in it. With all bits,
+     * the default, everything is seen.
+     */
+    uint32_t mask;
+    /**
+     * Which sides of triangles are not hit: one of `HGRID_CULL_...`. The front is that of the triangle in its own mesh: an
+     * instance that mirrors does not turn it round.
+     */
+    uint32_t cull;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+    /**
+     * Yours: passed on to `filter`.
+     */
+    void *context;
+    /**
+     * Says of a `hit` whether it counts; or NULL: all do. Within an instance it is asked from near to far and about each
+     * triangle at most once; instances come about from near to far, so a hit that it accepts may be replaced by a closer
+     * one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it.
+     */
+    hgrid_verdict (*filter)(void *context, const struct hgrid_scene_hit *hit);
+    /**
+     * Where to add up the work, or NULL. An instance that a ray is offered counts as a test.
+     */
+    struct hgrid_counters *counters;
+} hgrid_scene_options;
+
 #if defined(HGRID_STD)
 /**
  * Where `hgrid_create` gets its memory from. Initialise it with
@@ -1235,6 +1471,32 @@ typedef struct hgrid_allocator {
  * An older version built the blob with a method that was removed, brick: build it again with another one.
  */
 #define HGRID_ERROR_METHOD_REMOVED -48
+
+/**
+ * The blob is built over something else: a grid, a tree of shapes or a scene. `hgrid_peek` tells which.
+ */
+#define HGRID_ERROR_OTHER_CONTENT -49
+
+/**
+ * An instance names an object that there is not. The report's `triangle` says which instance.
+ */
+#define HGRID_ERROR_INSTANCE_OBJECT -60
+
+/**
+ * The matrix of an instance has no inverse that float can hold, is not finite, or takes its object beyond 2^120. The
+ * report's `triangle` says which instance.
+ */
+#define HGRID_ERROR_INSTANCE_MATRIX -61
+
+/**
+ * The instances of a scene name more objects than were brought.
+ */
+#define HGRID_ERROR_MISSING_OBJECTS -62
+
+/**
+ * More scenes stand inside one another than `HGRID_MAX_NESTING`.
+ */
+#define HGRID_ERROR_TOO_DEEP -63
 
 /**
  * The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
@@ -1936,6 +2198,353 @@ size_t hgrid_validate_bytes(const struct hgrid_grid *grid);
  */
 hgrid_status hgrid_inspect(const struct hgrid_grid *grid, struct hgrid_statistics *statistics);
 
+/**
+ * Builds a tree over the boxes of your own shapes: `hgrid_build` for shapes.
+ *
+ * Memory is that of a build of as many triangles: `HGRID_INDEX_BOUND`, `HGRID_SCRATCH_BOUND`, `hgrid_bound`. The
+ * method is `HGRID_METHOD_BVH`; quality, tasks and progress are as for a mesh.
+ *
+ * `boxes`, `index`, `scratch` and `shapes` may not be NULL; `config` may be: the defaults. `report` may be NULL.
+ * Returns `HGRID_OK` and writes the view to `shapes`; or returns the reason and leaves `shapes` as it was:
+ * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
+ *   `HGRID_ERROR_OVERLAP`;
+ * - with the boxes: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_MASKS`,
+ *   `HGRID_ERROR_TOO_MANY_TRIANGLES`, `HGRID_ERROR_NON_FINITE` with `HGRID_BUILD_STRICT`;
+ * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, also for another method than bvh, and what
+ *   `hgrid_build` returns;
+ * - with the memory: `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_SCRATCH_TOO_SMALL`.
+ *
+ * The report is written in both cases; its `triangle` is the number of a shape.
+ *
+ * Threads: as for `hgrid_build`.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_build_shapes(const struct hgrid_boxes *boxes,
+                                const struct hgrid_config *config,
+                                void *index,
+                                size_t index_bytes,
+                                void *scratch,
+                                size_t scratch_bytes,
+                                struct hgrid_shapes *shapes,
+                                struct hgrid_report *report);
+
+/**
+ * Opens a tree of shapes that was built earlier: `hgrid_open` for shapes.
+ *
+ * No argument may be NULL. Returns `HGRID_OK` and writes the view to `shapes`; or returns what `hgrid_open` returns
+ * (`HGRID_ERROR_OTHER_CONTENT` for a blob that is no tree of shapes), or `HGRID_ERROR_INVALID_POSITIONS` and
+ * `HGRID_ERROR_INVALID_MASKS` for the boxes, and leaves `shapes` as it was.
+ *
+ * Threads: any number of calls at once, also on the same blob, each with a view of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_open_shapes(const void *blob,
+                               size_t blob_bytes,
+                               const struct hgrid_boxes *boxes,
+                               struct hgrid_shapes *shapes);
+
+/**
+ * Gives a tree of shapes the boxes of shapes that moved: `hgrid_refit` for shapes.
+ *
+ * `boxes`, `blob` and `shapes` may not be NULL; `report` may be. Returns `HGRID_OK` and writes the view to
+ * `shapes`, or returns what `hgrid_refit` returns, and blob and `shapes` are as they were.
+ *
+ * Threads: as for `hgrid_refit`.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_refit_shapes(const struct hgrid_boxes *boxes,
+                                void *blob,
+                                size_t blob_bytes,
+                                struct hgrid_shapes *shapes,
+                                struct hgrid_refit_report *report);
+
+/**
+ * Proves that a blob is a tree of its boxes: `hgrid_validate` for shapes, in `HGRID_VALIDATE_BOUND(count)` bytes of
+ * scratch.
+ *
+ * Returns `HGRID_OK`, `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_NOT_A_GRID` for a view of
+ * zeros (`HGRID_SHAPES_INIT`), or `HGRID_ERROR_NULL_ARGUMENT`. The scratch overlaps nothing that the tree refers to.
+ *
+ * Threads: any number of calls and queries on the same tree at once, each with scratch of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_validate_shapes(const struct hgrid_shapes *shapes,
+                                   void *scratch,
+                                   size_t scratch_bytes);
+
+/**
+ * Finds the closest shape that a ray hits.
+ *
+ * Returns true and writes `hit`, with the number of the shape as `primitive` and `t`, `u` and `v` as the test said; or
+ * returns false and writes nothing. Where several shapes are hit at the same `t`, the one with the lowest number is
+ * reported. Of the options `mask`, `skip` and `counters` are looked at: sides and filters are the test's own business.
+ * `options` may be NULL. With another NULL, a view of zeros, a tree without a test, or options that break the rules for
+ * structs nothing is hit.
+ *
+ * The test for discs that lie flat:
+ *
+ * ```c
+ * typedef struct {
+ *     float x, y, z, radius;
+ * } disc;
+ *
+ * static bool meets_disc(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
+ * {
+ *     const disc *d = (const disc *)context + shape;
+ *     const float t = (d->z - ray->origin[2]) / ray->direction[2];
+ *     const float x = ray->origin[0] + t * ray->direction[0] - d->x;
+ *     const float y = ray->origin[1] + t * ray->direction[1] - d->y;
+ *     hit->t = t, hit->u = x, hit->v = y;
+ *     return x * x + y * y <= d->radius * d->radius;
+ * }
+ * ```
+ *
+ * Threads: any number of queries on the same tree at once; each thread with counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_intersect_shapes(const struct hgrid_shapes *shapes,
+                            const struct hgrid_ray *ray,
+                            const struct hgrid_query_options *options,
+                            struct hgrid_hit *hit);
+
+/**
+ * Tells whether a ray hits any shape: what `hgrid_intersect_shapes` would return, but sooner.
+ *
+ * `options` may be NULL. With another NULL, and in all cases in which that function hits nothing, the answer is false.
+ *
+ * Threads: any number of queries on the same tree at once; each thread with counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
+                           const struct hgrid_ray *ray,
+                           const struct hgrid_query_options *options);
+
+/**
+ * Makes an object of a grid.
+ *
+ * Neither argument may be NULL. Returns `HGRID_OK`, `HGRID_ERROR_NULL_ARGUMENT`, or `HGRID_ERROR_NOT_A_GRID` for a view
+ * of zeros.
+ *
+ * Threads: any number of calls at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_object_grid(const struct hgrid_grid *grid,
+                               struct hgrid_object *object);
+
+/**
+ * Makes an object of a tree of shapes, which brings its test.
+ *
+ * The test gets the ray as the object sees it, in the object's space, with a direction and a range of its own, and answers
+ * for that ray. Any number of threads may call it at once. No argument may be NULL. Returns what `hgrid_object_grid`
+ * returns.
+ *
+ * Threads: any number of calls at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_object_shapes(const struct hgrid_shapes *shapes,
+                                 struct hgrid_object *object);
+
+/**
+ * Makes an object of a scene, to be shown in another one. No argument may be NULL. Returns what `hgrid_object_grid`
+ * returns.
+ *
+ * Threads: any number of calls at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_object_scene(const struct hgrid_scene *scene,
+                                struct hgrid_object *object);
+
+/**
+ * Tells how much memory is enough for any scene of so many instances: `hgrid_bound` for scenes. `HGRID_SCENE_BOUND` and
+ * `HGRID_SCRATCH_BOUND` are the same as constants, rounded up a little.
+ *
+ * `config` may be NULL: the defaults. `report` may not be NULL. Returns what `hgrid_bound` returns, and
+ * `HGRID_ERROR_INVALID_METHOD` for another method than bvh.
+ *
+ * Threads: any number of calls at once, each with a report of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_scene_bound(size_t instance_count,
+                               const struct hgrid_config *config,
+                               struct hgrid_report *report);
+
+/**
+ * Builds a scene: a tree over instances of objects, in O(n).
+ *
+ * The instances are copied. The array of objects is not: it stays where it is, with the views that it names, for as long
+ * as the scene is queried. An object may be shown by any number of instances. Scenes may be shown in scenes,
+ * `HGRID_MAX_NESTING` deep. The index is a blob as that of every build: it names objects by number, and `hgrid_open_scene`
+ * opens it elsewhere with the same objects.
+ *
+ * ```c
+ * static hgrid_status put_twice(const hgrid_grid *grid, void *index, size_t index_bytes, void *scratch,
+ *                               size_t scratch_bytes, hgrid_object *object, hgrid_scene *scene)
+ * {
+ *     hgrid_instance two[2] = {HGRID_INSTANCE_INIT, HGRID_INSTANCE_INIT};
+ *     hgrid_status status = hgrid_object_grid(grid, object);
+ *     if (status != HGRID_OK)
+ *         return status;
+ *     two[1].translation[0] = 10;
+ *     return hgrid_build_scene(two, 2, object, 1, NULL, index, index_bytes, scratch, scratch_bytes, scene,
+ *                              NULL);
+ * }
+ * ```
+ *
+ * `instances` may be NULL if there are none, and `objects` likewise; `index`, `scratch` and `scene` may not be NULL.
+ * `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and writes
+ * the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
+ * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
+ *   `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+ * - with an instance, whose number is the report's `triangle`: `HGRID_ERROR_INSTANCE_OBJECT`,
+ *   `HGRID_ERROR_INSTANCE_MATRIX`;
+ * - with the objects: `HGRID_ERROR_TOO_DEEP`;
+ * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, also for another method than bvh, and what `hgrid_build`
+ *   returns;
+ * - with the memory: `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_SCRATCH_TOO_SMALL`.
+ *
+ * Threads: as for `hgrid_build`.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_build_scene(const struct hgrid_instance *instances,
+                               size_t instance_count,
+                               const struct hgrid_object *objects,
+                               size_t object_count,
+                               const struct hgrid_config *config,
+                               void *index,
+                               size_t index_bytes,
+                               void *scratch,
+                               size_t scratch_bytes,
+                               struct hgrid_scene *scene,
+                               struct hgrid_report *report);
+
+/**
+ * Opens a scene that was built earlier, with the same objects in the same order: `hgrid_open` for scenes.
+ *
+ * `blob` and `scene` may not be NULL; `objects` may be if there are none. Returns `HGRID_OK` and writes the view to
+ * `scene`; or returns what `hgrid_open` returns, `HGRID_ERROR_OTHER_CONTENT` for a blob that is no scene,
+ * `HGRID_ERROR_MISSING_OBJECTS` or `HGRID_ERROR_TOO_DEEP`, and leaves `scene` as it was.
+ *
+ * Threads: any number of calls at once, also on the same blob, each with a view of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_open_scene(const void *blob,
+                              size_t blob_bytes,
+                              const struct hgrid_object *objects,
+                              size_t object_count,
+                              struct hgrid_scene *scene);
+
+/**
+ * Gives a built scene the instances of another moment: in place, without scratch, in less than the time of a build.
+ *
+ * There are as many instances as in the build; `hgrid_refit` says when to build anew. Arguments are as those of
+ * `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the
+ * reason: `HGRID_ERROR_MESH_MISMATCH` for another number of instances, what `hgrid_open_scene` returns, and
+ * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are as they
+ * were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX`, after which the blob holds nothing of use.
+ *
+ * Threads: as for `hgrid_refit`.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_refit_scene(const struct hgrid_instance *instances,
+                               size_t instance_count,
+                               const struct hgrid_object *objects,
+                               size_t object_count,
+                               void *blob,
+                               size_t blob_bytes,
+                               struct hgrid_scene *scene,
+                               struct hgrid_refit_report *report);
+
+/**
+ * Proves that a scene is one of its objects, in `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch: the tree and the
+ * box of every instance. The objects have proofs of their own.
+ *
+ * `scene` may not be NULL, `scratch` only if it has no bytes. Returns what `hgrid_validate_shapes` returns.
+ *
+ * Threads: any number of calls and queries on the same scene at once, each with scratch of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_validate_scene(const struct hgrid_scene *scene,
+                                  void *scratch,
+                                  size_t scratch_bytes);
+
+/**
+ * Finds the closest thing in a scene that a ray hits.
+ *
+ * Returns true and writes `hit`; or returns false and writes nothing. Where several are hit at the same `t`, that of the
+ * first instance is reported, and in it the lowest number. `options` may be NULL: the defaults. With another NULL, a view
+ * of zeros, or options that break the rules for structs nothing is hit.
+ *
+ * A query allocates nothing and always ends. It takes up to 8 KiB of stack for the scene and for each scene inside it, and 7 KiB for a grid.
+ *
+ * Threads: any number of queries on the same scene at once; each thread with counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_intersect_scene(const struct hgrid_scene *scene,
+                           const struct hgrid_ray_f64 *ray,
+                           const struct hgrid_scene_options *options,
+                           struct hgrid_scene_hit *hit);
+
+/**
+ * Tells whether a ray hits anything in a scene: what `hgrid_intersect_scene` would return, but sooner.
+ *
+ * `options` may be NULL. With another NULL, and in all cases in which that function hits nothing, the answer is false.
+ *
+ * Threads: any number of queries on the same scene at once; each thread with counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_occluded_scene(const struct hgrid_scene *scene,
+                          const struct hgrid_ray_f64 *ray,
+                          const struct hgrid_scene_options *options);
+
+/**
+ * Takes a normal from the space of the object that a hit names to the scene's, of length 1.
+ *
+ * `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit, cross(b - a,
+ * c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing: the hit names nothing in
+ * the scene, or the normal is null, or it is NULL and the hit names no triangle.
+ *
+ * Threads: any number of calls and queries on the same scene at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_scene_normal(const struct hgrid_scene *scene,
+                        const struct hgrid_scene_hit *hit,
+                        const float *object_normal,
+                        float *normal);
+
 #if defined(HGRID_STD)
 /**
  * Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and
@@ -2087,6 +2696,22 @@ bool hgrid_has_method(uint32_t method);
                            1, 0, NULL, NULL, NULL}
 
 /**
+ * No boxes: set boxes, count, test and context.
+ */
+#define HGRID_BOXES_INIT {sizeof(hgrid_boxes), 0, NULL, 0, 0, NULL, 0, NULL, NULL}
+
+/**
+ * An instance of object 0 where it is, seen by every query.
+ */
+#define HGRID_INSTANCE_INIT {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, 0, {0, 0, 0}, 0xffffffffu, 0}
+
+/**
+ * The default options of a query of a scene.
+ */
+#define HGRID_SCENE_OPTIONS_INIT {sizeof(hgrid_scene_options), 0xffffffffu, HGRID_CULL_NONE, 0, NULL, \
+                                  NULL, NULL}
+
+/**
  * The default options of a query.
  */
 #define HGRID_QUERY_OPTIONS_INIT {sizeof(hgrid_query_options), 0xffffffffu, HGRID_CULL_NONE, \
@@ -2117,6 +2742,16 @@ bool hgrid_has_method(uint32_t method);
  * recognised and hits nothing. After a failed build or open a view is what it was before.
  */
 #define HGRID_GRID_INIT {{0}}
+
+/**
+ * Initialises a `hgrid_shapes` with zeros: a view that is recognised and hits nothing.
+ */
+#define HGRID_SHAPES_INIT {{0}}
+
+/**
+ * Initialises a `hgrid_scene` with zeros: a view that is recognised and hits nothing.
+ */
+#define HGRID_SCENE_INIT {{0}}
 
 #if defined(HGRID_STD)
 /**

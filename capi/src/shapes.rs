@@ -24,20 +24,6 @@ pub struct hgrid_shape_hit {
     pub v: f32,
 }
 
-/// Tests a shape: writes `hit` and returns true if `ray` hits shape number `shape`.
-///
-/// `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
-/// NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
-/// others, about from near to far but not exactly, and for each shape at most once for each ray. It may query this
-/// tree and others, and may not be left by `longjmp` or by a C++ exception.
-#[allow(non_camel_case_types, reason = "the C name")]
-pub type hgrid_shape_test = unsafe extern "C" fn(
-    context: *mut c_void,
-    shape: u32,
-    ray: *const hgrid_ray,
-    hit: *mut hgrid_shape_hit,
-) -> bool;
-
 /// The boxes of your own shapes (spheres, curves, height fields) and the test for them. Initialise it with
 /// `HGRID_BOXES_INIT`.
 ///
@@ -60,8 +46,20 @@ pub struct hgrid_boxes {
     pub masks: *const c_void,
     /// Bytes from one mask to the next, at least 4; 0 means 4.
     pub mask_stride: usize,
-    /// Tests a shape. May be NULL for calls that only build: then nothing is hit.
-    pub test: Option<hgrid_shape_test>,
+    /// Tests a shape: writes `hit` and returns true if `ray` hits shape number `shape`. May be NULL: then nothing is hit.
+    ///
+    /// `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
+    /// NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
+    /// others, about from near to far but not exactly, and for each shape at most once for each ray. It may query this
+    /// tree and others, and may not be left by `longjmp` or by a C++ exception.
+    pub test: Option<
+        unsafe extern "C" fn(
+            context: *mut c_void,
+            shape: u32,
+            ray: *const hgrid_ray,
+            hit: *mut hgrid_shape_hit,
+        ) -> bool,
+    >,
     /// Yours: passed on to `test`.
     pub context: *mut c_void,
 }
@@ -208,29 +206,21 @@ pub unsafe extern "C" fn hgrid_validate_shapes(
 /// `options` may be NULL. With another NULL, a view of zeros, a tree without a test, or options that break the rules for
 /// structs nothing is hit.
 ///
-/// A field of spheres:
+/// The test for discs that lie flat:
 ///
 /// ```c
 /// typedef struct {
-///     float x, y, z, r;
-/// } sphere;
+///     float x, y, z, radius;
+/// } disc;
 ///
-/// static bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
+/// static bool meets_disc(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
 /// {
-///     const sphere *s = (const sphere *)context + shape;
-///     const float *o = ray->origin, *d = ray->direction;
-///     const float p[3] = {o[0] - s->x, o[1] - s->y, o[2] - s->z};
-///     const float a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-///     const float b = p[0] * d[0] + p[1] * d[1] + p[2] * d[2];
-///     const float c = p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - s->r * s->r;
-///     const float root = b * b - a * c;
-///     if (root < 0)
-///         return false;
-///     hit->t = (-b - sqrtf(root)) / a;
-///     if (hit->t < ray->t_min)
-///         hit->t = (-b + sqrtf(root)) / a;
-///     hit->u = hit->v = 0;
-///     return true;
+///     const disc *d = (const disc *)context + shape;
+///     const float t = (d->z - ray->origin[2]) / ray->direction[2];
+///     const float x = ray->origin[0] + t * ray->direction[0] - d->x;
+///     const float y = ray->origin[1] + t * ray->direction[1] - d->y;
+///     hit->t = t, hit->u = x, hit->v = y;
+///     return x * x + y * y <= d->radius * d->radius;
 /// }
 /// ```
 ///
@@ -256,6 +246,8 @@ pub unsafe extern "C" fn hgrid_intersect_shapes(
 }
 
 /// Tells whether a ray hits any shape: what `hgrid_intersect_shapes` would return, but sooner.
+///
+/// `options` may be NULL. With another NULL, and in all cases in which that function hits nothing, the answer is false.
 ///
 /// Threads: any number of queries on the same tree at once; each thread with counters of its own.
 ///

@@ -9,8 +9,8 @@
 #define SIZE(type) printf(#type " %zu\n", sizeof(type))
 #define OFFSET(type, field) printf(#type "." #field " %zu\n", offsetof(type, field))
 #define BOUNDS(count) \
-    printf("bounds %lu %zu %zu %zu %zu %zu %zu %zu\n", (unsigned long)(count), \
-           HGRID_VALIDATE_BOUND(count), HGRID_INDEX_BOUND(count), HGRID_SCRATCH_BOUND(count), \
+    printf("bounds %lu %zu %zu %zu %zu %zu %zu %zu %zu\n", (unsigned long)(count), \
+           HGRID_VALIDATE_BOUND(count), HGRID_SCENE_BOUND(count), HGRID_INDEX_BOUND(count), HGRID_SCRATCH_BOUND(count), \
            HGRID_INDEX_BOUND_ONE_LEVEL(count), HGRID_SCRATCH_BOUND_ONE_LEVEL(count), \
            HGRID_INDEX_BOUND(count), HGRID_BVH_HIGH_SCRATCH_BOUND(count))
 
@@ -118,6 +118,52 @@ static void layout(void)
     OFFSET(hgrid_report, reserved);
     SIZE(hgrid_grid);
     OFFSET(hgrid_grid, opaque);
+    SIZE(hgrid_shape_hit);
+    OFFSET(hgrid_shape_hit, t);
+    OFFSET(hgrid_shape_hit, u);
+    OFFSET(hgrid_shape_hit, v);
+    SIZE(hgrid_boxes);
+    OFFSET(hgrid_boxes, struct_size);
+    OFFSET(hgrid_boxes, reserved);
+    OFFSET(hgrid_boxes, boxes);
+    OFFSET(hgrid_boxes, box_stride);
+    OFFSET(hgrid_boxes, count);
+    OFFSET(hgrid_boxes, masks);
+    OFFSET(hgrid_boxes, mask_stride);
+    OFFSET(hgrid_boxes, test);
+    OFFSET(hgrid_boxes, context);
+    SIZE(hgrid_shapes);
+    OFFSET(hgrid_shapes, opaque);
+    SIZE(hgrid_instance);
+    OFFSET(hgrid_instance, linear);
+    OFFSET(hgrid_instance, object);
+    OFFSET(hgrid_instance, translation);
+    OFFSET(hgrid_instance, mask);
+    OFFSET(hgrid_instance, id);
+    SIZE(hgrid_object);
+    OFFSET(hgrid_object, opaque);
+    SIZE(hgrid_scene);
+    OFFSET(hgrid_scene, opaque);
+    SIZE(hgrid_ray_f64);
+    OFFSET(hgrid_ray_f64, origin);
+    OFFSET(hgrid_ray_f64, direction);
+    OFFSET(hgrid_ray_f64, t_min);
+    OFFSET(hgrid_ray_f64, t_max);
+    OFFSET(hgrid_ray_f64, reserved);
+    SIZE(hgrid_scene_hit);
+    OFFSET(hgrid_scene_hit, t);
+    OFFSET(hgrid_scene_hit, u);
+    OFFSET(hgrid_scene_hit, v);
+    OFFSET(hgrid_scene_hit, primitive);
+    OFFSET(hgrid_scene_hit, path);
+    SIZE(hgrid_scene_options);
+    OFFSET(hgrid_scene_options, struct_size);
+    OFFSET(hgrid_scene_options, mask);
+    OFFSET(hgrid_scene_options, cull);
+    OFFSET(hgrid_scene_options, reserved);
+    OFFSET(hgrid_scene_options, context);
+    OFFSET(hgrid_scene_options, filter);
+    OFFSET(hgrid_scene_options, counters);
     SIZE(hgrid_allocator);
     OFFSET(hgrid_allocator, struct_size);
     OFFSET(hgrid_allocator, reserved);
@@ -141,6 +187,7 @@ static void constants(void)
     NUMBER(HGRID_QUALITY_FAST);
     NUMBER(HGRID_QUALITY_HIGH);
     NUMBER(HGRID_MAX_DEPTH);
+    NUMBER(HGRID_MAX_NESTING);
     NUMBER(HGRID_BUILD_STRICT);
     NUMBER(HGRID_MAX_TASKS);
     NUMBER(HGRID_CULL_NONE);
@@ -184,10 +231,15 @@ static void constants(void)
     NUMBER(HGRID_ERROR_NO_MESH);
     NUMBER(HGRID_ERROR_CANNOT_REFIT);
     NUMBER(HGRID_ERROR_METHOD_REMOVED);
+    NUMBER(HGRID_ERROR_OTHER_CONTENT);
     NUMBER(HGRID_ERROR_INVALID_RAYS);
     NUMBER(HGRID_ERROR_INVALID_ANSWERS);
     NUMBER(HGRID_ERROR_INVALID_COHERENCE);
     NUMBER(HGRID_ERROR_INVALID_CULL);
+    NUMBER(HGRID_ERROR_INSTANCE_OBJECT);
+    NUMBER(HGRID_ERROR_INSTANCE_MATRIX);
+    NUMBER(HGRID_ERROR_MISSING_OBJECTS);
+    NUMBER(HGRID_ERROR_TOO_DEEP);
 }
 
 static void versions(void)
@@ -212,6 +264,14 @@ static void defaults(void)
     const hgrid_refit_report f = HGRID_REFIT_REPORT_INIT;
     const hgrid_statistics s = HGRID_STATISTICS_INIT;
     const hgrid_allocator a = HGRID_ALLOCATOR_INIT;
+    const hgrid_boxes x = HGRID_BOXES_INIT;
+    const hgrid_scene_options n = HGRID_SCENE_OPTIONS_INIT;
+    printf("boxes %lu %lu %d %zu %zu %d %zu %d %d\n", (unsigned long)x.struct_size, (unsigned long)x.reserved,
+           x.boxes != NULL, x.box_stride, x.count, x.masks != NULL, x.mask_stride, x.test != NULL,
+           x.context != NULL);
+    printf("scene_options %lu %#lx %lu %lu %d %d %d\n", (unsigned long)n.struct_size, (unsigned long)n.mask,
+           (unsigned long)n.cull, (unsigned long)n.reserved, n.context != NULL, n.filter != NULL,
+           n.counters != NULL);
     printf("mesh %lu %lu %d %zu %zu %d %zu %zu %d %zu\n", (unsigned long)m.struct_size,
            (unsigned long)m.index_type, m.positions != NULL, m.position_stride, m.vertex_count,
            m.indices != NULL, m.index_stride, m.triangle_count, m.masks != NULL, m.mask_stride);

@@ -5,7 +5,7 @@ use std::fs;
 use std::process::Command;
 use std::sync::OnceLock;
 
-use hgrid_core::{Config, Method, Quality, Sizes};
+use hgrid_core::{Config, Method, Quality, Scene, Sizes};
 use hgrid_tests::artefact::{Flavour, compiler, compilers, is_cpp, root, run, static_library};
 use tempfile::TempDir;
 
@@ -211,7 +211,7 @@ pub(crate) fn structs() -> Vec<(String, Vec<String>)> {
             is_inside = true;
         } else if line.starts_with('}') {
             is_inside = false;
-        } else if is_inside && !line.trim_start().starts_with('*') && line.ends_with(';') {
+        } else if is_inside && line.starts_with("  ") && !line[2..].starts_with([' ', '*', '/']) {
             // `float origin[3]`, `const void *masks`, `bool (*progress)(void *context, float done)`
             let name = line.split_once("(*").map_or_else(
                 || line.trim_end_matches(';').rsplit([' ', '*']).next().unwrap_or_default(),
@@ -255,6 +255,8 @@ fn initialisers_are_the_defaults() {
         ("refit_report", "0xffffffff 0 0"),
         ("statistics", "0 0 0xffffffff 0 0 0 0 0"),
         ("allocator", "0 0 0 0"),
+        ("boxes", "0 0 0 0 0 0 0 0"),
+        ("scene_options", "0xffffffff 0 0 0 0 0"),
     ] {
         assert_eq!(fact(name), format!("{} {fields}", fact(&format!("hgrid_{name}"))), "{name}");
     }
@@ -275,12 +277,16 @@ fn bounds_are_no_less_than_those_of_core() {
     let mut count = 0;
     for line in facts().lines().filter_map(|line| line.strip_prefix("bounds ")) {
         let numbers: Vec<usize> = line.split(' ').map(|word| word.parse().unwrap()).collect();
-        let [triangles, proof, all @ ..] = &numbers[..] else { panic!("{line}") };
+        let [triangles, proof, scene, all @ ..] = &numbers[..] else { panic!("{line}") };
         // Whole words of a bit for each triangle.
         let least = triangles.div_ceil(32) * 4;
         assert!((least..=least + 4).contains(proof), "{line}");
         let triangles = u32::try_from(*triangles).unwrap();
         let tree = Config::default();
+        if let Some(bound) = Scene::bound(triangles, &tree) {
+            let is_close = *scene <= bound.index_bytes + bound.index_bytes / 16 + 1280;
+            assert!(*scene >= bound.index_bytes && (triangles > 1_000_000 || is_close), "{line}");
+        }
         let high = Config { quality: Quality::High, ..tree };
         let configs = [tree, Config::new(Method::OneLevel), high];
         assert_eq!(all.len(), 2 * configs.len());

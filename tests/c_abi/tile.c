@@ -62,6 +62,23 @@ int main(void)
         sees_light(&grid, &between, &on_second, up))
         return 9;
 
+    HGRID_ALIGNED static unsigned char scene_index[1152], shape_index[704], both_scratch[384];
+    hgrid_object object;
+    hgrid_scene scene;
+    const hgrid_ray_f64 wide = {{10.5, 0.5, 1}, {0, 0, -1}, 0, INFINITY, 0};
+    if (put_twice(&grid, scene_index, sizeof scene_index, both_scratch, sizeof both_scratch, &object, &scene) ||
+        !hgrid_occluded_scene(&scene, &wide, NULL))
+        return 12;
+    static disc discs[1] = {{1, 1, 0, 0.5f}};
+    static const float box[6] = {0.5f, 0.5f, 0, 1.5f, 1.5f, 0};
+    hgrid_boxes boxes = HGRID_BOXES_INIT;
+    hgrid_shapes shapes;
+    boxes.boxes = box, boxes.count = 1, boxes.test = meets_disc, boxes.context = discs;
+    if (hgrid_build_shapes(&boxes, NULL, shape_index, sizeof shape_index, both_scratch, sizeof both_scratch, &shapes,
+                           NULL) ||
+        !hgrid_occluded_shapes(&shapes, &rays[9], NULL) || hgrid_occluded_shapes(&shapes, &rays[0], NULL))
+        return 13;
+
     HGRID_ALIGNED static unsigned char more_index[1 << 16], more_scratch[1 << 16];
     if (build_on_threads(&mesh, more_index, sizeof more_index, more_scratch, sizeof more_scratch,
                          &grid))

@@ -20,7 +20,7 @@ use crate::questions::{
 use crate::scene::{
     hgrid_instance, hgrid_object, hgrid_ray_f64, hgrid_scene, hgrid_scene_hit, hgrid_scene_options,
 };
-use crate::shapes::{hgrid_boxes, hgrid_shape_hit, hgrid_shape_test, hgrid_shapes};
+use crate::shapes::{hgrid_boxes, hgrid_shape_hit, hgrid_shapes};
 use crate::span::{Region, Span};
 use crate::status::{
     HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_POSITIONS, HGRID_ERROR_NOT_A_GRID,
@@ -29,12 +29,16 @@ use crate::status::{
 };
 use crate::types::{Elements, hgrid_config, hgrid_report};
 
+/// The test of [`hgrid_boxes`].
+type ShapeTest =
+    unsafe extern "C" fn(*mut c_void, u32, *const hgrid_ray, *mut hgrid_shape_hit) -> bool;
+
 /// What a [`hgrid_shapes`] holds.
 #[repr(C)]
 pub(crate) struct Tested {
     tag: u64,
     pub(crate) shapes: Shapes<'static>,
-    test: Option<hgrid_shape_test>,
+    test: Option<ShapeTest>,
     context: *mut c_void,
 }
 
