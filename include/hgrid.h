@@ -2031,7 +2031,7 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
  *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
  * - with the blob: `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
  *   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_REMOVED`, `HGRID_ERROR_METHOD_LEFT_OUT`,
- *   `HGRID_ERROR_CORRUPT`;
+ *   `HGRID_ERROR_CORRUPT`, and `HGRID_ERROR_OTHER_CONTENT` for shapes and scenes;
  * - with both: `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`.
  *
  * Threads: any number of calls at once, also on the same blob, each with a view of its own.

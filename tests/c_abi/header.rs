@@ -211,7 +211,7 @@ pub(crate) fn structs() -> Vec<(String, Vec<String>)> {
             is_inside = true;
         } else if line.starts_with('}') {
             is_inside = false;
-        } else if is_inside && line.starts_with("  ") && !line[2..].starts_with([' ', '*', '/']) {
+        } else if is_inside && line.starts_with("    ") && !line[4..].starts_with([' ', '*', '/']) {
             // `float origin[3]`, `const void *masks`, `bool (*progress)(void *context, float done)`
             let name = line.split_once("(*").map_or_else(
                 || line.trim_end_matches(';').rsplit([' ', '*']).next().unwrap_or_default(),
