@@ -125,7 +125,7 @@ pub const HGRID_ERROR_CANNOT_REFIT: hgrid_status = -47;
 /// An older version built the blob with a method that was removed, brick: build it again with another one.
 pub const HGRID_ERROR_METHOD_REMOVED: hgrid_status = -48;
 
-/// The blob is built over something else: a grid, a tree of shapes or a scene. `hgrid_peek` tells which.
+/// The blob is built over something else: triangles, shapes or instances. Open it with the function for these.
 pub const HGRID_ERROR_OTHER_CONTENT: hgrid_status = -49;
 
 /// An instance names an object that there is not. The report's `triangle` says which instance.

@@ -116,12 +116,7 @@ impl Approach {
     /// The same for a ray whose origin is far away.
     #[cold]
     #[inline(never)]
-    fn from_afar(
-        ray: &Ray,
-        origin: [f64; 3],
-        bounds: &Aabb,
-        inverse: [f64; 3],
-    ) -> Option<Self> {
+    fn from_afar(ray: &Ray, origin: [f64; 3], bounds: &Aabb, inverse: [f64; 3]) -> Option<Self> {
         // In f64: the distance may be larger than any f32.
         let from_origin = Reach::of(bounds, ray.origin);
         let off = from_origin.distance * OFF;
@@ -144,8 +139,7 @@ impl Approach {
             });
         }
         let (t, _) = bounds.clip(origin, inverse)?;
-        let at =
-            |axis: usize| round(origin[axis] + t * f64::from(ray.direction[axis]));
+        let at = |axis: usize| round(origin[axis] + t * f64::from(ray.direction[axis]));
         let anchor = [at(0), at(1), at(2)];
         let (near, far) = bounds.clip(anchor.map(f64::from), inverse)?;
         let [x, y, z] = anchor.map(|coordinate| f64::from(coordinate.abs()));

@@ -17,8 +17,8 @@ use crate::blob::{BLOB_VERSION, HEADER_BYTES, HasMesh, Header, corrupt};
 use crate::config::Method;
 use crate::error::{Error, Region};
 use crate::grid::Grid;
-use crate::scene::ends_of;
 use crate::mesh::{Content, IndexType, MAX_TRIANGLES, Strided, TriangleMesh};
+use crate::scene::ends_of;
 
 /// What the header of a blob says, whether or not the rest of it is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

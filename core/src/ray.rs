@@ -136,7 +136,8 @@ pub(crate) const fn round(x: f64) -> f32 {
     x as f32
 }
 
-const _: () = assert!(size_of::<Ray>() == 32 && size_of::<Hit>() == 16 && size_of::<RayF64>() == 48);
+const _: () =
+    assert!(size_of::<Ray>() == 32 && size_of::<Hit>() == 16 && size_of::<RayF64>() == 48);
 
 #[cfg(test)]
 mod tests {

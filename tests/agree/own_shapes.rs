@@ -2,9 +2,7 @@
 
 use std::collections::HashSet;
 
-use hgrid_core::{
-    Boxes, Config, Counters, Quality, QueryOptions, Ray, ShapeHit, Shapes, Strided,
-};
+use hgrid_core::{Boxes, Config, Counters, Quality, QueryOptions, Ray, ShapeHit, Shapes, Strided};
 use hgrid_tests::random::Random;
 use hgrid_tests::scenes::Built;
 
@@ -69,9 +67,10 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
                 let ray = ray(&mut random, round);
                 let mask = [u32::MAX, 1, 6][round % 3];
                 let seen = |id: usize| mask == u32::MAX || masks[id] & mask != 0;
-                let hits = all.iter().enumerate().filter(|(id, _)| seen(*id)).filter_map(
-                    |(id, sphere)| meet(*sphere, &ray).map(|hit| (hit.t, id as u32)),
-                );
+                let hits =
+                    all.iter().enumerate().filter(|(id, _)| seen(*id)).filter_map(
+                        |(id, sphere)| meet(*sphere, &ray).map(|hit| (hit.t, id as u32)),
+                    );
                 let expected = hits.reduce(|a, b| if b < a { b } else { a });
 
                 let mut asked = HashSet::new();
@@ -86,7 +85,10 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
                 let hit = shapes.intersect_with(&ray, &mut options, &mut test);
                 assert_eq!(hit.map(|hit| (hit.t, hit.primitive)), expected, "{ray:?}");
                 if let Some(hit) = hit {
-                    assert_eq!([hit.v, hit.u], [all[hit.primitive as usize][0], all[hit.primitive as usize][3]]);
+                    assert_eq!(
+                        [hit.v, hit.u],
+                        [all[hit.primitive as usize][0], all[hit.primitive as usize][3]]
+                    );
                 }
                 assert!(work.primitive_tests as usize <= count && asked.len() <= count);
                 let mut options = QueryOptions { mask, ..QueryOptions::default() };

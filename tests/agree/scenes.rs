@@ -91,7 +91,8 @@ fn a_scene_answers_as_each_of_its_instances_alone() {
                 let mut hits = 0;
                 for round in 0..300 {
                     let ray = ray(&mut random, round, width as f32);
-                    let expected = alone.closest(objects, &ray, |_, scene, ray| scene.intersect(ray));
+                    let expected =
+                        alone.closest(objects, &ray, |_, scene, ray| scene.intersect(ray));
                     let hit = scene.intersect(&ray);
                     assert_eq!(hit, expected, "{ray:?}");
                     assert_eq!(scene.occluded(&ray), expected.is_some(), "{ray:?}");
@@ -101,7 +102,8 @@ fn a_scene_answers_as_each_of_its_instances_alone() {
                     let with_mask = |scene: &Scene<'_>, ray: &RayF64| {
                         let mut work = Counters::default();
                         let counters = Some(&mut work);
-                        let mut options = SceneOptions { mask, counters, ..SceneOptions::default() };
+                        let mut options =
+                            SceneOptions { mask, counters, ..SceneOptions::default() };
                         scene.intersect_with(ray, &mut options)
                     };
                     let expected =
@@ -238,7 +240,8 @@ fn scenes_in_scenes_name_the_way_to_the_hit() {
         let mut depths = [0; 4];
         for round in 0..1500 {
             let ray = ray(&mut random, 5 * round + round % 4, 6.0);
-            let expected = alone.closest(&outer_objects, &ray, |_, scene, ray| scene.intersect(ray));
+            let expected =
+                alone.closest(&outer_objects, &ray, |_, scene, ray| scene.intersect(ray));
             let hit = scene.intersect(&ray);
             assert_eq!(hit, expected, "{ray:?}");
             assert_eq!(scene.occluded(&ray), hit.is_some());
@@ -286,8 +289,7 @@ fn filters_see_the_hits_of_the_scene() {
                 assert_eq!(place, 0);
                 if keeps(hit, hit.path[0]) { Verdict::Accept } else { Verdict::Reject }
             };
-            let mut options =
-                SceneOptions { filter: Some(&mut filter), ..SceneOptions::default() };
+            let mut options = SceneOptions { filter: Some(&mut filter), ..SceneOptions::default() };
             let hit = scene.intersect_with(&ray, &mut options);
             assert_eq!(hit, expected);
             assert_eq!(scene.occluded_with(&ray, &mut options), expected.is_some());
@@ -307,7 +309,8 @@ fn shapes_stand_in_scenes() {
         let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
         for k in 0..3 {
             let d = f64::from(ray.direction[k]);
-            let at = |side: usize| (f64::from(boxes[id as usize][side]) - f64::from(ray.origin[k])) / d;
+            let at =
+                |side: usize| (f64::from(boxes[id as usize][side]) - f64::from(ray.origin[k])) / d;
             let (a, b) = (at(k), at(k + 3));
             near = near.max(a.min(b));
             far = far.min(a.max(b));

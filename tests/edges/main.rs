@@ -7,4 +7,5 @@ mod mixed;
 mod packed;
 mod progress;
 mod rays;
+mod scenes;
 mod shapes;

@@ -69,6 +69,7 @@ fn a_peek_tells_what_a_blob_is() {
     each(&ball(4, 1.0), |grid| {
         let info = BlobInfo::peek(&grid.blob()[..128]).unwrap();
         let expected = BlobInfo {
+            content: hgrid_core::Content::Triangles,
             version: BLOB_VERSION,
             method: grid.method(),
             has_mesh: false,

@@ -5,4 +5,5 @@ mod invariants;
 mod mutants;
 mod random;
 mod replay;
+mod scenes;
 mod truncations;

@@ -29,7 +29,8 @@ impl Built {
         let count = u32::try_from(instances.len()).expect("not so many");
         let (mut index, mut scratch) = memory(Scene::bound(count, config))?;
         let scratch = Block::bytes_mut(&mut scratch);
-        let scene = Scene::build(instances, objects, config, Block::bytes_mut(&mut index), scratch)?;
+        let scene =
+            Scene::build(instances, objects, config, Block::bytes_mut(&mut index), scratch)?;
         scene.validate(&mut vec![0xa5; scene.validate_bytes()])?;
         Ok(Self { index })
     }

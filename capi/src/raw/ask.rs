@@ -31,7 +31,9 @@ unsafe fn options(options: *const hgrid_query_options) -> Result<Option<Asked>, 
 /// # Safety
 /// The caller's promise.
 #[inline(always)]
-pub(super) unsafe fn all_options(options: *const hgrid_query_options) -> Result<Option<Asked>, hgrid_status> {
+pub(super) unsafe fn all_options(
+    options: *const hgrid_query_options,
+) -> Result<Option<Asked>, hgrid_status> {
     if options.is_null() {
         return Ok(None);
     }

@@ -7,8 +7,8 @@ use core::ptr::NonNull;
 use core::slice;
 
 use hgrid_core::{
-    Boxes, Counters, Cull, Hit, Instance, Object, ObjectTest, QueryOptions, Ray, Scene,
-    SceneHit, SceneOptions, ShapeHit, Shapes, Sizes, Verdict,
+    Boxes, Counters, Cull, Hit, Instance, Object, ObjectTest, QueryOptions, Ray, Scene, SceneHit,
+    SceneOptions, ShapeHit, Shapes, Sizes, Verdict,
 };
 
 use super::ask::{add, all_options};
@@ -169,9 +169,8 @@ pub(crate) unsafe fn build_shapes(
     let inputs = elements(&description)?.map(|array| Span::new(array.start, array.bytes));
     // SAFETY: the caller's promise.
     let [index, scratch] = unsafe { apart(inputs, memory) }?;
-    let built = controlled(caller, |control| {
-        Shapes::build_with(boxes, &config, index, scratch, control)
-    });
+    let built =
+        controlled(caller, |control| Shapes::build_with(boxes, &config, index, scratch, control));
     let built = built.map_err(|error| report.note_error(error))?;
     report.note_built(built.blob(), Sizes::bound(boxes.count(), &config));
     report.skipped_count = built.skipped_count();

@@ -38,9 +38,9 @@ fn four<S: Simd>(
     mesh: &TriangleMesh<'_>,
     [a, b, c, d]: [u32; 4],
 ) -> ([f32x4<S>; 3], [f32x4<S>; 3]) {
-    let ([a, e], [b, f], [c, g], [d, h]) = (rows(mesh, a), rows(mesh, b), rows(mesh, c), rows(mesh, d));
-    let [x, y, z, _] =
-        transpose([load(simd, &a), load(simd, &b), load(simd, &c), load(simd, &d)]);
+    let ([a, e], [b, f], [c, g], [d, h]) =
+        (rows(mesh, a), rows(mesh, b), rows(mesh, c), rows(mesh, d));
+    let [x, y, z, _] = transpose([load(simd, &a), load(simd, &b), load(simd, &c), load(simd, &d)]);
     let [_, far_x, far_y, far_z] =
         transpose([load(simd, &e), load(simd, &f), load(simd, &g), load(simd, &h)]);
     ([x, y, z], [far_x, far_y, far_z])

@@ -181,7 +181,8 @@ fn inverse_of([a, b, c]: &Matrix) -> Option<Matrix> {
     let determinant = a[0] * p[0] + a[1] * p[1] + a[2] * p[2];
     let inverse = 1.0 / determinant;
     let is_number = inverse.is_finite() && inverse.abs() > 0.0;
-    is_number.then(|| [0, 1, 2].map(|axis| [p[axis] * inverse, q[axis] * inverse, r[axis] * inverse]))
+    is_number
+        .then(|| [0, 1, 2].map(|axis| [p[axis] * inverse, q[axis] * inverse, r[axis] * inverse]))
 }
 
 /// A ray as an object sees it.
@@ -218,7 +219,8 @@ impl Seen {
         if is_far {
             self.shift = self.entry(&center, &half)?;
         }
-        let at = |axis: usize| round(self.origin[axis] + self.shift * f64::from(self.direction[axis]));
+        let at =
+            |axis: usize| round(self.origin[axis] + self.shift * f64::from(self.direction[axis]));
         Some(Ray {
             origin: [at(0), at(1), at(2)],
             t_min: self.inward(ray.t_min),

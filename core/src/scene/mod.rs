@@ -23,8 +23,8 @@ use crate::ray::Ray;
 use crate::shapes::{ShapeHit, Shapes};
 pub use instance::Instance;
 use instance::Placed;
-pub(crate) use store::ends_of;
 pub use query::{SceneFilter, SceneHit, SceneOptions};
+pub(crate) use store::ends_of;
 
 /// Scenes inside one another, at most, the outermost included.
 pub const MAX_NESTING: usize = 4;
@@ -58,7 +58,9 @@ impl fmt::Debug for Object<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Grid(grid) => f.debug_tuple("Grid").field(&grid.method()).finish_non_exhaustive(),
-            Self::Shapes(shapes, _) => f.debug_tuple("Shapes").field(shapes).finish_non_exhaustive(),
+            Self::Shapes(shapes, _) => {
+                f.debug_tuple("Shapes").field(shapes).finish_non_exhaustive()
+            }
             Self::Scene(scene) => scene.fmt(f),
         }
     }

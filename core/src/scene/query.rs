@@ -97,11 +97,7 @@ impl Scene<'_> {
     }
 
     /// [`intersect`](Self::intersect) with options.
-    pub fn intersect_with(
-        &self,
-        ray: &RayF64,
-        options: &mut SceneOptions<'_>,
-    ) -> Option<SceneHit> {
+    pub fn intersect_with(&self, ray: &RayF64, options: &mut SceneOptions<'_>) -> Option<SceneHit> {
         self.ask(0, ray, options, false)
     }
 
@@ -260,8 +256,12 @@ impl Offered<'_, '_> {
         inside.t_max = if limit < inside.t_max { limit } else { inside.t_max };
         let outward = |hit: &Hit| outward(&seen, ray, level, number, hit);
         let mut show;
-        let mut options =
-            QueryOptions { mask, cull, counters: self.counters.as_deref_mut(), ..QueryOptions::default() };
+        let mut options = QueryOptions {
+            mask,
+            cull,
+            counters: self.counters.as_deref_mut(),
+            ..QueryOptions::default()
+        };
         let hit = match object {
             Object::Grid(grid) => {
                 if let Some(filter) = &mut self.filter {

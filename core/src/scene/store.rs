@@ -18,7 +18,9 @@ type Sides = [f32; 6];
 
 /// Bytes behind the tree: table, boxes and instances.
 const fn behind_bytes(instances: u64) -> u64 {
-    section_bytes::<Table>(1) + section_bytes::<Sides>(instances) + section_bytes::<Placed>(instances)
+    section_bytes::<Table>(1)
+        + section_bytes::<Sides>(instances)
+        + section_bytes::<Placed>(instances)
 }
 
 /// Where the tree of a scene ends and its table starts, and the bytes of all of it.
@@ -88,7 +90,8 @@ impl<'a> Scene<'a> {
             return None;
         }
         let Some(sizes) = Sizes::bound_parallel(instances, config, tasks) else { return None };
-        let index = align_up(sizes.index_bytes as u64).saturating_add(behind_bytes(instances as u64));
+        let index =
+            align_up(sizes.index_bytes as u64).saturating_add(behind_bytes(instances as u64));
         if index > usize::MAX as u64 {
             return None;
         }

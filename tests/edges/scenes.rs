@@ -1,0 +1,220 @@
+//! Odd scenes and odd shapes: a clear error or a defined answer.
+
+use hgrid_core::{
+    Block, Boxes, BuildFlags, Config, ConfigField, Content, Error, Grid, Instance, Method, Object,
+    Ray, RayF64, Scene, ShapeHit, Shapes, Strided,
+};
+use hgrid_tests::meshes::{Mesh, one_triangle};
+use hgrid_tests::owned::Owned;
+use hgrid_tests::scenes::{Built, scattered};
+
+fn with_triangle(run: impl FnOnce(&[Object<'_>])) {
+    let mesh = one_triangle();
+    let owned = Owned::build(&mesh.view(), &Config::default()).unwrap();
+    let grid: Grid<'_> = owned.open(&mesh.view()).unwrap();
+    run(&[Object::Grid(&grid)]);
+}
+
+fn scaled(scale: [f32; 3]) -> Instance {
+    let [x, y, z] = scale;
+    Instance { linear: [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]], ..Instance::new(0) }
+}
+
+#[test]
+fn an_instance_without_an_inverse_is_named() {
+    with_triangle(|objects| {
+        let shear = |a: f32| Instance {
+            linear: [[1.0, a, 0.0], [a, a * a, 0.0], [0.0, 0.0, 1.0]],
+            ..Instance::new(0)
+        };
+        let flat = Instance {
+            linear: [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]],
+            ..Instance::new(0)
+        };
+        let nowhere = |c: f64| Instance { translation: [0.0, c, 0.0], ..Instance::new(0) };
+        let bad = [
+            scaled([1.0, 0.0, 1.0]),
+            scaled([0.0; 3]),
+            scaled([f32::NAN, 1.0, 1.0]),
+            scaled([1.0, f32::INFINITY, 1.0]),
+            scaled([1e-40, 1.0, 1.0]),
+            scaled([3e38; 3]),
+            shear(1.0),
+            shear(3.0),
+            flat,
+            nowhere(f64::NAN),
+            nowhere(f64::INFINITY),
+            nowhere(1e40),
+        ];
+        for instance in bad {
+            let all = [Instance::new(0), instance];
+            let error = Built::scene(&all, objects, &Config::default()).unwrap_err();
+            assert_eq!(error, Error::InstanceWithoutInverse { instance: 1 }, "{instance:?}");
+        }
+        let missing = [Instance::new(0), Instance::new(0), Instance::new(1)];
+        let error = Built::scene(&missing, objects, &Config::default()).unwrap_err();
+        assert_eq!(error, Error::InstanceWithoutObject { instance: 2 });
+        let most = [Instance::new(u32::MAX)];
+        let error = Built::scene(&most, objects, &Config::default()).unwrap_err();
+        assert_eq!(error, Error::InstanceWithoutObject { instance: 0 });
+    });
+}
+
+#[test]
+fn scales_from_tiny_to_huge_are_traced() {
+    with_triangle(|objects| {
+        for scale in [1e-30_f32, 1e-20, 1e-6, 1.0, 1e6, 1e20, 1e30] {
+            // Uneven, too.
+            for [x, y, z] in [[1.0, 1.0, 1.0], [1.0, -0.5, 2.0], [0.25, 1.0, 1e-3]] {
+                let instance = scaled([x * scale, y * scale, z * scale]);
+                let built = Built::scene(&[instance], objects, &Config::default()).unwrap();
+                let scene = built.open(objects).unwrap();
+                let s = f64::from(scale);
+                let from = [0.25 * f64::from(x) * s, 0.25 * f64::from(y) * s, s];
+                for length in [1.0_f32, 1e-6, 1e6] {
+                    let ray = RayF64::new(from, [0.0, 0.0, -length * scale]);
+                    let hit = scene.intersect(&ray).unwrap_or_else(|| panic!("{scale} {length}"));
+                    assert!((hit.t * length - 1.0).abs() < 1e-5, "{scale} {length} {hit:?}");
+                    assert!((hit.u - 0.25).abs() < 1e-5 && (hit.v - 0.25).abs() < 1e-5);
+                    assert!(scene.occluded(&ray));
+                    let short = RayF64 { t_max: hit.t * 0.99, ..ray };
+                    assert!(!scene.occluded(&short));
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn scenes_of_nothing_are_never_hit() {
+    let nothing = Mesh::default();
+    let owned = Owned::build(&nothing.view(), &Config::default()).unwrap();
+    let grid = owned.open(&nothing.view()).unwrap();
+    let objects = [Object::Grid(&grid)];
+    for instances in [Vec::new(), vec![Instance::new(0)], scattered(30, 1, 3.0, 1)] {
+        let built = Built::scene(&instances, &objects, &Config::default()).unwrap();
+        let scene = built.open(&objects).unwrap();
+        for origin in [[0.0; 3], [0.0, 0.0, 5.0], [1e30, 0.0, 0.0]] {
+            let ray = RayF64::new(origin, [0.0, 0.5, -1.0]);
+            assert_eq!(scene.intersect(&ray), None);
+            assert!(!scene.occluded(&ray));
+        }
+        assert_eq!(scene.triangle_normal(&hgrid_core::SceneHit::MISS), None);
+        assert!(scene.object_of(&hgrid_core::SceneHit::MISS).is_none());
+    }
+}
+
+#[test]
+fn rays_that_are_none_miss_everything() {
+    with_triangle(|objects| {
+        let built = Built::scene(&[Instance::new(0)], objects, &Config::default()).unwrap();
+        let scene = built.open(objects).unwrap();
+        let ray = RayF64::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
+        assert!(scene.occluded(&ray));
+        for k in 0..3 {
+            for odd in [f64::NAN, f64::INFINITY, 1e39, f64::MAX] {
+                let mut ray = ray;
+                ray.origin[k] = odd;
+                assert!(!scene.occluded(&ray) && scene.intersect(&ray).is_none(), "{ray:?}");
+            }
+            for odd in [f32::NAN, f32::INFINITY] {
+                let mut ray = ray;
+                ray.direction[k] = odd;
+                assert!(!scene.occluded(&ray), "{ray:?}");
+            }
+        }
+        assert!(!scene.occluded(&RayF64 { direction: [0.0; 3], ..ray }));
+        assert!(!scene.occluded(&RayF64 { t_min: 2.0, t_max: 1.0, ..ray }));
+        assert!(!scene.occluded(&RayF64 { t_min: f32::NAN, ..ray }));
+        assert!(!scene.occluded(&RayF64 { t_max: f32::NAN, ..ray }));
+        assert!(scene.occluded(&RayF64 { t_min: f32::NEG_INFINITY, ..ray }));
+        assert!(scene.occluded(&RayF64 { t_min: 1.0, t_max: 1.0, ..ray }));
+    });
+}
+
+#[test]
+fn blobs_are_opened_as_what_they_are() {
+    with_triangle(|objects| {
+        let Object::Grid(grid) = objects[0] else { panic!("a grid") };
+        let scene = Built::scene(&[Instance::new(0)], objects, &Config::default()).unwrap();
+        let boxes = [[0.0, 0.0, 0.0, 1.0, 1.0, 1.0_f32]];
+        let boxes = Boxes::new(&boxes).unwrap();
+        let shapes = Built::shapes(boxes, &Config::default()).unwrap();
+        let other = |content| Error::OtherContent(content);
+        let error = Scene::open(grid.blob(), objects).unwrap_err();
+        assert_eq!(error, other(Content::Triangles));
+        let error = Scene::open(shapes.bytes(), objects).unwrap_err();
+        assert_eq!(error, other(Content::Shapes));
+        let error = Shapes::open(scene.bytes(), boxes).unwrap_err();
+        assert_eq!(error, other(Content::Instances));
+        let error = Grid::open(scene.bytes(), *grid.mesh()).unwrap_err();
+        assert_eq!(error, other(Content::Instances));
+        let error = Grid::open_packed(shapes.bytes()).unwrap_err();
+        assert_eq!(error, other(Content::Shapes));
+        let error = scene.open(&[]).unwrap_err();
+        assert_eq!(error, Error::MissingObjects { needed: 1, available: 0 });
+    });
+}
+
+#[test]
+fn boxes_that_are_none_leave_their_shapes_out() {
+    let one = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0_f32];
+    let odd = |at: usize, number: f32| {
+        let mut sides = one;
+        sides[at] = number;
+        sides
+    };
+    let boxes = [
+        odd(0, f32::NAN),
+        one,
+        odd(5, f32::INFINITY),
+        odd(3, 1e37),
+        // Turned round: two opposite corners, too.
+        [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+        // Flat, and a point.
+        [0.5, 0.0, 0.0, 0.5, 1.0, 1.0],
+        [0.5; 6],
+    ];
+    let view = Boxes::new(&boxes).unwrap();
+    let built = Built::shapes(view, &Config::default()).unwrap();
+    let shapes = Shapes::open(built.bytes(), view).unwrap();
+    assert_eq!((shapes.count(), shapes.skipped_count()), (7, 3));
+    let mut offered = Vec::new();
+    let mut test = |id: u32, _: &Ray| {
+        offered.push(id);
+        None::<ShapeHit>
+    };
+    assert_eq!(shapes.intersect(&Ray::new([0.5, 0.5, -1.0], [0.0, 0.0, 1.0]), &mut test), None);
+    offered.sort_unstable();
+    assert_eq!(offered, [1, 4, 5, 6]);
+
+    let strict = Config { flags: BuildFlags::STRICT, ..Config::default() };
+    let error = Built::shapes(view, &strict).unwrap_err();
+    assert_eq!(error, Error::NonFiniteTriangle { triangle: 0 });
+    let error = Shapes::sizes(&view, &Config::new(Method::OneLevel), &mut []).unwrap_err();
+    assert_eq!(error, Error::InvalidConfig(ConfigField::Method));
+    let short = Strided { bytes: &[0; 47], stride: 24, count: 2 };
+    assert!(Boxes::strided(short).is_err());
+    let narrow = Strided { bytes: &[0; 48], stride: 23, count: 2 };
+    assert!(Boxes::strided(narrow).is_err());
+}
+
+#[test]
+fn a_refit_of_other_instances_is_refused() {
+    with_triangle(|objects| {
+        let instances = scattered(20, 1, 5.0, 1);
+        let mut built = Built::scene(&instances, objects, &Config::default()).unwrap();
+        let before = built.bytes().to_vec();
+        let fewer = Scene::refit(built.bytes_mut(), &instances[1..], objects).unwrap_err();
+        assert_eq!(fewer, Error::MeshMismatch);
+        let none = Scene::refit(built.bytes_mut(), &instances, &[]).unwrap_err();
+        assert_eq!(none, Error::MissingObjects { needed: 1, available: 0 });
+        assert!(built.bytes() == before);
+        let mut bad = instances.clone();
+        bad[7].linear[1] = bad[7].linear[0];
+        let error = Scene::refit(built.bytes_mut(), &bad, objects).unwrap_err();
+        assert_eq!(error, Error::InstanceWithoutInverse { instance: 7 });
+        let blocks = [Block::ZERO; 2];
+        assert_eq!(Scene::open(Block::bytes(&blocks), objects).unwrap_err(), Error::NotAGrid);
+    });
+}
