@@ -16,5 +16,6 @@ mod ppm;
 mod programs;
 mod progress;
 mod readme;
+mod scenes;
 mod shading;
 mod threads;

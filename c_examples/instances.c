@@ -1,0 +1,164 @@
+/*
+ * Instances: a field of thousands of knots, turned and scaled, on a floor, under a light that is a sphere.
+ *
+ *     make -C c_examples && c_examples/build/instances instances.ppm
+ *
+ * Three objects (a mesh, another mesh, a tree with one shape) and one scene over them. The mesh of the knot is in
+ * memory once, however often it is shown.
+ */
+
+#include "grid.h"
+#include "picture.h"
+#include "vector.h"
+
+#include <hgrid.h>
+
+#include <stdbool.h>
+#include <stdlib.h>
+
+const char *const program_name = "instances";
+
+enum { SIDE = 48, KNOTS = SIDE * SIDE, COUNT = KNOTS + 2, SIZE = 256 };
+enum { KNOT, FLOOR, LIGHT, OBJECTS };
+
+/* The light: center and radius, in the scene. */
+static const float LIGHT_AT[3] = {30, 22, 10};
+static const float LIGHT_RADIUS = 3;
+
+static float next_random(void)
+{
+    static uint32_t state = 3;
+    state = state * 1664525u + 1013904223u;
+    return (float)(state >> 8) / 16777216.0f;
+}
+
+/* Where a ray enters the unit sphere. */
+static bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
+{
+    const vector from = vector_of(ray->origin), along = vector_of(ray->direction);
+    const double a = dot(along, along), b = dot(from, along), inside = b * b - a * (dot(from, from) - 1);
+    (void)context, (void)shape;
+    hit->t = inside < 0 ? NAN : (float)((-b - sqrt(inside)) / a);
+    hit->u = hit->v = 0;
+    return inside >= 0;
+}
+
+/* Knots on a lattice, each turned about the vertical by some angle and scaled. */
+static void make_instances(hgrid_instance *all)
+{
+    const hgrid_instance usual = HGRID_INSTANCE_INIT;
+    for (int i = 0; i < KNOTS; i++) {
+        hgrid_instance *one = &all[i];
+        *one = usual;
+        one->object = KNOT;
+        /* A rational turn: the same bits on every machine. */
+        const float half = 4 * next_random() - 2, size = 0.5f + 0.4f * next_random();
+        const float cosine = (1 - half * half) / (1 + half * half), sine = 2 * half / (1 + half * half);
+        one->linear[0][0] = one->linear[2][2] = size * cosine;
+        one->linear[0][2] = size * sine, one->linear[2][0] = -size * sine;
+        one->linear[1][1] = size;
+        one->translation[0] = 3.0 * (i % SIDE) + (double)next_random();
+        one->translation[1] = 1.5;
+        one->translation[2] = -3.0 * (i / SIDE) - (double)next_random();
+    }
+    all[KNOTS] = usual, all[KNOTS].object = FLOOR;
+    all[KNOTS + 1] = usual, all[KNOTS + 1].object = LIGHT;
+    for (int k = 0; k < 3; k++) {
+        all[KNOTS + 1].linear[k][k] = LIGHT_RADIUS;
+        all[KNOTS + 1].translation[k] = (double)LIGHT_AT[k];
+    }
+    /* Shadow rays do not see the light itself. */
+    all[KNOTS + 1].mask = 1;
+}
+
+/* The brightness of what a ray sees. */
+static double look(const hgrid_scene *field, const hgrid_ray_f64 *ray)
+{
+    hgrid_scene_hit hit;
+    float normal[3];
+    if (!hgrid_intersect_scene(field, ray, NULL, &hit))
+        return 0.6;
+    if (hit.path[0] == KNOTS + 1)
+        return 1;
+    if (!hgrid_scene_normal(field, &hit, NULL, normal))
+        return 0;
+    const vector along = vector_of(ray->direction);
+    const vector from = {ray->origin[0], ray->origin[1], ray->origin[2]};
+    vector up = vector_of(normal);
+    if (dot(up, along) > 0)
+        up = scale(up, -1);
+    const vector at = offset(offset(from, (double)hit.t, along), 1e-3, up);
+    const vector to = offset(vector_of(LIGHT_AT), -1, at);
+    const double facing = dot(unit(to, up), up);
+    hgrid_ray_f64 to_light = {{at.x, at.y, at.z}, {(float)to.x, (float)to.y, (float)to.z}, 0, 1, 0};
+    hgrid_scene_options options = HGRID_SCENE_OPTIONS_INIT;
+    options.mask = 2;
+    return facing <= 0 || hgrid_occluded_scene(field, &to_light, &options) ? 0.12 : 0.12 + 0.8 * facing;
+}
+
+int main(int count, char **words)
+{
+    const char *path = count > 1 ? words[1] : "instances.ppm";
+    FILE *file = open_picture(path);
+    scene knot = make_knot();
+    const hgrid_mesh mesh = mesh_of(&knot);
+    const hgrid_config config = HGRID_CONFIG_INIT;
+    built_grid grid = build_grid(&mesh, &config, 1, NULL);
+
+    /* The floor: two triangles, in static memory. */
+    static const float corners[4][3] = {{-50, 0, 50}, {250, 0, 50}, {250, 0, -250}, {-50, 0, -250}};
+    static const uint32_t halves[2][3] = {{0, 1, 2}, {0, 2, 3}};
+    HGRID_ALIGNED static unsigned char floor_index[HGRID_INDEX_BOUND(2)], small[HGRID_SCRATCH_BOUND(2)];
+    hgrid_mesh floor_mesh = HGRID_MESH_INIT;
+    floor_mesh.positions = corners, floor_mesh.vertex_count = 4;
+    floor_mesh.indices = halves, floor_mesh.triangle_count = 2;
+    hgrid_grid floor_grid;
+    check(hgrid_build(&floor_mesh, NULL, floor_index, sizeof floor_index, small, sizeof small, &floor_grid, NULL),
+          NULL);
+
+    /* The light: one shape. */
+    static const float box[6] = {-1, -1, -1, 1, 1, 1};
+    HGRID_ALIGNED static unsigned char light_index[HGRID_INDEX_BOUND(1)];
+    hgrid_boxes boxes = HGRID_BOXES_INIT;
+    boxes.boxes = box, boxes.count = 1, boxes.test = meet;
+    hgrid_shapes light;
+    check(hgrid_build_shapes(&boxes, NULL, light_index, sizeof light_index, small, sizeof small, &light, NULL), NULL);
+
+    /* All of it as a scene. Objects and views stay where they are. */
+    hgrid_object objects[OBJECTS];
+    check(hgrid_object_grid(&grid.grid, &objects[KNOT]), NULL);
+    check(hgrid_object_grid(&floor_grid, &objects[FLOOR]), NULL);
+    check(hgrid_object_shapes(&light, &objects[LIGHT]), NULL);
+    hgrid_instance *instances = (hgrid_instance *)allocate(COUNT, sizeof *instances);
+    make_instances(instances);
+    const region index = allocate_region(HGRID_SCENE_BOUND(COUNT));
+    const region scratch = allocate_region(HGRID_SCRATCH_BOUND(COUNT));
+    hgrid_report report = HGRID_REPORT_INIT;
+    hgrid_scene all;
+    check(hgrid_build_scene(instances, COUNT, objects, OBJECTS, NULL, index.start, index.bytes, scratch.start,
+                            scratch.bytes, &all, &report),
+          &report);
+    free(scratch.allocation);
+    free(instances);
+
+    unsigned char *pixels = (unsigned char *)allocate(SIZE * SIZE, 3);
+    for (int row = 0; row < SIZE; row++)
+        for (int column = 0; column < SIZE; column++) {
+            const float x = 1.4f * ((float)column + 0.5f) / SIZE - 0.7f;
+            const float y = 0.7f - 1.4f * ((float)row + 0.5f) / SIZE;
+            const hgrid_ray_f64 ray = {{20, 14, 18}, {x + 0.25f, y - 0.35f, -1}, 0, INFINITY, 0};
+            const unsigned char grey = (unsigned char)(255 * look(&all, &ray) + 0.5);
+            unsigned char *pixel = pixels + 3 * (SIZE * row + column);
+            pixel[0] = pixel[1] = pixel[2] = grey;
+        }
+    write_picture(file, path, SIZE, SIZE, pixels);
+    printf("%d instances in %lu bytes, %lu triangles in memory, wrote %s\n", COUNT,
+           (unsigned long)report.index_bytes, (unsigned long)knot.triangle_count + 2, path);
+
+    free(pixels);
+    free(index.allocation);
+    free(grid.index.allocation);
+    free(knot.positions);
+    free(knot.indices);
+    return 0;
+}

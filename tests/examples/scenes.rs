@@ -1,0 +1,44 @@
+//! Shapes and instances: the pictures of their examples, by a hash of their bytes.
+
+use std::path::Path;
+use std::process::Command;
+
+use hgrid_tests::artefact::run;
+use hgrid_tests::copy::hash;
+use tempfile::TempDir;
+
+use crate::programs::{compile, example};
+
+/// Compiles an example, runs it with a name for the picture, and returns what it printed and the picture.
+fn draw(name: &str, sources: &[&str], dir: &Path) -> (String, Vec<u8>) {
+    let sources: Vec<_> = sources.iter().map(|source| example(source)).collect();
+    let (program, picture) = (dir.join(name), dir.join("picture.ppm"));
+    let flags = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    compile(&sources, &flags, &program);
+    let printed = run(Command::new(program).arg(&picture)).stdout;
+    let picture = std::fs::read(picture).expect("the picture");
+    (String::from_utf8(printed).expect("text"), picture)
+}
+
+#[test]
+fn spheres_are_drawn() {
+    let dir = TempDir::new().expect("a folder");
+    let (printed, picture) = draw("spheres", &["spheres.c", "memory.c", "picture.c"], dir.path());
+    assert!(printed.starts_with("4000 spheres in 39360 bytes, wrote "), "{printed}");
+    assert_eq!(hash(&picture), SPHERES, "the picture is another");
+}
+
+#[test]
+fn instances_are_drawn() {
+    let dir = TempDir::new().expect("a folder");
+    let sources =
+        ["instances.c", "grid.c", "knot.c", "memory.c", "picture.c", "progress.c", "threads.c"];
+    let (printed, picture) = draw("instances", &sources, dir.path());
+    assert!(printed.starts_with("2306 instances in "), "{printed}");
+    assert!(printed.contains(", 500002 triangles in memory, "), "{printed}");
+    assert_eq!(hash(&picture), INSTANCES, "the picture is another");
+}
+
+/// What the pictures are on every machine.
+const SPHERES: u64 = 0x1f32_09fc_3d25_e416;
+const INSTANCES: u64 = 0x25d4_a99b_4af1_1c9c;
