@@ -114,8 +114,9 @@ pub(crate) fn corner<S: Simd>(vertices: [f32x4<S>; 4]) -> [f32x4<S>; 3] {
 fn read(mesh: &TriangleMesh<'_>, ids: [u32; 4]) -> ([[Row; 4]; 3], u32) {
     let (mut rows, mut used) = ([[[0; 16]; 4]; 3], 0);
     let [a, b, c] = &mut rows;
+    let mut reader = mesh.reader();
     for (lane, (((id, a), b), c)) in ids.into_iter().zip(a).zip(b).zip(c).enumerate() {
-        let Some(triangle) = mesh.triangle(id) else { continue };
+        let Some(triangle) = reader.triangle(id) else { continue };
         for (row, [x, y, z]) in [a, b, c].into_iter().zip(triangle) {
             *row = bytemuck::cast([x, y, z, 0.0]);
         }
@@ -128,7 +129,8 @@ impl RayFilter {
     /// Which of a few triangles are not dropped, as bits, one after the other: for machines without vectors.
     #[inline(never)]
     pub(crate) fn survivors(&self, mesh: &TriangleMesh<'_>, ids: &[u32]) -> u32 {
-        let passes = |id| mesh.triangle(id).is_some_and(|triangle| self.passes(&triangle));
+        let mut reader = mesh.reader();
+        let mut passes = |id| reader.triangle(id).is_some_and(|triangle| self.passes(&triangle));
         (0..).zip(ids).fold(0, |bits, (lane, &id)| bits | u32::from(passes(id)) << (lane % 32))
     }
 }

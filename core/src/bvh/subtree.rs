@@ -22,6 +22,7 @@ use fearless_simd::{Simd, f32x4, f32x8, u8x64};
 use crate::aabb::Aabb;
 use crate::eight::load;
 use crate::mesh::TriangleMesh;
+use crate::parts::Near;
 use crate::simd::Kernel;
 
 use super::layout::{Entry, MOST_ROOT, most_of_root};
@@ -157,12 +158,12 @@ impl Subtree {
     /// Reads ids, boxes and where keys change.
     #[inline(always)]
     fn read<S: Simd>(&mut self, simd: S, mesh: &TriangleMesh<'_>, entries: &[Entry]) {
-        let wide = mesh.wide();
+        let mut near = mesh.near(entries.first().map_or(0, |entry| entry[1]));
         for (entry, (id, sides)) in entries.iter().zip(self.sources.iter_mut().zip(&mut self.boxes))
         {
             *id = entry[1];
-            let Some([a, b, c]) = wide.corners(entry[1]) else {
-                *sides = slow_sides(mesh, entry[1]);
+            let Some([a, b, c]) = near.corners(entry[1]) else {
+                (*sides, near) = slow_sides(mesh, entry[1]);
                 continue;
             };
             let (a, b, c) = (load(simd, a), load(simd, b), load(simd, c));
@@ -282,13 +283,13 @@ impl Subtree {
     }
 }
 
-/// The box of a triangle that cannot be read with vectors.
+/// The box of a triangle that cannot be read with vectors or lies in another part, and what is near it.
 #[cold]
 #[inline(never)]
-fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
+fn slow_sides<'a>(mesh: &TriangleMesh<'a>, id: u32) -> (Sides, Near<'a>) {
     let bounds = mesh.corners(id).and_then(Aabb::of).unwrap_or(Aabb::EMPTY);
     let ([x, y, z], [u, v, w]) = (bounds.min.to_array(), (-bounds.max).to_array());
-    [x, y, z, 0.0, u, v, w, 0.0]
+    ([x, y, z, 0.0, u, v, w, 0.0], mesh.near(id))
 }
 
 /// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys: where
