@@ -275,7 +275,8 @@ pub struct hgrid_report {
     /// is enough, but not exact, and after a build an upper bound of that. After a build with
     /// several tasks, whether it succeeds or fails, it is that of a build with one.
     pub scratch_bytes: u64,
-    /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
+    /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`. Of joined meshes it is counted
+    /// through all of them.
     pub triangle: u32,
     /// Triangles left out because a coordinate is not finite, or beyond 2^120. Known
     /// after a build, as are all below.

@@ -47,6 +47,9 @@ impl IndexType {
 enum Layout<'a> {
     /// By three indices of so many bytes.
     Indexed(IndexType),
+    /// By three indices of four bytes. The mesh was joined before it was packed: here are the first triangles
+    /// of the parts.
+    Packed(&'a [[u8; 4]]),
     /// A "triangle" is a box of six numbers: its least corner, its greatest corner, and that again. So
     /// whatever builds and proves a tree of triangles does the same for boxes.
     Boxes(Content),
@@ -135,8 +138,6 @@ pub struct TriangleMesh<'a> {
     layout: Layout<'a>,
     /// No elements: every triangle has all bits. For parts only their number, if any has masks.
     masks: Strided<'a>,
-    /// The first triangles of the parts that a packed mesh was made of.
-    numbering: &'a [[u8; 4]],
 }
 
 impl<'a> TriangleMesh<'a> {
@@ -185,7 +186,7 @@ impl<'a> TriangleMesh<'a> {
             return Err(Error::TooManyTriangles);
         }
         let layout = Layout::Indexed(index_type);
-        Ok(Self { positions, indices, layout, masks: Strided::NONE, numbering: &[] })
+        Ok(Self { positions, indices, layout, masks: Strided::NONE })
     }
 
     /// Boxes in place of triangles.
@@ -199,7 +200,7 @@ impl<'a> TriangleMesh<'a> {
         }
         let indices = Strided { count: positions.count, ..Strided::NONE };
         let layout = Layout::Boxes(content);
-        Ok(Self { positions, indices, layout, masks: Strided::NONE, numbering: &[] })
+        Ok(Self { positions, indices, layout, masks: Strided::NONE })
     }
 
     /// Parts in place of triangles, with so many triangles and vertices in all.
@@ -212,22 +213,26 @@ impl<'a> TriangleMesh<'a> {
         let positions = Strided { count: vertices as usize, ..Strided::NONE };
         let indices = Strided { count: triangles as usize, ..Strided::NONE };
         let masks = if has_masks { indices } else { Strided::NONE };
-        Self { positions, indices, layout: Layout::Joined(parts), masks, numbering: &[] }
+        Self { positions, indices, layout: Layout::Joined(parts), masks }
     }
 
-    /// The same mesh with the first triangles of the parts that it was packed from.
+    /// The same mesh, of indices of four bytes, with the first triangles of the parts that it was packed from.
     pub(crate) const fn numbered(self, numbering: &'a [[u8; 4]]) -> Self {
-        Self { numbering, ..self }
+        debug_assert!(matches!(self.layout, Layout::Indexed(IndexType::U32)));
+        Self { layout: Layout::Packed(numbering), ..self }
     }
 
     /// The first triangles of the parts that a packed mesh was made of.
     pub(crate) const fn numbering(&self) -> &'a [[u8; 4]] {
-        self.numbering
+        match self.layout {
+            Layout::Packed(numbering) => numbering,
+            Layout::Indexed(_) | Layout::Boxes(_) | Layout::Joined(_) => &[],
+        }
     }
 
     /// Returns true for a mesh with arrays of its own.
     pub(crate) const fn can_be_part(&self) -> bool {
-        matches!(self.layout, Layout::Indexed(_))
+        matches!(self.layout, Layout::Indexed(_) | Layout::Packed(_))
     }
 
     /// The meshes that were joined ([`join`](Self::join)); none if this one was not.
@@ -235,14 +240,14 @@ impl<'a> TriangleMesh<'a> {
     pub const fn parts(&self) -> &'a [MeshPart<'a>] {
         match self.layout {
             Layout::Joined(parts) => parts,
-            Layout::Indexed(_) | Layout::Boxes(_) => &[],
+            Layout::Indexed(_) | Layout::Packed(_) | Layout::Boxes(_) => &[],
         }
     }
 
     /// What it is made of.
     pub(crate) const fn content(&self) -> Content {
         match self.layout {
-            Layout::Indexed(_) | Layout::Joined(_) => Content::Triangles,
+            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => Content::Triangles,
             Layout::Boxes(content) => content,
         }
     }
@@ -307,7 +312,7 @@ impl<'a> TriangleMesh<'a> {
     #[must_use]
     pub const fn vertex_count(&self) -> usize {
         match self.layout {
-            Layout::Indexed(_) | Layout::Joined(_) => self.positions.count,
+            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => self.positions.count,
             Layout::Boxes(_) => 2 * self.positions.count,
         }
     }
@@ -353,7 +358,7 @@ impl<'a> TriangleMesh<'a> {
     pub const fn index_type(&self) -> IndexType {
         match self.layout {
             Layout::Indexed(index_type) => index_type,
-            Layout::Boxes(_) | Layout::Joined(_) => IndexType::U32,
+            Layout::Packed(_) | Layout::Boxes(_) | Layout::Joined(_) => IndexType::U32,
         }
     }
 
@@ -491,7 +496,11 @@ impl<'a> TriangleMesh<'a> {
     pub(crate) fn wide(&self) -> WideMesh<'a> {
         let stride = |array: &Strided<'_>| u16::try_from(array.stride);
         match (stride(&self.positions), stride(&self.indices), self.layout) {
-            (Ok(position_stride), Ok(index_stride), Layout::Indexed(IndexType::U32)) => WideMesh {
+            (
+                Ok(position_stride),
+                Ok(index_stride),
+                Layout::Indexed(IndexType::U32) | Layout::Packed(_),
+            ) => WideMesh {
                 positions: self.positions.bytes,
                 indices: self.indices.bytes,
                 position_stride,
@@ -504,7 +513,7 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     fn vertices_of(&self, triangle: u32) -> Option<[usize; 3]> {
         match self.layout {
-            Layout::Indexed(IndexType::U32) => {
+            Layout::Indexed(IndexType::U32) | Layout::Packed(_) => {
                 let b = self.indices.element::<12>(triangle as usize)?;
                 let index = |at: usize| {
                     u32::from_ne_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]) as usize
@@ -528,7 +537,7 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     fn vertex(&self, vertex: usize) -> Option<[f32; 3]> {
         let b = match self.layout {
-            Layout::Indexed(_) | Layout::Joined(_) => self.positions.element::<12>(vertex)?,
+            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => self.positions.element::<12>(vertex)?,
             Layout::Boxes(_) => {
                 let corners = self.positions.element::<BOX_BYTES>(vertex / 2)?.as_chunks::<12>().0;
                 corners.get(vertex % 2)?

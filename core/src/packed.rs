@@ -216,7 +216,10 @@ impl<'a> Grid<'a> {
             mesh = mesh.with_masks(section(masks, triangles, 4).ok_or(damaged)?)?;
         }
         let parts = section(parts, header.part_count().into(), 4).ok_or(damaged)?;
-        Self::open(blob, mesh.numbered(parts.bytes.as_chunks().0))
+        if parts.count > 0 {
+            mesh = mesh.numbered(parts.bytes.as_chunks().0);
+        }
+        Self::open(blob, mesh)
     }
 
     /// Proves that the parts of a packed mesh follow one another.
