@@ -207,10 +207,10 @@ impl<'a> TriangleMesh<'a> {
     }
 
     /// The mesh or the part of a triangle for reading many triangles fast.
-    #[inline(always)]
+    #[inline(never)]
     pub(crate) fn near(&self, triangle: u32) -> Near<'a> {
-        match self.part_of(triangle) {
-            Some(part) => Near { wide: part.mesh.wide(), first: part.first },
+        match self.place_of(triangle) {
+            Some((_, part)) => Near { wide: part.mesh.wide(), first: part.first },
             None => Near { wide: self.wide(), first: 0 },
         }
     }

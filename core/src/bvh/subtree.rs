@@ -22,7 +22,6 @@ use fearless_simd::{Simd, f32x4, f32x8, u8x64};
 use crate::aabb::Aabb;
 use crate::eight::load;
 use crate::mesh::TriangleMesh;
-use crate::parts::Near;
 use crate::simd::Kernel;
 
 use super::layout::{Entry, MOST_ROOT, most_of_root};
@@ -162,8 +161,13 @@ impl Subtree {
         for (entry, (id, sides)) in entries.iter().zip(self.sources.iter_mut().zip(&mut self.boxes))
         {
             *id = entry[1];
-            let Some([a, b, c]) = near.corners(entry[1]) else {
-                (*sides, near) = slow_sides(mesh, entry[1]);
+            let mut found = near.corners(entry[1]);
+            if found.is_none() {
+                near = mesh.near(entry[1]);
+                found = near.corners(entry[1]);
+            }
+            let Some([a, b, c]) = found else {
+                *sides = slow_sides(mesh, entry[1]);
                 continue;
             };
             let (a, b, c) = (load(simd, a), load(simd, b), load(simd, c));
@@ -283,13 +287,13 @@ impl Subtree {
     }
 }
 
-/// The box of a triangle that cannot be read with vectors or lies in another part, and what is near it.
+/// The box of a triangle that cannot be read with vectors.
 #[cold]
 #[inline(never)]
-fn slow_sides<'a>(mesh: &TriangleMesh<'a>, id: u32) -> (Sides, Near<'a>) {
+fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
     let bounds = mesh.corners(id).and_then(Aabb::of).unwrap_or(Aabb::EMPTY);
     let ([x, y, z], [u, v, w]) = (bounds.min.to_array(), (-bounds.max).to_array());
-    ([x, y, z, 0.0, u, v, w, 0.0], mesh.near(id))
+    [x, y, z, 0.0, u, v, w, 0.0]
 }
 
 /// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys: where
