@@ -77,6 +77,8 @@ using hit = ::hgrid_hit;
 using closest = ::hgrid_closest;
 /// Work done by queries. See `hgrid_counters`: it begins as `{}`.
 using counters = ::hgrid_counters;
+/// Memory for one of the meshes that `mesh::join` joins. See `hgrid_part`.
+using part = ::hgrid_part;
 /// Where a ray met the mesh. See `hgrid_surface`.
 using surface = ::hgrid_surface;
 /// What a build found out. See `hgrid_report`.
@@ -172,6 +174,8 @@ enum class [[nodiscard]] status : std::int32_t {
     non_finite = HGRID_ERROR_NON_FINITE,
     /// `HGRID_ERROR_INVALID_MASKS`
     invalid_masks = HGRID_ERROR_INVALID_MASKS,
+    /// `HGRID_ERROR_INVALID_PARTS`
+    invalid_parts = HGRID_ERROR_INVALID_PARTS,
     /// `HGRID_ERROR_INVALID_METHOD`
     invalid_method = HGRID_ERROR_INVALID_METHOD,
     /// `HGRID_ERROR_INVALID_DENSITY`
@@ -537,6 +541,20 @@ public:
     /// A mesh that was described in C.
     explicit mesh(const ::hgrid_mesh &raw) noexcept : raw_(raw) {}
 
+    /// Joins meshes: describes several as one, for a grid of them all. Nothing is copied; the triangles are
+    /// numbered through all meshes, and `view::locate` tells which one a hit is on. There are as many
+    /// `parts` as meshes, and they stay where they are, unchanged, as the meshes' arrays do. See `hgrid_join`.
+    static result<mesh> join(span<const mesh> meshes, span<part> parts) noexcept
+    {
+        static_assert(sizeof(mesh) == sizeof(::hgrid_mesh), "an array of the one is one of the other");
+        if (parts.size() < meshes.size())
+            return status::invalid_parts;
+        ::hgrid_mesh all = HGRID_MESH_INIT;
+        const ::hgrid_mesh *first = meshes.empty() ? nullptr : &meshes.data()->raw_;
+        const status answer{::hgrid_join(first, meshes.size(), parts.data(), &all)};
+        return answer == status::ok ? result<mesh>(mesh(all)) : answer;
+    }
+
     /// Adds a visibility mask for each triangle. If there are not as many masks as triangles, every call
     /// with this mesh answers `invalid_masks` (one without triangles ignores them).
     mesh &masks(strided<const std::uint32_t> masks) noexcept
@@ -599,6 +617,14 @@ private:
     }
 
     ::hgrid_mesh raw_ = HGRID_MESH_INIT;
+};
+
+/// The place of a triangle among joined meshes.
+struct location {
+    /// The place of the mesh in what was joined.
+    std::uint32_t geometry;
+    /// The triangle's number in that mesh.
+    std::uint32_t triangle;
 };
 
 // --- how to build ---------------------------------------------------------------------------------
@@ -987,6 +1013,15 @@ public:
         surface found;
         return ::hgrid_surface_at(&raw_, &along, &at, &found) ? std::optional<surface>(found)
                                                               : std::nullopt;
+    }
+    /// The mesh that a triangle is of, and its number there, in a grid of joined meshes; nothing if there is no
+    /// such triangle.
+    std::optional<location> locate(std::uint32_t primitive) const noexcept
+    {
+        location found{};
+        return ::hgrid_locate(&raw_, primitive, &found.geometry, &found.triangle)
+                   ? std::optional<location>(found)
+                   : std::nullopt;
     }
     /// The mesh, wherever it lies: the caller's, or the one in a packed blob.
     result<mesh> mesh_of() const noexcept

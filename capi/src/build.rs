@@ -6,7 +6,68 @@ use core::ptr::{NonNull, null_mut};
 use crate::raw;
 use crate::span::Region;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, hgrid_status};
-use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
+use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_part, hgrid_report};
+
+/// Joins meshes: describes several of them as one, for a grid of them all.
+///
+/// Nothing is copied. Each mesh keeps its arrays, with strides and an index type of its own, and with masks or without. The
+/// triangles are numbered through all meshes, in the order of the array: a hit names one by that number,
+/// and `hgrid_locate` tells which mesh it is of and which triangle there. Where several triangles are hit at the same `t`,
+/// the one of the first mesh counts. So a grid of joined meshes is, byte by byte, that of one mesh
+/// with the same triangles, and each ray takes one walk. One mesh alone is read faster than joined ones: the
+/// part of a triangle has to be found, in a binary search.
+///
+/// ```c
+/// static hgrid_status build_both(const hgrid_mesh meshes[2], hgrid_part parts[2], void *index,
+///                                size_t index_bytes, void *scratch, size_t scratch_bytes,
+///                                hgrid_grid *grid)
+/// {
+///     hgrid_mesh joined = HGRID_MESH_INIT;
+///     const hgrid_status status = hgrid_join(meshes, 2, parts, &joined);
+///     if (status != HGRID_OK)
+///         return status;
+///     return hgrid_build(&joined, NULL, index, index_bytes, scratch, scratch_bytes, grid, NULL);
+/// }
+/// ```
+///
+/// `meshes` are `count` structs side by side, all with the same `struct_size`, none of them joined itself. They are only read
+/// during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps neither the
+/// structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a grid of the
+/// joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without
+/// triangles. `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds the
+/// number of all triangles and vertices, and `parts`; its other fields are 0 or NULL. Such a call first goes over the
+/// parts, `hgrid_open` too. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another build;
+/// after arrays moved or counts changed, join the meshes again.
+///
+/// The report of a build that fails names the triangle to blame by its number in the joined mesh: take the triangle
+/// counts of the first meshes off it.
+///
+/// Returns `HGRID_OK` and fills `joined`, or returns the reason and leaves it as it was; then `parts` may hold anything:
+/// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_OVERLAP`;
+/// - with one of the meshes: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
+///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`;
+/// - with all of them: `HGRID_ERROR_TOO_MANY_TRIANGLES`, and `HGRID_ERROR_INVALID_PARTS` if one is joined itself, or
+///   if they are more than 2^30 - 1 or have more than 2^32 - 1 vertices together.
+///
+/// Threads: any number of calls at once, each with parts and a joined mesh of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_join(
+    meshes: *const hgrid_mesh,
+    count: usize,
+    parts: *mut hgrid_part,
+    joined: *mut hgrid_mesh,
+) -> hgrid_status {
+    let call = |joined: &mut hgrid_mesh| {
+        // SAFETY: the caller's promise.
+        joined.note(&unsafe { raw::join(meshes, count, parts) }?);
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::filling(joined, call) }
+}
 
 /// Tells how much memory is enough for any mesh with so many triangles, wherever they
 /// lie: O(1), nothing is looked at.
@@ -68,8 +129,8 @@ pub unsafe extern "C" fn hgrid_bound(
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
 ///   `HGRID_ERROR_OVERLAP`;
 /// - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
-///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`,
-///   `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_NON_FINITE`;
+///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_INVALID_PARTS`,
+///   `HGRID_ERROR_TOO_MANY_TRIANGLES`, `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_NON_FINITE`;
 /// - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
 ///   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
 ///   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,

@@ -224,3 +224,50 @@ pub unsafe extern "C" fn hgrid_surface_at(
     unsafe { raw::write(to, found.into()) };
     true
 }
+
+/// Tells which mesh a triangle is of, in a grid of meshes that `hgrid_join` joined.
+///
+/// `primitive` is the number that a hit has. Returns true and writes to `geometry` the place of its mesh in the
+/// array that was joined, and to `triangle` its number in that mesh's own indices; or returns false and
+/// writes nothing: if the grid has no such triangle, for NULL, and for a view of zeros
+/// (`HGRID_GRID_INIT`).
+///
+/// In a grid of one mesh every triangle is of mesh 0. A grid that was opened from what `hgrid_pack` wrote knows
+/// the meshes as well as the one that was packed. It takes a binary search among the meshes.
+///
+/// ```c
+/// static uint32_t material_of(const hgrid_grid *grid, const hgrid_hit *hit,
+///                             const uint32_t *const *materials)
+/// {
+///     uint32_t geometry, triangle;
+///     if (!hgrid_locate(grid, hit->primitive, &geometry, &triangle))
+///         return 0;
+///     return materials[geometry][triangle];
+/// }
+/// ```
+///
+/// Threads: any number of calls and queries on the same grid at once.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_locate(
+    grid: *const hgrid_grid,
+    primitive: u32,
+    geometry: *mut u32,
+    triangle: *mut u32,
+) -> bool {
+    let (Some(to_geometry), Some(to_triangle)) = (NonNull::new(geometry), NonNull::new(triangle))
+    else {
+        return false;
+    };
+    // SAFETY: the caller's promise.
+    let Ok(Some((geometry, triangle))) = (unsafe { raw::locate(grid, primitive) }) else {
+        return false;
+    };
+    // SAFETY: the caller's promise.
+    unsafe { raw::write(to_geometry, geometry) };
+    // SAFETY: the caller's promise.
+    unsafe { raw::write(to_triangle, triangle) };
+    true
+}

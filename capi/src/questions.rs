@@ -76,7 +76,7 @@ pub struct hgrid_hit {
     pub u: f32,
     /// Weight of the triangle's third vertex, 0 to 1.
     pub v: f32,
-    /// The triangle: its position in the index array.
+    /// The triangle: its position in the index array. Of joined meshes it is counted through all of them.
     pub primitive: u32,
 }
 
@@ -209,7 +209,7 @@ pub struct hgrid_closest {
     pub u: f32,
     /// Weight of the triangle's third vertex, 0 to 1.
     pub v: f32,
-    /// The triangle: its position in the index array.
+    /// The triangle: its position in the index array. Of joined meshes it is counted through all of them.
     pub primitive: u32,
 }
 

@@ -56,12 +56,12 @@ const _: () = assert!(align_of::<Object<'_>>() <= align_of::<hgrid_object>());
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_scene {
     /// Private; some of its bytes may never have been written.
-    pub opaque: [MaybeUninit<u64>; 64],
+    pub opaque: [MaybeUninit<u64>; 72],
 }
 
 impl hgrid_scene {
     /// What means nothing.
-    pub const NONE: Self = Self { opaque: [MaybeUninit::zeroed(); 64] };
+    pub const NONE: Self = Self { opaque: [MaybeUninit::zeroed(); 72] };
 }
 
 /// A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. All else is as in

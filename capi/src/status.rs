@@ -65,6 +65,10 @@ pub const HGRID_ERROR_NON_FINITE: hgrid_status = -25;
 /// The mask stride is below 4 bytes, or the masks do not fit into memory.
 pub const HGRID_ERROR_INVALID_MASKS: hgrid_status = -26;
 
+/// The parts of a joined mesh: they were not written by `hgrid_join`, or not with these counts, or the mesh has arrays, too;
+/// or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
+pub const HGRID_ERROR_INVALID_PARTS: hgrid_status = -27;
+
 /// The configuration's `method` is none that this version knows.
 pub const HGRID_ERROR_INVALID_METHOD: hgrid_status = -30;
 
@@ -162,6 +166,7 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
         Error::InvalidMesh(MeshField::Positions) => HGRID_ERROR_INVALID_POSITIONS,
         Error::InvalidMesh(MeshField::Indices) => HGRID_ERROR_INVALID_INDICES,
         Error::InvalidMesh(MeshField::Masks) => HGRID_ERROR_INVALID_MASKS,
+        Error::InvalidMesh(MeshField::Parts) => HGRID_ERROR_INVALID_PARTS,
         Error::TooManyTriangles => HGRID_ERROR_TOO_MANY_TRIANGLES,
         Error::IndexOutOfRange { .. } => HGRID_ERROR_INDEX_OUT_OF_RANGE,
         Error::NonFiniteTriangle { .. } => HGRID_ERROR_NON_FINITE,
@@ -230,6 +235,7 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
               HGRID_BUILD_STRICT to leave it out"
         }
         HGRID_ERROR_INVALID_MASKS => c"invalid masks: one for each triangle, and mask_stride 0, or 4 and more",
+        HGRID_ERROR_INVALID_PARTS => c"invalid parts: join meshes with arrays of their own by hgrid_join, and change nothing of what it fills",
         HGRID_ERROR_INVALID_METHOD => c"unknown method: use one of HGRID_METHOD_...",
         HGRID_ERROR_INVALID_DENSITY => {
             c"invalid density: above 0, and lower if the grid would become too fine or too large"

@@ -31,7 +31,8 @@ use crate::types::{hgrid_grid, hgrid_mesh};
 /// what is wrong and leaves `grid` as it was:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`;
 /// - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
-///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_INVALID_PARTS`,
+///   `HGRID_ERROR_TOO_MANY_TRIANGLES`;
 /// - with the blob: `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
 ///   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_REMOVED`, `HGRID_ERROR_METHOD_LEFT_OUT`,
 ///   `HGRID_ERROR_CORRUPT`, and `HGRID_ERROR_OTHER_CONTENT` for shapes and scenes;
@@ -147,7 +148,8 @@ pub unsafe extern "C" fn hgrid_peek(
 ///
 /// It holds the grid, then positions, indices (of 32 bits) and masks if there are any, tight, each
 /// at a multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid.
-/// Nothing is copied when it is opened.
+/// Nothing is copied when it is opened. Meshes that were joined become one mesh with the same triangles and numbers;
+/// the blob keeps where each of them begins, in 4 bytes, and `hgrid_locate` answers as before.
 ///
 /// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh nor
 /// any argument of this call. It may be NULL if `capacity` is 0: to ask for the size.
@@ -190,7 +192,8 @@ pub unsafe extern "C" fn hgrid_pack(
 ///
 /// `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with
 /// strides that are not 0, and arrays that are NULL if they are empty; without masks both of their
-/// fields are 0. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
+/// fields are 0. Of meshes that were joined it is the joined one, unless they were packed: a packed mesh is
+/// one. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
 /// or `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
 /// it as it was.
 ///

@@ -12,6 +12,7 @@ use hgrid_core::{
     Quality, Region, Scene, Sizes, Strided, TriangleMesh, sizes,
 };
 
+use crate::raw::parts_of;
 use crate::status::{
     HGRID_ERROR_INVALID_FLAGS, HGRID_ERROR_INVALID_INDEX_TYPE, HGRID_ERROR_INVALID_INDICES,
     HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_METHOD, HGRID_ERROR_INVALID_POSITIONS,
@@ -159,6 +160,19 @@ pub struct hgrid_mesh {
     pub masks: *const c_void,
     /// Bytes from one mask to the next, at least 4; 0 means 4.
     pub mask_stride: usize,
+    /// The meshes that `hgrid_join` made this one of, or NULL. With them there are no arrays, and nothing is set by
+    /// hand.
+    pub parts: *const hgrid_part,
+    /// Number of parts.
+    pub part_count: usize,
+}
+
+/// Memory for one of the meshes that `hgrid_join` joins. It is the caller's, as the mesh is.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_part {
+    /// Private; it may hold anything before the call.
+    pub opaque: [MaybeUninit<u64>; 24],
 }
 
 /// What a build may be told: which grid, and how to go about it. Initialise it with
@@ -261,7 +275,8 @@ pub struct hgrid_report {
     /// is enough, but not exact, and after a build an upper bound of that. After a build with
     /// several tasks, whether it succeeds or fails, it is that of a build with one.
     pub scratch_bytes: u64,
-    /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
+    /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`. Of joined meshes it is counted
+    /// through all of them.
     pub triangle: u32,
     /// Triangles left out because a coordinate is not finite, or beyond 2^120. Known
     /// after a build, as are all below.
@@ -494,7 +509,18 @@ impl hgrid_mesh {
             triangle_count: indices.count,
             masks: start(&masks),
             mask_stride: masks.stride,
+            parts: parts_of(mesh),
+            part_count: mesh.parts().len(),
         };
+        if self.has_parts() {
+            self.vertex_count = mesh.vertex_count();
+            self.triangle_count = mesh.triangle_count() as usize;
+        }
+    }
+
+    /// Whether it is made of others.
+    pub(crate) const fn has_parts(&self) -> bool {
+        !self.parts.is_null() || self.part_count > 0
     }
 
     /// The width of the indices.

@@ -70,7 +70,8 @@ pub(crate) struct Header {
     pub(crate) depth: u32,
     /// What it is built over, as [`Content`] numbers it.
     content: u32,
-    /// Whether the mesh lies behind the grid: see [`HasMesh`].
+    /// Whether the mesh lies behind the grid: see [`HasMesh`]. Above these two bits the number of parts that
+    /// the mesh was joined from, 0 if it was not.
     mesh: u32,
     /// Nodes of a tree; 0 for a method without nodes.
     pub(crate) node_count: u32,
@@ -202,17 +203,22 @@ impl Header {
 
     /// Whether the mesh lies behind the grid.
     pub(crate) fn has_mesh(&self) -> Result<HasMesh, Error> {
-        match self.mesh {
-            0 => Ok(HasMesh::No),
-            1 => Ok(HasMesh::Yes),
-            2 => Ok(HasMesh::WithMasks),
+        match (self.mesh & 3, self.part_count()) {
+            (0, 0) => Ok(HasMesh::No),
+            (1, _) => Ok(HasMesh::Yes),
+            (2, _) => Ok(HasMesh::WithMasks),
             _ => Err(corrupt(core::mem::offset_of!(Self, mesh))),
         }
     }
 
-    /// The same header for a blob with a mesh.
-    pub(crate) const fn packed(self, mesh: HasMesh) -> Self {
-        Self { mesh: mesh as u32, ..self }
+    /// How many parts the mesh behind the grid was joined from; 0 if it was not.
+    pub(crate) const fn part_count(&self) -> u32 {
+        self.mesh >> 2
+    }
+
+    /// The same header for a blob with a mesh, of so many parts.
+    pub(crate) const fn packed(self, mesh: HasMesh, part_count: u32) -> Self {
+        Self { mesh: mesh as u32 | part_count << 2, ..self }
     }
 
     /// The lattice, if box and resolution can be one.

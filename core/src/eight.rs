@@ -20,6 +20,7 @@ use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 
 use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
+use crate::parts::Near;
 use crate::ray::Ray;
 
 /// How many triangles are tested at once.
@@ -42,9 +43,11 @@ impl<S: Simd> Eight<S> {
     #[inline(always)]
     pub(crate) fn of(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; LANES], count: usize) -> Self {
         let [i, j, k, l, m, n, o, p] = ids;
-        let (low, used) = four(simd, mesh, [i, j, k, l]);
+        // The part of a joined mesh that the triangles before lie in.
+        let mut near = None;
+        let (low, used) = four(simd, mesh, [i, j, k, l], &mut near);
         let (high, used_high) =
-            if count > LANES / 2 { four(simd, mesh, [m, n, o, p]) } else { (low, 0) };
+            if count > LANES / 2 { four(simd, mesh, [m, n, o, p], &mut near) } else { (low, 0) };
         // Written out: arrays that are mapped live in memory.
         let ([a, b, c], [d, e, f]) = (low, high);
         let corners = [join(a, d), join(b, e), join(c, f)];
@@ -72,7 +75,12 @@ pub(crate) fn join<S: Simd>([x, y, z]: [f32x4<S>; 3], [u, v, w]: [f32x4<S>; 3]) 
 
 /// The corners of four triangles, by corner and axis, and the lanes that are used.
 #[inline(always)]
-fn four<S: Simd>(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; 4]) -> ([[f32x4<S>; 3]; 3], u32) {
+fn four<'m, S: Simd>(
+    simd: S,
+    mesh: &TriangleMesh<'m>,
+    ids: [u32; 4],
+    near: &mut Option<Near<'m>>,
+) -> ([[f32x4<S>; 3]; 3], u32) {
     let wide = mesh.wide();
     let rows = |id: u32| -> Option<[f32x4<S>; 3]> {
         let [a, b, c] = wide.corners(id)?;
@@ -86,7 +94,7 @@ fn four<S: Simd>(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; 4]) -> ([[f32x4<S>
         let corners = [corner([a, d, g, j]), corner([b, e, h, k]), corner([c, f, i, l])];
         return (corners, 0xf);
     }
-    let (rows, used) = read(mesh, ids);
+    let (rows, used) = read(mesh, ids, near);
     (corners_of(simd, &rows), used)
 }
 
@@ -108,13 +116,32 @@ pub(crate) fn corner<S: Simd>(vertices: [f32x4<S>; 4]) -> [f32x4<S>; 3] {
     [x, y, z]
 }
 
-/// Reads triangles of which [`WideMesh::corners`](crate::mesh::WideMesh::corners) cannot read all.
+/// Reads triangles of which [`WideMesh::corners`](crate::mesh::WideMesh::corners) cannot read all: those of
+/// joined meshes among them.
 #[cold]
 #[inline(never)]
-fn read(mesh: &TriangleMesh<'_>, ids: [u32; 4]) -> ([[Row; 4]; 3], u32) {
+fn read<'m>(
+    mesh: &TriangleMesh<'m>,
+    ids: [u32; 4],
+    near: &mut Option<Near<'m>>,
+) -> ([[Row; 4]; 3], u32) {
+    let is_joined = !mesh.parts().is_empty();
     let (mut rows, mut used) = ([[[0; 16]; 4]; 3], 0);
     let [a, b, c] = &mut rows;
     for (lane, (((id, a), b), c)) in ids.into_iter().zip(a).zip(b).zip(c).enumerate() {
+        if is_joined {
+            let mut found = near.and_then(|near| near.corners(id));
+            if found.is_none() {
+                let other = mesh.near(id);
+                found = other.corners(id);
+                *near = Some(other);
+            }
+            if let Some(corners) = found {
+                [*a, *b, *c] = corners.map(|corner| *corner);
+                used |= 1 << lane;
+                continue;
+            }
+        }
         let Some(triangle) = mesh.triangle(id) else { continue };
         for (row, [x, y, z]) in [a, b, c].into_iter().zip(triangle) {
             *row = bytemuck::cast([x, y, z, 0.0]);
@@ -128,7 +155,8 @@ impl RayFilter {
     /// Which of a few triangles are not dropped, as bits, one after the other: for machines without vectors.
     #[inline(never)]
     pub(crate) fn survivors(&self, mesh: &TriangleMesh<'_>, ids: &[u32]) -> u32 {
-        let passes = |id| mesh.triangle(id).is_some_and(|triangle| self.passes(&triangle));
+        let mut reader = mesh.reader();
+        let mut passes = |id| reader.triangle(id).is_some_and(|triangle| self.passes(&triangle));
         (0..).zip(ids).fold(0, |bits, (lane, &id)| bits | u32::from(passes(id)) << (lane % 32))
     }
 }

@@ -28,6 +28,9 @@ pub enum MeshField {
     /// The masks: there are not as many as triangles, their bytes end before the last, or
     /// the stride is below four bytes.
     Masks,
+    /// The parts of a joined mesh: one of them is joined itself, they are not numbered, or
+    /// there are more of them or of their vertices than a mesh may have.
+    Parts,
 }
 
 /// An array of a batch of rays.
@@ -183,6 +186,10 @@ impl fmt::Display for Error {
             Self::InvalidMesh(MeshField::Masks) => f.write_str(
                 "there are not as many masks as triangles, their bytes end before the last, or the stride \
                  is below 4",
+            ),
+            Self::InvalidMesh(MeshField::Parts) => f.write_str(
+                "a part of the mesh is joined itself, the parts are not numbered, or they or their vertices \
+                 are too many",
             ),
             Self::TooManyTriangles => {
                 write!(f, "a grid takes at most {} triangles", crate::MAX_TRIANGLES)

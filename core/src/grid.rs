@@ -193,6 +193,7 @@ impl<'a> Grid<'a> {
         if !header.unused_is_zero(self.method()) {
             return Err(corrupt(core::mem::offset_of!(Header, macrocell_factor)));
         }
+        self.check_parts()?;
         match &self.structure {
             Structure::OneLevel(grid) if HAS_ONE_LEVEL => {
                 grid.validate(&header, &self.lattice, self.blob, &self.mesh)

@@ -25,7 +25,7 @@
 //! # Ok::<(), hgrid_core::Error>(())
 //! ```
 //!
-//! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `approach`, `triangle`,
+//! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `parts`, `approach`, `triangle`,
 //! `simd`, `eight`, `filter`, `exact`, `pairs`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`,
 //! `hash`, `cell`, `spans`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure
 //! above them (`one_level`; `fixed` and `variable` on top of it; `recursive`; `bvh`), and `grid`:
@@ -79,6 +79,7 @@ mod one_level;
 mod options;
 mod packed;
 mod pairs;
+mod parts;
 mod ray;
 mod recursive;
 mod refit;
@@ -110,6 +111,7 @@ pub use inspect::Statistics;
 pub use mesh::{Content, IndexType, MAX_TRIANGLES, Strided, Triangle, TriangleMesh};
 pub use options::{Cull, Filter, QueryOptions, Verdict};
 pub use packed::BlobInfo;
+pub use parts::MeshPart;
 pub use ray::{Hit, INVALID_ID, Ray, RayF64};
 pub use recursive::MAX_DEPTH;
 pub use refit::{Refit, refit};

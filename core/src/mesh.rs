@@ -14,6 +14,7 @@ use glam::{Vec3A, Vec4};
 
 use crate::aabb::{Aabb, MAX_COORDINATE};
 use crate::error::{Error, MeshField};
+use crate::parts::MeshPart;
 
 /// The most triangles a mesh may have: ids are 32 bits and one of them means "none". A tree
 /// takes half as many.
@@ -42,13 +43,18 @@ impl IndexType {
 }
 
 /// How the corners of a triangle are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Layout {
+#[derive(Debug, Clone, Copy)]
+enum Layout<'a> {
     /// By three indices of so many bytes.
     Indexed(IndexType),
+    /// By three indices of four bytes. The mesh was joined before it was packed: here are the first triangles
+    /// of the parts.
+    Packed(&'a [[u8; 4]]),
     /// A "triangle" is a box of six numbers: its least corner, its greatest corner, and that again. So
     /// whatever builds and proves a tree of triangles does the same for boxes.
     Boxes(Content),
+    /// In the part where the triangle lies.
+    Joined(&'a [MeshPart<'a>]),
 }
 
 /// What a blob is built over.
@@ -90,6 +96,9 @@ pub struct Strided<'a> {
 }
 
 impl<'a> Strided<'a> {
+    /// No elements.
+    const NONE: Self = Self { bytes: &[], stride: 0, count: 0 };
+
     /// The same elements of `size` bytes without the bytes after the
     /// last of them, if all lie inside.
     pub(crate) fn cut(self, size: usize) -> Option<Self> {
@@ -122,12 +131,12 @@ impl<'a> Strided<'a> {
 /// A view of the caller's triangle mesh: vertices of three floats, triangles of three indices.
 #[derive(Debug, Clone, Copy)]
 pub struct TriangleMesh<'a> {
-    /// Vertices, or boxes.
+    /// Vertices, or boxes. For parts only their number.
     positions: Strided<'a>,
-    /// For boxes only their number.
+    /// For boxes and parts only their number.
     indices: Strided<'a>,
-    layout: Layout,
-    /// No elements: every triangle has all bits.
+    layout: Layout<'a>,
+    /// No elements: every triangle has all bits. For parts only their number, if any has masks.
     masks: Strided<'a>,
 }
 
@@ -176,8 +185,8 @@ impl<'a> TriangleMesh<'a> {
         if indices.count > MAX_TRIANGLES {
             return Err(Error::TooManyTriangles);
         }
-        let masks = Strided { bytes: &[], stride: 0, count: 0 };
-        Ok(Self { positions, indices, layout: Layout::Indexed(index_type), masks })
+        let layout = Layout::Indexed(index_type);
+        Ok(Self { positions, indices, layout, masks: Strided::NONE })
     }
 
     /// Boxes in place of triangles.
@@ -189,15 +198,56 @@ impl<'a> TriangleMesh<'a> {
         if positions.count > MAX_TRIANGLES {
             return Err(Error::TooManyTriangles);
         }
-        let none = Strided { bytes: &[], stride: 0, count: 0 };
-        let indices = Strided { count: positions.count, ..none };
-        Ok(Self { positions, indices, layout: Layout::Boxes(content), masks: none })
+        let indices = Strided { count: positions.count, ..Strided::NONE };
+        let layout = Layout::Boxes(content);
+        Ok(Self { positions, indices, layout, masks: Strided::NONE })
+    }
+
+    /// Parts in place of triangles, with so many triangles and vertices in all.
+    pub(crate) const fn of_parts(
+        parts: &'a [MeshPart<'a>],
+        triangles: u32,
+        vertices: u32,
+        has_masks: bool,
+    ) -> Self {
+        let positions = Strided { count: vertices as usize, ..Strided::NONE };
+        let indices = Strided { count: triangles as usize, ..Strided::NONE };
+        let masks = if has_masks { indices } else { Strided::NONE };
+        Self { positions, indices, layout: Layout::Joined(parts), masks }
+    }
+
+    /// The same mesh, of indices of four bytes, with the first triangles of the parts that it was packed from.
+    pub(crate) const fn numbered(self, numbering: &'a [[u8; 4]]) -> Self {
+        debug_assert!(matches!(self.layout, Layout::Indexed(IndexType::U32)));
+        Self { layout: Layout::Packed(numbering), ..self }
+    }
+
+    /// The first triangles of the parts that a packed mesh was made of.
+    pub(crate) const fn numbering(&self) -> &'a [[u8; 4]] {
+        match self.layout {
+            Layout::Packed(numbering) => numbering,
+            Layout::Indexed(_) | Layout::Boxes(_) | Layout::Joined(_) => &[],
+        }
+    }
+
+    /// Returns true for a mesh with arrays of its own.
+    pub(crate) const fn can_be_part(&self) -> bool {
+        matches!(self.layout, Layout::Indexed(_) | Layout::Packed(_))
+    }
+
+    /// The meshes that were joined ([`join`](Self::join)); none if this one was not.
+    #[must_use]
+    pub const fn parts(&self) -> &'a [MeshPart<'a>] {
+        match self.layout {
+            Layout::Joined(parts) => parts,
+            Layout::Indexed(_) | Layout::Packed(_) | Layout::Boxes(_) => &[],
+        }
     }
 
     /// What it is made of.
     pub(crate) const fn content(&self) -> Content {
         match self.layout {
-            Layout::Indexed(_) => Content::Triangles,
+            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => Content::Triangles,
             Layout::Boxes(content) => content,
         }
     }
@@ -214,7 +264,7 @@ impl<'a> TriangleMesh<'a> {
     ///
     /// # Errors
     /// [`Error::InvalidMesh`] if there are not as many masks as triangles, the stride is below four
-    /// or the bytes end before the last mask.
+    /// or the bytes end before the last mask; and for a joined mesh, whose parts bring their masks.
     ///
     /// ```
     /// use hgrid_core::{Strided, TriangleMesh};
@@ -224,7 +274,9 @@ impl<'a> TriangleMesh<'a> {
     /// # Ok::<(), hgrid_core::Error>(())
     /// ```
     pub fn with_masks(self, masks: Strided<'a>) -> Result<Self, Error> {
-        let masks = masks.cut(size_of::<u32>()).filter(|masks| masks.count == self.indices.count);
+        let is_one_each = |masks: &Strided<'_>| masks.count == self.indices.count;
+        let is_joined = matches!(self.layout, Layout::Joined(_));
+        let masks = masks.cut(size_of::<u32>()).filter(is_one_each).filter(|_| !is_joined);
         Ok(Self { masks: masks.ok_or(Error::InvalidMesh(MeshField::Masks))?, ..self })
     }
 
@@ -232,7 +284,21 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     #[must_use]
     pub fn mask(&self, triangle: u32) -> u32 {
+        if let Layout::Joined(_) = self.layout {
+            return self.mask_of_part(triangle);
+        }
+        self.own_mask(triangle)
+    }
+
+    #[inline(always)]
+    fn own_mask(&self, triangle: u32) -> u32 {
         self.masks.element(triangle as usize).map_or(u32::MAX, |bytes| u32::from_ne_bytes(*bytes))
+    }
+
+    #[inline(never)]
+    fn mask_of_part(&self, triangle: u32) -> u32 {
+        let part = self.part_of(triangle);
+        part.map_or(u32::MAX, |part| part.mesh().own_mask(triangle - part.first()))
     }
 
     /// Number of triangles.
@@ -246,7 +312,7 @@ impl<'a> TriangleMesh<'a> {
     #[must_use]
     pub const fn vertex_count(&self) -> usize {
         match self.layout {
-            Layout::Indexed(_) => self.positions.count,
+            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => self.positions.count,
             Layout::Boxes(_) => 2 * self.positions.count,
         }
     }
@@ -255,35 +321,51 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     #[must_use]
     pub fn triangle(&self, triangle: u32) -> Option<Triangle> {
+        // A joined mesh has nothing of its own.
+        let found = self.own_triangle(triangle);
+        if found.is_none() && matches!(self.layout, Layout::Joined(_)) {
+            return self.triangle_of_part(triangle);
+        }
+        found
+    }
+
+    /// The corners of a triangle of a mesh that was not joined.
+    #[inline(always)]
+    pub(crate) fn own_triangle(&self, triangle: u32) -> Option<Triangle> {
         let [a, b, c] = self.vertices_of(triangle)?;
         Some([self.vertex(a)?, self.vertex(b)?, self.vertex(c)?])
     }
 
-    /// The vertices, where the caller has them.
+    /// The vertices, where the caller has them; none for a joined mesh, whose [`parts`](Self::parts) have them.
     #[must_use]
     pub const fn positions(&self) -> Strided<'a> {
-        self.positions
+        self.own(self.positions)
     }
 
-    /// The triangles, where the caller has them.
+    /// The triangles, where the caller has them; none for a joined mesh.
     #[must_use]
     pub const fn triangles(&self) -> Strided<'a> {
-        self.indices
+        self.own(self.indices)
     }
 
-    /// The width of the vertex indices.
+    /// An array, if there is one.
+    const fn own(&self, array: Strided<'a>) -> Strided<'a> {
+        if matches!(self.layout, Layout::Joined(_)) { Strided::NONE } else { array }
+    }
+
+    /// The width of the vertex indices; of a joined mesh, where each part has its own, four bytes.
     #[must_use]
     pub const fn index_type(&self) -> IndexType {
         match self.layout {
             Layout::Indexed(index_type) => index_type,
-            Layout::Boxes(_) => IndexType::U32,
+            Layout::Packed(_) | Layout::Boxes(_) | Layout::Joined(_) => IndexType::U32,
         }
     }
 
-    /// The masks, where the caller has them; none if there are none.
+    /// The masks, where the caller has them; none if there are none, and for a joined mesh.
     #[must_use]
     pub const fn masks(&self) -> Strided<'a> {
-        self.masks
+        self.own(self.masks)
     }
 
     /// Whether triangles have masks of their own.
@@ -291,35 +373,62 @@ impl<'a> TriangleMesh<'a> {
         self.masks.count > 0
     }
 
-    /// The bytes of every vertex.
+    /// The bytes of every vertex, the parts' one after the other.
     pub(crate) fn each_vertex(&self, mut visit: impl FnMut(&[u8; 12])) {
-        (0..self.positions.count).filter_map(|at| self.positions.element(at)).for_each(&mut visit);
+        for positions in self.each_mesh().map(|mesh| mesh.positions) {
+            (0..positions.count).filter_map(|at| positions.element(at)).for_each(&mut visit);
+        }
     }
 
-    /// The vertices of a triangle.
-    #[expect(clippy::cast_possible_truncation, reason = "they were 32 bits or less")]
-    pub(crate) fn indices(&self, triangle: u32) -> Option<[u32; 3]> {
-        Some(self.vertices_of(triangle)?.map(|vertex| vertex as u32))
+    /// The vertices of every triangle, numbered as [`each_vertex`](Self::each_vertex) shows them; zeros where
+    /// there are none.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "indices and all vertices of parts are 32 bits"
+    )]
+    pub(crate) fn each_indices(&self, mut visit: impl FnMut([u32; 3])) {
+        let mut before = 0_usize;
+        for mesh in self.each_mesh() {
+            for triangle in 0..mesh.triangle_count() {
+                let vertices = mesh.vertices_of(triangle).unwrap_or_default();
+                visit(vertices.map(|vertex| before.wrapping_add(vertex) as u32));
+            }
+            before += mesh.vertex_count();
+        }
     }
 
     /// The first triangle that names a vertex that there is not.
     pub(crate) fn first_without_vertices(&self) -> Option<u32> {
-        let count = self.vertex_count();
-        let has_all = |id| self.vertices_of(id).is_some_and(|all| all.iter().all(|&at| at < count));
-        (0..self.triangle_count()).find(|&id| !has_all(id))
+        self.pieces(0..self.triangle_count()).find_map(|piece| {
+            let count = piece.mesh.vertex_count();
+            let has_all =
+                |id| piece.mesh.vertices_of(id).is_some_and(|all| all.iter().all(|&at| at < count));
+            Some(piece.first + piece.triangles.clone().find(|&id| !has_all(id))?)
+        })
     }
 
     /// Whether all coordinates of all vertices, used or not, are finite and no larger than
     /// `MAX_COORDINATE`.
     pub(crate) fn is_finite(&self) -> bool {
         let limit = MAX_COORDINATE;
-        (0..self.vertex_count())
-            .all(|at| self.vertex(at).is_some_and(|xyz| xyz.iter().all(|c| c.abs() <= limit)))
+        let is_finite = |xyz: [f32; 3]| xyz.iter().all(|c| c.abs() <= limit);
+        self.each_mesh()
+            .all(|mesh| (0..mesh.vertex_count()).all(|at| mesh.vertex(at).is_some_and(is_finite)))
     }
 
     /// The corners of a triangle as vectors.
     #[inline(always)]
     pub(crate) fn corners(&self, triangle: u32) -> Option<[Vec3A; 3]> {
+        let found = self.own_corners(triangle);
+        if found.is_none() && matches!(self.layout, Layout::Joined(_)) {
+            return self.corners_of_part(triangle);
+        }
+        found
+    }
+
+    /// The corners of a triangle of a mesh that was not joined, as vectors.
+    #[inline(always)]
+    pub(crate) fn own_corners(&self, triangle: u32) -> Option<[Vec3A; 3]> {
         if let Some([a, b, c]) = self.wide().corners(triangle) {
             return Some([vector(a), vector(b), vector(c)]);
         }
@@ -332,6 +441,18 @@ impl<'a> TriangleMesh<'a> {
     /// The box of some vertices, used or not: of those whose coordinates are finite and no larger
     /// than `MAX_COORDINATE`.
     pub(crate) fn vertex_bounds(&self, vertices: Range<usize>) -> Aabb {
+        let (mut bounds, mut before) = (Aabb::EMPTY, 0);
+        for mesh in self.each_mesh() {
+            let Range { start, end } = vertices;
+            let [start, end] = [start, end].map(|vertex| vertex.saturating_sub(before));
+            bounds = bounds.union(&mesh.own_vertex_bounds(start..end.min(mesh.vertex_count())));
+            before += mesh.vertex_count();
+        }
+        bounds
+    }
+
+    /// The same of a mesh that was not joined.
+    fn own_vertex_bounds(&self, vertices: Range<usize>) -> Aabb {
         // Four vertices that lie side by side are three vectors: x y z x | y z x y | z x y z.
         let fours = self.positions.tight::<12>(vertices.start, vertices.len()).as_chunks::<4>().0;
         let mut low = [Vec4::INFINITY; 3];
@@ -375,7 +496,11 @@ impl<'a> TriangleMesh<'a> {
     pub(crate) fn wide(&self) -> WideMesh<'a> {
         let stride = |array: &Strided<'_>| u16::try_from(array.stride);
         match (stride(&self.positions), stride(&self.indices), self.layout) {
-            (Ok(position_stride), Ok(index_stride), Layout::Indexed(IndexType::U32)) => WideMesh {
+            (
+                Ok(position_stride),
+                Ok(index_stride),
+                Layout::Indexed(IndexType::U32) | Layout::Packed(_),
+            ) => WideMesh {
                 positions: self.positions.bytes,
                 indices: self.indices.bytes,
                 position_stride,
@@ -388,7 +513,7 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     fn vertices_of(&self, triangle: u32) -> Option<[usize; 3]> {
         match self.layout {
-            Layout::Indexed(IndexType::U32) => {
+            Layout::Indexed(IndexType::U32) | Layout::Packed(_) => {
                 let b = self.indices.element::<12>(triangle as usize)?;
                 let index = |at: usize| {
                     u32::from_ne_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]) as usize
@@ -405,13 +530,14 @@ impl<'a> TriangleMesh<'a> {
                 let greatest = box_at.checked_mul(2)?.checked_add(1)?;
                 (box_at < self.positions.count).then_some([greatest - 1, greatest, greatest])
             }
+            Layout::Joined(_) => None,
         }
     }
 
     #[inline(always)]
     fn vertex(&self, vertex: usize) -> Option<[f32; 3]> {
         let b = match self.layout {
-            Layout::Indexed(_) => self.positions.element::<12>(vertex)?,
+            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => self.positions.element::<12>(vertex)?,
             Layout::Boxes(_) => {
                 let corners = self.positions.element::<BOX_BYTES>(vertex / 2)?.as_chunks::<12>().0;
                 corners.get(vertex % 2)?

@@ -1,13 +1,16 @@
 //! Grid and mesh in one blob, for those who have nothing else.
 //!
 //! ```text
-//! 0                 blob_bytes                                     total_bytes
-//! | header | grid   | positions    | indices     | masks           |
-//!   says so           12 a vertex    12 a triangle  4 a triangle, if the mesh has any
+//! 0                 blob_bytes                                                      total_bytes
+//! | header | grid   | positions    | indices      | masks           | parts         |
+//!   says so           12 a vertex    12 a triangle  4 a triangle,     4 a part, if the
+//!                                                   if it has any     mesh was joined
 //! ```
 //!
 //! Every section starts at a multiple of 64, as in the grid, which is the one that was built but
-//! for its header. The mesh is tight and its indices have 32 bits, whatever the caller's had.
+//! for its header. The mesh is tight and its indices have 32 bits, whatever the caller's had. Parts that were
+//! joined become one mesh: of each only the number of its first triangle is kept, so that
+//! [`TriangleMesh::locate`] answers as before.
 //! Opening reads it where it lies, so there is still no copy and no allocation.
 
 use core::mem::offset_of;
@@ -76,6 +79,7 @@ struct Sections {
     positions: u64,
     indices: u64,
     masks: u64,
+    parts: u64,
     end: u64,
 }
 
@@ -86,13 +90,16 @@ impl Sections {
         let positions = align_up(header.blob_bytes);
         if has_mesh == HasMesh::No {
             let end = header.blob_bytes;
-            return Ok(Self { positions, indices: positions, masks: positions, end });
+            let [indices, masks, parts] = [positions; 3];
+            return Ok(Self { positions, indices, masks, parts, end });
         }
         let indices = positions.saturating_add(section_bytes::<[f32; 3]>(header.vertex_count));
         let masks = indices.saturating_add(section_bytes::<[u32; 3]>(triangles));
         let mask_bytes =
             if has_mesh == HasMesh::WithMasks { section_bytes::<u32>(triangles) } else { 0 };
-        Ok(Self { positions, indices, masks, end: masks.saturating_add(mask_bytes) })
+        let parts = masks.saturating_add(mask_bytes);
+        let end = parts.saturating_add(section_bytes::<u32>(header.part_count().into()));
+        Ok(Self { positions, indices, masks, parts, end })
     }
 }
 
@@ -105,7 +112,10 @@ impl<'a> Grid<'a> {
     }
 
     /// Writes grid and mesh as one blob, which [`open_packed`](Self::open_packed) needs nothing
-    /// else for, and returns the part of `to` that it takes.
+    /// else for, and returns the bytes of `to` that it takes.
+    ///
+    /// Of a joined mesh ([`TriangleMesh::join`]) the blob holds one mesh with the same triangles and numbers,
+    /// and [`TriangleMesh::locate`] still tells which part a triangle is of.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] names the need, [`Error::Misaligned`] an address that is
@@ -134,7 +144,7 @@ impl<'a> Grid<'a> {
         let header = self.packed_header()?;
         let sections = Sections::of(&header)?;
         let mesh = self.mesh();
-        if let Some(triangle) = (0..mesh.triangle_count()).find(|&id| mesh.triangle(id).is_none()) {
+        if let Some(triangle) = mesh.first_without_vertices() {
             return Err(Error::IndexOutOfRange { triangle });
         }
         let available_bytes = to.len() as u64;
@@ -150,14 +160,15 @@ impl<'a> Grid<'a> {
         out.pad();
         mesh.each_vertex(|vertex| out.put(vertex));
         out.pad();
-        for id in 0..mesh.triangle_count() {
-            out.put(bytemuck::bytes_of(&mesh.indices(id).unwrap_or_default()));
-        }
+        mesh.each_indices(|vertices| out.put(bytemuck::bytes_of(&vertices)));
         out.pad();
         if mesh.has_masks() {
             (0..mesh.triangle_count()).for_each(|id| out.put(&mesh.mask(id).to_ne_bytes()));
             out.pad();
         }
+        mesh.parts().iter().for_each(|part| out.put(&part.first().to_ne_bytes()));
+        out.put(mesh.numbering().as_flattened());
+        out.pad();
         Ok(to)
     }
 
@@ -179,7 +190,7 @@ impl<'a> Grid<'a> {
         if has_mesh == HasMesh::No {
             return Err(Error::NoMesh);
         }
-        let Sections { positions, indices, masks, end } = Sections::of(&header)?;
+        let Sections { positions, indices, masks, parts, end } = Sections::of(&header)?;
         let (needed_bytes, available_bytes) = (end, blob.len() as u64);
         let truncated = Error::Truncated { needed_bytes, available_bytes };
         let damaged = corrupt(offset_of!(Header, triangle_count));
@@ -204,13 +215,37 @@ impl<'a> Grid<'a> {
         if has_mesh == HasMesh::WithMasks {
             mesh = mesh.with_masks(section(masks, triangles, 4).ok_or(damaged)?)?;
         }
+        let parts = section(parts, header.part_count().into(), 4).ok_or(damaged)?;
+        if parts.count > 0 {
+            mesh = mesh.numbered(parts.bytes.as_chunks().0);
+        }
         Self::open(blob, mesh)
+    }
+
+    /// Proves that the parts of a packed mesh follow one another.
+    pub(crate) fn check_parts(&self) -> Result<(), Error> {
+        let numbering = self.mesh().numbering();
+        let mut before = 0;
+        for (at, first) in numbering.iter().enumerate() {
+            let first = u32::from_ne_bytes(*first);
+            let is_next = first >= before && (at > 0 || first == 0);
+            if !is_next || first > self.mesh().triangle_count() {
+                let Sections { parts, .. } = Sections::of(&self.packed_header()?)?;
+                let offset = parts.saturating_add(at as u64 * size_of::<u32>() as u64);
+                return Err(Error::Corrupt { offset });
+            }
+            before = first;
+        }
+        Ok(())
     }
 
     /// The grid's header, as it is in a blob with the mesh.
     fn packed_header(&self) -> Result<Header, Error> {
         let has_mesh = if self.mesh().has_masks() { HasMesh::WithMasks } else { HasMesh::Yes };
-        Ok(Header::read(self.blob(), self.mesh())?.packed(has_mesh))
+        let parts = self.mesh().parts().len().max(self.mesh().numbering().len());
+        // No more than fit: joined parts are counted, and others come from a header.
+        let parts = u32::try_from(parts).unwrap_or(0);
+        Ok(Header::read(self.blob(), self.mesh())?.packed(has_mesh, parts))
     }
 }
 

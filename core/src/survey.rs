@@ -5,6 +5,7 @@ use crate::config::BuildFlags;
 use crate::control::Watch;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
+use crate::parts::Piece;
 
 /// What part of a build the survey is, about.
 const SHARE: [f32; 2] = [0.0, 0.15];
@@ -29,17 +30,19 @@ impl Survey {
     ) -> Result<Self, Error> {
         let mut survey = Self { bounds: Aabb::EMPTY, finite_count: 0, skipped_count: 0 };
         let count = mesh.triangle_count();
-        for id in 0..count {
-            watch.step(id, count, SHARE)?;
-            let Some(corners) = mesh.corners(id) else {
-                return Err(Error::IndexOutOfRange { triangle: id });
-            };
-            match Aabb::of(corners) {
-                Some(bounds) => survey.bounds = survey.bounds.union(&bounds),
-                None if flags.contains(BuildFlags::STRICT) => {
-                    return Err(Error::NonFiniteTriangle { triangle: id });
+        for piece in mesh.pieces(0..count) {
+            for (id, corners) in piece.each() {
+                watch.step(id, count, SHARE)?;
+                let Some(corners) = corners else {
+                    return Err(Error::IndexOutOfRange { triangle: id });
+                };
+                match Aabb::of(corners) {
+                    Some(bounds) => survey.bounds = survey.bounds.union(&bounds),
+                    None if flags.contains(BuildFlags::STRICT) => {
+                        return Err(Error::NonFiniteTriangle { triangle: id });
+                    }
+                    None => survey.skipped_count += 1,
                 }
-                None => survey.skipped_count += 1,
             }
         }
         survey.finite_count = mesh.triangle_count() - survey.skipped_count;
@@ -50,5 +53,6 @@ impl Survey {
 /// The finite triangles of a mesh with their boxes, in the order of their ids.
 #[inline(always)]
 pub(crate) fn boxes<'m>(mesh: &'m TriangleMesh<'_>) -> impl Iterator<Item = (u32, Aabb)> + 'm {
-    (0..mesh.triangle_count()).filter_map(|id| Some((id, Aabb::of(mesh.corners(id)?)?)))
+    let triangles = mesh.pieces(0..mesh.triangle_count()).flat_map(Piece::each);
+    triangles.filter_map(|(id, corners)| Some((id, Aabb::of(corners?)?)))
 }

@@ -5,6 +5,7 @@ mod closest;
 mod exact;
 mod forms;
 mod hits;
+mod joined;
 mod own_shapes;
 mod range;
 mod refit;

@@ -41,6 +41,8 @@ struct CMesh {
     triangle_count: usize,
     masks: *const c_void,
     mask_stride: usize,
+    parts: *const c_void,
+    part_count: usize,
 }
 
 /// `hgrid_grid`.
@@ -95,6 +97,8 @@ fn c_abi(criterion: &mut Criterion) {
             triangle_count: mesh.indices.len(),
             masks: null(),
             mask_stride: 0,
+            parts: null(),
+            part_count: 0,
         };
         let mut c_grid = CGrid([0; 64]);
         let (blob, bytes) = (grid.blob().as_ptr(), grid.blob().len());

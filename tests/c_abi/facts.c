@@ -45,6 +45,9 @@ static void layout(void)
     OFFSET(hgrid_mesh, triangle_count);
     OFFSET(hgrid_mesh, masks);
     OFFSET(hgrid_mesh, mask_stride);
+    OFFSET(hgrid_mesh, parts);
+    OFFSET(hgrid_mesh, part_count);
+    SIZE(hgrid_part);
     SIZE(hgrid_config);
     OFFSET(hgrid_config, struct_size);
     OFFSET(hgrid_config, method);
@@ -213,6 +216,7 @@ static void constants(void)
     NUMBER(HGRID_ERROR_INDEX_OUT_OF_RANGE);
     NUMBER(HGRID_ERROR_NON_FINITE);
     NUMBER(HGRID_ERROR_INVALID_MASKS);
+    NUMBER(HGRID_ERROR_INVALID_PARTS);
     NUMBER(HGRID_ERROR_INVALID_METHOD);
     NUMBER(HGRID_ERROR_INVALID_DENSITY);
     NUMBER(HGRID_ERROR_INVALID_FLAGS);
@@ -272,9 +276,10 @@ static void defaults(void)
     printf("scene_options %lu %#lx %lu %lu %d %d %d\n", (unsigned long)n.struct_size, (unsigned long)n.mask,
            (unsigned long)n.cull, (unsigned long)n.reserved, n.context != NULL, n.filter != NULL,
            n.counters != NULL);
-    printf("mesh %lu %lu %d %zu %zu %d %zu %zu %d %zu\n", (unsigned long)m.struct_size,
+    printf("mesh %lu %lu %d %zu %zu %d %zu %zu %d %zu %d %zu\n", (unsigned long)m.struct_size,
            (unsigned long)m.index_type, m.positions != NULL, m.position_stride, m.vertex_count,
-           m.indices != NULL, m.index_stride, m.triangle_count, m.masks != NULL, m.mask_stride);
+           m.indices != NULL, m.index_stride, m.triangle_count, m.masks != NULL, m.mask_stride,
+           m.parts != NULL, m.part_count);
     printf("query_options %lu %#lx %lu %#lx %d %d %d %d %zu\n", (unsigned long)o.struct_size,
            (unsigned long)o.mask, (unsigned long)o.cull, (unsigned long)o.skip, o.context != NULL,
            o.filter != NULL, o.counters != NULL, o.scratch != NULL, o.scratch_bytes);

@@ -248,7 +248,7 @@ fn versions_are_those_of_the_package() {
 fn initialisers_are_the_defaults() {
     // All else is 0 or NULL.
     for (name, fields) in [
-        ("mesh", "0 0 0 0 0 0 0 0 0"),
+        ("mesh", "0 0 0 0 0 0 0 0 0 0 0"),
         ("query_options", "0xffffffff 0 0xffffffff 0 0 0 0 0"),
         ("report", "0 0 0 0xffffffff 0 0 0 0 0 0 0"),
         ("blob_info", "0 0 0 0 0 0 0"),

@@ -178,6 +178,21 @@ static void arrays_of_a_mesh(void)
     EXPECT(HGRID_OK, hgrid_sizes(&empty, NULL, NULL, 0, &report));
 }
 
+static void joined_meshes(void)
+{
+    static hgrid_part parts[1];
+    REFUSED(hgrid_join.meshes, HGRID_ERROR_NULL_ARGUMENT, hgrid_join(NULL, 1, parts, &out.mesh));
+    REFUSED(hgrid_join.parts, HGRID_ERROR_NULL_ARGUMENT, hgrid_join(&mesh, 1, NULL, &out.mesh));
+    REFUSED(hgrid_join.joined, HGRID_ERROR_NULL_ARGUMENT, hgrid_join(&mesh, 1, parts, NULL));
+    ALLOWED(hgrid_join.meshes, hgrid_join(NULL, 0, NULL, &out.mesh));
+    uint32_t geometry = 77, triangle = 77;
+    MISSED(hgrid_locate.grid, hgrid_locate(NULL, 0, &geometry, &triangle));
+    MISSED(hgrid_locate.geometry, hgrid_locate(&grid, 0, NULL, &triangle));
+    MISSED(hgrid_locate.triangle, hgrid_locate(&grid, 0, &geometry, NULL));
+    CHECK(geometry == 77 && triangle == 77);
+    CHECK(hgrid_locate(&grid, 5, &geometry, &triangle) && geometry == 0 && triangle == 5);
+}
+
 /* More than one task needs someone who runs them. */
 static void callbacks(void)
 {
@@ -306,6 +321,7 @@ int main(void)
     questions_for_sizes();
     builds();
     arrays_of_a_mesh();
+    joined_meshes();
     callbacks();
     queries();
     batches();

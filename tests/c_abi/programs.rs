@@ -20,7 +20,7 @@ use crate::header::DIALECTS;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
 /// flavour of the library that they need.
-const PROGRAMS: [(&str, Flavour); 19] = [
+const PROGRAMS: [(&str, Flavour); 20] = [
     ("queries", Flavour::NoStd),
     ("options", Flavour::NoStd),
     ("batches", Flavour::NoStd),
@@ -38,6 +38,7 @@ const PROGRAMS: [(&str, Flavour); 19] = [
     ("blobs", Flavour::NoStd),
     ("stored", Flavour::NoStd),
     ("refits", Flavour::NoStd),
+    ("joined", Flavour::NoStd),
     ("scenes", Flavour::NoStd),
     ("create", Flavour::Std),
 ];

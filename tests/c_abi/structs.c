@@ -44,6 +44,10 @@ static void meshes(void)
     CHECK_VERSIONS(hgrid_open.mesh, hgrid_mesh, mesh, hgrid_open(blob, blob_bytes, it, &view));
     CHECK_VERSIONS(hgrid_refit.mesh, hgrid_mesh, mesh,
                    hgrid_refit(it, tree, tree_bytes, &view, NULL));
+    static hgrid_part parts[1];
+    hgrid_mesh all = HGRID_MESH_INIT;
+    CHECK_VERSIONS(hgrid_join.meshes, hgrid_mesh, mesh, hgrid_join(it, 1, parts, &all));
+    CHECK_VERSIONS(hgrid_join.joined, hgrid_mesh, mesh, hgrid_join(&mesh, 1, parts, it));
     CHECK_VERSIONS(hgrid_mesh_of.mesh, hgrid_mesh, mesh, hgrid_mesh_of(&grid, it));
 }
 

@@ -3,6 +3,7 @@
 mod blobs;
 mod bounds;
 mod inputs;
+mod joined;
 mod mixed;
 mod packed;
 mod progress;

@@ -77,6 +77,39 @@ static void check_rays()
     CHECK(hgrid::view().mesh_of().error() == status::not_a_grid);
 }
 
+static void check_joined()
+{
+    /* Two sheets, none, and four in another form: the highest of the last ones is on top. */
+    const scene low(2), high(4);
+    std::vector<std::uint32_t> masks(low.faces.size(), 2);
+    const std::vector<hgrid::point> corners = {{0, 0, 9}, {1, 0, 9}, {0, 1, 9}};
+    const std::vector<std::uint16_t> none;
+    const std::array<hgrid::mesh, 3> meshes = {low.mesh().masks(masks), hgrid::mesh(corners, none),
+                                               high.mesh()};
+    std::vector<hgrid::part> parts(meshes.size());
+    const auto joined = hgrid::mesh::join(meshes, parts);
+    CHECK(joined && joined->triangle_count() == low.faces.size() + high.faces.size());
+    const auto grid = hgrid::grid::build(*joined);
+    CHECK(grid);
+    const auto top = grid->intersect(down());
+    CHECK(top && is_near(top->t, 97));
+    const auto place = grid->locate(top->primitive);
+    CHECK(place && place->geometry == 2 && high.faces[place->triangle].material == 3);
+    const auto masked = grid->intersect(down(), hgrid::options().skip(top->primitive).mask(2));
+    CHECK(masked && is_near(masked->t, 98));
+    CHECK(!grid->locate(hgrid::invalid_id) && !hgrid::view().locate(0));
+    const auto packed = grid->pack();
+    CHECK(packed);
+    const auto opened = hgrid::view::open(*packed);
+    CHECK(opened && opened->locate(top->primitive)->triangle == place->triangle);
+
+    CHECK(hgrid::mesh::join(meshes, hgrid::span<hgrid::part>(parts.data(), 2)).error() ==
+          status::invalid_parts);
+    CHECK(hgrid::mesh::join({}, {})->triangle_count() == 0);
+    const std::array<hgrid::mesh, 1> again = {*joined};
+    CHECK(hgrid::mesh::join(again, parts).error() == status::invalid_parts);
+}
+
 static void check_options()
 {
     const scene s(5);
@@ -183,6 +216,7 @@ static void check_filters()
 void check_queries()
 {
     check_rays();
+    check_joined();
     check_options();
     check_filters();
 }

@@ -7,6 +7,7 @@ mod trees;
 
 use hgrid_core::{Config, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes};
 use hgrid_tests::guarded::Guarded;
+use hgrid_tests::joined::{Parts, merged};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::methods;
 use hgrid_tests::owned::Owned;
@@ -68,6 +69,26 @@ fn every_size_from_nothing_to_enough() {
         every_size(&ball(2, 1.0).view(), &config, 1);
         every_size(&soup(60, 0.3, 1).view(), &Config { density: 20.0, ..config }, 1);
         every_size(&soup(3000, 0.05, 1).view(), &config, 1003);
+    }
+}
+
+/// Parts take no memory but their own.
+#[test]
+fn every_size_for_joined_meshes() {
+    let meshes = [ball(2, 1.0), Mesh::default(), soup(40, 0.3, 1), one_triangle()];
+    let stored = Parts::of(&meshes);
+    let mut parts = stored.parts();
+    let mesh = TriangleMesh::join(&mut parts).unwrap();
+    for config in methods::configs() {
+        let every_size = match config.method {
+            Method::Bvh => trees::every_size,
+            _ => every_size,
+        };
+        every_size(&mesh, &config, 7);
+        assert_eq!(
+            sizes(&mesh, &config, &mut []),
+            sizes(&merged(&meshes).view(), &config, &mut [])
+        );
     }
 }
 

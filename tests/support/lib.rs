@@ -5,6 +5,7 @@ pub mod artefact;
 pub mod copy;
 pub mod guarded;
 pub mod hostile;
+pub mod joined;
 pub mod meshes;
 pub mod methods;
 pub mod oracle;

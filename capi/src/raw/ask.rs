@@ -211,6 +211,20 @@ pub(crate) unsafe fn surface(
     Ok(grid.mesh().surface(&ray.into(), &hit.into()))
 }
 
+/// The part of a grid's mesh that a triangle lies in, and the triangle's number there.
+///
+/// # Safety
+/// That of [`grid`].
+#[inline(always)]
+pub(crate) unsafe fn locate(
+    view: *const hgrid_grid,
+    primitive: u32,
+) -> Result<Option<(u32, u32)>, hgrid_status> {
+    // SAFETY: this function's contract.
+    let grid = unsafe { grid(view) }?;
+    Ok(grid.mesh().locate(primitive))
+}
+
 /// Runs a batch: `trace` gets the rays as core asks for them, and what the caller told.
 ///
 /// # Safety

@@ -25,6 +25,7 @@
 //! calls nothing here looks at them.
 
 mod ask;
+mod join;
 mod scene;
 
 use core::ffi::c_void;
@@ -33,7 +34,8 @@ use core::slice;
 
 use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
-pub(crate) use ask::{Arrays, batch, closest, query, query_all, surface};
+pub(crate) use ask::{Arrays, batch, closest, locate, query, query_all, surface};
+pub(crate) use join::{join, parts_of};
 pub(crate) use scene::{
     build_scene, build_shapes, open_scene, open_shapes, query_scene, query_shapes, refit_scene,
     refit_shapes, scene, scene_normal, shapes, validate_scene, validate_shapes, write_object,
@@ -154,6 +156,10 @@ unsafe fn bytes_mut(start: *mut c_void, count: usize) -> Result<&'static mut [u8
 /// # Safety
 /// The caller's promise.
 unsafe fn mesh(mesh: &hgrid_mesh) -> Result<TriangleMesh<'static>, hgrid_status> {
+    if mesh.has_parts() {
+        // SAFETY: the caller's promise.
+        return unsafe { join::joined(mesh) };
+    }
     let [positions, indices] = [mesh.position_elements()?, mesh.index_elements()?];
     let masks = mesh.mask_elements()?;
     // SAFETY: the caller's promise.
@@ -256,14 +262,12 @@ unsafe extern "C" fn call(task_context: *mut c_void, index: u32) {
 /// # Safety
 /// The caller's promise.
 unsafe fn regions(
-    mesh: &hgrid_mesh,
+    mesh: &TriangleMesh<'_>,
     [index, scratch]: [Region; 2],
 ) -> Result<[&'static mut [u8]; 2], hgrid_status> {
-    let inputs = [mesh.position_elements()?, mesh.index_elements()?, mesh.mask_elements()?]
-        .map(|elements| Span::new(elements.start, elements.bytes));
     let [index_span, scratch_span] = [index.span(), scratch.span()];
-    let is_shared = |input: &Span| input.overlaps(index_span) || input.overlaps(scratch_span);
-    if index_span.overlaps(scratch_span) || inputs.iter().any(is_shared) {
+    let is_shared = shares(mesh, index_span) || shares(mesh, scratch_span);
+    if index_span.overlaps(scratch_span) || is_shared {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads or writes lies there.
@@ -289,7 +293,7 @@ pub(crate) unsafe fn input(
     // SAFETY: the caller's promise.
     let (config, caller) = unsafe { config(settings) }?;
     // SAFETY: the caller's promise.
-    let [index, scratch] = unsafe { regions(&description, memory) }?;
+    let [index, scratch] = unsafe { regions(&mesh, memory) }?;
     Ok(Input { mesh, config, caller, index, scratch })
 }
 
@@ -334,7 +338,7 @@ pub(crate) unsafe fn refit(
     let mesh = unsafe { mesh(&description) }?;
     let none = Region { start: null_mut(), bytes: 0 };
     // SAFETY: the caller's promise.
-    let [blob, _] = unsafe { regions(&description, [blob, none]) }?;
+    let [blob, _] = unsafe { regions(&mesh, [blob, none]) }?;
     let refitted = hgrid_core::refit(blob, &mesh);
     report.note(&refitted);
     refitted.and_then(|_| Grid::open(blob, mesh)).map_err(status_of)
@@ -395,17 +399,32 @@ pub(crate) unsafe fn validate(grid: &Grid<'_>, scratch: Region) -> Result<(), hg
     grid.validate(scratch).map_err(status_of)
 }
 
+/// Where some bytes lie.
+fn span_of(bytes: &[u8]) -> Span {
+    Span::new(bytes.as_ptr().cast(), bytes.len())
+}
+
+/// Returns true if a mesh reads something that lies in a span.
+fn shares(mesh: &TriangleMesh<'_>, span: Span) -> bool {
+    let has = |mesh: &TriangleMesh<'_>| {
+        let arrays = [mesh.positions(), mesh.triangles(), mesh.masks()];
+        arrays.into_iter().any(|array| span_of(array.bytes).overlaps(span))
+    };
+    if span.is_empty() {
+        return false;
+    }
+    has(mesh)
+        || join::span_of(mesh).overlaps(span)
+        || mesh.parts().iter().any(|part| has(part.mesh()))
+}
+
 /// Bytes to write that lie in neither blob nor mesh.
 ///
 /// # Safety
 /// That of [`grid`].
 unsafe fn bytes_beside(grid: &Grid<'_>, to: Region) -> Result<&'static mut [u8], hgrid_status> {
-    let mesh = grid.mesh();
-    let [positions, triangles, masks] =
-        [mesh.positions(), mesh.triangles(), mesh.masks()].map(|array| array.bytes);
-    let is_shared =
-        |bytes: &[u8]| Span::new(bytes.as_ptr().cast(), bytes.len()).overlaps(to.span());
-    if [grid.blob(), positions, triangles, masks].into_iter().any(is_shared) {
+    let is_shared = span_of(grid.blob()).overlaps(to.span()) || shares(grid.mesh(), to.span());
+    if is_shared {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads lies there.

@@ -9,6 +9,7 @@ use crate::config::BuildFlags;
 use crate::control::Control;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
+use crate::parts::Piece;
 use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
 use crate::spans::{Corners, four};
 use crate::tasks::run;
@@ -99,40 +100,47 @@ impl Kernel for Part<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(mut self, simd: S) -> Self::Output {
-        let wide = self.mesh.wide();
         let mut low = [f32x8::splat(simd, f32::INFINITY); 3];
         let mut high = [f32x8::splat(simd, f32::NEG_INFINITY); 3];
         let limit = u32x8::splat(simd, MAX_COORDINATE.to_bits());
-        let keys = core::mem::take(&mut self.keys);
-        let mut first = self.first;
-        let (eights, rest) = keys.as_chunks_mut::<8>();
-        for keys in eights {
-            let mut is_done = false;
-            if HAS_VECTORS {
-                let (head, tail) =
-                    (four(simd, &wide, first), four(simd, &wide, first.wrapping_add(4)));
-                let a = Corners::join(head[0], tail[0]);
-                let b = Corners::join(head[1], tail[1]);
-                let c = Corners::join(head[2], tail[2]);
-                let largest = a.largest().max(b.largest()).max(c.largest());
-                if largest.simd_le(limit).all_true() {
-                    let min = [a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y), a.z.min(b.z).min(c.z)];
-                    let max = [a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y), a.z.max(b.z).max(c.z)];
-                    low = [low[0].min(min[0]), low[1].min(min[1]), low[2].min(min[2])];
-                    high = [high[0].max(max[0]), high[1].max(max[1]), high[2].max(max[2])];
-                    *keys = self.rule.of_eight(simd, min, max).into();
-                    for key in &*keys {
-                        self.add(*key);
+        let mut all_keys = core::mem::take(&mut self.keys);
+        #[expect(clippy::cast_possible_truncation, reason = "triangles of the mesh")]
+        let end = self.first + all_keys.len() as u32;
+        for piece in self.mesh.pieces(self.first..end) {
+            let wide = piece.mesh.wide();
+            let keys = take(&mut all_keys, piece.triangles.len());
+            let mut first = piece.triangles.start;
+            let (eights, rest) = keys.as_chunks_mut::<8>();
+            for keys in eights {
+                let mut is_done = false;
+                if HAS_VECTORS {
+                    let (head, tail) =
+                        (four(simd, &wide, first), four(simd, &wide, first.wrapping_add(4)));
+                    let a = Corners::join(head[0], tail[0]);
+                    let b = Corners::join(head[1], tail[1]);
+                    let c = Corners::join(head[2], tail[2]);
+                    let largest = a.largest().max(b.largest()).max(c.largest());
+                    if largest.simd_le(limit).all_true() {
+                        let min =
+                            [a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y), a.z.min(b.z).min(c.z)];
+                        let max =
+                            [a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y), a.z.max(b.z).max(c.z)];
+                        low = [low[0].min(min[0]), low[1].min(min[1]), low[2].min(min[2])];
+                        high = [high[0].max(max[0]), high[1].max(max[1]), high[2].max(max[2])];
+                        *keys = self.rule.of_eight(simd, min, max).into();
+                        for key in &*keys {
+                            self.add(*key);
+                        }
+                        is_done = true;
                     }
-                    is_done = true;
                 }
+                if !is_done {
+                    self.one_by_one(&piece, first, keys)?;
+                }
+                first = first.wrapping_add(8);
             }
-            if !is_done {
-                self.one_by_one(first, keys)?;
-            }
-            first = first.wrapping_add(8);
+            self.one_by_one(&piece, first, rest)?;
         }
-        self.one_by_one(first, rest)?;
         let least = |lanes: [f32; 8]| lanes.into_iter().fold(f32::INFINITY, f32::min);
         let most = |lanes: [f32; 8]| lanes.into_iter().fold(f32::NEG_INFINITY, f32::max);
         let low = low.map(|lanes| least(lanes.into()));
@@ -152,9 +160,10 @@ impl Part<'_> {
 
     /// Triangles that are not all finite, or cannot be read eight at a time.
     #[inline(never)]
-    fn one_by_one(&mut self, first: u32, keys: &mut [u32]) -> Result<(), Error> {
-        for (triangle, key) in (first..).zip(keys) {
-            let Some(corners) = self.mesh.corners(triangle) else {
+    fn one_by_one(&mut self, piece: &Piece<'_>, first: u32, keys: &mut [u32]) -> Result<(), Error> {
+        for (own, key) in (first..).zip(keys) {
+            let triangle = piece.first + own;
+            let Some(corners) = piece.mesh.own_corners(own) else {
                 return Err(Error::IndexOutOfRange { triangle });
             };
             match Aabb::of(corners) {

@@ -63,8 +63,9 @@ impl Bvh<'_> {
         }
         // Triangles were left out, so some of those in leaves may be new among those that are not finite.
         if header.skipped_count > 0 {
+            let mut reader = mesh.reader();
             for &triangle in self.ids {
-                if mesh.corners(triangle).and_then(Aabb::of).is_none() {
+                if reader.corners(triangle).and_then(Aabb::of).is_none() {
                     return Err(Error::NonFiniteTriangle { triangle });
                 }
             }
@@ -140,6 +141,7 @@ impl Tree<'_> {
     #[inline(never)]
     fn refit<const N: usize>(self) -> (Aabb, f64) {
         let Self { mesh, ids, nodes, least } = self;
+        let mut reader = mesh.reader();
         let none = [[0.0; 3]; 2];
         let mut levels = [Level { number: 0, rest: 0, slot: 0, boxes: [none; WIDTH] }; N];
         let mut cost = Cost::default();
@@ -155,7 +157,7 @@ impl Tree<'_> {
                         let first = first as usize;
                         let leaf = ids.get(first..first.saturating_add(count as usize));
                         for &id in leaf.unwrap_or_default() {
-                            let Some([a, b, c]) = mesh.corners(id) else { continue };
+                            let Some([a, b, c]) = reader.corners(id) else { continue };
                             bounds.min = bounds.min.min(a.min(b).min(c));
                             bounds.max = bounds.max.max(a.max(b).max(c));
                         }

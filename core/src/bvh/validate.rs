@@ -72,6 +72,7 @@ impl Bvh<'_> {
         let met = bytes.ok_or(short)?;
         met.fill(0);
 
+        let mut reader = mesh.reader();
         let bounds = lattice.bounds();
         let least = f64::from(bounds.size().max_element()) * LEAST_STEP;
         let mut levels =
@@ -117,7 +118,7 @@ impl Bvh<'_> {
                         let id = *id.ok_or(node_at(number))?;
                         let byte = met.get_mut(id as usize / 8).ok_or(word_at(word))?;
                         let bit = 1 << (id % 8);
-                        let bounds = mesh.corners(id).and_then(Aabb::of).ok_or(word_at(word))?;
+                        let bounds = reader.corners(id).and_then(Aabb::of).ok_or(word_at(word))?;
                         let is_held = bounds.min.as_dvec3().cmpge(min).all()
                             && bounds.max.as_dvec3().cmple(max).all();
                         if *byte & bit != 0 || !is_held {

@@ -50,8 +50,15 @@ impl Spread for MeshSpread<'_> {
 
     #[inline(always)]
     fn place(&self, places: Range<u32>, batch: &mut Batch) {
-        if HAS_VECTORS && !self.wide.is_empty() {
-            dispatch(SimdLevel::detect(), Place { spread: self, first: places.start, batch });
+        let (wide, first) = (self.wide, places.start);
+        // Of joined meshes the part of the first triangle: others are placed one by one.
+        let (wide, first) = if self.mesh.parts().is_empty() {
+            (wide, first)
+        } else {
+            self.mesh.near(first).own(first)
+        };
+        if HAS_VECTORS && !wide.is_empty() {
+            dispatch(SimdLevel::detect(), Place { spread: self, wide, first, batch });
         } else {
             batch.place_each(self, places);
         }
@@ -61,6 +68,8 @@ impl Spread for MeshSpread<'_> {
 /// Placing a batch of triangles, eight at a time.
 struct Place<'f, 'm> {
     spread: &'f MeshSpread<'m>,
+    wide: WideMesh<'m>,
+    /// The first triangle, as `wide` calls it.
     first: u32,
     batch: &'f mut Batch,
 }
@@ -70,18 +79,18 @@ impl Kernel for Place<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { spread, first, batch } = self;
+        let Self { spread, wide, first, batch } = self;
         let spans = Spans::new(simd, spread.lattice, 1);
         let [_, height, _] = spread.lattice.resolution;
         batch.is_placed = 0;
         let slots = batch.rows.iter_mut().zip(&mut batch.xs).zip(&mut batch.more);
         for (at, ((rows, xs), more)) in (0_u32..).step_by(LANES).zip(slots) {
-            let ([x, y, z], is_finite) = spans.of(simd, &spread.wide, first.wrapping_add(at));
-            let (wide, high, deep) = (x.last - x.first, y.last - y.first, z.last - z.first);
-            let is_placed = (wide | high | deep).simd_le(u32x8::splat(simd, MOST_MORE)) & is_finite;
+            let ([x, y, z], is_finite) = spans.of(simd, &wide, first.wrapping_add(at));
+            let (long, high, deep) = (x.last - x.first, y.last - y.first, z.last - z.first);
+            let is_placed = (long | high | deep).simd_le(u32x8::splat(simd, MOST_MORE)) & is_finite;
             *rows = (y.first + z.first * height).into();
             *xs = x.first.into();
-            *more = (wide | (high << MORE_BITS) | (deep << (2 * MORE_BITS))).into();
+            *more = (long | (high << MORE_BITS) | (deep << (2 * MORE_BITS))).into();
             batch.is_placed |= is_placed.to_bitmask() << at;
         }
     }
@@ -161,10 +170,14 @@ mod tests {
 
                     let mut batch = Batch::empty();
                     for level in SimdLevel::available() {
-                        dispatch(level, Place { spread: &spread, first, batch: &mut batch });
+                        dispatch(
+                            level,
+                            Place { spread: &spread, wide: spread.wide, first, batch: &mut batch },
+                        );
                         assert_eq!(rows(&batch, &spread, places.clone()), expected, "{level:?}");
                     }
-                    let place = Place { spread: &spread, first, batch: &mut batch };
+                    let place =
+                        Place { spread: &spread, wide: spread.wide, first, batch: &mut batch };
                     place.run(Fallback::new());
                     assert_eq!(rows(&batch, &spread, places.clone()), expected);
                     let placed = batch.is_placed.count_ones();

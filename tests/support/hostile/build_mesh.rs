@@ -40,6 +40,14 @@ fn describe_and_build(u: &mut Unstructured<'_>) -> Result<()> {
         return Ok(());
     }
     build(u, shape.view(), &config, tasks, run);
+    // Last, so that the bytes before mean what they did when they were kept.
+    if rarely(u, 3)? {
+        let cuts = <[u8; 6]>::arbitrary(u)?;
+        let count = u.int_in_range(0..=cuts.len())?;
+        let mut parts = shape.parts(&cuts[..count]);
+        let mesh = TriangleMesh::join(&mut parts).expect("sound meshes");
+        build(u, mesh, &config, tasks, run);
+    }
     Ok(())
 }
 

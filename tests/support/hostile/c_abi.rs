@@ -1,7 +1,7 @@
 //! Any calls of the C entry points, with any numbers in their structs, as far as the header's
 //! rules on pointers allow: every answer has a status that is known, an error leaves the outputs
 //! alone, and what succeeds answers as the same call in Rust does. Here is what builds;
-//! `c_stored` and `c_queries` have the rest.
+//! `c_stored`, `c_queries` and `c_joined` have the rest.
 
 use std::cell::Cell;
 use std::ffi::{CStr, c_void};
@@ -26,6 +26,8 @@ pub fn run(data: &[u8]) {
     let mut caller =
         Caller { shape: &shape, grid: hgrid_grid::NONE, opened: None, memory: Vec::new() };
     let _ = caller.calls(&mut u);
+    // Last, so that the calls before mean what they did when their bytes were kept.
+    let _ = caller.join(&mut u);
     caller.settle();
 }
 
@@ -165,6 +167,8 @@ impl Caller<'_> {
             triangle_count: shape.triangle_count,
             masks: if shape.masks.is_empty() { null() } else { shape.masks.as_ptr().cast() },
             mask_stride: shape.mask_stride,
+            parts: null(),
+            part_count: 0,
         };
         if rarely(u, 16)? {
             mesh.index_type = u.int_in_range(0..=2)?;

@@ -10,6 +10,7 @@
 mod ask;
 mod build_mesh;
 mod c_abi;
+mod c_joined;
 mod c_options;
 mod c_queries;
 mod c_stored;

@@ -3,7 +3,8 @@
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_core::{
-    BuildFlags, Config, Error, IndexType, MAX_COORDINATE, Method, Quality, Strided, TriangleMesh,
+    BuildFlags, Config, Error, IndexType, MAX_COORDINATE, MeshPart, Method, Quality, Strided,
+    TriangleMesh,
 };
 
 use super::memory::rarely;
@@ -167,6 +168,38 @@ impl Shape {
         }
         let (bytes, stride, count) = (&self.masks, self.mask_stride, self.triangle_count);
         view.with_masks(Strided { bytes, stride, count }).expect("a mask for each triangle")
+    }
+
+    /// The same triangles in parts, cut at these, every other one without masks.
+    pub(super) fn parts<'s>(&'s self, cuts: &[u8]) -> Vec<MeshPart<'s>> {
+        let mut ends: Vec<_> =
+            cuts.iter().map(|&cut| cut as usize % (self.triangle_count + 1)).collect();
+        ends.push(self.triangle_count);
+        ends.sort_unstable();
+        let starts = [0].into_iter().chain(ends.clone());
+        let parts = starts.zip(ends).enumerate().map(|(at, (start, end))| {
+            let count = end - start;
+            let from = |bytes: &'s [u8], stride: usize| {
+                // Behind the last triangle there is nothing, not even the rest of its stride.
+                let start = if count == 0 { 0 } else { start * stride };
+                Strided { bytes: &bytes[start..], stride, count }
+            };
+            let positions = Strided {
+                bytes: &self.positions,
+                stride: self.position_stride,
+                count: self.vertex_count,
+            };
+            let indices = from(&self.indices, self.index_stride);
+            let mesh = TriangleMesh::strided(positions, indices, self.index_type);
+            let mesh = mesh.expect("a sound mesh");
+            MeshPart::new(if self.masks.is_empty() || at % 2 == 1 {
+                mesh
+            } else {
+                let masks = from(&self.masks, self.mask_stride);
+                mesh.with_masks(masks).expect("a mask for each triangle")
+            })
+        });
+        parts.collect()
     }
 
     /// The same bytes under another description.

@@ -206,24 +206,27 @@ impl Kernel for Boxes<'_> {
         let Self { mesh, flags, first, items } = self;
         let mut bounds = Aabb::EMPTY;
         let mut count = 0;
-        for triangle in (first..).take(items.len()) {
-            let Some(corners) = mesh.corners(triangle) else {
-                return Err(Error::IndexOutOfRange { triangle });
-            };
-            let Some(box_of) = Aabb::of(corners) else {
-                if flags.contains(BuildFlags::STRICT) {
-                    return Err(Error::NonFiniteTriangle { triangle });
+        let triangles = first..first + items.len() as u32;
+        for piece in mesh.pieces(triangles) {
+            for (triangle, corners) in piece.each() {
+                let Some(corners) = corners else {
+                    return Err(Error::IndexOutOfRange { triangle });
+                };
+                let Some(box_of) = Aabb::of(corners) else {
+                    if flags.contains(BuildFlags::STRICT) {
+                        return Err(Error::NonFiniteTriangle { triangle });
+                    }
+                    continue;
+                };
+                bounds = bounds.union(&box_of);
+                // Of the two zeros the positive one, whatever the order of a union.
+                let [x, y, z] = (box_of.min + Vec3A::ZERO).to_array().map(f32::to_bits);
+                let [nx, ny, nz] = (-(box_of.max + Vec3A::ZERO)).to_array().map(f32::to_bits);
+                if let Some(item) = items.get_mut(count) {
+                    *item = [x, y, z, triangle, nx, ny, nz, 0];
                 }
-                continue;
-            };
-            bounds = bounds.union(&box_of);
-            // Of the two zeros the positive one, whatever the order of a union.
-            let [x, y, z] = (box_of.min + Vec3A::ZERO).to_array().map(f32::to_bits);
-            let [nx, ny, nz] = (-(box_of.max + Vec3A::ZERO)).to_array().map(f32::to_bits);
-            if let Some(item) = items.get_mut(count) {
-                *item = [x, y, z, triangle, nx, ny, nz, 0];
+                count += 1;
             }
-            count += 1;
         }
         Ok((count, bounds))
     }
