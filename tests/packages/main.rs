@@ -4,6 +4,7 @@
 //! package is still tried, in a folder that is laid out by the same list of files.
 
 mod cmake;
+mod crates;
 mod installed;
 mod pkg_config;
 mod prefix;
