@@ -8,24 +8,44 @@
 
 get_filename_component(_hgrid_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
 
-# cargo cinstall puts libraries where the system's own ones lie, or where --libdir says.
-foreach(_hgrid_dir "lib/${CMAKE_LIBRARY_ARCHITECTURE}" lib64 lib)
-  set(_hgrid_dir "${_hgrid_prefix}/${_hgrid_dir}")
+# The system's usual folders: cargo cinstall puts libraries into one of them.
+set(_hgrid_libdirs "lib/${CMAKE_LIBRARY_ARCHITECTURE}" lib64 lib)
+set(_hgrid_includedir include)
+set(_hgrid_definitions "")
+# An install by CMake and an archive say where they put things, and whether hgrid_create is there.
+include("${CMAKE_CURRENT_LIST_DIR}/hgrid-build.cmake" OPTIONAL)
+
+get_filename_component(_hgrid_includedir "${_hgrid_includedir}" ABSOLUTE BASE_DIR "${_hgrid_prefix}")
+foreach(_hgrid_dir IN LISTS _hgrid_libdirs)
+  get_filename_component(_hgrid_dir "${_hgrid_dir}" ABSOLUTE BASE_DIR "${_hgrid_prefix}")
   set(_hgrid_shared
     "${_hgrid_dir}/${CMAKE_SHARED_LIBRARY_PREFIX}hgrid${CMAKE_SHARED_LIBRARY_SUFFIX}")
   set(_hgrid_static
     "${_hgrid_dir}/${CMAKE_STATIC_LIBRARY_PREFIX}hgrid${CMAKE_STATIC_LIBRARY_SUFFIX}")
+  # On Windows programs find what is in bin, and linkers a library beside the static one. These are
+  # the names that Rust gives.
+  set(_hgrid_import "")
+  if(WIN32)
+    set(_hgrid_shared "${_hgrid_prefix}/bin/hgrid.dll")
+    set(_hgrid_import "${_hgrid_dir}/libhgrid.dll.a")
+    if(MSVC)
+      set(_hgrid_import "${_hgrid_dir}/hgrid.dll.lib")
+    endif()
+  endif()
   if(EXISTS "${_hgrid_shared}" AND NOT TARGET hgrid::hgrid)
     add_library(hgrid::hgrid SHARED IMPORTED)
     set_target_properties(hgrid::hgrid PROPERTIES
       IMPORTED_LOCATION "${_hgrid_shared}"
-      INTERFACE_INCLUDE_DIRECTORIES "${_hgrid_prefix}/include")
+      IMPORTED_IMPLIB "${_hgrid_import}"
+      INTERFACE_COMPILE_DEFINITIONS "${_hgrid_definitions}"
+      INTERFACE_INCLUDE_DIRECTORIES "${_hgrid_includedir}")
   endif()
   if(EXISTS "${_hgrid_static}" AND NOT TARGET hgrid::static)
     add_library(hgrid::static STATIC IMPORTED)
     set_target_properties(hgrid::static PROPERTIES
       IMPORTED_LOCATION "${_hgrid_static}"
-      INTERFACE_INCLUDE_DIRECTORIES "${_hgrid_prefix}/include")
+      INTERFACE_COMPILE_DEFINITIONS "${_hgrid_definitions}"
+      INTERFACE_INCLUDE_DIRECTORIES "${_hgrid_includedir}")
   endif()
 endforeach()
 
@@ -35,6 +55,10 @@ if(NOT TARGET hgrid::hgrid AND NOT TARGET hgrid::static)
 endif()
 
 unset(_hgrid_prefix)
+unset(_hgrid_libdirs)
+unset(_hgrid_includedir)
+unset(_hgrid_definitions)
 unset(_hgrid_dir)
 unset(_hgrid_shared)
 unset(_hgrid_static)
+unset(_hgrid_import)

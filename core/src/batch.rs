@@ -48,6 +48,13 @@ pub struct StridedMut<'a> {
 
 impl<'a> StridedMut<'a> {
     /// Elements that lie side by side.
+    ///
+    /// ```
+    /// use hgrid_core::{Hit, StridedMut};
+    /// let mut hits = [Hit::MISS; 3];
+    /// let hits = StridedMut::new(&mut hits);
+    /// assert_eq!((hits.stride, hits.count), (16, 3));
+    /// ```
     pub fn new<T: Pod>(elements: &'a mut [T]) -> Self {
         let count = elements.len();
         Self { bytes: bytemuck::cast_slice_mut(elements), stride: size_of::<T>(), count }
@@ -259,6 +266,36 @@ impl Grid<'_> {
 
     /// The closest hit of each ray: [`intersect_n_with`](Self::intersect_n_with), wherever rays and
     /// hits lie.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// struct Pixels<'a>(&'a mut [(Ray, f32)]);
+    ///
+    /// impl Batch<Hit> for Pixels<'_> {
+    ///     fn count(&self) -> usize {
+    ///         self.0.len()
+    ///     }
+    ///     fn ray(&self, place: usize) -> Ray {
+    ///         self.0[place].0
+    ///     }
+    ///     fn answer(&mut self, place: usize, hit: Hit) {
+    ///         self.0[place].1 = hit.t;
+    ///     }
+    /// }
+    ///
+    /// let mut pixels = [0.25, 2.0].map(|x| (Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]), 0.0));
+    /// let options = &mut QueryOptions::default();
+    /// grid.intersect_batch(&mut Pixels(&mut pixels), Coherence::Coherent, options);
+    /// assert_eq!(pixels.map(|(_, depth)| depth), [1.0, f32::INFINITY]);
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn intersect_batch(
         &self,
         batch: &mut impl Batch<Hit>,
@@ -274,6 +311,23 @@ impl Grid<'_> {
     ///
     /// # Errors
     /// The same as of [`intersect_n`](Self::intersect_n).
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let rays = [0.25, 2.0].map(|x| Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
+    /// let mut occluded = [0_u8; 2];
+    /// let answers = &mut StridedMut::new(&mut occluded);
+    /// grid.occluded_n(&Strided::new(&rays), answers, Coherence::Incoherent)?;
+    /// assert_eq!(occluded, [1, 0]);
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn occluded_n(
         &self,
         rays: &Strided<'_>,
@@ -288,6 +342,25 @@ impl Grid<'_> {
     ///
     /// # Errors
     /// The same as of [`intersect_n`](Self::intersect_n).
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let rays = [0.25, 2.0].map(|x| Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
+    /// let mut occluded = [1_u8; 2];
+    /// // Light comes through from the back.
+    /// let mut options = QueryOptions { cull: Cull::Front, ..QueryOptions::default() };
+    /// let answers = &mut StridedMut::new(&mut occluded);
+    /// grid.occluded_n_with(&Strided::new(&rays), answers, Coherence::Coherent, &mut options)?;
+    /// assert_eq!(occluded, [0, 0]);
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn occluded_n_with(
         &self,
         rays: &Strided<'_>,

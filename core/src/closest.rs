@@ -42,6 +42,13 @@ impl ClosestPoint {
     /// loop over all triangles compares.
     ///
     /// `None` if a coordinate is not finite. A triangle without area has points, too.
+    ///
+    /// ```
+    /// use hgrid_core::ClosestPoint;
+    /// let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let point = ClosestPoint::on_triangle(&triangle, 7, [0.25, 0.5, 3.0]).unwrap();
+    /// assert_eq!((point.distance, point.u, point.v, point.primitive), (3.0, 0.25, 0.5, 7));
+    /// ```
     #[must_use]
     pub fn on_triangle(triangle: &Triangle, primitive: u32, point: [f32; 3]) -> Option<Self> {
         Aabb::of(triangle.map(Vec3A::from_array))?;

@@ -77,6 +77,13 @@ impl Method {
 
     /// Whether this library has it. A feature of the package that is off leaves its method out, and
     /// who asks for it gets [`Error::MethodLeftOut`]; the default, `Bvh`, is no exception.
+    ///
+    /// ```
+    /// use hgrid_core::{Config, Method};
+    /// let smallest = [Method::OneLevel, Method::Bvh].into_iter().find(|method| method.is_available());
+    /// let config = smallest.map(Config::new);
+    /// # assert!(config.is_some());
+    /// ```
     #[must_use]
     pub const fn is_available(self) -> bool {
         match self {
@@ -173,6 +180,14 @@ bitflags! {
 }
 
 /// Everything a build can be told.
+///
+/// ```
+/// use hgrid_core::{Config, Method, Quality};
+/// // A tree for a scene that is traced for long, and a grid with more cells than usual.
+/// let tree = Config { quality: Quality::High, ..Config::default() };
+/// let grid = Config { density: 8.0, ..Config::new(Method::OneLevel) };
+/// assert_eq!((tree.method, grid.quality), (Method::Bvh, Quality::Fast));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// The structure to build.

@@ -108,6 +108,24 @@ impl<'a> Grid<'a> {
     /// Those of [`build`](Self::build), [`Error::InvalidParallelFor`] if a task was run twice or
     /// not at all, and [`Error::Cancelled`] if the progress callback had enough; after these two
     /// the index holds nothing of use.
+    ///
+    /// ```
+    /// use hgrid_core::{Block, Config, Control, Error, Grid, TriangleMesh, sizes};
+    /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// let config = Config::default();
+    /// let sizes = sizes(&mesh, &config, &mut [])?;
+    /// let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    ///
+    /// // Whoever waits for this build has gone away.
+    /// let progress = |_| false;
+    /// let control = Control { progress: Some(&progress), ..Control::default() };
+    /// let built = Grid::build_with(mesh, &config, index, scratch, &control);
+    /// assert_eq!(built.err(), Some(Error::Cancelled));
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn build_with(
         mesh: TriangleMesh<'a>,
         config: &Config,
@@ -152,6 +170,24 @@ impl<'a> Grid<'a> {
     /// [`Error::Misaligned`], [`Error::NotAGrid`], [`Error::WrongByteOrder`],
     /// [`Error::UnsupportedVersion`], [`Error::Truncated`], [`Error::MeshMismatch`],
     /// [`Error::Corrupt`] and [`Error::MethodLeftOut`], each for what it says.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// // What a build wrote: from a file, say, into memory at a multiple of 64.
+    /// let mut memory = vec![Block::ZERO; Block::count_for(grid.blob_bytes())];
+    /// Block::bytes_mut(&mut memory)[..grid.blob_bytes()].copy_from_slice(grid.blob());
+    ///
+    /// let grid = Grid::open(Block::bytes(&memory), mesh)?;
+    /// assert!(grid.occluded(&Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0])));
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn open(blob: &'a [u8], mesh: TriangleMesh<'a>) -> Result<Self, Error> {
         let header = Header::read(blob, &mesh)?;
         header.has_mesh()?;
@@ -188,6 +224,20 @@ impl<'a> Grid<'a> {
     /// [`Error::OutOfMemory`] if there is less scratch;
     /// [`Error::Corrupt`] with a byte that a build would not have written so;
     /// [`Error::IndexOutOfRange`] if the mesh itself is damaged.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let mut scratch = vec![0; grid.validate_bytes()];
+    /// grid.validate(&mut scratch)?;
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn validate(&self, scratch: &mut [u8]) -> Result<(), Error> {
         let header = Header::read(self.blob, &self.mesh)?;
         if !header.unused_is_zero(self.method()) {
@@ -230,6 +280,20 @@ impl<'a> Grid<'a> {
 
     /// The closest hit of a ray. Where several triangles are hit at the same `t`, the one with the
     /// lowest id. [`intersect_with`](Self::intersect_with) takes options.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let hit = grid.intersect(&Ray::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0]));
+    /// assert_eq!(hit.map(|hit| (hit.t, hit.u, hit.v, hit.primitive)), Some((1.0, 0.25, 0.5, 0)));
+    /// # Ok::<(), Error>(())
+    /// ```
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut closest = Closest(None);
@@ -238,6 +302,21 @@ impl<'a> Grid<'a> {
     }
 
     /// Whether anything is hit: what [`intersect`](Self::intersect) would find, found sooner.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// // Is the light at (0.25, 0.25, 1) seen from there?
+    /// let to_light = Ray { t_max: 1.0, ..Ray::new([0.25, 0.25, -1.0], [0.0, 0.0, 2.0]) };
+    /// assert!(grid.occluded(&to_light));
+    /// # Ok::<(), Error>(())
+    /// ```
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
         let mut any = Any(false);

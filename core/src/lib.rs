@@ -44,9 +44,9 @@
 #[cfg(test)]
 extern crate alloc;
 
-/// The README's example runs as a test.
+/// The example in this package's README runs as a test.
 #[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
+#[doc = include_str!("../README.md")]
 struct Readme;
 
 const _: () = assert!(usize::BITS >= 32, "hgrid needs pointers of 32 bits or more");

@@ -172,6 +172,21 @@ impl<'a> TriangleMesh<'a> {
     /// # Errors
     /// [`Error::InvalidMesh`] if a stride is below its element (12 bytes a vertex, three indices a
     /// triangle) or an array ends before its last element; [`Error::TooManyTriangles`].
+    ///
+    /// ```
+    /// use hgrid_core::{Error, IndexType, Strided, TriangleMesh};
+    /// // Vertices with a colour behind each position, and indices of 16 bits.
+    /// let vertices: [[f32; 6]; 3] = [
+    ///     [0.0, 0.0, 0.0, 1.0, 0.5, 0.5],
+    ///     [1.0, 0.0, 0.0, 0.5, 1.0, 0.5],
+    ///     [0.0, 1.0, 0.0, 0.5, 0.5, 1.0],
+    /// ];
+    /// let indices: [[u16; 3]; 1] = [[0, 1, 2]];
+    /// let mesh =
+    ///     TriangleMesh::strided(Strided::new(&vertices), Strided::new(&indices), IndexType::U16)?;
+    /// assert_eq!(mesh.triangle(0).map(|triangle| triangle[2]), Some([0.0, 1.0, 0.0]));
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn strided(
         positions: Strided<'a>,
         indices: Strided<'a>,

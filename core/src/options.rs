@@ -218,6 +218,24 @@ impl Grid<'_> {
     }
 
     /// Whether anything is hit that the options let count.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// // Is a window before the light? The triangle lets it through.
+    /// let mut through_windows = |_, _: &Hit| Verdict::Reject;
+    /// let mut options =
+    ///     QueryOptions { filter: Some(&mut through_windows), ..QueryOptions::default() };
+    /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
+    /// assert!(!grid.occluded_with(&ray, &mut options));
+    /// # Ok::<(), Error>(())
+    /// ```
     #[must_use]
     pub fn occluded_with(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> bool {
         self.occluded_at(0, ray, options)

@@ -51,6 +51,21 @@ impl BlobInfo {
     /// # Errors
     /// [`Error::NotAGrid`], [`Error::WrongByteOrder`], [`Error::UnsupportedVersion`],
     /// [`Error::Truncated`] if there are fewer bytes, [`Error::Corrupt`].
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let info = BlobInfo::peek(grid.blob())?;
+    /// assert_eq!((info.method, info.triangle_count), (Method::Bvh, 1));
+    /// assert!(!info.has_mesh && info.total_bytes == grid.blob_bytes() as u64);
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn peek(bytes: &[u8]) -> Result<Self, Error> {
         let header = Header::peek(bytes)?;
         let method = Method::from_u32(header.method).ok_or(corrupt(offset_of!(Header, method)))?;
@@ -180,6 +195,22 @@ impl<'a> Grid<'a> {
     ///
     /// # Errors
     /// Those of [`open`](Self::open), and [`Error::NoMesh`].
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let mut memory = vec![Block::ZERO; Block::count_for(grid.packed_bytes() as usize)];
+    /// let packed = grid.pack(Block::bytes_mut(&mut memory))?;
+    /// let grid = Grid::open_packed(packed)?;
+    /// assert_eq!(grid.mesh().triangle(0), Some(positions));
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn open_packed(blob: &'a [u8]) -> Result<Self, Error> {
         check_alignment(blob, Region::Index)?;
         let header = Header::peek(blob)?;

@@ -62,6 +62,11 @@ impl SimdLevel {
     }
 
     /// The levels of this machine, the best one last.
+    ///
+    /// ```
+    /// use hgrid_core::SimdLevel;
+    /// assert!(SimdLevel::available().any(|level| level == SimdLevel::detect()));
+    /// ```
     pub fn available() -> impl Iterator<Item = Self> {
         Self::ALL.iter().copied().filter(|level| level.is_available())
     }

@@ -50,6 +50,13 @@ impl Sizes {
     /// Enough for any mesh with so many triangles and a build with so many tasks
     /// ([`Control::tasks`]). A task of a tree takes no more than a byte of scratch for four triangles; the
     /// other methods have one task.
+    ///
+    /// ```
+    /// use hgrid_core::{Config, Method, Sizes};
+    /// const BVH: Config = Config::new(Method::Bvh);
+    /// let bound = |tasks| Sizes::bound_parallel(1_000_000, &BVH, tasks).unwrap();
+    /// assert!(bound(8).scratch_bytes <= bound(1).scratch_bytes + 8 * 250_000);
+    /// ```
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "compared before")]
     pub const fn bound_parallel(triangles: u32, config: &Config, tasks: u32) -> Option<Self> {
@@ -132,6 +139,17 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
 ///
 /// # Errors
 /// Those of [`Grid::build_with`](crate::Grid::build_with), but for index memory.
+///
+/// ```
+/// use hgrid_core::{Config, Control, Error, TriangleMesh, sizes, sizes_with};
+/// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+/// let config = Config::default();
+/// let control = Control { tasks: 8, ..Control::default() };
+/// let parallel = sizes_with(&mesh, &config, &mut [], &control)?;
+/// assert!(parallel.scratch_bytes >= sizes(&mesh, &config, &mut [])?.scratch_bytes);
+/// # Ok::<(), Error>(())
+/// ```
 pub fn sizes_with(
     mesh: &TriangleMesh<'_>,
     config: &Config,

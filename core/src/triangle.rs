@@ -169,6 +169,14 @@ impl TriangleTest {
     }
 
     /// The same test, that some sides of triangles pass.
+    ///
+    /// ```
+    /// use hgrid_core::{Cull, Ray, TriangleTest};
+    /// let test = TriangleTest::new(&Ray::new([0.25, 0.25, 2.0], [0.0, 0.0, -1.0])).unwrap();
+    /// let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// assert!(test.culling(Cull::Back).test(&triangle).is_some());
+    /// assert!(test.culling(Cull::Front).test(&triangle).is_none());
+    /// ```
     #[inline(always)]
     #[must_use]
     pub const fn culling(self, cull: Cull) -> Self {

@@ -12,12 +12,12 @@ use crate::installed::soname;
 use crate::prefix::{HIT, Prefix, VERSION, dynamic, installed, laid_out, output_of, program};
 
 /// CMake builds nothing by itself: it writes files for make.
-fn has_cmake() -> bool {
+pub(crate) fn has_cmake() -> bool {
     is_installed("cmake") && is_installed("make")
 }
 
 /// A cmake command that nothing in the environment bends.
-fn cmake() -> Command {
+pub(crate) fn cmake() -> Command {
     let mut cmake = command("cmake");
     for name in ["CMAKE_PREFIX_PATH", "CMAKE_GENERATOR", "CFLAGS", "LDFLAGS", "MAKEFLAGS"] {
         cmake.env_remove(name);
@@ -25,20 +25,28 @@ fn cmake() -> Command {
     cmake
 }
 
-/// Asks for a project's build files.
-fn configure(project: &Path, prefix: &Path, build: &Path) -> Output {
-    let mut cmake = cmake();
-    cmake.arg("-S").arg(project).arg("-B").arg(build);
+/// Asks a cmake command for a project's build files.
+pub(crate) fn configure(mut cmake: Command, project: &Path, build: &Path) -> Output {
+    output(cmake.arg("-S").arg(project).arg("-B").arg(build))
+}
+
+/// The same for a project that looks for packages in a folder.
+fn configure_with(mut cmake: Command, project: &Path, prefix: &Path, build: &Path) -> Output {
     cmake.arg(format!("-DCMAKE_PREFIX_PATH={}", prefix.display()));
     cmake.arg(format!("-DSOURCE={}", root().join("c_examples/minimal.c").display()));
-    output(&mut cmake)
+    configure(cmake, project, build)
 }
 
 /// Builds the project outside with what lies in a folder, and runs its two programs.
 fn build_and_run(prefix: &Path) -> (TempDir, [PathBuf; 2]) {
+    build_and_run_by(cmake, prefix)
+}
+
+/// The same by another cmake command.
+pub(crate) fn build_and_run_by(cmake: fn() -> Command, prefix: &Path) -> (TempDir, [PathBuf; 2]) {
     let dir = TempDir::new().expect("a folder");
     let project = root().join("tests/packages/outside");
-    let Output { status, stderr, .. } = configure(&project, prefix, dir.path());
+    let Output { status, stderr, .. } = configure_with(cmake(), &project, prefix, dir.path());
     assert!(status.success(), "{}", String::from_utf8_lossy(&stderr));
     run(cmake().arg("--build").arg(dir.path()));
     let programs = ["shared", "static"].map(|name| dir.path().join(name));
@@ -103,7 +111,8 @@ fn probe(prefix: &Path, wanted: &str) -> (String, bool) {
     let dir = TempDir::new().expect("a folder");
     let lists = format!("set(WANTED {wanted})\n{PROBE}");
     fs::write(dir.path().join("CMakeLists.txt"), lists).expect("a file");
-    let Output { status, stderr, .. } = configure(dir.path(), prefix, &dir.path().join("build"));
+    let build = dir.path().join("build");
+    let Output { status, stderr, .. } = configure_with(cmake(), dir.path(), prefix, &build);
     (String::from_utf8(stderr).expect("text"), status.success())
 }
 

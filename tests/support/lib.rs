@@ -1,5 +1,10 @@
 //! What the tests of hgrid share: the oracle, meshes to ask about, a grid that owns its memory.
 
+/// The example in the project's README runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
+
 #[cfg(feature = "full")]
 pub mod artefact;
 pub mod copy;

@@ -1,0 +1,147 @@
+//! A project that has a checkout of hgrid in a folder of its own: CMake calls cargo.
+
+use std::env;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use hgrid_tests::artefact::{bare_compiler, root, run, target_dir};
+use hgrid_tests::tools::{command, is_installed};
+use tempfile::TempDir;
+
+use crate::archive::build_within;
+use crate::cmake::{build_and_run_by, cmake, configure, has_cmake};
+use crate::installed::soname;
+use crate::prefix::{HIT, VERSION, dynamic, output_of, program};
+
+/// A cmake that finds the cargo of this test, which does without a network.
+fn cargo_cmake() -> Command {
+    let mut cmake = cmake();
+    for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET"] {
+        cmake.env_remove(name);
+    }
+    cmake.env("CARGO_NET_OFFLINE", "true");
+    cmake
+}
+
+/// What is set for all projects here: one compiled library serves them.
+fn options() -> Vec<String> {
+    vec![
+        format!("-DHGRID_CARGO={}", env!("CARGO")),
+        format!("-DHGRID_TARGET_DIR={}", target_dir().join("cmake").display()),
+        "-DHGRID_METHODS=bvh".to_owned(),
+        "-DHGRID_STD=ON".to_owned(),
+    ]
+}
+
+/// A debug build of the project, too, gets an optimised library.
+#[test]
+fn a_project_builds_a_checkout_and_installs_it() {
+    if !has_cmake() || !is_installed("c++") {
+        return;
+    }
+    let mut within = options();
+    within.push("-DCMAKE_BUILD_TYPE=Debug".to_owned());
+    let dir = build_within(cargo_cmake, root(), &within);
+    if is_installed("binutils") {
+        assert!(dynamic(&dir.path().join("shared"), "NEEDED").contains(&soname()));
+        assert!(!dynamic(&dir.path().join("static"), "NEEDED").contains(&soname()));
+    }
+    // Nothing is built twice.
+    let shared = dir.path().join("shared");
+    let built = || fs::metadata(&shared).and_then(|file| file.modified()).expect("a time");
+    let before = built();
+    run(cargo_cmake().arg("--build").arg(dir.path()));
+    assert_eq!(built(), before);
+
+    install("lib");
+    install("odd/place");
+}
+
+/// Installs the checkout, with libraries in a folder of this name, and uses what is there.
+fn install(lib: &str) {
+    let dir = TempDir::new().expect("a folder");
+    let [build, prefix] = ["build", "prefix"].map(|name| dir.path().join(name));
+    let mut ask = cargo_cmake();
+    ask.args(options()).arg(format!("-DCMAKE_INSTALL_LIBDIR={lib}"));
+    let Output { status, stderr, .. } = configure(ask, root(), &build);
+    assert!(status.success(), "{}", String::from_utf8_lossy(&stderr));
+    run(cargo_cmake().arg("--build").arg(&build));
+    run(cargo_cmake().arg("--install").arg(&build).arg("--prefix").arg(&prefix));
+    // The place is found from where the package lies, now and when all of it was moved.
+    let moved = dir.path().join("another place");
+    fs::rename(&prefix, &moved).expect("a new place");
+    build_and_run_by(cmake, &moved);
+    asks_pkg_config(&moved, lib);
+}
+
+fn asks_pkg_config(prefix: &Path, lib: &str) {
+    if !is_installed("pkg-config") {
+        return;
+    }
+    let lib = prefix.join(lib);
+    let mut ask = command("pkg-config");
+    let ask = ask.env("PKG_CONFIG_PATH", lib.join("pkgconfig"));
+    assert_eq!(output_of(ask.args(["--modversion", "hgrid"])).trim(), VERSION);
+    let mut ask = command("pkg-config");
+    let ask = ask.env("PKG_CONFIG_PATH", lib.join("pkgconfig"));
+    let answer = output_of(ask.args(["--static", "--cflags", "--libs", "hgrid"]));
+    assert!(answer.contains("-DHGRID_STD"), "{answer}");
+    // The folder's name has a space, which pkg-config escapes for the shell.
+    let path = prefix.join("program");
+    let source = root().join("c_examples/minimal.c");
+    let compiler = bare_compiler();
+    let line = format!(
+        "{} '{}' {answer} -o '{}'",
+        compiler.get_program().display(),
+        source.display(),
+        path.display()
+    );
+    run(Command::new("sh").arg("-c").arg(line.replace('\n', " ")));
+    let printed = output_of(program(&path).env("LD_LIBRARY_PATH", &lib));
+    assert!(printed.ends_with(HIT), "{printed}");
+}
+
+/// A bare machine, with clang for its compiler.
+const TOOLCHAIN: &str = "
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR arm)
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+set(CMAKE_C_COMPILER clang)
+set(CMAKE_C_COMPILER_TARGET thumbv7em-none-eabihf)
+";
+
+#[test]
+fn a_cross_build_gets_a_static_library_for_the_target() {
+    let target = "thumbv7em-none-eabihf";
+    if !has_cmake() || !["clang", "rust-targets"].into_iter().all(is_installed) {
+        return;
+    }
+    let libraries =
+        run(Command::new("rustc").args(["--print", "target-libdir", "--target", target]));
+    let libraries = String::from_utf8(libraries.stdout).expect("a path");
+    if !Path::new(libraries.trim()).is_dir() {
+        hgrid_tests::tools::skip(&format!("no Rust libraries for {target}"));
+        return;
+    }
+    let dir = TempDir::new().expect("a folder");
+    let toolchain = dir.path().join("toolchain.cmake");
+    fs::write(&toolchain, TOOLCHAIN).expect("a file");
+    let ask = |options: &[&str]| {
+        let mut cmake = cargo_cmake();
+        cmake.args(self::options()).args(["-DHGRID_METHODS=one-level", "-DHGRID_STD=OFF"]);
+        cmake.arg(format!("-DCMAKE_TOOLCHAIN_FILE={}", toolchain.display())).args(options);
+        configure(cmake, root(), &dir.path().join("build"))
+    };
+    // CMake's words tell no target of Rust's.
+    let Output { status, stderr, .. } = ask(&[]);
+    let said = String::from_utf8(stderr).expect("text");
+    assert!(!status.success() && said.contains("set HGRID_CARGO_TARGET"), "{said}");
+
+    let Output { status, stderr, .. } = ask(&[&format!("-DHGRID_CARGO_TARGET={target}")]);
+    assert!(status.success(), "{}", String::from_utf8_lossy(&stderr));
+    run(cargo_cmake().arg("--build").arg(dir.path().join("build")));
+    let lib = dir.path().join("build/lib");
+    let names: Vec<_> = fs::read_dir(&lib).expect("libraries").flatten().collect();
+    assert!(names.len() == 1 && names[0].file_name() == "libhgrid.a", "{names:?}");
+}
