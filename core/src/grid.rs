@@ -21,7 +21,7 @@ use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{self, OneLevel};
 use crate::options::{Choice, Cull};
-use crate::ray::{Hit, Ray};
+use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::recursive::{self, Recursive};
 use crate::search::{Any, Closest, Outcome, Search};
 use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
@@ -239,7 +239,12 @@ impl<'a> Grid<'a> {
     /// Whether anything is hit: what [`intersect`](Self::intersect) would find, found sooner.
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        let mut any = Any(false);
+        self.any(ray) != INVALID_ID
+    }
+
+    /// A triangle that a ray hits, or [`INVALID_ID`].
+    pub(crate) fn any(&self, ray: &Ray) -> u32 {
+        let mut any = Any(INVALID_ID);
         self.search(ray, ray.t_min, Cull::None, &mut any, &mut ());
         any.0
     }
@@ -437,7 +442,7 @@ impl<'a> Grid<'a> {
         &self,
         choice: Choice,
         memory: &mut [bvh::Entry],
-        batch: &mut impl Together,
+        batch: &mut (impl Together + ?Sized),
     ) -> bool {
         if !HAS_VECTORS || !HAS_BVH {
             return false;
