@@ -4,7 +4,8 @@
  * It adds no code of its own to a query: each function here is the C call of the same name, and the
  * manual is hgrid.h. What it adds is for the programmer:
  *
- *   hgrid::grid       a built grid that owns its memory; moves, frees itself
+ *   hgrid::grid       a built grid that owns its memory, and its mesh if it is moved in; moves, frees
+ *                     itself
  *   hgrid::view       a grid in memory of yours: an arena, a mapped file; what hgrid_grid is in C
  *   hgrid::mesh       where your vertices and indices are, whatever structs they lie in
  *   hgrid::config     how to build; progress and parallel_for are callables of yours
@@ -499,6 +500,48 @@ struct scalar<T, std::void_t<typename T::value_type>> {
     using type = typename T::value_type;
 };
 
+// Converts to float and to nothing else.
+struct only_float {
+    template <class T, std::enable_if_t<std::is_same<T, float>::value, int> = 0>
+    constexpr operator T() const noexcept
+    {
+        return 0;
+    }
+};
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmissing-braces"
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#endif
+// Whether an aggregate begins with three floats, in members of its own or in arrays and structs that it
+// begins with.
+template <class T, class = void>
+struct begins_with_floats : std::false_type {};
+template <class T>
+struct begins_with_floats<T,
+                          std::void_t<decltype(T{only_float(), only_float(), only_float()})>>
+    : std::is_standard_layout<T> {};
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
+
+// Whether a class, which may have constructors, begins with floats x, y and z.
+template <class T, class = void>
+struct has_xyz : std::false_type {};
+template <class T>
+struct has_xyz<T, std::void_t<decltype(T::x), decltype(T::y), decltype(T::z)>>
+    : std::integral_constant<bool, std::is_standard_layout<T>::value &&
+                                       std::is_same<decltype(T::x), float>::value &&
+                                       std::is_same<decltype(T::y), float>::value &&
+                                       std::is_same<decltype(T::z), float>::value> {};
+template <class T, bool = has_xyz<T>::value>
+struct begins_with_xyz : std::false_type {};
+template <class T>
+struct begins_with_xyz<T, true>
+    : std::integral_constant<bool, offsetof(T, x) == 0 && offsetof(T, y) == sizeof(float) &&
+                                       offsetof(T, z) == 2 * sizeof(float)> {};
+
 template <class C>
 constexpr auto elements(const C &container) noexcept
 {
@@ -520,9 +563,9 @@ class mesh {
 public:
     /// A mesh of a container of vertices and one of indices.
     ///
-    /// Vertices are structs that begin with three floats x, y, z (anything may follow), arrays of
-    /// floats, or floats alone, three for each vertex. If the floats are elsewhere in the struct:
-    /// `field(vertices, &vertex::position)`.
+    /// Vertices are structs that begin with three floats (anything may follow), classes that begin with
+    /// floats x, y, z, arrays of floats, or floats alone, three for each vertex. All else does not compile.
+    /// If the floats are elsewhere in the struct: `field(vertices, &vertex::position)`.
     ///
     /// Indices are numbers of 16 bits (unsigned) or 32, three for each triangle; or arrays of three;
     /// or a field of a struct, from which on there are three: `field(faces, &face::corners)`.
@@ -568,8 +611,9 @@ private:
                       "the coordinates of a vertex are floats");
         static_assert(std::is_same_v<V, float> || sizeof(V) >= 3 * sizeof(float),
                       "a vertex has three coordinates");
-        static_assert(std::is_standard_layout_v<V>,
-                      "where does the vertex have its coordinates? name the field: "
+        static_assert(std::is_same_v<number, float> || detail::begins_with_floats<V>::value ||
+                          detail::begins_with_xyz<V>::value,
+                      "where does the vertex have its three floats? name the field: "
                       "hgrid::field(vertices, &vertex::position)");
         raw_.positions = vertices.first();
         raw_.position_stride = is_flat ? 3 * sizeof(float) : vertices.stride();
@@ -755,6 +799,10 @@ public:
         return raw_.scratch = scratch.data(), raw_.scratch_bytes = scratch.size(), *this;
     }
 
+    /// The filter is asked about triangles whose mask has a bit in common with this one; the others are
+    /// opaque and count unasked. With 0 or all bits it is asked about every triangle.
+    options &filter_mask(std::uint32_t bits) noexcept { return raw_.filter_mask = bits, *this; }
+
     /// Asks `callable` about each hit, from near to far, each triangle at most once a ray.
     ///
     /// It is called with the hit, or with the ray's place in its batch and the hit, and returns a
@@ -926,6 +974,18 @@ public:
         return ::hgrid_occluded(&raw_, &along, &with.c());
     }
 
+    /// A triangle that blocks a ray, or `invalid_id`: one that the options let count. It need not be the
+    /// closest.
+    std::uint32_t occluder(const ray &along) const noexcept
+    {
+        return ::hgrid_occluder(&raw_, &along, nullptr);
+    }
+    /// The same with options.
+    std::uint32_t occluder(const ray &along, const options &with) const noexcept
+    {
+        return ::hgrid_occluder(&raw_, &along, &with.c());
+    }
+
     /// The closest hit of each ray; a miss has the primitive `invalid_id`. There are as many hits as
     /// rays, or the answer is `invalid_answers`.
     status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know) const noexcept
@@ -951,6 +1011,20 @@ public:
                       const options &with) const noexcept
     {
         return occluded_n(rays, answers, know, &with.c());
+    }
+
+    /// For each ray a triangle that blocks it, or `invalid_id`. There are as many answers as rays, or the
+    /// answer is `invalid_answers`.
+    status occluder_n(strided<const ray> rays, strided<std::uint32_t> answers,
+                      coherence know) const noexcept
+    {
+        return occluder_n(rays, answers, know, nullptr);
+    }
+    /// The same with options for all rays.
+    status occluder_n(strided<const ray> rays, strided<std::uint32_t> answers, coherence know,
+                      const options &with) const noexcept
+    {
+        return occluder_n(rays, answers, know, &with.c());
     }
 
     /// Every triangle that a ray hits, sorted by t, as many as there is room for; gives their number,
@@ -1060,6 +1134,15 @@ private:
                                          answers.stride(), rays.size(),
                                          static_cast<::hgrid_coherence>(know), with)};
     }
+    status occluder_n(strided<const ray> rays, strided<std::uint32_t> answers, coherence know,
+                      const ::hgrid_query_options *with) const noexcept
+    {
+        if (rays.size() != answers.size())
+            return status::invalid_answers;
+        return status{::hgrid_occluder_n(&raw_, rays.first(), rays.stride(), answers.first(),
+                                         answers.stride(), rays.size(),
+                                         static_cast<::hgrid_coherence>(know), with)};
+    }
     result<std::size_t> intersect_all(const ray &along, span<hit> hits,
                                       const ::hgrid_query_options *with) const noexcept
     {
@@ -1082,7 +1165,7 @@ private:
 
 // --- a grid that owns its memory ------------------------------------------------------------------
 
-/// A built grid and its memory. The mesh stays the caller's.
+/// A built grid and its memory. The mesh stays the caller's, unless `keep` takes it over.
 ///
 /// It is a view, so it answers queries, and where a view is wanted it can be given; that view is good
 /// for as long as the grid is. Moving it does not move the memory.
@@ -1098,6 +1181,52 @@ public:
     /// `hgrid_build`, and `out_of_memory`. `details` says which triangle is to blame.
     static result<grid> build(const mesh &of, const config &how = {},
                               report *details = nullptr) noexcept;
+
+    /// Builds a grid that keeps its vertices and indices: both are moved in.
+    ///
+    ///     auto grid = hgrid::grid::keep(std::move(vertices), std::move(indices));
+    ///
+    /// Containers are those that a `mesh` is made of. Moving the grid does not move what it keeps.
+    template <class Vertices, class Indices,
+              std::enable_if_t<!std::is_invocable_v<const Indices &, const Vertices &>, int> = 0>
+    static result<grid> keep(Vertices &&vertices, Indices &&indices, const config &how = {},
+                             report *details = nullptr) noexcept
+    {
+        static_assert(!std::is_lvalue_reference_v<Vertices> && !std::is_lvalue_reference_v<Indices>,
+                      "the grid keeps its vertices and indices: std::move them");
+        struct arrays {
+            Vertices vertices;
+            Indices indices;
+        };
+        const auto describe = [](const arrays &kept) noexcept {
+            return mesh(kept.vertices, kept.indices);
+        };
+        return keep(arrays{std::move(vertices), std::move(indices)}, describe, how, details);
+    }
+    /// The same with data of any kind, which is moved in, and a callable that says what the mesh of them is.
+    ///
+    ///     auto grid = hgrid::grid::keep(std::move(model), [](const model &kept) {
+    ///         return hgrid::mesh(kept.vertices, hgrid::field(kept.faces, &face::corners));
+    ///     });
+    ///
+    /// What others use, too, is shared: let the data be a `std::shared_ptr` of them.
+    template <class Data, class Describe,
+              std::enable_if_t<std::is_invocable_v<const Describe &, const Data &>, int> = 0>
+    static result<grid> keep(Data &&data, const Describe &describe, const config &how = {},
+                             report *details = nullptr) noexcept
+    {
+        static_assert(!std::is_lvalue_reference_v<Data>, "the grid keeps its data: std::move them");
+        std::unique_ptr<Data> moved(new (std::nothrow) Data(std::move(data)));
+        if (moved == nullptr)
+            return status::out_of_memory;
+        const mesh of = describe(static_cast<const Data &>(*moved));
+        auto built = build(of, how, details);
+        if (built)
+            built->kept_ = {moved.release(), [](void *kept) noexcept {
+                                delete static_cast<Data *>(kept);
+                            }};
+        return built;
+    }
 
     /// Opening takes a view: `view::open` where the blob stays yours, `adopt` where it becomes the grid's.
     template <class... Arguments>
@@ -1118,7 +1247,8 @@ public:
 
     /// Takes the other grid, which is none then.
     grid(grid &&other) noexcept
-        : view(std::exchange(static_cast<view &>(other), view())), blob_(std::move(other.blob_))
+        : view(std::exchange(static_cast<view &>(other), view())), blob_(std::move(other.blob_)),
+          kept_(std::move(other.kept_))
     {
     }
     /// Frees its own memory and takes the other grid, which is none then.
@@ -1126,6 +1256,7 @@ public:
     {
         static_cast<view &>(*this) = std::exchange(static_cast<view &>(other), view());
         blob_ = std::move(other.blob_);
+        kept_ = std::move(other.kept_);
         return *this;
     }
 
@@ -1161,6 +1292,8 @@ private:
     }
 
     memory blob_;
+    // What the mesh refers to, if the grid keeps it.
+    std::unique_ptr<void, void (*)(void *)> kept_{nullptr, [](void *) {}};
 };
 
 /// Tells how much memory a build of this mesh takes: roughly, or with scratch exactly.

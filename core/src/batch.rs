@@ -15,6 +15,7 @@
 //!           the hit, go on behind it alone
 //! ```
 
+use core::fmt;
 use core::marker::PhantomData;
 use core::ops::Range;
 
@@ -46,7 +47,6 @@ pub enum Coherence {
 }
 
 /// `count` elements to be written in a slice of bytes, one every `stride` bytes.
-#[derive(Debug)]
 pub struct StridedMut<'a> {
     /// The bytes, from the first element's first to at least the last element's last.
     pub bytes: &'a mut [u8],
@@ -54,6 +54,16 @@ pub struct StridedMut<'a> {
     pub stride: usize,
     /// Number of elements.
     pub count: usize,
+}
+
+impl fmt::Debug for StridedMut<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("StridedMut")
+            .field("bytes", &self.bytes.len())
+            .field("stride", &self.stride)
+            .field("count", &self.count)
+            .finish()
+    }
 }
 
 impl<'a> StridedMut<'a> {

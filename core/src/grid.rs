@@ -1,5 +1,7 @@
 //! The view that queries run on: a blob bound to its mesh, whichever method built it.
 
+use core::fmt;
+
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
@@ -35,7 +37,7 @@ use crate::visit::Visitor;
 /// number of threads may query it at once. Queries never fail, never allocate and never panic;
 /// their steps are bounded by the resolutions (one level: by their sum). A single query's stack is
 /// below 7 KiB, a batch's below 36 KiB.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,
     blob: &'a [u8],
@@ -567,5 +569,27 @@ impl<'a> Grid<'a> {
 
     fn header(&self) -> Option<Header> {
         Header::read(self.blob, &self.mesh).ok()
+    }
+
+    /// A grid that hits nothing.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn nothing() -> Self {
+        let (mesh, blob) = (TriangleMesh::EMPTY, &[]);
+        let (lattice, structure) = (Lattice::NOTHING, Structure::Bvh(Bvh::NOTHING));
+        Self { mesh, blob, lattice, structure, simd: SimdLevel::detect() }
+    }
+
+    /// Says in one line what it is.
+    pub(crate) fn describe(&self, mut to: fmt::DebugStruct<'_, '_>) -> fmt::Result {
+        to.field("method", &self.method())
+            .field("triangles", &self.mesh.triangle_count())
+            .field("bytes", &self.blob_bytes())
+            .finish()
+    }
+}
+
+impl fmt::Debug for Grid<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.describe(f.debug_struct("Grid"))
     }
 }

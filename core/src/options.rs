@@ -302,11 +302,15 @@ impl Grid<'_> {
         ray: &Ray,
         options: &mut QueryOptions<'_>,
     ) -> Option<u32> {
+        if options.are_plain() {
+            let id = self.any(ray);
+            return (id != INVALID_ID).then_some(id);
+        }
         if options.filter.is_some() {
             return self.intersect_at(place, ray, options).map(|hit| hit.primitive);
         }
         // Nobody is promised an order.
-        let [mut hit] = [Hit::MISS];
+        let mut hit = Hit::MISS;
         let found = self.nearest(ray, options, None, core::slice::from_mut(&mut hit), true);
         (found > 0).then_some(hit.primitive)
     }

@@ -69,6 +69,8 @@ static void layout(void)
     OFFSET(hgrid_query_options, counters);
     OFFSET(hgrid_query_options, scratch);
     OFFSET(hgrid_query_options, scratch_bytes);
+    OFFSET(hgrid_query_options, filter_mask);
+    OFFSET(hgrid_query_options, reserved);
     SIZE(hgrid_closest);
     OFFSET(hgrid_closest, position);
     OFFSET(hgrid_closest, distance);

@@ -5,6 +5,7 @@ mod bounds;
 mod inputs;
 mod mixed;
 mod packed;
+mod printed;
 mod progress;
 mod rays;
 mod shapes;

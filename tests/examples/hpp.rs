@@ -131,7 +131,7 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// What must not compile, and what the compiler has to say about it.
-const REFUSED: [(&str, &str); 17] = [
+const REFUSED: [(&str, &str); 23] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     ("hgrid::config().progress([](float) {});", "progress"),
@@ -139,6 +139,15 @@ const REFUSED: [(&str, &str); 17] = [
     ("hgrid::mesh m(std::vector<float>(9), indices);", "give them a name"),
     ("std::vector<double> v(9); hgrid::mesh m(v, indices);", "coordinates of a vertex are floats"),
     ("std::vector<std::array<float, 2>> v(3); hgrid::mesh m(v, indices);", "three coordinates"),
+    ("std::vector<of<double>> v(3); hgrid::mesh m(v, indices);", "name the field"),
+    ("std::vector<late> v(3); hgrid::mesh m(v, indices);", "name the field"),
+    ("std::vector<backwards> v(3); hgrid::mesh m(v, indices);", "name the field"),
+    ("std::vector<face> v(3); hgrid::mesh m(v, indices);", "name the field"),
+    ("std::vector<float> v(9); hgrid::grid::keep(v, std::vector<int>(3));", "std::move them"),
+    (
+        "hgrid::memory m; hgrid::grid::keep(m, [](const hgrid::memory &) { return hgrid::mesh(hgrid_mesh{}); });",
+        "std::move them",
+    ),
     ("std::vector<face> f(1); hgrid::mesh m(vertices, f);", "name the field"),
     ("std::vector<short> i(3); hgrid::mesh m(vertices, i);", "or unsigned ones of 16"),
     ("hgrid::grid a; hgrid::grid b = a;", "delete"),
@@ -162,6 +171,9 @@ fn what_cannot_work_does_not_compile() {
         format!(
             "#include <hgrid.hpp>\n#include <array>\n#include <vector>\n\
              struct face {{ int material; unsigned corners[3]; }};\n\
+             template <class T> struct of {{ T x, y, z; }};\n\
+             struct late {{ int id; float x, y, z; }};\n\
+             struct backwards {{ backwards() : z(0), y(0), x(0) {{}} float z, y, x; }};\n\
              void refused(const std::vector<float> &vertices, const std::vector<unsigned> &indices);\n\
              void refused(const std::vector<float> &vertices, const std::vector<unsigned> &indices)\n\
              {{\n    static_cast<void>(vertices), static_cast<void>(indices);\n    {line}\n}}\n"

@@ -3,6 +3,7 @@
 #include "hpp.h"
 
 #include <atomic>
+#include <memory>
 #include <new>
 #include <string>
 #include <thread>
@@ -257,9 +258,66 @@ static void check_blobs()
     CHECK(whole && whole->longest_list > 0 && whole->degenerate_count == 0);
 }
 
+/* A grid keeps what it is given, wherever it moves, and lets go of it in the end. */
+struct holder {
+    hgrid::grid grid;
+    int other = 0;
+};
+
+static void check_kept()
+{
+    const scene s(3);
+    std::vector<std::array<std::uint32_t, 3>> corners;
+    for (const face &f : s.faces)
+        corners.push_back(f.corners);
+    const auto expected = hgrid::grid::build(s.mesh());
+    const auto *first = s.vertices.data();
+    std::vector<vertex> vertices = s.vertices;
+    CHECK(vertices.data() != first);
+    first = vertices.data();
+    auto kept = hgrid::grid::keep(std::move(vertices), std::move(corners));
+    CHECK(kept && kept->mesh_of()->c().positions == first);
+    std::vector<holder> holders;
+    for (int i = 0; i < 9; i++)
+        holders.emplace_back();
+    holders[3].grid = std::move(*kept);
+    holders.resize(100);
+    CHECK(holders[3].grid.intersect(down())->primitive == expected->intersect(down())->primitive);
+    CHECK(!kept->occluded(down()) && holders[3].grid.validate() == status::ok);
+
+    /* Shared data, with a mesh that looks into it; and arrays of another type. */
+    auto shared = std::make_shared<const scene>(3);
+    const auto describe = [](const std::shared_ptr<const scene> &of) { return of->mesh(); };
+    {
+        auto owner = hgrid::grid::keep(std::shared_ptr<const scene>(shared), describe,
+                                       hgrid::method::one_level);
+        CHECK(owner && shared.use_count() == 2 && owner->occluded(down()));
+        holders[5].grid = std::move(*owner);
+    }
+    CHECK(shared.use_count() == 2 && holders[5].grid.occluded(down()));
+    holders[5].grid = hgrid::grid();
+    CHECK(shared.use_count() == 1);
+    const auto triangle = hgrid::grid::keep(std::array<float, 9>{0, 0, 0, 1, 0, 0, 0, 1, 0},
+                                            std::array<std::uint16_t, 3>{0, 1, 2});
+    CHECK(triangle && triangle->occluded(down(0.2f, 0.3f)) && !triangle->occluded(down(0.9f, 0.9f)));
+
+    /* What cannot be built is given back. */
+    const auto bad = [](const std::shared_ptr<const scene> &of) {
+        hgrid_mesh raw = of->mesh().c();
+        raw.vertex_count = 3;
+        return hgrid::mesh(raw);
+    };
+    hgrid::report report;
+    const auto refused = hgrid::grid::keep(std::shared_ptr<const scene>(shared), bad,
+                                           hgrid::method::bvh, &report);
+    CHECK(refused.error() == status::index_out_of_range && report.triangle == 0);
+    CHECK(shared.use_count() == 1);
+}
+
 void check_builds()
 {
     check_grids();
+    check_kept();
     check_memory_that_runs_out();
     check_views();
     check_progress_and_threads();

@@ -80,6 +80,22 @@ struct corners16 {
     std::uint16_t first, second, third;
 };
 
+/* Vertices that begin with three floats, one way or another. */
+struct named {
+    float x, y, z;
+    std::uint32_t color;
+};
+struct nested {
+    named position;
+    float *elsewhere;
+};
+class constructed {
+public:
+    constructed() noexcept : x(0), y(0), z(0) {}
+    explicit constructed(const hgrid::point &p) noexcept : x(p[0]), y(p[1]), z(p[2]) {}
+    float x, y, z;
+};
+
 /* A mesh gives the hits that the scene's own gives. */
 static void check_mesh(const scene &s, const hgrid::mesh &mesh)
 {
@@ -123,6 +139,17 @@ static void check_meshes()
     check_mesh(s, {hgrid::field(s.vertices, &vertex::position), triples});
     check_mesh(s, {hgrid::span<const float>(flat), hgrid::field(structs, &corners16::first)});
     check_mesh(s, hgrid::mesh(s.mesh().c()));
+    std::vector<named> by_name;
+    std::vector<nested> in_structs;
+    std::vector<constructed> of_classes;
+    for (const hgrid::point &p : arrays) {
+        by_name.push_back({p[0], p[1], p[2], 0});
+        in_structs.push_back({by_name.back(), nullptr});
+        of_classes.emplace_back(p);
+    }
+    check_mesh(s, {by_name, triples});
+    check_mesh(s, {in_structs, triples});
+    check_mesh(s, {of_classes, triples});
 #if __cplusplus >= 202002L
     check_mesh(s, {std::span(arrays), std::span(flat16)});
 #endif

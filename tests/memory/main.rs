@@ -2,6 +2,7 @@
 //! nothing touched beside it?
 
 mod budget;
+mod owned;
 mod trees;
 
 use hgrid_core::{Config, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes};
