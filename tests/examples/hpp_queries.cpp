@@ -92,7 +92,7 @@ static void check_options()
         masks.push_back(1u << f.material);
     const auto grid = hgrid::grid::build(s.mesh().masks(masks));
     CHECK(grid);
-    const auto material = [&](const std::optional<hgrid::hit> &hit) {
+    const auto material = [&](const hgrid::optional<hgrid::hit> &hit) {
         return hit ? s.faces[hit->primitive].material : -1;
     };
     for (masks.pop_back();; masks.clear()) {
@@ -135,7 +135,7 @@ static void check_filters()
     const scene s(5);
     const auto grid = hgrid::grid::build(s.mesh());
     CHECK(grid);
-    const auto material = [&](const std::optional<hgrid::hit> &hit) {
+    const auto material = [&](const hgrid::optional<hgrid::hit> &hit) {
         return hit ? s.faces[hit->primitive].material : -1;
     };
 
