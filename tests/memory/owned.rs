@@ -216,9 +216,8 @@ struct Vertex {
 fn vertices_in_structs_small_indices_and_masks() {
     static MASKS: [u32; 4] = [1, 2, 3, 4];
     let mesh = ball(1, 0.0);
-    let vertices: Vec<_> =
-        mesh.positions.iter().map(|&position| Vertex { color: 7, position, normal: [0.0; 2] });
-    let vertices: Vec<_> = vertices.collect();
+    let vertex = |&position: &[f32; 3]| Vertex { color: 7, position, normal: [0.0; 2] };
+    let vertices: Vec<_> = mesh.positions.iter().map(vertex).collect();
     let indices: Vec<u16> =
         mesh.indices.iter().flatten().map(|&at| u16::try_from(at).unwrap()).collect();
     let triples: Arc<[[u16; 3]]> = indices.as_chunks().0.to_vec().into();
