@@ -1,5 +1,5 @@
 /*
- * hgrid from C++17, without exceptions and without a pointer: a table under a leaf with holes.
+ * hgrid from C++ (14 or later), without exceptions and without a pointer: a table under a leaf with holes.
  *
  *     cargo build --release -p hgrid-capi
  *     c++ -std=c++17 -Iinclude c_examples/hello.cpp target/release/libhgrid.a -o hello

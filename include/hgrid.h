@@ -9,16 +9,17 @@
  * -----------
  *   hgrid_sizes       how much memory does this mesh take?     optional: there are bounds, too
  *   hgrid_build       mesh + memory -> grid
- *   hgrid_intersect   grid + ray -> hit;  hgrid_occluded only says whether there is one
+ *   hgrid_intersect   grid + ray -> hit;  hgrid_occluded only says whether there is one, and
+ *                     hgrid_occluder names one
  *
- * Many rays at once, from your structs into your structs: hgrid_intersect_n, hgrid_occluded_n. Every
- * triangle along a ray: hgrid_intersect_all. The nearest point: hgrid_closest_point. Masks, culling, a
- * triangle to skip, filters and counters are options of these. hgrid_bound, hgrid_sizes and hgrid_fit
- * are about memory: enough for any mesh, for this one, and the best grid for a budget. A build on
- * threads of yours, with progress, is a matter of hgrid_config. hgrid_surface_at knows the normal of a
- * hit, and where rays start that leave it. For grids that are stored there are hgrid_open, hgrid_peek,
- * hgrid_pack, hgrid_mesh_of and hgrid_validate, and hgrid_inspect looks at all of one. hgrid_refit moves a
- * tree with its vertices.
+ * Many rays at once, from your structs into your structs: hgrid_intersect_n, hgrid_occluded_n,
+ * hgrid_occluder_n. Every triangle along a ray: hgrid_intersect_all. The nearest point:
+ * hgrid_closest_point. Masks, culling, a triangle to skip, filters and counters are options of these.
+ * hgrid_bound, hgrid_sizes and hgrid_fit are about memory: enough for any mesh, for this one, and the
+ * best grid for a budget. A build on threads of yours, with progress, is a matter of hgrid_config.
+ * hgrid_surface_at knows the normal of a hit, and where rays start that leave it. For grids that are
+ * stored there are hgrid_open, hgrid_peek, hgrid_pack, hgrid_mesh_of and hgrid_validate, and
+ * hgrid_inspect looks at all of one. hgrid_refit moves a tree with its vertices.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -121,8 +122,9 @@
  * Pointers
  * --------
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
- * valid during the call. Positions, indices and masks, the rays and answers of hgrid_intersect_n
- * and hgrid_occluded_n, and the bytes that hgrid_peek looks at need no alignment; all else does.
+ * valid during the call. Positions, indices and masks, the rays and answers of hgrid_intersect_n,
+ * hgrid_occluded_n and hgrid_occluder_n, and the bytes that hgrid_peek looks at need no alignment; all
+ * else does.
  * Regions, blobs, positions, indices and masks point to as many bytes as the sizes next to them
  * say. Each function says which of its pointers may be NULL; any other NULL is answered with
  * HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of a
@@ -749,8 +751,9 @@ typedef struct hgrid_counters {
  * What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
  *
  * A query with options that are not the defaults is somewhat slower than one without. A tree
- * (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are;
- * with `filter` or `counters`, and with the other methods, they are traced one by one.
+ * (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are, and
+ * with a `filter` up to their first hits; with `counters`, and with the other methods, they are traced
+ * one by one.
  * Options that break the rules for structs make
  * a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
  * returns what is wrong with them.
@@ -785,7 +788,8 @@ typedef struct hgrid_query_options {
      * its batch, 0 for a single one.
      *
      * Hits are offered from near to far, where `t` is equal by ascending triangle, and each
-     * triangle at most once for each ray. It is called on the thread that asks, may ask the same
+     * triangle at most once for each ray; those of one ray of a batch before those of the next. Which
+     * triangles are offered, `filter_mask` says. It is called on the thread that asks, may ask the same
      * grid other questions, and may not be left by `longjmp` or by a C++ exception. Here is glass,
      * which lets shadow rays pass and weakens them:
      *
@@ -833,6 +837,33 @@ typedef struct hgrid_query_options {
      * 256 rays on the stack. Larger windows give the answers sooner, up to millions of rays.
      */
     size_t scratch_bytes;
+    /**
+     * `filter` is asked about a triangle if its mask and this have a bit in common; the others are
+     * opaque: their hits count unasked. 0, the default, and all bits ask about every triangle, even one
+     * whose mask is 0.
+     *
+     * Rays that meet none of those triangles cost in a batch what they cost without a filter. Of a ray
+     * that an opaque triangle blocks, `hgrid_occluded` and the other questions of that kind may offer the
+     * filter other hits or not. Here are leaves, whose triangles have the mask 2, among walls:
+     *
+     * ```c
+     * static hgrid_status light_of_rays(const hgrid_grid *grid, const hgrid_ray *rays, size_t count,
+     *                                   hgrid_verdict (*is_leaf_there)(void *, size_t,
+     *                                                                  const hgrid_hit *),
+     *                                   void *textures, unsigned char *occluded)
+     * {
+     *     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+     *     options.filter = is_leaf_there, options.context = textures;
+     *     options.filter_mask = 2;
+     *     return hgrid_occluded_n(grid, rays, 0, occluded, 0, count, HGRID_COHERENCE_COHERENT, &options);
+     * }
+     * ```
+     */
+    uint32_t filter_mask;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
 } hgrid_query_options;
 
 /**
@@ -1772,6 +1803,32 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
                     const struct hgrid_query_options *options);
 
 /**
+ * Names a triangle that blocks a ray, or `HGRID_INVALID_ID` where `hgrid_occluded` would say false.
+ *
+ * The ray hits this triangle in its range. It need not be the closest one, and another one may be named
+ * in a batch or on another machine. Shadow rays that follow may be tested against it first:
+ *
+ * ```c
+ * static bool is_lit(const hgrid_grid *grid, const hgrid_ray *to_light, uint32_t *blocker)
+ * {
+ *     *blocker = hgrid_occluder(grid, to_light, NULL);
+ *     return *blocker == HGRID_INVALID_ID;
+ * }
+ * ```
+ *
+ * `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
+ * or with options that break the rules for structs, the answer is `HGRID_INVALID_ID`.
+ *
+ * Threads: any number of queries on the same grid at once; each thread with counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+uint32_t hgrid_occluder(const struct hgrid_grid *grid,
+                        const struct hgrid_ray *ray,
+                        const struct hgrid_query_options *options);
+
+/**
  * Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
  *
  * Writes as many hits as there is room for, the nearest, and to `count` how many there are, which
@@ -2005,6 +2062,31 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
                               size_t ray_stride,
                               uint8_t *occluded,
                               size_t occluded_stride,
+                              size_t count,
+                              hgrid_coherence coherence,
+                              const struct hgrid_query_options *options);
+
+/**
+ * Names for each of many rays a triangle that blocks it: as `hgrid_occluder` would, but sooner.
+ *
+ * Writes a `uint32_t` for each ray, a triangle or `HGRID_INVALID_ID`, every `occluder_stride` bytes
+ * from `occluders` on. It is `HGRID_INVALID_ID` where `hgrid_occluded_n` writes 0. Where several
+ * triangles block a ray, it may be another one than `hgrid_occluder` names. All else is as with
+ * `hgrid_occluded_n`. `rays` and `occluders` may be NULL if `count` is 0, `options` may be NULL.
+ * Returns `HGRID_OK` and has written all names, or returns what `hgrid_intersect_n` returns and has
+ * written none.
+ *
+ * Threads: any number of queries on the same grid at once; each thread with names and counters of
+ * its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_occluder_n(const struct hgrid_grid *grid,
+                              const struct hgrid_ray *rays,
+                              size_t ray_stride,
+                              uint32_t *occluders,
+                              size_t occluder_stride,
                               size_t count,
                               hgrid_coherence coherence,
                               const struct hgrid_query_options *options);
@@ -2715,7 +2797,7 @@ bool hgrid_has_method(uint32_t method);
  * The default options of a query.
  */
 #define HGRID_QUERY_OPTIONS_INIT {sizeof(hgrid_query_options), 0xffffffffu, HGRID_CULL_NONE, \
-                                  HGRID_INVALID_ID, NULL, NULL, NULL, NULL, 0}
+                                  HGRID_INVALID_ID, NULL, NULL, NULL, NULL, 0, 0, 0}
 
 /**
  * A report before its call.

@@ -1,10 +1,12 @@
 /*
- * hgrid for C++17 and later: hgrid.h with types that own, know their size and call lambdas.
+ * hgrid for C++14 and later: hgrid.h with types that own, know their size and call lambdas. From C++17
+ * on optional and byte are those of the standard library.
  *
  * It adds no code of its own to a query: each function here is the C call of the same name, and the
  * manual is hgrid.h. What it adds is for the programmer:
  *
- *   hgrid::grid       a built grid that owns its memory; moves, frees itself
+ *   hgrid::grid       a built grid that owns its memory, and its mesh if it is moved in; moves, frees
+ *                     itself
  *   hgrid::view       a grid in memory of yours: an arena, a mapped file; what hgrid_grid is in C
  *   hgrid::mesh       where your vertices and indices are, whatever structs they lie in
  *   hgrid::config     how to build; progress and parallel_for are callables of yours
@@ -47,8 +49,20 @@
 
 #include "hgrid.h"
 
-#if (defined(_MSVC_LANG) ? _MSVC_LANG : __cplusplus) < 201703L
-#error "hgrid.hpp needs C++17"
+#if defined(_MSVC_LANG)
+#define HGRID_CPP _MSVC_LANG
+#else
+#define HGRID_CPP __cplusplus
+#endif
+#if HGRID_CPP < 201402L
+#error "hgrid.hpp needs C++14"
+#endif
+#if HGRID_CPP >= 201703L
+#define HGRID_INLINE inline
+#define HGRID_NODISCARD [[nodiscard]]
+#else
+#define HGRID_INLINE
+#define HGRID_NODISCARD
 #endif
 
 #include <array>
@@ -60,12 +74,18 @@
 #include <limits>
 #include <memory>
 #include <new>
-#include <optional>
 #include <type_traits>
 #include <utility>
+#if HGRID_CPP >= 201703L
+#include <optional>
+#endif
 
 /// See the head of this file.
 namespace hgrid {
+#if HGRID_CPP < 201703L
+// Under another name for the linker than where these are the types of C++17.
+inline namespace cpp14 {
+#endif
 
 // --- words ----------------------------------------------------------------------------------------
 
@@ -98,9 +118,9 @@ using blob_info = ::hgrid_blob_info;
 using point = std::array<float, 3>;
 
 /// The id that no triangle has; in a hit of a batch, a miss.
-inline constexpr std::uint32_t invalid_id = HGRID_INVALID_ID;
+HGRID_INLINE constexpr std::uint32_t invalid_id = HGRID_INVALID_ID;
 /// Every region and every blob starts at a multiple of this many bytes.
-inline constexpr std::size_t alignment = HGRID_ALIGNMENT;
+HGRID_INLINE constexpr std::size_t alignment = HGRID_ALIGNMENT;
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic push
@@ -143,7 +163,7 @@ inline constexpr std::size_t validate_bound(std::size_t triangles) noexcept
 
 /// What a call answers: `ok`, or why not. The numbers are those of `hgrid_status`, and a later library
 /// may return others than these.
-enum class [[nodiscard]] status : std::int32_t {
+enum class HGRID_NODISCARD status : std::int32_t {
     /// `HGRID_OK`
     ok = HGRID_OK,
     /// `HGRID_ERROR_NULL_ARGUMENT`
@@ -228,6 +248,13 @@ inline const char *message(status of) noexcept
     return ::hgrid_status_string(static_cast<::hgrid_status>(of));
 }
 
+namespace detail {
+inline status said(::hgrid_status of) noexcept
+{
+    return static_cast<status>(of);
+}
+} // namespace detail
+
 /// The structure to build; `hgrid.h` says when to choose which.
 enum class method : std::uint32_t {
     /// `HGRID_METHOD_ONE_LEVEL`
@@ -301,12 +328,53 @@ inline bool has_method(method which) noexcept
     return ::hgrid_has_method(static_cast<std::uint32_t>(which));
 }
 
+// --- a value or nothing, bytes --------------------------------------------------------------------
+
+#if HGRID_CPP >= 201703L
+/// A value, or nothing: that of the standard library.
+template <class T>
+using optional = std::optional<T>;
+/// A byte: that of the standard library.
+using byte = std::byte;
+#else
+/// A value, or nothing: what C++17's `std::optional` is, for the types of this header.
+template <class T>
+class optional {
+public:
+    /// Nothing.
+    constexpr optional() noexcept = default;
+    /// A value.
+    constexpr optional(T value) noexcept : value_(std::move(value)), has_value_(true) {}
+
+    /// Whether there is a value.
+    constexpr bool has_value() const noexcept { return has_value_; }
+    /// Whether there is a value.
+    constexpr explicit operator bool() const noexcept { return has_value_; }
+    /// The value, which must be there.
+    constexpr T &operator*() & noexcept { return assert(has_value_), value_; }
+    /// The value, which must be there.
+    constexpr const T &operator*() const & noexcept { return assert(has_value_), value_; }
+    /// The value, which must be there, to move from.
+    constexpr T &&operator*() && noexcept { return assert(has_value_), std::move(value_); }
+    /// The value's members; it must be there.
+    constexpr T *operator->() noexcept { return assert(has_value_), &value_; }
+    /// The value's members; it must be there.
+    constexpr const T *operator->() const noexcept { return assert(has_value_), &value_; }
+
+private:
+    T value_{};
+    bool has_value_ = false;
+};
+/// A byte.
+using byte = unsigned char;
+#endif
+
 // --- a value or a status --------------------------------------------------------------------------
 
 /// A value, or the status that says why there is none. Test it before you look at the value:
 /// `if (!result) return result.error();`
 template <class T>
-class [[nodiscard]] result {
+class HGRID_NODISCARD result {
 public:
     /// With a value.
     constexpr result(T value) noexcept : value_(std::move(value)) {}
@@ -332,7 +400,7 @@ public:
     constexpr const T *operator->() const noexcept { return assert(value_), &*value_; }
 
 private:
-    std::optional<T> value_;
+    optional<T> value_;
     status error_ = status::ok;
 };
 
@@ -340,14 +408,79 @@ private:
 
 namespace detail {
 
+// What std::void_t is.
+template <class...>
+struct make_void {
+    using type = void;
+};
+template <class... T>
+using void_t = typename make_void<T...>::type;
+
+// Whether a callable takes these arguments, and what it returns.
+template <class Void, class F, class... Arguments>
+struct calls : std::false_type {};
+template <class F, class... Arguments>
+struct calls<void_t<decltype(std::declval<F>()(std::declval<Arguments>()...))>, F, Arguments...>
+    : std::true_type {};
+template <class F, class... Arguments>
+using is_callable = calls<void, F, Arguments...>;
+template <class F, class... Arguments>
+using answer_of = decltype(std::declval<F>()(std::declval<Arguments>()...));
+
+// What std::data and std::size are.
 template <class C>
-using element_of = std::remove_pointer_t<decltype(std::data(std::declval<C &>()))>;
+constexpr auto data_of(C &container) noexcept -> decltype(container.data())
+{
+    return container.data();
+}
+template <class T, std::size_t N>
+constexpr T *data_of(T (&array)[N]) noexcept
+{
+    return array;
+}
+template <class C>
+constexpr auto size_of(const C &container) noexcept -> decltype(container.size())
+{
+    return container.size();
+}
+template <class T, std::size_t N>
+constexpr std::size_t size_of(const T (&)[N]) noexcept
+{
+    return N;
+}
+
+// Whether a build goes on after its progress was told.
+template <class F>
+bool goes_on(F &progress, float done, std::true_type) noexcept
+{
+    return progress(done), true;
+}
+template <class F>
+bool goes_on(F &progress, float done, std::false_type) noexcept
+{
+    return static_cast<bool>(progress(done));
+}
+
+// What a filter that takes a hit alone, or also its ray's place, says of it.
+template <class F>
+auto verdict_of(F &filter, std::size_t, const hit &at, std::true_type) noexcept
+{
+    return filter(at);
+}
+template <class F>
+auto verdict_of(F &filter, std::size_t place, const hit &at, std::false_type) noexcept
+{
+    return filter(place, at);
+}
+
+template <class C>
+using element_of = std::remove_pointer_t<decltype(data_of(std::declval<C &>()))>;
 
 // Whether the elements of a container are T, but for const.
 template <class C, class T, class = void>
 struct holds : std::false_type {};
 template <class C, class T>
-struct holds<C, T, std::void_t<element_of<C>, decltype(std::size(std::declval<C &>()))>>
+struct holds<C, T, void_t<element_of<C>, decltype(size_of(std::declval<C &>()))>>
     : std::is_convertible<element_of<C> (*)[], T (*)[]> {};
 
 } // namespace detail
@@ -362,11 +495,13 @@ public:
     /// So many elements from an address on.
     constexpr span(T *data, std::size_t size) noexcept : data_(data), size_(size) {}
     /// The elements of a container or an array. What is to be written must not be a temporary.
-    template <class C, std::enable_if_t<detail::holds<std::remove_reference_t<C>, T>::value &&
-                                            (std::is_lvalue_reference_v<C> || std::is_const_v<T> ||
-                                             std::is_trivially_destructible_v<C>),
-                                        int> = 0>
-    constexpr span(C &&container) noexcept : data_(std::data(container)), size_(std::size(container))
+    template <class C,
+              std::enable_if_t<detail::holds<std::remove_reference_t<C>, T>::value &&
+                                   (std::is_lvalue_reference<C>::value || std::is_const<T>::value ||
+                                    std::is_trivially_destructible<C>::value),
+                               int> = 0>
+    constexpr span(C &&container) noexcept
+        : data_(detail::data_of(container)), size_(detail::size_of(container))
     {
     }
 
@@ -396,18 +531,18 @@ private:
 
 /// The bytes of elements.
 template <class C>
-span<const std::byte> as_bytes(const C &container) noexcept
+span<const byte> as_bytes(const C &container) noexcept
 {
-    return {reinterpret_cast<const std::byte *>(std::data(container)),
-            std::size(container) * sizeof(*std::data(container))};
+    return {reinterpret_cast<const byte *>(detail::data_of(container)),
+            detail::size_of(container) * sizeof(*detail::data_of(container))};
 }
 
 /// The bytes of elements, to be written: an array becomes a region.
 template <class C>
-span<std::byte> as_writable_bytes(C &container) noexcept
+span<byte> as_writable_bytes(C &container) noexcept
 {
-    return {reinterpret_cast<std::byte *>(std::data(container)),
-            std::size(container) * sizeof(*std::data(container))};
+    return {reinterpret_cast<byte *>(detail::data_of(container)),
+            detail::size_of(container) * sizeof(*detail::data_of(container))};
 }
 
 /// Elements at a fixed distance in bytes, as fields of structs are. Made from all that makes a span,
@@ -423,13 +558,14 @@ public:
     {
     }
     /// Elements side by side, as for `span`.
-    template <class C, std::enable_if_t<std::is_constructible_v<span<T>, C &&>, int> = 0>
+    template <class C, std::enable_if_t<std::is_constructible<span<T>, C &&>::value, int> = 0>
     constexpr strided(C &&container) noexcept
-        : first_(std::data(container)), stride_(sizeof(T)), size_(std::size(container))
+        : first_(detail::data_of(container)), stride_(sizeof(T)), size_(detail::size_of(container))
     {
     }
     /// The same elements, not to be written.
-    template <class U, std::enable_if_t<std::is_same_v<const U, T> && !std::is_const_v<U>, int> = 0>
+    template <class U,
+              std::enable_if_t<std::is_same<const U, T>::value && !std::is_const<U>::value, int> = 0>
     constexpr strided(const strided<U> &other) noexcept
         : first_(other.first()), stride_(other.stride()), size_(other.size())
     {
@@ -444,9 +580,9 @@ public:
     /// An element; there must be one.
     T &operator[](std::size_t i) const noexcept
     {
-        using byte = std::conditional_t<std::is_const_v<T>, const std::byte, std::byte>;
+        using raw = std::conditional_t<std::is_const<T>::value, const byte, byte>;
         assert(i < size_);
-        return *reinterpret_cast<T *>(reinterpret_cast<byte *>(first_) + i * stride_);
+        return *reinterpret_cast<T *>(reinterpret_cast<raw *>(first_) + i * stride_);
     }
 
 private:
@@ -457,23 +593,23 @@ private:
 
 /// One field of each struct: `hgrid::field(pixels, &pixel::ray)`.
 template <class C, class S, class M,
-          std::enable_if_t<std::is_convertible_v<detail::element_of<C> *, const S *>, int> = 0>
+          std::enable_if_t<std::is_convertible<detail::element_of<C> *, const S *>::value, int> = 0>
 constexpr auto field(C &&structs, M S::*member) noexcept
 {
     using struct_type = detail::element_of<C>;
-    using field_type = std::conditional_t<std::is_const_v<struct_type>, const M, M>;
-    static_assert(std::is_lvalue_reference_v<C> || std::is_trivially_destructible_v<C>,
+    using field_type = std::conditional_t<std::is_const<struct_type>::value, const M, M>;
+    static_assert(std::is_lvalue_reference<C>::value || std::is_trivially_destructible<C>::value,
                   "the structs must outlive this: give them a name");
-    const bool empty = std::size(structs) == 0;
-    return strided<field_type>(empty ? nullptr : std::addressof(std::data(structs)->*member),
-                               sizeof(struct_type), std::size(structs));
+    const bool empty = detail::size_of(structs) == 0;
+    return strided<field_type>(empty ? nullptr : std::addressof(detail::data_of(structs)->*member),
+                               sizeof(struct_type), detail::size_of(structs));
 }
 
 /// One field of each struct that is a field itself.
 template <class T, class S, class M>
 constexpr auto field(const strided<T> &structs, M S::*member) noexcept
 {
-    using field_type = std::conditional_t<std::is_const_v<T>, const M, M>;
+    using field_type = std::conditional_t<std::is_const<T>::value, const M, M>;
     const bool empty = structs.size() == 0;
     return strided<field_type>(empty ? nullptr : std::addressof(structs.first()->*member),
                                structs.stride(), structs.size());
@@ -492,29 +628,76 @@ struct is_strided<strided<T>> : std::true_type {};
 // or of anything with value_type, or else void.
 template <class T, class = void>
 struct scalar {
-    using type = std::conditional_t<std::is_arithmetic_v<T>, T, void>;
+    using type = std::conditional_t<std::is_arithmetic<T>::value, T, void>;
 };
 template <class T, std::size_t N>
 struct scalar<T[N], void> {
     using type = T;
 };
 template <class T>
-struct scalar<T, std::void_t<typename T::value_type>> {
+struct scalar<T, void_t<typename T::value_type>> {
     using type = typename T::value_type;
 };
 
-template <class C>
-constexpr auto elements(const C &container) noexcept
+// Converts to float and to nothing else.
+struct only_float {
+    template <class T, std::enable_if_t<std::is_same<T, float>::value, int> = 0>
+    constexpr operator T() const noexcept
+    {
+        return 0;
+    }
+};
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmissing-braces"
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#endif
+// Whether an aggregate begins with three floats, in members of its own or in arrays and structs that it
+// begins with.
+template <class T, class = void>
+struct begins_with_floats : std::false_type {};
+template <class T>
+struct begins_with_floats<T,
+                          void_t<decltype(T{only_float(), only_float(), only_float()})>>
+    : std::is_standard_layout<T> {};
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
+
+// Whether a class, which may have constructors, begins with floats x, y and z.
+template <class T, class = void>
+struct has_xyz : std::false_type {};
+template <class T>
+struct has_xyz<T, void_t<decltype(T::x), decltype(T::y), decltype(T::z)>>
+    : std::integral_constant<bool, std::is_standard_layout<T>::value &&
+                                       std::is_same<decltype(T::x), float>::value &&
+                                       std::is_same<decltype(T::y), float>::value &&
+                                       std::is_same<decltype(T::z), float>::value> {};
+template <class T, bool = has_xyz<T>::value>
+struct begins_with_xyz : std::false_type {};
+template <class T>
+struct begins_with_xyz<T, true>
+    : std::integral_constant<bool, offsetof(T, x) == 0 && offsetof(T, y) == sizeof(float) &&
+                                       offsetof(T, z) == 2 * sizeof(float)> {};
+
+template <class T>
+constexpr strided<const T> elements(const strided<T> &container) noexcept
 {
-    if constexpr (is_strided<C>::value)
-        return strided<const std::remove_pointer_t<decltype(container.first())>>(container);
-    else
-        return strided<const element_of<const C>>(container);
+    return container;
+}
+template <class C, std::enable_if_t<!is_strided<C>::value, int> = 0>
+constexpr strided<const element_of<const C>> elements(const C &container) noexcept
+{
+    return container;
 }
 
+// Whether what is referred to is there later.
 template <class C>
-inline constexpr bool stays = std::is_lvalue_reference_v<C> ||
-                              std::is_trivially_destructible_v<std::remove_reference_t<C>>;
+struct stays
+    : std::integral_constant<bool, std::is_lvalue_reference<C>::value ||
+                                       std::is_trivially_destructible<
+                                           std::remove_reference_t<C>>::value> {};
 
 } // namespace detail
 
@@ -524,16 +707,16 @@ class mesh {
 public:
     /// A mesh of a container of vertices and one of indices.
     ///
-    /// Vertices are structs that begin with three floats x, y, z (anything may follow), arrays of
-    /// floats, or floats alone, three for each vertex. If the floats are elsewhere in the struct:
-    /// `field(vertices, &vertex::position)`.
+    /// Vertices are structs that begin with three floats (anything may follow), classes that begin with
+    /// floats x, y, z, arrays of floats, or floats alone, three for each vertex. All else does not compile.
+    /// If the floats are elsewhere in the struct: `field(vertices, &vertex::position)`.
     ///
     /// Indices are numbers of 16 bits (unsigned) or 32, three for each triangle; or arrays of three;
     /// or a field of a struct, from which on there are three: `field(faces, &face::corners)`.
     template <class Vertices, class Indices>
     mesh(Vertices &&vertices, Indices &&indices) noexcept
     {
-        static_assert(detail::stays<Vertices &&> && detail::stays<Indices &&>,
+        static_assert(detail::stays<Vertices &&>::value && detail::stays<Indices &&>::value,
                       "the mesh refers to its vertices and indices: give them a name");
         set_positions<detail::is_strided<std::decay_t<Vertices>>::value>(detail::elements(vertices));
         set_indices<detail::is_strided<std::decay_t<Indices>>::value>(detail::elements(indices));
@@ -560,13 +743,14 @@ public:
     mesh &masks(strided<const std::uint32_t> masks) noexcept
     {
         const bool is_one_each = masks.size() == raw_.triangle_count;
-        raw_.masks = is_one_each ? masks.first() : &invalid_id;
+        static const std::uint32_t none = 0;
+        raw_.masks = is_one_each ? masks.first() : &none;
         // No masks lie closer to each other than their four bytes: that is what is refused.
         raw_.mask_stride = is_one_each ? masks.stride() : 1;
         return *this;
     }
     /// The mesh refers to its masks: give them a name.
-    template <class Masks, std::enable_if_t<!detail::stays<Masks &&>, int> = 0>
+    template <class Masks, std::enable_if_t<!detail::stays<Masks &&>::value, int> = 0>
     mesh &masks(Masks &&) = delete;
 
     /// How many vertices there are.
@@ -581,13 +765,14 @@ private:
     void set_positions(const strided<const V> &vertices) noexcept
     {
         using number = typename detail::scalar<V>::type;
-        constexpr bool is_flat = std::is_same_v<V, float> && !IsField;
-        static_assert(std::is_same_v<number, float> || std::is_void_v<number>,
+        constexpr bool is_flat = std::is_same<V, float>::value && !IsField;
+        static_assert(std::is_same<number, float>::value || std::is_void<number>::value,
                       "the coordinates of a vertex are floats");
-        static_assert(std::is_same_v<V, float> || sizeof(V) >= 3 * sizeof(float),
+        static_assert(std::is_same<V, float>::value || sizeof(V) >= 3 * sizeof(float),
                       "a vertex has three coordinates");
-        static_assert(std::is_standard_layout_v<V>,
-                      "where does the vertex have its coordinates? name the field: "
+        static_assert(std::is_same<number, float>::value || detail::begins_with_floats<V>::value ||
+                          detail::begins_with_xyz<V>::value,
+                      "where does the vertex have its three floats? name the field: "
                       "hgrid::field(vertices, &vertex::position)");
         raw_.positions = vertices.first();
         raw_.position_stride = is_flat ? 3 * sizeof(float) : vertices.stride();
@@ -597,24 +782,28 @@ private:
     template <bool IsField, class I>
     void set_indices(const strided<const I> &indices) noexcept
     {
-        using number = typename detail::scalar<I>::type;
-        static_assert(!std::is_void_v<number>,
+        using found = typename detail::scalar<I>::type;
+        static_assert(!std::is_void<found>::value,
                       "where does the triangle have its indices? name the field: "
                       "hgrid::field(triangles, &triangle::corners)");
-        if constexpr (!std::is_void_v<number>) {
-            constexpr bool is_flat = std::is_same_v<I, number> && !IsField;
-            static_assert(std::is_integral_v<number> &&
-                              (sizeof(number) == 4 ||
-                               (sizeof(number) == 2 && std::is_unsigned_v<number>)),
-                          "indices are integers of 32 bits, or unsigned ones of 16");
-            static_assert(std::is_same_v<I, number> || sizeof(I) >= 3 * sizeof(number),
-                          "a triangle has three indices");
-            raw_.index_type = sizeof(number) == 4 ? HGRID_INDEX_U32 : HGRID_INDEX_U16;
-            raw_.indices = indices.first();
-            raw_.index_stride = is_flat ? 3 * sizeof(number) : indices.stride();
-            raw_.triangle_count = is_flat ? indices.size() / 3 : indices.size();
-        }
+        using number = std::conditional_t<std::is_void<found>::value, std::uint32_t, found>;
+        constexpr bool is_flat = std::is_same<I, number>::value && !IsField;
+        static_assert(std::is_integral<number>::value &&
+                          (sizeof(number) == 4 ||
+                           (sizeof(number) == 2 && std::is_unsigned<number>::value)),
+                      "indices are integers of 32 bits, or unsigned ones of 16");
+        static_assert(std::is_same<I, number>::value || sizeof(I) >= 3 * sizeof(number),
+                      "a triangle has three indices");
+        raw_.index_type = sizeof(number) == 4 ? HGRID_INDEX_U32 : HGRID_INDEX_U16;
+        raw_.indices = indices.first();
+        raw_.index_stride = is_flat ? 3 * sizeof(number) : indices.stride();
+        raw_.triangle_count = is_flat ? indices.size() / 3 : indices.size();
     }
+
+#if HGRID_CPP < 201703L
+    friend class optional<mesh>;
+    mesh() noexcept = default;
+#endif
 
     ::hgrid_mesh raw_ = HGRID_MESH_INIT;
 };
@@ -692,13 +881,11 @@ public:
     template <class F>
     config &progress(F &callable) noexcept
     {
-        static_assert(std::is_invocable_v<F &, float>, "progress is called with a float");
+        static_assert(detail::is_callable<F &, float>::value, "progress is called with a float");
         progress_object_ = address(callable);
         progress_ = [](void *object, float done) noexcept -> bool {
-            if constexpr (std::is_void_v<std::invoke_result_t<F &, float>>)
-                return (*static_cast<F *>(object))(done), true;
-            else
-                return static_cast<bool>((*static_cast<F *>(object))(done));
+            using is_void = std::is_void<detail::answer_of<F &, float>>;
+            return detail::goes_on(*static_cast<F *>(object), done, is_void());
         };
         return *this;
     }
@@ -710,7 +897,7 @@ public:
     template <class F>
     config &parallel_for(std::uint32_t tasks, F &callable) noexcept
     {
-        static_assert(std::is_invocable_v<F &, std::uint32_t, task>,
+        static_assert(detail::is_callable<F &, std::uint32_t, task>::value,
                       "parallel_for is called with a std::uint32_t and a hgrid::task");
         raw_.tasks = tasks;
         run_object_ = address(callable);
@@ -741,13 +928,13 @@ public:
 
 private:
     friend class grid;
-    friend result<config> fit(const mesh &, const config &, std::size_t, span<std::byte>,
+    friend result<config> fit(const mesh &, const config &, std::size_t, span<byte>,
                               report *) noexcept;
 
     template <class F>
     static void *address(F &callable) noexcept
     {
-        static_assert(!std::is_function_v<F>, "put the function into a lambda");
+        static_assert(!std::is_function<F>::value, "put the function into a lambda");
         return const_cast<void *>(static_cast<const void *>(std::addressof(callable)));
     }
 
@@ -776,10 +963,14 @@ public:
     options &count(counters &work) noexcept { return raw_.counters = &work, *this; }
     /// Lends memory in which a batch of incoherent rays may be sorted, 16 bytes a ray. Each thread
     /// needs its own.
-    options &sort_in(span<std::byte> scratch) noexcept
+    options &sort_in(span<byte> scratch) noexcept
     {
         return raw_.scratch = scratch.data(), raw_.scratch_bytes = scratch.size(), *this;
     }
+
+    /// The filter is asked about triangles whose mask has a bit in common with this one; the others are
+    /// opaque and count unasked. With 0 or all bits it is asked about every triangle.
+    options &filter_mask(std::uint32_t bits) noexcept { return raw_.filter_mask = bits, *this; }
 
     /// Asks `callable` about each hit, from near to far, each triangle at most once a ray.
     ///
@@ -792,17 +983,14 @@ public:
     template <class F>
     options &filter(F &callable) noexcept
     {
-        static_assert(!std::is_function_v<F>, "put the function into a lambda");
-        static_assert(std::is_invocable_v<F &, const hit &> ||
-                          std::is_invocable_v<F &, std::size_t, const hit &>,
+        static_assert(!std::is_function<F>::value, "put the function into a lambda");
+        static_assert(detail::is_callable<F &, const hit &>::value ||
+                          detail::is_callable<F &, std::size_t, const hit &>::value,
                       "a filter is called with a hit, or with a place and a hit");
         raw_.context = const_cast<void *>(static_cast<const void *>(std::addressof(callable)));
         raw_.filter = [](void *context, std::size_t place, const hit *at) noexcept {
-            F &self = *static_cast<F *>(context);
-            if constexpr (std::is_invocable_v<F &, const hit &>)
-                return static_cast<void>(place), number(self(*at));
-            else
-                return number(self(place, *at));
+            using takes_hit = detail::is_callable<F &, const hit &>;
+            return number(detail::verdict_of(*static_cast<F *>(context), place, *at, takes_hit()));
         };
         return *this;
     }
@@ -836,8 +1024,7 @@ public:
         memory region;
         if (bytes > std::numeric_limits<std::size_t>::max() / 2)
             return status::out_of_memory;
-        region.bytes_.reset(static_cast<std::byte *>(::operator new(
-            static_cast<std::size_t>(bytes), std::align_val_t{alignment}, std::nothrow)));
+        region.bytes_.reset(static_cast<byte *>(aligned(static_cast<std::size_t>(bytes))));
         if (region.bytes_ == nullptr)
             return status::out_of_memory;
         region.size_ = static_cast<std::size_t>(bytes);
@@ -857,18 +1044,43 @@ public:
     }
 
     /// The first byte, or null.
-    std::byte *data() const noexcept { return bytes_.get(); }
+    byte *data() const noexcept { return bytes_.get(); }
     /// How many bytes there are.
     std::size_t size() const noexcept { return size_; }
 
 private:
     struct freed {
-        void operator()(std::byte *bytes) const noexcept
+        void operator()(byte *bytes) const noexcept
         {
+#if HGRID_CPP >= 201703L
             ::operator delete(bytes, std::align_val_t{alignment}, std::nothrow);
+#else
+            void *start = nullptr;
+            if (bytes != nullptr)
+                std::memcpy(&start, bytes - sizeof start, sizeof start);
+            ::operator delete(start, std::nothrow);
+#endif
         }
     };
-    std::unique_ptr<std::byte, freed> bytes_;
+#if HGRID_CPP >= 201703L
+    static void *aligned(std::size_t bytes) noexcept
+    {
+        return ::operator new(bytes, std::align_val_t{alignment}, std::nothrow);
+    }
+#else
+    // What `operator new` gave is noted in front.
+    static void *aligned(std::size_t bytes) noexcept
+    {
+        void *const start = ::operator new(bytes + alignment + sizeof(void *), std::nothrow);
+        if (start == nullptr)
+            return nullptr;
+        byte *to = static_cast<byte *>(start) + sizeof start;
+        to += (alignment - reinterpret_cast<std::uintptr_t>(to) % alignment) % alignment;
+        std::memcpy(to - sizeof start, &start, sizeof start);
+        return to;
+    }
+#endif
+    std::unique_ptr<byte, freed> bytes_;
     std::size_t size_ = 0;
 };
 
@@ -891,52 +1103,53 @@ public:
     explicit view(const ::hgrid_grid &raw) noexcept : raw_(raw) {}
 
     /// Builds in an index, which keeps the grid, and a scratch, which is free again afterwards.
-    static result<view> build(const mesh &of, const config &how, span<std::byte> index,
-                              span<std::byte> scratch, report *details = nullptr) noexcept
+    static result<view> build(const mesh &of, const config &how, span<byte> index,
+                              span<byte> scratch, report *details = nullptr) noexcept
     {
         view built;
         const ::hgrid_config raw = how.c();
-        const status answer{::hgrid_build(&of.c(), &raw, index.data(), index.size(), scratch.data(),
-                                          scratch.size(), &built.raw_, details)};
+        const status answer = detail::said(::hgrid_build(&of.c(), &raw, index.data(), index.size(),
+                                                         scratch.data(), scratch.size(),
+                                                         &built.raw_, details));
         return answer == status::ok ? result<view>(built) : answer;
     }
     /// Opens a blob that was built for this mesh, where it lies.
-    static result<view> open(span<const std::byte> blob, const mesh &of) noexcept
+    static result<view> open(span<const byte> blob, const mesh &of) noexcept
     {
         return open(blob, &of.c());
     }
     /// Opens a blob that brings its mesh, as `pack` makes them.
-    static result<view> open(span<const std::byte> blob) noexcept { return open(blob, nullptr); }
+    static result<view> open(span<const byte> blob) noexcept { return open(blob, nullptr); }
     /// Memory that nobody keeps: give it a name, or `grid::adopt` it.
-    template <class Blob, std::enable_if_t<!detail::stays<Blob &&>, int> = 0>
+    template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
     static result<view> open(Blob &&, const mesh &) = delete;
     /// The same.
-    template <class Blob, std::enable_if_t<!detail::stays<Blob &&>, int> = 0>
+    template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
     static result<view> open(Blob &&) = delete;
     /// Bytes of scratch that `validate` takes: some for a tree, none for the other methods.
     std::size_t validate_bytes() const noexcept { return ::hgrid_validate_bytes(&raw_); }
     /// Proves that a blob from elsewhere is the grid of its mesh, in scratch that may lie at any address.
-    status validate(span<std::byte> scratch) const noexcept
+    status validate(span<byte> scratch) const noexcept
     {
-        return status{::hgrid_validate(&raw_, scratch.data(), scratch.size())};
+        return detail::said(::hgrid_validate(&raw_, scratch.data(), scratch.size()));
     }
     /// The same in memory of its own, if it takes any.
     status validate() const noexcept
     {
         const std::size_t bytes = validate_bytes();
         if (bytes == 0)
-            return validate(span<std::byte>());
+            return validate(span<byte>());
         const auto scratch = memory::allocate(bytes);
         return scratch ? validate(*scratch) : scratch.error();
     }
 
     /// The closest triangle that a ray hits.
-    std::optional<hit> intersect(const ray &along) const noexcept
+    optional<hit> intersect(const ray &along) const noexcept
     {
         return intersect(along, nullptr);
     }
     /// The closest triangle that a ray hits and that the options let count.
-    std::optional<hit> intersect(const ray &along, const options &with) const noexcept
+    optional<hit> intersect(const ray &along, const options &with) const noexcept
     {
         return intersect(along, &with.c());
     }
@@ -950,6 +1163,18 @@ public:
     bool occluded(const ray &along, const options &with) const noexcept
     {
         return ::hgrid_occluded(&raw_, &along, &with.c());
+    }
+
+    /// A triangle that blocks a ray, or `invalid_id`: one that the options let count. It need not be the
+    /// closest.
+    std::uint32_t occluder(const ray &along) const noexcept
+    {
+        return ::hgrid_occluder(&raw_, &along, nullptr);
+    }
+    /// The same with options.
+    std::uint32_t occluder(const ray &along, const options &with) const noexcept
+    {
+        return ::hgrid_occluder(&raw_, &along, &with.c());
     }
 
     /// The closest hit of each ray; a miss has the primitive `invalid_id`. There are as many hits as
@@ -979,6 +1204,20 @@ public:
         return occluded_n(rays, answers, know, &with.c());
     }
 
+    /// For each ray a triangle that blocks it, or `invalid_id`. There are as many answers as rays, or the
+    /// answer is `invalid_answers`.
+    status occluder_n(strided<const ray> rays, strided<std::uint32_t> answers,
+                      coherence know) const noexcept
+    {
+        return occluder_n(rays, answers, know, nullptr);
+    }
+    /// The same with options for all rays.
+    status occluder_n(strided<const ray> rays, strided<std::uint32_t> answers, coherence know,
+                      const options &with) const noexcept
+    {
+        return occluder_n(rays, answers, know, &with.c());
+    }
+
     /// Every triangle that a ray hits, sorted by t, as many as there is room for; gives their number,
     /// which may be larger.
     result<std::size_t> intersect_all(const ray &along, span<hit> hits) const noexcept
@@ -993,14 +1232,14 @@ public:
     }
 
     /// The nearest point of the mesh that is no farther away than this.
-    std::optional<closest>
+    optional<closest>
     closest_point(const point &from,
                   float max_distance = std::numeric_limits<float>::infinity()) const noexcept
     {
         return closest_point(from, max_distance, nullptr);
     }
     /// The same with options; culling and filters do not matter.
-    std::optional<closest> closest_point(const point &from, float max_distance,
+    optional<closest> closest_point(const point &from, float max_distance,
                                          const options &with) const noexcept
     {
         return closest_point(from, max_distance, &with.c());
@@ -1008,11 +1247,11 @@ public:
 
     /// Where a ray met the mesh, which way it faces there, and where rays start that leave it; `hit` is
     /// what a query has found for the ray.
-    std::optional<surface> surface_at(const ray &along, const hit &at) const noexcept
+    optional<surface> surface_at(const ray &along, const hit &at) const noexcept
     {
         surface found;
-        return ::hgrid_surface_at(&raw_, &along, &at, &found) ? std::optional<surface>(found)
-                                                              : std::nullopt;
+        return ::hgrid_surface_at(&raw_, &along, &at, &found) ? optional<surface>(found)
+                                                              : optional<surface>();
     }
     /// The mesh that a triangle is of, and its number there, in a grid of joined meshes; nothing if there is no
     /// such triangle.
@@ -1027,7 +1266,7 @@ public:
     result<mesh> mesh_of() const noexcept
     {
         ::hgrid_mesh found = HGRID_MESH_INIT;
-        const status answer{::hgrid_mesh_of(&raw_, &found)};
+        const status answer = detail::said(::hgrid_mesh_of(&raw_, &found));
         return answer == status::ok ? result<mesh>(mesh(found)) : answer;
     }
 
@@ -1039,10 +1278,10 @@ public:
         return bytes;
     }
     /// Writes grid and mesh as one blob, which `open` needs no mesh for.
-    status pack(span<std::byte> to) const noexcept
+    status pack(span<byte> to) const noexcept
     {
         std::uint64_t bytes = 0;
-        return status{::hgrid_pack(&raw_, to.data(), to.size(), &bytes)};
+        return detail::said(::hgrid_pack(&raw_, to.data(), to.size(), &bytes));
     }
     /// The same in memory of its own.
     result<memory> pack() const noexcept
@@ -1058,7 +1297,7 @@ public:
     result<statistics> inspect() const noexcept
     {
         statistics found = HGRID_STATISTICS_INIT;
-        const status answer{::hgrid_inspect(&raw_, &found)};
+        const status answer = detail::said(::hgrid_inspect(&raw_, &found));
         return answer == status::ok ? result<statistics>(found) : answer;
     }
 
@@ -1066,50 +1305,60 @@ public:
     const ::hgrid_grid &c() const noexcept { return raw_; }
 
 private:
-    static result<view> open(span<const std::byte> blob, const ::hgrid_mesh *of) noexcept
+    static result<view> open(span<const byte> blob, const ::hgrid_mesh *of) noexcept
     {
         view opened;
-        const status answer{::hgrid_open(blob.data(), blob.size(), of, &opened.raw_)};
+        const status answer = detail::said(::hgrid_open(blob.data(), blob.size(), of,
+                                                        &opened.raw_));
         return answer == status::ok ? result<view>(opened) : answer;
     }
-    std::optional<hit> intersect(const ray &along, const ::hgrid_query_options *with) const noexcept
+    optional<hit> intersect(const ray &along, const ::hgrid_query_options *with) const noexcept
     {
         hit at;
-        return ::hgrid_intersect(&raw_, &along, with, &at) ? std::optional<hit>(at) : std::nullopt;
+        return ::hgrid_intersect(&raw_, &along, with, &at) ? optional<hit>(at) : optional<hit>();
     }
     status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
                        const ::hgrid_query_options *with) const noexcept
     {
         if (rays.size() != hits.size())
             return status::invalid_answers;
-        return status{::hgrid_intersect_n(&raw_, rays.first(), rays.stride(), hits.first(),
-                                          hits.stride(), rays.size(),
-                                          static_cast<::hgrid_coherence>(know), with)};
+        return detail::said(::hgrid_intersect_n(&raw_, rays.first(), rays.stride(), hits.first(),
+                                                hits.stride(), rays.size(),
+                                                static_cast<::hgrid_coherence>(know), with));
     }
     status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
                       const ::hgrid_query_options *with) const noexcept
     {
         if (rays.size() != answers.size())
             return status::invalid_answers;
-        return status{::hgrid_occluded_n(&raw_, rays.first(), rays.stride(), answers.first(),
-                                         answers.stride(), rays.size(),
-                                         static_cast<::hgrid_coherence>(know), with)};
+        return detail::said(::hgrid_occluded_n(&raw_, rays.first(), rays.stride(), answers.first(),
+                                               answers.stride(), rays.size(),
+                                               static_cast<::hgrid_coherence>(know), with));
+    }
+    status occluder_n(strided<const ray> rays, strided<std::uint32_t> answers, coherence know,
+                      const ::hgrid_query_options *with) const noexcept
+    {
+        if (rays.size() != answers.size())
+            return status::invalid_answers;
+        return detail::said(::hgrid_occluder_n(&raw_, rays.first(), rays.stride(), answers.first(),
+                                               answers.stride(), rays.size(),
+                                               static_cast<::hgrid_coherence>(know), with));
     }
     result<std::size_t> intersect_all(const ray &along, span<hit> hits,
                                       const ::hgrid_query_options *with) const noexcept
     {
         std::size_t count = 0;
-        const status answer{
-            ::hgrid_intersect_all(&raw_, &along, with, hits.data(), hits.size(), &count)};
+        const status answer = detail::said(
+            ::hgrid_intersect_all(&raw_, &along, with, hits.data(), hits.size(), &count));
         return answer == status::ok ? result<std::size_t>(count) : answer;
     }
-    std::optional<closest> closest_point(const point &from, float max_distance,
+    optional<closest> closest_point(const point &from, float max_distance,
                                          const ::hgrid_query_options *with) const noexcept
     {
         closest at;
         return ::hgrid_closest_point(&raw_, from.data(), max_distance, with, &at)
-                   ? std::optional<closest>(at)
-                   : std::nullopt;
+                   ? optional<closest>(at)
+                   : optional<closest>();
     }
 
     ::hgrid_grid raw_ = HGRID_GRID_INIT;
@@ -1117,7 +1366,7 @@ private:
 
 // --- a grid that owns its memory ------------------------------------------------------------------
 
-/// A built grid and its memory. The mesh stays the caller's.
+/// A built grid and its memory. The mesh stays the caller's, unless `keep` takes it over.
 ///
 /// It is a view, so it answers queries, and where a view is wanted it can be given; that view is good
 /// for as long as the grid is. Moving it does not move the memory.
@@ -1133,6 +1382,55 @@ public:
     /// `hgrid_build`, and `out_of_memory`. `details` says which triangle is to blame.
     static result<grid> build(const mesh &of, const config &how = {},
                               report *details = nullptr) noexcept;
+
+    /// Builds a grid that keeps its vertices and indices: both are moved in.
+    ///
+    ///     auto grid = hgrid::grid::keep(std::move(vertices), std::move(indices));
+    ///
+    /// Containers are those that a `mesh` is made of. Moving the grid does not move what it keeps.
+    template <class Vertices, class Indices,
+              std::enable_if_t<!detail::is_callable<const Indices &, const Vertices &>::value,
+                               int> = 0>
+    static result<grid> keep(Vertices &&vertices, Indices &&indices, const config &how = {},
+                             report *details = nullptr) noexcept
+    {
+        static_assert(!std::is_lvalue_reference<Vertices>::value &&
+                          !std::is_lvalue_reference<Indices>::value,
+                      "the grid keeps its vertices and indices: std::move them");
+        struct arrays {
+            Vertices vertices;
+            Indices indices;
+        };
+        const auto describe = [](const arrays &kept) noexcept {
+            return mesh(kept.vertices, kept.indices);
+        };
+        return keep(arrays{std::move(vertices), std::move(indices)}, describe, how, details);
+    }
+    /// The same with data of any kind, which is moved in, and a callable that says what the mesh of them is.
+    ///
+    ///     auto grid = hgrid::grid::keep(std::move(model), [](const model &kept) {
+    ///         return hgrid::mesh(kept.vertices, hgrid::field(kept.faces, &face::corners));
+    ///     });
+    ///
+    /// What others use, too, is shared: let the data be a `std::shared_ptr` of them.
+    template <class Data, class Describe,
+              std::enable_if_t<detail::is_callable<const Describe &, const Data &>::value, int> = 0>
+    static result<grid> keep(Data &&data, const Describe &describe, const config &how = {},
+                             report *details = nullptr) noexcept
+    {
+        static_assert(!std::is_lvalue_reference<Data>::value,
+                      "the grid keeps its data: std::move them");
+        std::unique_ptr<Data> moved(new (std::nothrow) Data(std::move(data)));
+        if (moved == nullptr)
+            return status::out_of_memory;
+        const mesh of = describe(static_cast<const Data &>(*moved));
+        auto built = build(of, how, details);
+        if (built)
+            built->kept_ = {moved.release(), [](void *kept) noexcept {
+                                delete static_cast<Data *>(kept);
+                            }};
+        return built;
+    }
 
     /// Opening takes a view: `view::open` where the blob stays yours, `adopt` where it becomes the grid's.
     template <class... Arguments>
@@ -1153,7 +1451,8 @@ public:
 
     /// Takes the other grid, which is none then.
     grid(grid &&other) noexcept
-        : view(std::exchange(static_cast<view &>(other), view())), blob_(std::move(other.blob_))
+        : view(std::exchange(static_cast<view &>(other), view())), blob_(std::move(other.blob_)),
+          kept_(std::move(other.kept_))
     {
     }
     /// Frees its own memory and takes the other grid, which is none then.
@@ -1161,6 +1460,7 @@ public:
     {
         static_cast<view &>(*this) = std::exchange(static_cast<view &>(other), view());
         blob_ = std::move(other.blob_);
+        kept_ = std::move(other.kept_);
         return *this;
     }
 
@@ -1170,7 +1470,8 @@ public:
     {
         refit_report found = HGRID_REFIT_REPORT_INIT;
         ::hgrid_grid fresh = HGRID_GRID_INIT;
-        const status answer{::hgrid_refit(&of.c(), blob_.data(), blob_.size(), &fresh, &found)};
+        const status answer = detail::said(::hgrid_refit(&of.c(), blob_.data(), blob_.size(),
+                                                         &fresh, &found));
         if (answer != status::ok)
             return answer;
         static_cast<view &>(*this) = view(fresh);
@@ -1178,7 +1479,7 @@ public:
     }
 
     /// The blob: bytes without pointers, to be stored or sent, and opened elsewhere.
-    span<const std::byte> blob() const noexcept { return blob_; }
+    span<const byte> blob() const noexcept { return blob_; }
 
 private:
     grid(const view &built, memory blob) noexcept : view(built), blob_(std::move(blob)) {}
@@ -1188,7 +1489,7 @@ private:
     static std::uint64_t usual_bytes(const mesh &of, const config &how) noexcept
     {
         const auto triangles = static_cast<std::uint64_t>(of.triangle_count());
-        switch (method{how.raw_.method}) {
+        switch (static_cast<method>(how.raw_.method)) {
         case method::variable: return 96 * triangles + 4096;
         case method::recursive: return 160 * triangles + 4096;
         default: return std::numeric_limits<std::uint64_t>::max();
@@ -1196,14 +1497,16 @@ private:
     }
 
     memory blob_;
+    // What the mesh refers to, if the grid keeps it.
+    std::unique_ptr<void, void (*)(void *)> kept_{nullptr, [](void *) {}};
 };
 
 /// Tells how much memory a build of this mesh takes: roughly, or with scratch exactly.
 inline status sizes(const mesh &of, const config &how, report &found,
-                    span<std::byte> scratch = {}) noexcept
+                    span<byte> scratch = {}) noexcept
 {
     const ::hgrid_config raw = how.c();
-    return status{::hgrid_sizes(&of.c(), &raw, scratch.data(), scratch.size(), &found)};
+    return detail::said(::hgrid_sizes(&of.c(), &raw, scratch.data(), scratch.size(), &found));
 }
 
 /// Tells how much memory is enough for any mesh with so many triangles.
@@ -1211,29 +1514,30 @@ inline result<report> bound(std::size_t triangle_count, const config &how) noexc
 {
     const ::hgrid_config raw = how.c();
     report found;
-    const status answer{::hgrid_bound(triangle_count, &raw, &found)};
+    const status answer = detail::said(::hgrid_bound(triangle_count, &raw, &found));
     return answer == status::ok ? result<report>(found) : answer;
 }
 
 /// Finds the finest grid of a method that fits into so many bytes.
 inline result<config> fit(const mesh &of, const config &how, std::size_t index_bytes,
-                          span<std::byte> scratch, report *details = nullptr) noexcept
+                          span<byte> scratch, report *details = nullptr) noexcept
 {
     const ::hgrid_config raw = how.c();
     config fitted = how;
     report found;
-    const status answer{::hgrid_fit(&of.c(), &raw, index_bytes, scratch.data(), scratch.size(),
-                                    &fitted.raw_, details != nullptr ? details : &found)};
+    const status answer = detail::said(::hgrid_fit(&of.c(), &raw, index_bytes, scratch.data(),
+                                                   scratch.size(), &fitted.raw_,
+                                                   details != nullptr ? details : &found));
     // The callables are set for each call.
     fitted.raw_.context = nullptr, fitted.raw_.run = nullptr, fitted.raw_.progress = nullptr;
     return answer == status::ok ? result<config>(fitted) : answer;
 }
 
 /// Reads what the first bytes of a blob say, to learn how large it is before all of it is there.
-inline result<blob_info> peek(span<const std::byte> blob) noexcept
+inline result<blob_info> peek(span<const byte> blob) noexcept
 {
     blob_info found = HGRID_BLOB_INFO_INIT;
-    const status answer{::hgrid_peek(blob.data(), blob.size(), &found)};
+    const status answer = detail::said(::hgrid_peek(blob.data(), blob.size(), &found));
     return answer == status::ok ? result<blob_info>(found) : answer;
 }
 
@@ -1279,6 +1583,13 @@ inline result<grid> grid::build(const mesh &of, const config &how, report *detai
     }
 }
 
+#if HGRID_CPP < 201703L
+} // namespace cpp14
+#endif
 } // namespace hgrid
+
+#undef HGRID_INLINE
+#undef HGRID_NODISCARD
+#undef HGRID_CPP
 
 #endif

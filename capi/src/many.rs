@@ -150,3 +150,41 @@ pub unsafe extern "C" fn hgrid_occluded_n(
     };
     call().err().unwrap_or(HGRID_OK)
 }
+
+/// Names for each of many rays a triangle that blocks it: as `hgrid_occluder` would, but sooner.
+///
+/// Writes a `uint32_t` for each ray, a triangle or `HGRID_INVALID_ID`, every `occluder_stride` bytes
+/// from `occluders` on. It is `HGRID_INVALID_ID` where `hgrid_occluded_n` writes 0. Where several
+/// triangles block a ray, it may be another one than `hgrid_occluder` names. All else is as with
+/// `hgrid_occluded_n`. `rays` and `occluders` may be NULL if `count` is 0, `options` may be NULL.
+/// Returns `HGRID_OK` and has written all names, or returns what `hgrid_intersect_n` returns and has
+/// written none.
+///
+/// Threads: any number of queries on the same grid at once; each thread with names and counters of
+/// its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluder_n(
+    grid: *const hgrid_grid,
+    rays: *const hgrid_ray,
+    ray_stride: usize,
+    occluders: *mut u32,
+    occluder_stride: usize,
+    count: usize,
+    coherence: hgrid_coherence,
+    options: *const hgrid_query_options,
+) -> hgrid_status {
+    let call = || {
+        let batch = Batch::new((rays, ray_stride), (occluders, occluder_stride), count)?;
+        let coherence = questions::coherence(coherence)?;
+        let trace =
+            |grid: &Grid<'_>, rays: &mut raw::Arrays<'_, u32>, options: &mut QueryOptions<'_>| {
+                grid.occluder_batch(rays, coherence, options);
+            };
+        // SAFETY: the caller's promise.
+        unsafe { raw::batch(grid, &batch, options, trace) }
+    };
+    call().err().unwrap_or(HGRID_OK)
+}

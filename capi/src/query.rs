@@ -2,7 +2,7 @@
 
 use core::ptr::NonNull;
 
-use hgrid_core::{Grid, QueryOptions};
+use hgrid_core::{Grid, INVALID_ID, QueryOptions};
 
 use crate::questions::{hgrid_closest, hgrid_hit, hgrid_query_options, hgrid_ray, hgrid_surface};
 use crate::raw;
@@ -72,6 +72,40 @@ pub unsafe extern "C" fn hgrid_occluded(
         |grid: &Grid<'_>, ray: &_, options: &mut QueryOptions<'_>| grid.occluded_with(ray, options);
     // SAFETY: the caller's promise.
     unsafe { raw::query(grid, ray, options, plain, with) }.unwrap_or(false)
+}
+
+/// Names a triangle that blocks a ray, or `HGRID_INVALID_ID` where `hgrid_occluded` would say false.
+///
+/// The ray hits this triangle in its range. It need not be the closest one, and another one may be named
+/// in a batch or on another machine. Shadow rays that follow may be tested against it first:
+///
+/// ```c
+/// static bool is_lit(const hgrid_grid *grid, const hgrid_ray *to_light, uint32_t *blocker)
+/// {
+///     *blocker = hgrid_occluder(grid, to_light, NULL);
+///     return *blocker == HGRID_INVALID_ID;
+/// }
+/// ```
+///
+/// `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
+/// or with options that break the rules for structs, the answer is `HGRID_INVALID_ID`.
+///
+/// Threads: any number of queries on the same grid at once; each thread with counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluder(
+    grid: *const hgrid_grid,
+    ray: *const hgrid_ray,
+    options: *const hgrid_query_options,
+) -> u32 {
+    let with =
+        |grid: &Grid<'_>, ray: &_, options: &mut QueryOptions<'_>| grid.occluder(ray, options);
+    let plain = |grid: &Grid<'_>, ray: &_| grid.occluder(ray, &mut QueryOptions::default());
+    // SAFETY: the caller's promise.
+    let found = unsafe { raw::query(grid, ray, options, plain, with) };
+    found.ok().flatten().unwrap_or(INVALID_ID)
 }
 
 /// Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.

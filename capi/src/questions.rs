@@ -122,8 +122,9 @@ pub const HGRID_CULL_FRONT: u32 = 2;
 /// What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
 ///
 /// A query with options that are not the defaults is somewhat slower than one without. A tree
-/// (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are;
-/// with `filter` or `counters`, and with the other methods, they are traced one by one.
+/// (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are, and
+/// with a `filter` up to their first hits; with `counters`, and with the other methods, they are traced
+/// one by one.
 /// Options that break the rules for structs make
 /// a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
 /// returns what is wrong with them.
@@ -148,7 +149,8 @@ pub struct hgrid_query_options {
     /// its batch, 0 for a single one.
     ///
     /// Hits are offered from near to far, where `t` is equal by ascending triangle, and each
-    /// triangle at most once for each ray. It is called on the thread that asks, may ask the same
+    /// triangle at most once for each ray; those of one ray of a batch before those of the next. Which
+    /// triangles are offered, `filter_mask` says. It is called on the thread that asks, may ask the same
     /// grid other questions, and may not be left by `longjmp` or by a C++ exception. Here is glass,
     /// which lets shadow rays pass and weakens them:
     ///
@@ -195,6 +197,29 @@ pub struct hgrid_query_options {
     /// KiB or more, the batch is sorted window by window, as many rays as fit. With still fewer a window is
     /// 256 rays on the stack. Larger windows give the answers sooner, up to millions of rays.
     pub scratch_bytes: usize,
+    /// `filter` is asked about a triangle if its mask and this have a bit in common; the others are
+    /// opaque: their hits count unasked. 0, the default, and all bits ask about every triangle, even one
+    /// whose mask is 0.
+    ///
+    /// Rays that meet none of those triangles cost in a batch what they cost without a filter. Of a ray
+    /// that an opaque triangle blocks, `hgrid_occluded` and the other questions of that kind may offer the
+    /// filter other hits or not. Here are leaves, whose triangles have the mask 2, among walls:
+    ///
+    /// ```c
+    /// static hgrid_status light_of_rays(const hgrid_grid *grid, const hgrid_ray *rays, size_t count,
+    ///                                   hgrid_verdict (*is_leaf_there)(void *, size_t,
+    ///                                                                  const hgrid_hit *),
+    ///                                   void *textures, unsigned char *occluded)
+    /// {
+    ///     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+    ///     options.filter = is_leaf_there, options.context = textures;
+    ///     options.filter_mask = 2;
+    ///     return hgrid_occluded_n(grid, rays, 0, occluded, 0, count, HGRID_COHERENCE_COHERENT, &options);
+    /// }
+    /// ```
+    pub filter_mask: u32,
+    /// 0.
+    pub reserved: u32,
 }
 
 /// The point of a mesh that is closest to a point: 28 bytes.
@@ -367,6 +392,11 @@ impl hgrid_query_options {
             && self.skip == INVALID_ID
             && self.filter.is_none()
             && self.counters.is_null()
+    }
+
+    /// The triangles that the filter is asked about, as core knows them.
+    pub(crate) const fn filter_mask(&self) -> u32 {
+        if self.filter_mask == 0 { u32::MAX } else { self.filter_mask }
     }
 
     /// The sides that are not hit.

@@ -4,6 +4,8 @@
 //! layout says at which byte each section starts, and the cast from bytes to words is checked
 //! (alignment and length), never assumed.
 
+use core::fmt;
+
 use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
 
 use crate::error::{Error, Region};
@@ -20,8 +22,14 @@ pub const ALIGNMENT: usize = 64;
 /// assert_eq!(Block::bytes_mut(&mut index).len(), 1024);
 /// ```
 #[repr(C, align(64))]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[derive(Clone, Copy, Pod, Zeroable)]
 pub struct Block([u8; ALIGNMENT]);
+
+impl fmt::Debug for Block {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Block")
+    }
+}
 
 impl Block {
     /// A block of zeros.

@@ -4,7 +4,18 @@
 //! ([`Method::Bvh`](crate::Method::Bvh)) takes rays of any kind in groups of up to 64, as they are
 //! given or sorted first, and one by one where their origins lie far apart. The other methods trace one
 //! ray after the other.
+//!
+//! A filter is asked in the order of the rays, all about one before the next. In groups, too:
+//!
+//! ```text
+//! closest   the group finds the closest hit of each ray among all triangles; a miss or an opaque one is
+//!           the answer
+//! occluded  an opaque hit ends a ray and is the answer; of the others the group keeps the closest
+//! then      in the order of the rays: ask the filter about the hit of each that is left; if it rejects
+//!           the hit, go on behind it alone
+//! ```
 
+use core::fmt;
 use core::marker::PhantomData;
 use core::ops::Range;
 
@@ -36,7 +47,6 @@ pub enum Coherence {
 }
 
 /// `count` elements to be written in a slice of bytes, one every `stride` bytes.
-#[derive(Debug)]
 pub struct StridedMut<'a> {
     /// The bytes, from the first element's first to at least the last element's last.
     pub bytes: &'a mut [u8],
@@ -44,6 +54,16 @@ pub struct StridedMut<'a> {
     pub stride: usize,
     /// Number of elements.
     pub count: usize,
+}
+
+impl fmt::Debug for StridedMut<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("StridedMut")
+            .field("bytes", &self.bytes.len())
+            .field("stride", &self.stride)
+            .field("count", &self.count)
+            .finish()
+    }
 }
 
 impl<'a> StridedMut<'a> {
@@ -161,7 +181,7 @@ struct Arrays<'r, 'a, 'b> {
     answers: &'r mut StridedMut<'b>,
 }
 
-impl Batch<Hit> for Arrays<'_, '_, '_> {
+impl<A: Answer> Batch<A> for Arrays<'_, '_, '_> {
     #[inline(always)]
     fn count(&self) -> usize {
         self.rays.count
@@ -173,25 +193,8 @@ impl Batch<Hit> for Arrays<'_, '_, '_> {
     }
 
     #[inline(always)]
-    fn answer(&mut self, place: usize, hit: Hit) {
-        self.answers.write(place, &hit);
-    }
-}
-
-impl Batch<bool> for Arrays<'_, '_, '_> {
-    #[inline(always)]
-    fn count(&self) -> usize {
-        self.rays.count
-    }
-
-    #[inline(always)]
-    fn ray(&self, place: usize) -> Ray {
-        self.rays.read(place)
-    }
-
-    #[inline(always)]
-    fn answer(&mut self, place: usize, is_occluded: bool) {
-        self.answers.write(place, &u8::from(is_occluded));
+    fn answer(&mut self, place: usize, answer: A) {
+        self.answers.write(place, &answer.stored());
     }
 }
 
@@ -302,9 +305,7 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) {
-        let is_plain = options.are_plain();
-        Asked { grid: self, batch, options, is_plain, answers: PhantomData }
-            .trace::<false>(coherence);
+        Asked::<_, Hit, false>::trace::<false>(self, batch, coherence, options);
     }
 
     /// For each ray a byte: 1 if anything is hit, 0 if not.
@@ -381,14 +382,49 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) {
-        let is_plain = options.are_plain();
-        Asked { grid: self, batch, options, is_plain, answers: PhantomData }
-            .trace::<true>(coherence);
+        Asked::<_, bool, false>::trace::<true>(self, batch, coherence, options);
+    }
+
+    /// For each ray a `u32`: a triangle that blocks it, of those that the options let count, as
+    /// [`occluder`](Self::occluder) says; [`INVALID_ID`] if nothing does. The options are for all rays.
+    ///
+    /// # Errors
+    /// The same as of [`intersect_n`](Self::intersect_n).
+    pub fn occluder_n_with(
+        &self,
+        rays: &Strided<'_>,
+        occluders: &mut StridedMut<'_>,
+        coherence: Coherence,
+        options: &mut QueryOptions<'_>,
+    ) -> Result<(), Error> {
+        check(rays, occluders, size_of::<u32>())?;
+        self.occluder_batch(&mut Arrays { rays, answers: occluders }, coherence, options);
+        Ok(())
+    }
+
+    /// A triangle that blocks each ray: [`occluder_n_with`](Self::occluder_n_with), wherever rays and
+    /// answers lie.
+    pub fn occluder_batch(
+        &self,
+        batch: &mut impl Batch<u32>,
+        coherence: Coherence,
+        options: &mut QueryOptions<'_>,
+    ) {
+        Asked::<_, u32, false>::trace::<true>(self, batch, coherence, options);
     }
 }
 
 /// What a ray is asked for in a batch.
-trait Answer {
+trait Answer: Sized {
+    /// Whether batches of this kind are rare: they share a kernel, which costs a call for each ray and
+    /// answer and saves the code of another one.
+    const IS_RARE: bool = false;
+
+    /// What stands in an array of answers.
+    type Stored: Pod;
+
+    fn stored(self) -> Self::Stored;
+
     /// What a ray that was traced with others says.
     fn of(hit: &Hit) -> Self;
 
@@ -400,6 +436,13 @@ trait Answer {
 }
 
 impl Answer for Hit {
+    type Stored = Self;
+
+    #[inline(always)]
+    fn stored(self) -> Self {
+        self
+    }
+
     #[inline(always)]
     fn of(hit: &Hit) -> Self {
         *hit
@@ -415,6 +458,13 @@ impl Answer for Hit {
 }
 
 impl Answer for bool {
+    type Stored = u8;
+
+    #[inline(always)]
+    fn stored(self) -> u8 {
+        self.into()
+    }
+
     #[inline(always)]
     fn of(hit: &Hit) -> Self {
         hit.primitive != INVALID_ID
@@ -425,7 +475,31 @@ impl Answer for bool {
     }
 
     fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self {
-        grid.occluded_at(place, ray, options)
+        grid.occluder_at(place, ray, options).is_some()
+    }
+}
+
+impl Answer for u32 {
+    const IS_RARE: bool = true;
+
+    type Stored = Self;
+
+    #[inline(always)]
+    fn stored(self) -> Self {
+        self
+    }
+
+    #[inline(always)]
+    fn of(hit: &Hit) -> Self {
+        hit.primitive
+    }
+
+    fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
+        grid.any(ray)
+    }
+
+    fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self {
+        grid.occluder_at(place, ray, options).unwrap_or(INVALID_ID)
     }
 }
 
@@ -442,10 +516,20 @@ pub(crate) trait Together {
 
     /// Traces a ray alone, and answers for it.
     fn alone(&mut self, place: usize);
+
+    /// Returns true if [`alone`](Self::alone) and [`ask`](Self::ask) have to be called in the order of
+    /// places: a filter is asked there.
+    fn keeps_order(&self) -> bool;
+
+    /// Returns true if the filter has to be asked about the first hit of a ray.
+    fn asks(&self, hit: &Hit) -> bool;
+
+    /// Asks the filter about the first hit of a ray, goes on alone if it wants another, and answers.
+    fn ask(&mut self, place: usize, hit: &Hit);
 }
 
-/// A batch and what it is asked for.
-struct Asked<'r, 'm, 'q, B, A> {
+/// A batch and what it is asked for; `ASKS` if a filter is asked, too.
+struct Asked<'r, 'm, 'q, B, A, const ASKS: bool> {
     grid: &'r Grid<'m>,
     batch: &'r mut B,
     options: &'r mut QueryOptions<'q>,
@@ -454,7 +538,7 @@ struct Asked<'r, 'm, 'q, B, A> {
     answers: PhantomData<A>,
 }
 
-impl<A: Answer, B: Batch<A>> Together for Asked<'_, '_, '_, B, A> {
+impl<A: Answer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_, B, A, ASKS> {
     #[inline(always)]
     fn count(&self) -> usize {
         self.batch.count()
@@ -480,15 +564,54 @@ impl<A: Answer, B: Batch<A>> Together for Asked<'_, '_, '_, B, A> {
         };
         self.batch.answer(place, answer);
     }
+
+    #[inline(always)]
+    fn keeps_order(&self) -> bool {
+        ASKS
+    }
+
+    #[inline(always)]
+    fn asks(&self, hit: &Hit) -> bool {
+        let (id, mesh) = (hit.primitive, self.grid.mesh());
+        ASKS && id != INVALID_ID && self.options.choice().asks(mesh, id)
+    }
+
+    #[inline(never)]
+    fn ask(&mut self, place: usize, hit: &Hit) {
+        if ASKS {
+            let ray = self.batch.ray(place);
+            let found = self.grid.intersect_from(place, &ray, self.options, hit);
+            self.batch.answer(place, A::of(&found.unwrap_or(Hit::MISS)));
+        }
+    }
 }
 
 /// Rays of a window that is sorted on the stack.
 const FEW: usize = 256;
 
-impl<A: Answer, B: Batch<A>> Asked<'_, '_, '_, B, A> {
+impl<'r, 'm, 'q, A: Answer, B: Batch<A>> Asked<'r, 'm, 'q, B, A, false> {
+    /// Traces all rays of a batch.
+    #[inline(always)]
+    fn trace<const ANY: bool>(
+        grid: &'r Grid<'m>,
+        batch: &'r mut B,
+        coherence: Coherence,
+        options: &'r mut QueryOptions<'q>,
+    ) {
+        let is_plain = options.are_plain();
+        if options.filter.is_none() {
+            Self { grid, batch, options, is_plain, answers: PhantomData }.all::<ANY>(coherence);
+        } else {
+            Asked::<B, A, true> { grid, batch, options, is_plain, answers: PhantomData }
+                .all::<ANY>(coherence);
+        }
+    }
+}
+
+impl<A: Answer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
     /// Traces all rays, together where the grid can.
     #[inline(always)]
-    fn trace<const ANY: bool>(&mut self, coherence: Coherence) {
+    fn all<const ANY: bool>(&mut self, coherence: Coherence) {
         let is_one_by_one = self.options.are_for_single_rays();
         match (self.grid.method(), coherence) {
             (Method::Bvh, Coherence::Coherent) if !is_one_by_one => self.groups::<ANY>(&mut []),
@@ -524,7 +647,18 @@ impl<A: Answer, B: Batch<A>> Asked<'_, '_, '_, B, A> {
     #[inline(never)]
     fn groups<const ANY: bool>(&mut self, memory: &mut [bvh::Entry]) {
         let (grid, choice) = (self.grid, self.options.choice());
-        if !grid.groups::<ANY>(choice, memory, self) {
+        let are_done = if ASKS || A::IS_RARE {
+            let batch: &mut dyn Together = self;
+            // If no hit can end a ray unasked, the first one is sooner found as the closest.
+            if ANY && !choice.asks_all(grid.mesh()) {
+                grid.groups::<true>(choice, memory, batch)
+            } else {
+                grid.groups::<false>(choice, memory, batch)
+            }
+        } else {
+            grid.groups::<ANY>(choice, memory, self)
+        };
+        if !are_done {
             self.one_by_one(0..self.batch.count());
         }
     }

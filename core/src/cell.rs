@@ -107,6 +107,17 @@ pub(crate) const fn cube_root(x: f64) -> f64 {
 }
 
 impl Lattice {
+    /// One cell at the origin.
+    #[cfg(feature = "alloc")]
+    pub(crate) const NOTHING: Self = Self {
+        min: [0.0; 3],
+        max: [0.0; 3],
+        resolution: [1; 3],
+        cells_per_unit: [1.0; 3],
+        units_per_cell: [1.0; 3],
+        margin: [0.0; 3],
+    };
+
     /// Pads a mesh's box, so that no triangle and no float error lies on the outside.
     pub(crate) fn pad(bounds: &Aabb) -> Aabb {
         // Without a single finite triangle there is no box: any will do, nothing is in it.

@@ -1,5 +1,7 @@
 //! The view that queries run on: a blob bound to its mesh, whichever method built it.
 
+use core::fmt;
+
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
@@ -21,7 +23,7 @@ use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{self, OneLevel};
 use crate::options::{Choice, Cull};
-use crate::ray::{Hit, Ray, RayF64};
+use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
 use crate::recursive::{self, Recursive};
 use crate::search::{Any, Closest, Outcome, Search};
 use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
@@ -35,7 +37,7 @@ use crate::visit::Visitor;
 /// number of threads may query it at once. Queries never fail, never allocate and never panic;
 /// their steps are bounded by the resolutions (one level: by their sum). A single query's stack is
 /// below 7 KiB, a batch's below 36 KiB.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,
     blob: &'a [u8],
@@ -319,7 +321,12 @@ impl<'a> Grid<'a> {
     /// ```
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        let mut any = Any(false);
+        self.any(ray) != INVALID_ID
+    }
+
+    /// A triangle that a ray hits, or [`INVALID_ID`].
+    pub(crate) fn any(&self, ray: &Ray) -> u32 {
+        let mut any = Any(INVALID_ID);
         self.search(ray, ray.t_min, Cull::None, &mut any, &mut ());
         any.0
     }
@@ -544,7 +551,7 @@ impl<'a> Grid<'a> {
         &self,
         choice: Choice,
         memory: &mut [bvh::Entry],
-        batch: &mut impl Together,
+        batch: &mut (impl Together + ?Sized),
     ) -> bool {
         if !HAS_VECTORS || !HAS_BVH {
             return false;
@@ -669,5 +676,27 @@ impl<'a> Grid<'a> {
 
     fn header(&self) -> Option<Header> {
         Header::read(self.blob, &self.mesh).ok()
+    }
+
+    /// A grid that hits nothing.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn nothing() -> Self {
+        let (mesh, blob) = (TriangleMesh::EMPTY, &[]);
+        let (lattice, structure) = (Lattice::NOTHING, Structure::Bvh(Bvh::NOTHING));
+        Self { mesh, blob, lattice, structure, simd: SimdLevel::detect() }
+    }
+
+    /// Says in one line what it is.
+    pub(crate) fn describe(&self, mut to: fmt::DebugStruct<'_, '_>) -> fmt::Result {
+        to.field("method", &self.method())
+            .field("triangles", &self.mesh.triangle_count())
+            .field("bytes", &self.blob_bytes())
+            .finish()
+    }
+}
+
+impl fmt::Debug for Grid<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.describe(f.debug_struct("Grid"))
     }
 }

@@ -30,18 +30,21 @@
 //! `hash`, `cell`, `spans`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure
 //! above them (`one_level`; `fixed` and `variable` on top of it; `recursive`; `bvh`), and `grid`:
 //! the view that queries run on. Then the questions: `sizes`, `options`, `batch`, `closest`,
-//! `surface`, `inspect`, `packed`, `refit`. core/DESIGN.md tells how it all works and what was left out.
+//! `surface`, `inspect`, `packed`, `refit`, `owned`. core/DESIGN.md tells how it all works and what was left out.
 //!
 //! Each structure has a feature of the package (`one-level`, `fixed`, `variable`, `recursive` and
 //! `bvh`, all on by default), so that a program with little flash takes the ones it needs:
 //! [`Method::is_available`] and [`Error::MethodLeftOut`] tell of the others.
+//!
+//! The feature `alloc`, off by default, brings `OwnedGrid`: grid, memory and mesh in one type without a
+//! lifetime. All else is the same with it and without.
 //!
 //! Keys used in these pages: **CP10** Costa, Pereira, Jorge 2010; **LD08** Lagae and Dutré,
 //! *Compact, Fast and Robust Grids for Ray Tracing*, 2008.
 #![no_std]
 #![deny(unsafe_code)]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "alloc"))]
 extern crate alloc;
 
 /// The example in this package's README runs as a test.
@@ -77,6 +80,8 @@ mod lists;
 mod mesh;
 mod one_level;
 mod options;
+#[cfg(feature = "alloc")]
+mod owned;
 mod packed;
 mod pairs;
 mod parts;
@@ -110,6 +115,8 @@ pub use grid::Grid;
 pub use inspect::Statistics;
 pub use mesh::{Content, IndexType, MAX_TRIANGLES, Strided, Triangle, TriangleMesh};
 pub use options::{Cull, Filter, QueryOptions, Verdict};
+#[cfg(feature = "alloc")]
+pub use owned::{OwnedGrid, OwnedMesh, OwnedStrided};
 pub use packed::BlobInfo;
 pub use parts::MeshPart;
 pub use ray::{Hit, INVALID_ID, Ray, RayF64};

@@ -8,6 +8,7 @@
 //! The last element needs only its own bytes, not its stride. Nothing has to be aligned: every
 //! read goes through bytes, which costs nothing on the machines that matter and removes a rule.
 
+use core::fmt;
 use core::ops::Range;
 
 use glam::{Vec3A, Vec4};
@@ -85,7 +86,7 @@ impl Content {
 pub(crate) const BOX_BYTES: usize = size_of::<[f32; 6]>();
 
 /// `count` elements in a slice of bytes, one every `stride` bytes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Strided<'a> {
     /// The bytes, from the first element's first to at least the last element's last.
     pub bytes: &'a [u8],
@@ -93,6 +94,16 @@ pub struct Strided<'a> {
     pub stride: usize,
     /// Number of elements.
     pub count: usize,
+}
+
+impl fmt::Debug for Strided<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Strided")
+            .field("bytes", &self.bytes.len())
+            .field("stride", &self.stride)
+            .field("count", &self.count)
+            .finish()
+    }
 }
 
 impl<'a> Strided<'a> {
@@ -129,7 +140,7 @@ impl<'a> Strided<'a> {
 }
 
 /// A view of the caller's triangle mesh: vertices of three floats, triangles of three indices.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct TriangleMesh<'a> {
     /// Vertices, or boxes. For parts only their number.
     positions: Strided<'a>,
@@ -140,7 +151,29 @@ pub struct TriangleMesh<'a> {
     masks: Strided<'a>,
 }
 
+impl fmt::Debug for TriangleMesh<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.describe(f.debug_struct("TriangleMesh"))
+    }
+}
+
 impl<'a> TriangleMesh<'a> {
+    /// A mesh of nothing.
+    #[cfg(feature = "alloc")]
+    pub(crate) const EMPTY: Self = {
+        let none = Strided { bytes: &[], stride: 0, count: 0 };
+        Self { positions: none, indices: none, layout: Layout::Indexed(IndexType::U32), masks: none }
+    };
+
+    /// Says in one line what it is.
+    pub(crate) fn describe(&self, mut to: fmt::DebugStruct<'_, '_>) -> fmt::Result {
+        to.field("vertices", &self.vertex_count())
+            .field("triangles", &self.triangle_count())
+            .field("indices", &self.index_type())
+            .field("has_masks", &self.has_masks())
+            .finish()
+    }
+
     /// A mesh in two tight arrays.
     ///
     /// # Errors

@@ -74,9 +74,14 @@ pub struct QueryOptions<'q> {
     pub skip: u32,
     /// Says of a hit whether it counts: gets the place of the ray in its batch, 0 for a single one,
     /// and the hit. Asked about hits from near to far, where `t` is equal by ascending id, and about
-    /// each triangle at most once for each ray. The rays of a batch are then traced one by one, in
-    /// their order.
+    /// each triangle at most once for each ray; all about one ray of a batch before the next, in their
+    /// order. A ray of [`occluded_with`](Grid::occluded_with) and its like that an opaque triangle
+    /// blocks may be asked about or not.
     pub filter: Option<&'q mut Filter<'q>>,
+    /// The filter is asked about a triangle if a bit of this is set in its mask, too; the others are
+    /// opaque: their hits count unasked, and rays that meet no others cost what they cost without a
+    /// filter. At first all bits, which asks about every triangle, even one whose mask is 0.
+    pub filter_mask: u32,
     /// Where to add up the work. The rays of a batch are then traced one by one: those of a group
     /// share their work, and none of it could be told to be one ray's.
     pub counters: Option<&'q mut Counters>,
@@ -93,6 +98,7 @@ impl Default for QueryOptions<'_> {
             cull: Cull::None,
             skip: INVALID_ID,
             filter: None,
+            filter_mask: u32::MAX,
             counters: None,
             scratch: &mut [],
         }
@@ -106,6 +112,7 @@ impl fmt::Debug for QueryOptions<'_> {
             .field("cull", &self.cull)
             .field("skip", &self.skip)
             .field("filter", &self.filter.is_some())
+            .field("filter_mask", &self.filter_mask)
             .field("counters", &self.counters)
             .field("scratch", &self.scratch.len())
             .finish()
@@ -121,31 +128,46 @@ impl<'q> QueryOptions<'q> {
 
     /// Returns true if rays have to be traced one by one.
     pub(crate) const fn are_for_single_rays(&self) -> bool {
-        self.filter.is_some() || self.counters.is_some()
+        self.counters.is_some()
     }
 
     /// Returns true if they change nothing.
     pub(crate) fn are_plain(&self) -> bool {
-        self.choice() == Choice::ALL && !self.are_for_single_rays()
+        self.choice() == Choice::ALL && self.filter.is_none() && !self.are_for_single_rays()
     }
 
-    /// What can be said of triangles without a filter.
+    /// What can be said of triangles without asking the filter.
     pub(crate) const fn choice(&self) -> Choice {
-        Choice { mask: self.mask, skip: self.skip, cull: self.cull }
+        let asked = if self.filter.is_some() { self.filter_mask } else { 0 };
+        Choice { mask: self.mask, skip: self.skip, cull: self.cull, asked }
     }
 }
 
-/// Masks, culling and the triangle to skip.
+/// Masks, culling, the triangle to skip, and which triangles the filter is asked about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Choice {
     mask: u32,
     skip: u32,
     pub(crate) cull: Cull,
+    /// The mask of the filter; no bits without one.
+    asked: u32,
 }
 
 impl Choice {
-    /// All triangles from both sides.
-    pub(crate) const ALL: Self = Self { mask: u32::MAX, skip: INVALID_ID, cull: Cull::None };
+    /// All triangles from both sides, unasked.
+    pub(crate) const ALL: Self =
+        Self { mask: u32::MAX, skip: INVALID_ID, cull: Cull::None, asked: 0 };
+
+    /// Returns true if the filter is asked about a triangle.
+    #[inline(always)]
+    pub(crate) fn asks(&self, mesh: &TriangleMesh<'_>, primitive: u32) -> bool {
+        self.asked != 0 && (self.asked == u32::MAX || mesh.mask(primitive) & self.asked != 0)
+    }
+
+    /// Returns true if the filter is asked about every triangle.
+    pub(crate) const fn asks_all(&self, mesh: &TriangleMesh<'_>) -> bool {
+        self.asked == u32::MAX || (self.asked != 0 && !mesh.has_masks())
+    }
 
     /// Returns true if a triangle is seen, from whichever side.
     #[inline(always)]
@@ -209,8 +231,34 @@ impl Grid<'_> {
         ray: &Ray,
         options: &mut QueryOptions<'_>,
     ) -> Option<Hit> {
+        self.intersect_behind((place, ray), options, None, 1)
+    }
+
+    /// The same once the first hit is known, which the filter is asked about.
+    pub(crate) fn intersect_from(
+        &self,
+        place: usize,
+        ray: &Ray,
+        options: &mut QueryOptions<'_>,
+        first: &Hit,
+    ) -> Option<Hit> {
+        let verdict = options.filter.as_mut().map(|filter| filter(place, first));
+        if verdict == Some(Verdict::Reject) {
+            return self.intersect_behind((place, ray), options, Some(*first), 2);
+        }
+        Some(*first)
+    }
+
+    /// The first hit behind another that counts. The first walk collects `room` hits.
+    fn intersect_behind(
+        &self,
+        ray: (usize, &Ray),
+        options: &mut QueryOptions<'_>,
+        after: Option<Hit>,
+        room: usize,
+    ) -> Option<Hit> {
         let mut closest = None;
-        self.in_order((place, ray), options, None, 1, |hit| {
+        self.in_order(ray, options, after, room, |hit| {
             closest = Some(*hit);
             false
         });
@@ -238,21 +286,51 @@ impl Grid<'_> {
     /// ```
     #[must_use]
     pub fn occluded_with(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> bool {
-        self.occluded_at(0, ray, options)
+        self.occluder_at(0, ray, options).is_some()
+    }
+
+    /// A triangle that blocks a ray, of those that the options let count; `None` if the ray is not
+    /// [`occluded`](Grid::occluded_with).
+    ///
+    /// It is hit within the ray's range, but need not be the closest, and another one may be named in a
+    /// batch or on another machine.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
+    /// assert_eq!(grid.occluder(&ray, &mut QueryOptions::default()), Some(0));
+    /// # Ok::<(), Error>(())
+    /// ```
+    #[must_use]
+    pub fn occluder(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> Option<u32> {
+        self.occluder_at(0, ray, options)
     }
 
     /// The same for the ray at a place of a batch.
-    pub(crate) fn occluded_at(
+    pub(crate) fn occluder_at(
         &self,
         place: usize,
         ray: &Ray,
         options: &mut QueryOptions<'_>,
-    ) -> bool {
+    ) -> Option<u32> {
+        if options.are_plain() {
+            let id = self.any(ray);
+            return (id != INVALID_ID).then_some(id);
+        }
         if options.filter.is_some() {
-            return self.intersect_at(place, ray, options).is_some();
+            return self.intersect_at(place, ray, options).map(|hit| hit.primitive);
         }
         // Nobody is promised an order.
-        self.nearest(ray, options, None, &mut [Hit::MISS], true) > 0
+        let mut hit = Hit::MISS;
+        let found = self.nearest(ray, options, None, core::slice::from_mut(&mut hit), true);
+        (found > 0).then_some(hit.primitive)
     }
 
     /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.
@@ -333,13 +411,14 @@ impl Grid<'_> {
         mut take: impl FnMut(&Hit) -> bool,
     ) {
         let mut buffer = [Hit::MISS; ROOM];
+        let choice = options.choice();
         loop {
             let space = buffer.get_mut(..room).unwrap_or_default();
             let found = self.nearest(ray, options, after, space, false);
             for hit in buffer.iter().take(found) {
                 let verdict = match &mut options.filter {
-                    Some(filter) => filter(place, hit),
-                    None => Verdict::Accept,
+                    Some(filter) if choice.asks(self.mesh(), hit.primitive) => filter(place, hit),
+                    _ => Verdict::Accept,
                 };
                 let is_enough = match verdict {
                     Verdict::Reject => false,

@@ -69,14 +69,14 @@ impl Search for Closest {
     }
 }
 
-/// Any hit.
+/// Any hit: its triangle, or [`INVALID_ID`].
 #[derive(Debug)]
-pub(crate) struct Any(pub(crate) bool);
+pub(crate) struct Any(pub(crate) u32);
 
 impl Search for Any {
     #[inline(always)]
-    fn show(&mut self, _: Hit) -> Outcome {
-        self.0 = true;
+    fn show(&mut self, hit: Hit) -> Outcome {
+        self.0 = hit.primitive;
         Outcome::Done
     }
 }

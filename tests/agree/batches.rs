@@ -13,10 +13,10 @@ use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
 
-const COHERENCES: [Coherence; 2] = [Coherence::Coherent, Coherence::Incoherent];
+pub(crate) const COHERENCES: [Coherence; 2] = [Coherence::Coherent, Coherence::Incoherent];
 
 /// A ball in a soup of small and large triangles, with a crowd on it.
-fn scene() -> Mesh {
+pub(crate) fn scene() -> Mesh {
     let mut mesh = ball(12, 1.0);
     mesh.append(&soup(300, 0.1, 5));
     mesh.append(&soup(6, 2.0, 7));
@@ -39,7 +39,7 @@ fn close(bounds: ([f32; 3], [f32; 3]), view: View, size: u16, [left, top]: [u16;
 }
 
 /// Rays in the pieces of large pictures, which come first.
-const CLOSE: usize = 40 * 128;
+pub(crate) const CLOSE: usize = 40 * 128;
 
 /// Those of them of which one half has ends of its own.
 const LIMITED: Range<usize> = 28 * 128..36 * 128;
@@ -79,7 +79,7 @@ fn odd_rays() -> Vec<Ray> {
 }
 
 /// Rays of every kind: tiles, tiles with strangers in them, random ones, odd ones alone and mixed.
-fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
+pub(crate) fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
     let mut random = Random(73);
     let mut rays = Vec::new();
     // First, so that those of each go together. Across the ball, its edges and the crowd.
@@ -366,7 +366,7 @@ fn elements_may_lie_anywhere_and_what_is_between_them_stays() {
 }
 
 /// Levels that a method has something to do with.
-fn levels_of(method: Method) -> Vec<SimdLevel> {
+pub(crate) fn levels_of(method: Method) -> Vec<SimdLevel> {
     if method == Method::Bvh { levels() } else { vec![SimdLevel::detect()] }
 }
 
@@ -427,7 +427,7 @@ fn masks_culling_and_a_triangle_to_skip_agree() {
 }
 
 /// Rays that start around some points in turn and go anywhere; among many points odd ones, too.
-fn scattered(count: usize, points: usize) -> Vec<Ray> {
+pub(crate) fn scattered(count: usize, points: usize) -> Vec<Ray> {
     let mut random = Random(91);
     let points: Vec<_> = (0..points).map(|_| random.point()).collect();
     let odd = odd_rays();

@@ -3,6 +3,7 @@
 mod batches;
 mod closest;
 mod exact;
+mod filters;
 mod forms;
 mod hits;
 mod joined;

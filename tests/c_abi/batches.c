@@ -246,6 +246,35 @@ static void scratch_may_be_anything(void)
     }
 }
 
+/* A triangle is named where something blocks, one that the ray hits; gaps stay as they are. */
+static void check_occluders(const uint8_t occluded[RAYS], const hgrid_query_options *options,
+                            hgrid_coherence coherence)
+{
+    const size_t stride = 7;
+    unsigned char *names = (unsigned char *)guarded((RAYS - 1) * stride + 4);
+    hgrid_hit all[TRIANGLES];
+    EXPECT(HGRID_OK, hgrid_occluder_n(&grid, rays, 0, (uint32_t *)(void *)names, stride, RAYS,
+                                      coherence, options));
+    for (size_t ray = 0; ray < RAYS; ray++) {
+        const uint32_t alone = hgrid_occluder(&grid, &rays[ray], options);
+        uint32_t named;
+        size_t count;
+        memcpy(&named, names + ray * stride, sizeof named);
+        CHECK((named != HGRID_INVALID_ID) == occluded[ray]);
+        CHECK((alone != HGRID_INVALID_ID) == occluded[ray]);
+        EXPECT(HGRID_OK,
+               hgrid_intersect_all(&grid, &rays[ray], options, all, TRIANGLES, &count));
+        bool is_there = count == 0, alone_is_there = count == 0;
+        for (size_t i = 0; i < count; i++) {
+            is_there |= all[i].primitive == named;
+            alone_is_there |= all[i].primitive == alone;
+        }
+        CHECK(is_there && alone_is_there);
+        if (ray > 0)
+            CHECK(all_bytes_are(names + ray * stride - 3, 3, 0xc7));
+    }
+}
+
 /* Masks, culling and a triangle to skip: as in single queries. */
 static void options_are_for_all_rays(hgrid_coherence coherence)
 {
@@ -263,6 +292,7 @@ static void options_are_for_all_rays(hgrid_coherence coherence)
             const bool is_hit = hgrid_intersect(&grid, &rays[ray], &options, &hit);
             CHECK(memcmp(&hit, &hits[ray], sizeof hit) == 0 && occluded[ray] == is_hit);
         }
+        check_occluders(occluded, &options, coherence);
     }
 }
 
@@ -333,6 +363,8 @@ static void refuse(hgrid_status status, call c)
                                      c.hit_stride, c.count, c.coherence, c.options));
     EXPECT(status, hgrid_occluded_n(c.grid, c.rays, c.ray_stride, (uint8_t *)c.answers,
                                     c.occluded_stride, c.count, c.coherence, c.options));
+    EXPECT(status, hgrid_occluder_n(c.grid, c.rays, c.ray_stride, (uint32_t *)c.answers,
+                                    c.hit_stride, c.count, c.coherence, c.options));
     CHECK(all_bytes_are(memory, sizeof memory, 0xc7));
 }
 
@@ -364,6 +396,8 @@ static void misuse_is_refused(void)
     refuse(HGRID_ERROR_STRUCT_SIZE, c);
     options.struct_size++, options.cull = 3;
     refuse(HGRID_ERROR_INVALID_CULL, c);
+    options.cull = HGRID_CULL_NONE, options.reserved = 1;
+    refuse(HGRID_ERROR_STRUCT_SIZE, c);
 }
 
 static void impossible_strides_are_refused(void)
@@ -443,6 +477,8 @@ static void overlaps_are_refused(void)
             }
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_intersect_n(&grid, rays, 0, (hgrid_hit *)(void *)rays, 0, 1,
                                                   HGRID_COHERENCE_COHERENT, NULL));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_occluder_n(&grid, rays, 0, (uint32_t *)(void *)rays, 0, 1,
+                                                 HGRID_COHERENCE_COHERENT, NULL));
 
     /* Other strides must lie apart, even if no element meets another. */
     check_overlap(true, 16, 64, 16, 0, COUNT);

@@ -72,6 +72,8 @@ static void layout(void)
     OFFSET(hgrid_query_options, counters);
     OFFSET(hgrid_query_options, scratch);
     OFFSET(hgrid_query_options, scratch_bytes);
+    OFFSET(hgrid_query_options, filter_mask);
+    OFFSET(hgrid_query_options, reserved);
     SIZE(hgrid_closest);
     OFFSET(hgrid_closest, position);
     OFFSET(hgrid_closest, distance);
@@ -280,9 +282,10 @@ static void defaults(void)
            (unsigned long)m.index_type, m.positions != NULL, m.position_stride, m.vertex_count,
            m.indices != NULL, m.index_stride, m.triangle_count, m.masks != NULL, m.mask_stride,
            m.parts != NULL, m.part_count);
-    printf("query_options %lu %#lx %lu %#lx %d %d %d %d %zu\n", (unsigned long)o.struct_size,
+    printf("query_options %lu %#lx %lu %#lx %d %d %d %d %zu %lu %lu\n", (unsigned long)o.struct_size,
            (unsigned long)o.mask, (unsigned long)o.cull, (unsigned long)o.skip, o.context != NULL,
-           o.filter != NULL, o.counters != NULL, o.scratch != NULL, o.scratch_bytes);
+           o.filter != NULL, o.counters != NULL, o.scratch != NULL, o.scratch_bytes,
+           (unsigned long)o.filter_mask, (unsigned long)o.reserved);
     printf("report %lu %lu %llu %llu %#lx %lu %lu %g %lu %lu %lu %lu\n",
            (unsigned long)r.struct_size, (unsigned long)r.is_exact,
            (unsigned long long)r.index_bytes, (unsigned long long)r.scratch_bytes,

@@ -249,7 +249,7 @@ fn initialisers_are_the_defaults() {
     // All else is 0 or NULL.
     for (name, fields) in [
         ("mesh", "0 0 0 0 0 0 0 0 0 0 0"),
-        ("query_options", "0xffffffff 0 0xffffffff 0 0 0 0 0"),
+        ("query_options", "0xffffffff 0 0xffffffff 0 0 0 0 0 0 0"),
         ("report", "0 0 0 0xffffffff 0 0 0 0 0 0 0"),
         ("blob_info", "0 0 0 0 0 0 0"),
         ("refit_report", "0xffffffff 0 0"),

@@ -19,6 +19,7 @@ static void ask_everything(const hgrid_grid *view, const hgrid_mesh *mesh)
     hgrid_hit *hits = (hgrid_hit *)guarded(RAYS * sizeof *hits);
     hgrid_hit *hit = (hgrid_hit *)guarded(sizeof *hit), all[4];
     uint8_t *occluded = (uint8_t *)guarded(RAYS);
+    uint32_t *occluders = (uint32_t *)guarded(RAYS * sizeof *occluders);
     size_t *count = (size_t *)guarded(sizeof *count);
     hgrid_closest *closest = (hgrid_closest *)guarded(sizeof *closest);
     hgrid_query_options *options = (hgrid_query_options *)guarded(sizeof *options);
@@ -33,8 +34,10 @@ static void ask_everything(const hgrid_grid *view, const hgrid_mesh *mesh)
             const hgrid_query_options *as = with ? options : NULL;
             EXPECT(HGRID_OK, hgrid_intersect_n(grid, rays, 0, hits, 0, RAYS, c, as));
             EXPECT(HGRID_OK, hgrid_occluded_n(grid, rays, 0, occluded, 0, RAYS, c, as));
+            EXPECT(HGRID_OK, hgrid_occluder_n(grid, rays, 0, occluders, 0, RAYS, c, as));
             for (int i = 0; i < RAYS; i++)
-                CHECK(hits[i].primitive < TRIANGLES && occluded[i] == 1);
+                CHECK(hits[i].primitive < TRIANGLES && occluded[i] == 1 &&
+                      occluders[i] < TRIANGLES);
         }
     for (int i = 0; i < RAYS; i += 13) {
         const hgrid_ray *ray = (hgrid_ray *)guarded_copy(&rays[i], sizeof *ray);
@@ -44,6 +47,7 @@ static void ask_everything(const hgrid_grid *view, const hgrid_mesh *mesh)
         CHECK(hgrid_intersect(grid, ray, NULL, hit) && hit->primitive == id);
         CHECK(hgrid_intersect(grid, ray, options, hit) && hit->primitive == id);
         CHECK(hgrid_occluded(grid, ray, options));
+        CHECK(hgrid_occluder(grid, ray, options) < TRIANGLES);
         CHECK(hgrid_closest_point(grid, point, INFINITY, options, closest));
         /* Masks are read when a ray hits. */
         options->mask = 1u << id % 31;

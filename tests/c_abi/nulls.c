@@ -31,6 +31,7 @@ typedef struct {
     hgrid_blob_info info;
     hgrid_statistics statistics;
     uint8_t occluded[RAYS];
+    uint32_t occluders[RAYS];
     size_t count;
     uint64_t bytes;
 } outputs;
@@ -221,6 +222,11 @@ static void queries(void)
     CHECK(hgrid_occluded(&grid, rays, NULL));
     puts("null hgrid_occluded.options");
 
+    MISSED(hgrid_occluder.grid, hgrid_occluder(NULL, rays, &options) != HGRID_INVALID_ID);
+    MISSED(hgrid_occluder.ray, hgrid_occluder(&grid, NULL, &options) != HGRID_INVALID_ID);
+    CHECK(hgrid_occluder(&grid, rays, NULL) != HGRID_INVALID_ID);
+    puts("null hgrid_occluder.options");
+
     REFUSED(hgrid_intersect_all.grid, HGRID_ERROR_NULL_ARGUMENT,
             hgrid_intersect_all(NULL, rays, &options, out.hits, RAYS, &out.count));
     REFUSED(hgrid_intersect_all.ray, HGRID_ERROR_NULL_ARGUMENT,
@@ -274,6 +280,16 @@ static void batches(void)
     ALLOWED(hgrid_occluded_n.rays, hgrid_occluded_n(&grid, NULL, 0, NULL, 0, 0, c, &options));
     ALLOWED(hgrid_occluded_n.options,
             hgrid_occluded_n(&grid, rays, 0, out.occluded, 0, RAYS, c, NULL));
+
+    REFUSED(hgrid_occluder_n.grid, HGRID_ERROR_NULL_ARGUMENT,
+            hgrid_occluder_n(NULL, rays, 0, out.occluders, 0, RAYS, c, &options));
+    REFUSED(hgrid_occluder_n.rays, HGRID_ERROR_NULL_ARGUMENT,
+            hgrid_occluder_n(&grid, NULL, 0, out.occluders, 0, RAYS, c, &options));
+    REFUSED(hgrid_occluder_n.occluders, HGRID_ERROR_NULL_ARGUMENT,
+            hgrid_occluder_n(&grid, rays, 0, NULL, 0, RAYS, c, &options));
+    ALLOWED(hgrid_occluder_n.rays, hgrid_occluder_n(&grid, NULL, 0, NULL, 0, 0, c, &options));
+    ALLOWED(hgrid_occluder_n.options,
+            hgrid_occluder_n(&grid, rays, 0, out.occluders, 0, RAYS, c, NULL));
 }
 
 static void stored_grids(void)

@@ -30,15 +30,18 @@ static void refuse(hgrid_status expected, const hgrid_query_options *options)
         hgrid_hit hit;
         hgrid_closest closest;
         uint8_t occluded;
+        uint32_t occluder;
         size_t count;
     } out;
     memset(&out, 0xc7, sizeof out);
     CHECK(!hgrid_intersect(&grid, &ray, options, &out.hit));
     CHECK(!hgrid_occluded(&grid, &ray, options));
+    CHECK(hgrid_occluder(&grid, &ray, options) == HGRID_INVALID_ID);
     CHECK(!hgrid_closest_point(&grid, point, INFINITY, options, &out.closest));
     EXPECT(expected, hgrid_intersect_all(&grid, &ray, options, &out.hit, 1, &out.count));
     EXPECT(expected, hgrid_intersect_n(&grid, &ray, 0, &out.hit, 0, 1, c, options));
     EXPECT(expected, hgrid_occluded_n(&grid, &ray, 0, &out.occluded, 0, 1, c, options));
+    EXPECT(expected, hgrid_occluder_n(&grid, &ray, 0, &out.occluder, 0, 1, c, options));
     CHECK(all_bytes_are(&out, sizeof out, 0xc7));
 }
 
@@ -54,6 +57,8 @@ static void unknown_sides_are_refused(void)
     }
     options.cull = HGRID_CULL_NONE;
     options.struct_size--;
+    refuse(HGRID_ERROR_STRUCT_SIZE, &options);
+    options.struct_size++, options.reserved = 1;
     refuse(HGRID_ERROR_STRUCT_SIZE, &options);
     CHECK(counters.primitive_tests == 1 && counters.cell_steps == 2 && counters.grid_steps == 3);
 }
@@ -129,6 +134,62 @@ static void a_filter_may_ask_and_say_anything(void)
         CHECK(hgrid_occluded(&grid, &ray, &options) == (v < 2) && i.calls == 2);
         EXPECT(HGRID_OK, hgrid_intersect_all(&grid, &ray, &options, &hit, 1, &count));
         CHECK(count == (v < 2) && i.calls == 3);
+    }
+}
+
+/* Rejects everything, and counts how often it was asked about triangles with a mask and without. */
+static hgrid_verdict reject(void *context, size_t place, const hgrid_hit *hit)
+{
+    int *calls = (int *)context;
+    CHECK(place == 0);
+    calls[mesh.masks != NULL && hit->primitive % 2 == 0]++;
+    return HGRID_REJECT;
+}
+
+/* 0 and all bits ask about every triangle, one whose mask is 0 among them; other bits about those that
+ * have one of them; the others count unasked. */
+static void filter_masks_are_those_of_the_header(void)
+{
+    const hgrid_ray along = {{-1, 0.43f, 0.04f}, 0, {1, 0.01f, 0}, INFINITY};
+    const hgrid_coherence c = HGRID_COHERENCE_COHERENT;
+    hgrid_hit all[TRIANGLES], some[TRIANGLES], hit;
+    size_t count;
+    EXPECT(HGRID_OK, hgrid_intersect_all(&grid, &along, NULL, all, TRIANGLES, &count));
+    int expected[2] = {0, 0};
+    for (size_t i = 0; i < count; i++)
+        expected[all[i].primitive % 2 == 0]++;
+    CHECK(expected[0] > 1 && expected[1] > 1);
+
+    const uint32_t masks[] = {0, UINT32_MAX, 1, 0x80000002u, 2};
+    for (int m = 0; m < 5; m++) {
+        int calls[2] = {0, 0};
+        hgrid_query_options options = defaults;
+        options.filter = reject, options.context = calls, options.filter_mask = masks[m];
+        /* All hits: those that are opaque are left, in their order. */
+        size_t left = 0, found;
+        EXPECT(HGRID_OK, hgrid_intersect_all(&grid, &along, &options, some, TRIANGLES, &found));
+        for (size_t i = 0; i < count; i++) {
+            const bool is_even = all[i].primitive % 2 == 0;
+            const bool is_asked = m < 2 || (m < 4 && is_even);
+            if (!is_asked)
+                CHECK(memcmp(&all[i], &some[left++], sizeof *all) == 0);
+        }
+        CHECK(found == left);
+        CHECK(calls[0] == (m < 2 ? expected[0] : 0) && calls[1] == (m < 4 ? expected[1] : 0));
+
+        /* The others: the first that is opaque, or nothing. */
+        uint8_t occluded;
+        uint32_t occluder;
+        CHECK(hgrid_intersect(&grid, &along, &options, &hit) == (left > 0));
+        CHECK(left == 0 || memcmp(&hit, some, sizeof hit) == 0);
+        CHECK(hgrid_occluded(&grid, &along, &options) == (left > 0));
+        CHECK((hgrid_occluder(&grid, &along, &options) != HGRID_INVALID_ID) == (left > 0));
+        EXPECT(HGRID_OK, hgrid_intersect_n(&grid, &along, 0, &hit, 0, 1, c, &options));
+        CHECK(left == 0 ? hit.primitive == HGRID_INVALID_ID : memcmp(&hit, some, sizeof hit) == 0);
+        EXPECT(HGRID_OK, hgrid_occluded_n(&grid, &along, 0, &occluded, 0, 1, c, &options));
+        CHECK(occluded == (left > 0));
+        EXPECT(HGRID_OK, hgrid_occluder_n(&grid, &along, 0, &occluder, 0, 1, c, &options));
+        CHECK((occluder != HGRID_INVALID_ID) == (left > 0));
     }
 }
 
@@ -239,6 +300,7 @@ int main(void)
         sides_are_those_of_the_header();
         masks_are_those_of_the_header();
         a_filter_may_ask_and_say_anything();
+        filter_masks_are_those_of_the_header();
         all_hits_are_written_to_their_place();
         the_closest_point_is_where_it_says();
     }

@@ -29,6 +29,7 @@ static hgrid_grid grid;
 static hgrid_ray rays[RAYS], mixed[RAYS];
 static hgrid_hit hits[RAYS];
 static uint8_t occluded[RAYS];
+static uint32_t occluders[RAYS];
 static hgrid_counters counters;
 
 static void one(void)
@@ -88,6 +89,18 @@ static void many(void)
         CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, c, NULL) == HGRID_OK);
         CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, c, &all) == HGRID_OK);
         CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, c, &all) == HGRID_OK);
+        CHECK(hgrid_occluder_n(&grid, mixed, 0, occluders, 0, RAYS, c, NULL) == HGRID_OK);
+        /* A filter that rejects behind a group of rays, in each order of them. */
+        const hgrid_ray *each[] = {mixed, rays};
+        for (int i = 0; i < 4; i++) {
+            hgrid_query_options asking = HGRID_QUERY_OPTIONS_INIT;
+            asking.filter = reject, asking.context = &grid;
+            asking.filter_mask = i < 2 ? 0 : 1;
+            const hgrid_ray *from = each[i % 2];
+            CHECK(hgrid_intersect_n(&grid, from, 0, hits, 0, RAYS, c, &asking) == HGRID_OK);
+            CHECK(hgrid_occluded_n(&grid, from, 0, occluded, 0, RAYS, c, &asking) == HGRID_OK);
+            CHECK(hgrid_occluder_n(&grid, from, 0, occluders, 0, RAYS, c, &asking) == HGRID_OK);
+        }
     }
 }
 

@@ -119,11 +119,14 @@ static void options_of_queries(void)
     hgrid_hit hit;
     hgrid_closest closest;
     uint8_t occluded;
+    uint32_t occluder;
     size_t count;
     CHECK_VERSIONS(hgrid_intersect.options, hgrid_query_options, options,
                    found(hgrid_intersect(&grid, &ray, it, &hit)));
     CHECK_VERSIONS(hgrid_occluded.options, hgrid_query_options, options,
                    found(hgrid_occluded(&grid, &ray, it)));
+    CHECK_VERSIONS(hgrid_occluder.options, hgrid_query_options, options,
+                   found(hgrid_occluder(&grid, &ray, it) != HGRID_INVALID_ID));
     CHECK_VERSIONS(hgrid_closest_point.options, hgrid_query_options, options,
                    found(hgrid_closest_point(&grid, point, 5, it, &closest)));
     CHECK_VERSIONS(hgrid_intersect_all.options, hgrid_query_options, options,
@@ -132,6 +135,8 @@ static void options_of_queries(void)
                    hgrid_intersect_n(&grid, &ray, 0, &hit, 0, 1, c, it));
     CHECK_VERSIONS(hgrid_occluded_n.options, hgrid_query_options, options,
                    hgrid_occluded_n(&grid, &ray, 0, &occluded, 0, 1, c, it));
+    CHECK_VERSIONS(hgrid_occluder_n.options, hgrid_query_options, options,
+                   hgrid_occluder_n(&grid, &ray, 0, &occluder, 0, 1, c, it));
 }
 
 int main(void)

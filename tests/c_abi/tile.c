@@ -8,6 +8,12 @@
 
 FUNCTIONS
 
+static hgrid_verdict reject(void *calls, size_t ray, const hgrid_hit *hit)
+{
+    *(int *)calls += hit->primitive == 0 && ray < 64;
+    return HGRID_REJECT;
+}
+
 int main(void)
 {
     static const float positions[6][3] = {{0, 0, 0},  {8, 0, 0},  {0, 8, 0},
@@ -51,6 +57,29 @@ int main(void)
         fabsf(light_along(&grid, &rays[0], both) - 0.64f) > 1e-6f ||
         light_along(&grid, &rays[63], none) != 1)
         return 8;
+
+    uint32_t blocker;
+    if (is_lit(&grid, &rays[0], &blocker) || blocker > 1 || !is_lit(&grid, &rays[63], &blocker) ||
+        blocker != HGRID_INVALID_ID)
+        return 12;
+    /* A leaf in front of a wall, then a wall in front of a leaf. */
+    uint32_t masks[2] = {2, 1};
+    hgrid_grid masked;
+    HGRID_ALIGNED static unsigned char masked_index[HGRID_INDEX_BOUND(2)];
+    mesh.masks = masks;
+    if (hgrid_build(&mesh, NULL, masked_index, sizeof masked_index, scratch, sizeof scratch, &masked,
+                    NULL))
+        return 13;
+    unsigned char dark[64];
+    int calls = 0;
+    for (int i = 0; i < 2; i++, masks[0] = 1, masks[1] = 2)
+        if (light_of_rays(&masked, rays, 64, reject, &calls, dark) || dark[0] != 1 || dark[63] != 0)
+            return 14;
+    masks[0] = 2;
+    calls = 0;
+    if (light_of_rays(&masked, rays, 64, reject, &calls, dark) || dark[0] != 0 || calls != 36)
+        return 15;
+    mesh.masks = NULL;
 
     /* From the first triangle nothing is in the way of a light above; between the two is the first. */
     const float up[3] = {0, 0, 1}, down[3] = {0, 0, -1};

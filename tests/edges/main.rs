@@ -6,6 +6,7 @@ mod inputs;
 mod joined;
 mod mixed;
 mod packed;
+mod printed;
 mod progress;
 mod rays;
 mod scenes;

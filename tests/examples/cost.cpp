@@ -59,8 +59,8 @@ std::size_t count_hits(const hgrid::view *grid, const hgrid::ray *ray, hgrid::hi
 }
 
 hgrid::status build(const float (*positions)[3], std::size_t vertex_count,
-                    const std::uint32_t (*indices)[3], std::size_t triangle_count, std::byte *index,
-                    std::size_t index_bytes, std::byte *scratch, std::size_t scratch_bytes,
+                    const std::uint32_t (*indices)[3], std::size_t triangle_count, hgrid::byte *index,
+                    std::size_t index_bytes, hgrid::byte *scratch, std::size_t scratch_bytes,
                     hgrid::view *grid)
 {
     const hgrid::mesh mesh(hgrid::span<const float[3]>(positions, vertex_count),

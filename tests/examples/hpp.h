@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <type_traits>
 #include <vector>
 
 #define CHECK(condition)                                                                  \
@@ -17,6 +18,9 @@
             std::exit(1);                                                                 \
         }                                                                                 \
     } while (false)
+
+/* What a compiler can check. */
+#define STATIC_CHECK(...) static_assert((__VA_ARGS__), #__VA_ARGS__)
 
 /* Each file checks a part; the first check that fails ends the program. */
 void check_types();

@@ -3,6 +3,7 @@
 #include "hpp.h"
 
 #include <atomic>
+#include <memory>
 #include <new>
 #include <string>
 #include <thread>
@@ -13,22 +14,43 @@ using hgrid::status;
 
 static long allocations_left = -1, allocations_alive = 0;
 
-void *operator new(std::size_t bytes, std::align_val_t alignment, const std::nothrow_t &) noexcept
+static void *take(std::size_t bytes, std::size_t alignment) noexcept
 {
     if (allocations_left == 0)
         return nullptr;
     allocations_left -= allocations_left > 0;
-    const auto multiple = static_cast<std::size_t>(alignment);
-    void *memory = std::aligned_alloc(multiple, (bytes + multiple) / multiple * multiple);
+    void *memory = aligned_alloc(alignment, (bytes + alignment) / alignment * alignment);
     allocations_alive += memory != nullptr;
     return memory;
 }
 
-void operator delete(void *memory, std::align_val_t, const std::nothrow_t &) noexcept
+static void give(void *memory) noexcept
 {
     allocations_alive -= memory != nullptr;
     std::free(memory);
 }
+
+#if __cplusplus >= 201703L
+void *operator new(std::size_t bytes, std::align_val_t alignment, const std::nothrow_t &) noexcept
+{
+    return take(bytes, static_cast<std::size_t>(alignment));
+}
+
+void operator delete(void *memory, std::align_val_t, const std::nothrow_t &) noexcept
+{
+    give(memory);
+}
+#else
+void *operator new(std::size_t bytes, const std::nothrow_t &) noexcept
+{
+    return take(bytes, alignof(std::max_align_t));
+}
+
+void operator delete(void *memory, const std::nothrow_t &) noexcept
+{
+    give(memory);
+}
+#endif
 
 /* --- building ------------------------------------------------------------------------------------ */
 
@@ -248,7 +270,7 @@ static void check_blobs()
     CHECK(opened && opened->validate() == status::ok);
     CHECK(opened->intersect(down())->primitive == grid->intersect(down())->primitive);
     CHECK(grid->packed_bytes() == packed->size() && hgrid::view().packed_bytes() == 0);
-    CHECK(grid->pack(hgrid::span<std::byte>(*packed).subspan(0, 64)) == status::index_too_small);
+    CHECK(grid->pack(hgrid::span<hgrid::byte>(*packed).subspan(0, 64)) == status::index_too_small);
     CHECK(hgrid::view().pack().error() == status::not_a_grid);
     const auto adopted = hgrid::grid::adopt(std::move(*packed));
     CHECK(adopted && adopted->occluded(down()));
@@ -257,9 +279,74 @@ static void check_blobs()
     CHECK(whole && whole->longest_list > 0 && whole->degenerate_count == 0);
 }
 
+/* A grid keeps what it is given, wherever it moves, and lets go of it in the end. */
+struct holder {
+    hgrid::grid grid;
+    int other = 0;
+};
+
+static void check_kept()
+{
+    const long alive = allocations_alive;
+    const scene s(3);
+    std::vector<std::array<std::uint32_t, 3>> corners;
+    for (const face &f : s.faces)
+        corners.push_back(f.corners);
+    const auto expected = hgrid::grid::build(s.mesh());
+    const auto *first = s.vertices.data();
+    std::vector<vertex> vertices = s.vertices;
+    CHECK(vertices.data() != first);
+    first = vertices.data();
+    auto kept = hgrid::grid::keep(std::move(vertices), std::move(corners));
+    CHECK(kept && kept->mesh_of()->c().positions == first);
+    std::vector<holder> holders;
+    for (int i = 0; i < 9; i++)
+        holders.emplace_back();
+    holders[3].grid = std::move(*kept);
+    holders.resize(100);
+    CHECK(holders[3].grid.intersect(down())->primitive == expected->intersect(down())->primitive);
+    CHECK(!kept->occluded(down()) && holders[3].grid.validate() == status::ok);
+
+    /* Shared data, with a mesh that looks into it; and arrays of another type. */
+    auto shared = std::make_shared<const scene>(3);
+    const auto describe = [](const std::shared_ptr<const scene> &of) { return of->mesh(); };
+    {
+        auto owner = hgrid::grid::keep(std::shared_ptr<const scene>(shared), describe,
+                                       hgrid::method::one_level);
+        CHECK(owner && shared.use_count() == 2 && owner->occluded(down()));
+        holders[5].grid = std::move(*owner);
+    }
+    CHECK(shared.use_count() == 2 && holders[5].grid.occluded(down()));
+    holders[5].grid = hgrid::grid();
+    CHECK(shared.use_count() == 1);
+    const auto triangle = hgrid::grid::keep(std::array<float, 9>{0, 0, 0, 1, 0, 0, 0, 1, 0},
+                                            std::array<std::uint16_t, 3>{0, 1, 2});
+    CHECK(triangle && triangle->occluded(down(0.2f, 0.3f)) && !triangle->occluded(down(0.9f, 0.9f)));
+
+    /* What cannot be built is given back. */
+    const auto bad = [](const std::shared_ptr<const scene> &of) {
+        hgrid_mesh raw = of->mesh().c();
+        raw.vertex_count = 3;
+        return hgrid::mesh(raw);
+    };
+    hgrid::report report;
+    const auto refused = hgrid::grid::keep(std::shared_ptr<const scene>(shared), bad,
+                                           hgrid::method::bvh, &report);
+    CHECK(refused.error() == status::index_out_of_range && report.triangle == 0);
+    CHECK(shared.use_count() == 1);
+
+    /* Before C++17 what is kept is counted, too, and freed by a delete that nobody counts. */
+    holders.clear();
+    CHECK(allocations_alive >= alive);
+#if __cplusplus < 201703L
+    allocations_alive = alive;
+#endif
+}
+
 void check_builds()
 {
     check_grids();
+    check_kept();
     check_memory_that_runs_out();
     check_views();
     check_progress_and_threads();

@@ -9,6 +9,7 @@ struct pixel {
     hgrid::ray ray;
     hgrid::hit hit;
     std::uint8_t is_dark;
+    std::uint32_t blocker;
 };
 
 static void check_rays()
@@ -28,11 +29,15 @@ static void check_rays()
                                 know) == status::ok);
         CHECK(grid->occluded_n(hgrid::field(pixels, &pixel::ray),
                                hgrid::field(pixels, &pixel::is_dark), know) == status::ok);
+        CHECK(grid->occluder_n(hgrid::field(pixels, &pixel::ray),
+                               hgrid::field(pixels, &pixel::blocker), know) == status::ok);
         for (const pixel &p : pixels) {
             const auto single = grid->intersect(p.ray);
             CHECK(single ? single->primitive == p.hit.primitive
                          : p.hit.primitive == hgrid::invalid_id);
             CHECK(single.has_value() == (p.is_dark == 1));
+            for (const auto named : {p.blocker, grid->occluder(p.ray)})
+                CHECK(single ? named < s.faces.size() : named == hgrid::invalid_id);
         }
     }
 
@@ -45,6 +50,8 @@ static void check_rays()
     CHECK(grid->intersect_n(rays, hits, hgrid::coherence::coherent) == status::invalid_answers);
     std::array<std::uint8_t, 4> bytes{};
     CHECK(grid->occluded_n(rays, bytes, hgrid::coherence::coherent) == status::invalid_answers);
+    std::array<std::uint32_t, 2> names{};
+    CHECK(grid->occluder_n(rays, names, hgrid::coherence::coherent) == status::invalid_answers);
     CHECK(grid->intersect_n({}, {}, hgrid::coherence::coherent) == status::ok);
     CHECK(hgrid::view().intersect_n(rays, hits, hgrid::coherence::coherent) != status::ok);
 
@@ -118,7 +125,7 @@ static void check_options()
         masks.push_back(1u << f.material);
     const auto grid = hgrid::grid::build(s.mesh().masks(masks));
     CHECK(grid);
-    const auto material = [&](const std::optional<hgrid::hit> &hit) {
+    const auto material = [&](const hgrid::optional<hgrid::hit> &hit) {
         return hit ? s.faces[hit->primitive].material : -1;
     };
     for (masks.pop_back();; masks.clear()) {
@@ -161,7 +168,7 @@ static void check_filters()
     const scene s(5);
     const auto grid = hgrid::grid::build(s.mesh());
     CHECK(grid);
-    const auto material = [&](const std::optional<hgrid::hit> &hit) {
+    const auto material = [&](const hgrid::optional<hgrid::hit> &hit) {
         return hit ? s.faces[hit->primitive].material : -1;
     };
 
@@ -207,6 +214,25 @@ static void check_filters()
     CHECK(grid->occluded_n(rays, dark, hgrid::coherence::coherent,
                            hgrid::options().filter(nothing)) == status::ok);
     CHECK((dark == std::array<std::uint8_t, 9>{}));
+
+    /* Only the sheets 2 and 3 ask; 1 is opaque. */
+    std::vector<std::uint32_t> masks;
+    for (const face &f : s.faces)
+        masks.push_back(1u << f.material);
+    const auto masked = hgrid::grid::build(s.mesh().masks(masks));
+    const auto see_through = hgrid::options().mask(0xe).filter_mask(0xc);
+    hgrid::options asking = see_through;
+    offered.clear();
+    CHECK(material(masked->intersect(down(), asking.filter(below_three))) == 2);
+    CHECK((offered == std::vector<std::int64_t>{3, 2}));
+    asking = see_through;
+    CHECK(material(masked->intersect(down(), asking.filter(nothing))) == 1);
+    const auto blocker = masked->occluder(down(), asking);
+    CHECK(blocker < s.faces.size() && s.faces[blocker].material == 1);
+    std::array<std::uint32_t, 9> blockers{};
+    CHECK(masked->occluder_n(rays, blockers, hgrid::coherence::coherent, asking) == status::ok);
+    CHECK(s.faces[blockers[8]].material == 1);
+    CHECK(masked->occluder(down(), asking.mask(0xc)) == hgrid::invalid_id);
 
     /* A pointer to a function is a callable, too. */
     auto *function = is_below_256;

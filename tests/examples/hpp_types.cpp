@@ -6,27 +6,27 @@
 #include <span>
 #endif
 
-static_assert(!std::is_copy_constructible_v<hgrid::grid> && !std::is_copy_assignable_v<hgrid::grid>);
-static_assert(std::is_nothrow_move_constructible_v<hgrid::grid>);
-static_assert(std::is_nothrow_move_assignable_v<hgrid::grid>);
-static_assert(std::is_trivially_copyable_v<hgrid::view> && sizeof(hgrid::view) == sizeof(hgrid_grid));
-static_assert(std::is_trivially_copyable_v<hgrid::options>);
-static_assert(sizeof(hgrid::options) == sizeof(hgrid_query_options));
-static_assert(sizeof(hgrid::mesh) == sizeof(hgrid_mesh));
-static_assert(noexcept(std::declval<const hgrid::view &>().intersect(
+STATIC_CHECK(!std::is_copy_constructible<hgrid::grid>::value && !std::is_copy_assignable<hgrid::grid>::value);
+STATIC_CHECK(std::is_nothrow_move_constructible<hgrid::grid>::value);
+STATIC_CHECK(std::is_nothrow_move_assignable<hgrid::grid>::value);
+STATIC_CHECK(std::is_trivially_copyable<hgrid::view>::value && sizeof(hgrid::view) == sizeof(hgrid_grid));
+STATIC_CHECK(std::is_trivially_copyable<hgrid::options>::value);
+STATIC_CHECK(sizeof(hgrid::options) == sizeof(hgrid_query_options));
+STATIC_CHECK(sizeof(hgrid::mesh) == sizeof(hgrid_mesh));
+STATIC_CHECK(noexcept(std::declval<const hgrid::view &>().intersect(
     std::declval<const hgrid::ray &>(), std::declval<const hgrid::options &>())));
-static_assert(noexcept(hgrid::grid::build(std::declval<const hgrid::mesh &>())));
-static_assert(std::is_convertible_v<std::vector<hgrid::hit> &, hgrid::span<hgrid::hit>>);
-static_assert(std::is_convertible_v<const std::vector<hgrid::hit> &, hgrid::span<const hgrid::hit>>);
-static_assert(!std::is_convertible_v<const std::vector<hgrid::hit> &, hgrid::span<hgrid::hit>>);
-static_assert(!std::is_convertible_v<std::vector<hgrid::hit>, hgrid::span<hgrid::hit>>);
-static_assert(!std::is_convertible_v<std::vector<hgrid::ray> &, hgrid::span<hgrid::hit>>);
-static_assert(std::is_convertible_v<hgrid::span<int>, hgrid::span<const int>>);
-static_assert(!std::is_convertible_v<hgrid::span<const int>, hgrid::span<int>>);
-static_assert(!std::is_convertible_v<hgrid::strided<int>, hgrid::span<int>>);
-static_assert(std::is_convertible_v<hgrid::strided<int>, hgrid::strided<const int>>);
-static_assert(std::is_convertible_v<std::array<int, 3> &, hgrid::strided<int>>);
-static_assert(hgrid::make_ray({1, 2, 3}, {4, 5, 6}, 7, 8).t_max == 8);
+STATIC_CHECK(noexcept(hgrid::grid::build(std::declval<const hgrid::mesh &>())));
+STATIC_CHECK(std::is_convertible<std::vector<hgrid::hit> &, hgrid::span<hgrid::hit>>::value);
+STATIC_CHECK(std::is_convertible<const std::vector<hgrid::hit> &, hgrid::span<const hgrid::hit>>::value);
+STATIC_CHECK(!std::is_convertible<const std::vector<hgrid::hit> &, hgrid::span<hgrid::hit>>::value);
+STATIC_CHECK(!std::is_convertible<std::vector<hgrid::hit>, hgrid::span<hgrid::hit>>::value);
+STATIC_CHECK(!std::is_convertible<std::vector<hgrid::ray> &, hgrid::span<hgrid::hit>>::value);
+STATIC_CHECK(std::is_convertible<hgrid::span<int>, hgrid::span<const int>>::value);
+STATIC_CHECK(!std::is_convertible<hgrid::span<const int>, hgrid::span<int>>::value);
+STATIC_CHECK(!std::is_convertible<hgrid::strided<int>, hgrid::span<int>>::value);
+STATIC_CHECK(std::is_convertible<hgrid::strided<int>, hgrid::strided<const int>>::value);
+STATIC_CHECK(std::is_convertible<std::array<int, 3> &, hgrid::strided<int>>::value);
+STATIC_CHECK(hgrid::make_ray({1, 2, 3}, {4, 5, 6}, 7, 8).t_max == 8);
 
 /* --- spans --------------------------------------------------------------------------------------- */
 
@@ -49,7 +49,7 @@ static void check_spans()
     CHECK(sum == 10);
     CHECK(hgrid::span<int>().empty() && hgrid::span<int>().begin() == nullptr);
     CHECK(hgrid::as_bytes(numbers).size() == sizeof numbers);
-    hgrid::as_writable_bytes(numbers)[0] = std::byte{7};
+    hgrid::as_writable_bytes(numbers)[0] = hgrid::byte{7};
     CHECK(numbers[0] != 1);
 
     std::vector<outer> structs(3);
@@ -57,11 +57,11 @@ static void check_spans()
         structs[static_cast<std::size_t>(i)].inner.value = i;
     using inner = decltype(outer::inner);
     const auto values = hgrid::field(hgrid::field(structs, &outer::inner), &inner::value);
-    static_assert(std::is_same_v<decltype(values), const hgrid::strided<int>>);
+    STATIC_CHECK(std::is_same<decltype(values), const hgrid::strided<int>>::value);
     CHECK(values.size() == 3 && values.stride() == sizeof(outer) && values[2] == 2);
     const auto &constant = structs;
     const auto fixed = hgrid::field(constant, &outer::before);
-    static_assert(std::is_same_v<decltype(fixed), const hgrid::strided<const int>>);
+    STATIC_CHECK(std::is_same<decltype(fixed), const hgrid::strided<const int>>::value);
     const std::vector<outer> none;
     CHECK(hgrid::field(none, &outer::before).first() == nullptr);
 
@@ -78,6 +78,22 @@ static void check_spans()
 struct corners16 {
     char name[3];
     std::uint16_t first, second, third;
+};
+
+/* Vertices that begin with three floats, one way or another. */
+struct named {
+    float x, y, z;
+    std::uint32_t color;
+};
+struct nested {
+    named position;
+    float *elsewhere;
+};
+class constructed {
+public:
+    constructed() noexcept : x(0), y(0), z(0) {}
+    explicit constructed(const hgrid::point &p) noexcept : x(p[0]), y(p[1]), z(p[2]) {}
+    float x, y, z;
 };
 
 /* A mesh gives the hits that the scene's own gives. */
@@ -123,6 +139,17 @@ static void check_meshes()
     check_mesh(s, {hgrid::field(s.vertices, &vertex::position), triples});
     check_mesh(s, {hgrid::span<const float>(flat), hgrid::field(structs, &corners16::first)});
     check_mesh(s, hgrid::mesh(s.mesh().c()));
+    std::vector<named> by_name;
+    std::vector<nested> in_structs;
+    std::vector<constructed> of_classes;
+    for (const hgrid::point &p : arrays) {
+        by_name.push_back({p[0], p[1], p[2], 0});
+        in_structs.push_back({by_name.back(), nullptr});
+        of_classes.emplace_back(p);
+    }
+    check_mesh(s, {by_name, triples});
+    check_mesh(s, {in_structs, triples});
+    check_mesh(s, {of_classes, triples});
 #if __cplusplus >= 202002L
     check_mesh(s, {std::span(arrays), std::span(flat16)});
 #endif

@@ -2,6 +2,7 @@
 //! nothing touched beside it?
 
 mod budget;
+mod owned;
 mod scenes;
 mod trees;
 

@@ -4,14 +4,17 @@
 
 use core::ptr::NonNull;
 
-use hgrid_core::{ClosestPoint, Counters, Cull, Grid, Hit, QueryOptions, Ray, Surface, Verdict};
+use hgrid_core::{
+    ClosestPoint, Counters, Cull, Grid, Hit, QueryOptions, Ray, Surface, TriangleMesh, Verdict,
+};
 
 use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
 use crate::batch::Batch;
 use crate::questions::{hgrid_counters, hgrid_hit, hgrid_query_options, hgrid_ray, verdict};
 use crate::span::Region;
 use crate::status::{
-    HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP, hgrid_status,
+    HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,
+    HGRID_ERROR_STRUCT_SIZE, hgrid_status,
 };
 use crate::types::{Elements, hgrid_grid};
 
@@ -39,6 +42,9 @@ pub(super) unsafe fn all_options(
     }
     // SAFETY: the caller's promise.
     let options = unsafe { read_sized(options) }?;
+    if options.reserved != 0 {
+        return Err(HGRID_ERROR_STRUCT_SIZE);
+    }
     Ok(Some(Asked { options, cull: options.cull()? }))
 }
 
@@ -55,26 +61,37 @@ impl Asked {
     /// The caller's promise.
     pub(super) unsafe fn ask<T>(&self, ask: impl FnOnce(&mut QueryOptions<'_>) -> T) -> T {
         // SAFETY: this function's contract.
-        unsafe { self.ask_and_see(|_| {}, ask) }
+        unsafe { self.ask_and_see(None, |_| {}, ask) }
     }
 
-    /// The same; `see` is shown what the caller's filter accepts.
+    /// The same; `see` is shown what counts: what the caller's filter accepts, and the opaque triangles
+    /// of the mesh if there is one.
     ///
     /// # Safety
     /// The caller's promise.
     unsafe fn ask_and_see<T>(
         &self,
+        mesh: Option<&TriangleMesh<'_>>,
         mut see: impl FnMut(hgrid_hit),
         ask: impl FnOnce(&mut QueryOptions<'_>) -> T,
     ) -> T {
         let hgrid_query_options { mask, skip, context, filter, counters, .. } = self.options;
+        let filter_mask = self.options.filter_mask();
         let mut work = Counters::default();
-        let mut offer = |ray: usize, hit: &Hit| {
-            let hit = hgrid_hit::from(*hit);
-            let Some(filter) = filter else { return Verdict::Accept };
-            // SAFETY: a function of this type by the caller's promise;
-            // the hit lives until it returns.
-            let verdict = verdict(unsafe { filter(context, ray, &raw const hit) });
+        let is_opaque = |hit: &Hit| {
+            let mask = |mesh: &TriangleMesh<'_>| mesh.mask(hit.primitive);
+            filter_mask != u32::MAX && mesh.is_some_and(|mesh| mask(mesh) & filter_mask == 0)
+        };
+        let mut offer = |ray: usize, offered: &Hit| {
+            let hit = hgrid_hit::from(*offered);
+            let verdict = match filter {
+                Some(filter) if !is_opaque(offered) => {
+                    // SAFETY: a function of this type by the caller's promise;
+                    // the hit lives until it returns.
+                    verdict(unsafe { filter(context, ray, &raw const hit) })
+                }
+                _ => Verdict::Accept,
+            };
             if verdict != Verdict::Reject {
                 see(hit);
             }
@@ -83,6 +100,8 @@ impl Asked {
         let mut options = QueryOptions { mask, cull: self.cull, skip, ..QueryOptions::default() };
         if filter.is_some() {
             options.filter = Some(&mut offer);
+            // With a mesh the opaque triangles have to be seen, too.
+            options.filter_mask = if mesh.is_some() { u32::MAX } else { filter_mask };
         }
         if counters.is_null() {
             return ask(&mut options);
@@ -155,7 +174,7 @@ pub(crate) unsafe fn query_all(
         };
         let all = |options: &mut QueryOptions<'_>| grid.intersect_all(&ray, options, &mut []);
         // SAFETY: the caller's promise.
-        return Ok(unsafe { asked.ask_and_see(see, all) });
+        return Ok(unsafe { asked.ask_and_see(Some(grid.mesh()), see, all) });
     }
     // SAFETY: the caller's promise; hits overlap nothing else that the call uses.
     let hits = unsafe { bytes_mut(hits.cast(), bytes) }?;

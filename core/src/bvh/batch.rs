@@ -4,16 +4,19 @@ use fearless_simd::Simd;
 
 use super::Bvh;
 use super::group::{Group, Stack};
-use super::order::{self, Entry};
+use super::order::{self, Entry, Sorted};
 use super::rays::{GROUP, Rays};
 use crate::aabb::Aabb;
 use crate::batch::Together;
+use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
-use crate::options::Choice;
+use crate::options::{Choice, Cull};
+use crate::ray::{Hit, INVALID_ID};
 use crate::simd::Kernel;
+use crate::triangle::TriangleTest;
 
 /// The rays of a batch, which go in groups.
-pub(crate) struct Groups<'r, C, const ANY: bool> {
+pub(crate) struct Groups<'r, C: ?Sized, const ANY: bool> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
     pub(crate) bounds: Aabb,
@@ -23,7 +26,7 @@ pub(crate) struct Groups<'r, C, const ANY: bool> {
     pub(crate) batch: &'r mut C,
 }
 
-impl<C: Together, const ANY: bool> Kernel for Groups<'_, C, ANY> {
+impl<C: Together + ?Sized, const ANY: bool> Kernel for Groups<'_, C, ANY> {
     type Output = ();
 
     #[inline(always)]
@@ -37,7 +40,7 @@ impl<C: Together, const ANY: bool> Kernel for Groups<'_, C, ANY> {
         while first < all {
             // Sort a window of rays, or take all of them as they are.
             let of_window = if window > 0 { window.min(all - first) } else { all };
-            let order = if window > 0 {
+            let mut order = if window > 0 {
                 order::sort(batch, first, of_window, &bounds, memory)
             } else {
                 None
@@ -56,14 +59,51 @@ impl<C: Together, const ANY: bool> Kernel for Groups<'_, C, ANY> {
                     Group::<ANY> { bvh, mesh, rays, stack }.run(simd);
                 }
                 for (lane, &place) in places.iter().enumerate().take(count) {
-                    if alone >> lane & 1 == 0 {
-                        batch.found(place, &rays.hits[lane % GROUP]);
-                    } else {
+                    let (is_alone, hit) = (alone >> lane & 1 != 0, &rays.hits[lane % GROUP]);
+                    if !is_alone && !batch.asks(hit) {
+                        batch.found(place, hit);
+                    } else if batch.keeps_order()
+                        && let Some(order) = &mut order
+                    {
+                        order.defer(
+                            place - first,
+                            if is_alone { INVALID_ID } else { hit.primitive },
+                        );
+                    } else if is_alone {
                         batch.alone(place);
+                    } else {
+                        batch.ask(place, hit);
                     }
                 }
             }
+            if batch.keeps_order()
+                && let Some(order) = &order
+            {
+                take_turns(batch, mesh, choice.cull, order, first);
+            }
             first += of_window;
+        }
+    }
+}
+
+/// Finishes the rays of a sorted window that wait for the filter, in the caller's order.
+#[inline(never)]
+fn take_turns<C: Together + ?Sized>(
+    batch: &mut C,
+    mesh: &TriangleMesh<'_>,
+    cull: Cull,
+    order: &Sorted<'_>,
+    first: usize,
+) {
+    for (at, id) in order.deferred() {
+        let place = first + at;
+        // The same bits as the group found.
+        let test = TriangleTest::with(&batch.ray(place), RayFilter::NONE).culling(cull);
+        let hit = if id == INVALID_ID { Hit::MISS } else { test.decide(mesh, id) };
+        if hit.primitive == INVALID_ID {
+            batch.alone(place);
+        } else {
+            batch.ask(place, &hit);
         }
     }
 }

@@ -68,6 +68,10 @@ pub(crate) struct Bvh<'a> {
 }
 
 impl<'a> Bvh<'a> {
+    /// A tree without nodes: nothing is hit.
+    #[cfg(feature = "alloc")]
+    pub(crate) const NOTHING: Self = Self { nodes: &[], ids: &[], levels: 0 };
+
     /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
     pub(crate) fn open(header: &Header, blob: &'a [u8]) -> Result<Self, Error> {
         let sections = blob.get(HEADER_BYTES..).and_then(|behind| {

@@ -39,15 +39,36 @@ const ENOUGH: usize = 2 * GROUP;
 /// that start at two or four places in turn are scattered, too.
 const SAMPLE: usize = GROUP / 4 + 1;
 
-/// The rays of a window in order.
-pub(crate) struct Sorted<'m>(&'m [Entry]);
+/// The rays of a window in order, and which of them wait until all others are done.
+pub(crate) struct Sorted<'m> {
+    order: &'m [Entry],
+    /// By their places in the window.
+    waiting: &'m mut [Entry],
+}
+
+/// Marks a ray that waits; below it stands what it waits for.
+const WAITS: Entry = 1 << 32;
 
 impl Sorted<'_> {
+    /// Notes that the ray at a place of the window waits, and a triangle.
+    pub(crate) fn defer(&mut self, place: usize, id: u32) {
+        if let Some(slot) = self.waiting.get_mut(place) {
+            *slot = WAITS | Entry::from(id);
+        }
+    }
+
+    /// The rays that wait by ascending place, with their triangles. None were, if a batch defers none.
+    #[expect(clippy::cast_possible_truncation, reason = "the low half")]
+    pub(crate) fn deferred(&self) -> impl Iterator<Item = (usize, u32)> {
+        let waiting = self.waiting.iter().enumerate().filter(|(_, slot)| **slot & WAITS != 0);
+        waiting.map(|(place, slot)| (place, *slot as u32))
+    }
+
     /// The place in the window of the ray at a place of the order.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the low half")]
     pub(crate) fn place(&self, at: usize) -> usize {
-        self.0.get(at).map_or(0, |&entry| entry as u32) as usize
+        self.order.get(at).map_or(0, |&entry| entry as u32) as usize
     }
 }
 
@@ -64,7 +85,7 @@ pub(crate) const fn window(memory: &[Entry]) -> usize {
 /// Out of line: it needs no vectors, and its counts no stack while rays are traced.
 #[inline(never)]
 pub(crate) fn sort<'m>(
-    batch: &impl Together,
+    batch: &(impl Together + ?Sized),
     first: usize,
     count: usize,
     bounds: &Aabb,
@@ -91,11 +112,19 @@ pub(crate) fn sort<'m>(
     }
     pass(sorted, spare, &mut low, 0);
     pass(spare, sorted, &mut high, 1);
-    Some(Sorted(sorted))
+    if batch.keeps_order() {
+        spare.fill(0);
+    }
+    Some(Sorted { order: sorted, waiting: spare })
 }
 
 /// Returns true if rays that follow one another start far from each other, in more than a few groups.
-fn are_scattered(batch: &impl Together, first: usize, count: usize, bounds: &Aabb) -> bool {
+fn are_scattered(
+    batch: &(impl Together + ?Sized),
+    first: usize,
+    count: usize,
+    bounds: &Aabb,
+) -> bool {
     let far = bounds.size().max_element() / 4.0;
     let (mut groups, mut scattered) = (0, 0);
     for start in (0..count).step_by(GROUP) {
@@ -196,6 +225,16 @@ mod tests {
         fn found(&mut self, _: usize, _: &Hit) {}
 
         fn alone(&mut self, _: usize) {}
+
+        fn keeps_order(&self) -> bool {
+            true
+        }
+
+        fn asks(&self, _: &Hit) -> bool {
+            false
+        }
+
+        fn ask(&mut self, _: usize, _: &Hit) {}
     }
 
     /// Rays that start around some points in turn and go anywhere.
@@ -223,13 +262,20 @@ mod tests {
                 rays.0[2000 + at].direction[at % 3] = odd;
             }
             let mut memory = vec![0xa5a5; 2 * count + 3];
-            let sorted = sort(&rays, first, count, &BOUNDS, &mut memory).expect("scattered");
+            let mut sorted = sort(&rays, first, count, &BOUNDS, &mut memory).expect("scattered");
             let places: Vec<_> = (0..count).map(|at| sorted.place(at)).collect();
             let cells = Cells::of(&BOUNDS);
             let key = |place: usize| (cells.key(&rays.ray(first + place)), place);
             assert!(places.windows(2).all(|pair| key(pair[0]) < key(pair[1])));
             assert!(places.iter().all(|&place| place < count));
             assert!(key(0).0 >> (2 * DIGIT_BITS) == 0);
+
+            // Rays wait by place, whatever order they come in.
+            for (place, id) in [(7, 3), (2, u32::MAX), (count - 1, 0)] {
+                sorted.defer(place, id);
+            }
+            let deferred: Vec<_> = sorted.deferred().collect();
+            assert_eq!(deferred, [(2, u32::MAX), (7, 3), (count - 1, 0)]);
         }
     }
 

@@ -353,7 +353,7 @@ impl Rays {
         while hits != 0 {
             let lane = hits.trailing_zeros() as usize % PAIRS;
             hits &= hits - 1;
-            self.found::<ANY>(of[lane], decided.hit(lane, ids[lane]));
+            self.found::<ANY>(mesh, of[lane], decided.hit(lane, ids[lane]));
         }
         let mut unsure = decided.unsure;
         while unsure != 0 {
@@ -370,21 +370,27 @@ impl Rays {
         let test = TriangleTest::with(&self.given[at], RayFilter::NONE).culling(self.choice.cull);
         let hit = test.decide(mesh, id);
         if hit.primitive != INVALID_ID {
-            self.found::<ANY>(ray, hit);
+            self.found::<ANY>(mesh, ray, hit);
         }
     }
 
     /// Keeps a hit if it is the closest so far.
+    ///
+    /// `ANY`: a hit ends its ray, unless the filter has to be asked about it: of those the closest one is
+    /// kept until the ray ends at another.
     #[inline(always)]
-    fn found<const ANY: bool>(&mut self, ray: u32, hit: Hit) {
+    fn found<const ANY: bool>(&mut self, mesh: &TriangleMesh<'_>, ray: u32, hit: Hit) {
         let at = ray as usize % GROUP;
-        if !hit.is_closer(&self.hits[at]) {
+        if ANY && !self.choice.asks(mesh, hit.primitive) {
+            self.hits[at] = hit;
+            self.alive &= !(1 << at);
+            return;
+        }
+        if !hit.is_closer(&self.hits[at]) || (ANY && self.alive >> at & 1 == 0) {
             return;
         }
         self.hits[at] = hit;
-        if ANY {
-            self.alive &= !(1 << at);
-        } else {
+        if !ANY {
             // What rounds to the same t may lie farther away: see `Slab::nearby`.
             let scale = get(&self.scale, ray);
             let (end, tiny) = (hit.t * scale, TINY * scale.max(1.0));

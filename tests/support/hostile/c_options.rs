@@ -32,7 +32,7 @@ pub(super) struct Options {
 /// More than a window on the stack has.
 const SCRATCH: usize = 9000;
 
-/// Says of hit after hit what two bits say, round and round.
+/// Says of a hit what two bits say: those of its triangle.
 struct Filter {
     verdicts: u32,
     shown: RefCell<Vec<(usize, [u32; 4])>>,
@@ -42,7 +42,7 @@ impl Filter {
     fn ask(&self, ray: usize, hit: [u32; 4]) -> u32 {
         let mut shown = self.shown.borrow_mut();
         shown.push((ray, hit));
-        self.verdicts >> (shown.len() % 16 * 2) & 3
+        self.verdicts >> (hit[3] % 16 * 2) & 3
     }
 }
 
@@ -81,6 +81,8 @@ impl Options {
             counters: if has_counters { counters.as_ptr() } else { null_mut() },
             scratch: null_mut(),
             scratch_bytes: 0,
+            filter_mask: 0,
+            reserved: 0,
         };
         let scratch = Lent::new([0xa5; SCRATCH]);
         if bool::arbitrary(u)? {
@@ -92,6 +94,7 @@ impl Options {
             options.mask = u8::arbitrary(u)?.into();
             options.cull = u.int_in_range(0..=2)?;
             options.skip = u8::arbitrary(u)?.into();
+            options.filter_mask = u8::arbitrary(u)?.into();
         }
         if rarely(u, 32)? {
             options.cull = u32::arbitrary(u)?;
@@ -122,7 +125,7 @@ impl Options {
         if self.options.is_null() {
             return ask(&mut QueryOptions::default());
         }
-        let hgrid_query_options { mask, skip, filter, .. } = *self.options.value();
+        let hgrid_query_options { mask, skip, filter, filter_mask, .. } = *self.options.value();
         let verdicts = self.filter.verdicts;
         let Told { shown, work } = told;
         let again = Filter { verdicts, shown: RefCell::new(std::mem::take(shown)) };
@@ -136,6 +139,7 @@ impl Options {
         if filter.is_some() {
             options.filter = Some(&mut offer);
         }
+        options.filter_mask = if filter_mask == 0 { u32::MAX } else { filter_mask };
         let answer = ask(&mut options);
         *shown = again.shown.into_inner();
         answer
@@ -151,9 +155,34 @@ impl Options {
                 == [work.primitive_tests + 1, work.cell_steps + 2, work.grid_steps + 3]
     }
 
+    /// The same for a batch that asks whether anything is hit: of a ray that an opaque triangle blocks the
+    /// filter may be shown less.
+    pub(super) fn agree_but_for_blocked_rays(&self, told: &Told, is_blocked: &[bool]) -> bool {
+        let seen = self.filter.shown.borrow();
+        let of = |all: &[(usize, [u32; 4])], ray| -> Vec<[u32; 4]> {
+            all.iter().filter(|(place, _)| *place == ray).map(|(_, hit)| *hit).collect()
+        };
+        let agrees = |(ray, &is_blocked): (usize, &bool)| {
+            let (told, seen) = (of(&told.shown, ray), of(&seen, ray));
+            told == seen || is_blocked && told.starts_with(&seen)
+        };
+        let all = Told { shown: seen.clone(), work: told.work };
+        seen.is_sorted_by_key(|(place, _)| *place)
+            && is_blocked.iter().enumerate().all(agrees)
+            && seen.iter().all(|(place, _)| *place < is_blocked.len())
+            && {
+                drop(seen);
+                self.agree(&all)
+            }
+    }
+
     /// Whether rays of a batch may be traced together.
     pub(super) fn let_rays_go_together(&self) -> bool {
-        let hgrid_query_options { filter, counters, .. } = *self.options.value();
-        self.options.is_null() || filter.is_none() && counters.is_null()
+        self.options.is_null() || self.options.value().counters.is_null()
+    }
+
+    /// Whether a filter is asked.
+    pub(super) fn have_filter(&self) -> bool {
+        !self.options.is_null() && self.options.value().filter.is_some()
     }
 }

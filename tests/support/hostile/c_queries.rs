@@ -219,6 +219,7 @@ impl Caller<'_> {
         let is_right = self.opened.as_ref().is_some_and(|opened| opened.is_right);
         let mut told = Told::default();
         let mut expected = before.clone();
+        let mut is_blocked = vec![false; rays.len()];
         for (i, ray) in rays.iter().enumerate() {
             let Some(core) = core.filter(|_| options.are_sound()) else { break };
             let slot = answers_at + i * if answer_stride == 0 { size } else { answer_stride };
@@ -226,6 +227,7 @@ impl Caller<'_> {
             if any {
                 let found = options.ask(&mut told, i, |options| core.occluded_with(ray, options));
                 answer.copy_from_slice(&[u8::from(found)]);
+                is_blocked[i] = found;
             } else {
                 let found = options.ask(&mut told, i, |options| core.intersect_with(ray, options));
                 answer.copy_from_slice(bytes_of(&found.unwrap_or(Hit::MISS)));
@@ -267,10 +269,18 @@ impl Caller<'_> {
         }
         assert!(core.is_some() && options.are_sound() && coherence <= HGRID_COHERENCE_COHERENT);
         // Rays that go together may find other triangles in damaged lists.
-        if is_right || !options.let_rays_go_together() {
+        let must_agree = is_right || !options.let_rays_go_together();
+        if must_agree {
             assert!(memory.bytes() == expected, "other answers, or written beside them");
         }
-        assert!(options.agree(&told), "shown or counted otherwise");
+        if must_agree || !options.have_filter() {
+            let agrees = if any {
+                options.agree_but_for_blocked_rays(&told, &is_blocked)
+            } else {
+                options.agree(&told)
+            };
+            assert!(agrees, "shown or counted otherwise");
+        }
         Ok(())
     }
 

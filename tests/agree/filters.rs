@@ -1,0 +1,327 @@
+//! Filters are asked about the triangles that `filter_mask` names and no others, alone and in batches,
+//! in the order that the docs promise; and what is said to block a ray blocks it. The reference is a
+//! loop over all hits of each ray.
+
+use hgrid_core::{
+    Coherence, Config, Counters, Cull, Grid, Hit, INVALID_ID, Method, QueryOptions, Ray, Strided,
+    StridedMut, TriangleMesh, Verdict,
+};
+use hgrid_tests::owned::Owned;
+use hgrid_tests::{methods, oracle};
+
+use crate::batches::{CLOSE, COHERENCES, levels_of, rays, scattered, scene};
+
+/// What a filter says, whatever the mask of the triangle is.
+fn verdict(hit: &Hit) -> Verdict {
+    match hit.primitive / 7 % 3 {
+        0 => Verdict::Accept,
+        1 => Verdict::Reject,
+        _ => Verdict::AcceptAndStop,
+    }
+}
+
+/// Which triangles there are, and about which of them a filter is asked.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    mask: u32,
+    cull: Cull,
+    skip: u32,
+    filter_mask: u32,
+}
+
+impl Asked {
+    fn options<'q>(self) -> QueryOptions<'q> {
+        let Self { mask, cull, skip, filter_mask } = self;
+        QueryOptions { mask, cull, skip, filter_mask, ..QueryOptions::default() }
+    }
+
+    /// A bit in common, or all bits.
+    fn is_asked(self, mesh: &TriangleMesh<'_>, id: u32) -> bool {
+        self.filter_mask == u32::MAX || mesh.mask(id) & self.filter_mask != 0
+    }
+
+    fn counts(self, mesh: &TriangleMesh<'_>, hit: &Hit) -> bool {
+        !self.is_asked(mesh, hit.primitive) || verdict(hit) != Verdict::Reject
+    }
+}
+
+/// What is true of a ray: its hits that are there, whatever the filter says.
+fn there(grid: &Grid<'_>, ray: &Ray, asked: Asked) -> Vec<Hit> {
+    let mesh = grid.mesh();
+    let is_seen = |id| asked.mask == u32::MAX || mesh.mask(id) & asked.mask != 0;
+    let mut hits = oracle::all_hits(grid, ray, asked.cull);
+    hits.retain(|hit| hit.primitive != asked.skip && is_seen(hit.primitive));
+    hits
+}
+
+/// The hits that a filter is shown until one counts, and that one.
+fn walk(grid: &Grid<'_>, hits: &[Hit], asked: Asked) -> (Vec<Hit>, Hit) {
+    let mesh = grid.mesh();
+    let first = hits.iter().position(|hit| asked.counts(mesh, hit));
+    let until = first.map_or(hits.len(), |at| at + 1);
+    let shown = hits[..until].iter().filter(|hit| asked.is_asked(mesh, hit.primitive));
+    (shown.copied().collect(), first.map_or(Hit::MISS, |at| hits[at]))
+}
+
+/// Those of a ray among the hits that a filter was shown.
+fn of(shown: &[(usize, Hit)], place: usize) -> Vec<Hit> {
+    shown.iter().filter(|(at, _)| *at == place).map(|(_, hit)| *hit).collect()
+}
+
+/// One ray at a time: everything is asked near to far.
+fn check_single(grid: &Grid<'_>, ray: &Ray, hits: &[Hit], asked: Asked) {
+    let (expected_shown, expected) = walk(grid, hits, asked);
+    let expected = (expected != Hit::MISS).then_some(expected);
+    let mut shown = Vec::new();
+    let mut filter = |place: usize, hit: &Hit| {
+        assert_eq!(place, 0);
+        shown.push(*hit);
+        verdict(hit)
+    };
+    let mut options = QueryOptions { filter: Some(&mut filter), ..asked.options() };
+    let found = grid.intersect_with(ray, &mut options);
+    let is_occluded = grid.occluded_with(ray, &mut options);
+    let occluder = grid.occluder(ray, &mut options);
+    let mut all = vec![Hit::MISS; hits.len() + 1];
+    let count = grid.intersect_all(ray, &mut options, &mut all);
+    assert_eq!((found, is_occluded), (expected, expected.is_some()), "{asked:?} {ray:?}");
+    check_occluder(grid, hits, asked, occluder.unwrap_or(INVALID_ID), "alone");
+    assert_eq!(shown[..expected_shown.len()], expected_shown, "{asked:?} {ray:?}");
+
+    // All hits: those that count, up to one that is the last.
+    let is_last = |hit: &Hit| {
+        asked.is_asked(grid.mesh(), hit.primitive) && verdict(hit) == Verdict::AcceptAndStop
+    };
+    let until = hits.iter().position(is_last).map_or(hits.len(), |at| at + 1);
+    let counts = hits[..until].iter().filter(|hit| asked.counts(grid.mesh(), hit));
+    assert!(all[..count].iter().eq(counts), "{asked:?} {ray:?}");
+}
+
+/// Fails unless a triangle is one of those that block a ray, or none is named where none blocks.
+fn check_occluder(grid: &Grid<'_>, hits: &[Hit], asked: Asked, named: u32, what: &str) {
+    let mut blocking = hits.iter().filter(|hit| asked.counts(grid.mesh(), hit)).peekable();
+    if named == INVALID_ID {
+        assert!(blocking.peek().is_none(), "{what} {asked:?}: {:?} blocks", blocking.peek());
+    } else {
+        assert!(blocking.any(|hit| hit.primitive == named), "{what} {asked:?}: {named} does not");
+    }
+}
+
+/// A batch of each kind, with memory to sort in.
+fn check_batches(
+    grid: &Grid<'_>,
+    rays: &[Ray],
+    hits: &[Vec<Hit>],
+    asked: Asked,
+    coherence: Coherence,
+    scratch: usize,
+) {
+    let what = format!("{:?} {coherence:?} {scratch} {asked:?}", grid.method());
+    let walks: Vec<_> = hits.iter().map(|hits| walk(grid, hits, asked)).collect();
+    let mut memory = vec![0xa5; scratch];
+    let mut shown = Vec::new();
+    let mut filter = |place: usize, hit: &Hit| {
+        shown.push((place, *hit));
+        verdict(hit)
+    };
+    let strided = Strided::new(rays);
+
+    let mut found = vec![Hit { primitive: 7, ..Hit::MISS }; rays.len()];
+    let mut options =
+        QueryOptions { filter: Some(&mut filter), scratch: &mut memory, ..asked.options() };
+    let answers = &mut StridedMut::new(&mut found);
+    grid.intersect_n_with(&strided, answers, coherence, &mut options).unwrap();
+    assert!(found.iter().eq(walks.iter().map(|(_, first)| first)), "{what}");
+    let in_order = walks
+        .iter()
+        .enumerate()
+        .flat_map(|(at, (shown, _))| shown.iter().map(move |hit| (at, *hit)));
+    assert!(shown.iter().copied().eq(in_order), "{what}: the filter saw something else");
+
+    // Whether something blocks, and what: all about one ray before the next. Of a ray that an opaque
+    // triangle blocks the filter may be told or not.
+    for names in [false, true] {
+        shown.clear();
+        let mut filter = |place: usize, hit: &Hit| {
+            shown.push((place, *hit));
+            verdict(hit)
+        };
+        let mut options =
+            QueryOptions { filter: Some(&mut filter), scratch: &mut memory, ..asked.options() };
+        if names {
+            let mut named = vec![7; rays.len()];
+            let answers = &mut StridedMut::new(&mut named);
+            grid.occluder_n_with(&strided, answers, coherence, &mut options).unwrap();
+            for (hits, named) in hits.iter().zip(named) {
+                check_occluder(grid, hits, asked, named, &what);
+            }
+        } else {
+            let mut occluded = vec![7_u8; rays.len()];
+            let answers = &mut StridedMut::new(&mut occluded);
+            grid.occluded_n_with(&strided, answers, coherence, &mut options).unwrap();
+            let expected = walks.iter().map(|(_, first)| u8::from(*first != Hit::MISS));
+            assert!(occluded.into_iter().eq(expected), "{what}");
+        }
+        assert!(shown.is_sorted_by_key(|(place, _)| *place), "{what}: not in the order of rays");
+        let opaque = |hit: &&Hit| !asked.is_asked(grid.mesh(), hit.primitive);
+        for (place, (expected, _)) in walks.iter().enumerate() {
+            let seen = of(&shown, place);
+            let is_blocked = hits[place].iter().any(|hit| opaque(&hit));
+            let is_right = *expected == seen || (is_blocked && expected.starts_with(&seen));
+            assert!(is_right, "{what}: ray {place} {expected:?} {seen:?}");
+        }
+    }
+}
+
+/// Every choice of triangles, and of those that are asked about.
+fn choices(skip: u32) -> [Asked; 9] {
+    let asked = |mask, cull, skip, filter_mask| Asked { mask, cull, skip, filter_mask };
+    [
+        asked(u32::MAX, Cull::None, INVALID_ID, u32::MAX),
+        asked(u32::MAX, Cull::None, INVALID_ID, 1),
+        asked(u32::MAX, Cull::None, INVALID_ID, 6),
+        asked(u32::MAX, Cull::None, INVALID_ID, 0),
+        asked(u32::MAX, Cull::None, INVALID_ID, 8),
+        asked(u32::MAX, Cull::Back, skip, 2),
+        asked(5, Cull::None, skip, 1),
+        asked(3, Cull::Front, INVALID_ID, u32::MAX),
+        asked(2, Cull::None, INVALID_ID, 1),
+    ]
+}
+
+/// One bit in turn, and none: that triangle is asked about by all bits alone.
+fn masks(count: u32) -> Vec<u32> {
+    (0..count).map(|id| if id % 20 == 19 { 0 } else { 1 << (id % 3) }).collect()
+}
+
+#[test]
+fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
+    let mesh = scene();
+    let masks = masks(mesh.view().triangle_count());
+    let with_masks = mesh.view().with_masks(Strided::new(&masks)).unwrap();
+    // Without masks every triangle is asked about, or none: enough to ask of trees.
+    let trees = methods::configs().filter(|config| config.method == Method::Bvh);
+    let plain = trees.map(|config| (config, mesh.view()));
+    for (config, view) in methods::configs().map(|config| (config, with_masks)).chain(plain) {
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        // Tiles, strangers and odd rays; and rays without order, enough of them to be sorted.
+        let tiles = rays(grid.bounds())[CLOSE - 64..].to_vec();
+        for rays in [tiles, scattered(1200, 2)] {
+            let whole = Asked { filter_mask: 0, ..choices(INVALID_ID)[0] };
+            let first = rays.iter().flat_map(|ray| there(&grid, ray, whole)).next();
+            let choices = choices(first.expect("some hit").primitive);
+            for asked in choices {
+                let hits: Vec<_> = rays.iter().map(|ray| there(&grid, ray, asked)).collect();
+                for (ray, hits) in rays.iter().zip(&hits).step_by(5) {
+                    check_single(&grid, ray, hits, asked);
+                }
+                for level in levels_of(config.method) {
+                    let grid = grid.with_simd(level);
+                    check_batches(&grid, &rays, &hits, asked, COHERENCES[0], 0);
+                    for scratch in [0, 9000, 16 * rays.len()] {
+                        check_batches(&grid, &rays, &hits, asked, COHERENCES[1], scratch);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What is counted is what single rays take, and less than a filter about everything would.
+#[test]
+fn opaque_triangles_cost_no_walk() {
+    let mesh = scene();
+    let masks = masks(mesh.view().triangle_count());
+    let view = mesh.view().with_masks(Strided::new(&masks)).unwrap();
+    for config in methods::configs() {
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let rays = &rays(grid.bounds())[CLOSE..][..300];
+        let tests = |filter_mask: u32| {
+            let (mut alone, mut together) = (Counters::default(), Counters::default());
+            let mut reject = |_: usize, _: &Hit| Verdict::Reject;
+            for ray in rays {
+                let options = QueryOptions::counting(&mut alone);
+                let mut options =
+                    QueryOptions { filter: Some(&mut reject), filter_mask, ..options };
+                let _ = grid.intersect_with(ray, &mut options);
+            }
+            let mut hits = vec![Hit::MISS; rays.len()];
+            let options = QueryOptions::counting(&mut together);
+            let mut options = QueryOptions { filter: Some(&mut reject), filter_mask, ..options };
+            let answers = &mut StridedMut::new(&mut hits);
+            grid.intersect_n_with(&Strided::new(rays), answers, Coherence::Coherent, &mut options)
+                .unwrap();
+            assert_eq!(alone, together, "{:?}", config.method);
+            alone.primitive_tests
+        };
+        let mut plain = Counters::default();
+        for ray in rays {
+            let _ = grid.intersect_with(ray, &mut QueryOptions::counting(&mut plain));
+        }
+        // A mask that no triangle has: no more work than without a filter.
+        assert_eq!(tests(8), plain.primitive_tests, "{:?}", config.method);
+        assert!(tests(1) < tests(u32::MAX), "{:?}", config.method);
+    }
+}
+
+/// Without a filter, too, and through every entry point.
+#[test]
+fn what_is_named_blocks_the_ray() {
+    let mesh = scene();
+    let view = mesh.view();
+    for config in methods::configs() {
+        let owned = Owned::build(&view, &config).unwrap();
+        let grid = owned.open(&view).unwrap();
+        let rays = [rays(grid.bounds())[CLOSE - 256..].to_vec(), scattered(1500, 2)].concat();
+        for asked in [Cull::None, Cull::Back, Cull::Front].map(|cull| Asked {
+            cull,
+            filter_mask: 0,
+            ..choices(INVALID_ID)[0]
+        }) {
+            let hits: Vec<_> = rays.iter().map(|ray| there(&grid, ray, asked)).collect();
+            for (ray, hits) in rays.iter().zip(&hits) {
+                let named = grid.occluder(ray, &mut asked.options()).unwrap_or(INVALID_ID);
+                check_occluder(&grid, hits, asked, named, "alone");
+                let mut counters = Counters::default();
+                let mut options = QueryOptions { counters: Some(&mut counters), ..asked.options() };
+                let named = grid.occluder(ray, &mut options).unwrap_or(INVALID_ID);
+                check_occluder(&grid, hits, asked, named, "counted");
+            }
+            for (level, coherence) in
+                levels_of(config.method).into_iter().flat_map(|l| COHERENCES.map(|c| (l, c)))
+            {
+                let mut named = vec![7; rays.len()];
+                let mut scratch = vec![0; 16 * rays.len()];
+                let mut options = QueryOptions { scratch: &mut scratch, ..asked.options() };
+                let answers = &mut StridedMut::new(&mut named);
+                grid.with_simd(level)
+                    .occluder_n_with(&Strided::new(&rays), answers, coherence, &mut options)
+                    .unwrap();
+                for (hits, named) in hits.iter().zip(named) {
+                    check_occluder(&grid, hits, asked, named, "in a batch");
+                }
+            }
+        }
+    }
+}
+
+/// Answers are four bytes each: less is refused.
+#[test]
+fn places_for_names_are_checked() {
+    let mesh = scene();
+    let view = mesh.view();
+    let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
+    let grid = owned.open(&view).unwrap();
+    let rays = [Ray::new([0.0, 0.0, 3.0], [0.0, 0.0, -1.0]); 2];
+    for (bytes, stride, is_sound) in [(8, 4, true), (7, 4, false), (8, 3, false), (9, 5, true)] {
+        let mut memory = vec![0xa5; bytes];
+        let answers = &mut StridedMut { bytes: &mut memory, stride, count: 2 };
+        let options = &mut QueryOptions::default();
+        let rays = Strided::new(&rays);
+        let result = grid.occluder_n_with(&rays, answers, Coherence::Coherent, options);
+        assert_eq!(result.is_ok(), is_sound);
+        assert_eq!(memory.iter().all(|&byte| byte == 0xa5), !is_sound);
+    }
+}

@@ -1,0 +1,322 @@
+//! Grids that own their memory: how much of the heap they take while they are built and afterwards, how
+//! they ask for it, and what they do without it. Their answers are those of other grids.
+
+#![expect(unsafe_code, reason = "an allocator is unsafe to implement")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::mem::offset_of;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use hgrid_core::{
+    ALIGNMENT, Config, Error, Grid, IndexType, Method, OwnedGrid, OwnedMesh, OwnedStrided, Ray,
+    Region, Strided, sizes,
+};
+use hgrid_tests::meshes::{Mesh, ball, soup};
+use hgrid_tests::owned::{Owned, prove};
+use hgrid_tests::random::Random;
+use hgrid_tests::{methods, oracle};
+
+/// What a thread asks of the heap.
+#[derive(Debug, Clone, Copy)]
+struct Heap {
+    current: usize,
+    peak: usize,
+    /// Of what came with anything in it, or had to be cleared because of its alignment, or was moved.
+    written: usize,
+    /// Allocations that are left, before there is no more memory.
+    left: usize,
+}
+
+const UNLIMITED: Heap = Heap { current: 0, peak: 0, written: 0, left: usize::MAX };
+
+thread_local! {
+    static HEAP: Cell<Heap> = const { Cell::new(UNLIMITED) };
+}
+
+/// As `calloc` and `realloc` are good for, without a look at the bytes.
+const USUAL_ALIGNMENT: usize = 16;
+
+/// Takes one of the allocations that are left; false if there are none.
+fn take(bytes: usize, is_written: bool) -> bool {
+    let heap = HEAP.get();
+    let Some(left) = heap.left.checked_sub(1) else { return false };
+    HEAP.set(Heap { left, ..heap });
+    add(bytes, is_written);
+    true
+}
+
+fn add(bytes: usize, is_written: bool) {
+    let heap = HEAP.get();
+    let current = heap.current.wrapping_add(bytes);
+    let written = heap.written + if is_written { bytes } else { 0 };
+    HEAP.set(Heap { current, peak: heap.peak.max(current), written, ..heap });
+}
+
+fn give(bytes: usize) {
+    let heap = HEAP.get();
+    HEAP.set(Heap { current: heap.current.wrapping_sub(bytes), ..heap });
+}
+
+struct Counting;
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+// SAFETY: every call goes to the system's allocator as it came; counting does not allocate.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        if !take(layout.size(), true) {
+            return std::ptr::null_mut();
+        }
+        // SAFETY: the caller's promise about the layout is the one that is needed.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        if !take(layout.size(), layout.align() > USUAL_ALIGNMENT) {
+            return std::ptr::null_mut();
+        }
+        // SAFETY: as above.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, start: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
+        give(layout.size());
+        add(bytes, layout.align() > USUAL_ALIGNMENT);
+        // SAFETY: as above, for a block of this allocator.
+        unsafe { System.realloc(start, layout, bytes) }
+    }
+
+    unsafe fn dealloc(&self, start: *mut u8, layout: Layout) {
+        give(layout.size());
+        // SAFETY: as above, for a block of this allocator.
+        unsafe { System.dealloc(start, layout) }
+    }
+}
+
+fn scene() -> Mesh {
+    let mut mesh = ball(24, 1.0);
+    mesh.append(&soup(2000, 0.1, 5));
+    mesh
+}
+
+fn owned(mesh: &Mesh) -> OwnedMesh {
+    OwnedMesh::new(mesh.positions.clone(), mesh.indices.clone()).unwrap()
+}
+
+fn check(grid: &Grid<'_>) {
+    let mut random = Random(3);
+    prove(grid).unwrap();
+    for _ in 0..20 {
+        oracle::check(grid, &Ray::new(random.point().map(|c| 2.0 * c), random.point()));
+    }
+}
+
+/// Bytes beside the grid that an owned one takes: to move to an aligned address, and for the boxes
+/// around the caller's containers.
+const LITTLE: usize = ALIGNMENT + 256;
+
+#[test]
+fn a_grid_keeps_what_it_takes_and_nothing_is_written_but_by_the_build() {
+    let mesh = scene();
+    for config in methods::configs() {
+        let plain = Owned::build(&mesh.view(), &config).unwrap();
+        let bound = sizes(&mesh.view(), &config, &mut []).unwrap();
+        let input = owned(&mesh);
+        let before = HEAP.get();
+        HEAP.set(Heap { peak: before.current, written: 0, ..before });
+        let grid = OwnedGrid::build(input, &config).unwrap();
+        let after = HEAP.get();
+        assert_eq!(grid.grid().blob(), plain.bytes(), "{:?}", config.method);
+        let kept = after.current.wrapping_sub(before.current);
+        let exact = plain.bytes().len();
+        assert!((exact..exact + LITTLE).contains(&kept), "{:?} {kept} {exact}", config.method);
+        assert!(after.written < LITTLE, "{:?} {}", config.method, after.written);
+        let most = after.peak.wrapping_sub(before.current);
+        let index = if config.method == Method::Bvh { bound.index_bytes } else { exact };
+        assert!(most <= index + bound.scratch_bytes + 2 * LITTLE, "{:?} {most}", config.method);
+        check(&grid.grid());
+        drop(grid);
+        let left = HEAP.get().current.wrapping_sub(before.current).cast_signed();
+        assert!(left < 0, "{left} bytes left, and the mesh");
+    }
+}
+
+/// Where the allocator has nothing, at whichever call, the build says so.
+#[test]
+fn without_memory_there_is_an_error() {
+    let mesh = scene();
+    for config in methods::configs() {
+        let mut refused = 0;
+        for left in 0.. {
+            let input = owned(&mesh);
+            HEAP.set(Heap { left, ..HEAP.get() });
+            let built = OwnedGrid::build(input, &config);
+            HEAP.set(Heap { left: usize::MAX, ..HEAP.get() });
+            match built {
+                Ok(grid) => {
+                    check(&grid.grid());
+                    break;
+                }
+                Err(Error::OutOfMemory { available_bytes: 0, needed_bytes, region }) => {
+                    let expected = [Region::Scratch, Region::Index][refused];
+                    assert!(region == expected && needed_bytes > 1000, "{:?}", config.method);
+                }
+                Err(error) => panic!("{error}"),
+            }
+            refused += 1;
+        }
+        assert_eq!(refused, 2, "{:?}", config.method);
+    }
+}
+
+/// A field of a struct, in another thread, under a lock, in a list that moves.
+struct Holder {
+    grid: OwnedGrid,
+    _name: String,
+}
+
+#[test]
+fn it_fits_into_a_struct_and_moves_with_it() {
+    let mesh = scene();
+    let shared: Arc<[[f32; 3]]> = mesh.positions.clone().into();
+    let mut holders = Vec::new();
+    for config in methods::configs() {
+        let input = OwnedMesh::new(Arc::clone(&shared), mesh.indices.clone()).unwrap();
+        assert_eq!(input.view().positions().bytes.as_ptr(), shared.as_ptr().cast(), "copied");
+        let grid = OwnedGrid::build(input, &config).unwrap();
+        holders.push(Holder { grid, _name: format!("{:?}", config.method) });
+    }
+    assert_eq!(Arc::strong_count(&shared), 1 + holders.len());
+    let holders = Arc::new(std::sync::RwLock::new(holders));
+    let threads: Vec<_> = (0..3)
+        .map(|_| {
+            let holders = Arc::clone(&holders);
+            std::thread::spawn(move || {
+                holders.read().unwrap().iter().for_each(|holder| check(&holder.grid.grid()));
+            })
+        })
+        .collect();
+    threads.into_iter().for_each(|thread| thread.join().unwrap());
+    drop(holders);
+    assert_eq!(Arc::strong_count(&shared), 1);
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, bytemuck::Zeroable, bytemuck::Pod)]
+struct Vertex {
+    color: u32,
+    position: [f32; 3],
+    normal: [f32; 2],
+}
+
+#[test]
+fn vertices_in_structs_small_indices_and_masks() {
+    static MASKS: [u32; 4] = [1, 2, 3, 4];
+    let mesh = ball(1, 0.0);
+    let vertex = |&position: &[f32; 3]| Vertex { color: 7, position, normal: [0.0; 2] };
+    let vertices: Vec<_> = mesh.positions.iter().map(vertex).collect();
+    let indices: Vec<u16> =
+        mesh.indices.iter().flatten().map(|&at| u16::try_from(at).unwrap()).collect();
+    let triples: Arc<[[u16; 3]]> = indices.as_chunks().0.to_vec().into();
+    let strided = |at| {
+        let positions = OwnedStrided::new(vertices.clone()).at(at);
+        OwnedMesh::strided(positions, OwnedStrided::new(Arc::clone(&triples)), IndexType::U16)
+    };
+    let input = strided(offset_of!(Vertex, position)).unwrap();
+    let grid = OwnedGrid::build(input.clone(), &Config::default()).unwrap();
+    assert_eq!(grid.grid().blob(), Owned::build(&mesh.view(), &Config::default()).unwrap().bytes());
+    check(&grid.grid());
+    // Fields that reach beyond the last struct.
+    assert!(strided(12).is_ok() && strided(13).is_err() && strided(usize::MAX).is_err());
+
+    assert!(input.clone().with_masks(OwnedStrided::new(MASKS.as_slice())).is_err());
+    let masks: Vec<u32> = (0..12).map(|id| 1 << (id % 3)).collect();
+    let input = input.with_masks(OwnedStrided::new(masks)).unwrap();
+    let grid = OwnedGrid::build(input, &Config::default()).unwrap();
+    assert_eq!((grid.grid().mesh().mask(4), grid.mesh().view().mask(5)), (2, 4));
+    check(&grid.grid());
+    let none = OwnedMesh::new(Vec::new(), Vec::new()).unwrap();
+    check(&OwnedGrid::build(none, &Config::default()).unwrap().grid());
+}
+
+#[test]
+fn a_stored_grid_is_opened_from_any_address() {
+    let mesh = scene();
+    for config in methods::configs() {
+        let plain = Owned::build(&mesh.view(), &config).unwrap();
+        for shift in [0, 1, 63] {
+            let bytes = [&vec![0xa5; shift], plain.bytes(), &[1, 2, 3]].concat();
+            let grid = OwnedGrid::open(&bytes[shift..], owned(&mesh)).unwrap();
+            assert_eq!(grid.grid().blob(), plain.bytes());
+        }
+        let cut = &plain.bytes()[..plain.bytes().len() - 1];
+        assert!(matches!(OwnedGrid::open(cut, owned(&mesh)), Err(Error::Truncated { .. })));
+        let other = owned(&ball(2, 1.0));
+        assert!(matches!(OwnedGrid::open(plain.bytes(), other), Err(Error::MeshMismatch)));
+    }
+}
+
+#[test]
+fn a_refit_takes_the_mesh_that_moved() {
+    let (mesh, moved) = (scene(), scene().map(|[x, y, z]| [1.5 * x, y + 0.2 * x, z]));
+    let mut grid = OwnedGrid::build(owned(&mesh), &Config::new(Method::Bvh)).unwrap();
+    let refitted = grid.refit(owned(&moved)).unwrap();
+    assert!(refitted.cost_after > 0.0);
+    let expected = &moved.positions;
+    assert_eq!(grid.mesh().view().positions().bytes, Strided::new(expected).bytes);
+    check(&grid.grid());
+    // One that does not fit is not taken.
+    assert_eq!(grid.refit(owned(&ball(2, 1.0))), Err(Error::MeshMismatch));
+    check(&grid.grid());
+    let mut grid = OwnedGrid::build(owned(&mesh), &Config::new(Method::OneLevel)).unwrap();
+    assert_eq!(grid.refit(owned(&moved)), Err(Error::CannotRefit));
+    check(&grid.grid());
+}
+
+/// Vertices that are not there any more after some looks.
+struct Fickle(Vec<[f32; 3]>, AtomicUsize);
+
+impl AsRef<[[f32; 3]]> for Fickle {
+    fn as_ref(&self) -> &[[f32; 3]] {
+        let look = self.1.fetch_add(1, Ordering::Relaxed);
+        if look < 100 { &self.0 } else { &self.0[..5] }
+    }
+}
+
+#[test]
+fn containers_that_change_make_a_grid_that_hits_nothing() {
+    let mesh = scene();
+    let fickle = Fickle(mesh.positions.clone(), AtomicUsize::new(0));
+    let input = OwnedMesh::new(fickle, mesh.indices.clone()).unwrap();
+    let grid = OwnedGrid::build(input, &Config::default()).unwrap();
+    let ray = Ray::new([0.1, 0.2, 3.0], [0.0, 0.0, -1.0]);
+    let hits = (0..200).filter(|_| grid.grid().occluded(&ray)).count();
+    assert!((50..100).contains(&hits), "{hits}");
+    assert!(grid.grid().intersect(&ray).is_none() && grid.grid().blob().is_empty());
+}
+
+#[test]
+fn what_is_printed_is_short() {
+    let mesh = scene();
+    let grid = OwnedGrid::build(owned(&mesh), &Config::default()).unwrap();
+    let (bytes, triangles) = (grid.grid().blob_bytes(), mesh.indices.len());
+    assert_eq!(
+        format!("{grid:?}"),
+        format!("OwnedGrid {{ method: Bvh, triangles: {triangles}, bytes: {bytes} }}")
+    );
+    let vertices = mesh.positions.len();
+    assert_eq!(
+        format!("{:?}", grid.mesh()),
+        format!(
+            "OwnedMesh {{ vertices: {vertices}, triangles: {triangles}, indices: U32, \
+             has_masks: false }}"
+        )
+    );
+    assert_eq!(
+        format!("{:?}", OwnedStrided::new(vec![7_u32; 1000]).at(2)),
+        "OwnedStrided { bytes: 3998, stride: 4, count: 1000 }"
+    );
+}
