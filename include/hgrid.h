@@ -17,7 +17,9 @@
  * hgrid_closest_point. Masks, culling, a triangle to skip, filters and counters are options of these.
  * hgrid_bound, hgrid_sizes and hgrid_fit are about memory: enough for any mesh, for this one, and the
  * best grid for a budget. A build on threads of yours, with progress, is a matter of hgrid_config.
- * hgrid_surface_at knows the normal of a hit, and where rays start that leave it. For grids that are
+ * hgrid_surface_at knows the normal of a hit, and where rays start that leave it. hgrid_join takes
+ * several meshes into one grid, and hgrid_locate tells which of them was hit. Trees of your own shapes
+ * begin with hgrid_build_shapes, scenes of instances with hgrid_build_scene. For grids that are
  * stored there are hgrid_open, hgrid_peek, hgrid_pack, hgrid_mesh_of and hgrid_validate, and
  * hgrid_inspect looks at all of one. hgrid_refit moves a tree with its vertices.
  *
@@ -109,15 +111,15 @@
  * the sign of its product with the direction. hgrid_surface_at tells all that, and where the next ray
  * starts: a ray to a light that started at the hit itself could hit the triangle that it leaves.
  *
- * One grid is one mesh. With several, ask one after the other, and let each hit shorten the ray:
+ * One grid may hold several meshes: hgrid_join makes them one, without a copy, and hgrid_locate tells whose
+ * triangle was hit. Masks can leave meshes out. Several grids are asked one after the other; let each hit
+ * shorten the ray:
  *
  *   for (size_t i = 0; i < count; i++)
  *       if (hgrid_intersect(&grids[i], &ray, NULL, &found) && found.t < hit.t)
  *           hit = found, object = i, ray.t_max = found.t;
  *
- * where hit.t begins as INFINITY; a shadow ray is blocked if any grid blocks it. Or put all meshes into
- * one, and keep where each begins, which tells whose triangle was hit: then each ray takes one walk, and
- * masks can leave meshes out.
+ * where hit.t begins as INFINITY; a shadow ray is blocked if any grid blocks it.
  *
  * Pointers
  * --------
@@ -428,6 +430,77 @@
 typedef int32_t hgrid_status;
 
 /**
+ * Memory for one of the meshes that `hgrid_join` joins. It is the caller's, as the mesh is.
+ */
+typedef struct hgrid_part {
+    /**
+     * Private; it may hold anything before the call.
+     */
+    uint64_t opaque[24];
+} hgrid_part;
+
+/**
+ * A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
+ *
+ * The arrays are read where they lie, never copied and never changed, and not one byte behind the
+ * last element's own bytes. They need no alignment, so all may be fields of the caller's structs.
+ * Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
+ * struct itself is only read during the call.
+ */
+typedef struct hgrid_mesh {
+    /**
+     * `sizeof(hgrid_mesh)`.
+     */
+    uint32_t struct_size;
+    /**
+     * `HGRID_INDEX_U32` or `HGRID_INDEX_U16`.
+     */
+    uint32_t index_type;
+    /**
+     * The first vertex: three floats x, y, z, in scene units. NULL only without vertices.
+     */
+    const void *positions;
+    /**
+     * Bytes from one vertex to the next, at least 12; 0 means 12.
+     */
+    size_t position_stride;
+    /**
+     * Number of vertices.
+     */
+    size_t vertex_count;
+    /**
+     * The first triangle: three vertex numbers, from 0. NULL only without triangles.
+     */
+    const void *indices;
+    /**
+     * Bytes from one triangle to the next, at least three indices; 0 means exactly three indices.
+     */
+    size_t index_stride;
+    /**
+     * Number of triangles, at most 4294967294.
+     */
+    size_t triangle_count;
+    /**
+     * The first triangle's mask, a `uint32_t`, or NULL: queries with a mask of their own see a
+     * triangle if both have a bit in common. NULL means that every triangle has all bits.
+     */
+    const void *masks;
+    /**
+     * Bytes from one mask to the next, at least 4; 0 means 4.
+     */
+    size_t mask_stride;
+    /**
+     * The meshes that `hgrid_join` made this one of, or NULL. With them there are no arrays, and nothing is set by
+     * hand.
+     */
+    const struct hgrid_part *parts;
+    /**
+     * Number of parts.
+     */
+    size_t part_count;
+} hgrid_mesh;
+
+/**
  * A part of a build, as `run` of a `hgrid_config` gets it: a function of this library.
  *
  * It may be called on any thread, on several at once, with the `task_context` that came
@@ -556,7 +629,8 @@ typedef struct hgrid_report {
      */
     uint64_t scratch_bytes;
     /**
-     * The first triangle that is to blame for the error, or `HGRID_INVALID_ID`.
+     * The first triangle that is to blame for the error, or `HGRID_INVALID_ID`. Of joined meshes it is counted
+     * through all of them.
      */
     uint32_t triangle;
     /**
@@ -585,58 +659,6 @@ typedef struct hgrid_report {
      */
     uint32_t reserved;
 } hgrid_report;
-
-/**
- * A triangle mesh in the caller's memory. Initialise it with `HGRID_MESH_INIT`.
- *
- * The arrays are read where they lie, never copied and never changed, and not one byte behind the
- * last element's own bytes. They need no alignment, so all may be fields of the caller's structs.
- * Blob and view refer to the mesh: it stays unchanged for as long as the grid is queried. The
- * struct itself is only read during the call.
- */
-typedef struct hgrid_mesh {
-    /**
-     * `sizeof(hgrid_mesh)`.
-     */
-    uint32_t struct_size;
-    /**
-     * `HGRID_INDEX_U32` or `HGRID_INDEX_U16`.
-     */
-    uint32_t index_type;
-    /**
-     * The first vertex: three floats x, y, z, in scene units. NULL only without vertices.
-     */
-    const void *positions;
-    /**
-     * Bytes from one vertex to the next, at least 12; 0 means 12.
-     */
-    size_t position_stride;
-    /**
-     * Number of vertices.
-     */
-    size_t vertex_count;
-    /**
-     * The first triangle: three vertex numbers, from 0. NULL only without triangles.
-     */
-    const void *indices;
-    /**
-     * Bytes from one triangle to the next, at least three indices; 0 means exactly three indices.
-     */
-    size_t index_stride;
-    /**
-     * Number of triangles, at most 4294967294.
-     */
-    size_t triangle_count;
-    /**
-     * The first triangle's mask, a `uint32_t`, or NULL: queries with a mask of their own see a
-     * triangle if both have a bit in common. NULL means that every triangle has all bits.
-     */
-    const void *masks;
-    /**
-     * Bytes from one mask to the next, at least 4; 0 means 4.
-     */
-    size_t mask_stride;
-} hgrid_mesh;
 
 /**
  * A built grid and its mesh, ready for queries: a view, held by value.
@@ -722,7 +744,7 @@ typedef struct hgrid_hit {
      */
     float v;
     /**
-     * The triangle: its position in the index array.
+     * The triangle: its position in the index array. Of joined meshes it is counted through all of them.
      */
     uint32_t primitive;
 } hgrid_hit;
@@ -887,7 +909,7 @@ typedef struct hgrid_closest {
      */
     float v;
     /**
-     * The triangle: its position in the index array.
+     * The triangle: its position in the index array. Of joined meshes it is counted through all of them.
      */
     uint32_t primitive;
 } hgrid_closest;
@@ -1135,7 +1157,7 @@ typedef struct hgrid_scene {
     /**
      * Private; some of its bytes may never have been written.
      */
-    uint64_t opaque[64];
+    uint64_t opaque[72];
 } hgrid_scene;
 
 /**
@@ -1410,6 +1432,12 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_MASKS -26
 
 /**
+ * The parts of a joined mesh: they were not written by `hgrid_join`, or not with these counts, or the mesh has arrays, too;
+ * or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
+ */
+#define HGRID_ERROR_INVALID_PARTS -27
+
+/**
  * The configuration's `method` is none that this version knows.
  */
 #define HGRID_ERROR_INVALID_METHOD -30
@@ -1504,7 +1532,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_METHOD_REMOVED -48
 
 /**
- * The blob is built over something else: a grid, a tree of shapes or a scene. `hgrid_peek` tells which.
+ * The blob is built over something else: triangles, shapes or instances. Open it with the function for these.
  */
 #define HGRID_ERROR_OTHER_CONTENT -49
 
@@ -1552,6 +1580,58 @@ typedef struct hgrid_allocator {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * Joins meshes: describes several of them as one, for a grid of them all.
+ *
+ * Nothing is copied. Each mesh keeps its arrays, with strides and an index type of its own, and with masks or without. The
+ * triangles are numbered through all meshes, in the order of the array: a hit names one by that number,
+ * and `hgrid_locate` tells which mesh it is of and which triangle there. Where several triangles are hit at the same `t`,
+ * the one of the first mesh counts. So a grid of joined meshes is, byte by byte, that of one mesh
+ * with the same triangles, and each ray takes one walk. One mesh alone is read faster than joined ones: the
+ * part of a triangle has to be found, in a binary search.
+ *
+ * ```c
+ * static hgrid_status build_both(const hgrid_mesh meshes[2], hgrid_part parts[2], void *index,
+ *                                size_t index_bytes, void *scratch, size_t scratch_bytes,
+ *                                hgrid_grid *grid)
+ * {
+ *     hgrid_mesh joined = HGRID_MESH_INIT;
+ *     const hgrid_status status = hgrid_join(meshes, 2, parts, &joined);
+ *     if (status != HGRID_OK)
+ *         return status;
+ *     return hgrid_build(&joined, NULL, index, index_bytes, scratch, scratch_bytes, grid, NULL);
+ * }
+ * ```
+ *
+ * `meshes` are `count` structs side by side, all with the same `struct_size`, none of them joined itself. They are only read
+ * during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps neither the
+ * structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a grid of the
+ * joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without
+ * triangles. `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds the
+ * number of all triangles and vertices, and `parts`; its other fields are 0 or NULL. Such a call first goes over the
+ * parts, `hgrid_open` too. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another build;
+ * after arrays moved or counts changed, join the meshes again.
+ *
+ * The report of a build that fails names the triangle to blame by its number in the joined mesh: take the triangle
+ * counts of the first meshes off it.
+ *
+ * Returns `HGRID_OK` and fills `joined`, or returns the reason and leaves it as it was; then `parts` may hold anything:
+ * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_OVERLAP`;
+ * - with one of the meshes: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
+ *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`;
+ * - with all of them: `HGRID_ERROR_TOO_MANY_TRIANGLES`, and `HGRID_ERROR_INVALID_PARTS` if one is joined itself, or
+ *   if they are more than 2^30 - 1 or have more than 2^32 - 1 vertices together.
+ *
+ * Threads: any number of calls at once, each with parts and a joined mesh of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_join(const struct hgrid_mesh *meshes,
+                        size_t count,
+                        struct hgrid_part *parts,
+                        struct hgrid_mesh *joined);
 
 /**
  * Tells how much memory is enough for any mesh with so many triangles, wherever they
@@ -1603,8 +1683,8 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
  *   `HGRID_ERROR_OVERLAP`;
  * - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
- *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`,
- *   `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_NON_FINITE`;
+ *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_INVALID_PARTS`,
+ *   `HGRID_ERROR_TOO_MANY_TRIANGLES`, `HGRID_ERROR_INDEX_OUT_OF_RANGE`, `HGRID_ERROR_NON_FINITE`;
  * - with the configuration: `HGRID_ERROR_INVALID_METHOD`, `HGRID_ERROR_METHOD_LEFT_OUT`,
  *   `HGRID_ERROR_INVALID_DENSITY`, `HGRID_ERROR_INVALID_FLAGS`,
  *   `HGRID_ERROR_INVALID_MACROCELL_FACTOR`, `HGRID_ERROR_INVALID_DEPTH`,
@@ -1951,6 +2031,38 @@ bool hgrid_surface_at(const struct hgrid_grid *grid,
                       struct hgrid_surface *surface);
 
 /**
+ * Tells which mesh a triangle is of, in a grid of meshes that `hgrid_join` joined.
+ *
+ * `primitive` is the number that a hit has. Returns true and writes to `geometry` the place of its mesh in the
+ * array that was joined, and to `triangle` its number in that mesh's own indices; or returns false and
+ * writes nothing: if the grid has no such triangle, for NULL, and for a view of zeros
+ * (`HGRID_GRID_INIT`).
+ *
+ * In a grid of one mesh every triangle is of mesh 0. A grid that was opened from what `hgrid_pack` wrote knows
+ * the meshes as well as the one that was packed. It takes a binary search among the meshes.
+ *
+ * ```c
+ * static uint32_t material_of(const hgrid_grid *grid, const hgrid_hit *hit,
+ *                             const uint32_t *const *materials)
+ * {
+ *     uint32_t geometry, triangle;
+ *     if (!hgrid_locate(grid, hit->primitive, &geometry, &triangle))
+ *         return 0;
+ *     return materials[geometry][triangle];
+ * }
+ * ```
+ *
+ * Threads: any number of calls and queries on the same grid at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_locate(const struct hgrid_grid *grid,
+                  uint32_t primitive,
+                  uint32_t *geometry,
+                  uint32_t *triangle);
+
+/**
  * Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
  * each, bit for bit, but sooner.
  *
@@ -2110,7 +2222,8 @@ hgrid_status hgrid_occluder_n(const struct hgrid_grid *grid,
  * what is wrong and leaves `grid` as it was:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`;
  * - with the mesh: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
- *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+ *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`, `HGRID_ERROR_INVALID_PARTS`,
+ *   `HGRID_ERROR_TOO_MANY_TRIANGLES`;
  * - with the blob: `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_WRONG_BYTE_ORDER`,
  *   `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_REMOVED`, `HGRID_ERROR_METHOD_LEFT_OUT`,
  *   `HGRID_ERROR_CORRUPT`, and `HGRID_ERROR_OTHER_CONTENT` for shapes and scenes;
@@ -2188,7 +2301,8 @@ hgrid_status hgrid_peek(const void *blob, size_t blob_bytes, struct hgrid_blob_i
  *
  * It holds the grid, then positions, indices (of 32 bits) and masks if there are any, tight, each
  * at a multiple of 64; about 12 bytes for each vertex and for each triangle more than the grid.
- * Nothing is copied when it is opened.
+ * Nothing is copied when it is opened. Meshes that were joined become one mesh with the same triangles and numbers;
+ * the blob keeps where each of them begins, in 4 bytes, and `hgrid_locate` answers as before.
  *
  * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps neither blob nor mesh nor
  * any argument of this call. It may be NULL if `capacity` is 0: to ask for the size.
@@ -2205,7 +2319,10 @@ hgrid_status hgrid_peek(const void *blob, size_t blob_bytes, struct hgrid_blob_i
  * # Safety
  * Pointers are as the head of this file says.
  */
-hgrid_status hgrid_pack(const struct hgrid_grid *grid, void *to, size_t capacity, uint64_t *bytes);
+hgrid_status hgrid_pack(const struct hgrid_grid *grid,
+                        void *to,
+                        size_t capacity,
+                        uint64_t *bytes);
 
 /**
  * Tells where the mesh of a grid is: the arrays that were given to the build or to `hgrid_open`, or
@@ -2213,7 +2330,8 @@ hgrid_status hgrid_pack(const struct hgrid_grid *grid, void *to, size_t capacity
  *
  * `mesh` was initialised with `HGRID_MESH_INIT`, and describes the mesh as for a build: with
  * strides that are not 0, and arrays that are NULL if they are empty; without masks both of their
- * fields are 0. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
+ * fields are 0. Of meshes that were joined it is the joined one, unless they were packed: a packed mesh is
+ * one. It is good for as long as the grid is. Neither argument may be NULL. Returns `HGRID_OK` and fills `mesh`;
  * or `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_NULL_ARGUMENT` or `HGRID_ERROR_STRUCT_SIZE`, and leaves
  * it as it was.
  *
@@ -2739,7 +2857,8 @@ bool hgrid_has_method(uint32_t method);
 /**
  * An empty mesh of tight arrays: set positions, vertex_count, indices and triangle_count.
  */
-#define HGRID_MESH_INIT {sizeof(hgrid_mesh), HGRID_INDEX_U32, NULL, 0, 0, NULL, 0, 0, NULL, 0}
+#define HGRID_MESH_INIT {sizeof(hgrid_mesh), HGRID_INDEX_U32, NULL, 0, 0, NULL, 0, 0, NULL, 0, \
+                         NULL, 0}
 
 /**
  * The default configuration: a tree.

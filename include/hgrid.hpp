@@ -232,6 +232,16 @@ enum class HGRID_NODISCARD status : std::int32_t {
     cannot_refit = HGRID_ERROR_CANNOT_REFIT,
     /// `HGRID_ERROR_METHOD_REMOVED`
     method_removed = HGRID_ERROR_METHOD_REMOVED,
+    /// `HGRID_ERROR_OTHER_CONTENT`
+    other_content = HGRID_ERROR_OTHER_CONTENT,
+    /// `HGRID_ERROR_INSTANCE_OBJECT`
+    instance_object = HGRID_ERROR_INSTANCE_OBJECT,
+    /// `HGRID_ERROR_INSTANCE_MATRIX`
+    instance_matrix = HGRID_ERROR_INSTANCE_MATRIX,
+    /// `HGRID_ERROR_MISSING_OBJECTS`
+    missing_objects = HGRID_ERROR_MISSING_OBJECTS,
+    /// `HGRID_ERROR_TOO_DEEP`
+    too_deep = HGRID_ERROR_TOO_DEEP,
     /// `HGRID_ERROR_INVALID_RAYS`
     invalid_rays = HGRID_ERROR_INVALID_RAYS,
     /// `HGRID_ERROR_INVALID_ANSWERS`
@@ -734,7 +744,7 @@ public:
             return status::invalid_parts;
         ::hgrid_mesh all = HGRID_MESH_INIT;
         const ::hgrid_mesh *first = meshes.empty() ? nullptr : &meshes.data()->raw_;
-        const status answer{::hgrid_join(first, meshes.size(), parts.data(), &all)};
+        const status answer = detail::said(::hgrid_join(first, meshes.size(), parts.data(), &all));
         return answer == status::ok ? result<mesh>(mesh(all)) : answer;
     }
 
@@ -1255,12 +1265,12 @@ public:
     }
     /// The mesh that a triangle is of, and its number there, in a grid of joined meshes; nothing if there is no
     /// such triangle.
-    std::optional<location> locate(std::uint32_t primitive) const noexcept
+    optional<location> locate(std::uint32_t primitive) const noexcept
     {
         location found{};
         return ::hgrid_locate(&raw_, primitive, &found.geometry, &found.triangle)
-                   ? std::optional<location>(found)
-                   : std::nullopt;
+                   ? optional<location>(found)
+                   : optional<location>();
     }
     /// The mesh, wherever it lies: the caller's, or the one in a packed blob.
     result<mesh> mesh_of() const noexcept
@@ -1582,6 +1592,202 @@ inline result<grid> grid::build(const mesh &of, const config &how, report *detai
         return adopt(std::move(*kept), of);
     }
 }
+
+// --- shapes and scenes ---------------------------------------------------------------------------
+
+/// Where a ray hits a shape. See `hgrid_shape_hit`.
+using shape_hit = ::hgrid_shape_hit;
+/// A ray whose origin is in double. See `hgrid_ray_f64`.
+using ray_f64 = ::hgrid_ray_f64;
+/// Where a ray meets a scene. See `hgrid_scene_hit`.
+using scene_hit = ::hgrid_scene_hit;
+/// An object at a place in a scene. See `hgrid_instance`: `instance one = HGRID_INSTANCE_INIT;`
+using instance = ::hgrid_instance;
+/// What instances show. See `hgrid_object`; `make_object` makes it.
+using object = ::hgrid_object;
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wold-style-cast"
+#endif
+/// Bytes of index that are enough for any scene of so many instances; of scratch `scratch_bound` is enough.
+inline constexpr std::size_t scene_bound(std::size_t instances) noexcept
+{
+    return HGRID_SCENE_BOUND(instances);
+}
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
+
+/// The boxes of shapes of one's own, six floats each, and the test for them: `hgrid_boxes`. It refers to both.
+class boxes {
+public:
+    /// Boxes with a test: `bool test(std::uint32_t shape, const hgrid::ray &along, hgrid::shape_hit &hit)`, a callable with a
+    /// name, which stays where it is for as long as shapes are queried.
+    template <class Test>
+    boxes(strided<const std::array<float, 6>> all, Test &test) noexcept
+    {
+        raw_.boxes = all.first();
+        raw_.box_stride = all.stride();
+        raw_.count = all.size();
+        raw_.context = const_cast<void *>(static_cast<const void *>(&test));
+        raw_.test = [](void *context, std::uint32_t shape, const ::hgrid_ray *along,
+                       ::hgrid_shape_hit *found) noexcept -> bool {
+            return (*static_cast<Test *>(context))(shape, *along, *found);
+        };
+    }
+    /// A mask for each shape.
+    boxes &masks(strided<const std::uint32_t> all) noexcept
+    {
+        raw_.masks = all.first();
+        raw_.mask_stride = all.stride();
+        has_masks_ = all.size() == raw_.count;
+        return *this;
+    }
+    /// What C takes.
+    const ::hgrid_boxes &c() const noexcept { return raw_; }
+    /// Whether there are as many masks as boxes.
+    bool is_sound() const noexcept { return has_masks_; }
+
+private:
+    ::hgrid_boxes raw_ = HGRID_BOXES_INIT;
+    bool has_masks_ = true;
+};
+
+/// A tree over the boxes of shapes: `hgrid_shapes`, in memory that stays the caller's.
+class shapes {
+public:
+    /// A view of nothing, which hits nothing.
+    shapes() noexcept = default;
+    /// Builds in an index, which keeps the tree, and a scratch.
+    static result<shapes> build(const boxes &of, const config &how, span<byte> index, span<byte> scratch,
+                                report *details = nullptr) noexcept
+    {
+        if (!of.is_sound())
+            return status::invalid_masks;
+        shapes built;
+        const ::hgrid_config raw = how.c();
+        const status answer = detail::said(::hgrid_build_shapes(&of.c(), &raw, index.data(), index.size(),
+                                                                scratch.data(), scratch.size(), &built.raw_,
+                                                                details));
+        return answer == status::ok ? result<shapes>(built) : answer;
+    }
+    /// Opens a blob that was built over these boxes.
+    static result<shapes> open(span<const byte> blob, const boxes &of) noexcept
+    {
+        if (!of.is_sound())
+            return status::invalid_masks;
+        shapes opened;
+        const status answer =
+            detail::said(::hgrid_open_shapes(blob.data(), blob.size(), &of.c(), &opened.raw_));
+        return answer == status::ok ? result<shapes>(opened) : answer;
+    }
+    /// Proves that the blob is a tree of its boxes.
+    status validate(span<byte> scratch) const noexcept
+    {
+        return detail::said(::hgrid_validate_shapes(&raw_, scratch.data(), scratch.size()));
+    }
+    /// The closest shape that a ray hits.
+    optional<hit> intersect(const ray &along) const noexcept
+    {
+        hit found;
+        return ::hgrid_intersect_shapes(&raw_, &along, nullptr, &found) ? optional<hit>(found) : optional<hit>();
+    }
+    /// Whether a ray hits any shape.
+    bool occluded(const ray &along) const noexcept
+    {
+        return ::hgrid_occluded_shapes(&raw_, &along, nullptr);
+    }
+    /// What C takes.
+    const ::hgrid_shapes &c() const noexcept { return raw_; }
+
+private:
+    ::hgrid_shapes raw_ = HGRID_SHAPES_INIT;
+};
+
+/// A tree over instances of objects: `hgrid_scene`, in memory that stays the caller's. The objects stay where they are, with
+/// the views that they name.
+class scene {
+public:
+    /// A view of nothing, which hits nothing.
+    scene() noexcept = default;
+    /// Builds in an index, which keeps the scene, and a scratch.
+    static result<scene> build(span<const instance> all, span<const object> of, const config &how, span<byte> index,
+                               span<byte> scratch, report *details = nullptr) noexcept
+    {
+        scene built;
+        const ::hgrid_config raw = how.c();
+        const status answer =
+            detail::said(::hgrid_build_scene(all.data(), all.size(), of.data(), of.size(), &raw, index.data(),
+                                             index.size(), scratch.data(), scratch.size(), &built.raw_, details));
+        return answer == status::ok ? result<scene>(built) : answer;
+    }
+    /// Opens a blob that was built with these objects.
+    static result<scene> open(span<const byte> blob, span<const object> of) noexcept
+    {
+        scene opened;
+        const status answer = detail::said(
+            ::hgrid_open_scene(blob.data(), blob.size(), of.data(), of.size(), &opened.raw_));
+        return answer == status::ok ? result<scene>(opened) : answer;
+    }
+    /// Proves that the blob is a scene of its objects.
+    status validate(span<byte> scratch) const noexcept
+    {
+        return detail::said(::hgrid_validate_scene(&raw_, scratch.data(), scratch.size()));
+    }
+    /// The closest thing that a ray hits.
+    optional<scene_hit> intersect(const ray_f64 &along) const noexcept
+    {
+        scene_hit found;
+        const bool is_hit = ::hgrid_intersect_scene(&raw_, &along, nullptr, &found);
+        return is_hit ? optional<scene_hit>(found) : optional<scene_hit>();
+    }
+    /// Whether a ray hits anything.
+    bool occluded(const ray_f64 &along) const noexcept
+    {
+        return ::hgrid_occluded_scene(&raw_, &along, nullptr);
+    }
+    /// The normal of the triangle that was hit, of length 1, in the scene; zeros if the hit names none.
+    point normal(const scene_hit &of) const noexcept
+    {
+        point found = {};
+        static_cast<void>(::hgrid_scene_normal(&raw_, &of, nullptr, found.data()));
+        return found;
+    }
+    /// What C takes.
+    const ::hgrid_scene &c() const noexcept { return raw_; }
+
+private:
+    ::hgrid_scene raw_ = HGRID_SCENE_INIT;
+};
+
+/// Makes an object of a grid or view; it stays where it is.
+inline result<object> make_object(const view &of) noexcept
+{
+    object made;
+    const status answer = detail::said(::hgrid_object_grid(&of.c(), &made));
+    return answer == status::ok ? result<object>(made) : answer;
+}
+/// Makes an object of a tree of shapes; it stays where it is.
+inline result<object> make_object(const shapes &of) noexcept
+{
+    object made;
+    const status answer = detail::said(::hgrid_object_shapes(&of.c(), &made));
+    return answer == status::ok ? result<object>(made) : answer;
+}
+/// Makes an object of a scene; it stays where it is.
+inline result<object> make_object(const scene &of) noexcept
+{
+    object made;
+    const status answer = detail::said(::hgrid_object_scene(&of.c(), &made));
+    return answer == status::ok ? result<object>(made) : answer;
+}
+/// An object refers to its view: give it a name.
+result<object> make_object(const view &&) = delete;
+/// The same.
+result<object> make_object(const shapes &&) = delete;
+/// The same.
+result<object> make_object(const scene &&) = delete;
 
 #if HGRID_CPP < 201703L
 } // namespace cpp14

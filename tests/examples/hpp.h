@@ -26,6 +26,7 @@
 void check_types();
 void check_builds();
 void check_queries();
+void check_scenes();
 
 struct vertex {
     hgrid::point position;

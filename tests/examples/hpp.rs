@@ -15,7 +15,8 @@ const STRICT: [&str; 5] =
     ["-fno-exceptions", "-fno-rtti", "-Wconversion", "-Wold-style-cast", "-Wsign-conversion"];
 
 /// A program of several files that include the header.
-const PROGRAM: [&str; 4] = ["hpp_types.cpp", "hpp_builds.cpp", "hpp_queries.cpp", "cost.cpp"];
+const PROGRAM: [&str; 5] =
+    ["hpp_types.cpp", "hpp_builds.cpp", "hpp_queries.cpp", "hpp_scenes.cpp", "cost.cpp"];
 
 fn header(name: &str) -> String {
     fs::read_to_string(root().join("include").join(name)).expect("a header")

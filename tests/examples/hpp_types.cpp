@@ -167,5 +167,6 @@ int main()
     check_types();
     check_builds();
     check_queries();
+    check_scenes();
     std::puts("all is well");
 }

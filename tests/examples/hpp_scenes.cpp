@@ -1,0 +1,74 @@
+// Shapes and scenes through hgrid.hpp.
+#include "hpp.h"
+
+namespace {
+
+struct ball {
+    std::array<float, 6> box;
+    float center[3];
+};
+
+alignas(64) unsigned char shape_index[hgrid::index_bound(64) / 64 * 64 + 64];
+alignas(64) unsigned char scene_index[hgrid::scene_bound(8) / 64 * 64 + 64];
+alignas(64) unsigned char grid_index[hgrid::index_bound(1) / 64 * 64 + 64];
+alignas(64) unsigned char scratch[hgrid::scratch_bound(64) / 64 * 64 + 64];
+
+} // namespace
+
+void check_scenes()
+{
+    // Cubes in a row, met where their front is.
+    std::vector<ball> all;
+    for (int i = 0; i < 64; i++) {
+        const float x = static_cast<float>(2 * i);
+        all.push_back(ball{{{x, 0, 0, x + 1, 1, 1}}, {x, 0, 0}});
+    }
+    auto test = [&](std::uint32_t shape, const hgrid::ray &along, hgrid::shape_hit &found) {
+        const float x = along.origin[0] - all[shape].center[0];
+        found = hgrid::shape_hit{(1 - along.origin[2]) / along.direction[2], x, 0};
+        return x >= 0 && x <= 1;
+    };
+    const hgrid::boxes boxes(hgrid::field(all, &ball::box), test);
+    const auto shapes = hgrid::shapes::build(boxes, hgrid::config(), hgrid::as_writable_bytes(shape_index),
+                                             hgrid::as_writable_bytes(scratch));
+    CHECK(shapes && shapes->validate(hgrid::as_writable_bytes(scratch)) == hgrid::status::ok);
+    const auto hit = shapes->intersect(hgrid::make_ray({10.25f, 0.5f, 3}, {0, 0, -1}));
+    CHECK(hit && hit->primitive == 5 && hit->t == 2 && hit->u == 0.25f);
+    CHECK(!shapes->occluded(hgrid::make_ray({11.5f, 0.5f, 3}, {0, 0, -1})));
+    const auto again = hgrid::shapes::open(hgrid::as_bytes(shape_index), boxes);
+    CHECK(again && again->occluded(hgrid::make_ray({0.5f, 0.5f, 3}, {0, 0, -1})));
+    CHECK(!hgrid::shapes().occluded(hgrid::make_ray({0.5f, 0.5f, 3}, {0, 0, -1})));
+
+    // Twice a triangle, and the cubes.
+    const std::vector<std::array<float, 3>> corners = {{{0, 0, 0}}, {{1, 0, 0}}, {{0, 1, 0}}};
+    const std::vector<std::uint32_t> indices = {0, 1, 2};
+    const auto grid = hgrid::view::build(hgrid::mesh(corners, indices), hgrid::config(),
+                                         hgrid::as_writable_bytes(grid_index), hgrid::as_writable_bytes(scratch));
+    CHECK(grid);
+    const auto one = hgrid::make_object(*grid), other = hgrid::make_object(*shapes);
+    CHECK(one && other);
+    const std::array<hgrid::object, 2> objects = {{*one, *other}};
+    std::array<hgrid::instance, 3> instances;
+    instances.fill(hgrid::instance HGRID_INSTANCE_INIT);
+    instances[1].translation[2] = -5, instances[1].linear[0][0] = -1;
+    instances[2].object = 1, instances[2].translation[1] = 10;
+    const auto scene = hgrid::scene::build(instances, objects, hgrid::config(),
+                                           hgrid::as_writable_bytes(scene_index),
+                                           hgrid::as_writable_bytes(scratch));
+    CHECK(scene && scene->validate(hgrid::as_writable_bytes(scratch)) == hgrid::status::ok);
+    const hgrid::ray_f64 left = {{-0.25, 0.25, 1}, {0, 0, -1}, 0, 100, 0};
+    const auto found = scene->intersect(left);
+    CHECK(found && found->path[0] == 1 && found->t == 6);
+    const hgrid::point normal = scene->normal(*found);
+    CHECK(normal[2] == 1 || normal[2] == -1);
+    CHECK(scene->occluded({{10.25, 10.5, 3}, {0, 0, -1}, 0, 100, 0}));
+    CHECK(hgrid::scene::open(hgrid::as_bytes(scene_index), objects));
+    CHECK(!hgrid::scene().occluded(left));
+    instances[0].object = 2;
+    const auto refused = hgrid::scene::build(instances, objects, hgrid::config(),
+                                             hgrid::as_writable_bytes(scene_index),
+                                             hgrid::as_writable_bytes(scratch));
+    CHECK(!refused && refused.error() == hgrid::status::instance_object);
+    const hgrid::view none;
+    CHECK(hgrid::make_object(none).error() == hgrid::status::not_a_grid);
+}
