@@ -1682,6 +1682,16 @@ public:
             detail::said(::hgrid_open_shapes(blob.data(), blob.size(), &of.c(), &opened.raw_));
         return answer == status::ok ? result<shapes>(opened) : answer;
     }
+    /// Gives the tree in a blob the boxes of shapes that moved, in place.
+    static result<shapes> refit(span<byte> blob, const boxes &of, refit_report *details = nullptr) noexcept
+    {
+        if (!of.is_sound())
+            return status::invalid_masks;
+        shapes moved;
+        const status answer = detail::said(
+            ::hgrid_refit_shapes(&of.c(), blob.data(), blob.size(), &moved.raw_, details));
+        return answer == status::ok ? result<shapes>(moved) : answer;
+    }
     /// Proves that the blob is a tree of its boxes.
     status validate(span<byte> scratch) const noexcept
     {
@@ -1729,6 +1739,21 @@ public:
         const status answer = detail::said(
             ::hgrid_open_scene(blob.data(), blob.size(), of.data(), of.size(), &opened.raw_));
         return answer == status::ok ? result<scene>(opened) : answer;
+    }
+    /// Gives the scene in a blob other instances, as many as before, in place.
+    static result<scene> refit(span<const instance> all, span<const object> of, span<byte> blob,
+                               refit_report *details = nullptr) noexcept
+    {
+        scene moved;
+        const status answer = detail::said(::hgrid_refit_scene(all.data(), all.size(), of.data(), of.size(),
+                                                               blob.data(), blob.size(), &moved.raw_, details));
+        return answer == status::ok ? result<scene>(moved) : answer;
+    }
+    /// Tells how much memory is enough for any scene of so many instances, with any configuration.
+    static status bound(std::size_t instances, const config &how, report &details) noexcept
+    {
+        const ::hgrid_config raw = how.c();
+        return detail::said(::hgrid_scene_bound(instances, &raw, &details));
     }
     /// Proves that the blob is a scene of its objects.
     status validate(span<byte> scratch) const noexcept

@@ -64,6 +64,13 @@ void check_scenes()
     CHECK(scene->occluded({{10.25, 10.5, 3}, {0, 0, -1}, 0, 100, 0}));
     CHECK(hgrid::scene::open(hgrid::as_bytes(scene_index), objects));
     CHECK(!hgrid::scene().occluded(left));
+    instances[1].translation[2] = -7;
+    const auto moved = hgrid::scene::refit(instances, objects, hgrid::as_writable_bytes(scene_index));
+    CHECK(moved && moved->intersect(left)->t == 8);
+    CHECK(hgrid::shapes::refit(hgrid::as_writable_bytes(shape_index), boxes));
+    hgrid::report enough;
+    CHECK(hgrid::scene::bound(3, hgrid::config(), enough) == hgrid::status::ok);
+    CHECK(enough.index_bytes <= hgrid::scene_bound(3));
     instances[0].object = 2;
     const auto refused = hgrid::scene::build(instances, objects, hgrid::config(),
                                              hgrid::as_writable_bytes(scene_index),
