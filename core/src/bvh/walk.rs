@@ -239,7 +239,6 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
         let nearby = if afar.is_none() { Slab::nearby(ray, begin, bounds) } else { afar.copied() };
         let Some((slab, filter)) = nearby else { return false };
         let slab = &slab;
-        let mut test = None;
         let given = ray;
         // Hidden from the compiler: it would subtract and multiply in one lane and spread the result, which
         // makes the way from one node to the next longer.
@@ -351,8 +350,10 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 let lane = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
                 let Some(&id) = ids.get(lane) else { break };
-                let test = test.get_or_insert_with(|| exact(given, cull));
-                match search.decide(test, mesh, id) {
+                if search.knows(id) {
+                    continue;
+                }
+                match search.decided(TriangleTest::decide_for(given, cull, mesh, id)) {
                     Outcome::Unchanged => {}
                     Outcome::EndsAt(t) => end = slab.latest(t),
                     Outcome::Done => return true,
@@ -362,12 +363,6 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
             child = next;
         }
     }
-}
-
-/// The test that decides in f64. Most rays that miss never ask for it.
-#[inline(never)]
-fn exact(ray: &Ray, cull: Cull) -> TriangleTest {
-    TriangleTest::with(ray, RayFilter::NONE).culling(cull)
 }
 
 /// Pushes a child behind those of the same node that begin farther away. `near` is the bits of a distance: a
