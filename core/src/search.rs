@@ -44,7 +44,12 @@ pub(crate) trait Search {
         if self.knows(id) {
             return Outcome::Unchanged;
         }
-        let hit = test.decide(mesh, id);
+        self.decided(test.decide(mesh, id))
+    }
+
+    /// Shows what became of a triangle that passed the filter: a hit, or none.
+    #[inline(always)]
+    fn decided(&mut self, hit: Hit) -> Outcome {
         if hit.primitive == INVALID_ID { Outcome::Unchanged } else { self.show(hit) }
     }
 }

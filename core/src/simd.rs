@@ -2,8 +2,8 @@
 //!
 //! A [`Kernel`] is code generic over the vectors of `fearless_simd`; [`dispatch`] compiles it once
 //! for each level that the target may meet and runs the one that was asked for. Every level gives
-//! the same bits: the kernels use nothing that rounds differently, in particular no fused
-//! multiply-add.
+//! the same bits: the kernels use nothing that rounds differently, and fused multiply-adds only where
+//! the product is exact.
 //!
 //! ```text
 //! target          at build time                     at run time

@@ -213,6 +213,19 @@ impl TriangleTest {
         hit.map_or(Hit::MISS, |hit| hit.on(id))
     }
 
+    /// The hit of a ray with a triangle that passed a filter, or [`Hit::MISS`].
+    ///
+    /// In one piece: a test made elsewhere goes through memory, and the end of the ray waits for it.
+    #[inline(never)]
+    pub(crate) fn decide_for(ray: &Ray, cull: Cull, mesh: &TriangleMesh<'_>, id: u32) -> Hit {
+        let test = Self::with(ray, RayFilter::NONE).culling(cull);
+        let hit = mesh.triangle(id).and_then(
+            #[inline(always)]
+            |triangle| test.resolve(&triangle),
+        );
+        hit.map_or(Hit::MISS, |hit| hit.on(id))
+    }
+
     /// Decides in f64.
     #[inline(always)]
     fn resolve(&self, &[a, b, c]: &Triangle) -> Option<TriangleHit> {

@@ -443,10 +443,11 @@ fn sixteen<S: Simd>(simd: S, row: &Row, which: usize) -> f32x16<S> {
 
 #[inline(always)]
 fn put(row: &mut Row, ray: usize, number: f32) {
-    row[ray / 8 % OCTETS][ray % 8] = number;
+    bytemuck::cast_mut::<Row, [f32; GROUP]>(row)[ray % GROUP] = number;
 }
 
 #[inline(always)]
 fn get(row: &Row, ray: u32) -> f32 {
-    row[ray as usize / 8 % OCTETS][ray as usize % 8]
+    // Flat, so that its place is one index from where the row lies.
+    bytemuck::cast_ref::<Row, [f32; GROUP]>(row)[ray as usize % GROUP]
 }

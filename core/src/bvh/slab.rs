@@ -60,6 +60,8 @@ pub(crate) struct Slab {
     /// The `t` of the start, and scaled distances for each unit of `t`.
     t: f64,
     scale: f64,
+    /// The scale of a ray that starts at its origin; 0 of others.
+    nearby: f32,
 }
 
 impl Slab {
@@ -109,6 +111,7 @@ impl Slab {
             end: end + (end.abs() * (WIDER - 1.0) + tiny),
             t: 0.0,
             scale: f64::from(scale),
+            nearby: scale,
         };
         let sum = direction[0].abs() + direction[1].abs() + direction[2].abs();
         let filter = RayFilter::nearby(ray.origin, direction, sum, distance, size.max_element());
@@ -145,6 +148,7 @@ impl Slab {
             end: 0.0,
             t: approach.t,
             scale,
+            nearby: 0.0,
         };
         slab.start = slab.earliest(begin);
         slab.end = slab.latest(ray.t_max);
@@ -160,6 +164,12 @@ impl Slab {
     /// A distance no nearer than a `t` and all that rounds to it.
     #[inline(always)]
     pub(crate) fn latest(&self, t: f32) -> f32 {
+        if self.nearby > 0.0 {
+            // As the end of such a ray: the margin holds what rounds to the same t.
+            let distance = t * self.nearby;
+            let tiny = TINY * self.nearby.max(1.0);
+            return distance + (distance.abs() * (WIDER - 1.0) + tiny);
+        }
         let distance = round((f64::from(t.next_up()) - self.t) * self.scale);
         (distance + distance.abs() * (WIDER - 1.0)) + TINY
     }

@@ -71,6 +71,9 @@ pub(super) type Near = [usize; 3];
 /// Rows from a low side to the high one; from one to the other, a mask.
 const FLIP: usize = 3;
 
+/// All boxes of a node, as bits.
+const ALL: u32 = (1 << WIDTH) - 1;
+
 impl<S: Simd> Wide<S> {
     #[inline(always)]
     fn new(simd: S, slab: &Slab, filter: &RayFilter) -> Self {
@@ -105,7 +108,7 @@ impl<S: Simd> Wide<S> {
         !dropped & triangles.used
     }
 
-    /// Which boxes of a node the ray meets before its end, as bits, and where it enters each.
+    /// Which boxes of a node the ray misses or meets behind its end, as bits, and where it enters each.
     #[inline(always)]
     fn meet(&self, simd: S, node: &Node, flips: Near, end: f32) -> (u32, f32x8<S>) {
         // As integers, or numbers are loaded into one lane and then spread.
@@ -120,16 +123,15 @@ impl<S: Simd> Wide<S> {
             let far = side(simd, node, axis, flips[axis] ^ FLIP);
             let step = (steps[axis] & 0x7f80_0000).bitcast::<f32x8<S>>();
             let origin = origin[axis].bitcast::<f32x8<S>>();
-            let step_near = step * self.inverse_near[axis];
-            let step_far = step * self.inverse_far[axis];
-            let base_near = (origin - self.origin_near[axis]) * self.inverse_near[axis];
-            let base_far = (origin - self.origin_far[axis]) * self.inverse_far[axis];
-            distances[axis] = (near * step_near + base_near, far * step_far + base_far);
+            // The product is exact, eight bits times a power of two: fused or not, the sum has the same bits.
+            let near = near.mul_add(step, origin - self.origin_near[axis]);
+            let far = far.mul_add(step, origin - self.origin_far[axis]);
+            distances[axis] = (near * self.inverse_near[axis], far * self.inverse_far[axis]);
         }
         let [x, y, z] = distances;
         let near = x.0.max(y.0).max(z.0.max(self.start));
         let far = x.1.min(y.1).min(z.1.min(f32x8::splat(simd, end)));
-        (bits(!near.simd_gt(far)), near)
+        (bits(near.simd_gt(far)), near)
     }
 }
 
@@ -174,23 +176,22 @@ pub(super) fn flips_of(slab: &Slab) -> Near {
 fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>) {
     let flips = flips_of(slab);
     let (origin, steps, inverse_far) = (node.origin(), node.steps(), slab.inverse_far());
-    let (mut met, mut nearest) = (0, [0.0; WIDTH]);
+    let (mut missed, mut nearest) = (0, [0.0; WIDTH]);
     for (slot, nearest) in nearest.iter_mut().enumerate() {
         let (mut near, mut far) = (slab.start, end);
         for axis in 0..3 {
             let bound = |flip: usize| f32::from(row(node, axis, flip)[slot % WIDTH]);
-            let at_near = bound(flips[axis]) * (steps[axis] * slab.inverse[axis])
-                + (origin[axis] - slab.origin_near[axis]) * slab.inverse[axis];
-            let at_far = bound(flips[axis] ^ FLIP) * (steps[axis] * inverse_far[axis])
-                + (origin[axis] - slab.origin_far[axis]) * inverse_far[axis];
-            near = greater(at_near, near);
-            far = lesser(at_far, far);
+            let near_side =
+                bound(flips[axis]) * steps[axis] + (origin[axis] - slab.origin_near[axis]);
+            let far_side =
+                bound(flips[axis] ^ FLIP) * steps[axis] + (origin[axis] - slab.origin_far[axis]);
+            near = greater(near_side * slab.inverse[axis], near);
+            far = lesser(far_side * inverse_far[axis], far);
         }
         *nearest = near;
-        let is_missed = near > far;
-        met |= u32::from(!is_missed) << slot;
+        missed |= u32::from(near > far) << slot;
     }
-    (met, f32x8::simd_from(simd, nearest))
+    (missed, f32x8::simd_from(simd, nearest))
 }
 
 /// A side of eight boxes as numbers.
@@ -238,7 +239,6 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
         let nearby = if afar.is_none() { Slab::nearby(ray, begin, bounds) } else { afar.copied() };
         let Some((slab, filter)) = nearby else { return false };
         let slab = &slab;
-        let mut test = None;
         let given = ray;
         // Hidden from the compiler: it would subtract and multiply in one lane and spread the result, which
         // makes the way from one node to the next longer.
@@ -260,34 +260,36 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 let rest = budget.checked_sub(1);
                 let (Some(node), Some(rest)) = (node, rest) else { return true };
                 budget = rest;
-                let (met, near) = match wide {
+                let (missed, near) = match wide {
                     Some(ray) => ray.meet(simd, node, flips, end),
                     None => meet(simd, slab, node, end),
                 };
-                if met == 0 {
+                if missed == ALL {
                     let Some(next) = pop(bvh, stack, &mut top, end) else { return true };
                     child = next;
                     continue;
                 }
-                let first = met.trailing_zeros();
-                let others = met & (met - 1);
+                // One is met: the bits above the eight do not matter to the first.
+                let first = (!missed).trailing_zeros();
+                let others = !missed & (!missed - 1) & ALL;
                 if others == 0 {
                     child = node.child(first);
                     continue;
                 }
                 // Descend into the nearest, push the others.
-                let near: [f32; WIDTH] = near.into();
-                let at = |slot: u32| near[slot as usize % WIDTH];
+                let near: [u32; WIDTH] = near.bitcast::<u32x8<S>>().into();
+                let bits_at = |slot: u32| near[slot as usize % WIDTH];
+                let at = |slot: u32| f32::from_bits(bits_at(slot));
                 let second = others.trailing_zeros();
                 let mut rest = others & (others - 1);
                 let base = top;
                 if rest == 0 {
                     // A branch, where a choice would wait for the distances.
                     if at(second) < at(first) {
-                        push(stack, &mut top, base, number, first, at(first));
+                        push(stack, &mut top, base, number, first, bits_at(first));
                         child = node.child(second);
                     } else {
-                        push(stack, &mut top, base, number, second, at(second));
+                        push(stack, &mut top, base, number, second, bits_at(second));
                         child = node.child(first);
                     }
                     continue;
@@ -296,14 +298,14 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 if at(second) < at(first) {
                     (nearest, other) = (second, first);
                 }
-                push(stack, &mut top, base, number, other, at(other));
+                push(stack, &mut top, base, number, other, bits_at(other));
                 while rest != 0 {
                     let mut slot = rest.trailing_zeros();
                     rest &= rest - 1;
                     if at(slot) < at(nearest) {
                         core::mem::swap(&mut slot, &mut nearest);
                     }
-                    push(stack, &mut top, base, number, slot, at(slot));
+                    push(stack, &mut top, base, number, slot, bits_at(slot));
                 }
                 child = node.child(nearest);
             }
@@ -348,8 +350,10 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 let lane = survivors.trailing_zeros() as usize;
                 survivors &= survivors - 1;
                 let Some(&id) = ids.get(lane) else { break };
-                let test = test.get_or_insert_with(|| exact(given, cull));
-                match search.decide(test, mesh, id) {
+                if search.knows(id) {
+                    continue;
+                }
+                match search.decided(TriangleTest::decide_for(given, cull, mesh, id)) {
                     Outcome::Unchanged => {}
                     Outcome::EndsAt(t) => end = slab.latest(t),
                     Outcome::Done => return true,
@@ -361,22 +365,17 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
     }
 }
 
-/// The test that decides in f64. Most rays that miss never ask for it.
-#[inline(never)]
-fn exact(ray: &Ray, cull: Cull) -> TriangleTest {
-    TriangleTest::with(ray, RayFilter::NONE).culling(cull)
-}
-
-/// Pushes a child behind those of the same node that begin farther away.
+/// Pushes a child behind those of the same node that begin farther away. `near` is the bits of a distance: a
+/// number and an integer would be stored apart, and popping both at once would wait for the two.
 #[inline(always)]
-fn push(stack: &mut [Waiting], top: &mut usize, base: usize, node: u32, slot: u32, near: f32) {
-    let waiting = u64::from(near.to_bits()) << 32 | u64::from(node << 3 | slot);
+fn push(stack: &mut [Waiting], top: &mut usize, base: usize, node: u32, slot: u32, near: u32) {
+    let waiting = u64::from(near) << 32 | u64::from(node << 3 | slot);
     let mut at = *top;
     let Some(_) = stack.get(at) else { return };
     *top += 1;
     while at > base
         && let Some(&below) = stack.get(at - 1)
-        && f32::from_bits((below >> 32) as u32) < near
+        && f32::from_bits((below >> 32) as u32) < f32::from_bits(near)
     {
         if let Some(slot) = stack.get_mut(at) {
             *slot = below;
@@ -421,7 +420,7 @@ mod tests {
             let wide =
                 Wide::new(simd, slab, &RayFilter::NONE).meet(simd, node, flips_of(slab), end);
             let one_by_one = meet(simd, slab, node, end);
-            [wide, one_by_one].map(|(met, near)| (met, near.into()))
+            [wide, one_by_one].map(|(missed, near)| (missed, near.into()))
         }
     }
 
@@ -461,10 +460,10 @@ mod tests {
             }
             let Some((slab, _)) = Slab::nearby(&ray, 0.0, &bounds) else { continue };
             for &level in &levels {
-                let [(wide, near_wide), (met, near)] =
+                let [(wide, near_wide), (missed, near)] =
                     dispatch(level, Both(&slab, &node, slab.end));
-                assert_eq!(wide, met, "{level:?} {ray:?} {node:?}");
-                for slot in (0..WIDTH).filter(|slot| met >> slot & 1 == 1) {
+                assert_eq!(wide, missed, "{level:?} {ray:?} {node:?}");
+                for slot in (0..WIDTH).filter(|slot| missed >> slot & 1 == 0) {
                     assert_eq!(near_wide[slot].to_bits(), near[slot].to_bits());
                     met_some += 1;
                 }
