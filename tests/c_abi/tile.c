@@ -108,6 +108,24 @@ int main(void)
         !hgrid_occluded_shapes(&shapes, &rays[9], NULL) || hgrid_occluded_shapes(&shapes, &rays[0], NULL))
         return 13;
 
+    /* Two meshes of a triangle each in one grid, and what the second is made of. */
+    hgrid_mesh halves[2];
+    hgrid_part parts[2];
+    hgrid_grid both_grid;
+    hgrid_hit lower;
+    HGRID_ALIGNED static unsigned char joined_index[HGRID_INDEX_BOUND(2)], joined_scratch[HGRID_SCRATCH_BOUND(2)];
+    halves[0] = halves[1] = mesh;
+    halves[0].triangle_count = halves[1].triangle_count = 1;
+    halves[1].indices = indices[1];
+    if (build_both(halves, parts, joined_index, sizeof joined_index, joined_scratch, sizeof joined_scratch,
+                   &both_grid) ||
+        !hgrid_intersect(&both_grid, &between, NULL, &lower) || lower.primitive != 1)
+        return 14;
+    static const uint32_t stone[1] = {5}, wood[1] = {6};
+    static const uint32_t *const materials[2] = {stone, wood};
+    if (material_of(&both_grid, &lower, materials) != 6)
+        return 15;
+
     HGRID_ALIGNED static unsigned char more_index[1 << 16], more_scratch[1 << 16];
     if (build_on_threads(&mesh, more_index, sizeof more_index, more_scratch, sizeof more_scratch,
                          &grid))
