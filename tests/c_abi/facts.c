@@ -69,6 +69,9 @@ static void layout(void)
     OFFSET(hgrid_query_options, counters);
     OFFSET(hgrid_query_options, scratch);
     OFFSET(hgrid_query_options, scratch_bytes);
+    SIZE(hgrid_point_query);
+    OFFSET(hgrid_point_query, point);
+    OFFSET(hgrid_point_query, max_distance);
     SIZE(hgrid_closest);
     OFFSET(hgrid_closest, position);
     OFFSET(hgrid_closest, distance);
@@ -143,6 +146,7 @@ static void constants(void)
     NUMBER(HGRID_MAX_DEPTH);
     NUMBER(HGRID_BUILD_STRICT);
     NUMBER(HGRID_MAX_TASKS);
+    NUMBER(HGRID_PROGRESS_END);
     NUMBER(HGRID_CULL_NONE);
     NUMBER(HGRID_CULL_BACK);
     NUMBER(HGRID_CULL_FRONT);

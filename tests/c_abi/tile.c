@@ -52,6 +52,9 @@ int main(void)
         light_along(&grid, &rays[63], none) != 1)
         return 8;
 
+    if (distance_to(&grid, 1, 1, 2) != 2)
+        return 12;
+
     /* From the first triangle nothing is in the way of a light above; between the two is the first. */
     const float up[3] = {0, 0, 1}, down[3] = {0, 0, -1};
     const hgrid_ray between = {{0.25f, 0.25f, -1}, 0, {0, 0, -1}, INFINITY};
