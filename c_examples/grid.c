@@ -56,9 +56,9 @@ static region allocate_grid(const hgrid_mesh *mesh, const hgrid_config *config, 
 }
 
 /* Told by hgrid how far it is; to return false would end the build. */
-static bool go_on(void *context, float done)
+static bool go_on(void *context, uint32_t done)
 {
-    show_progress((progress *)context, done);
+    show_progress((progress *)context, (double)done / HGRID_PROGRESS_END);
     return true;
 }
 

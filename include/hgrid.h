@@ -384,6 +384,11 @@
 #define HGRID_MAX_TASKS 64
 
 /**
+ * What `progress` of `hgrid_config` is told when all is done.
+ */
+#define HGRID_PROGRESS_END 1000
+
+/**
  * Both sides of a triangle are hit: the default of `hgrid_query_options`.
  */
 #define HGRID_CULL_NONE 0
@@ -590,14 +595,15 @@ typedef struct hgrid_config {
      */
     void (*run)(void *context, uint32_t count, hgrid_task task, void *task_context);
     /**
-     * Told how much of a build is `done`, from 0 to 1, and answers whether to go on; or NULL. It
-     * is called on the thread that builds, a few times to a few hundred times; `done` grows from
-     * call to call, and in the last call of a build that succeeds it is exactly 1, whatever the
-     * answer. After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass
-     * over the mesh is over. It may ask other grids questions and build other grids, but not touch the
-     * regions of this build nor change its mesh, and may not be left by `longjmp` or by a C++ exception.
+     * Told how much of a build is `done`, in thousandths from 0 to `HGRID_PROGRESS_END`, and answers
+     * whether to go on; or NULL. It is called on the thread that builds, a few times to a few hundred
+     * times; `done` grows from call to call, and in the last call of a build that succeeds it is
+     * `HGRID_PROGRESS_END`, whatever the answer. After false the build ends with
+     * `HGRID_ERROR_CANCELLED`, at the latest when a pass over the mesh is over. It may ask other grids
+     * questions and build other grids, but not touch the regions of this build nor change its mesh, and
+     * may not be left by `longjmp` or by a C++ exception.
      */
-    bool (*progress)(void *context, float done);
+    bool (*progress)(void *context, uint32_t done);
 } hgrid_config;
 
 /**
@@ -887,6 +893,20 @@ typedef struct hgrid_query_options {
      */
     uint32_t reserved;
 } hgrid_query_options;
+
+/**
+ * A point, and how far to look from there: 16 bytes.
+ */
+typedef struct hgrid_point_query {
+    /**
+     * Where to look from, in scene units.
+     */
+    float point[3];
+    /**
+     * The largest distance that is accepted, 0 or more; `INFINITY` and `FLT_MAX` are both fine.
+     */
+    float max_distance;
+} hgrid_point_query;
 
 /**
  * The point of a mesh that is closest to a point: 28 bytes.
@@ -1579,7 +1599,7 @@ typedef struct hgrid_allocator {
 
 #ifdef __cplusplus
 extern "C" {
-#endif // __cplusplus
+#endif /* __cplusplus */
 
 /**
  * Joins meshes: describes several of them as one, for a grid of them all.
@@ -1958,11 +1978,19 @@ hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
                                  size_t *count);
 
 /**
- * Finds the point of the mesh that is closest to a point, `max_distance` away at most.
+ * Finds the point of the mesh that is closest to `point` of the query, `max_distance` away at most.
  *
  * Returns true and writes `closest`; or returns false and writes nothing. Where several triangles
- * are equally close, the one with the lowest number is reported. `max_distance` may be `INFINITY`.
- * `point` is three floats; it and `closest` may not be NULL.
+ * are equally close, the one with the lowest number is reported. `query` and `closest` may not be NULL.
+ *
+ * ```c
+ * static float distance_to(const hgrid_grid *grid, float x, float y, float z)
+ * {
+ *     const hgrid_point_query query = {{x, y, z}, INFINITY};
+ *     hgrid_closest closest;
+ *     return hgrid_closest_point(grid, &query, NULL, &closest) ? closest.distance : INFINITY;
+ * }
+ * ```
  *
  * Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts
  * the lists or leaves that were looked at, `primitive_tests` the triangles in them, `grid_steps` the nodes
@@ -1982,8 +2010,7 @@ hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
  * Pointers are as the head of this file says.
  */
 bool hgrid_closest_point(const struct hgrid_grid *grid,
-                         const float *point,
-                         float max_distance,
+                         const struct hgrid_point_query *query,
                          const struct hgrid_query_options *options,
                          struct hgrid_closest *closest);
 
@@ -2848,9 +2875,14 @@ const char *hgrid_version_string(void);
  */
 bool hgrid_has_method(uint32_t method);
 
+/**
+ * The same where Rust 1.89 has no assembly or the object format has no weak symbols.
+ */
+void rust_eh_personality(void);
+
 #ifdef __cplusplus
-}  // extern "C"
-#endif  // __cplusplus
+}  /* extern "C" */
+#endif  /* __cplusplus */
 
 #endif  /* HGRID_H */
 

@@ -929,9 +929,10 @@ public:
                 self->run_(self->run_object_, count, task(function, task_context));
             };
         if (progress_ != nullptr)
-            raw.progress = [](void *context, float done) noexcept -> bool {
+            raw.progress = [](void *context, std::uint32_t done) noexcept -> bool {
                 const auto *self = static_cast<const config *>(context);
-                return self->progress_(self->progress_object_, done);
+                return self->progress_(self->progress_object_,
+                                       static_cast<float>(done) / HGRID_PROGRESS_END);
             };
         return raw;
     }
@@ -1365,8 +1366,9 @@ private:
     optional<closest> closest_point(const point &from, float max_distance,
                                          const ::hgrid_query_options *with) const noexcept
     {
+        const ::hgrid_point_query query = {{from[0], from[1], from[2]}, max_distance};
         closest at;
-        return ::hgrid_closest_point(&raw_, from.data(), max_distance, with, &at)
+        return ::hgrid_closest_point(&raw_, &query, with, &at)
                    ? optional<closest>(at)
                    : optional<closest>();
     }

@@ -40,8 +40,12 @@ mod version;
 
 // What it is made of.
 mod batch;
+#[cfg(all(target_arch = "arm", target_endian = "little", unix))]
+mod division;
 mod input;
 mod raw;
+#[cfg(not(feature = "rlib"))]
+mod runtime;
 mod span;
 #[cfg(feature = "std")]
 mod system;

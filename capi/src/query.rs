@@ -4,7 +4,9 @@ use core::ptr::NonNull;
 
 use hgrid_core::{Grid, INVALID_ID, QueryOptions};
 
-use crate::questions::{hgrid_closest, hgrid_hit, hgrid_query_options, hgrid_ray, hgrid_surface};
+use crate::questions::{
+    hgrid_closest, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, hgrid_surface,
+};
 use crate::raw;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};
 use crate::types::hgrid_grid;
@@ -168,11 +170,19 @@ pub unsafe extern "C" fn hgrid_intersect_all(
     call().err().unwrap_or(HGRID_OK)
 }
 
-/// Finds the point of the mesh that is closest to a point, `max_distance` away at most.
+/// Finds the point of the mesh that is closest to `point` of the query, `max_distance` away at most.
 ///
 /// Returns true and writes `closest`; or returns false and writes nothing. Where several triangles
-/// are equally close, the one with the lowest number is reported. `max_distance` may be `INFINITY`.
-/// `point` is three floats; it and `closest` may not be NULL.
+/// are equally close, the one with the lowest number is reported. `query` and `closest` may not be NULL.
+///
+/// ```c
+/// static float distance_to(const hgrid_grid *grid, float x, float y, float z)
+/// {
+///     const hgrid_point_query query = {{x, y, z}, INFINITY};
+///     hgrid_closest closest;
+///     return hgrid_closest_point(grid, &query, NULL, &closest) ? closest.distance : INFINITY;
+/// }
+/// ```
 ///
 /// Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts
 /// the lists or leaves that were looked at, `primitive_tests` the triangles in them, `grid_steps` the nodes
@@ -193,14 +203,13 @@ pub unsafe extern "C" fn hgrid_intersect_all(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hgrid_closest_point(
     grid: *const hgrid_grid,
-    point: *const f32,
-    max_distance: f32,
+    query: *const hgrid_point_query,
     options: *const hgrid_query_options,
     closest: *mut hgrid_closest,
 ) -> bool {
     let Some(to) = NonNull::new(closest) else { return false };
     // SAFETY: the caller's promise.
-    let Ok(Some(found)) = (unsafe { raw::closest(grid, point, max_distance, options) }) else {
+    let Ok(Some(found)) = (unsafe { raw::closest(grid, query, options) }) else {
         return false;
     };
     // SAFETY: the caller's promise.

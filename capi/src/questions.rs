@@ -222,6 +222,16 @@ pub struct hgrid_query_options {
     pub reserved: u32,
 }
 
+/// A point, and how far to look from there: 16 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct hgrid_point_query {
+    /// Where to look from, in scene units.
+    pub point: [f32; 3],
+    /// The largest distance that is accepted, 0 or more; `INFINITY` and `FLT_MAX` are both fine.
+    pub max_distance: f32,
+}
+
 /// The point of a mesh that is closest to a point: 28 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]

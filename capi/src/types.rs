@@ -117,6 +117,9 @@ pub const HGRID_BUILD_STRICT: u32 = 1;
 /// The most tasks that a parallel build runs at once.
 pub const HGRID_MAX_TASKS: u32 = 64;
 
+/// What `progress` of `hgrid_config` is told when all is done.
+pub const HGRID_PROGRESS_END: u32 = 1000;
+
 const _: () = assert!(HGRID_ALIGNMENT == hgrid_core::ALIGNMENT);
 const _: () = assert!(HGRID_BLOB_VERSION == hgrid_core::BLOB_VERSION);
 const _: () = assert!(HGRID_METHOD_ONE_LEVEL == Method::OneLevel as u32);
@@ -238,13 +241,14 @@ pub struct hgrid_config {
             task_context: *mut c_void,
         ),
     >,
-    /// Told how much of a build is `done`, from 0 to 1, and answers whether to go on; or NULL. It
-    /// is called on the thread that builds, a few times to a few hundred times; `done` grows from
-    /// call to call, and in the last call of a build that succeeds it is exactly 1, whatever the
-    /// answer. After false the build ends with `HGRID_ERROR_CANCELLED`, at the latest when a pass
-    /// over the mesh is over. It may ask other grids questions and build other grids, but not touch the
-    /// regions of this build nor change its mesh, and may not be left by `longjmp` or by a C++ exception.
-    pub progress: Option<unsafe extern "C" fn(context: *mut c_void, done: f32) -> bool>,
+    /// Told how much of a build is `done`, in thousandths from 0 to `HGRID_PROGRESS_END`, and answers
+    /// whether to go on; or NULL. It is called on the thread that builds, a few times to a few hundred
+    /// times; `done` grows from call to call, and in the last call of a build that succeeds it is
+    /// `HGRID_PROGRESS_END`, whatever the answer. After false the build ends with
+    /// `HGRID_ERROR_CANCELLED`, at the latest when a pass over the mesh is over. It may ask other grids
+    /// questions and build other grids, but not touch the regions of this build nor change its mesh, and
+    /// may not be left by `longjmp` or by a C++ exception.
+    pub progress: Option<unsafe extern "C" fn(context: *mut c_void, done: u32) -> bool>,
 }
 
 /// A part of a build, as `run` of a `hgrid_config` gets it: a function of this library.

@@ -22,7 +22,7 @@ use crate::filter::RayFilter;
 use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{self, OneLevel};
-use crate::options::{Choice, Cull};
+use crate::options::{Choice, Cull, QueryOptions};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
 use crate::recursive::{self, Recursive};
 use crate::search::{Any, Closest, Outcome, Search};
@@ -30,6 +30,10 @@ use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
 use crate::triangle::TriangleTest;
 use crate::variable::{self, Variable};
 use crate::visit::Visitor;
+
+/// On a microcontroller flash is dearer than a few instructions a ray: questions without options are
+/// asked as those with the defaults, so that a program has one walk of a kind.
+const IS_SMALL: bool = cfg!(all(target_os = "none", target_pointer_width = "32"));
 
 /// A built grid and the mesh it was built for, ready for queries.
 ///
@@ -298,6 +302,9 @@ impl<'a> Grid<'a> {
     /// ```
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        if IS_SMALL {
+            return self.intersect_with(ray, &mut QueryOptions::default());
+        }
         let mut closest = Closest(None);
         self.search(ray, ray.t_min, Cull::None, &mut closest, &mut ());
         closest.0
@@ -321,6 +328,9 @@ impl<'a> Grid<'a> {
     /// ```
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
+        if IS_SMALL {
+            return self.occluded_with(ray, &mut QueryOptions::default());
+        }
         self.any(ray) != INVALID_ID
     }
 

@@ -54,6 +54,12 @@ struct Readme;
 
 const _: () = assert!(usize::BITS >= 32, "hgrid needs pointers of 32 bits or more");
 
+#[cfg(all(any(target_arch = "x86", target_arch = "x86_64"), not(target_feature = "sse2")))]
+compile_error!(
+    "hgrid needs SSE2 on x86: the x87 registers round otherwise, so hits and grids would have other \
+     bits than everywhere else. Build for i686 or x86_64, or with `-C target-feature=+sse2`"
+);
+
 mod aabb;
 mod approach;
 mod arena;

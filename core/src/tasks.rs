@@ -34,7 +34,7 @@ pub(crate) fn task_count<const N: usize>(parallel: &Control<'_>, most: usize) ->
 pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
     parallel: &Control<'_>,
     tasks: impl Iterator<Item = T>,
-    work: impl Fn(T) -> R + Sync,
+    work: impl Fn(T) -> R + Lendable,
 ) -> Result<[Option<R>; N], Error> {
     // Loops, not functions of arrays: these do everything once for each of many slots in a row.
     let mut slots = [const { Slot::new(State::Nothing) }; N];
@@ -86,6 +86,8 @@ mod with_atomics {
 
     /// What tasks take along and bring back.
     pub(crate) use core::marker::Send as Portable;
+    /// What all tasks look at.
+    pub(crate) use core::marker::Sync as Lendable;
 
     /// A place from which one of several threads takes something.
     pub(super) struct Slot<T>(spin::Mutex<T>);
@@ -134,7 +136,7 @@ mod with_atomics {
 #[cfg(target_has_atomic = "32")]
 pub(crate) use with_atomics::Shared;
 #[cfg(target_has_atomic = "32")]
-use with_atomics::{Portable, Slot, each};
+use with_atomics::{Lendable, Portable, Slot, each};
 
 #[cfg(not(target_has_atomic = "32"))]
 mod without_atomics {
@@ -146,6 +148,11 @@ mod without_atomics {
     pub(crate) trait Portable {}
 
     impl<T> Portable for T {}
+
+    /// What all tasks look at: on one core anything.
+    pub(crate) trait Lendable {}
+
+    impl<T> Lendable for T {}
 
     /// A place from which one of several tasks takes something.
     pub(super) struct Slot<T>(RefCell<T>);
@@ -195,4 +202,4 @@ mod without_atomics {
 #[cfg(not(target_has_atomic = "32"))]
 pub(crate) use without_atomics::Shared;
 #[cfg(not(target_has_atomic = "32"))]
-use without_atomics::{Portable, Slot, each};
+use without_atomics::{Lendable, Portable, Slot, each};

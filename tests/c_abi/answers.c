@@ -93,7 +93,8 @@ static bool ask_closest_point(const grid_view *view, const asked *how, const flo
                               float max, hgrid_closest *closest)
 {
     hgrid_query_options options;
-    return hgrid_closest_point(view, point, max, options_of(how, &options), closest);
+    const hgrid_point_query query = {{point[0], point[1], point[2]}, max};
+    return hgrid_closest_point(view, &query, options_of(how, &options), closest);
 }
 
 int main(int argc, char **argv)

@@ -35,9 +35,9 @@ static void run(void *context, uint32_t count, hgrid_task task, void *task_conte
         task(task_context, i);
 }
 
-static bool never(void *context, float done)
+static bool never(void *context, uint32_t done)
 {
-    CHECK(context == NULL && done != done);
+    CHECK(context == NULL && done > HGRID_PROGRESS_END);
     return false;
 }
 

@@ -144,6 +144,13 @@ static inline hgrid_config usual(int method)
     return all[method];
 }
 
+/* The closest point to a point, however far it is. */
+static inline hgrid_point_query anywhere(const float point[3])
+{
+    const hgrid_point_query query = {{point[0], point[1], point[2]}, INFINITY};
+    return query;
+}
+
 /* A ray straight down onto the sheet. */
 static inline hgrid_ray ray_down(float x, float y)
 {

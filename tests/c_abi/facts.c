@@ -74,6 +74,9 @@ static void layout(void)
     OFFSET(hgrid_query_options, scratch_bytes);
     OFFSET(hgrid_query_options, filter_mask);
     OFFSET(hgrid_query_options, reserved);
+    SIZE(hgrid_point_query);
+    OFFSET(hgrid_point_query, point);
+    OFFSET(hgrid_point_query, max_distance);
     SIZE(hgrid_closest);
     OFFSET(hgrid_closest, position);
     OFFSET(hgrid_closest, distance);
@@ -195,6 +198,7 @@ static void constants(void)
     NUMBER(HGRID_MAX_NESTING);
     NUMBER(HGRID_BUILD_STRICT);
     NUMBER(HGRID_MAX_TASKS);
+    NUMBER(HGRID_PROGRESS_END);
     NUMBER(HGRID_CULL_NONE);
     NUMBER(HGRID_CULL_BACK);
     NUMBER(HGRID_CULL_FRONT);

@@ -131,6 +131,10 @@ fn it_is_current() {
     let mut generated = Vec::new();
     builder.generate().expect("cbindgen understands the sources").write(&mut generated);
     let generated = String::from_utf8(generated).expect("text");
+    // What C of 1989 takes for a comment; cbindgen writes these two lines itself.
+    let generated = generated
+        .replace("// extern \"C\"", "/* extern \"C\" */")
+        .replace("// __cplusplus", "/* __cplusplus */");
 
     if std::env::var_os("HGRID_BLESS").is_some() {
         // In one step: the other tests are reading it.
@@ -152,6 +156,43 @@ fn it_compiles_alone_in_every_dialect() {
     for_every_compiler(|compiler, language| {
         run(compiler.args(["-fsyntax-only", "-x", language]).arg(&source));
     });
+}
+
+#[test]
+fn it_compiles_in_the_oldest_dialect_with_all_that_it_defines() {
+    let dir = TempDir::new().expect("a folder");
+    let source = dir.path().join("old.c");
+    fs::write(&source, "#define HGRID_STD\n#include <hgrid.h>\n").expect("a file");
+    for mut compiler in compilers("c89") {
+        // The compiler's own <stdbool.h> needs the one: _Bool is younger.
+        let named = ["-Wno-long-long", "-Wno-unknown-warning-option", "-Wno-c99-extensions"];
+        run(compiler.arg("-pedantic-errors").args(named).arg("-fsyntax-only").arg(&source));
+    }
+}
+
+/// Programs that are compiled without the processor's registers for floats, such as kernels, pass a
+/// float elsewhere than the library does.
+#[test]
+fn no_function_takes_or_returns_a_float_by_value() {
+    let declarations = declarations(&committed());
+    assert!(declarations.len() > functions(Flavour::Std).len());
+    for declaration in declarations {
+        let words = declaration.split(['(', ')', ',']).map(str::trim);
+        for word in words.filter(|word| !word.contains('*')) {
+            let is_float = word.split(' ').any(|part| ["float", "double"].contains(&part));
+            assert!(!is_float, "{declaration}");
+        }
+    }
+}
+
+/// What is called, by C or by the library: functions, types of functions and pointers to them, each in
+/// one line.
+fn declarations(header: &str) -> Vec<String> {
+    let is_text = |line: &&str| !line.trim_start().starts_with(['*', '/', '#']);
+    let code: Vec<_> = header.lines().filter(is_text).map(str::trim).collect();
+    let code = code.join(" ");
+    let parts = code.split([';', '{', '}']).map(str::trim);
+    parts.filter(|part| part.contains('(')).map(str::to_owned).collect()
 }
 
 #[test]

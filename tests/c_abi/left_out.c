@@ -37,10 +37,11 @@ static void ask(const hgrid_config *config, const void *blob, size_t bytes, answ
     hgrid_ray rays[RAYS];
     int found = 0;
     for (int i = 0; i < RAYS; i++) {
-        const float x = (float)(i % 10) / 9, y = (float)(i / 10) / 9, point[3] = {x, y, 0.2f};
+        const float x = (float)(i % 10) / 9, y = (float)(i / 10) / 9;
+        const hgrid_point_query query = {{x, y, 0.2f}, INFINITY};
         rays[i] = ray_down(x, y);
         found += hgrid_intersect(&grid, &rays[i], NULL, &a->single[i]);
-        found += hgrid_closest_point(&grid, point, INFINITY, NULL, &a->closest[i]);
+        found += hgrid_closest_point(&grid, &query, NULL, &a->closest[i]);
     }
     CHECK(found == 2 * RAYS);
     EXPECT(HGRID_OK,
@@ -88,7 +89,7 @@ static void is_there(const hgrid_config *config, const void *stored, size_t stor
     CHECK(memcmp(&a, expected, sizeof a) == 0);
 }
 
-static bool is_never_called(void *context, float done)
+static bool is_never_called(void *context, uint32_t done)
 {
     (void)context, (void)done;
     CHECK(!"progress of a build that cannot be");

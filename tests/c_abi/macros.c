@@ -16,7 +16,7 @@ HGRID_ALIGNED static unsigned char tree[HGRID_INDEX_BOUND(3)], tree_scratch[HGRI
 static unsigned char proof[HGRID_VALIDATE_BOUND(3)];
 
 #if HGRID_VERSION < 0x000100 || HGRID_BLOB_VERSION < 1 || HGRID_ALIGNMENT != 64 || HGRID_MAX_DEPTH < 1 || \
-    HGRID_MAX_TASKS != 64
+    HGRID_MAX_TASKS != 64 || HGRID_PROGRESS_END != 1000
 #error "the numbers work in the preprocessor, too"
 #endif
 
@@ -31,7 +31,7 @@ int main(void)
     hgrid_allocator allocator = HGRID_ALLOCATOR_INIT;
     hgrid_grid grid = HGRID_GRID_INIT;
     hgrid_closest closest;
-    const float point[3] = {0, 0, 0};
+    const hgrid_point_query query = {{0, 0, 0}, 1};
     size_t count = 0;
     const hgrid_ray ray = {{0, 0, 0}, 0, {0, 0, 1}, 1};
     hgrid_hit hit;
@@ -59,7 +59,7 @@ int main(void)
            hgrid_intersect(&grid, &ray, &options, &hit) || hgrid_occluded(&grid, &ray, NULL) ||
            hgrid_intersect_n(&grid, &ray, 0, &hit, 0, 1, coherence, &options) != HGRID_OK ||
            hgrid_intersect_all(&grid, &ray, &options, &hit, 1, &count) != HGRID_OK || count != 0 ||
-           hgrid_closest_point(&grid, point, 1, NULL, &closest) || info.has_mesh != 0 ||
+           hgrid_closest_point(&grid, &query, NULL, &closest) || info.has_mesh != 0 ||
            statistics.first_bad != HGRID_INVALID_ID || hit.primitive != HGRID_INVALID_ID ||
            allocator.allocate != NULL;
 }

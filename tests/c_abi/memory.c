@@ -41,14 +41,15 @@ static void ask_everything(const hgrid_grid *view, const hgrid_mesh *mesh)
         }
     for (int i = 0; i < RAYS; i += 13) {
         const hgrid_ray *ray = (hgrid_ray *)guarded_copy(&rays[i], sizeof *ray);
-        const float *point = (float *)guarded_copy(ray->origin, sizeof ray->origin);
+        const hgrid_point_query here = anywhere(ray->origin);
+        const hgrid_point_query *query = (hgrid_point_query *)guarded_copy(&here, sizeof here);
         const uint32_t id = hits[i].primitive;
         options->mask = UINT32_MAX;
         CHECK(hgrid_intersect(grid, ray, NULL, hit) && hit->primitive == id);
         CHECK(hgrid_intersect(grid, ray, options, hit) && hit->primitive == id);
         CHECK(hgrid_occluded(grid, ray, options));
         CHECK(hgrid_occluder(grid, ray, options) < TRIANGLES);
-        CHECK(hgrid_closest_point(grid, point, INFINITY, options, closest));
+        CHECK(hgrid_closest_point(grid, query, options, closest));
         /* Masks are read when a ray hits. */
         options->mask = 1u << id % 31;
         CHECK(hgrid_occluded(grid, ray, options));

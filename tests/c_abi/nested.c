@@ -56,8 +56,8 @@ static void ask(const hgrid_grid *grid)
     EXPECT(HGRID_OK, hgrid_intersect_all(grid, &rays[1], NULL, &hit, 1, &count));
     CHECK(count >= 1 && memcmp(&hit, &expected[1], sizeof hit) == 0);
     hgrid_closest closest;
-    const float point[3] = {0.5f, 0.5f, 0.05f};
-    CHECK(hgrid_closest_point(grid, point, INFINITY, NULL, &closest));
+    const hgrid_point_query query = {{0.5f, 0.5f, 0.05f}, INFINITY};
+    CHECK(hgrid_closest_point(grid, &query, NULL, &closest));
 }
 
 /* Builds the other grid anew, and asks and proves it. */
@@ -109,9 +109,9 @@ static void filters_ask_and_build(const hgrid_grid *grid, other *o)
     }
 }
 
-static bool progress(void *context, float done)
+static bool progress(void *context, uint32_t done)
 {
-    CHECK(done >= 0 && done <= 1);
+    CHECK(done <= HGRID_PROGRESS_END);
     build((other *)context);
     return true;
 }

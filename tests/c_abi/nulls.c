@@ -16,7 +16,7 @@ static unsigned char *index_region, *scratch, *packed;
 static void *tree;
 static size_t index_bytes, scratch_bytes, packed_bytes, tree_bytes;
 static hgrid_ray rays[RAYS];
-static const float point[3] = {0.5f, 0.5f, 1};
+static const hgrid_point_query query = {{0.5f, 0.5f, 1}, INFINITY};
 static hgrid_report report = HGRID_REPORT_INIT;
 static hgrid_refit_report refit_report = HGRID_REFIT_REPORT_INIT;
 
@@ -242,12 +242,12 @@ static void queries(void)
             hgrid_intersect_all(&grid, rays, &options, out.hits, RAYS, NULL));
 
     MISSED(hgrid_closest_point.grid,
-           hgrid_closest_point(NULL, point, INFINITY, &options, &out.closest));
-    MISSED(hgrid_closest_point.point,
-           hgrid_closest_point(&grid, NULL, INFINITY, &options, &out.closest));
+           hgrid_closest_point(NULL, &query, &options, &out.closest));
+    MISSED(hgrid_closest_point.query,
+           hgrid_closest_point(&grid, NULL, &options, &out.closest));
     MISSED(hgrid_closest_point.closest,
-           hgrid_closest_point(&grid, point, INFINITY, &options, NULL));
-    CHECK(hgrid_closest_point(&grid, point, INFINITY, NULL, &out.closest));
+           hgrid_closest_point(&grid, &query, &options, NULL));
+    CHECK(hgrid_closest_point(&grid, &query, NULL, &out.closest));
     puts("null hgrid_closest_point.options");
 
     const hgrid_hit hit = {1, 0.25f, 0.25f, 3};

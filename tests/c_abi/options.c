@@ -24,7 +24,7 @@ static void build(int method)
 /* The options that count nothing and find nothing, in each query. */
 static void refuse(hgrid_status expected, const hgrid_query_options *options)
 {
-    const float point[3] = {0.4f, 0.3f, 1};
+    const hgrid_point_query query = {{0.4f, 0.3f, 1}, INFINITY};
     const hgrid_coherence c = HGRID_COHERENCE_INCOHERENT;
     struct {
         hgrid_hit hit;
@@ -37,7 +37,7 @@ static void refuse(hgrid_status expected, const hgrid_query_options *options)
     CHECK(!hgrid_intersect(&grid, &ray, options, &out.hit));
     CHECK(!hgrid_occluded(&grid, &ray, options));
     CHECK(hgrid_occluder(&grid, &ray, options) == HGRID_INVALID_ID);
-    CHECK(!hgrid_closest_point(&grid, point, INFINITY, options, &out.closest));
+    CHECK(!hgrid_closest_point(&grid, &query, options, &out.closest));
     EXPECT(expected, hgrid_intersect_all(&grid, &ray, options, &out.hit, 1, &out.count));
     EXPECT(expected, hgrid_intersect_n(&grid, &ray, 0, &out.hit, 0, 1, c, options));
     EXPECT(expected, hgrid_occluded_n(&grid, &ray, 0, &out.occluded, 0, 1, c, options));
@@ -236,7 +236,8 @@ static bool find(const float point[3], float max, const hgrid_query_options *opt
                  hgrid_closest *closest)
 {
     memset(closest, 0xc7, sizeof *closest);
-    const bool is_found = hgrid_closest_point(&grid, point, max, options, closest);
+    const hgrid_point_query query = {{point[0], point[1], point[2]}, max};
+    const bool is_found = hgrid_closest_point(&grid, &query, options, closest);
     CHECK(is_found != all_bytes_are(closest, sizeof *closest, 0xc7));
     return is_found;
 }
@@ -289,7 +290,8 @@ static void the_closest_point_is_where_it_says(void)
     for (size_t i = 0; i < sizeof odd / sizeof *odd; i++)
         CHECK(!find(odd[i], odd[i][3], NULL, &other));
     const hgrid_grid nothing = HGRID_GRID_INIT;
-    CHECK(!hgrid_closest_point(&nothing, above, INFINITY, NULL, &other));
+    const hgrid_point_query query = anywhere(above);
+    CHECK(!hgrid_closest_point(&nothing, &query, NULL, &other));
 }
 
 int main(void)

@@ -1,4 +1,4 @@
-/* Is a build told to its caller, from 0 to exactly 1, and does it end when the caller says so? */
+/* Is a build told to its caller, from nothing to the end, and does it end when the caller says so? */
 
 #include "check.h"
 
@@ -10,23 +10,23 @@ static hgrid_mesh mesh;
 /* Says stop at a call, counted from 0, and looks that there is none behind it. */
 typedef struct {
     size_t stop_at, calls;
-    float last;
+    uint32_t last;
     pthread_t thread;
 } watcher;
 
-static bool watch(void *context, float done)
+static bool watch(void *context, uint32_t done)
 {
     watcher *w = (watcher *)context;
     CHECK(pthread_equal(w->thread, pthread_self()));
     CHECK(w->calls <= w->stop_at);
-    CHECK(done >= 0 && done <= 1 && (w->calls == 0 ? done == 0 : done > w->last));
+    CHECK(done <= HGRID_PROGRESS_END && (w->calls == 0 ? done == 0 : done > w->last));
     w->last = done;
     return w->calls++ < w->stop_at;
 }
 
 static watcher watcher_of(size_t stop_at)
 {
-    const watcher w = {stop_at, 0, -1, pthread_self()};
+    const watcher w = {stop_at, 0, 0, pthread_self()};
     return w;
 }
 
@@ -54,7 +54,7 @@ static void every_call_may_cancel(const hgrid_config *plain, uint32_t tasks)
 
     EXPECT(HGRID_OK, hgrid_build(&mesh, &config, index, index_bytes, scratch, scratch_bytes, &grid,
                                  &report));
-    CHECK(w.last == 1 && w.calls > 2);
+    CHECK(w.last == HGRID_PROGRESS_END && w.calls > 2);
     const size_t calls = w.calls, bytes = (size_t)report.index_bytes;
     void *expected = guarded_copy(index, bytes);
 
@@ -62,7 +62,7 @@ static void every_call_may_cancel(const hgrid_config *plain, uint32_t tasks)
     w = watcher_of(calls - 1);
     EXPECT(HGRID_OK, hgrid_build(&mesh, &config, index, index_bytes, scratch, scratch_bytes, &grid,
                                  NULL));
-    CHECK(w.last == 1 && w.calls == calls);
+    CHECK(w.last == HGRID_PROGRESS_END && w.calls == calls);
     CHECK(memcmp(index, expected, bytes) == 0);
 
     for (size_t stop_at = 0; stop_at + 1 < calls; stop_at++) {
@@ -71,7 +71,7 @@ static void every_call_may_cancel(const hgrid_config *plain, uint32_t tasks)
         memset(index, 0xc7, index_bytes);
         EXPECT(HGRID_ERROR_CANCELLED, hgrid_build(&mesh, &config, index, index_bytes, scratch,
                                                   scratch_bytes, &grid, &report));
-        CHECK(w.last < 1 && w.calls == stop_at + 1);
+        CHECK(w.last < HGRID_PROGRESS_END && w.calls == stop_at + 1);
         CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
         CHECK(report.index_bytes == 0 && report.triangle == HGRID_INVALID_ID);
         /* What is left in the index is not mistaken for a grid, nor does it disturb the next one. */

@@ -69,9 +69,10 @@ static void closest(void)
 {
     for (int i = 0; i < RAYS; i += 20) {
         const hgrid_query_options all = options();
+        const hgrid_point_query query = anywhere(rays[i].origin);
         hgrid_closest found;
-        hgrid_closest_point(&grid, rays[i].origin, INFINITY, NULL, &found);
-        hgrid_closest_point(&grid, rays[i].origin, INFINITY, &all, &found);
+        hgrid_closest_point(&grid, &query, NULL, &found);
+        hgrid_closest_point(&grid, &query, &all, &found);
     }
 }
 

@@ -114,7 +114,7 @@ static void options_of_queries(void)
 {
     const hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
     const hgrid_ray ray = ray_down(0.5f, 0.5f);
-    const float point[3] = {0.5f, 0.5f, 1};
+    const hgrid_point_query query = {{0.5f, 0.5f, 1}, 5};
     const hgrid_coherence c = HGRID_COHERENCE_COHERENT;
     hgrid_hit hit;
     hgrid_closest closest;
@@ -128,7 +128,7 @@ static void options_of_queries(void)
     CHECK_VERSIONS(hgrid_occluder.options, hgrid_query_options, options,
                    found(hgrid_occluder(&grid, &ray, it) != HGRID_INVALID_ID));
     CHECK_VERSIONS(hgrid_closest_point.options, hgrid_query_options, options,
-                   found(hgrid_closest_point(&grid, point, 5, it, &closest)));
+                   found(hgrid_closest_point(&grid, &query, it, &closest)));
     CHECK_VERSIONS(hgrid_intersect_all.options, hgrid_query_options, options,
                    hgrid_intersect_all(&grid, &ray, it, &hit, 1, &count));
     CHECK_VERSIONS(hgrid_intersect_n.options, hgrid_query_options, options,

@@ -58,7 +58,8 @@ static void ask_about_rays(answers *a)
         CHECK(hgrid_intersect_all(&grid, &rays[i], &options, a->all[i], ROOM, &a->counts[i]) ==
               HGRID_OK);
         options.counters = &a->counters[2];
-        hgrid_closest_point(&grid, rays[i].origin, INFINITY, &options, &a->closest[i]);
+        const hgrid_point_query query = anywhere(rays[i].origin);
+        hgrid_closest_point(&grid, &query, &options, &a->closest[i]);
         filtering.counters = &a->counters[3];
         hgrid_intersect(&grid, &rays[i], &filtering, &a->filtered[i]);
     }

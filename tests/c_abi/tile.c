@@ -80,6 +80,8 @@ int main(void)
     if (light_of_rays(&masked, rays, 64, reject, &calls, dark) || dark[0] != 0 || calls != 36)
         return 15;
     mesh.masks = NULL;
+    if (distance_to(&grid, 1, 1, 2) != 2)
+        return 16;
 
     /* From the first triangle nothing is in the way of a light above; between the two is the first. */
     const float up[3] = {0, 0, 1}, down[3] = {0, 0, -1};

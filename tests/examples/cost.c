@@ -54,8 +54,9 @@ bool is_dark_behind_leaves(const hgrid_grid *grid, const hgrid_ray *ray,
 
 float distance(const hgrid_grid *grid, const float *point, float most)
 {
+    const hgrid_point_query query = {{point[0], point[1], point[2]}, most};
     hgrid_closest closest;
-    return hgrid_closest_point(grid, point, most, NULL, &closest) ? closest.distance : most;
+    return hgrid_closest_point(grid, &query, NULL, &closest) ? closest.distance : most;
 }
 
 size_t count_hits(const hgrid_grid *grid, const hgrid_ray *ray, hgrid_hit *hits, size_t capacity)

@@ -10,7 +10,9 @@ use hgrid_core::{
 
 use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
 use crate::batch::Batch;
-use crate::questions::{hgrid_counters, hgrid_hit, hgrid_query_options, hgrid_ray, verdict};
+use crate::questions::{
+    hgrid_counters, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, verdict,
+};
 use crate::span::Region;
 use crate::status::{
     HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,
@@ -195,14 +197,13 @@ pub(crate) unsafe fn query_all(
 /// That of [`grid`].
 pub(crate) unsafe fn closest(
     view: *const hgrid_grid,
-    point: *const f32,
-    max_distance: f32,
+    query: *const hgrid_point_query,
     asked: *const hgrid_query_options,
 ) -> Result<Option<ClosestPoint>, hgrid_status> {
     // SAFETY: this function's contract.
     let grid = unsafe { grid(view) }?;
-    // SAFETY: the caller's promise: three of them.
-    let point = unsafe { read(point.cast::<[f32; 3]>()) }?;
+    // SAFETY: the caller's promise.
+    let hgrid_point_query { point, max_distance } = unsafe { read(query) }?;
     let find = |options: &mut QueryOptions<'_>| grid.closest_point(point, max_distance, options);
     // SAFETY: the caller's promise.
     match unsafe { options(asked) }? {

@@ -48,7 +48,9 @@ use crate::status::{
     HGRID_ERROR_NOT_A_GRID, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,
     HGRID_ERROR_STRUCT_SIZE, HGRID_OK, hgrid_status, status_of,
 };
-use crate::types::{Elements, hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report, hgrid_task};
+use crate::types::{
+    Elements, HGRID_PROGRESS_END, hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report, hgrid_task,
+};
 
 /// The most bytes that a reference may span.
 const MAX_BYTES: usize = isize::MAX.unsigned_abs();
@@ -215,7 +217,7 @@ pub(crate) struct Caller {
     pub(crate) tasks: u32,
     context: *mut c_void,
     run: Option<unsafe extern "C" fn(*mut c_void, u32, hgrid_task, *mut c_void)>,
-    progress: Option<unsafe extern "C" fn(*mut c_void, f32) -> bool>,
+    progress: Option<unsafe extern "C" fn(*mut c_void, u32) -> bool>,
 }
 
 impl Caller {
@@ -239,7 +241,15 @@ impl Caller {
     }
 
     /// Tells how far a build is; `false` if the caller does not want the rest.
+    ///
+    /// Core's steps are larger than a thousandth, so the whole numbers grow as its shares do.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 0 to 1000, and what is not whole was not done yet"
+    )]
     pub(crate) fn progress(&self, done: f32) -> bool {
+        let done = (done * HGRID_PROGRESS_END as f32) as u32;
         // SAFETY: a function of this type by the caller's promise.
         self.progress.is_none_or(|progress| unsafe { progress(self.context, done) })
     }

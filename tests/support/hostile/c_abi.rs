@@ -94,7 +94,7 @@ pub(super) struct Control {
     run: Loop,
     /// How often progress says to go on.
     patience: u32,
-    done: Cell<f32>,
+    done: Cell<u32>,
     calls: Cell<u32>,
 }
 
@@ -112,10 +112,11 @@ unsafe extern "C" fn run_tasks(
 }
 
 /// Watches a build.
-unsafe extern "C" fn progress(context: *mut c_void, done: f32) -> bool {
+unsafe extern "C" fn progress(context: *mut c_void, done: u32) -> bool {
     // SAFETY: only ever given together with one.
     let control = unsafe { &*context.cast::<Control>() };
-    assert!(control.done.get() <= done && done <= 1.0, "{done} after {}", control.done.get());
+    let before = control.done.get();
+    assert!(before <= done && done <= HGRID_PROGRESS_END, "{done} after {before}");
     control.done.set(done);
     control.calls.set(control.calls.get() + 1);
     control.calls.get() <= control.patience
@@ -200,7 +201,7 @@ impl Caller<'_> {
         let chosen = shape::config(u)?;
         let patience = if rarely(u, 4)? { u8::arbitrary(u)?.into() } else { u32::MAX };
         let run = Loop::arbitrary(u)?;
-        let control = Control { run, patience, done: Cell::new(0.0), calls: Cell::new(0) };
+        let control = Control { run, patience, done: Cell::new(0), calls: Cell::new(0) };
         let control = Lent::new(control);
         let mut config = hgrid_config {
             struct_size: 0,
@@ -313,7 +314,7 @@ impl Caller<'_> {
         assert!(input.mesh.is_sound() && !to.is_null() && index_at % 64 == 0);
         let Control { done, calls, patience, .. } = &*input.control;
         let is_watched = !input.config.is_null() && input.config.value().progress.is_some();
-        assert!(!is_watched || done.get().to_bits() == 1.0_f32.to_bits());
+        assert!(!is_watched || done.get() == HGRID_PROGRESS_END);
         assert!(calls.get() <= patience.saturating_add(1), "went on when it was to stop");
         self.grid = grid;
         self.opened = Some(Opened {

@@ -160,22 +160,22 @@ impl Caller<'_> {
     pub(super) fn closest(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         for ray in self.rays(u)? {
             let point = ray.origin;
-            let to_point = if rarely(u, 48)? { null() } else { point.as_ptr() };
+            let query = hgrid_point_query { point, max_distance: ray.t_max };
+            let to_query = if rarely(u, 48)? { null() } else { &raw const query };
             let grid = self.view(u)?;
             let options = Options::new(u)?;
             let untouched =
                 hgrid_closest { position: [7.0; 3], distance: 7.0, u: 7.0, v: 7.0, primitive: 7 };
             let mut closest = untouched;
             let to = if rarely(u, 48)? { null_mut() } else { from_mut(&mut closest) };
-            let is_sound = !to_point.is_null() && !grid.is_null() && !to.is_null();
+            let is_sound = !to_query.is_null() && !grid.is_null() && !to.is_null();
             let core = self.core().filter(|_| is_sound && options.are_sound());
             let mut told = Told::default();
             let expected = core.and_then(|grid| {
                 options.ask(&mut told, 0, |options| grid.closest_point(point, ray.t_max, options))
             });
             // SAFETY: all pointers are NULL or point to what they should.
-            let is_found =
-                unsafe { hgrid_closest_point(grid, to_point, ray.t_max, options.as_ptr(), to) };
+            let is_found = unsafe { hgrid_closest_point(grid, to_query, options.as_ptr(), to) };
             assert_eq!(is_found, expected.is_some(), "{point:?} {}", ray.t_max);
             let hgrid_closest { position, distance, u, v, primitive } = closest;
             let written = ClosestPoint { position, distance, u, v, primitive };
