@@ -48,6 +48,7 @@ static void layout(void)
     OFFSET(hgrid_mesh, parts);
     OFFSET(hgrid_mesh, part_count);
     SIZE(hgrid_part);
+    OFFSET(hgrid_part, opaque);
     SIZE(hgrid_config);
     OFFSET(hgrid_config, struct_size);
     OFFSET(hgrid_config, method);
