@@ -2066,11 +2066,6 @@ const char *hgrid_version_string(void);
  */
 bool hgrid_has_method(uint32_t method);
 
-/**
- * The same where Rust 1.89 has no assembly or the object format has no weak symbols.
- */
-void rust_eh_personality(void);
-
 #ifdef __cplusplus
 }  /* extern "C" */
 #endif  /* __cplusplus */
