@@ -8,7 +8,7 @@ use std::io::{self, Write as _};
 use anyhow::{Context as _, Result, ensure};
 use comfy_table::{CellAlignment, Table, presets};
 use hgrid_core::{Config, Counters, TriangleMesh};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::cli::{Race, TableArgs};
 use crate::light::Lights;
@@ -37,7 +37,7 @@ pub fn run(args: &TableArgs) -> Result<()> {
 }
 
 /// Every number of a race over some scenes, and where they come from.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     /// Where the numbers come from.
     pub machine: Machine,
@@ -52,7 +52,7 @@ pub struct Results {
 }
 
 /// The numbers of all methods on one scene.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneResults {
     /// The scene.
     #[serde(flatten)]
