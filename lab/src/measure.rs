@@ -391,7 +391,7 @@ mod tests {
         assert!((300..900).contains(&hits), "{hits}");
         assert_eq!(measurements.len(), configs.len());
         for (m, config) in measurements.iter().zip(configs) {
-            assert_eq!((m.method, m.hits), (config.method.name(), hits as u64));
+            assert_eq!((&*m.method, m.hits), (config.method.name(), hits as u64));
             assert!(m.allocated_index_bytes >= m.index_bytes && m.peak_bytes >= m.index_bytes);
         }
     }

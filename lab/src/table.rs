@@ -97,9 +97,38 @@ impl Results {
     /// The same as Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let mut table = self.table(|title| format!("**{title}**"), "");
         let source = format!("{}. Command: `{}`.", self.machine.summary(), self.machine.command);
-        [markdown(&mut table, 1), self.notes().join(" "), source].join("\n\n")
+        [self.markdown_table(), source].join("\n\n")
+    }
+
+    /// The same as Markdown, without where the numbers come from.
+    #[must_use]
+    pub(crate) fn markdown_table(&self) -> String {
+        let mut table = self.table(|title| format!("**{title}**"), "");
+        [markdown(&mut table, 1), self.notes().join(" ")].join("\n\n")
+    }
+
+    /// Joins the scenes of races that were run one by one.
+    ///
+    /// # Errors
+    /// If there is none, or one has another size of pictures, other methods, or other repetitions.
+    pub(crate) fn merged(races: Vec<Self>) -> Result<Self> {
+        let mut races = races.into_iter();
+        let mut merged = races.next().context("no results")?;
+        let methods =
+            |scene: &SceneResults| scene.methods.iter().map(Measurement::title).collect::<Vec<_>>();
+        for race in races {
+            ensure!(
+                (race.size, race.repeats, race.threads)
+                    == (merged.size, merged.repeats, merged.threads),
+                "results of pictures, repetitions or threads that differ"
+            );
+            merged.scenes.extend(race.scenes);
+        }
+        let expected = merged.scenes.first().map(methods);
+        let are_equal = merged.scenes.iter().all(|scene| Some(methods(scene)) == expected);
+        ensure!(are_equal, "results of methods that differ");
+        Ok(merged)
     }
 
     /// The rows; `titled` makes a heading of the title of a group, and the others are indented.
