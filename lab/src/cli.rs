@@ -76,7 +76,7 @@ Examples:
   hgrid compare sponza.ply --view inside
   hgrid compare bunny.ply dragon.ply --markdown --json compare.json -o pictures
 
-This needs a program with the peers in it; lab/COMPARE.md tells how they are set up and measured:
+This needs a program with the peers in it; docs/performance.md tells how they are set up and measured:
   apt-get install libembree-dev g++
   RUSTFLAGS='-C target-cpu=native' cargo run --release -p hgrid-lab --features peers -- compare ...";
 
@@ -137,6 +137,8 @@ pub enum Command {
     /// Measures every method and other ray tracers, its peers, over the same rays
     #[command(after_help = [COMPARE_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Compare(CompareArgs),
+    /// Writes the tables and charts of README.md and docs/ from the results in lab/results
+    Report(ReportArgs),
     /// Builds once with one system: `compare` starts a new process for each first build
     #[command(name = FIRST_BUILD, hide = true)]
     FirstBuild(FirstBuildArgs),
@@ -303,6 +305,17 @@ pub struct CompareArgs {
     /// Draw charts into this folder, as SVG and PNG; it is made if it is missing
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+}
+
+/// Which pages to write.
+#[derive(Debug, Parser)]
+pub struct ReportArgs {
+    /// The root of a checkout
+    #[arg(default_value = ".")]
+    pub root: PathBuf,
+    /// Write nothing, and fail if a page is not what the results say
+    #[arg(long)]
+    pub check: bool,
 }
 
 /// What to build once.

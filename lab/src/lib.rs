@@ -9,6 +9,7 @@
 //!                                                   '-> figures: its charts, by plot
 //!       -> animate: the mesh deformed, built and rendered frame after frame
 //!       -> compare: hgrid and other structures, over the same rays
+//! results in JSON -> pages: the tables and charts of README.md and docs/
 //! ```
 
 #![deny(unsafe_code)]
@@ -23,6 +24,7 @@ pub mod image;
 pub mod light;
 pub mod machine;
 pub mod measure;
+pub mod pages;
 mod plot;
 pub mod progress;
 mod regions;

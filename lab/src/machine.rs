@@ -3,12 +3,13 @@
 use std::env;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 use std::time::SystemTime;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The machine, the compiler, the day and the words that a measurement was started with.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
     /// The processor's name, if the system tells, and on x86 its family and model: a virtual
     /// machine may say no more than whose it is.
@@ -19,6 +20,9 @@ pub struct Machine {
     pub large_pages: Option<String>,
     /// The compiler that this program was built with.
     pub rustc: String,
+    /// The commit of the checkout that the command was started in, `-dirty` if files differ from it.
+    #[serde(default)]
+    pub commit: Option<String>,
     /// The day, in UTC, as YYYY-MM-DD.
     pub date: String,
     /// The words of the command line; of the program's own path only the name.
@@ -39,6 +43,7 @@ impl Machine {
                 .ok()
                 .and_then(|text| chosen(&text)),
             rustc: rustc_version_runtime::version().to_string(),
+            commit: commit(),
             date: now,
             command: command(env::args()),
         }
@@ -53,6 +58,18 @@ impl Machine {
         let Self { system, rustc, date, .. } = self;
         format!("{cpu} (one thread), {system}{pages}, rustc {rustc}, {date}")
     }
+}
+
+/// The commit that the current folder is a checkout of, if it is one of hgrid.
+fn commit() -> Option<String> {
+    let git = |arguments: &[&str]| {
+        let output = Command::new("git").args(arguments).output().ok()?;
+        let text = String::from_utf8(output.stdout).ok().filter(|_| output.status.success())?;
+        Some(text.trim().to_owned())
+    };
+    let root = git(&["rev-parse", "--show-toplevel"])?;
+    let is_hgrid = Path::new(&root).join("include/hgrid.h").is_file();
+    is_hgrid.then(|| git(&["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]))?
 }
 
 /// The word in brackets among those of a kernel's setting.

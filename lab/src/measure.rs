@@ -20,11 +20,12 @@
 //! to the grid, as a renderer does, shades them, and moves the progress bar. Trees trace them
 //! together, the others one by one. The work is counted in a pass of its own, ray by ray.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{Config, Counters, Grid, Hit, Method, QueryOptions, Ray, TriangleMesh};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::light::Lights;
 use crate::progress::Progress;
@@ -35,7 +36,7 @@ use crate::threads::Threads;
 use crate::tiles::{TILE_RAYS, Tiles, intersect};
 
 /// A scene as the paper's Table 1 describes it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneFacts {
     /// The scene's name.
     pub scene: String,
@@ -61,10 +62,10 @@ impl SceneFacts {
 }
 
 /// What a method took for a picture of a scene.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// The structure.
-    pub method: &'static str,
+    pub method: Cow<'static, str>,
     /// Cells per triangle that were asked for, where the method has such a number.
     pub configured_density: Option<f32>,
     /// Cells per triangle that the grid was built for: fewer where it would hold too many ids.
@@ -134,7 +135,7 @@ impl Measurement {
     fn titled(&self, density: Option<f32>) -> String {
         match density {
             Some(density) => format!("{}, density {density}", self.method),
-            None => self.method.to_owned(),
+            None => self.method.clone().into_owned(),
         }
     }
 }
@@ -313,7 +314,7 @@ fn numbers(
     let has_density = config.method.has_density();
     let (build_seconds, render_seconds) = (median(builds), median(renders));
     Measurement {
-        method: grid.method().name(),
+        method: grid.method().name().into(),
         configured_density: has_density.then_some(config.density),
         density: has_density.then(|| grid.density()),
         resolution: grid.resolution(),
@@ -390,7 +391,7 @@ mod tests {
         assert!((300..900).contains(&hits), "{hits}");
         assert_eq!(measurements.len(), configs.len());
         for (m, config) in measurements.iter().zip(configs) {
-            assert_eq!((m.method, m.hits), (config.method.name(), hits as u64));
+            assert_eq!((&*m.method, m.hits), (config.method.name(), hits as u64));
             assert!(m.allocated_index_bytes >= m.index_bytes && m.peak_bytes >= m.index_bytes);
         }
     }

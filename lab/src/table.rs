@@ -8,7 +8,7 @@ use std::io::{self, Write as _};
 use anyhow::{Context as _, Result, ensure};
 use comfy_table::{CellAlignment, Table, presets};
 use hgrid_core::{Config, Counters, TriangleMesh};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::cli::{Race, TableArgs};
 use crate::light::Lights;
@@ -37,7 +37,7 @@ pub fn run(args: &TableArgs) -> Result<()> {
 }
 
 /// Every number of a race over some scenes, and where they come from.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     /// Where the numbers come from.
     pub machine: Machine,
@@ -52,7 +52,7 @@ pub struct Results {
 }
 
 /// The numbers of all methods on one scene.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneResults {
     /// The scene.
     #[serde(flatten)]
@@ -97,9 +97,38 @@ impl Results {
     /// The same as Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let mut table = self.table(|title| format!("**{title}**"), "");
         let source = format!("{}. Command: `{}`.", self.machine.summary(), self.machine.command);
-        [markdown(&mut table, 1), self.notes().join(" "), source].join("\n\n")
+        [self.markdown_table(), source].join("\n\n")
+    }
+
+    /// The same as Markdown, without where the numbers come from.
+    #[must_use]
+    pub(crate) fn markdown_table(&self) -> String {
+        let mut table = self.table(|title| format!("**{title}**"), "");
+        [markdown(&mut table, 1), self.notes().join(" ")].join("\n\n")
+    }
+
+    /// Joins the scenes of races that were run one by one.
+    ///
+    /// # Errors
+    /// If there is none, or one has another size of pictures, other methods, or other repetitions.
+    pub(crate) fn merged(races: Vec<Self>) -> Result<Self> {
+        let mut races = races.into_iter();
+        let mut merged = races.next().context("no results")?;
+        let methods =
+            |scene: &SceneResults| scene.methods.iter().map(Measurement::title).collect::<Vec<_>>();
+        for race in races {
+            ensure!(
+                (race.size, race.repeats, race.threads)
+                    == (merged.size, merged.repeats, merged.threads),
+                "results of pictures, repetitions or threads that differ"
+            );
+            merged.scenes.extend(race.scenes);
+        }
+        let expected = merged.scenes.first().map(methods);
+        let are_equal = merged.scenes.iter().all(|scene| Some(methods(scene)) == expected);
+        ensure!(are_equal, "results of methods that differ");
+        Ok(merged)
     }
 
     /// The rows; `titled` makes a heading of the title of a group, and the others are indented.

@@ -2,6 +2,7 @@
 
 mod blobs;
 mod bounds;
+mod format;
 mod inputs;
 mod joined;
 mod mixed;

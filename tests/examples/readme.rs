@@ -5,8 +5,10 @@ use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
-use hgrid_tests::artefact::{bare_compiler, library_dir, root, run};
-use hgrid_tests::tools::OPTIONAL;
+use hgrid_tests::artefact::{
+    bare_compiler, compiler, cpp_compiler, library_dir, root, run, static_library, warnings,
+};
+use hgrid_tests::tools::{OPTIONAL, skip};
 use tempfile::TempDir;
 
 fn page(name: &str) -> String {
@@ -24,7 +26,7 @@ fn block<'a>(readme: &'a str, language: &str) -> (&'a str, &'a str) {
 fn its_c_program_prints_the_hit() {
     let readme = page("README.md");
     let (program, behind) = block(&readme, "c");
-    assert!(program.lines().count() <= 40);
+    assert!(program.lines().count() <= 16);
     let (commands, _) = block(behind, "sh");
     let commands: Vec<_> = commands.lines().collect();
     // The library is there already, and the last line has a test of its own.
@@ -45,6 +47,54 @@ fn its_c_program_prints_the_hit() {
     assert_eq!(String::from_utf8(printed.stdout).as_deref(), Ok("hit at t = 1\n"));
 }
 
+/// The first program of a page and what is said to come of it.
+fn program_of(page: &str, language: &str) -> (String, String) {
+    let page = self::page(page);
+    let (program, behind) = block(&page, language);
+    (program.to_owned(), block(behind, "text").0.to_owned())
+}
+
+/// Compiles a program of a page with the library, and returns what it prints.
+fn printed(program: &str, mut compiler: Command, name: &str) -> String {
+    let dir = TempDir::new().expect("a folder");
+    fs::write(dir.path().join(name), program).expect("a file");
+    let compiler = compiler.arg("-I").arg(root().join("include")).arg(name);
+    run(compiler.arg(static_library()).args(["-o", "program"]).current_dir(dir.path()));
+    let printed = run(&mut Command::new(dir.path().join("program"))).stdout;
+    String::from_utf8(printed).expect("text")
+}
+
+#[test]
+fn the_programs_of_docs_print_what_they_say() {
+    let (program, expected) = program_of("docs/c.md", "c");
+    assert_eq!(printed(&program, warnings(compiler("c99"), "c99"), "prog.c"), expected);
+    let (program, expected) = program_of("docs/cpp.md", "cpp");
+    if let Some(compiler) = cpp_compiler("c++17") {
+        assert_eq!(printed(&program, compiler, "prog.cpp"), expected);
+    } else {
+        skip("no C++ compiler for docs/cpp.md");
+    }
+}
+
+/// A stranger reads one page, and no wall of text.
+#[test]
+fn the_readme_is_short() {
+    let readme = page("README.md");
+    assert!(readme.lines().count() <= 130, "{} lines", readme.lines().count());
+    let mut is_code = false;
+    let mut length = 0;
+    for line in readme.lines() {
+        is_code ^= line.starts_with("```");
+        let is_text = !is_code && !line.is_empty() && !line.starts_with(['|', '-', '#', '<', '`']);
+        length = if is_text { length + 1 } else { 0 };
+        assert!(length <= 5, "a paragraph of more than five lines ends with: {line}");
+    }
+    assert!(page("core/DESIGN.md").lines().count() <= 200);
+    let rejected = page("core/REJECTED.md");
+    let entries = rejected.lines().filter(|line| line.starts_with("- ")).count();
+    assert!(rejected.lines().count() <= entries + 6, "one line each");
+}
+
 /// Each has a row in the table of tests/README.md, and `.ci/run` leaves out all but make once.
 #[test]
 fn programs_that_may_be_missing_are_listed() {
@@ -62,16 +112,46 @@ fn programs_that_may_be_missing_are_listed() {
     assert_eq!(list.split(',').collect::<Vec<_>>(), without);
 }
 
+/// The pages of the project: those at its root, in docs, and in the folders.
+fn pages() -> impl Iterator<Item = String> {
+    let docs = fs::read_dir(root().join("docs")).expect("docs").map(|entry| {
+        let name = entry.expect("an entry").file_name().into_string().expect("a name in UTF-8");
+        format!("docs/{name}")
+    });
+    let docs = docs.filter(|name| Path::new(name).extension().is_some_and(|e| e == "md"));
+    let others = ["README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"];
+    let folders =
+        ["core/DESIGN.md", "core/REJECTED.md", "tests/README.md", "lab/results/README.md"];
+    others.into_iter().chain(folders).map(str::to_owned).chain(docs)
+}
+
 #[test]
 fn the_files_that_pages_name_are_there() {
-    let folders = ["core", "capi", "include", "c_examples", "tests", "lab", ".ci"];
-    for name in ["README.md", "core/DESIGN.md", "tests/README.md", "lab/results/README.md"] {
-        let page = page(name);
-        let words = page.split(|c: char| c.is_whitespace() || "`()|:;,".contains(c));
+    let folders = ["core", "capi", "include", "c_examples", "tests", "lab", "docs", ".ci"];
+    for name in pages() {
+        let page = page(&name);
+        let words = page.split(|c: char| c.is_whitespace() || "`()|:;,[]".contains(c));
         for word in words.map(|word| word.trim_end_matches('.')) {
             let is_path = folders.iter().any(|folder| word.starts_with(&format!("{folder}/")));
             assert!(!is_path || Path::exists(&root().join(word)), "{name} names {word}");
             assert!(!word.starts_with('@'), "{name} has a gap: {word}");
         }
     }
+}
+
+/// Links go to files, from the folder of the page.
+#[test]
+fn links_lead_somewhere() {
+    let mut count = 0;
+    for name in pages() {
+        let folder = Path::new(&name).parent().expect("a folder");
+        let page = page(&name);
+        for link in page.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let path = link.split('#').next().unwrap_or_default();
+            let is_elsewhere = path.contains("://") || path.is_empty();
+            assert!(is_elsewhere || root().join(folder).join(path).exists(), "{name}: {link}");
+            count += 1;
+        }
+    }
+    assert!(count > 15);
 }

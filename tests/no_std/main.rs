@@ -86,7 +86,7 @@ fn a_microcontroller_gets_a_static_library() {
 }
 
 /// Links what programs need of the archive, and of nothing else, as the linker would for them, and
-/// compares it with a row of the README's table.
+/// compares it with a row of the table in docs/embedded.md.
 fn check_flash(row: &str, archive: &Path) {
     let host = rustc("host-tuple");
     let linker = rustlib(&host).join("bin/rust-lld");

@@ -1,4 +1,4 @@
-//! How large is a program with the library in it? The README says so.
+//! How large is a program with the library in it? docs/embedded.md says so.
 
 use std::fs;
 use std::path::Path;
@@ -9,9 +9,9 @@ use hgrid_tests::tools::skip;
 use tempfile::TempDir;
 
 #[test]
-fn minimal_is_as_small_as_the_readme_says() {
+fn minimal_is_as_small_as_the_page_says() {
     if !cfg!(all(target_arch = "x86_64", target_os = "linux")) {
-        skip("the README has the size for x86-64 Linux");
+        skip("docs/embedded.md has the size for x86-64 Linux");
         return;
     }
     check_sizes(["stripped: ", " bytes, of which "], measure());

@@ -1,18 +1,20 @@
-//! Sizes that the README says and a test measures: a library that grows without anybody noticing
+//! Sizes that docs/embedded.md says and a test measures: a library that grows without anybody noticing
 //! does not stay one that a small machine can carry.
 
 use std::fs;
 
 use crate::artefact::root;
 
-/// Checks that the README says each of these sizes, to a tenth, behind the words for it, one after
+const PAGE: &str = "docs/embedded.md";
+
+/// Checks that the page says each of these sizes, to a tenth, behind the words for it, one after
 /// the other. With `HGRID_BLESS` it writes them there.
 ///
 /// # Panics
 /// If it says something else, or lacks the words.
 pub fn check_sizes<const N: usize>(words: [&str; N], sizes: [u64; N]) {
-    let path = root().join("README.md");
-    let readme = fs::read_to_string(&path).expect("README.md");
+    let path = root().join(PAGE);
+    let readme = fs::read_to_string(&path).expect(PAGE);
     let is_blessed = std::env::var_os("HGRID_BLESS").is_some();
     let (mut blessed, mut rest) = (String::new(), readme.as_str());
     for (words, is) in words.into_iter().zip(sizes) {
@@ -21,12 +23,12 @@ pub fn check_sizes<const N: usize>(words: [&str; N], sizes: [u64; N]) {
         let said: u64 = behind[..end].parse().expect("a number");
         assert!(
             is_blessed || is.abs_diff(said) <= said / 10,
-            "{words}{said} in the README, now {is}: HGRID_BLESS=1 writes it anew"
+            "{words}{said} in {PAGE}, now {is}: HGRID_BLESS=1 writes it anew"
         );
         blessed = format!("{blessed}{before}{words}{is}");
         rest = &behind[end..];
     }
     if is_blessed {
-        fs::write(path, blessed + rest).expect("README.md can be written");
+        fs::write(path, blessed + rest).expect("a page that can be written");
     }
 }

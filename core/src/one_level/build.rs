@@ -14,7 +14,7 @@
 //! The number of references has no bound in the number of triangles: a million triangles that each
 //! span the scene would fill every cell a million times. [`reference_limit`] is the promise that
 //! this does not happen: a mesh that would need more is built with half the density, again and
-//! again until it fits. Scans never come near it (core/DESIGN.md has the numbers).
+//! again until it fits. Scans never come near it.
 
 use super::displacement::displace;
 use super::layout::{Layout, Scratch};

@@ -23,7 +23,7 @@ use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
 
 /// How far back from the end of the table a row looks for holes.
 ///
-/// More finds more holes and takes longer; lab/results/displacement.md has the sweep.
+/// More finds more holes and takes longer; core/DESIGN.md says how it was chosen.
 const WINDOW_SLOTS: usize = 2048;
 
 /// Finds an offset for every row and returns the number of slots, or `None` beyond `i32::MAX`.

@@ -15,7 +15,7 @@
 //!
 //! The paper names no threshold. 16 is the largest number that divides cells of every scan, with
 //! the tests per ray that the paper reports; no number makes a single picture sooner than no
-//! subgrids (lab/results/subdivision.md has the sweep).
+//! subgrids (core/DESIGN.md).
 
 mod build;
 mod subgrid;

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Everything but the peers is compiled always; the peers are behind the feature of that name,
-//! because they need libraries of the system. lab/COMPARE.md says how each is set up and measured.
+//! because they need libraries of the system. docs/performance.md says how each is set up and measured.
 
 pub mod agreement;
 mod charts;

@@ -54,13 +54,13 @@ impl Quantity {
         let methods = scene.methods.iter();
         match self {
             Self::Seconds(_, time) => methods
-                .map(|m| Bar { color: color_of(m.method), amount: time(m), peak: time(m) })
+                .map(|m| Bar { color: color_of(&m.method), amount: time(m), peak: time(m) })
                 .collect(),
             Self::Memory => {
                 let mesh = mebibytes(scene.facts.scene_bytes);
                 let mesh = Bar { color: MUTED, amount: mesh, peak: mesh };
                 let methods = methods.map(|m| Bar {
-                    color: color_of(m.method),
+                    color: color_of(&m.method),
                     amount: mebibytes(m.index_bytes),
                     peak: mebibytes(m.peak_bytes),
                 });
@@ -88,7 +88,7 @@ impl Drawing for Figure<'_> {
     fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B> {
         let Results { machine, size, repeats, threads, scenes } = self.0;
         let methods = scenes.first().map(|scene| &*scene.methods).unwrap_or_default();
-        let legend = methods.iter().map(|m| (m.title(), color_of(m.method)));
+        let legend = methods.iter().map(|m| (m.title(), color_of(&m.method)));
         let legend: Vec<_> = legend.chain([("mesh".to_owned(), MUTED)]).collect();
         let title = format!("Memory and times, {size} x {size} rays");
         let built = match threads {

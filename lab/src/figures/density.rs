@@ -1,12 +1,14 @@
 //! Figure 1: build, render and time to image against density, one chart for each method.
 
+use std::borrow::Cow;
+
 use anyhow::{Context as _, Result, bail, ensure};
 use hgrid_core::Config;
 use plotters::coord::ranged1d::Ranged as _;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::cli::FiguresArgs;
 use crate::machine::Machine;
@@ -20,7 +22,7 @@ use crate::scene::Scene;
 use crate::table::{display_name, measure_diffuse, times};
 
 /// What one scene takes at every density, for every method.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Curves {
     machine: Machine,
     size: u16,
@@ -31,9 +33,9 @@ pub(super) struct Curves {
 }
 
 /// What one method takes at every density.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Curve {
-    method: &'static str,
+    method: Cow<'static, str>,
     default_density: f32,
     points: Vec<Measurement>,
 }
@@ -64,7 +66,7 @@ impl Curves {
 
         let curves = methods.iter().zip(numbers.chunks(args.densities.len()));
         let curves = curves.map(|(config, points)| Curve {
-            method: config.method.name(),
+            method: config.method.name().into(),
             default_density: config.density,
             points: points.to_vec(),
         });
@@ -169,7 +171,7 @@ impl Curve {
         pen: Pen,
         axes: (Stops, Scale),
     ) -> AreaResult<B> {
-        let words = Words { title: self.method, x: "density (cells per triangle)", y: "seconds" };
+        let words = Words { title: &self.method, x: "density (cells per triangle)", y: "seconds" };
         let x = f64::from(self.default_density).log2();
         let range = axes.1.range();
         let is_shown = axes.0.range.contains(&x);

@@ -16,7 +16,7 @@ use plotters::prelude::RGBColor;
 use serde::Serialize;
 
 use crate::cli::FiguresArgs;
-use crate::plot::{COLORS, Drawing, save};
+use crate::plot::{COLORS, Drawing, save, svg};
 use crate::table::Results;
 
 /// Measures, draws and writes.
@@ -36,6 +36,23 @@ pub fn run(args: &FiguresArgs) -> Result<()> {
     let names = ["figure1", "figure2"].map(|name| folder.join(name).display().to_string());
     writeln!(io::stdout(), "wrote {} as .svg, .png and .json", names.join(" and "))?;
     Ok(())
+}
+
+/// Draws figure 1 from the JSON file that the command wrote, as SVG.
+///
+/// # Errors
+/// If the file is none, and those of drawing.
+pub(crate) fn figure1(json: &str) -> Result<String> {
+    let curves: density::Curves = serde_json::from_str(json).context("no numbers of figure 1")?;
+    svg(&density::Figure(&curves))
+}
+
+/// Draws figure 2 from the numbers of a table, as SVG.
+///
+/// # Errors
+/// Those of drawing.
+pub(crate) fn figure2(results: &Results) -> Result<String> {
+    svg(&bars::Figure(results))
 }
 
 fn write(

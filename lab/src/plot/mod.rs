@@ -118,7 +118,11 @@ pub(crate) fn save(drawing: &impl Drawing, folder: &Path, name: &str) -> Result<
     image::write_png(&path.with_extension("png"), size, &pixels)
 }
 
-fn svg(drawing: &impl Drawing) -> Result<String> {
+/// The drawing as SVG.
+///
+/// # Errors
+/// Those of drawing.
+pub(crate) fn svg(drawing: &impl Drawing) -> Result<String> {
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, drawing.size()).into_drawing_area();

@@ -39,6 +39,7 @@ pub enum Peer {
     /// obvhs, its preset for very slow builds, eight-wide
     ObvhsSlow,
     /// bvh, its only builder
+    #[value(name = "bvh-crate")]
     Bvh,
     /// parry3d, binned
     ParryBinned,
@@ -59,7 +60,7 @@ impl Peer {
             Self::Tinybvh8Hq => "tinybvh8-hq",
             Self::ObvhsFast => "obvhs-fast",
             Self::ObvhsSlow => "obvhs-slow",
-            Self::Bvh => "bvh",
+            Self::Bvh => "bvh-crate", // A method of hgrid is `bvh`.
             Self::ParryBinned => "parry-binned",
             Self::ParryPloc => "parry-ploc",
         }
@@ -124,12 +125,17 @@ pub fn systems(_: &[Peer]) -> Result<Vec<Box<dyn System>>> {
 
 #[cfg(test)]
 mod tests {
+    use hgrid_core::Method;
+
     use super::*;
 
     #[test]
-    fn names_are_those_of_the_command_line() {
+    fn names_are_those_of_the_command_line_and_of_no_method() {
         for peer in Peer::value_variants() {
             assert_eq!(peer.to_possible_value().unwrap().get_name(), peer.name());
+            // A first build is started by name.
+            let is_method = |method: &Method| method.name() == peer.name();
+            assert!(!Method::ALL.iter().any(is_method), "{peer:?}");
         }
     }
 

@@ -1,0 +1,168 @@
+//! Tables from what `hgrid compare` wrote: hgrid beside other libraries.
+
+use comfy_table::{Cell, CellAlignment, Table};
+use serde::Deserialize;
+
+use crate::machine::Machine;
+use crate::measure::ratio;
+use crate::table::{count, display_name, markdown, seconds};
+
+/// A file of `hgrid compare --json`, as much of it as tables show.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub(super) struct Comparison {
+    machine: Machine,
+    scenes: Vec<Scene>,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Scene {
+    scene: String,
+    triangles: usize,
+    systems: Vec<System>,
+    ratios: Vec<Ratio>,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct System {
+    system: String,
+    is_peer: bool,
+    first_build: Build,
+    rebuild: Build,
+    index_bytes: u64,
+    peak_bytes: u64,
+    runs: Vec<Run>,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Build {
+    seconds: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Run {
+    workload: String,
+    mode: String,
+    seconds: f64,
+    rays: u64,
+    differing: u64,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Ratio {
+    what: String,
+    hgrid: String,
+    value: f64,
+    peer: String,
+    peer_value: f64,
+    ratio: f64,
+    least: f64,
+    most: f64,
+}
+
+/// The workloads, in the order of columns.
+const WORKLOADS: [&str; 6] = ["primary", "ao", "bounce", "random", "near", "far"];
+
+/// The scenes of all files, with the names that columns have: a named view is part of it.
+fn scenes(files: &[Comparison]) -> impl Iterator<Item = (String, &Scene)> {
+    files.iter().flat_map(|file| {
+        let mut words = file.machine.command.split(' ');
+        let view = words.find(|word| *word == "--view").and_then(|_| words.next());
+        let view = view.map(|view| format!(", {view}")).unwrap_or_default();
+        file.scenes
+            .iter()
+            .map(move |scene| (format!("{}{view}", display_name(&scene.scene)), scene))
+    })
+}
+
+/// A row for each ratio, a column for each scene: the medians.
+pub(super) fn ratios(files: &[Comparison]) -> String {
+    let columns = scenes(files).map(|(name, scene)| format!("{name} {}", count(scene.triangles)));
+    let mut table = table("hgrid's default / peer", columns);
+    let rows = scenes(files).next().map(|(_, scene)| &*scene.ratios).unwrap_or_default();
+    for row in rows {
+        let cells = scenes(files).map(|(_, scene)| {
+            let ratio = scene.ratios.iter().find(|ratio| ratio.what == row.what);
+            ratio.map_or_else(String::new, |ratio| format!("{:.2}", ratio.ratio))
+        });
+        table.add_row(core::iter::once(row.what.clone()).chain(cells));
+    }
+    markdown(&mut table, 1)
+}
+
+/// A table for each scene: the ratios with their least and most, and what they are ratios of.
+pub(super) fn ratios_in_full(files: &[Comparison]) -> String {
+    let tables = scenes(files).map(|(name, scene)| {
+        let columns = ["ratio", "least to most", "hgrid", "peer", "modes"].map(str::to_owned);
+        let mut table = table(&format!("{name}, {}", count(scene.triangles)), columns);
+        for Ratio { what, hgrid, value, peer, peer_value, ratio, least, most } in &scene.ratios {
+            let is_exact = what.contains("bytes");
+            let number = |value: f64| {
+                if is_exact { format!("{value:.1}") } else { format!("{} s", seconds(value)) }
+            };
+            table.add_row([
+                what.clone(),
+                format!("{ratio:.2}"),
+                if is_exact { String::new() } else { format!("{least:.2} to {most:.2}") },
+                number(*value),
+                number(*peer_value),
+                format!("{hgrid} / {peer}"),
+            ]);
+        }
+        markdown(&mut table, 1)
+    });
+    tables.collect::<Vec<_>>().join("\n\n")
+}
+
+/// A table for each scene: builds, bytes and the fastest mode of every workload, for each structure.
+pub(super) fn systems(files: &[Comparison]) -> String {
+    let tables = scenes(files).map(|(name, scene)| {
+        let columns = ["first build", "rebuild", "index", "peak"];
+        let columns = columns.into_iter().chain(WORKLOADS).map(str::to_owned);
+        let mut table = table(&format!("{name}, {}", count(scene.triangles)), columns);
+        for system in &scene.systems {
+            let triangles = scene.triangles as u64;
+            let times = [&system.first_build, &system.rebuild];
+            let times = times.map(|build| nanoseconds(build.seconds, triangles));
+            let bytes = [system.index_bytes, system.peak_bytes];
+            let bytes = bytes.map(|bytes| format!("{:.1}", ratio(bytes, triangles)));
+            let cells = WORKLOADS.into_iter().map(|workload| system.fastest(workload));
+            let name = &system.system;
+            let name = if system.is_peer { name.clone() } else { format!("hgrid {name}") };
+            let name = core::iter::once(name);
+            table.add_row(name.chain(times).chain(bytes).chain(cells));
+        }
+        markdown(&mut table, 1)
+    });
+    tables.collect::<Vec<_>>().join("\n\n")
+}
+
+impl System {
+    /// Nanoseconds a ray in the fastest mode whose answers are right, and that mode.
+    fn fastest(&self, workload: &str) -> String {
+        let runs = self.runs.iter().filter(|run| run.workload == workload);
+        // The rule of the ratios: no more than one answer in a thousand differs.
+        let right = runs.filter(|run| run.differing * 1000 <= run.rays);
+        let fastest = right.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        fastest.map_or_else(String::new, |run| {
+            format!("{} {}", nanoseconds(run.seconds, run.rays), run.mode)
+        })
+    }
+}
+
+fn nanoseconds(seconds: f64, of: u64) -> String {
+    match 1e9 * seconds / ratio(of, 1) {
+        ns if ns >= 100.0 => format!("{ns:.0}"),
+        ns => format!("{ns:.1}"),
+    }
+}
+
+/// A table with a column of words, then of numbers.
+fn table(title: &str, columns: impl IntoIterator<Item = String>) -> Table {
+    let mut table = Table::new();
+    let header = core::iter::once(title.to_owned()).chain(columns);
+    table.set_header(header.map(Cell::new).collect::<Vec<_>>());
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}

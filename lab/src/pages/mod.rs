@@ -1,0 +1,214 @@
+//! The `report` command: writes the tables and charts of pages from results in JSON.
+//!
+//! ```text
+//! <!-- hgrid report KIND FILE... -->     FILE: what a command wrote with --json
+//! (a table, or the line that shows a chart)
+//! <!-- end of report -->
+//! ```
+//!
+//! So a number in a page is one that a file has, and measuring again is a new file and one command.
+//! Paths are relative to the root of a checkout. Charts are written beside the page.
+
+mod compared;
+mod paper;
+
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail, ensure};
+use serde::de::DeserializeOwned;
+
+use crate::cli::ReportArgs;
+use crate::figures;
+use crate::machine::Machine;
+use crate::table::Results;
+use paper::Paper;
+
+/// The pages with tables of results.
+const PAGES: [&str; 3] = ["README.md", "docs/performance.md", "docs/paper.md"];
+
+const BEGIN: &str = "<!-- hgrid report ";
+const END: &str = "<!-- end of report -->";
+
+/// Writes the tables of all pages, or tells which differ from the results.
+///
+/// # Errors
+/// If a page or a result cannot be read, a marker is wrong, or pages differ and were only to be checked.
+pub fn run(args: &ReportArgs) -> Result<()> {
+    let stale = stale(&args.root)?;
+    let mut out = io::stdout();
+    if args.check {
+        let names: Vec<_> = stale.iter().map(|file| file.name.clone()).collect();
+        ensure!(
+            names.is_empty(),
+            "not what the results say: {}; run `hgrid report`",
+            names.join(", ")
+        );
+        return Ok(writeln!(out, "all pages say what the results say")?);
+    }
+    for File { name, text } in &stale {
+        let path = args.root.join(name);
+        fs::write(&path, text).with_context(|| format!("cannot write `{}`", path.display()))?;
+        writeln!(out, "wrote {name}")?;
+    }
+    Ok(())
+}
+
+/// A file as it should be.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct File {
+    /// Its path below the root.
+    name: String,
+    text: String,
+}
+
+/// Returns the files that are not what they should be.
+fn stale(root: &Path) -> Result<Vec<File>> {
+    let mut files = Vec::new();
+    for page in PAGES {
+        let path = root.join(page);
+        let text = fs::read_to_string(&path)
+            .with_context(|| format!("cannot read `{}`: is it a checkout?", path.display()))?;
+        let text = fill(root, page, &text, &mut files).with_context(|| page.to_owned())?;
+        files.push(File { name: page.to_owned(), text });
+    }
+    files
+        .retain(|file| fs::read_to_string(root.join(&file.name)).ok().as_ref() != Some(&file.text));
+    Ok(files)
+}
+
+/// Returns a page with the text between its markers made anew; charts go to `files`.
+fn fill(root: &Path, page: &str, text: &str, files: &mut Vec<File>) -> Result<String> {
+    let (mut filled, mut rest) = (String::new(), text);
+    while let Some((before, behind)) = rest.split_once(BEGIN) {
+        let (words, behind) = behind.split_once(" -->\n").context("a marker does not end")?;
+        let (_, behind) = behind.split_once(END).with_context(|| format!("no end of `{words}`"))?;
+        let block = Block { root, page, words: words.split(' ').collect() };
+        let made = block.make(files).with_context(|| format!("`{words}`"))?;
+        filled += &format!("{before}{BEGIN}{words} -->\n{made}\n{END}");
+        rest = behind;
+    }
+    Ok(filled + rest)
+}
+
+/// A marker of a page.
+struct Block<'a> {
+    root: &'a Path,
+    page: &'a str,
+    /// The kind, then the files.
+    words: Vec<&'a str>,
+}
+
+impl Block<'_> {
+    fn make(&self, files: &mut Vec<File>) -> Result<String> {
+        let (kind, names) = self.words.split_first().context("no kind")?;
+        ensure!(!names.is_empty(), "no files");
+        match *kind {
+            "ratios" => Ok(compared::ratios(&self.read(names)?)),
+            "ratios-in-full" => Ok(compared::ratios_in_full(&self.read(names)?)),
+            "systems" => Ok(compared::systems(&self.read(names)?)),
+            "table1" => Ok(Results::merged(self.read(names)?)?.markdown_table()),
+            "beside-the-paper" => {
+                let [paper, names @ ..] = names else { bail!("no files") };
+                let paper: Paper = self.read_one(paper)?;
+                paper.beside(&Results::merged(self.read(names)?)?)
+            }
+            "figure1" => self.chart(&figures::figure1(&self.text(names)?)?, "figure1", files),
+            "figure2" => {
+                let results = Results::merged(self.read(names)?)?;
+                self.chart(&figures::figure2(&results)?, "figure2", files)
+            }
+            "sources" => self.sources(names),
+            _ => bail!("there is no such kind of table"),
+        }
+    }
+
+    /// Puts a chart beside the page, and returns the line that shows it.
+    fn chart(&self, svg: &str, name: &str, files: &mut Vec<File>) -> Result<String> {
+        let folder = Path::new(self.page).parent().unwrap_or(Path::new(""));
+        let path: PathBuf = folder.join(name).with_extension("svg");
+        let path = path.to_str().context("a path that is no text")?;
+        files.push(File { name: path.to_owned(), text: svg.to_owned() });
+        Ok(format!("![{name}]({name}.svg)"))
+    }
+
+    /// Says where the numbers come from, a line for each file.
+    fn sources(&self, names: &[&str]) -> Result<String> {
+        #[derive(serde::Deserialize)]
+        struct Source {
+            machine: Machine,
+        }
+        let lines = names.iter().map(|name| {
+            let Source { machine } = self.read_one(name)?;
+            let commit = machine.commit.as_ref().map(|commit| format!(", commit {commit}"));
+            let commit = commit.unwrap_or_default();
+            Ok(format!("- {name}: {}{commit}. `{}`", machine.summary(), machine.command))
+        });
+        Ok(lines.collect::<Result<Vec<_>>>()?.join("\n"))
+    }
+
+    fn read<T: DeserializeOwned>(&self, names: &[&str]) -> Result<Vec<T>> {
+        names.iter().map(|name| self.read_one(name)).collect()
+    }
+
+    fn read_one<T: DeserializeOwned>(&self, name: &str) -> Result<T> {
+        serde_json::from_str(&self.text(&[name])?).with_context(|| format!("cannot read `{name}`"))
+    }
+
+    fn text(&self, names: &[&str]) -> Result<String> {
+        let [name] = names else { bail!("one file, not {}", names.len()) };
+        fs::read_to_string(self.root.join(name)).with_context(|| format!("cannot read `{name}`"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn root() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+    }
+
+    #[test]
+    fn the_pages_say_what_the_results_say() {
+        let stale: Vec<_> = stale(&root()).unwrap().into_iter().map(|file| file.name).collect();
+        assert!(stale.is_empty(), "`cargo run --release -- report` writes {stale:?}");
+    }
+
+    #[test]
+    fn every_page_has_a_table() {
+        for page in PAGES {
+            assert!(fs::read_to_string(root().join(page)).unwrap().contains(BEGIN), "{page}");
+        }
+    }
+
+    #[test]
+    fn what_is_between_markers_is_replaced_and_nothing_else() {
+        let name = "lab/results/paper.json";
+        let page = |text: &str| format!("a\n{BEGIN}KIND {name} -->\n{text}{END}\nb\n");
+        let fill = |text: &str| fill(&root(), "docs/page.md", text, &mut Vec::new());
+        assert_eq!(fill("no markers\n").unwrap(), "no markers\n");
+        let error = format!("{:#}", fill(&page("old\n")).unwrap_err());
+        assert!(error.contains("no such kind"), "{error}");
+        let sources = |text: &str| page(text).replace("KIND", "sources");
+        let filled = fill(&sources("old\n")).unwrap();
+        assert!(filled.starts_with("a\n") && filled.ends_with("\nb\n"), "{filled}");
+        assert!(filled.contains(name) && !filled.contains("old"), "{filled}");
+        assert_eq!(fill(&filled).unwrap(), filled);
+    }
+
+    #[test]
+    fn wrong_markers_are_errors() {
+        for (text, words) in [
+            (format!("{BEGIN}ratios"), "does not end"),
+            (format!("{BEGIN}ratios a.json -->\n"), "no end"),
+            (format!("{BEGIN}ratios a.json -->\n{END}"), "a.json"),
+            (format!("{BEGIN}ratios -->\n{END}"), "no files"),
+            (format!("{BEGIN}ratios README.md -->\n{END}"), "README.md"),
+        ] {
+            let error = fill(&root(), "docs/page.md", &text, &mut Vec::new()).unwrap_err();
+            assert!(format!("{error:#}").contains(words), "{error:#}");
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The paper's Table 1 beside ours.
+
+use anyhow::{Result, ensure};
+use comfy_table::{Cell, CellAlignment, Table};
+use serde::Deserialize;
+
+use crate::measure::Measurement;
+use crate::table::{Results, count, display_name, markdown, seconds};
+
+/// lab/results/paper.json: the paper's numbers.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub(super) struct Paper {
+    scenes: Vec<String>,
+    methods: Vec<Method>,
+}
+
+/// A method's rows, a number for each scene.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Method {
+    method: String,
+    primitive_tests_per_ray: Vec<f64>,
+    cell_steps_per_ray: Vec<f64>,
+    grid_steps_per_ray: Vec<f64>,
+    build_seconds: Vec<f64>,
+    render_seconds: Vec<f64>,
+    time_to_image_seconds: Vec<f64>,
+}
+
+/// A row of a method: its name, the paper's numbers, ours, and how they are written.
+type Row = (&'static str, fn(&Method) -> &[f64], fn(&Measurement) -> f64, fn(f64) -> String);
+
+const ROWS: [Row; 6] = [
+    ("tests / ray", |p| &p.primitive_tests_per_ray, |m| m.primitive_tests_per_ray, two_places),
+    ("cell steps / ray", |p| &p.cell_steps_per_ray, |m| m.cell_steps_per_ray, two_places),
+    ("grid steps / ray", |p| &p.grid_steps_per_ray, |m| m.grid_steps_per_ray, two_places),
+    ("build (s)", |p| &p.build_seconds, |m| m.build_seconds, seconds),
+    ("render (s)", |p| &p.render_seconds, |m| m.render_seconds, seconds),
+    ("time to image (s)", |p| &p.time_to_image_seconds, |m| m.time_to_image_seconds, seconds),
+];
+
+fn two_places(number: f64) -> String {
+    format!("{number:.2}")
+}
+
+impl Paper {
+    /// A table with our numbers, and the paper's in brackets. Scenes match by their order.
+    pub(super) fn beside(&self, results: &Results) -> Result<String> {
+        ensure!(
+            results.scenes.len() == self.scenes.len(),
+            "the paper has {} scenes, these results {}",
+            self.scenes.len(),
+            results.scenes.len()
+        );
+        let mut table = Table::new();
+        let columns = results.scenes.iter().zip(&self.scenes).map(|(scene, paper)| {
+            let (name, count) = (display_name(&scene.facts.scene), count(scene.facts.triangles));
+            if name == *paper { format!("{name} {count}") } else { format!("{name} ({paper})") }
+        });
+        let header = ["", ""].map(str::to_owned).into_iter().chain(columns);
+        table.set_header(header.map(Cell::new).collect::<Vec<_>>());
+        for column in table.column_iter_mut().skip(2) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        for (name, theirs, ours, words) in ROWS {
+            for (place, paper) in self.methods.iter().enumerate() {
+                let cells = results.scenes.iter().enumerate().map(|(column, scene)| {
+                    let ours = scene.methods.iter().find(|m| m.method == paper.method).map(ours);
+                    let theirs = theirs(paper).get(column).copied();
+                    let [ours, theirs] = [ours, theirs].map(|n| n.map(words).unwrap_or_default());
+                    format!("{ours} (*{theirs}*)")
+                });
+                let name = if place == 0 { format!("**{name}**") } else { String::new() };
+                table.add_row([name, paper.method.clone()].into_iter().chain(cells));
+            }
+        }
+        Ok(markdown(&mut table, 2))
+    }
+}
