@@ -210,29 +210,11 @@ impl fmt::Display for Error {
             Self::MethodLeftOut(method) => {
                 write!(f, "this library has no method {0}: turn on its feature {0}", method.name())
             }
-            Self::OtherContent(Content::Triangles) => {
-                f.write_str("the blob is a grid of triangles: open it as a grid")
-            }
-            Self::OtherContent(Content::Shapes) => {
-                f.write_str("the blob is a tree of shapes: open it as shapes")
-            }
-            Self::OtherContent(Content::Instances) => {
-                f.write_str("the blob is a scene of instances: open it as a scene")
-            }
-            Self::InstanceWithoutObject { instance } => {
-                write!(f, "instance {instance} names an object that there is not")
-            }
-            Self::InstanceWithoutInverse { instance } => write!(
-                f,
-                "the matrix of instance {instance} is singular or not finite, or takes its object beyond {:e}",
-                crate::MAX_COORDINATE
-            ),
-            Self::MissingObjects { needed, available } => {
-                write!(f, "the scene needs {needed} objects and was given {available}")
-            }
-            Self::TooDeep => {
-                write!(f, "more than {} scenes stand inside one another", crate::MAX_NESTING)
-            }
+            Self::OtherContent(_)
+            | Self::InstanceWithoutObject { .. }
+            | Self::InstanceWithoutInverse { .. }
+            | Self::MissingObjects { .. }
+            | Self::TooDeep => self.describe_scene(f),
             Self::MethodRemoved => {
                 f.write_str("the grid was built with the method brick, which was removed: build it again")
             }
@@ -271,6 +253,38 @@ impl fmt::Display for Error {
                 f.write_str("only a tree can be refitted, and only without a packed mesh")
             }
             Self::Corrupt { offset } => write!(f, "the grid is damaged at byte {offset}"),
+        }
+    }
+}
+
+impl Error {
+    /// What is wrong with shapes or scenes.
+    fn describe_scene(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OtherContent(Content::Triangles) => {
+                f.write_str("the blob is a grid of triangles: open it as a grid")
+            }
+            Self::OtherContent(Content::Shapes) => {
+                f.write_str("the blob is a tree of shapes: open it as shapes")
+            }
+            Self::OtherContent(Content::Instances) => {
+                f.write_str("the blob is a scene of instances: open it as a scene")
+            }
+            Self::InstanceWithoutObject { instance } => {
+                write!(f, "instance {instance} names an object that there is not")
+            }
+            Self::InstanceWithoutInverse { instance } => write!(
+                f,
+                "the matrix of instance {instance} is singular or not finite, or takes its object beyond {:e}",
+                crate::MAX_COORDINATE
+            ),
+            Self::MissingObjects { needed, available } => {
+                write!(f, "the scene needs {needed} objects and was given {available}")
+            }
+            Self::TooDeep => {
+                write!(f, "more than {} scenes stand inside one another", crate::MAX_NESTING)
+            }
+            _ => Ok(()),
         }
     }
 }

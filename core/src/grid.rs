@@ -406,7 +406,7 @@ impl<'a> Grid<'a> {
         if !HAS_BVH {
             return;
         }
-        if narrow.origin.map(f64::from) == ray.origin {
+        if narrow.origin.map(|c| f64::from(c).to_bits()) == ray.origin.map(f64::to_bits) {
             return self.search_tree(bvh, narrow, ray.t_min, Cull::None, search, tally);
         }
         let bounds = &self.lattice.bounds();

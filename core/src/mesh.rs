@@ -162,7 +162,12 @@ impl<'a> TriangleMesh<'a> {
     #[cfg(feature = "alloc")]
     pub(crate) const EMPTY: Self = {
         let none = Strided { bytes: &[], stride: 0, count: 0 };
-        Self { positions: none, indices: none, layout: Layout::Indexed(IndexType::U32), masks: none }
+        Self {
+            positions: none,
+            indices: none,
+            layout: Layout::Indexed(IndexType::U32),
+            masks: none,
+        }
     };
 
     /// Says in one line what it is.
@@ -585,7 +590,9 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     fn vertex(&self, vertex: usize) -> Option<[f32; 3]> {
         let b = match self.layout {
-            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => self.positions.element::<12>(vertex)?,
+            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => {
+                self.positions.element::<12>(vertex)?
+            }
             Layout::Boxes(_) => {
                 let corners = self.positions.element::<BOX_BYTES>(vertex / 2)?.as_chunks::<12>().0;
                 corners.get(vertex % 2)?

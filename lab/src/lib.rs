@@ -14,6 +14,8 @@
 
 #![deny(unsafe_code)]
 
+extern crate alloc;
+
 pub mod animate;
 pub mod camera;
 pub mod cli;

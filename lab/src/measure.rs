@@ -20,7 +20,7 @@
 //! to the grid, as a renderer does, shades them, and moves the progress bar. Trees trace them
 //! together, the others one by one. The work is counted in a pass of its own, ray by ray.
 
-use std::borrow::Cow;
+use alloc::borrow::Cow;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};

@@ -273,7 +273,7 @@ fn filters_see_the_hits_of_the_scene() {
         let built = Built::scene(&instances, objects, &Config::default()).unwrap();
         let scene = built.open(objects).unwrap();
         let alone = Alone::new(&instances, objects);
-        let keeps = |hit: &SceneHit, number: u32| (hit.primitive + number) % 3 == 0;
+        let keeps = |hit: &SceneHit, number: u32| (hit.primitive + number).is_multiple_of(3);
         let mut random = Random(14);
         let mut changed = 0;
         for round in 0..300 {

@@ -1,7 +1,7 @@
 //! Damaged scenes: opening and asking end, and what `validate` accepts answers as the scene that was built.
 
 use hgrid_core::{Config, Grid, Object, RayF64, Scene, SceneHit};
-use hgrid_tests::copy::{CHECKSUM, Copy};
+use hgrid_tests::copy::Copy;
 use hgrid_tests::meshes::ball;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
@@ -73,7 +73,6 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
         assert!(!same || found == expected, "round {round}");
     }
     assert!(opened > 1000 && accepted > 10, "{opened} opened, {accepted} accepted");
-    assert!(CHECKSUM < 128);
     // Every truncation is refused.
     for length in (0..bytes.len()).step_by(13) {
         let copy = Copy::of(&bytes[..length]);

@@ -246,6 +246,7 @@ impl Caller {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
         reason = "from 0 to 1000, and what is not whole was not done yet"
     )]
     pub(crate) fn progress(&self, done: f32) -> bool {

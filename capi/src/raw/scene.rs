@@ -127,12 +127,12 @@ unsafe fn apart<const N: usize>(
 /// The caller's promise.
 unsafe fn write_shapes(
     to: NonNull<hgrid_shapes>,
-    shapes: Shapes<'static>,
+    shapes: &Shapes<'static>,
     description: &hgrid_boxes,
 ) {
     let hgrid_boxes { test, context, .. } = *description;
     // SAFETY: large enough and aligned as the assertions above say.
-    unsafe { write(to.cast(), Tested { tag: SHAPES_TAG, shapes, test, context }) }
+    unsafe { write(to.cast(), Tested { tag: SHAPES_TAG, shapes: *shapes, test, context }) }
 }
 
 /// The shapes of a view.
@@ -176,7 +176,7 @@ pub(crate) unsafe fn build_shapes(
     report.skipped_count = built.skipped_count();
     report.reference_count = built.count() - built.skipped_count();
     // SAFETY: the caller's promise.
-    unsafe { write_shapes(to, built, &description) };
+    unsafe { write_shapes(to, &built, &description) };
     Ok(())
 }
 
@@ -198,7 +198,7 @@ pub(crate) unsafe fn open_shapes(
     let blob = unsafe { bytes(blob, blob_bytes) }?;
     let opened = Shapes::open(blob, boxes).map_err(status_of)?;
     // SAFETY: the caller's promise.
-    unsafe { write_shapes(to, opened, &description) };
+    unsafe { write_shapes(to, &opened, &description) };
     Ok(())
 }
 
@@ -226,7 +226,7 @@ pub(crate) unsafe fn refit_shapes(
     report.note(&refitted);
     let opened = refitted.and_then(|_| Shapes::open(blob, boxes)).map_err(status_of)?;
     // SAFETY: the caller's promise.
-    unsafe { write_shapes(to, opened, &description) };
+    unsafe { write_shapes(to, &opened, &description) };
     Ok(())
 }
 
@@ -327,9 +327,9 @@ unsafe fn instances(
 ///
 /// # Safety
 /// The caller's promise.
-unsafe fn write_scene(to: NonNull<hgrid_scene>, scene: Scene<'static>) {
+unsafe fn write_scene(to: NonNull<hgrid_scene>, scene: &Scene<'static>) {
     // SAFETY: large enough and aligned as the assertions above say.
-    unsafe { write(to.cast(), SceneView { tag: SCENE_TAG, scene }) }
+    unsafe { write(to.cast(), SceneView { tag: SCENE_TAG, scene: *scene }) }
 }
 
 /// The scene of a view.
@@ -376,7 +376,7 @@ pub(crate) unsafe fn build_scene(
     report.note_built(built.blob(), Scene::bound(built.instance_count(), &config));
     report.reference_count = built.instance_count();
     // SAFETY: the caller's promise.
-    unsafe { write_scene(to, built) };
+    unsafe { write_scene(to, &built) };
     Ok(())
 }
 
@@ -395,7 +395,7 @@ pub(crate) unsafe fn open_scene(
     let blob = unsafe { bytes(blob, blob_bytes) }?;
     let opened = Scene::open(blob, objects).map_err(status_of)?;
     // SAFETY: the caller's promise.
-    unsafe { write_scene(to, opened) };
+    unsafe { write_scene(to, &opened) };
     Ok(())
 }
 
@@ -424,7 +424,7 @@ pub(crate) unsafe fn refit_scene(
     report.note(&refitted);
     let opened = refitted.and_then(|_| Scene::open(blob, objects)).map_err(status_of)?;
     // SAFETY: the caller's promise.
-    unsafe { write_scene(to, opened) };
+    unsafe { write_scene(to, &opened) };
     Ok(())
 }
 

@@ -56,11 +56,14 @@ fn rows(mesh: &TriangleMesh<'_>, id: u32) -> [Row; 2] {
     [*first, *last]
 }
 
+/// A 2^40th.
+const PAD: f32 = 1.0 / (1_048_576.0 * 1_048_576.0);
+
 /// What sides of boxes are moved out by, on the ray's way: a 2^40th of the scene, which times the steepest inverse
 /// is far behind the scene.
 #[inline(always)]
 pub(super) fn pad_of(bounds: &Aabb) -> f32 {
-    (bounds.size().max_element() * (1.0 / (1_u64 << 40) as f32)).max(f32::MIN_POSITIVE)
+    (bounds.size().max_element() * PAD).max(f32::MIN_POSITIVE)
 }
 
 /// Which boxes of a leaf a ray meets before its end, as bits, and where it enters each, box by box: for

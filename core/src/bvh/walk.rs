@@ -248,8 +248,7 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
         );
         let wide = wide.as_ref().map(core::hint::black_box);
         let flips = flips_of(slab);
-        let mut end = slab.end;
-        let mut top = 0;
+        let (mut end, mut top) = (slab.end, 0);
         // Damaged bytes may lead in circles; a tree's nodes are entered once.
         let mut budget = bvh.budget();
         let mut child = Child::Inner(0);
@@ -317,32 +316,13 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
             budget = rest;
             tally.cell_step();
             tally.primitive_tests(ids.len());
-            if F::OF_BOXES {
-                let pad = pad_of(bounds);
-                let (mut met, near) = match wide {
-                    Some(ray) => ray.meet_leaf(simd, mesh, ids, flips, pad, end),
-                    None => meet_leaf(slab, mesh, ids, pad, end),
-                };
-                // Offer the shapes, the nearest first, that do not begin behind the end of the ray.
-                while met != 0 {
-                    let lane = nearest_of(met, &near);
-                    met &= !(1 << lane);
-                    let Some(&id) = ids.get(lane) else { break };
-                    let is_behind = near[lane % WIDTH] > end;
-                    if is_behind {
-                        break;
-                    }
-                    match search.offer(id) {
-                        Outcome::Unchanged => {}
-                        Outcome::EndsAt(t) => end = slab.latest(t),
-                        Outcome::Done => return true,
-                    }
-                }
-                let Some(next) = pop(bvh, stack, &mut top, end) else { return true };
-                child = next;
-                continue;
-            }
             let mut survivors = match wide {
+                _ if F::OF_BOXES
+                    && offer_leaf(simd, wide, slab, mesh, ids, bounds, &mut end, *search) =>
+                {
+                    return true;
+                }
+                _ if F::OF_BOXES => 0,
                 Some(ray) => ray.survivors(simd, bvh, mesh, first, ids),
                 None => filter.survivors(mesh, ids),
             };
@@ -363,6 +343,42 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
             child = next;
         }
     }
+}
+
+/// Offers a search the shapes of a leaf whose boxes the ray meets, the nearest first, and moves the end of the
+/// ray; returns true once the search is over.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "a part of the walk, with its variables")]
+fn offer_leaf<S: Simd, F: Search>(
+    simd: S,
+    wide: Option<&Wide<S>>,
+    slab: &Slab,
+    mesh: &TriangleMesh<'_>,
+    ids: &[u32],
+    bounds: &Aabb,
+    end: &mut f32,
+    search: &mut F,
+) -> bool {
+    let pad = pad_of(bounds);
+    let (mut met, near) = match wide {
+        Some(ray) => ray.meet_leaf(simd, mesh, ids, flips_of(slab), pad, *end),
+        None => meet_leaf(slab, mesh, ids, pad, *end),
+    };
+    while met != 0 {
+        let lane = nearest_of(met, &near);
+        met &= !(1 << lane);
+        let Some(&id) = ids.get(lane) else { break };
+        let is_behind = near[lane % WIDTH] > *end;
+        if is_behind {
+            break;
+        }
+        match search.offer(id) {
+            Outcome::Unchanged => {}
+            Outcome::EndsAt(t) => *end = slab.latest(t),
+            Outcome::Done => return true,
+        }
+    }
+    false
 }
 
 /// Pushes a child behind those of the same node that begin farther away. `near` is the bits of a distance: a

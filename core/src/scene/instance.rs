@@ -86,14 +86,13 @@ impl Placed {
         let linear = instance.linear.map(|row| row.map(f64::from));
         let inverse = inverse_of(&linear)?.map(|row| row.map(round));
         let rounded = inverse.map(|row| row.map(f64::from));
+        let [a, b, c] = rounded;
         for (row, line) in linear.iter().enumerate() {
-            for column in 0..3 {
-                let product: f64 = (0..3).map(|k| line[k] * rounded[k][column]).sum();
-                let expected = if row == column { 1.0 } else { 0.0 };
-                let is_near = (product - expected).abs() <= RESIDUE;
-                if !is_near {
-                    return None;
-                }
+            let mut product = [0, 1, 2].map(|k| line[0] * a[k] + line[1] * b[k] + line[2] * c[k]);
+            product[row] -= 1.0;
+            let is_near = product.iter().all(|residue| residue.abs() <= RESIDUE);
+            if !is_near {
+                return None;
             }
         }
         Some(Self(Instance { linear: inverse, ..*instance }))
@@ -168,7 +167,7 @@ fn grown((min, max): &([f32; 3], [f32; 3])) -> ([f64; 3], [f64; 3]) {
     let mut half = [0, 1, 2].map(|axis| 0.5 * (max[axis] - min[axis]));
     let largest = |[x, y, z]: [f64; 3]| greater(x, greater(y, z));
     let growth = (largest(center.map(f64::abs)) + 2.0 * largest(half)) * GROWTH;
-    half.iter_mut().for_each(|half| *half += growth);
+    half = half.map(|half| half + growth);
     (center, half)
 }
 

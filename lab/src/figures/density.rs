@@ -1,6 +1,6 @@
 //! Figure 1: build, render and time to image against density, one chart for each method.
 
-use std::borrow::Cow;
+use alloc::borrow::Cow;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use hgrid_core::Config;

@@ -15,6 +15,7 @@ pub(super) struct Comparison {
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
+#[expect(clippy::struct_field_names, reason = "the names in the results")]
 struct Scene {
     scene: String,
     triangles: usize,
@@ -23,6 +24,7 @@ struct Scene {
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
+#[expect(clippy::struct_field_names, reason = "the names in the results")]
 struct System {
     system: String,
     is_peer: bool,
@@ -48,6 +50,7 @@ struct Run {
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
+#[expect(clippy::struct_field_names, reason = "the names in the results")]
 struct Ratio {
     what: String,
     hgrid: String,

@@ -12,6 +12,7 @@
 mod compared;
 mod paper;
 
+use core::fmt::Write as _;
 use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -86,7 +87,7 @@ fn fill(root: &Path, page: &str, text: &str, files: &mut Vec<File>) -> Result<St
         let (_, behind) = behind.split_once(END).with_context(|| format!("no end of `{words}`"))?;
         let block = Block { root, page, words: words.split(' ').collect() };
         let made = block.make(files).with_context(|| format!("`{words}`"))?;
-        filled += &format!("{before}{BEGIN}{words} -->\n{made}\n{END}");
+        write!(filled, "{before}{BEGIN}{words} -->\n{made}\n{END}")?;
         rest = behind;
     }
     Ok(filled + rest)

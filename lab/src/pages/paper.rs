@@ -16,6 +16,7 @@ pub(super) struct Paper {
 
 /// A method's rows, a number for each scene.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
+#[expect(clippy::struct_field_names, reason = "the names in the results")]
 struct Method {
     method: String,
     primitive_tests_per_ray: Vec<f64>,
