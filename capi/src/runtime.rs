@@ -100,6 +100,7 @@ mod arm {
         u64::from(quotient as u32) | u64::from(rest as u32) << 32
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
     extern "C" fn quotient(dividend: u32, divisor: u32) -> u32 {
         both(dividend, divisor) as u32
     }
