@@ -46,6 +46,14 @@ impl<'a> Boxes<'a> {
     /// # Errors
     /// [`Error::InvalidMesh`] of the positions if the stride is below 24 or the bytes end before the last box;
     /// [`Error::TooManyTriangles`].
+    ///
+    /// ```
+    /// use hgrid_core::{Boxes, Error, Strided};
+    /// // A sphere behind its box.
+    /// let spheres: [[f32; 10]; 1] = [[-1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]];
+    /// assert_eq!(Boxes::strided(Strided::new(&spheres))?.count(), 1);
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn strided(boxes: Strided<'a>) -> Result<Self, Error> {
         Ok(Self(TriangleMesh::of_boxes(boxes, Content::Shapes)?))
     }
@@ -235,6 +243,24 @@ impl<'a> Shapes<'a> {
     }
 
     /// Whether any shape is hit.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let boxes = [[-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]];
+    /// # let boxes = Boxes::new(&boxes)?;
+    /// # let config = Config::default();
+    /// # let sizes = Shapes::sizes(&boxes, &config, &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let shapes = Shapes::build(boxes, &config, index, scratch)?;
+    /// // The middle of each box is in the way, whatever its shape.
+    /// let mut middle = |_, _: &Ray| Some(ShapeHit { t: 2.0, u: 0.0, v: 0.0 });
+    /// let ray = Ray::new([0.0, 0.0, 2.0], [0.0, 0.0, -1.0]);
+    /// assert!(shapes.occluded(&ray, &mut middle));
+    /// assert!(!shapes.occluded(&Ray { t_max: 1.5, ..ray }, &mut middle));
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn occluded(&self, ray: &Ray, test: &mut ShapeTest<'_>) -> bool {
         self.occluded_with(ray, &mut QueryOptions::default(), test)
     }

@@ -52,6 +52,14 @@ impl Instance {
     }
 
     /// An object moved by a matrix of three rows and four columns, the last of which is the translation.
+    ///
+    /// ```
+    /// use hgrid_core::Instance;
+    /// // The third object of a scene, twice as large, and ten units along x.
+    /// let matrix = [[2.0, 0.0, 0.0, 10.0], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, 0.0]];
+    /// let instance = Instance { id: 7, ..Instance::with_transform(2, matrix) };
+    /// assert_eq!((instance.object, instance.translation), (2, [10.0, 0.0, 0.0]));
+    /// ```
     #[must_use]
     pub fn with_transform(object: u32, [a, b, c]: [[f32; 4]; 3]) -> Self {
         let row = |[x, y, z, _]: [f32; 4]| [x, y, z];

@@ -85,18 +85,72 @@ impl fmt::Debug for SceneOptions<'_> {
 
 impl Scene<'_> {
     /// The closest hit of a ray. Where several are equally close, that of the first instance, then of the lowest id.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let config = Config::default();
+    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
+    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
+    /// # let scratch = Block::bytes_mut(&mut scratch);
+    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
+    /// # let objects = [Object::Grid(&grid)];
+    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    /// let hit = scene.intersect(&RayF64::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0]));
+    /// assert_eq!(hit.map(|hit| (hit.t, hit.path[0], hit.primitive)), Some((1.0, 0, 0)));
+    /// # Ok::<(), Error>(())
+    /// ```
     #[must_use]
     pub fn intersect(&self, ray: &RayF64) -> Option<SceneHit> {
         self.intersect_with(ray, &mut SceneOptions::default())
     }
 
     /// Whether anything is hit.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let config = Config::default();
+    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
+    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
+    /// # let scratch = Block::bytes_mut(&mut scratch);
+    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
+    /// # let objects = [Object::Grid(&grid)];
+    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    /// assert!(scene.occluded(&RayF64::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0])));
+    /// # Ok::<(), Error>(())
+    /// ```
     #[must_use]
     pub fn occluded(&self, ray: &RayF64) -> bool {
         self.occluded_with(ray, &mut SceneOptions::default())
     }
 
     /// [`intersect`](Self::intersect) with options.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let config = Config::default();
+    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
+    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
+    /// # let scratch = Block::bytes_mut(&mut scratch);
+    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
+    /// # let objects = [Object::Grid(&grid)];
+    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    /// let ray = RayF64::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0]);
+    /// let mut options = SceneOptions { cull: Cull::Front, ..SceneOptions::default() };
+    /// assert_eq!(scene.intersect_with(&ray, &mut options), None);
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn intersect_with(&self, ray: &RayF64, options: &mut SceneOptions<'_>) -> Option<SceneHit> {
         self.ask(0, ray, options, false)
     }

@@ -182,6 +182,27 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// [`Error::MissingObjects`] if instances name more objects than there are; [`Error::TooDeep`];
     /// [`Error::OtherContent`] for a blob that is no scene; those of [`Grid::open`].
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let config = Config::default();
+    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
+    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
+    /// # let scratch = Block::bytes_mut(&mut scratch);
+    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
+    /// # let objects = [Object::Grid(&grid)];
+    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    /// let mut copy = vec![Block::ZERO; Block::count_for(scene.blob().len())];
+    /// Block::bytes_mut(&mut copy)[..scene.blob().len()].copy_from_slice(scene.blob());
+    ///
+    /// let scene = Scene::open(Block::bytes(&copy), &objects)?;
+    /// assert_eq!(scene.instance_count(), 1);
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn open(blob: &'a [u8], objects: &'a [Object<'a>]) -> Result<Self, Error> {
         check_alignment(blob, Region::Index)?;
         let header = Header::peek(blob)?;
@@ -259,6 +280,32 @@ impl<'a> Scene<'a> {
     /// [`Error::MeshMismatch`] for another number of instances; those of [`open`](Self::open), after which the
     /// scene is as it was. After [`Error::InstanceWithoutObject`], [`Error::InstanceWithoutInverse`] and
     /// [`Error::Corrupt`] it holds nothing of use.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let config = Config::default();
+    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
+    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
+    /// # let scratch = Block::bytes_mut(&mut scratch);
+    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
+    /// # let objects = [Object::Grid(&grid)];
+    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    /// let blob = scene.blob();
+    /// # let mut copy = vec![Block::ZERO; Block::count_for(blob.len())];
+    /// # Block::bytes_mut(&mut copy)[..blob.len()].copy_from_slice(blob);
+    /// # let index = Block::bytes_mut(&mut copy);
+    /// // The instance moves up, and rays find it there.
+    /// let moved = [Instance { translation: [0.0, 0.0, 5.0], ..Instance::new(0) }];
+    /// Scene::refit(index, &moved, &objects)?;
+    /// let scene = Scene::open(index, &objects)?;
+    /// let hit = scene.intersect(&RayF64::new([0.25, 0.25, 6.0], [0.0, 0.0, -1.0]));
+    /// assert_eq!(hit.map(|hit| hit.t), Some(1.0));
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn refit(
         index: &mut [u8],
         instances: &[Instance],
