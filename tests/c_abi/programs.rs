@@ -209,7 +209,7 @@ fn no_thread_gets_in_the_way_of_another() {
     }
 }
 
-/// The header promises 7 KiB for a ray or a point, 36 KiB for a batch, 17 KiB for a build, 96 KiB
+/// The header promises 7 KiB for a ray or a point, 36 KiB for a batch, 18 KiB for a build, 96 KiB
 /// for one with tasks and 13 KiB for a task.
 #[test]
 fn queries_and_builds_take_little_stack() {
@@ -225,7 +225,7 @@ fn queries_and_builds_take_little_stack() {
     }
     // The buffers alone are 128 rays and 128 hits.
     assert!((128 * 48..36 << 10).contains(&most("many")), "many: {}", most("many"));
-    assert!((2000..17 << 10).contains(&most("build")), "build: {}", most("build"));
+    assert!((2000..18 << 10).contains(&most("build")), "build: {}", most("build"));
     // There is room for 64 of them.
     assert!((20 << 10..96 << 10).contains(&most("tasks")), "tasks: {}", most("tasks"));
     assert!((500..13 << 10).contains(&most("task")), "task: {}", most("task"));
