@@ -1787,7 +1787,7 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * index reaches and then go on counting: the report's `index_bytes` is exact (with bvh maybe
  * only enough), and with so many the same call succeeds.
  *
- * A build allocates nothing and needs at most 17 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
+ * A build allocates nothing and needs at most 18 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
  * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 13
  * KiB where it is called; all beside what `run` and `progress` take (measured on x86-64).
  *
