@@ -2576,8 +2576,8 @@ hgrid_status hgrid_object_grid(const struct hgrid_grid *grid,
  * Makes an object of a tree of shapes, which brings its test.
  *
  * The test gets the ray as the object sees it, in the object's space, with a direction and a range of its own, and answers
- * for that ray. Any number of threads may call it at once. No argument may be NULL. Returns what `hgrid_object_grid`
- * returns.
+ * for that ray. Any number of threads may call it at once. No argument may be NULL. Returns `HGRID_OK`, or what
+ * `hgrid_object_grid` returns.
  *
  * Threads: any number of calls at once.
  *
@@ -2588,8 +2588,8 @@ hgrid_status hgrid_object_shapes(const struct hgrid_shapes *shapes,
                                  struct hgrid_object *object);
 
 /**
- * Makes an object of a scene, to be shown in another one. No argument may be NULL. Returns what `hgrid_object_grid`
- * returns.
+ * Makes an object of a scene, to be shown in another one. No argument may be NULL. Returns `HGRID_OK`, or what
+ * `hgrid_object_grid` returns.
  *
  * Threads: any number of calls at once.
  *
@@ -2711,7 +2711,7 @@ hgrid_status hgrid_refit_scene(const struct hgrid_instance *instances,
  * Proves that a scene is one of its objects, in `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch: the tree and the
  * box of every instance. The objects have proofs of their own.
  *
- * `scene` may not be NULL, `scratch` only if it has no bytes. Returns what `hgrid_validate_shapes` returns.
+ * `scene` may not be NULL, `scratch` only if it has no bytes. Returns `HGRID_OK`, or what `hgrid_validate_shapes` returns.
  *
  * Threads: any number of calls and queries on the same scene at once, each with scratch of its own.
  *

@@ -15,7 +15,7 @@ class told {
 public:
     explicit told(const asked &how) : filter_{how.seen}
     {
-        options_.mask(how.of->mask).cull(hgrid::culling{how.of->cull}).skip(how.of->skip);
+        options_.mask(how.of->mask).cull(static_cast<hgrid::culling>(how.of->cull)).skip(how.of->skip);
         if (how.counters != nullptr)
             options_.count(*how.counters);
         if (how.of->rule != 0)
@@ -28,7 +28,7 @@ private:
         offers *seen;
         hgrid::verdict operator()(std::size_t place, const hgrid::hit &hit) const
         {
-            return hgrid::verdict{offer(seen, place, &hit)};
+            return static_cast<hgrid::verdict>(offer(seen, place, &hit));
         }
     };
     filter filter_;
@@ -41,7 +41,7 @@ std::vector<hgrid::memory> blobs;
 
 hgrid::config config_of(const hgrid_config &c)
 {
-    hgrid::config config(hgrid::method{c.method});
+    hgrid::config config(static_cast<hgrid::method>(c.method));
     return config.density(c.density)
         .quality(static_cast<hgrid::quality>(c.quality))
         .macrocell_factor(c.macrocell_factor)
@@ -56,8 +56,10 @@ hgrid::mesh mesh_from(const hgrid_mesh &m)
     if (m.position_stride != 0)
         return hgrid::mesh(m);
     using corners = std::array<std::uint32_t, 3>;
-    const hgrid::span vertices(static_cast<const hgrid::point *>(m.positions), m.vertex_count);
-    const hgrid::span triangles(static_cast<const corners *>(m.indices), m.triangle_count);
+    const hgrid::span<const hgrid::point> vertices(static_cast<const hgrid::point *>(m.positions),
+                                                   m.vertex_count);
+    const hgrid::span<const corners> triangles(static_cast<const corners *>(m.indices),
+                                               m.triangle_count);
     hgrid::mesh mesh(vertices, triangles);
     if (m.masks != nullptr)
         mesh.masks({static_cast<const std::uint32_t *>(m.masks), 4, m.triangle_count});
@@ -121,7 +123,7 @@ static void ask_closest_hits(const grid_view *view, const asked *how, const hgri
 {
     const hgrid::strided<const hgrid_ray> from(rays, ray_stride, count);
     const hgrid::strided<hgrid_hit> to(hits, hit_stride, count);
-    const hgrid::coherence known{coherence};
+    const auto known = static_cast<hgrid::coherence>(coherence);
     const auto status = how->of == nullptr
                             ? view->intersect_n(from, to, known)
                             : view->intersect_n(from, to, known, told(*how).options());
@@ -134,7 +136,7 @@ static void ask_any_hits(const grid_view *view, const asked *how, const hgrid_ra
 {
     const hgrid::strided<const hgrid_ray> from(rays, ray_stride, count);
     const hgrid::strided<std::uint8_t> to(occluded, stride, count);
-    const hgrid::coherence known{coherence};
+    const auto known = static_cast<hgrid::coherence>(coherence);
     const auto status = how->of == nullptr
                             ? view->occluded_n(from, to, known)
                             : view->occluded_n(from, to, known, told(*how).options());

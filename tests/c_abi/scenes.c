@@ -29,6 +29,15 @@ static size_t shape_bytes, scene_bytes, inner_bytes;
 
 enum { INDEX_BYTES = 112 * 1000 + 896, SCRATCH_BYTES = 271 * 64 };
 
+/* A square root: the programs are linked without a library of mathematics. */
+static double root_of(double square)
+{
+    double root = square > 1 ? square : 1;
+    for (int i = 0; i < 60; i++)
+        root = 0.5 * (root + square / root);
+    return square > 0 ? root : 0;
+}
+
 /* The nearer of the two places where a ray meets a sphere, or the farther one. */
 static bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
 {
@@ -42,7 +51,7 @@ static bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shap
     }
     if (b * b < a * c)
         return false;
-    const double root = sqrt(b * b - a * c);
+    const double root = root_of(b * b - a * c);
     hit->t = (float)((-b - root) / a);
     if (hit->t < ray->t_min)
         hit->t = (float)((-b + root) / a);
