@@ -245,7 +245,6 @@ impl Caller {
     /// Core's steps are larger than a thousandth, so the whole numbers grow as its shares do.
     #[expect(
         clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
         clippy::cast_sign_loss,
         clippy::cast_precision_loss,
         reason = "from 0 to 1000, and what is not whole was not done yet"
