@@ -3,7 +3,8 @@
 //! It turns the blob of any method into boxes with ids, checks what the page says of them, and answers
 //! rays with them: those whose box a ray meets, tested by a triangle test of its own.
 
-use hgrid_core::{Block, Grid, Ray};
+use hgrid_core::{Block, Grid, MeshPart, Ray, TriangleMesh};
+use hgrid_tests::joined::{Parts, merged};
 use hgrid_tests::meshes::{Mesh, ball};
 use hgrid_tests::methods::configs;
 use hgrid_tests::owned::Owned;
@@ -285,12 +286,28 @@ fn recursive(blob: Bytes<'_>, header: &Header) -> Vec<Leaf> {
     leaves
 }
 
-/// Positions and indices behind the grid.
-fn packed(blob: Bytes<'_>, header: &Header) -> (Vec<Point>, Vec<[u32; 3]>) {
-    assert_eq!(header.mesh, 1);
+/// Positions and indices behind the grid. Masks and first triangles are what the mesh says.
+fn packed(
+    blob: Bytes<'_>,
+    header: &Header,
+    mesh: &TriangleMesh<'_>,
+) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let (kind, parts) = (header.mesh & 3, (header.mesh >> 2) as usize);
+    // Without masks every triangle has all bits.
+    let has_masks = (0..mesh.triangle_count()).any(|id| mesh.mask(id) != u32::MAX);
+    assert_eq!(kind, if has_masks { 2 } else { 1 });
     let mut sections = Sections { blob, at: header.blob_bytes };
     let positions = sections.next(12 * header.vertex_count);
     let indices = sections.next(12 * header.triangle_count);
+    if kind == 2 {
+        let masks = sections.next(4 * header.triangle_count);
+        for id in 0..header.triangle_count as u32 {
+            assert_eq!(blob.u32(masks + 4 * id as usize), mesh.mask(id));
+        }
+    }
+    let firsts = sections.next(4 * parts);
+    let expected = mesh.parts().iter().map(MeshPart::first);
+    assert!((0..parts).map(|part| blob.u32(firsts + 4 * part)).eq(expected));
     assert_eq!(sections.at, blob.0.len());
     let positions = (0..header.vertex_count).map(|vertex| blob.f32s(positions + 12 * vertex));
     let indices = (0..header.triangle_count).map(|triangle| blob.u32s(indices + 12 * triangle));
@@ -341,7 +358,7 @@ fn check(mesh: &Mesh, grid: &Grid<'_>) {
         6 => bvh(blob, &header),
         other => panic!("no method {other}"),
     };
-    let (positions, indices) = packed(blob, &header);
+    let (positions, indices) = packed(blob, &header, grid.mesh());
     let expected = |p: &[f32; 3]| p.map(f64::from).map(f64::to_bits);
     let are_equal = |(a, b): (&Point, &[f32; 3])| a.map(f64::to_bits) == expected(b);
     assert!(positions.iter().zip(&mesh.positions).all(are_equal));
@@ -404,5 +421,14 @@ fn the_page_is_enough_to_read_a_blob() {
             let owned = Owned::build(&view, &config).unwrap();
             check(&mesh, &owned.open(&view).unwrap());
         }
+    }
+    // Several meshes as one, some of them with masks.
+    let meshes = [ball(6, 0.5), ball(9, 1.0).scaled(0.3), ball(4, 0.2).scaled(0.6)];
+    let kept = Parts::of(&meshes);
+    let mut parts = kept.parts();
+    let view = TriangleMesh::join(&mut parts).unwrap();
+    for config in configs() {
+        let owned = Owned::build(&view, &config).unwrap();
+        check(&merged(&meshes), &owned.open(&view).unwrap());
     }
 }
