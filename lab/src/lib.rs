@@ -4,8 +4,9 @@
 //! and the same camera, so that a number and a picture always speak of the same rays.
 //!
 //! ```text
-//! scene -> measure (hgrid_core::Grid, tiles, shade) -> render: a picture and a report
-//!                                                   |-> table: the paper's Table 1
+//! scene -> render: a picture, by all threads
+//!       -> pack: grid and mesh in a file; info and validate look at such files
+//!       -> measure (hgrid_core::Grid, tiles, shade) -> table: the paper's Table 1
 //!                                                   '-> figures: its charts, by plot
 //!       -> animate: the mesh deformed, built and rendered frame after frame
 //!       -> compare: hgrid and other structures, over the same rays
@@ -17,25 +18,28 @@
 extern crate alloc;
 
 pub mod animate;
+pub mod blob;
 pub mod camera;
 pub mod cli;
 pub mod compare;
 pub mod figures;
 pub mod heat;
 pub mod image;
+pub mod info;
 pub mod light;
 pub mod machine;
 pub mod measure;
+pub mod pack;
 pub mod pages;
 mod plot;
 pub mod progress;
 mod regions;
 pub mod render;
-pub mod report;
 pub mod resident;
 pub mod scene;
 pub mod shade;
 pub mod table;
 pub mod threads;
 pub mod tiles;
+pub mod validate;
 mod vector;

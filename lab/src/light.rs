@@ -1,37 +1,65 @@
 //! What is in the way of light: shadows of the lamp, and ambient occlusion.
 //!
 //! ```text
-//! tile of hits -> rays toward the lamp                     -> one call of occluded_n -> lit
-//!              -> some rays of each hit toward sky, ground -> one call of occluded_n -> open
+//! spots of a tile -> rays toward the lamp                    -> one call of occluded_n -> lit
+//!                 -> some rays of each toward sky and ground -> one call of occluded_n -> open
 //! ```
 //!
 //! The rays of a call are in the order of the tile's pixels, those of a pixel side by side: rays that
 //! follow one another start near each other, so that a tree takes them in groups, wherever they go.
 
-use hgrid_core::{Coherence, Grid, Hit, INVALID_ID, Ray, Strided, StridedMut, Surface};
+use hgrid_core::{Coherence, Grid, Ray, Strided, StridedMut};
 
 use crate::tiles::TILE_RAYS;
-use crate::vector::{Vector, cross, dot, length, offset, round, unit};
-
-/// How far away something may hide the sky, in parts of the scene's radius.
-const SKY_REACH: f64 = 0.5;
+use crate::vector::{Vector, cross, dot, offset, round, unit};
 
 /// The lights that something may be in the way of.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Lights {
     /// The lamp casts shadows.
     pub has_shadows: bool,
-    /// Rays from each hit that look for sky and ground; without any, all of these is seen.
+    /// Rays from each sample that look for sky and ground; without any, all of these is seen.
     pub sky_rays: u16,
 }
 
-/// How much light reaches the hits of a tile, from 0 to 1.
+/// A point of a surface that a pixel shows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spot {
+    /// The pixel, counted in its tile.
+    pub(crate) at: usize,
+    /// The unit normal on the viewer's side.
+    pub(crate) normal: [f32; 3],
+    /// Where rays start that leave on that side.
+    pub(crate) start: [f32; 3],
+    /// Two numbers from 0 to 1 that differ from pixel to pixel.
+    pub(crate) noise: [f64; 2],
+}
+
+/// Where light comes from, and how far away something may hide the sky.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Around {
+    /// The direction toward the lamp.
+    pub(crate) lamp: [f32; 3],
+    /// Rays toward the sky end here.
+    pub(crate) reach: f32,
+}
+
+/// One sample of several that a pixel gets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sample {
+    pub(crate) number: u16,
+    pub(crate) count: u16,
+}
+
+/// How much light reaches the spots of a tile, from 0 to 1.
 #[derive(Debug)]
 pub(crate) struct Reached {
     /// The lamp's.
     pub(crate) lit: [f32; TILE_RAYS],
     /// That of sky and ground.
     pub(crate) open: [f32; TILE_RAYS],
+    /// Rays that were sent to find out.
+    pub(crate) rays: u64,
 }
 
 impl Lights {
@@ -41,38 +69,35 @@ impl Lights {
         !self.has_shadows && self.sky_rays == 0
     }
 
-    /// Asks what reaches the hits of a tile's rays; `lamp` is the direction toward the lamp.
+    /// Asks what reaches the spots of a tile.
     pub(crate) fn reach(
         self,
         grid: &Grid<'_>,
-        lamp: [f32; 3],
-        rays: &[Ray],
-        hits: &[Hit],
+        around: &Around,
+        sample: Sample,
+        spots: &[Spot],
     ) -> Reached {
-        let mut reached = Reached { lit: [1.0; TILE_RAYS], open: [1.0; TILE_RAYS] };
-        let surfaces = rays.iter().zip(hits).enumerate().filter_map(|(at, (ray, hit))| {
-            let surface = (hit.primitive != INVALID_ID).then(|| grid.mesh().surface(ray, hit));
-            Some((at, seed(ray), surface??))
-        });
-        let surfaces: Vec<(usize, u32, Surface)> = surfaces.collect();
+        let mut reached = Reached { lit: [1.0; TILE_RAYS], open: [1.0; TILE_RAYS], rays: 0 };
         if self.has_shadows {
-            let is_lit = |surface: &Surface| dot(wide(surface.normal), wide(lamp)) > 0.0;
-            let probes = surfaces.iter().filter(|(_, _, surface)| is_lit(surface));
-            let probes = probes.map(|&(at, _, surface)| (at, Ray::new(surface.above, lamp)));
-            send(grid, probes, |at| reached.lit[at] = 0.0);
+            let lamp = wide(around.lamp);
+            let is_lit = |spot: &&Spot| dot(wide(spot.normal), lamp) > 0.0;
+            let probes = spots.iter().filter(is_lit);
+            let probes = probes.map(|spot| (spot.at, Ray::new(spot.start, around.lamp)));
+            reached.rays += send(grid, probes, |at| reached.lit[at] = 0.0);
         }
         if self.sky_rays > 0 {
-            let (min, max) = grid.bounds();
-            let [t_max, ..] =
-                round([SKY_REACH * 0.5 * length(offset(wide(max), -1.0, wide(min))), 0.0, 0.0]);
-            let probes = surfaces.iter().flat_map(|&(at, seed, surface)| {
-                (0..self.sky_rays).map(move |number| {
-                    let toward = scatter(wide(surface.normal), seed, number, self.sky_rays);
-                    (at, Ray { t_max, ..Ray::new(surface.above, round(toward)) })
+            let t_max = around.reach;
+            // The samples of a pixel share one set of directions and take turns in it.
+            let all = u32::from(self.sky_rays) * u32::from(sample.count);
+            let numbers = (u32::from(sample.number)..all).step_by(sample.count.into());
+            let probes = spots.iter().flat_map(|spot| {
+                numbers.clone().map(move |number| {
+                    let toward = scatter(wide(spot.normal), spot.noise, number, all);
+                    (spot.at, Ray { t_max, ..Ray::new(spot.start, round(toward)) })
                 })
             });
             let part = 1.0 / f32::from(self.sky_rays);
-            send(grid, probes, |at| reached.open[at] -= part);
+            reached.rays += send(grid, probes, |at| reached.open[at] -= part);
         }
         reached
     }
@@ -83,7 +108,7 @@ fn send(
     grid: &Grid<'_>,
     probes: impl Iterator<Item = (usize, Ray)>,
     mut hidden: impl FnMut(usize),
-) {
+) -> u64 {
     let (pixels, rays): (Vec<_>, Vec<_>) = probes.unzip();
     let mut occluded = vec![0_u8; rays.len()];
     let answers = &mut StridedMut::new(&mut occluded);
@@ -92,33 +117,32 @@ fn send(
     for (at, _) in pixels.into_iter().zip(occluded).filter(|(_, occluded)| *occluded != 0) {
         hidden(at);
     }
+    rays.len() as u64
+}
+
+/// Returns two numbers from 0 to 1 for a pixel, unlike those of the pixels around it.
+///
+/// Interleaved gradient noise (Jimenez 2014): any 3 x 3 pixels have numbers that are spread over
+/// the whole range, so that what is noise in each is even over a few.
+pub(crate) fn noise([column, row]: [f32; 2]) -> [f64; 2] {
+    let of =
+        |x: f64, y: f64| (52.982_918_9 * (0.067_110_56 * x + 0.005_837_15 * y).fract()).fract();
+    let [x, y] = [column, row].map(|c| f64::from(c.round().max(0.0)));
+    [of(x, y), of(y + 47.0, x + 17.0)]
 }
 
 fn wide(vector: [f32; 3]) -> Vector {
     vector.map(f64::from)
 }
 
-/// A number for the pixel of a ray, whichever tile it is in.
-fn seed(ray: &Ray) -> u32 {
-    ray.direction.iter().fold(0, |seed, c| mixed(seed ^ c.to_bits()))
-}
-
-/// A number that looks random: every bit of it depends on every bit of `x`.
-const fn mixed(x: u32) -> u32 {
-    let x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
-    let x = (x ^ x >> 15).wrapping_mul(0x846c_a68b);
-    x ^ x >> 16
-}
-
 /// One of the directions from a surface to the sky above it.
 ///
 /// Points on a disk, lifted to the hemisphere above it, have the cosine in them. On the disk they
 /// lie like the seeds of a sunflower, turned by another angle for each pixel.
-fn scatter(normal: Vector, seed: u32, number: u16, count: u16) -> Vector {
+fn scatter(normal: Vector, [turn, part]: [f64; 2], number: u32, count: u32) -> Vector {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    let part = |x: u32| f64::from(mixed(x)) / 4_294_967_296.0;
-    let area = (f64::from(number) + part(seed)) / f64::from(count);
-    let angle = core::f64::consts::TAU * (f64::from(number) * GOLDEN + part(!seed));
+    let area = (f64::from(number) + part) / f64::from(count);
+    let angle = core::f64::consts::TAU * (f64::from(number) * GOLDEN + turn);
     let helper = if normal[2].abs() < 0.9 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
     let first = unit(cross(helper, normal)).unwrap_or(helper);
     let (radius, height) = (area.sqrt(), (1.0 - area).sqrt());
@@ -128,10 +152,11 @@ fn scatter(normal: Vector, seed: u32, number: u16, count: u16) -> Vector {
 
 #[cfg(test)]
 mod tests {
-    use hgrid_core::{Config, Method, TriangleMesh};
+    use hgrid_core::{Config, Hit, Method, TriangleMesh};
 
     use super::*;
     use crate::regions::Regions;
+    use crate::vector::length;
 
     /// A floor, and a roof over one half of it; rays straight down at both halves and beside them.
     #[test]
@@ -148,22 +173,33 @@ mod tests {
             let grid = Grid::open(&regions.index, mesh).unwrap();
             let rays = [-2.0, 2.0, 9.0].map(|x| Ray::new([x, 0.0, 0.3], [0.0, 0.0, -1.0]));
             let hits = rays.map(|ray| grid.intersect(&ray).unwrap_or(Hit::MISS));
-            let reached = lights.reach(&grid, [0.0, 0.0, 1.0], &rays, &hits);
+            let spots: Vec<_> = (0..)
+                .zip(rays.iter().zip(&hits))
+                .filter_map(|(at, (ray, hit))| {
+                    let surface = mesh.surface(ray, hit)?;
+                    let (normal, start) = (surface.normal, surface.above);
+                    Some(Spot { at, normal, start, noise: [0.3, 0.6] })
+                })
+                .collect();
+            let around = Around { lamp: [0.0, 0.0, 1.0], reach: 3.0 };
+            let reached = lights.reach(&grid, &around, Sample { number: 1, count: 2 }, &spots);
+            assert_eq!((spots.len(), reached.rays), (2, 2 * (1 + 64)));
             assert_eq!(reached.lit[..3], [1.0, 0.0, 1.0]);
             assert!(reached.open[0] > 0.9 && reached.open[1] < 0.1, "{:?}", &reached.open[..3]);
             assert_eq!(reached.open[2].to_bits(), 1.0_f32.to_bits());
-            assert!(!lights.are_everywhere() && Lights::default().are_everywhere());
         }
     }
 
     #[test]
     fn directions_lie_above_the_surface() {
         for normal in [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [0.6, 0.0, -0.8]] {
-            let mean =
-                (0..100).map(|i| scatter(normal, 7, i, 100)).fold([0.0; 3], |sum, toward| {
+            let mean = (0..100).map(|i| scatter(normal, [0.2, 0.5], i, 100)).fold(
+                [0.0; 3],
+                |sum, toward| {
                     assert!(dot(toward, normal) > 0.0 && (length(toward) - 1.0).abs() < 1e-9);
                     offset(sum, 0.01, toward)
-                });
+                },
+            );
             assert!((dot(mean, normal) - 2.0 / 3.0).abs() < 0.01, "{mean:?}");
         }
     }

@@ -1,28 +1,36 @@
 //! The `hgrid` command.
 
-use std::io::Write as _;
+use std::env;
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
-use clap::Parser as _;
-use hgrid_lab::cli::{Cli, Command, RenderArgs};
-use hgrid_lab::{animate, compare, figures, pages, render, table};
+use hgrid_lab::cli::{Cli, Command};
+use hgrid_lab::{animate, compare, figures, info, pack, pages, render, table, validate};
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
-        Some(Command::Render(args)) => render::run(&args),
-        Some(Command::Table(args)) => table::run(&args),
-        Some(Command::Figures(args)) => figures::run(&args),
-        Some(Command::Animate(args)) => animate::run(&args),
-        Some(Command::Compare(args)) => compare::run(&args),
-        Some(Command::Report(args)) => pages::run(&args),
-        Some(Command::FirstBuild(args)) => compare::first::run(&args),
-        None => render::run(&RenderArgs::parse_from(["hgrid"])).and_then(|()| {
-            let next = "next: hgrid render YOUR.ply, or hgrid render --help";
-            Ok(writeln!(std::io::stdout(), "{next}")?)
-        }),
+    let cli = Cli::of_words(env::args_os().skip(1)).unwrap_or_else(|error| error.exit());
+    let is_first_try = env::args_os().len() == 1;
+    let result = match cli.command {
+        Command::Render(args) => render::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Pack(args) => pack::run(&args),
+        Command::Validate(args) => validate::run(&args),
+        Command::Table(args) => args.race.check().and_then(|()| table::run(&args)),
+        Command::Figures(args) => args.race.check().and_then(|()| figures::run(&args)),
+        Command::Animate(args) => {
+            args.tuning.check(&[args.method]).and_then(|()| animate::run(&args))
+        }
+        Command::Compare(args) => compare::run(&args),
+        Command::Report(args) => pages::run(&args),
+        Command::FirstBuild(args) => compare::first::run(&args),
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => {
+            if is_first_try {
+                let _ = writeln!(io::stdout(), "next: hgrid YOUR.ply, or hgrid --help");
+            }
+            ExitCode::SUCCESS
+        }
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE

@@ -27,7 +27,6 @@ use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{Config, Counters, Grid, Hit, Method, QueryOptions, Ray, TriangleMesh};
 use serde::{Deserialize, Serialize};
 
-use crate::light::Lights;
 use crate::progress::Progress;
 use crate::regions::{Regions, peak_bytes};
 use crate::scene::Scene;
@@ -147,9 +146,6 @@ pub struct Subject<'a> {
     pub mesh: TriangleMesh<'a>,
     /// The picture.
     pub tiles: Tiles,
-    /// What may be in the way of the light. If anything is, pictures are lit, however they would be
-    /// shaded.
-    pub lights: Lights,
     /// Who builds.
     pub threads: &'a Threads,
 }
@@ -185,7 +181,7 @@ pub fn measure(
     cost: impl Fn(&Counters) -> u64,
     progress: &mut Progress,
 ) -> Result<Outcome> {
-    let Subject { mesh, tiles, lights, threads } = *subject;
+    let Subject { mesh, tiles, threads } = *subject;
     let shader = Shader::new(mesh, &tiles.camera);
     let mut samples = vec![(Vec::new(), Vec::new()); configs.len()];
     let mut outcome = Outcome { measurements: Vec::new(), pixels: Vec::new(), costs: Vec::new() };
@@ -211,11 +207,7 @@ pub fn measure(
             let pixels = trace(&tiles, progress, [0; 3], |rays, pixels| {
                 let hits = &mut hits[..rays.len()];
                 intersect(&grid, rays, hits);
-                if lights.are_everywhere() {
-                    shade(&shader, rays, hits, pixels);
-                } else {
-                    shader.lit(&grid, &lights, rays, hits, pixels);
-                }
+                shade(&shader, rays, hits, pixels);
             });
             renders.push(start.elapsed().as_secs_f64());
 
@@ -270,15 +262,17 @@ fn trace<T: Copy>(
 }
 
 /// The work of every ray of a picture.
-struct Work {
-    counters: Counters,
-    hits: u64,
-    largest: u64,
-    costs: Vec<u32>,
+pub(crate) struct Work {
+    pub(crate) counters: Counters,
+    pub(crate) hits: u64,
+    /// The most tests and steps that one ray took.
+    pub(crate) largest: u64,
+    /// The cost of each pixel's ray.
+    pub(crate) costs: Vec<u32>,
 }
 
-/// Traces a picture again and counts.
-fn count(
+/// Traces a picture, ray by ray, and counts.
+pub(crate) fn count(
     grid: &Grid<'_>,
     tiles: &Tiles,
     cost: impl Fn(&Counters) -> u64,
@@ -367,12 +361,7 @@ mod tests {
         let mesh = TriangleMesh::new(&scene.positions, &scene.indices).unwrap();
         let camera = Camera::framing(scene.framed_bounds(), View::ThreeQuarter, Up::Y);
         let threads = Threads::new(2).unwrap();
-        let subject = Subject {
-            mesh,
-            tiles: Tiles { camera, size: 40 },
-            lights: Lights::default(),
-            threads: &threads,
-        };
+        let subject = Subject { mesh, tiles: Tiles { camera, size: 40 }, threads: &threads };
         let cost = |work: &Counters| work.primitive_tests + work.cell_steps + work.grid_steps;
         let mut progress = Progress::new("", 0);
         let is_hit: Shade = |_, _, hits, pixels| {

@@ -7,10 +7,9 @@
 //! Pixels are shaded 64 at a time, number by number instead of vector by vector, which the
 //! compiler turns into vectors of several pixels: tracing should be what a picture takes.
 
-use hgrid_core::{Grid, Hit, INVALID_ID, Ray, Triangle, TriangleMesh};
+use hgrid_core::{Hit, INVALID_ID, Ray, Triangle, TriangleMesh};
 
 use crate::camera::Camera;
-use crate::light::Lights;
 use crate::vector::{Vector, cross, length, offset, round, unit};
 
 /// A colour as a PNG holds it.
@@ -23,9 +22,6 @@ const LIGHT: [f32; 3] = [-0.7, 0.8, 1.0];
 const KEY: [f32; 3] = [0.62, 0.60, 0.56];
 const SKY: [f32; 3] = [0.09, 0.11, 0.14];
 const GROUND: [f32; 3] = [0.03, 0.027, 0.024];
-
-/// Sky and ground that are partly hidden are brighter, so that one can see what is hidden.
-const OPEN_SKY_GAIN: f32 = 2.2;
 
 /// The background at the upper and the lower edge, linear.
 const ZENITH: [f32; 3] = [0.008, 0.018, 0.055];
@@ -61,6 +57,12 @@ impl<'a> Shader<'a> {
         Self { mesh, axes, light: light.map(|c| c / length) }
     }
 
+    /// The direction toward the lamp, a unit vector.
+    #[must_use]
+    pub const fn lamp(&self) -> [f32; 3] {
+        self.light
+    }
+
     /// A grey solid in a lit room: the colours of rays with these hits, [`Hit::MISS`] for none. All
     /// three are equally long.
     pub fn diffuse(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
@@ -69,26 +71,6 @@ impl<'a> Shader<'a> {
             let key = dot(normal, self.light).max(0.0);
             let sky = 0.5 + 0.5 * dot(normal, up);
             [0, 1, 2].map(|c| KEY[c] * key + SKY[c] * sky + GROUND[c] * (1.0 - sky))
-        });
-    }
-
-    /// The same with what is in the way of the light, for the rays of a tile.
-    pub fn lit(
-        &self,
-        grid: &Grid<'_>,
-        lights: &Lights,
-        rays: &[Ray],
-        hits: &[Hit],
-        colors: &mut [Rgb],
-    ) {
-        let reached = lights.reach(grid, self.light, rays, hits);
-        let [_, up, _] = self.axes;
-        let gain = if lights.sky_rays > 0 { OPEN_SKY_GAIN } else { 1.0 };
-        self.shade(rays, hits, colors, |pixel, normal| {
-            let key = reached.lit[pixel] * dot(normal, self.light).max(0.0);
-            let open = gain * reached.open[pixel];
-            let sky = 0.5 + 0.5 * dot(normal, up);
-            [0, 1, 2].map(|c| KEY[c] * key + open * (SKY[c] * sky + GROUND[c] * (1.0 - sky)))
         });
     }
 
@@ -140,10 +122,16 @@ impl<'a> Shader<'a> {
     /// The light from where there is nothing.
     #[inline(always)]
     fn background(&self, direction: [f32; 3]) -> [f32; 3] {
-        // The picture's edges are at about a third of the direction's length.
-        let height = (0.5 + 1.4 * dot(direction, self.axes[1])).clamp(0.0, 1.0);
-        [0, 1, 2].map(|c| HORIZON[c] * (1.0 - height) + ZENITH[c] * height)
+        background(self.axes[1], direction)
     }
+}
+
+/// The light from where there is nothing, in a picture with this direction upward.
+#[inline(always)]
+pub(crate) fn background(up: [f32; 3], direction: [f32; 3]) -> [f32; 3] {
+    // The picture's edges are at about a third of the direction's length.
+    let height = (0.5 + 1.4 * dot(direction, up)).clamp(0.0, 1.0);
+    [0, 1, 2].map(|c| HORIZON[c] * (1.0 - height) + ZENITH[c] * height)
 }
 
 /// The triangles that the rays of a group see.
@@ -199,7 +187,7 @@ fn put(lanes: &mut [Lanes<f32>; 3], lane: usize, vector: [f32; 3]) {
 }
 
 #[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+pub(crate) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

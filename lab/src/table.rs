@@ -11,7 +11,6 @@ use hgrid_core::{Config, Counters, TriangleMesh};
 use serde::{Deserialize, Serialize};
 
 use crate::cli::{Race, TableArgs};
-use crate::light::Lights;
 use crate::machine::Machine;
 use crate::measure::{Measurement, SceneFacts, Subject, measure, ratio, rows};
 use crate::progress::Progress;
@@ -207,12 +206,7 @@ pub(crate) fn measure_diffuse(
 ) -> Result<Vec<Measurement>> {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
     let threads = Threads::new(race.builders.threads)?;
-    let subject = Subject {
-        mesh,
-        tiles: race.picture.tiles(scene)?,
-        lights: Lights::default(),
-        threads: &threads,
-    };
+    let subject = Subject { mesh, tiles: race.picture.tiles(scene)?, threads: &threads };
     let cost = |_: &Counters| 0;
     let shade: Shade = |shader, rays, hits, colors| shader.diffuse(rays, hits, colors);
     Ok(measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements)

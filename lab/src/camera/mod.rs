@@ -14,6 +14,7 @@ mod aim;
 mod lens;
 pub mod named;
 mod view;
+pub mod viewpoint;
 
 use hgrid_core::Ray;
 
@@ -102,6 +103,22 @@ impl Camera {
     pub(crate) fn down(&self, row: u16, size: u16) -> [f32; 3] {
         let y = (f32::from(size) - 2.0 * f32::from(row) - 1.0) * self.half_pixel(size);
         self.up.map(|c| y * c)
+    }
+
+    /// What to add to the directions of all rays to move them by a part of a pixel, right and down.
+    #[must_use]
+    pub fn shift(&self, [right, down]: [f32; 2], size: u16) -> [f32; 3] {
+        let pixel = 2.0 * self.half_pixel(size);
+        [0, 1, 2].map(|axis| pixel * (right * self.right[axis] - down * self.up[axis]))
+    }
+
+    /// The column and the row of the pixel that a ray goes through.
+    pub(crate) fn pixel(&self, ray: &Ray, size: u16) -> [f32; 2] {
+        let along =
+            |axis: [f32; 3]| axis.iter().zip(ray.direction).map(|(a, d)| a * d).sum::<f32>();
+        let [right, down] = [along(self.right), -along(self.up)];
+        let half = self.half_pixel(size) * 2.0;
+        [right, down].map(|c| c / half + 0.5 * f32::from(size) - 0.5)
     }
 
     /// The ray of a column and a row.
@@ -204,6 +221,18 @@ mod tests {
         assert_eq!([near, far], [[-half, half, -1.0], [half, -half, -1.0]]);
         let centre = Camera::framing(BOX, View::Top, Up::Y).ray(0, 0, 1);
         assert_eq!(centre, Ray::new([2.0, centre.origin[1], 0.5], [0.0, -1.0, 0.0]));
+    }
+
+    #[test]
+    fn a_shift_by_a_pixel_gives_the_ray_beside() {
+        let camera = Camera::framing(BOX, View::ThreeQuarter, Up::Z);
+        let (ray, beside) = (camera.ray(3, 5, 9), camera.ray(4, 7, 9));
+        let shift = camera.shift([1.0, 2.0], 9);
+        for ((from, shift), to) in ray.direction.into_iter().zip(shift).zip(beside.direction) {
+            assert!((from + shift - to).abs() < 1e-6);
+        }
+        let [column, row] = camera.pixel(&beside, 9);
+        assert!((column - 4.0).abs() < 1e-4 && (row - 7.0).abs() < 1e-4);
     }
 
     #[test]

@@ -5,10 +5,10 @@ use core::str::FromStr;
 use anyhow::{Context as _, Error, Result, ensure};
 use clap::ValueEnum;
 
-use crate::scene::Bounds;
-use crate::vector::Vector;
+use crate::scene::{Bounds, Scene};
+use crate::vector::{Vector, round, unit};
 
-/// A box lower than this part of its width is seen from above unless the caller says otherwise.
+/// A box lower than this part of its width is flat.
 const FLAT: f64 = 0.25;
 
 /// Which axis of the scene is up in the picture.
@@ -21,6 +21,22 @@ pub enum Up {
 }
 
 impl Up {
+    /// The axis that is up in a scene: as its format says, or z if it lies flat on x and y.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        let bounds = scene.framed_bounds();
+        match scene.is_z_up {
+            Some(true) => Self::Z,
+            None if is_flat(bounds, Self::Z) && !is_flat(bounds, Self::Y) => Self::Z,
+            Some(false) | None => Self::Y,
+        }
+    }
+
+    /// The direction that is up.
+    pub(crate) fn direction(self) -> Vector {
+        self.turned_back([0.0, 1.0, 0.0])
+    }
+
     /// A vector of the scene, turned so that y is up.
     pub(super) fn turned(self, [x, y, z]: Vector) -> Vector {
         match self {
@@ -65,11 +81,16 @@ pub enum View {
 }
 
 impl View {
-    /// The view of a scene that nobody chose one for: from the front, or from above if it is flat.
+    /// The view of a measurement that nobody chose one for: from the front, or from above if the
+    /// scene is flat.
     #[must_use]
     pub fn of(bounds: Bounds, up: Up) -> Self {
-        let [x, y, z] = up.turned(half_extent(bounds)).map(f64::abs);
-        if y < FLAT * x.max(z) { Self::ThreeQuarter } else { Self::Front }
+        if is_flat(bounds, up) { Self::ThreeQuarter } else { Self::Front }
+    }
+
+    /// The direction from a scene to the eye, as a unit vector of the scene.
+    pub(crate) fn unit(self, up: Up) -> [f32; 3] {
+        round(up.turned_back(unit(self.toward_eye()).unwrap_or_default()))
     }
 
     /// The direction from the scene to the eye; any length.
@@ -89,6 +110,12 @@ impl View {
             }
         }
     }
+}
+
+/// Returns true if a box is much wider than high.
+pub(super) fn is_flat(bounds: Bounds, up: Up) -> bool {
+    let [x, y, z] = up.turned(half_extent(bounds)).map(f64::abs);
+    y < FLAT * x.max(z)
 }
 
 impl FromStr for View {
@@ -160,6 +187,20 @@ mod tests {
         assert_eq!(View::of(BOX, Up::Z), View::Front);
         assert_eq!(View::of(([0.0; 3], [1.0; 3]), Up::Y), View::Front);
         assert_eq!(View::of(Bounds::default(), Up::Y), View::Front);
+    }
+
+    #[test]
+    fn z_is_up_where_the_format_says_so_or_the_scene_lies_on_x_and_y() {
+        let scene = |bounds: Bounds, is_z_up| Scene {
+            positions: vec![bounds.0, bounds.1],
+            is_z_up,
+            ..Scene::default()
+        };
+        let map = ([0.0; 3], [9.0, 7.0, 1.0]);
+        assert_eq!(Up::of(&scene(map, None)), Up::Z);
+        assert_eq!(Up::of(&scene(map, Some(false))), Up::Y);
+        assert_eq!(Up::of(&scene(BOX, None)), Up::Y);
+        assert_eq!(Up::of(&scene(BOX, Some(true))), Up::Z);
     }
 
     #[test]

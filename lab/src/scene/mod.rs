@@ -4,15 +4,23 @@
 //! nothing is merged, reordered or repaired, because a measurement should see the file as it is.
 //! Only faces with more than three corners are cut into triangles.
 
+pub mod format;
+mod gltf;
 mod knot;
+pub mod model;
 mod noise;
 mod obj;
+mod packed;
 mod ply;
 pub mod procedural;
+mod stl;
 
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
+
+use self::format::{ENDINGS, Format};
+use self::model::{Mesh, Model};
 
 /// Two opposite corners of a box: the smallest and the largest coordinates.
 pub type Bounds = ([f32; 3], [f32; 3]);
@@ -28,12 +36,14 @@ pub struct Scene {
     pub indices: Vec<[u32; 3]>,
     /// The part that pictures are about, if that is not all of it.
     pub focus: Option<Bounds>,
+    /// The axis that the format of the file says is up, if it says so: true for z, false for y.
+    pub is_z_up: Option<bool>,
 }
 
 impl Scene {
-    /// Loads a `.ply` or `.obj` file, or makes a scene from `procedural:NAME[:TRIANGLES]`, or puts
-    /// one of them into another: `bunny.ply+stadium.ply` is the bunny, as large as it is, in the
-    /// middle of the stadium, and pictures are of the bunny.
+    /// Loads a file, or makes a scene from `procedural:NAME[:TRIANGLES]`, or puts one of them into
+    /// another: `bunny.ply+stadium.ply` is the bunny, as large as it is, in the middle of the
+    /// stadium, and pictures are of the bunny. Instances become triangles.
     ///
     /// # Errors
     /// If the words name no scene or the file cannot be read; the message says what to do.
@@ -44,25 +54,26 @@ impl Scene {
     /// # Ok::<(), anyhow::Error>(())
     /// ```
     pub fn load(spec: &str) -> Result<Self> {
-        if let Some((inner, outer)) = spec.split_once('+').filter(|_| !Path::new(spec).exists()) {
+        let path = Path::new(spec);
+        if let Some((inner, outer)) = spec.split_once('+').filter(|_| !path.exists()) {
             return Ok(Self::load(inner)?.within(Self::load(outer)?));
         }
         if let Some(words) = spec.strip_prefix("procedural:") {
             return procedural::make(words).with_context(|| format!("no scene `{spec}`"));
         }
-        let path = Path::new(spec);
-        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let loaded = match extension.to_str() {
-            Some("ply") => ply::load(path),
-            Some("obj") => obj::load(path),
-            _ => bail!(
-                "no scene `{spec}`: name a .ply file, an .obj file or procedural:NAME:TRIANGLES, \
+        if !path.exists() && Format::named(path).is_none() {
+            bail!(
+                "no scene `{spec}`: name a file that ends in {ENDINGS}, or procedural:NAME:TRIANGLES, \
                  where NAME is {}; or one inside another, A+B",
                 procedural::NAMES.join(", ")
-            ),
-        };
+            );
+        }
+        let (format, model) = read_model(path).with_context(|| format!("cannot load `{spec}`"))?;
+        let mesh = model.flatten();
+        let Mesh { positions, indices } =
+            mesh.with_context(|| format!("`{spec}` has more than 2^32 vertices"))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { name, ..loaded.with_context(|| format!("cannot load `{spec}`"))? })
+        Ok(Self { name, positions, indices, focus: None, is_z_up: format.is_z_up() })
     }
 
     /// This scene in the middle of another, as large as both are; pictures are of what this one is.
@@ -83,21 +94,13 @@ impl Scene {
         let behind = outer.indices.into_iter().map(|triangle| triangle.map(|v| v + first));
         let positions = self.positions.into_iter().map(place).chain(outer.positions).collect();
         let indices = self.indices.into_iter().chain(behind).collect();
-        Self { name, positions, indices, focus }
+        Self { name, positions, indices, focus, is_z_up: self.is_z_up }
     }
 
     /// The box around all finite vertices, or `None` if there are none.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
-        let is_finite = |position: &&[f32; 3]| position.iter().all(|c| c.is_finite());
-        self.positions.iter().filter(is_finite).fold(None, |bounds, &position| {
-            let (mut min, mut max) = bounds.unwrap_or((position, position));
-            for axis in 0..3 {
-                min[axis] = min[axis].min(position[axis]);
-                max[axis] = max[axis].max(position[axis]);
-            }
-            Some((min, max))
-        })
+        model::bounds(&self.positions)
     }
 
     /// The box that a picture shows: the focus, or all of the scene, or the origin if it is empty.
@@ -107,13 +110,22 @@ impl Scene {
     }
 }
 
+/// Reads the meshes of a file and where they stand, in the format that it has.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn read_model(path: &Path) -> Result<(Format, Model)> {
+    let format = Format::of(path)?;
+    Ok((format, format.read(path)?))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn unknown_scenes_are_refused_with_the_known_ones() {
-        for spec in ["knot", "mesh.stl", "", "procedural:bunny", "procedural:"] {
+        for spec in ["knot", "mesh.step", "", "procedural:bunny", "procedural:"] {
             let message = format!("{:#}", Scene::load(spec).unwrap_err());
             assert!(message.contains(spec) && message.contains("knot"), "{message}");
         }

@@ -1,73 +1,164 @@
 //! OBJ files: all objects and groups of the file as one mesh.
 //!
-//! Materials, normals and texture coordinates are left out. Points and lines are not triangles
-//! and are left out too.
+//! The lines that start with `v` and `f` are read; materials, normals, texture coordinates, points
+//! and lines are left out. Errors name the line, which is why there is a reader here: the crates
+//! for this format do not tell it.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader};
-use std::path::Path;
+use anyhow::{Context as _, Result, bail, ensure};
 
-use anyhow::{Context as _, Result};
-use tobj::{LoadError, LoadOptions};
-
-use super::Scene;
-use crate::progress::Progress;
+use super::Mesh;
 
 /// Reads a file.
 ///
 /// # Errors
-/// If the file cannot be opened, is not text, or has a face with a vertex that it does not have.
-pub(super) fn load(path: &Path) -> Result<Scene> {
-    let file = File::open(path).context("cannot open it")?;
-    let byte_count = file.metadata().context("cannot read its size")?.len();
-    read(&mut BufReader::new(Progress::new("loading", byte_count).reader(file)))
+/// If a line is not what its first word announces, or a face names a vertex that the file does
+/// not have.
+pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
+    let mut mesh = Mesh::default();
+    // The largest index so far and its line: a face may come before its vertices.
+    let mut largest = (0, 0);
+    let mut corners = Vec::new();
+    let mut joined = Vec::new();
+    let mut lines = Lines { rest: bytes, number: 0 };
+    while let Some(line) = lines.next() {
+        let number = lines.number;
+        let line = if line.ends_with(b"\\") { lines.join(line, &mut joined) } else { line };
+        let line = str::from_utf8(line).map_or("\0", str::trim_ascii);
+        let (keyword, words) = line.split_once([' ', '\t']).unwrap_or((line, ""));
+        let result = match keyword {
+            "v" => vertex(words).map(|vertex| mesh.positions.push(vertex)),
+            "f" => face(words, mesh.positions.len(), &mut corners).map(|()| {
+                let most = corners.iter().copied().max().unwrap_or(0);
+                largest = largest.max((most, number));
+                let [first, rest @ ..] = &*corners else { return };
+                let fan = rest.windows(2).map(|side| [*first, side[0], side[1]]);
+                mesh.indices.extend(fan);
+            }),
+            _ if keyword.contains(|c: char| c.is_ascii_control()) => {
+                Err(anyhow::anyhow!("it is not text"))
+            }
+            _ => Ok(()),
+        };
+        result.with_context(|| format!("line {number}"))?;
+    }
+    let (most, number) = largest;
+    let count = mesh.positions.len();
+    ensure!(
+        mesh.indices.is_empty() || (most as usize) < count,
+        "line {number}: there is no vertex {}, the file has {count}",
+        u64::from(most) + 1
+    );
+    ensure!(
+        count > 0 || bytes.trim_ascii().is_empty(),
+        "it has no line that starts with `v`: it is not an OBJ file, or has no vertices"
+    );
+    Ok(mesh)
 }
 
-fn read(source: &mut impl BufRead) -> Result<Scene> {
-    let options = LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..LoadOptions::default()
-    };
-    let no_materials = |_: &Path| Err(LoadError::GenericFailure);
-    let (models, _) =
-        tobj::load_obj_buf(source, &options, no_materials).context("it is not a valid OBJ file")?;
-
-    let mut scene = Scene::default();
-    for model in models {
-        let base = u32::try_from(scene.positions.len()).context("it has too many vertices")?;
-        let (positions, _) = model.mesh.positions.as_chunks::<3>();
-        scene.positions.extend_from_slice(positions);
-        let (triangles, _) = model.mesh.indices.as_chunks::<3>();
-        scene.indices.extend(triangles.iter().map(|triangle| triangle.map(|i| base + i)));
+/// Reads the coordinates of a vertex. A weight or a colour may follow.
+fn vertex(words: &str) -> Result<[f32; 3]> {
+    let mut words = words.split_ascii_whitespace();
+    let mut vertex = [0.0; 3];
+    for (coordinate, axis) in vertex.iter_mut().zip(["x", "y", "z"]) {
+        let word = words.next().with_context(|| format!("the vertex has no {axis}"))?;
+        *coordinate = word.parse().ok().with_context(|| format!("`{word}` is no number"))?;
     }
-    Ok(scene)
+    Ok(vertex)
+}
+
+/// Reads the corners of a face, each like `7`, `7/1`, `7//3` or, from the last vertex, `-1`.
+fn face(words: &str, vertices: usize, corners: &mut Vec<u32>) -> Result<()> {
+    corners.clear();
+    for word in words.split_ascii_whitespace() {
+        let index = word.split('/').next().unwrap_or(word);
+        let index: i64 = index.parse().ok().with_context(|| format!("`{word}` is no corner"))?;
+        let from_zero = match index {
+            1.. => index - 1,
+            0 => bail!("there is no vertex 0: vertices count from 1"),
+            _ => i64::try_from(vertices)? + index,
+        };
+        let corner = u32::try_from(from_zero).ok().filter(|&corner| corner < u32::MAX);
+        corners.push(corner.with_context(|| format!("there is no vertex {index}"))?);
+    }
+    ensure!(corners.len() >= 3, "a face has three corners or more, this one {}", corners.len());
+    Ok(())
+}
+
+/// The lines of a file, and the number of the last one.
+struct Lines<'a> {
+    rest: &'a [u8],
+    number: usize,
+}
+
+impl<'a> Iterator for Lines<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        if self.rest.is_empty() {
+            return None;
+        }
+        self.number += 1;
+        let end = self.rest.iter().position(|&byte| byte == b'\n').unwrap_or(self.rest.len());
+        let (line, rest) = self.rest.split_at(end);
+        self.rest = rest.get(1..).unwrap_or_default();
+        Some(line.strip_suffix(b"\r").unwrap_or(line))
+    }
+}
+
+impl Lines<'_> {
+    /// Joins a line that ends in a backslash with those that follow.
+    fn join<'j>(&mut self, line: &[u8], joined: &'j mut Vec<u8>) -> &'j [u8] {
+        joined.clear();
+        joined.extend_from_slice(line);
+        while joined.last() == Some(&b'\\') {
+            joined.pop();
+            joined.push(b' ');
+            joined.extend_from_slice(self.next().unwrap_or_default());
+        }
+        joined
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn objects_become_one_mesh_and_quads_two_triangles() {
-        let text = "mtllib none.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\n\
-                    f 1//1 2//1 3//1 4//1\no b\nv 0 0 1\nusemtl x\nf -1 1 2\np 1\nl 1 2\n";
-        let scene = read(&mut text.as_bytes()).unwrap();
-        let corners: Vec<_> = scene
-            .indices
-            .iter()
-            .map(|triangle| triangle.map(|i| scene.positions[i as usize]))
-            .collect();
-        let [a, b, c, d] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
-        assert_eq!(corners, [[a, b, c], [a, c, d], [[0., 0., 1.], a, b]]);
+    fn message(text: &[u8]) -> String {
+        format!("{:#}", read(text).unwrap_err())
     }
 
     #[test]
-    fn damaged_files_are_refused() {
-        for text in [&b"v 0 0 0\nf 1 2 3\n"[..], b"v 0 zero 0\n", b"\xff\xfe\x00\x01\n"] {
-            let message = format!("{:#}", read(&mut &*text).unwrap_err());
-            assert!(message.starts_with("it is not a valid OBJ file: "), "{message}");
+    fn objects_become_one_mesh_and_quads_two_triangles() {
+        let text = "mtllib none.mtl\no a\nv 0 0 0\nv 1 0 0\r\nv 1 1 0 0.5 0.5 0.5\nv\t0 1 0\nvn 0 0 1\n\
+                    f 1//1 2//1 \\\n 3//1 4//1\no b\nv 0 0 1\nusemtl x\nf -1 1 2\np 1\nl 1 2\n#\n\n";
+        let mesh = read(text.as_bytes()).unwrap();
+        assert_eq!(mesh.positions.len(), 5);
+        assert_eq!(mesh.indices, [[0, 1, 2], [0, 2, 3], [4, 0, 1]]);
+        assert_eq!(read(b"\n").unwrap(), Mesh::default());
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        for (text, expected) in [
+            (
+                &b"v 0 0 0\nv 1 0 0\nf 1 2 3\nv 2 0 0\nf 1 2 4"[..],
+                "line 5: there is no vertex 4, the file has 3",
+            ),
+            (b"# a\nv 0 zero 0\n", "line 2: `zero` is no number"),
+            (b"v 0 0\n", "line 1: the vertex has no z"),
+            (b"v 0 0 \\\n\nv 0 x 0", "line 1: the vertex has no z"),
+            (b"v 0 0 0\nf 1 0 1\n", "line 2: there is no vertex 0: vertices count from 1"),
+            (b"v 0 0 0\nf 1 -2 1\n", "line 2: there is no vertex -2"),
+            (b"v 0 0 0\nf 1 a 1\n", "line 2: `a` is no corner"),
+            (b"v 0 0 0\nf 1 1\n", "line 2: a face has three corners or more, this one 2"),
+            (b"v 0 0 0\nf 1 1 9999999999\n", "line 2: there is no vertex 9999999999"),
+            (b"\xff\xfe\x00\x01\n", "line 1: it is not text"),
+            (
+                b"hello\n",
+                "it has no line that starts with `v`: it is not an OBJ file, or has no vertices",
+            ),
+        ] {
+            assert_eq!(message(text), expected);
         }
     }
 }

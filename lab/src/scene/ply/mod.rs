@@ -1,20 +1,24 @@
-//! PLY files: ascii and binary, any number type, faces with any number of corners.
+//! PLY files: ASCII and binary, any number type, faces with any number of corners.
 //!
 //! Elements are read one at a time and go straight into the arrays that the scene keeps, so a
 //! file of ten million triangles needs no second copy of itself. Everything that is neither a
-//! coordinate nor a list of corners is read past.
+//! coordinate nor a list of corners is read past. The elements that nearly every binary file has
+//! are decoded a buffer at a time ([`fast`]), all others number by number.
+
+mod fast;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::Path;
 
-use anyhow::{Context as _, Result, anyhow, bail, ensure};
+use anyhow::{Context as _, Error, Result, anyhow, ensure};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
     BeginList, ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult,
 };
 
-use super::Scene;
+use self::fast::{FaceLayout, VertexLayout};
+use super::Mesh;
 use crate::progress::Progress;
 
 /// Bytes per read: large enough that system calls do not show.
@@ -24,7 +28,7 @@ const BUFFER_BYTES: usize = 1 << 20;
 ///
 /// # Errors
 /// If the file cannot be opened, is not PLY, ends too early, or declares no vertices.
-pub(super) fn load(path: &Path) -> Result<Scene> {
+pub(super) fn load(path: &Path) -> Result<Mesh> {
     let file = File::open(path).context("cannot open it")?;
     let byte_count = file.metadata().context("cannot read its size")?.len();
     let reader = Progress::new("loading", byte_count).reader(file);
@@ -32,7 +36,7 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
 }
 
 /// Reads a PLY of at most `byte_count` bytes, which only limits what is reserved in advance.
-fn read(mut source: impl BufRead, byte_count: u64) -> Result<Scene> {
+fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
     let is_ply = source.fill_buf()?.starts_with(b"ply");
     ensure!(is_ply, "it is not a PLY file: it does not start with `ply`");
     let mut reader = Reader::new(source);
@@ -47,8 +51,9 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Scene> {
         "it has triangle strips; convert them to faces first"
     );
 
+    let is_little = header.encoding == Encoding::BinaryLittleEndian;
     let mut source = reader.into_inner();
-    let mut scene = Scene::default();
+    let mut mesh = Mesh::default();
     for element in header.elements.values() {
         // Elements of no bytes would never end the file, however many the header promises.
         ensure!(!element.properties.is_empty(), "its `{}` elements are empty", element.name);
@@ -57,23 +62,29 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Scene> {
         match element.name.as_str() {
             "vertex" => {
                 check_vertex(element)?;
-                scene.positions.reserve_exact(count);
-                each(&mut source, header.encoding, element, |vertex: Vertex| {
-                    scene.positions.push(vertex.0);
-                    Ok(())
-                })?;
+                mesh.positions.reserve_exact(count);
+                match VertexLayout::of(element).filter(|_| is_little) {
+                    Some(layout) => layout.read(&mut source, element, &mut mesh.positions)?,
+                    None => each(&mut source, header.encoding, element, |vertex: Vertex| {
+                        mesh.positions.push(vertex.0);
+                        Ok(())
+                    })?,
+                }
             }
             "face" => {
                 check_face(element)?;
-                scene.indices.reserve_exact(count);
-                each(&mut source, header.encoding, element, |face: Face| {
-                    face.fan(&mut scene.indices)
-                })?;
+                mesh.indices.reserve_exact(count);
+                match FaceLayout::of(element).filter(|_| is_little) {
+                    Some(layout) => layout.read(&mut source, element, &mut mesh.indices)?,
+                    None => each(&mut source, header.encoding, element, |face: Face| {
+                        face.fan(&mut mesh.indices)
+                    })?,
+                }
             }
             _ => each(&mut source, header.encoding, element, |_: Skipped| Ok(()))?,
         }
     }
-    Ok(scene)
+    Ok(mesh)
 }
 
 /// Reads all elements of one kind and hands them on.
@@ -98,12 +109,10 @@ fn each<E: PropertyAccess>(
             Encoding::BinaryLittleEndian => parser.read_little_endian_element(source, element),
             Encoding::BinaryBigEndian => parser.read_big_endian_element(source, element),
         };
-        if value.as_ref().is_err_and(|error| error.kind() == ErrorKind::UnexpectedEof) {
-            bail!(
-                "it is cut off after {number} of {} `{}` elements: fetch or export it again",
-                element.count,
-                element.name
-            );
+        if let Err(error) = value.as_ref()
+            && error.kind() == ErrorKind::UnexpectedEof
+        {
+            return Err(cut_off(number, element));
         }
         value
             .map_err(Into::into)
@@ -111,6 +120,12 @@ fn each<E: PropertyAccess>(
             .with_context(|| format!("`{}` element {number}", element.name))?;
     }
     Ok(())
+}
+
+/// The error of a file that ends within its elements.
+fn cut_off(number: usize, element: &ElementDef) -> Error {
+    let (count, name) = (element.count, &element.name);
+    anyhow!("it is cut off after {number} of {count} `{name}` elements: fetch or export it again")
 }
 
 fn check_vertex(element: &ElementDef) -> Result<()> {
@@ -256,7 +271,7 @@ mod tests {
         bytes
     }
 
-    fn read_all(bytes: &[u8]) -> Result<Scene> {
+    fn read_all(bytes: &[u8]) -> Result<Mesh> {
         read(bytes, bytes.len() as u64)
     }
 
@@ -272,10 +287,42 @@ mod tests {
             binary("binary_big_endian", f32::to_be_bytes, i32::to_be_bytes),
         ];
         for file in files {
-            let scene = read_all(&file).unwrap();
-            assert_eq!(scene.positions, VERTICES);
-            assert_eq!(scene.indices, [[0, 1, 2], [0, 2, 3], [3, 2, 1]]);
+            let mesh = read_all(&file).unwrap();
+            assert_eq!(mesh.positions, VERTICES);
+            assert_eq!(mesh.indices, [[0, 1, 2], [0, 2, 3], [3, 2, 1]]);
         }
+    }
+
+    /// Records that end anywhere in a buffer are decoded like those that lie within one.
+    #[test]
+    fn buffers_of_any_size_give_one_mesh() {
+        let file = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);
+        let expected = read_all(&file).unwrap();
+        for capacity in 3..60 {
+            let source = BufReader::with_capacity(capacity, &*file);
+            assert_eq!(read(source, file.len() as u64).unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn plain_files_are_decoded_at_once() {
+        let header = "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\n\
+            property float y\nproperty float z\nelement face 3\n\
+            property list uchar int vertex_indices\nend_header\n";
+        let file = |faces: &[&[i32]]| {
+            let mut bytes = header.as_bytes().to_vec();
+            bytes.extend(VERTICES.as_flattened().iter().flat_map(|c| c.to_le_bytes()));
+            for face in faces {
+                bytes.push(u8::try_from(face.len()).unwrap());
+                bytes.extend(face.iter().flat_map(|corner| corner.to_le_bytes()));
+            }
+            bytes
+        };
+        let mesh = read_all(&file(&[&[0, 1, 2], &[3, 2], &[1, 3, 0]])).unwrap();
+        assert_eq!(mesh.positions, VERTICES);
+        assert_eq!(mesh.indices, [[0, 1, 2], [1, 3, 0]]);
+        let message = message(&file(&[&[0, 1, 2], &[3, 2, -2], &[1, 3, 0]]));
+        assert_eq!(message, "`face` element 1: vertex -2 does not exist");
     }
 
     #[test]
@@ -283,9 +330,9 @@ mod tests {
         let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty short y\n\
             property float32 z\nelement face 1\nproperty list int ushort vertex_index\nend_header\n\
             0.25 -1 0\n1 2 0\n0 1 0\n3 0 1 2\n";
-        let scene = read_all(text.as_bytes()).unwrap();
-        assert_eq!(scene.positions, [[0.25, -1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 1.0, 0.0]]);
-        assert_eq!(scene.indices, [[0, 1, 2]]);
+        let mesh = read_all(text.as_bytes()).unwrap();
+        assert_eq!(mesh.positions, [[0.25, -1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 1.0, 0.0]]);
+        assert_eq!(mesh.indices, [[0, 1, 2]]);
     }
 
     #[test]

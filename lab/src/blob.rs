@@ -1,0 +1,54 @@
+//! Blobs in files: grids as they are in memory, with or without their mesh.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use anyhow::{Context as _, Result, ensure};
+use hgrid_core::{BlobInfo, Block};
+
+/// The bytes of a file, where a grid can be opened.
+#[derive(Debug)]
+pub struct Blob {
+    memory: Vec<Block>,
+    length: usize,
+}
+
+impl Blob {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// If it cannot be read, is no blob of this version, or is cut off.
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut file = File::open(path).context("cannot open it")?;
+        let length = usize::try_from(file.metadata()?.len()).context("it is too large")?;
+        let mut memory = vec![Block::ZERO; Block::count_for(length)];
+        let bytes = &mut Block::bytes_mut(&mut memory)[..length];
+        file.read_exact(bytes).context("cannot read it")?;
+        let needed = BlobInfo::peek(bytes).context("it is not a blob that this version reads")?;
+        ensure!(
+            length as u64 >= needed.total_bytes,
+            "it is cut off: it has {length} bytes of {}",
+            needed.total_bytes
+        );
+        Ok(Self { memory, length })
+    }
+
+    /// Makes room for a blob.
+    #[must_use]
+    pub fn zeroed(length: usize) -> Self {
+        Self { memory: vec![Block::ZERO; Block::count_for(length)], length }
+    }
+
+    /// The bytes, at an address where a grid can be opened.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        &Block::bytes(&self.memory)[..self.length]
+    }
+
+    /// The bytes, to be written.
+    #[must_use]
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut Block::bytes_mut(&mut self.memory)[..self.length]
+    }
+}

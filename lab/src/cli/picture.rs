@@ -1,0 +1,78 @@
+//! The words that say how large a picture is and from where it is taken.
+
+use anyhow::{Result, ensure};
+use clap::Args;
+use hgrid_core::Grid;
+
+use crate::camera::{Aim, Camera, Lens, Point, Up, View, viewpoint};
+use crate::scene::Scene;
+use crate::tiles::Tiles;
+
+/// How large a picture is and from where it is taken.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Picture {
+    /// Pixels on each side
+    #[arg(long, value_name = "PIXELS", default_value_t = 1024,
+          value_parser = clap::value_parser!(u16).range(1..=16_384))]
+    pub size: u16,
+    /// From which side to look, or a named view of the scene
+    #[arg(long, allow_hyphen_values = true)]
+    pub view: Option<Aim>,
+    /// Look from this point instead, as X,Y,Z
+    #[arg(long, value_name = "X,Y,Z", conflicts_with = "view", allow_hyphen_values = true)]
+    pub eye: Option<Point>,
+    /// Look at this point [default: the middle of the scene]
+    #[arg(long, value_name = "X,Y,Z", requires = "eye", allow_hyphen_values = true)]
+    pub target: Option<Point>,
+    /// Degrees that the picture covers, from edge to edge [default: 40, in a room 70]
+    #[arg(long, value_name = "DEGREES")]
+    pub fov: Option<Lens>,
+    /// Which axis of the scene is up [default: y, or z for STL and what lies flat on x and y]
+    #[arg(long, value_enum)]
+    pub up: Option<Up>,
+}
+
+impl Picture {
+    /// The picture of a scene for measurements: of all of it unless the words say otherwise.
+    ///
+    /// # Errors
+    /// If the scene has no view of that name, or the eye is where it looks.
+    pub fn tiles(&self, scene: &Scene) -> Result<Tiles> {
+        let (up, lens) = (self.up(scene), self.fov.unwrap_or_default());
+        let bounds = scene.framed_bounds();
+        let usual = || Camera::framing_through(lens, bounds, View::of(bounds, up), up);
+        let camera = self.asked(scene)?.unwrap_or_else(usual);
+        Ok(Tiles { camera, size: self.size })
+    }
+
+    /// The picture of a scene to look at: from where one sees most unless the words say otherwise.
+    ///
+    /// # Errors
+    /// Those of [`tiles`](Self::tiles).
+    pub fn shot(&self, scene: &Scene, grid: &Grid<'_>) -> Result<Tiles> {
+        let (part, is_all) = (scene.framed_bounds(), scene.focus.is_none());
+        let best = || viewpoint::choose(grid, part, is_all, self.up(scene), self.fov);
+        let camera = self.asked(scene)?.unwrap_or_else(best);
+        Ok(Tiles { camera, size: self.size })
+    }
+
+    /// The axis that is up.
+    #[must_use]
+    pub fn up(&self, scene: &Scene) -> Up {
+        self.up.unwrap_or_else(|| Up::of(scene))
+    }
+
+    /// The camera that the words ask for, if they do.
+    fn asked(&self, scene: &Scene) -> Result<Option<Camera>> {
+        let (up, lens) = (self.up(scene), self.fov.unwrap_or_default());
+        if let Some(eye) = self.eye {
+            let target = self.target.unwrap_or(Point::centre_of(scene.framed_bounds()));
+            ensure!(
+                eye != target,
+                "--eye and --target are the same point: there is no direction to look in"
+            );
+            return Ok(Some(Camera::between(eye, target, up, lens)));
+        }
+        self.view.map(|aim| aim.camera(scene, up, lens)).transpose()
+    }
+}

@@ -1,0 +1,142 @@
+//! The words of `hgrid render`.
+
+use core::num::NonZero;
+use std::path::PathBuf;
+use std::thread;
+
+use anyhow::{Result, ensure};
+use clap::{Parser, ValueEnum};
+use hgrid_core::{Config, Control, Method};
+
+use super::{DEFAULT_OUTPUT, DEFAULT_SCENE, Picture, Tuning, method_parser, thread_parser};
+use crate::heat::Counter;
+use crate::light::Lights;
+
+/// Samples of a pixel, and rays of ambient occlusion from each, of a picture by a tree.
+const SAMPLES: u16 = 4;
+const SKY_RAYS: u16 = 4;
+
+/// What to render and how.
+#[derive(Debug, Parser)]
+pub struct RenderArgs {
+    /// A mesh file or procedural:NAME:TRIANGLES
+    #[arg(default_value = DEFAULT_SCENE)]
+    pub scene: String,
+    /// The picture to write, as PNG
+    #[arg(short, long, value_name = "FILE.png", default_value = DEFAULT_OUTPUT)]
+    pub output: PathBuf,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub picture: Picture,
+    /// What the colours mean
+    #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
+    pub shading: Shading,
+    /// Rays through each pixel, against jagged edges and noise [default: 4, of a grid 1]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    samples: Option<u16>,
+    /// Rays of ambient occlusion from each sample, 0 for none [default: 16 a pixel, of a grid 0]
+    #[arg(long, value_name = "RAYS", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    ao: Option<u16>,
+    /// The lamp casts no shadows
+    #[arg(long)]
+    no_shadows: bool,
+    /// For heat: the work that is shown [default: cost]
+    #[arg(long, value_enum)]
+    pub counter: Option<Counter>,
+    /// For heat: the number that is red, to compare pictures [default: what 99 of 100 rays take]
+    #[arg(long, value_name = "NUMBER")]
+    pub heat_top: Option<u32>,
+    /// The structure to build
+    #[arg(long, value_parser = method_parser(), default_value = Method::default().name())]
+    pub method: Method,
+    /// Cells per triangle, for other methods than bvh [default: the paper's for the method]
+    #[arg(long, value_name = "CELLS", allow_negative_numbers = true)]
+    pub density: Option<f32>,
+    #[expect(missing_docs, reason = "a doc would become the help of all its options")]
+    #[command(flatten)]
+    pub tuning: Tuning,
+    /// Threads that render and, for bvh, build [default: one for each core]
+    #[arg(long, value_name = "NUMBER", value_parser = thread_parser())]
+    threads: Option<u32>,
+    /// Print the numbers as a JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl RenderArgs {
+    /// The grid that the words ask for.
+    #[must_use]
+    pub fn config(&self) -> Config {
+        let config = self.tuning.config(self.method);
+        Config { density: self.density.unwrap_or(config.density), ..config }
+    }
+
+    /// Refuses options that would be ignored.
+    ///
+    /// # Errors
+    /// The first such option, and what it is for.
+    pub fn check(&self) -> Result<()> {
+        ensure!(
+            self.density.is_none() || self.method.has_density(),
+            "--density is not for {}, which has none",
+            self.method.name()
+        );
+        self.tuning.check(&[self.method])?;
+        let is_for = |option: &str, is_there: bool, shading: Shading, word: &str| {
+            ensure!(
+                !is_there || self.shading == shading,
+                "{option} is for --shading {word}: leave one of them out"
+            );
+            Ok(())
+        };
+        is_for("--ao", self.ao.is_some(), Shading::Diffuse, "diffuse")?;
+        is_for("--no-shadows", self.no_shadows, Shading::Diffuse, "diffuse")?;
+        is_for("--counter", self.counter.is_some(), Shading::Heat, "heat")?;
+        is_for("--heat-top", self.heat_top.is_some(), Shading::Heat, "heat")?;
+        ensure!(
+            self.samples.is_none() || self.shading != Shading::Heat,
+            "--samples is not for --shading heat, which shows the work of one ray a pixel"
+        );
+        Ok(())
+    }
+
+    /// Rays through each pixel.
+    #[must_use]
+    pub fn samples(&self) -> u16 {
+        let default = if self.method == Method::Bvh { SAMPLES } else { 1 };
+        if self.shading == Shading::Heat { 1 } else { self.samples.unwrap_or(default) }
+    }
+
+    /// The lights: all that a tree traces in a few seconds; grids take longer for rays that go
+    /// anywhere, and get shadows alone.
+    #[must_use]
+    pub fn lights(&self) -> Lights {
+        if self.shading != Shading::Diffuse {
+            return Lights::default();
+        }
+        let default = match self.method {
+            Method::Bvh => (SAMPLES * SKY_RAYS).div_ceil(self.samples()),
+            _ => 0,
+        };
+        Lights { has_shadows: !self.no_shadows, sky_rays: self.ao.unwrap_or(default) }
+    }
+
+    /// Threads that build and render.
+    #[must_use]
+    pub fn threads(&self) -> u32 {
+        let cores = || thread::available_parallelism().map_or(1, NonZero::get);
+        let most = Control::MAX_TASKS;
+        self.threads.unwrap_or_else(|| u32::try_from(cores()).unwrap_or(most).min(most))
+    }
+}
+
+/// What the colours of a picture mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Shading {
+    /// A grey solid under lamp and sky
+    Diffuse,
+    /// Surface normals: red to the right, green up, blue toward the viewer
+    Normals,
+    /// The work of each ray, from blue to red
+    Heat,
+}

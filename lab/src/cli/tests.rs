@@ -1,0 +1,127 @@
+//! Words, and what becomes of them.
+
+use super::*;
+
+#[test]
+fn the_definition_is_sound() {
+    Cli::command().debug_assert();
+}
+
+#[test]
+fn bad_values_are_refused() {
+    for words in [
+        "render --size 0",
+        "render --size 16385",
+        "table a.ply --repeat 0",
+        "render --view above",
+        "render --eye 1,2",
+        "render --target 1,2,3",
+        "render --eye 1,2,3 --view top",
+        "render --fov 0",
+        "compare a.ply --eye 1,2,3 --view inside",
+        "render --density many",
+        "render --method octree",
+        "render --macrocell-factor -1",
+        "table",
+        "table a.ply --methods fixed,octree",
+        "table a.ply --json --markdown",
+        "compare",
+        "compare a.ply --peers optix",
+        "render --samples 0",
+        "pack a.ply",
+        "validate",
+        "animate --frames 0",
+        "animate --threads 65",
+        "render --threads 0",
+    ] {
+        let words = ["hgrid"].into_iter().chain(words.split(' '));
+        assert!(Cli::try_parse_from(words.clone()).is_err(), "{:?}", words.collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn without_a_command_a_scene_is_rendered() {
+    let parse = |words: &str| {
+        let words = words.split(' ').filter(|word| !word.is_empty()).map(OsString::from);
+        Cli::of_words(words).map(|cli| cli.command)
+    };
+    for (words, expected) in [
+        ("", DEFAULT_SCENE),
+        ("bunny.ply", "bunny.ply"),
+        ("--size 9 bunny.ply", "bunny.ply"),
+        ("render bunny.ply --json", "bunny.ply"),
+    ] {
+        let Ok(Command::Render(args)) = parse(words) else { panic!("{words}") };
+        assert_eq!(args.scene, expected);
+    }
+    assert!(matches!(parse("info a.ply"), Ok(Command::Info(_))));
+    for words in ["--help", "help", "help render", "-V", "a.ply b.ply", "pack a.ply", "info"] {
+        assert!(parse(words).is_err(), "{words}");
+    }
+}
+
+#[test]
+fn every_command_teaches_by_example() {
+    let commands = Cli::command();
+    for command in commands.get_subcommands().filter(|command| !command.is_hide_set()) {
+        let mut command = command.clone();
+        let help = command.render_help().to_string();
+        let example = format!("  hgrid {}", command.get_name());
+        let says_where = command.get_after_help().is_none();
+        assert!(says_where || help.contains(&example), "{}", command.get_name());
+    }
+}
+
+#[test]
+fn parameters_of_others_are_refused() {
+    let check = |words: &str| {
+        TableArgs::parse_from(["hgrid", "a.ply"].into_iter().chain(words.split(' '))).race.check()
+    };
+    check("--depth 2").unwrap();
+    check("--methods fixed,bvh --quality high").unwrap();
+    let message = check("--methods fixed,bvh --depth 2").unwrap_err().to_string();
+    assert!(message.contains("--depth is for recursive"), "{message}");
+}
+
+#[test]
+fn negative_values_are_values() {
+    for words in [
+        "--view -30,-20",
+        "--eye -1,-2,-3 --target -1,0,0 --fov 60",
+        "--view inside --fov 20.5",
+        "--density -1",
+    ] {
+        let words = ["hgrid", "render"].into_iter().chain(words.split(' '));
+        Cli::try_parse_from(words).unwrap();
+    }
+}
+
+#[test]
+fn methods_have_their_names_and_all_compete_unless_some_are_named() {
+    for &method in Method::ALL {
+        let args = RenderArgs::parse_from(["hgrid", "--method", method.name()]);
+        assert_eq!(args.config(), Config::new(method));
+    }
+    let methods = |words: &[&str]| -> Vec<Method> {
+        let words = ["hgrid", "a.ply"].iter().chain(words);
+        TableArgs::parse_from(words).race.configs().iter().map(|c| c.method).collect()
+    };
+    assert_eq!(methods(&[]), Method::ALL);
+    assert_eq!(methods(&["--methods", "fixed,one-level"]), [Method::Fixed, Method::OneLevel]);
+}
+
+#[test]
+fn parameters_reach_the_configuration() {
+    let words =
+        "hgrid --macrocell-factor 4 --subdivide-above 9 --depth 2 --density 2 --quality high";
+    let config = RenderArgs::parse_from(words.split(' ')).config();
+    let expected = Config {
+        macrocell_factor: 4,
+        subdivide_above: 9,
+        depth: 2,
+        density: 2.0,
+        quality: Quality::High,
+        ..Config::default()
+    };
+    assert_eq!(config, expected);
+}

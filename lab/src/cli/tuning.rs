@@ -1,0 +1,81 @@
+//! The words that say how a method is built.
+
+use anyhow::{Result, ensure};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use hgrid_core::{Config, Control, Method, Quality};
+
+/// Parameters of single methods.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Tuning {
+    /// For `fixed`: cells in a macrocell on each axis [default: the paper's, 6]
+    #[arg(long, value_name = "CELLS")]
+    pub macrocell_factor: Option<u32>,
+    /// For `variable`: a cell with more triangles than this gets a subgrid [default: 16]
+    #[arg(long, value_name = "TRIANGLES")]
+    pub subdivide_above: Option<u32>,
+    /// For `recursive`: levels of grids [default: the paper's, 3]
+    #[arg(long, value_name = "LEVELS")]
+    pub depth: Option<u32>,
+    /// For `bvh`: `high` builds longer for rays that are faster [default: fast]
+    #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
+    pub quality: Option<Quality>,
+}
+
+impl Tuning {
+    /// The method with these parameters and the paper's where none are given.
+    #[must_use]
+    pub fn config(&self, method: Method) -> Config {
+        let default = Config::new(method);
+        Config {
+            macrocell_factor: self.macrocell_factor.unwrap_or(default.macrocell_factor),
+            subdivide_above: self.subdivide_above.unwrap_or(default.subdivide_above),
+            depth: self.depth.unwrap_or(default.depth),
+            quality: self.quality.unwrap_or(default.quality),
+            ..default
+        }
+    }
+
+    /// Refuses parameters of methods that are not built.
+    ///
+    /// # Errors
+    /// The first such parameter, and the method that it is for.
+    pub fn check(&self, methods: &[Method]) -> Result<()> {
+        for (option, is_there, method) in [
+            ("--macrocell-factor", self.macrocell_factor.is_some(), Method::Fixed),
+            ("--subdivide-above", self.subdivide_above.is_some(), Method::Variable),
+            ("--depth", self.depth.is_some(), Method::Recursive),
+            ("--quality", self.quality.is_some(), Method::Bvh),
+        ] {
+            ensure!(
+                !is_there || methods.contains(&method),
+                "{option} is for {0}, which is not built: ask for {0}, or leave it out",
+                method.name()
+            );
+        }
+        Ok(())
+    }
+}
+
+/// As many threads as a build can use.
+pub(super) fn thread_parser() -> impl TypedValueParser<Value = u32> {
+    clap::value_parser!(u32).range(1..=i64::from(Control::MAX_TASKS))
+}
+
+/// A method by its name.
+pub(super) fn method_parser() -> impl TypedValueParser<Value = Method> {
+    let names = Method::ALL.iter().copied().map(Method::name);
+    PossibleValuesParser::new(names).try_map(|word| {
+        let method = Method::ALL.iter().copied().find(|method| method.name() == word);
+        method.ok_or("no such method")
+    })
+}
+
+/// A quality by its name.
+pub(super) fn quality_parser() -> impl TypedValueParser<Value = Quality> {
+    let names = Quality::ALL.iter().copied().map(Quality::name);
+    PossibleValuesParser::new(names).try_map(|word| {
+        let quality = Quality::ALL.iter().copied().find(|quality| quality.name() == word);
+        quality.ok_or("no such quality")
+    })
+}

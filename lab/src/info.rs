@@ -1,0 +1,281 @@
+//! The content of a file, a mesh or a blob: the `info` command.
+
+use std::io::{self, Write as _};
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use hgrid_core::{BlobInfo, Content, Grid};
+use indicatif::HumanCount;
+use serde::Serialize;
+
+use crate::blob::Blob;
+use crate::camera::Up;
+use crate::cli::blob::InfoArgs;
+use crate::scene::format::Format;
+use crate::scene::{Scene, read_model};
+use crate::shade::normal_of;
+
+/// Looks and prints.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn run(args: &InfoArgs) -> Result<()> {
+    let facts = Facts::of(&args.file)?;
+    let mut out = io::stdout();
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(&facts)?)?;
+        return Ok(());
+    }
+    let rows = facts.rows();
+    let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    for (name, value) in rows {
+        writeln!(out, "{name:width$}  {value}")?;
+    }
+    Ok(())
+}
+
+/// A name and a value, as they are printed.
+type Row = (&'static str, String);
+
+fn count(count: impl TryInto<u64>) -> String {
+    HumanCount(count.try_into().unwrap_or(u64::MAX)).to_string()
+}
+
+fn corners([min, max]: [[f32; 3]; 2]) -> String {
+    let point = |[x, y, z]: [f32; 3]| format!("{x} {y} {z}");
+    format!("{}  to  {}", point(min), point(max))
+}
+
+/// What is in a file.
+#[derive(Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+enum Facts {
+    Mesh(MeshFacts),
+    Blob(BlobFacts),
+}
+
+/// A mesh.
+#[derive(Debug, PartialEq, Serialize)]
+struct MeshFacts {
+    file: String,
+    format: &'static str,
+    /// Meshes of the file, and places where they stand.
+    meshes: usize,
+    instances: usize,
+    /// Counts of all instances together.
+    triangles: usize,
+    vertices: usize,
+    /// The lowest and the highest corner of the box around it.
+    bounds: Option<[[f32; 3]; 2]>,
+    up: &'static str,
+    /// Triangles that name a vertex that is not there: such a mesh cannot be built.
+    triangles_without_vertex: usize,
+    triangles_not_finite: usize,
+    triangles_without_area: usize,
+}
+
+/// A blob.
+#[derive(Debug, PartialEq, Serialize)]
+struct BlobFacts {
+    file: String,
+    format: &'static str,
+    version: u32,
+    method: &'static str,
+    /// What it is built over, one of the three.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    triangles: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shapes: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instances: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vertices: Option<u64>,
+    grid_bytes: u64,
+    total_bytes: u64,
+    has_mesh: bool,
+    #[serde(flatten)]
+    grid: Option<GridFacts>,
+}
+
+/// The grid of a blob that has its mesh.
+#[derive(Debug, PartialEq, Serialize)]
+struct GridFacts {
+    bounds: [[f32; 3]; 2],
+    triangles_not_finite: u32,
+    triangles_without_area: u32,
+    lists: u64,
+    references: u64,
+    longest_list: u32,
+    content_hash: String,
+}
+
+impl Facts {
+    fn of(file: &str) -> Result<Self> {
+        let path = Path::new(file);
+        if file.starts_with("procedural:") || !path.exists() {
+            let scene = Scene::load(file)?;
+            return Ok(Self::Mesh(MeshFacts::of(file, "formula", [1, 1], &scene)));
+        }
+        let cannot = || format!("cannot read `{file}`");
+        if Format::of(path).with_context(cannot)? == Format::Blob {
+            let facts = Blob::read(path).and_then(|blob| BlobFacts::of(file, &blob));
+            return facts.map(Self::Blob).with_context(cannot);
+        }
+        let (format, model) = read_model(path).with_context(cannot)?;
+        let counts = [model.meshes.len(), model.instances.len()];
+        let mesh =
+            model.flatten().context("it has more than 2^32 vertices").with_context(cannot)?;
+        let scene = Scene {
+            positions: mesh.positions,
+            indices: mesh.indices,
+            is_z_up: format.is_z_up(),
+            ..Scene::default()
+        };
+        Ok(Self::Mesh(MeshFacts::of(file, format.name(), counts, &scene)))
+    }
+}
+
+impl Facts {
+    fn rows(&self) -> Vec<Row> {
+        match self {
+            Self::Mesh(facts) => facts.rows(),
+            Self::Blob(facts) => facts.rows(),
+        }
+    }
+}
+
+impl MeshFacts {
+    fn rows(&self) -> Vec<Row> {
+        let all = [
+            ("file", self.file.clone()),
+            ("format", self.format.to_owned()),
+            ("meshes", count(self.meshes)),
+            ("instances", count(self.instances)),
+            ("triangles", count(self.triangles)),
+            ("vertices", count(self.vertices)),
+            ("bounds", self.bounds.map(corners).unwrap_or_default()),
+            ("up", self.up.to_owned()),
+        ];
+        let flaws = [
+            ("without a vertex", self.triangles_without_vertex),
+            ("not finite", self.triangles_not_finite),
+            ("without area", self.triangles_without_area),
+        ];
+        let flaws = flaws.into_iter().filter(|&(_, number)| number > 0);
+        all.into_iter()
+            .chain(flaws.map(|(name, n)| (name, format!("{} triangles", count(n)))))
+            .collect()
+    }
+
+    fn of(
+        file: &str,
+        format: &'static str,
+        [meshes, instances]: [usize; 2],
+        scene: &Scene,
+    ) -> Self {
+        let Scene { positions, indices, .. } = scene;
+        let (mut missing, mut not_finite, mut flat) = (0, 0, 0);
+        for triangle in indices {
+            let corners = triangle.map(|vertex| positions.get(vertex as usize).copied());
+            match corners {
+                [Some(a), Some(b), Some(c)] => {
+                    let is_finite = [a, b, c].as_flattened().iter().all(|c| c.is_finite());
+                    let has_area = normal_of(&[a, b, c]).is_some();
+                    not_finite += usize::from(!is_finite);
+                    flat += usize::from(is_finite && !has_area);
+                }
+                _ => missing += 1,
+            }
+        }
+        Self {
+            file: file.to_owned(),
+            format,
+            meshes,
+            instances,
+            triangles: indices.len(),
+            vertices: positions.len(),
+            bounds: scene.bounds().map(|(min, max)| [min, max]),
+            up: match Up::of(scene) {
+                Up::Y => "y",
+                Up::Z => "z",
+            },
+            triangles_without_vertex: missing,
+            triangles_not_finite: not_finite,
+            triangles_without_area: flat,
+        }
+    }
+}
+
+impl BlobFacts {
+    fn rows(&self) -> Vec<Row> {
+        let mesh = if self.has_mesh { "in it" } else { "not in it" };
+        let mut rows = vec![
+            ("file", self.file.clone()),
+            ("format", format!("{}, version {}", self.format, self.version)),
+            ("method", self.method.to_owned()),
+        ];
+        rows.extend(self.triangles.map(|_| ("mesh", mesh.to_owned())));
+        let counts = [
+            ("triangles", self.triangles.map(u64::from)),
+            ("shapes", self.shapes.map(u64::from)),
+            ("instances", self.instances.map(u64::from)),
+            ("vertices", self.vertices),
+        ];
+        rows.extend(counts.into_iter().filter_map(|(name, number)| Some((name, count(number?)))));
+        rows.extend([
+            ("grid", format!("{} bytes", count(self.grid_bytes))),
+            ("all", format!("{} bytes", count(self.total_bytes))),
+        ]);
+        if let Some(grid) = &self.grid {
+            rows.extend([
+                ("bounds", corners(grid.bounds)),
+                (
+                    "lists",
+                    format!("{}, of {} triangles at most", count(grid.lists), grid.longest_list),
+                ),
+                ("references", count(grid.references)),
+                ("not finite", format!("{} triangles", count(grid.triangles_not_finite))),
+                ("without area", format!("{} triangles", count(grid.triangles_without_area))),
+                ("content hash", grid.content_hash.clone()),
+            ]);
+        }
+        rows
+    }
+
+    fn of(file: &str, blob: &Blob) -> Result<Self> {
+        let info = BlobInfo::peek(blob.bytes())?;
+        let of = |content| (info.content == content).then_some(info.triangle_count);
+        let is_mesh = info.content == Content::Triangles;
+        let has_mesh = is_mesh && info.has_mesh;
+        let grid = has_mesh.then(|| Grid::open_packed(blob.bytes())).transpose()?;
+        Ok(Self {
+            file: file.to_owned(),
+            format: Format::Blob.name(),
+            version: info.version,
+            method: info.method.name(),
+            triangles: of(Content::Triangles),
+            shapes: of(Content::Shapes),
+            instances: of(Content::Instances),
+            vertices: is_mesh.then_some(info.vertex_count),
+            grid_bytes: info.grid_bytes,
+            total_bytes: info.total_bytes,
+            has_mesh,
+            grid: grid.as_ref().map(GridFacts::of),
+        })
+    }
+}
+
+impl GridFacts {
+    fn of(grid: &Grid<'_>) -> Self {
+        let ((min, max), found) = (grid.bounds(), grid.inspect());
+        Self {
+            bounds: [min, max],
+            triangles_not_finite: found.skipped_count,
+            triangles_without_area: found.degenerate_count,
+            lists: found.list_count,
+            references: found.reference_count,
+            longest_list: found.longest_list,
+            content_hash: format!("{:016x}", found.content_hash),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Grid and mesh in one file: the `pack` command.
+//!
+//! The file is a blob as core/src/packed.rs describes it, or C source with its bytes: an array that
+//! a program for a microcontroller has in flash and opens there.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use anyhow::{Context as _, Result, ensure};
+use hgrid_core::{Config, Grid, TriangleMesh};
+use indicatif::HumanCount;
+
+use crate::blob::Blob;
+use crate::cli::blob::PackArgs;
+use crate::image::check_writable;
+use crate::regions::Regions;
+use crate::scene::Scene;
+use crate::scene::format::Format;
+
+/// Bytes in a line of C.
+const IN_LINE: usize = 24;
+
+/// Builds, packs and writes.
+///
+/// # Errors
+/// If the scene cannot be loaded or built, or the file cannot be written.
+pub fn run(args: &PackArgs) -> Result<()> {
+    check(args)?;
+    check_writable(&args.output)?;
+    let scene = Scene::load(&args.scene)?;
+    let cannot = || format!("cannot pack `{}`", args.scene);
+    let blob = pack(&scene, &config(args)).with_context(cannot)?;
+    let written = match &args.c_array {
+        None => fs::write(&args.output, blob.bytes()),
+        Some(name) => File::create(&args.output).and_then(|file| {
+            let is_header =
+                args.output.extension().is_some_and(|ending| ending == "h" || ending == "hpp");
+            let mut file = BufWriter::new(file);
+            write_c(&mut file, name, is_header, &scene.name, blob.bytes())?;
+            file.flush()
+        }),
+    };
+    written.with_context(|| format!("cannot write `{}`", args.output.display()))?;
+    let bytes = HumanCount(blob.bytes().len() as u64);
+    let triangles = HumanCount(scene.indices.len() as u64);
+    let (output, method) = (args.output.display(), args.method.name());
+    writeln!(
+        io::stdout(),
+        "wrote {output}: {bytes} bytes, a {method} and its mesh of {triangles} triangles"
+    )?;
+    Ok(())
+}
+
+fn config(args: &PackArgs) -> Config {
+    let config = args.tuning.config(args.method);
+    Config { density: args.density.unwrap_or(config.density), ..config }
+}
+
+/// Refuses words that would be ignored, and files that are no blob's.
+fn check(args: &PackArgs) -> Result<()> {
+    let (method, output) = (args.method, args.output.display());
+    ensure!(
+        args.density.is_none() || method.has_density(),
+        "--density is not for {}, which has none",
+        method.name()
+    );
+    args.tuning.check(&[method])?;
+    let is_mesh = Format::named(&args.output).is_some_and(|format| format != Format::Blob);
+    ensure!(!is_mesh, "`{output}` would be a mesh by its name: name a file like x.hgrid or x.c");
+    let is_source = |path: &Path| {
+        let endings = ["c", "h", "cpp", "hpp", "cc"];
+        path.extension().is_some_and(|ending| endings.iter().any(|source| ending == *source))
+    };
+    match &args.c_array {
+        None => {
+            ensure!(!is_source(&args.output), "`{output}` is C by its name: add --c-array NAME");
+        }
+        Some(name) => {
+            ensure!(
+                is_source(&args.output),
+                "`{output}` is not C by its name: name a file like x.c"
+            );
+            ensure!(is_identifier(name), "`{name}` is no name in C: take letters, digits and _");
+        }
+    }
+    Ok(())
+}
+
+fn is_identifier(name: &str) -> bool {
+    let is_word = name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+    is_word && name.bytes().next().is_some_and(|first| !first.is_ascii_digit())
+}
+
+/// Builds a grid of a scene and writes both into one blob.
+fn pack(scene: &Scene, config: &Config) -> Result<Blob> {
+    let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
+    let regions = Regions::build(mesh, config)?;
+    let grid = Grid::open(&regions.index, mesh)?;
+    let mut blob = Blob::zeroed(usize::try_from(grid.packed_bytes())?);
+    grid.pack(blob.bytes_mut())?;
+    Ok(blob)
+}
+
+/// Writes bytes as an array of C.
+fn write_c(
+    out: &mut impl Write,
+    name: &str,
+    is_header: bool,
+    scene: &str,
+    bytes: &[u8],
+) -> io::Result<()> {
+    let order = if cfg!(target_endian = "little") { "little" } else { "big" };
+    // A comment ends where its end stands in a file's name.
+    let scene = scene.replace("*/", "* /");
+    writeln!(out, "/* {scene}, packed by `hgrid pack` for machines of {order}-endian order:")?;
+    writeln!(out, " *   hgrid_open({name}, sizeof {name}, NULL, &grid) */")?;
+    writeln!(out, "#include <hgrid.h>\n")?;
+    if !is_header {
+        // Other files of a C++ program see no constant that is not declared first.
+        writeln!(out, "extern const unsigned char {name}[{}];", bytes.len())?;
+    }
+    let linkage = if is_header { "static " } else { "" };
+    writeln!(out, "HGRID_ALIGNED {linkage}const unsigned char {name}[{}] = {{", bytes.len())?;
+    for line in bytes.chunks(IN_LINE) {
+        let line: Vec<_> = line.iter().map(u8::to_string).collect();
+        writeln!(out, "{},", line.join(","))?;
+    }
+    writeln!(out, "}};")
+}

@@ -1,0 +1,243 @@
+//! From a scene to a picture: the `render` command.
+//!
+//! ```text
+//! scene -> grid -> camera (as asked for, or viewpoint) -> studio (lamp, sky, floor) -> paint -> PNG
+//!                                                      '> heat: the work of each ray
+//! ```
+
+mod paint;
+mod studio;
+mod summary;
+
+use core::sync::atomic::Ordering;
+use std::io::{self, Write as _};
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, ensure};
+use hgrid_core::{Counters, Grid, TriangleMesh};
+
+use self::paint::{Seen, paint};
+use self::studio::Studio;
+pub(crate) use self::summary::seconds;
+pub use self::summary::{Summary, Work};
+use crate::cli::render::{RenderArgs, Shading};
+use crate::heat::{self, Counter, Picture};
+use crate::image;
+use crate::light::Lights;
+use crate::measure::{self, SceneFacts, ratio};
+use crate::progress::Progress;
+use crate::regions::Regions;
+use crate::scene::Scene;
+use crate::shade::{Rgb, Shader};
+use crate::threads::Threads;
+use crate::tiles::Tiles;
+
+/// Renders, writes the picture and prints the numbers.
+///
+/// # Errors
+/// If the scene cannot be loaded or built, there is nothing to see, or the picture cannot be written.
+pub fn run(args: &RenderArgs) -> Result<()> {
+    args.check()?;
+    image::check_picture(&args.output)?;
+
+    let start = Instant::now();
+    let scene = Scene::load(&args.scene)?;
+    let load_seconds = start.elapsed().as_secs_f64();
+    let none = || format!("no picture of `{}`", args.scene);
+    ensure!(!scene.indices.is_empty(), "{}: it has no triangles", none());
+    ensure!(scene.bounds().is_some(), "{}: no vertex has finite coordinates", none());
+
+    let mesh = TriangleMesh::new(&scene.positions, &scene.indices).with_context(none)?;
+    let threads = Threads::new(args.threads())?;
+    threads.wake();
+    let start = Instant::now();
+    let built = threads.parallel(|parallel| Regions::fresh(mesh, &args.config(), parallel));
+    let Regions { index, scratch } = built.with_context(none)?;
+    let build_seconds = start.elapsed().as_secs_f64();
+    drop(scratch);
+    let grid = Grid::open(&index, mesh)?;
+
+    let tiles = args.picture.shot(&scene, &grid)?;
+    let lights = args.lights();
+    let start = Instant::now();
+    let outcome = draw(args, &scene, &grid, tiles, lights, &threads)?;
+    let render_seconds = start.elapsed().as_secs_f64();
+    ensure!(
+        outcome.hits > 0,
+        "{}: no ray hits anything; look from elsewhere, by --view, or by --eye and --target",
+        none()
+    );
+    let Picture { size, pixels } = outcome.picture;
+    image::write_png(&args.output, size, &pixels)?;
+
+    let summary = Summary {
+        scene: SceneFacts::of(&scene),
+        load_seconds,
+        method: grid.method().name(),
+        threads: outcome.threads,
+        build_seconds,
+        index_bytes: grid.blob_bytes(),
+        skipped_triangles: grid.skipped_count(),
+        size: tiles.size,
+        samples: args.samples(),
+        shadows: lights.has_shadows,
+        ao: lights.sky_rays,
+        rays: outcome.rays,
+        hits: outcome.hits,
+        render_seconds,
+        work: outcome.work,
+    };
+    // Not println, which panics when the reader of a pipe has gone.
+    let mut out = io::stdout();
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(&summary)?)?;
+    } else {
+        let note = outcome.note.map(|note| format!("; {note}")).unwrap_or_default();
+        writeln!(out, "{summary}\nwrote {}{note}", args.output.display())?;
+    }
+    Ok(())
+}
+
+/// A picture, and what it took.
+struct Outcome {
+    picture: Picture,
+    rays: u64,
+    hits: u64,
+    threads: u32,
+    work: Option<Work>,
+    note: Option<String>,
+}
+
+fn draw(
+    args: &RenderArgs,
+    scene: &Scene,
+    grid: &Grid<'_>,
+    tiles: Tiles,
+    lights: Lights,
+    threads: &Threads,
+) -> Result<Outcome> {
+    let square =
+        |pixels: Vec<Rgb>| Picture { size: (tiles.size.into(), tiles.size.into()), pixels };
+    let (pixels, tally) = match args.shading {
+        Shading::Heat => return heat(args, grid, &tiles),
+        Shading::Diffuse => {
+            let part = (scene.framed_bounds(), scene.focus.is_none());
+            let studio = Studio::new(grid, tiles, lights, part, args.picture.up(scene));
+            paint(grid, &tiles, args.samples(), threads, |seen, light| studio.shade(seen, light))
+        }
+        Shading::Normals => {
+            let shader = Shader::new(*grid.mesh(), &tiles.camera);
+            paint(grid, &tiles, args.samples(), threads, |seen: &Seen<'_>, light| {
+                let mut colors = vec![[0; 3]; seen.rays.len()];
+                shader.normals(seen.rays, seen.hits, &mut colors);
+                for (light, color) in light.iter_mut().zip(colors) {
+                    *light = color.map(|c| (f32::from(c) / 255.0).powi(2));
+                }
+                0
+            })
+        }
+    };
+    let [rays, hits] = [tally.rays, tally.hits].map(|count| count.load(Ordering::Relaxed));
+    let threads = threads.count();
+    Ok(Outcome { picture: square(pixels), rays, hits, threads, work: None, note: None })
+}
+
+/// Counts the work of every ray, on one thread.
+fn heat(args: &RenderArgs, grid: &Grid<'_>, tiles: &Tiles) -> Result<Outcome> {
+    let counter = args.counter.unwrap_or(Counter::Cost);
+    let mut progress = Progress::new("counting", tiles.size.into());
+    let cost = |work: &Counters| counter.of(work);
+    let measure::Work { counters, hits, largest, costs } =
+        measure::count(grid, tiles, cost, &mut progress);
+    let (picture, top) = heat::picture(&costs, tiles.size, counter, args.heat_top)?;
+    let rays = costs.len() as u64;
+    let work = Work {
+        primitive_tests_per_ray: ratio(counters.primitive_tests, rays),
+        cell_steps_per_ray: ratio(counters.cell_steps, rays),
+        grid_steps_per_ray: ratio(counters.grid_steps, rays),
+        largest_ray_cost: largest,
+    };
+    let note = Some(format!("red is {top} {} or more", counter.words()));
+    Ok(Outcome { picture, rays, hits, threads: 1, work: Some(work), note })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use clap::Parser as _;
+
+    use super::*;
+
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+    /// Runs the command in a folder of its own that has a file, and returns whether there is a picture.
+    fn run_words(name: &str, words: &[&str], file: Option<(&str, &str)>) -> (Result<()>, bool) {
+        let folder = std::env::temp_dir().join(format!("hgrid-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let output = folder.join("picture.png");
+        let place = |path: &Path| path.to_str().unwrap().to_owned();
+        let scene = file.map(|(name, text)| {
+            std::fs::write(folder.join(name), text).unwrap();
+            place(&folder.join(name))
+        });
+        let own = ["hgrid".to_owned(), "--size".to_owned(), "20".to_owned(), "-o".to_owned()];
+        let own = own.into_iter().chain([place(&output)]);
+        let words = own.chain(words.iter().map(|&word| word.to_owned())).chain(scene);
+        let result =
+            RenderArgs::try_parse_from(words).map_err(Into::into).and_then(|args| run(&args));
+        let is_written = output.exists();
+        std::fs::remove_dir_all(&folder).unwrap();
+        (result, is_written)
+    }
+
+    #[test]
+    fn every_shading_and_method_gives_a_picture() {
+        for (at, options) in [
+            "--shading diffuse",
+            "--shading normals --samples 2",
+            "--shading heat --counter cell-steps",
+            "--samples 1 --ao 0 --no-shadows --threads 1",
+            "--method one-level --ao 2",
+            "--view 30,40 --json",
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let words: Vec<_> =
+                ["procedural:knot:500"].into_iter().chain(options.split(' ')).collect();
+            let (result, is_written) = run_words(&format!("shading-{at}"), &words, None);
+            result.unwrap();
+            assert!(is_written, "{options}");
+        }
+    }
+
+    #[test]
+    fn failures_leave_no_picture_and_name_the_cause() {
+        let nowhere = "v nan 0 0\nv nan 0 0\nv 0 nan 0\nf 1 2 3\n";
+        let cases: [(&str, &str, &str); 14] = [
+            ("--method fixed --density -1", TRIANGLE, "density"),
+            ("--ao 4 --shading normals", TRIANGLE, "--ao is for --shading diffuse"),
+            ("--no-shadows --shading heat", TRIANGLE, "--no-shadows is for --shading diffuse"),
+            ("--samples 4 --shading heat", TRIANGLE, "--samples"),
+            ("--counter cost", TRIANGLE, "--counter is for --shading heat"),
+            ("--heat-top 9", TRIANGLE, "--heat-top is for --shading heat"),
+            ("--density 8", TRIANGLE, "--density is not for bvh"),
+            ("--macrocell-factor 8", TRIANGLE, "--macrocell-factor is for fixed"),
+            ("--depth 2", TRIANGLE, "--depth is for recursive"),
+            ("--method fixed --quality high", TRIANGLE, "--quality is for bvh"),
+            ("--eye 1,2,3 --target 1,2,3", TRIANGLE, "--eye and --target are the same point"),
+            ("--eye 1,2,3 --target 1,2,4", TRIANGLE, "no ray hits anything"),
+            ("--json", "v 0 0 0\n", "it has no triangles"),
+            ("--json", nowhere, "no vertex has finite coordinates"),
+        ];
+        for (at, (words, text, expected)) in cases.into_iter().enumerate() {
+            let words: Vec<_> = words.split(' ').collect();
+            let (result, is_written) =
+                run_words(&format!("failure-{at}"), &words, Some(("a.obj", text)));
+            let message = format!("{:#}", result.unwrap_err());
+            assert!(message.contains(expected), "{message}");
+            assert!(!is_written);
+        }
+    }
+}

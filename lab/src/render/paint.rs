@@ -1,0 +1,143 @@
+//! A picture from samples: every pixel is the mean of several rays, on all threads.
+//!
+//! Tiles go down band by band. A sample moves the rays of a tile by a part of a pixel, the same for
+//! all of them, so that the places of its samples are spread over each pixel:
+//!
+//! ```text
+//! +---------+
+//! |     1   |     Places by the R2 sequence (Roberts 2018): any number of samples is
+//! |  3      |     spread well, without a grid that edges could line up with.
+//! |       2 |
+//! +---------+
+//! ```
+
+use core::sync::atomic::{AtomicU64, Ordering};
+use std::sync::Mutex;
+
+use hgrid_core::{Grid, Hit, INVALID_ID, Ray};
+
+use crate::light::Sample;
+use crate::progress::Progress;
+use crate::shade::Rgb;
+use crate::threads::Threads;
+use crate::tiles::{TILE_RAYS, Tiles, intersect};
+
+/// The rays of a tile with their hits, and which sample of their pixels they are.
+pub(super) struct Seen<'a> {
+    pub(super) rays: &'a [Ray],
+    pub(super) hits: &'a [Hit],
+    /// The rays through the middle of the pixels.
+    pub(super) middles: &'a [Ray],
+    pub(super) sample: Sample,
+}
+
+/// What a picture took.
+#[derive(Debug, Default)]
+pub(super) struct Tally {
+    /// Rays from the eye and from what they hit.
+    pub(super) rays: AtomicU64,
+    /// Rays from the eye that hit something.
+    pub(super) hits: AtomicU64,
+}
+
+/// Paints a picture; `shade` gives the light of each ray, which a screen takes the root of, and
+/// returns how many more rays it sent.
+#[expect(clippy::cast_possible_truncation, reason = "fewer bands than pixels of a side")]
+pub(super) fn paint(
+    grid: &Grid<'_>,
+    tiles: &Tiles,
+    samples: u16,
+    threads: &Threads,
+    shade: impl Fn(&Seen<'_>, &mut [[f32; 3]]) -> u64 + Sync,
+) -> (Vec<Rgb>, Tally) {
+    let mut pixels = vec![[0; 3]; tiles.pixels()];
+    let tally = Tally::default();
+    let progress = Mutex::new(Progress::new("rendering", tiles.size.into()));
+    let bands: Vec<_> = tiles.bands(&mut pixels).map(Mutex::new).collect();
+    threads.each(bands.len() as u32, |at| {
+        let Some(Ok(mut band)) = bands.get(at as usize).map(|band| band.lock()) else { return };
+        band.fill(|middles, colors| tile(grid, tiles, samples, middles, colors, &shade, &tally));
+        if let Ok(mut progress) = progress.lock() {
+            progress.advance(band.height().into());
+        }
+    });
+    drop(bands);
+    (pixels, tally)
+}
+
+/// Paints the pixels of a tile.
+fn tile(
+    grid: &Grid<'_>,
+    tiles: &Tiles,
+    samples: u16,
+    middles: &[Ray],
+    colors: &mut [Rgb],
+    shade: impl Fn(&Seen<'_>, &mut [[f32; 3]]) -> u64,
+    tally: &Tally,
+) {
+    let mut hits = [Hit::MISS; TILE_RAYS];
+    let hits = &mut hits[..middles.len()];
+    let mut light = [[0.0; 3]; TILE_RAYS];
+    let light = &mut light[..middles.len()];
+    let mut sums = [[0.0; 3]; TILE_RAYS];
+    let (mut traced, mut struck) = (0, 0);
+    for number in 0..samples {
+        let shift = tiles.camera.shift(place(number, samples), tiles.size);
+        let rays: Vec<_> = middles
+            .iter()
+            .map(|ray| {
+                Ray::new(ray.origin, [0, 1, 2].map(|axis| ray.direction[axis] + shift[axis]))
+            })
+            .collect();
+        intersect(grid, &rays, hits);
+        let sample = Sample { number, count: samples };
+        traced += rays.len() as u64 + shade(&Seen { rays: &rays, hits, middles, sample }, light);
+        struck += hits.iter().filter(|hit| hit.primitive != INVALID_ID).count() as u64;
+        for (sum, light) in sums.iter_mut().zip(&*light) {
+            *sum = [0, 1, 2].map(|c| sum[c] + light[c]);
+        }
+    }
+    for (color, sum) in colors.iter_mut().zip(sums) {
+        *color = sum.map(|c| display(c / f32::from(samples)));
+    }
+    tally.rays.fetch_add(traced, Ordering::Relaxed);
+    tally.hits.fetch_add(struck, Ordering::Relaxed);
+}
+
+/// Returns the place of a sample, in pixels from the middle.
+fn place(number: u16, samples: u16) -> [f32; 2] {
+    if samples == 1 {
+        return [0.0; 2];
+    }
+    [0.754_877_7, 0.569_840_3].map(|step| (0.5 + step * f32::from(number)).fract() - 0.5)
+}
+
+/// Returns linear light as a screen wants it; a square root is close to a screen's curve.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 255")]
+fn display(light: f32) -> u8 {
+    (light.clamp(0.0, 1.0).sqrt() * 255.0).round() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_spread_over_the_pixel() {
+        assert_eq!(place(0, 1).map(f32::to_bits), [0; 2]);
+        for count in [4, 16, 64] {
+            let mut sum = [0.0; 2];
+            for place in (0..count).map(|number| place(number, count)) {
+                assert!(place.iter().all(|c| (-0.5..0.5).contains(c)));
+                sum = [0, 1].map(|axis| sum[axis] + place[axis]);
+            }
+            let most = 0.2 * f32::from(count);
+            assert!(sum.iter().all(|c| c.abs() < most), "{sum:?} of {count}");
+        }
+    }
+
+    #[test]
+    fn light_is_shown_from_black_to_white() {
+        assert_eq!([-1.0, 0.0, 0.25, 1.0, 9.0].map(display), [0, 0, 128, 255, 255]);
+    }
+}

@@ -1,0 +1,234 @@
+//! The light of a picture: a lamp, sky and ground, and the floor that a thing stands on.
+//!
+//! ```text
+//!  lamp                  thing: the lamp over the viewer's left shoulder, and a floor under it that
+//!     \    sky                  has the colours of the background, but for what shades it
+//!      \  .---.          room:  of some lamps the one that lights most of what is seen, as bright
+//!       \ | * |                 as it takes to see the rest
+//!  -------floor-----
+//! ```
+
+use hgrid_core::{Grid, Hit, INVALID_ID, Ray};
+
+use super::paint::Seen;
+use crate::camera::{Camera, Up, View};
+use crate::light::{Around, Lights, Sample, Spot, noise};
+use crate::scene::Bounds;
+use crate::shade::{Shader, background};
+use crate::tiles::{Tiles, intersect};
+use crate::vector::{dot, length, offset, round};
+
+/// The three lights on a surface, as linear red, green and blue.
+const KEY: [f32; 3] = [0.92, 0.86, 0.76];
+const SKY: [f32; 3] = [0.21, 0.25, 0.31];
+const GROUND: [f32; 3] = [0.11, 0.10, 0.085];
+
+/// How far away something hides the sky: in parts of half the scene's diagonal, and in a room in
+/// parts of the distance that is seen.
+const REACH: f64 = 0.5;
+const ROOM_REACH: f64 = 0.35;
+
+/// The light in a room: the mean that its pictures get, and how much brighter they may become.
+const ROOM_MEAN: f32 = 0.34;
+const MAX_EXPOSURE: f32 = 6.0;
+
+/// Surfaces that face the lamp more than this count no more for its choice: a light that falls on
+/// many of them beats one that falls on a floor alone.
+const GRAZING: f32 = 0.5;
+
+/// How dark the floor gets: what is left without the lamp, and without the sky.
+const FLOOR_SHADE: f32 = 0.5;
+const FLOOR_CLOSED: f32 = 0.35;
+
+/// The floor's shade begins to fade and ends so many radii of the scene from its middle.
+const FADE: [f64; 2] = [1.2, 3.5];
+
+/// Rays on each side of the coarse picture that the light of a room is chosen by.
+const COARSE: u16 = 48;
+
+/// What lights the surfaces of a scene, as a camera sees them.
+#[derive(Debug)]
+pub(super) struct Studio<'a> {
+    grid: &'a Grid<'a>,
+    tiles: Tiles,
+    lights: Lights,
+    around: Around,
+    /// The direction to the sky.
+    up: [f32; 3],
+    /// How much brighter sky and ground are than outside.
+    exposure: f32,
+    floor: Option<Floor>,
+}
+
+/// A level plane below a thing.
+#[derive(Debug, Clone, Copy)]
+struct Floor {
+    middle: [f64; 3],
+    radius: f64,
+}
+
+impl<'a> Studio<'a> {
+    /// Lights a part of a scene for a camera.
+    pub(super) fn new(
+        grid: &'a Grid<'a>,
+        tiles: Tiles,
+        lights: Lights,
+        (part, is_all): (Bounds, bool),
+        up: Up,
+    ) -> Self {
+        let lamp = Shader::new(*grid.mesh(), &tiles.camera).lamp();
+        let (min, max) = (part.0.map(f64::from), part.1.map(f64::from));
+        let diagonal = offset(max, -1.0, min);
+        let radius = 0.5 * length(diagonal);
+        let upward = up.direction();
+        let middle = offset(min, 0.5, diagonal);
+        let half_height = 0.5 * dot(diagonal, upward).abs();
+        let floor = Floor { middle: offset(middle, -half_height, upward), radius };
+        let eye = tiles.camera.ray(0, 0, 1).origin.map(f64::from);
+        let is_above = dot(offset(eye, -1.0, floor.middle), upward) > 0.0;
+        let [reach, ..] = round([REACH * radius, 0.0, 0.0]);
+        let mut studio = Self {
+            grid,
+            tiles,
+            lights,
+            around: Around { lamp, reach },
+            up: round(upward),
+            exposure: 1.0,
+            floor: (is_all && is_above && !lights.are_everywhere()).then_some(floor),
+        };
+        let is_within = (0..3).all(|axis| (min[axis]..=max[axis]).contains(&eye[axis]));
+        if is_within {
+            studio.light_room(up);
+        }
+        studio
+    }
+
+    /// Chooses lamp, reach and exposure for a camera that stands in the scene.
+    fn light_room(&mut self, up: Up) {
+        self.floor = None;
+        let coarse = Tiles { size: COARSE, ..self.tiles };
+        let (mut rays, mut hits) = (Vec::new(), Vec::new());
+        coarse.each(|tile, _| {
+            let from = hits.len();
+            hits.resize(from + tile.len(), Hit::MISS);
+            intersect(self.grid, tile, &mut hits[from..]);
+            rays.extend_from_slice(tile);
+        });
+        let surfaces: Vec<_> = rays
+            .iter()
+            .zip(&hits)
+            .filter_map(|(ray, hit)| self.grid.mesh().surface(ray, hit))
+            .collect();
+        if surfaces.is_empty() {
+            return;
+        }
+        let count = f64::from(u32::try_from(surfaces.len()).unwrap_or(u32::MAX));
+        let distances = hits.iter().filter(|hit| hit.primitive != INVALID_ID);
+        let mean = distances.map(|hit| f64::from(hit.t)).sum::<f64>() / count;
+        [self.around.reach, ..] = round([ROOM_REACH * mean, 0.0, 0.0]);
+
+        if self.lights.has_shadows {
+            let lit = |lamp: [f32; 3]| -> f32 {
+                let lit = surfaces.iter().map(|surface| {
+                    let toward = crate::shade::dot(surface.normal, lamp).max(0.0);
+                    let is_dark =
+                        toward <= 0.0 || self.grid.occluded(&Ray::new(surface.above, lamp));
+                    if is_dark { 0.0 } else { toward.min(GRAZING) }
+                });
+                lit.sum()
+            };
+            let lamps = [30.0, 50.0, 70.0].into_iter().flat_map(|elevation| {
+                (0..12).map(move |at| View::Angles { azimuth: 30.0 * f64::from(at), elevation })
+            });
+            let lamps = lamps.map(|view| view.unit(up)).chain([self.around.lamp]);
+            let best = lamps.map(|lamp| (lit(lamp), lamp)).max_by(|a, b| a.0.total_cmp(&b.0));
+            self.around.lamp = best.map_or(self.around.lamp, |(_, lamp)| lamp);
+        }
+
+        let (mut sum, mut pixels) = (0.0, 0.0);
+        coarse.each(|tile, _| {
+            let mut hits = vec![Hit::MISS; tile.len()];
+            intersect(self.grid, tile, &mut hits);
+            let mut light = vec![[0.0; 3]; tile.len()];
+            let sample = Sample { number: 0, count: 1 };
+            self.shade(&Seen { rays: tile, hits: &hits, middles: tile, sample }, &mut light);
+            for (_, [_, green, _]) in
+                hits.iter().zip(light).filter(|(hit, _)| hit.primitive != INVALID_ID)
+            {
+                sum += green;
+                pixels += 1.0;
+            }
+        });
+        if sum > 0.0 {
+            self.exposure = (ROOM_MEAN * pixels / sum).clamp(1.0, MAX_EXPOSURE);
+        }
+    }
+
+    /// The camera's picture.
+    fn camera(&self) -> &Camera {
+        &self.tiles.camera
+    }
+
+    /// Gives rays their light, and returns how many more it took.
+    pub(super) fn shade(&self, seen: &Seen<'_>, light: &mut [[f32; 3]]) -> u64 {
+        let mesh = self.grid.mesh();
+        let size = self.tiles.size;
+        let mut spots = Vec::with_capacity(seen.rays.len());
+        for (at, ((ray, hit), middle)) in
+            (0..).zip(seen.rays.iter().zip(seen.hits).zip(seen.middles))
+        {
+            let noise = noise(self.camera().pixel(middle, size));
+            if let Some(surface) = mesh.surface(ray, hit) {
+                spots.push(Spot { at, normal: surface.normal, start: surface.above, noise });
+            } else if let Some((start, _)) = self.on_floor(ray) {
+                spots.push(Spot { at, normal: self.up, start, noise });
+            }
+        }
+        let reached = self.lights.reach(self.grid, &self.around, seen.sample, &spots);
+        let [_, picture_up, _] = self.camera().axes();
+        for (light, ray) in light.iter_mut().zip(seen.rays) {
+            *light = background(picture_up, ray.direction);
+        }
+        for Spot { at, normal, .. } in spots {
+            let (lit, open) = (reached.lit[at], reached.open[at]);
+            if seen.hits[at].primitive == INVALID_ID {
+                let fade = self.on_floor(&seen.rays[at]).map_or(0.0, |(_, fade)| fade);
+                let shade = FLOOR_SHADE + (1.0 - FLOOR_SHADE) * lit;
+                let closed = FLOOR_CLOSED + (1.0 - FLOOR_CLOSED) * open;
+                let left = 1.0 - fade * (1.0 - shade * closed);
+                light[at] = light[at].map(|c| c * left);
+            } else {
+                light[at] = self.surface(normal, lit, open);
+            }
+        }
+        reached.rays
+    }
+
+    /// Returns the light of a surface, as film takes it: bright light never quite becomes white.
+    fn surface(&self, normal: [f32; 3], lit: f32, open: f32) -> [f32; 3] {
+        let dot = crate::shade::dot;
+        let key = lit * dot(normal, self.around.lamp).max(0.0);
+        let sky = 0.5 + 0.5 * dot(normal, self.up);
+        [0, 1, 2].map(|c| {
+            let fill = open * (SKY[c] * sky + GROUND[c] * (1.0 - sky));
+            1.0 - (-KEY[c] * key - self.exposure * fill).exp()
+        })
+    }
+
+    /// Returns where a ray meets the floor, and how much of the floor's shade is to be seen there.
+    fn on_floor(&self, ray: &Ray) -> Option<([f32; 3], f32)> {
+        let Floor { middle, radius } = self.floor?;
+        let (up, along) = (self.up.map(f64::from), ray.direction.map(f64::from));
+        let from = offset(ray.origin.map(f64::from), -1.0, middle);
+        let fall = -dot(along, up);
+        let t = dot(from, up) / fall;
+        if fall <= 0.0 || t <= 0.0 {
+            return None;
+        }
+        let place = offset(from, t, along);
+        let [near, far] = FADE;
+        let part = ((far - length(place) / radius) / (far - near)).clamp(0.0, 1.0);
+        let [fade, ..] = round([part * part * (3.0 - 2.0 * part), 0.0, 0.0]);
+        (fade > 0.0).then(|| (round(offset(middle, 1.0, place)), fade))
+    }
+}

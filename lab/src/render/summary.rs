@@ -1,0 +1,134 @@
+//! The numbers of a picture: as lines for people and as JSON for programs.
+
+use core::fmt;
+
+use indicatif::HumanCount;
+use serde::Serialize;
+
+use crate::measure::{SceneFacts, ratio};
+
+/// A picture, and the time and work that it took.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// The scene.
+    #[serde(flatten)]
+    pub scene: SceneFacts,
+    /// Reading or generating it.
+    pub load_seconds: f64,
+    /// The structure.
+    pub method: &'static str,
+    /// Threads that built, if the method is built in parallel, and rendered.
+    pub threads: u32,
+    /// Asking for sizes, getting memory and building.
+    pub build_seconds: f64,
+    /// Bytes of the grid, without the mesh.
+    pub index_bytes: usize,
+    /// Triangles without finite coordinates, which the grid leaves out.
+    pub skipped_triangles: u32,
+    /// Pixels on each side of the picture.
+    pub size: u16,
+    /// Rays from the eye through each pixel.
+    pub samples: u16,
+    /// The lamp casts shadows.
+    pub shadows: bool,
+    /// Rays of ambient occlusion from each sample.
+    pub ao: u16,
+    /// Rays from the eye, to the lamp and to the sky.
+    pub rays: u64,
+    /// Rays from the eye that hit something.
+    pub hits: u64,
+    /// Tracing and shading every pixel.
+    pub render_seconds: f64,
+    /// The work of rays from the eye, if it was counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub work: Option<Work>,
+}
+
+/// The work of rays from the eye.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Work {
+    /// Triangles tested.
+    pub primitive_tests_per_ray: f64,
+    /// Cells or leaves entered.
+    pub cell_steps_per_ray: f64,
+    /// Subgrids, levels or nodes entered.
+    pub grid_steps_per_ray: f64,
+    /// The most tests and steps that one ray took.
+    pub largest_ray_cost: u64,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scene, method, threads, size, samples, .. } = self;
+        let (triangles, vertices) =
+            (HumanCount(scene.triangles as u64), HumanCount(scene.vertices as u64));
+        let loaded = seconds(self.load_seconds);
+        writeln!(
+            f,
+            "{}: {triangles} triangles, {vertices} vertices, loaded in {loaded}",
+            scene.scene
+        )?;
+
+        let s = if *threads == 1 { "" } else { "s" };
+        let bytes = HumanCount(self.index_bytes as u64);
+        let each = ratio(self.index_bytes as u64, scene.triangles as u64);
+        let built = seconds(self.build_seconds);
+        write!(f, "{method}: built in {built}, {bytes} bytes, {each:.1} a triangle")?;
+        match self.skipped_triangles {
+            0 => writeln!(f)?,
+            skipped => writeln!(f, "; {skipped} triangles that are not finite are left out")?,
+        }
+
+        write!(f, "picture: {size} x {size} pixels")?;
+        match samples {
+            1 => {}
+            samples => write!(f, ", {samples} samples each")?,
+        }
+        match (self.shadows, self.ao) {
+            (true, 0) => f.write_str(", shadows")?,
+            (true, _) => f.write_str(", shadows and ambient occlusion")?,
+            (false, 0) => {}
+            (false, _) => f.write_str(", ambient occlusion")?,
+        }
+        let (rays, rendered) = (HumanCount(self.rays), seconds(self.render_seconds));
+        write!(f, "; {rays} rays in {rendered} on {threads} thread{s}")?;
+        if let Some(Work {
+            primitive_tests_per_ray: tests,
+            cell_steps_per_ray: cells,
+            grid_steps_per_ray: grids,
+            largest_ray_cost: most,
+        }) = self.work
+        {
+            write!(
+                f,
+                "\nwork of a ray: {tests:.2} primitive tests, {cells:.2} cell steps, {grids:.2} grid \
+                 steps; {} at most",
+                HumanCount(most)
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// A time with three digits that count.
+pub(crate) fn seconds(seconds: f64) -> String {
+    match seconds {
+        s if s >= 100.0 => format!("{s:.0} s"),
+        s if s >= 10.0 => format!("{s:.1} s"),
+        s if s >= 1.0 => format!("{s:.2} s"),
+        s if s >= 0.1 => format!("{:.0} ms", s * 1e3),
+        s if s >= 0.01 => format!("{:.1} ms", s * 1e3),
+        s => format!("{:.2} ms", s * 1e3),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_read_well() {
+        let times = [123.4, 12.34, 1.234, 0.1234, 0.012_34, 0.000_123].map(seconds);
+        assert_eq!(times, ["123 s", "12.3 s", "1.23 s", "123 ms", "12.3 ms", "0.12 ms"]);
+    }
+}

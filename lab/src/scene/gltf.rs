@@ -1,0 +1,292 @@
+//! glTF files, as JSON or binary (GLB): the triangles of the default scene's meshes, where its
+//! nodes put them.
+//!
+//! A primitive is a mesh here, because it has vertices of its own; a node that shows a glTF mesh
+//! is an instance of each of its primitives. Materials, skins, morph targets and animations are
+//! left out: everything is as it rests.
+
+use core::ops::Range;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use base64::Engine as _;
+use gltf::accessor::{DataType, Dimensions};
+use gltf::buffer::Source;
+use gltf::mesh::Mode;
+use gltf::{Document, Gltf, Primitive, Semantic};
+
+use super::model::{IDENTITY, Mesh, Model, Transform};
+use crate::vector::round;
+
+/// A matrix in `f64`: the product of a chain of nodes is rounded once.
+type Matrix = [[f64; 4]; 3];
+
+/// Reads the bytes of a file; the files that it names are beside it.
+///
+/// # Errors
+/// If it is not glTF, needs an extension that is not read, or names data that are not there.
+pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Model> {
+    let Gltf { document, blob } = Gltf::from_slice(bytes).context("it is not a valid glTF file")?;
+    let buffers = buffers(&document, blob, path.parent().unwrap_or(Path::new("")))?;
+    let mut model = Model::default();
+    // Where the primitives of each glTF mesh begin, and how many it has.
+    let mut places = Vec::new();
+    for mesh in document.meshes() {
+        let first = model.meshes.len();
+        for primitive in mesh.primitives() {
+            let triangles = triangles(&primitive, &buffers).with_context(|| {
+                format!("mesh {}, primitive {}", mesh.index(), primitive.index())
+            })?;
+            model.meshes.extend(triangles);
+        }
+        places.push(first..model.meshes.len());
+    }
+    model.instances = instances(&document, &places)?;
+    Ok(model)
+}
+
+/// Reads all buffers: the binary part of the file, files beside it, or text in it.
+fn buffers(document: &Document, mut blob: Option<Vec<u8>>, folder: &Path) -> Result<Vec<Vec<u8>>> {
+    let mut read = |buffer: gltf::Buffer<'_>| {
+        let bytes = match buffer.source() {
+            Source::Bin => blob.take().context("the file has no binary part")?,
+            Source::Uri(uri) => match uri.strip_prefix("data:") {
+                Some(data) => {
+                    let (_, text) =
+                        data.split_once(";base64,").context("its text is not base64")?;
+                    base64::prelude::BASE64_STANDARD
+                        .decode(text)
+                        .context("its text is not base64")?
+                }
+                None if uri.contains(':') => bail!("`{uri}` is not a file: fetch it first"),
+                None => {
+                    let file =
+                        folder.join(&*urlencoding::decode(uri).context("its name is not text")?);
+                    fs::read(&file).with_context(|| format!("cannot read `{}`", file.display()))?
+                }
+            },
+        };
+        let (length, there) = (buffer.length(), bytes.len());
+        ensure!(there >= length, "it has {there} bytes of {length}");
+        Ok(bytes)
+    };
+    let buffers = document.buffers();
+    buffers
+        .map(|buffer| {
+            let index = buffer.index();
+            read(buffer).with_context(|| format!("buffer {index}"))
+        })
+        .collect()
+}
+
+/// Returns the triangles of a primitive, or `None` if it has points or lines.
+fn triangles(primitive: &Primitive<'_>, buffers: &[Vec<u8>]) -> Result<Option<Mesh>> {
+    let mode = primitive.mode();
+    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+        return Ok(None);
+    }
+    let accessor = primitive.get(&Semantic::Positions).context("it has no positions")?;
+    if accessor.count() == 0 {
+        return Ok(Some(Mesh::default()));
+    }
+    ensure!(
+        (accessor.data_type(), accessor.dimensions()) == (DataType::F32, Dimensions::Vec3),
+        "its positions are not three floats each"
+    );
+    ensure!(primitive.indices().is_none_or(|indices| indices.count() > 0), "it has no indices");
+    let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|bytes| &**bytes));
+    let positions: Vec<_> =
+        reader.read_positions().context("its positions are outside their buffer")?.collect();
+    let corners: Vec<u32> = match primitive.indices() {
+        None => (0..u32::try_from(positions.len())?).collect(),
+        Some(_) => reader
+            .read_indices()
+            .context("its indices are outside their buffer")?
+            .into_u32()
+            .collect(),
+    };
+    if let Some(corner) = corners.iter().find(|&&corner| corner as usize >= positions.len()) {
+        bail!("there is no vertex {corner}, it has {}", positions.len());
+    }
+    let indices = match mode {
+        Mode::TriangleStrip => {
+            let turned = |(at, c): (usize, &[u32])| match at % 2 {
+                0 => [c[0], c[1], c[2]],
+                _ => [c[1], c[0], c[2]],
+            };
+            corners.windows(3).enumerate().map(turned).collect()
+        }
+        Mode::TriangleFan => {
+            let rest = corners.get(1..).unwrap_or_default();
+            rest.windows(2).map(|side| [corners[0], side[0], side[1]]).collect()
+        }
+        _ => corners.as_chunks::<3>().0.to_vec(),
+    };
+    Ok(Some(Mesh { positions, indices }))
+}
+
+/// Walks the nodes of the default scene, of the first one or of no scene at all: of all then.
+fn instances(document: &Document, places: &[Range<usize>]) -> Result<Vec<(usize, Transform)>> {
+    let scene = document.default_scene().or_else(|| document.scenes().next());
+    let roots: Vec<_> = if let Some(scene) = scene {
+        scene.nodes().collect()
+    } else {
+        let mut is_child = vec![false; document.nodes().len()];
+        for child in document.nodes().flat_map(|node| node.children()) {
+            is_child[child.index()] = true;
+        }
+        document.nodes().filter(|node| !is_child[node.index()]).collect()
+    };
+    let mut instances = Vec::new();
+    let mut is_seen = vec![false; document.nodes().len()];
+    let mut waiting: Vec<_> = roots.into_iter().map(|node| (node, wide(&IDENTITY))).collect();
+    waiting.reverse();
+    while let Some((node, parent)) = waiting.pop() {
+        let index = node.index();
+        ensure!(!is_seen[index], "node {index} has two parents, or is below itself");
+        is_seen[index] = true;
+        let world = product(&parent, &rows(node.transform().matrix()));
+        if let Some(place) = node.mesh().and_then(|mesh| places.get(mesh.index())) {
+            instances.extend(place.clone().map(|mesh| (mesh, world.map(narrow))));
+        }
+        let children: Vec<_> = node.children().map(|child| (child, world)).collect();
+        waiting.extend(children.into_iter().rev());
+    }
+    Ok(instances)
+}
+
+fn narrow([x, y, z, offset]: [f64; 4]) -> [f32; 4] {
+    let ([x, y, z], [offset, ..]) = (round([x, y, z]), round([offset, 0.0, 0.0]));
+    [x, y, z, offset]
+}
+
+fn wide(transform: &Transform) -> Matrix {
+    transform.map(|row| row.map(f64::from))
+}
+
+/// Returns the rows of a matrix that glTF gives as four columns.
+fn rows(columns: [[f32; 4]; 4]) -> Matrix {
+    [0, 1, 2].map(|row| columns.map(|column| f64::from(column[row])))
+}
+
+/// Returns the map that applies `b` and then `a`.
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    a.map(|row| {
+        let column = |at: usize| row[0] * b[0][at] + row[1] * b[1][at] + row[2] * b[2][at];
+        [column(0), column(1), column(2), column(3) + row[3]]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use base64::prelude::BASE64_STANDARD;
+
+    use super::*;
+
+    /// A mesh of one triangle and one strip of two, twice: moved by a parent, and mirrored there.
+    fn json(buffer: &str) -> String {
+        format!(
+            r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0, 1]}}],
+            "nodes": [
+                {{"mesh": 0}},
+                {{"translation": [10, 0, 0], "rotation": [0, 0, 1, 0], "children": [2]}},
+                {{"mesh": 0, "scale": [1, 2, -1], "translation": [1, 0, 0]}},
+                {{"mesh": 0}}],
+            "meshes": [{{"primitives": [
+                {{"attributes": {{"POSITION": 0}}, "indices": 1}},
+                {{"attributes": {{"POSITION": 0}}, "mode": 5}},
+                {{"attributes": {{"POSITION": 0}}, "mode": 0}}]}}],
+            "buffers": [{{"byteLength": 54, {buffer}}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 48}},
+                {{"buffer": 0, "byteOffset": 48, "byteLength": 6}}],
+            "accessors": [
+                {{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 4,
+                  "min": [0, 0, 0], "max": [1, 1, 0]}},
+                {{"bufferView": 1, "componentType": 5123, "type": "SCALAR", "count": 3}}]}}"#
+        )
+    }
+
+    fn bytes() -> Vec<u8> {
+        let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+        let floats = corners.as_flattened().iter().flat_map(|c| c.to_le_bytes());
+        floats.chain([2u16, 0, 1].into_iter().flat_map(u16::to_le_bytes)).collect()
+    }
+
+    fn as_text() -> String {
+        let text = BASE64_STANDARD.encode(bytes());
+        json(&format!(r#""uri": "data:application/octet-stream;base64,{text}""#))
+    }
+
+    fn read_text(text: &str) -> Result<Model> {
+        read(text.as_bytes(), Path::new("no/such/scene.gltf"))
+    }
+
+    #[test]
+    fn meshes_stand_where_their_nodes_put_them() {
+        let model = read_text(&as_text()).unwrap();
+        let [one, strip] = &*model.meshes else { panic!("{:?}", model.meshes) };
+        assert_eq!(one.indices, [[2, 0, 1]]);
+        assert_eq!(strip.indices, [[0, 1, 2], [2, 1, 3]]);
+        let numbers: Vec<_> = model.instances.iter().map(|&(mesh, _)| mesh).collect();
+        assert_eq!(numbers, [0, 1, 0, 1]);
+        assert_eq!(model.instances[1].1, IDENTITY);
+        // Half a turn about z takes x and y to their opposites, after the child's own place.
+        let mesh = model.flatten().unwrap();
+        assert_eq!(
+            mesh.positions[8..12],
+            [[9., 0., 0.], [8., 0., 0.], [9., -2., 0.], [8., -2., 0.]]
+        );
+        assert_eq!(mesh.indices[3], [10, 9, 8]);
+    }
+
+    #[test]
+    fn binary_files_have_their_buffer_in_them() {
+        let mut json = json(r#""extras": 1"#).into_bytes();
+        json.resize(json.len().next_multiple_of(4), b' ');
+        let mut bin = bytes();
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        let length = |bytes: &[u8]| u32::try_from(bytes.len()).unwrap().to_le_bytes();
+        let all = u32::try_from(28 + json.len() + bin.len()).unwrap().to_le_bytes();
+        let file = [
+            &b"glTF\x02\0\0\0"[..],
+            &all,
+            &length(&json),
+            b"JSON",
+            &json,
+            &length(&bin),
+            b"BIN\0",
+            &bin,
+        ];
+        let model = read(&file.concat(), Path::new("scene.glb")).unwrap();
+        assert_eq!(model, read_text(&as_text()).unwrap());
+    }
+
+    #[test]
+    fn damage_is_reported() {
+        let text = as_text();
+        for (from, to, expected) in [
+            ("data:application", "mesh.bin?", "buffer 0: cannot read `no/such/mesh.bin"),
+            ("data:", "https:", "is not a file: fetch it first"),
+            (";base64,", ";base64,!", "buffer 0: its text is not base64"),
+            (r#""byteLength": 54"#, r#""byteLength": 99"#, "buffer 0: it has 54 bytes of 99"),
+            (
+                r#""count": 4"#,
+                r#""count": 2"#,
+                "mesh 0, primitive 0: there is no vertex 2, it has 2",
+            ),
+            (r#""count": 4"#, r#""count": 5"#, "mesh 0, primitive 0: its positions are outside"),
+            (r#""children": [2]"#, r#""children": [0]"#, "two parents"),
+            (
+                r#""asset""#,
+                r#""extensionsRequired": ["KHR_draco_mesh_compression"], "asset""#,
+                "draco",
+            ),
+            (r#""mesh": 0"#, r#""mesh": 8"#, "not a valid glTF file"),
+            ("{", "[", "not a valid glTF file"),
+        ] {
+            let message = format!("{:#}", read_text(&text.replacen(from, to, 1)).unwrap_err());
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The content of a file: meshes, and the places where they stand.
+//!
+//! ```text
+//! meshes     [ knot, floor ]
+//! instances  (0, here) (0, there) (1, at the origin)      three things from two meshes
+//! ```
+//!
+//! A file without transforms is one mesh and one instance that leaves it where it is.
+
+use super::Bounds;
+use crate::vector::{Vector, dot, round};
+
+/// The rows of a 3 x 4 matrix: a linear map, and a translation in the last column.
+pub type Transform = [[f32; 4]; 3];
+
+/// The transform that changes nothing.
+pub const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+
+/// Vertices and triangles, in the arrays that the core takes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertices, in units of the file.
+    pub positions: Vec<[f32; 3]>,
+    /// Three vertices for each triangle.
+    pub indices: Vec<[u32; 3]>,
+}
+
+/// Meshes, and where each of them stands how often.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Model {
+    /// The meshes, each once.
+    pub meshes: Vec<Mesh>,
+    /// The number of a mesh, and its place.
+    pub instances: Vec<(usize, Transform)>,
+}
+
+impl From<Mesh> for Model {
+    fn from(mesh: Mesh) -> Self {
+        Self { meshes: vec![mesh], instances: vec![(0, IDENTITY)] }
+    }
+}
+
+impl Model {
+    /// Returns the triangles of all instances as one mesh; `None` if that has more than 2^32 vertices.
+    ///
+    /// The front of a triangle stays its front: under a mirror its corners change their order.
+    #[must_use]
+    pub fn flatten(mut self) -> Option<Mesh> {
+        if let ([_], [(0, IDENTITY)]) = (&*self.meshes, &*self.instances) {
+            return self.meshes.pop();
+        }
+        let instances = || {
+            let mesh = |&(mesh, transform)| Some((self.meshes.get(mesh)?, transform));
+            self.instances.iter().filter_map(mesh)
+        };
+        let (mut vertices, mut triangles) = (0, 0);
+        for (mesh, _) in instances() {
+            vertices += mesh.positions.len();
+            triangles += mesh.indices.len();
+        }
+        u32::try_from(vertices).ok()?;
+        let mut all = Mesh::default();
+        all.positions.reserve_exact(vertices);
+        all.indices.reserve_exact(triangles);
+        for (mesh, transform) in instances() {
+            let first = u32::try_from(all.positions.len()).ok()?;
+            all.positions.extend(mesh.positions.iter().map(|&p| moved(&transform, p)));
+            let is_mirrored = determinant(&transform) < 0.0;
+            // An index out of range stays one, for the core to refuse.
+            let vertex =
+                |v: u32| if (v as usize) < mesh.positions.len() { first + v } else { u32::MAX };
+            all.indices.extend(mesh.indices.iter().map(|triangle| {
+                let [a, b, c] = triangle.map(vertex);
+                if is_mirrored { [a, c, b] } else { [a, b, c] }
+            }));
+        }
+        Some(all)
+    }
+}
+
+/// Moves a point, in `f64` until it is there.
+fn moved(transform: &Transform, point: [f32; 3]) -> [f32; 3] {
+    let point = point.map(f64::from);
+    round(transform.map(|row| {
+        let [x, y, z, offset] = row.map(f64::from);
+        dot([x, y, z], point) + offset
+    }))
+}
+
+/// Returns the volume that the unit cube gets, negative under a mirror.
+fn determinant(transform: &Transform) -> f64 {
+    let [a, b, c] = transform.map(|[x, y, z, _]| -> Vector { [x, y, z].map(f64::from) });
+    dot(a, crate::vector::cross(b, c))
+}
+
+/// Returns the box around all finite points, or `None` if there are none.
+pub(super) fn bounds(positions: &[[f32; 3]]) -> Option<Bounds> {
+    let is_finite = |position: &&[f32; 3]| position.iter().all(|c| c.is_finite());
+    positions.iter().filter(is_finite).fold(None, |bounds, &position| {
+        let (mut min, mut max) = bounds.unwrap_or((position, position));
+        for axis in 0..3 {
+            min[axis] = min[axis].min(position[axis]);
+            max[axis] = max[axis].max(position[axis]);
+        }
+        Some((min, max))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn instances_become_triangles_with_their_fronts() {
+        let mesh = Mesh {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            indices: vec![[0, 1, 2]],
+        };
+        assert_eq!(Model::from(mesh.clone()).flatten().as_ref(), Some(&mesh));
+        let moved = [[2.0, 0.0, 0.0, 5.0], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, -1.0]];
+        let mirror = [[-1.0, 0.0, 0.0, 0.0], IDENTITY[1], IDENTITY[2]];
+        let model =
+            Model { meshes: vec![mesh], instances: vec![(0, moved), (0, mirror), (7, mirror)] };
+        let all = model.flatten().unwrap();
+        assert_eq!(all.indices, [[0, 1, 2], [3, 5, 4]]);
+        let bits = |positions: &[[f32; 3]]| {
+            positions.iter().map(|p| p.map(f32::to_bits)).collect::<Vec<_>>()
+        };
+        let expected = [[7.0, 0.0, -1.0], [5.0, 2.0, -1.0], [0.0; 3], [-1.0, 0.0, 0.0]];
+        assert_eq!(bits(&all.positions[1..5]), bits(&expected));
+    }
+
+    #[test]
+    fn bad_indices_stay_bad() {
+        let mesh = |indices| Mesh { positions: vec![[0.0; 3]], indices };
+        let meshes = vec![mesh(vec![[0, 0, 1]]), mesh(vec![[0; 3]])];
+        let all =
+            Model { meshes, instances: vec![(0, IDENTITY), (1, IDENTITY)] }.flatten().unwrap();
+        assert_eq!(all.indices, [[0, 0, u32::MAX], [1; 3]]);
+    }
+}

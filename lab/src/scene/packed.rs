@@ -1,0 +1,29 @@
+//! The mesh of a blob that has one: grids that were packed with their mesh can be looked at.
+
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use hgrid_core::Grid;
+
+use super::Mesh;
+use crate::blob::Blob;
+
+/// Reads the mesh out of a packed blob.
+///
+/// # Errors
+/// If the file is no blob of this version, or has no mesh.
+pub(super) fn load(path: &Path) -> Result<Mesh> {
+    let blob = Blob::read(path)?;
+    let grid = Grid::open_packed(blob.bytes()).context("it cannot be opened")?;
+    let mesh = grid.mesh();
+    let (vertices, _) = mesh.positions().bytes.as_chunks::<12>();
+    let (triangles, _) = mesh.triangles().bytes.as_chunks::<12>();
+    let words = |bytes: &[u8; 12]| -> [[u8; 4]; 3] {
+        let (words, _) = bytes.as_chunks::<4>();
+        [words[0], words[1], words[2]]
+    };
+    Ok(Mesh {
+        positions: vertices.iter().map(|bytes| words(bytes).map(f32::from_ne_bytes)).collect(),
+        indices: triangles.iter().map(|bytes| words(bytes).map(u32::from_ne_bytes)).collect(),
+    })
+}

@@ -1,0 +1,139 @@
+//! STL files, binary and ASCII: three vertices of its own for each triangle, as the file has them.
+//!
+//! A binary file is told by its length, which follows from the triangle count behind its header:
+//! many of them start with `solid`, as ASCII files do. An ASCII file may have several solids.
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+use super::Mesh;
+
+/// Bytes before the first triangle of a binary file: a comment and the triangle count.
+const HEADER_BYTES: usize = 84;
+
+/// Bytes of a triangle: its normal, three corners, and two that programs use in their own ways.
+const TRIANGLE_BYTES: usize = 50;
+
+/// Reads a file.
+///
+/// # Errors
+/// If the file is cut off, or a line of an ASCII file is not what it should be.
+pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
+    let count = bytes.get(..HEADER_BYTES).and_then(|header| header.last_chunk());
+    let count = count.map(|count| u32::from_le_bytes(*count) as usize);
+    let rest = bytes.get(HEADER_BYTES..).unwrap_or_default();
+    let is_text = bytes.trim_ascii_start().starts_with(b"solid");
+    match count {
+        Some(count) if count.saturating_mul(TRIANGLE_BYTES) == rest.len() => Ok(binary(rest)),
+        _ if is_text => ascii(str::from_utf8(bytes).context("it is neither binary STL nor text")?),
+        // Some programs write more behind the last triangle.
+        Some(count) => {
+            let present = rest.len() / TRIANGLE_BYTES;
+            ensure!(
+                count <= present,
+                "it is cut off after {present} of {count} triangles, or it is not an STL file"
+            );
+            Ok(binary(&rest[..count * TRIANGLE_BYTES]))
+        }
+        None => bail!("it is not an STL file: it is too short, and does not start with `solid`"),
+    }
+}
+
+fn binary(triangles: &[u8]) -> Mesh {
+    let (triangles, _) = triangles.as_chunks::<TRIANGLE_BYTES>();
+    let mut positions = Vec::with_capacity(3 * triangles.len());
+    for triangle in triangles {
+        let (floats, _) = triangle[12..48].as_chunks::<4>();
+        let (corners, _) = floats.as_chunks::<3>();
+        positions.extend(corners.iter().map(|corner| corner.map(f32::from_le_bytes)));
+    }
+    with_positions(positions)
+}
+
+fn ascii(text: &str) -> Result<Mesh> {
+    let mut positions = Vec::new();
+    let mut is_complete = true;
+    for (number, line) in (1..).zip(text.lines()) {
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("vertex") => {
+                let corner: Vec<f32> = words.flat_map(str::parse).collect();
+                let corner = <[f32; 3]>::try_from(corner).ok();
+                positions.push(corner.with_context(|| {
+                    format!("line {number}: `vertex` should have three numbers behind it")
+                })?);
+            }
+            Some("endfacet") => ensure!(
+                positions.len() % 3 == 0,
+                "line {number}: a facet has three vertices, this one has not"
+            ),
+            Some("solid") => is_complete = false,
+            Some("endsolid") => is_complete = true,
+            Some("facet" | "outer" | "endloop" | "color") | None => {}
+            Some(word) => bail!("line {number}: `{word}` is no word of an STL file"),
+        }
+    }
+    ensure!(
+        is_complete && positions.len() % 3 == 0,
+        "it is cut off: it does not end with `endsolid`"
+    );
+    Ok(with_positions(positions))
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a file of 2^32 vertices does not fit in memory"
+)]
+fn with_positions(positions: Vec<[f32; 3]>) -> Mesh {
+    let indices = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    Mesh { positions, indices }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.5], [1.0, 0.0, 0.0], [0.0, 1e-3, 0.0]];
+
+    fn file(start: &[u8], count: u32) -> Vec<u8> {
+        let mut bytes = vec![b' '; 80];
+        bytes[..start.len()].copy_from_slice(start);
+        bytes.extend(count.to_le_bytes());
+        for _ in 0..count {
+            bytes.extend([0; 12]);
+            bytes.extend(CORNERS.as_flattened().iter().flat_map(|c| c.to_le_bytes()));
+            bytes.extend([7; 2]);
+        }
+        bytes
+    }
+
+    const TEXT: &str = "solid\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0.5\n   vertex 1 0 0\n\
+        vertex 0 1e-3 0\n  endloop\n endfacet\nendsolid\n";
+
+    #[test]
+    fn both_encodings_give_one_mesh() {
+        for bytes in
+            [TEXT.as_bytes(), &file(b"solid but binary", 1), &[file(b"", 1), vec![1; 9]].concat()]
+        {
+            let mesh = read(bytes).unwrap();
+            assert_eq!((&*mesh.positions, &*mesh.indices), (&CORNERS[..], &[[0, 1, 2]][..]));
+        }
+        assert_eq!(read(TEXT.repeat(3).as_bytes()).unwrap().indices.len(), 3);
+        assert_eq!(read(&file(b"", 0)).unwrap(), Mesh::default());
+    }
+
+    #[test]
+    fn damage_is_reported() {
+        let message = |bytes: &[u8]| format!("{:#}", read(bytes).unwrap_err());
+        assert!(message(&file(b"", 2)[..183]).starts_with("it is cut off after 1 of 2 triangles"));
+        assert!(message(b"hello").contains("not an STL file"));
+        for (from, to, expected) in [
+            ("1e-3", "one", "line 6: `vertex` should have three numbers"),
+            ("vertex 1 0 0\n", "", "line 7: a facet has three vertices"),
+            ("outer loop", "inner loop", "line 3: `inner` is no word"),
+            ("endsolid", "", "cut off"),
+        ] {
+            let message = message(TEXT.replacen(from, to, 1).as_bytes());
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}

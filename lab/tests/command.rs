@@ -1,0 +1,131 @@
+//! `hgrid` as a program: words, files and exit statuses, as a shell sees them.
+
+use std::fs;
+use std::io;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+/// A folder of its own, with a mesh in it.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> io::Result<Self> {
+        let folder =
+            std::env::temp_dir().join(format!("hgrid-command-{name}-{}", std::process::id()));
+        fs::create_dir_all(&folder)?;
+        fs::write(
+            folder.join("a.obj"),
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3 4\nf 1 2 4\n",
+        )?;
+        Ok(Self(folder))
+    }
+
+    /// Runs the command there.
+    fn hgrid(&self, words: &str) -> io::Result<Output> {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
+        command.current_dir(&self.0).args(words.split_whitespace()).output()
+    }
+
+    /// Returns what it prints.
+    fn says(&self, words: &str) -> io::Result<String> {
+        let output = self.hgrid(words)?;
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{words}: {error}");
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    }
+
+    /// Returns the message that it fails with.
+    fn fails(&self, words: &str) -> io::Result<String> {
+        let output = self.hgrid(words)?;
+        assert!(!output.status.success() && output.stdout.is_empty(), "{words}");
+        Ok(String::from_utf8_lossy(&output.stderr).into_owned())
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn a_file_alone_is_rendered() {
+    let folder = Folder::new("render").unwrap();
+    let text = folder.says("a.obj --size 16").unwrap();
+    assert!(text.contains("3 triangles") && text.contains("wrote hgrid.png"), "{text}");
+    assert!(folder.0.join("hgrid.png").exists());
+    let json = folder.says("render a.obj --size 16 --samples 2 --json -o other.png").unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((&json["triangles"], &json["samples"]), (&3.into(), &2.into()));
+
+    assert!(folder.fails("a.obj -o a.jpg").unwrap().contains("name it a.png"));
+    assert!(folder.fails("nothing.ply").unwrap().contains("cannot open it"));
+    assert!(folder.fails("nothing").unwrap().contains("no scene `nothing`"));
+    assert!(
+        folder
+            .fails("hgrid.png")
+            .unwrap()
+            .contains("it is a PNG picture: a mesh is read from .ply")
+    );
+    assert!(
+        folder
+            .fails("table a.obj --methods bvh --depth 2")
+            .unwrap()
+            .contains("--depth is for recursive")
+    );
+}
+
+#[test]
+fn packed_files_are_described_proved_and_rendered() {
+    let folder = Folder::new("pack").unwrap();
+    let facts = folder.says("info a.obj").unwrap();
+    assert!(facts.contains("OBJ") && facts.contains("0 0 0  to  1 1 1"), "{facts}");
+    for options in ["", "--method one-level --density 2", "--quality high"] {
+        folder.says(&format!("pack a.obj -o a.hgrid {options}")).unwrap();
+        let json: serde_json::Value =
+            serde_json::from_str(&folder.says("info a.hgrid --json").unwrap()).unwrap();
+        assert_eq!((&json["triangles"], &json["has_mesh"]), (&3.into(), &true.into()));
+        let total = fs::metadata(folder.0.join("a.hgrid")).unwrap().len();
+        assert_eq!(json["total_bytes"], total);
+        assert!(folder.says("validate a.hgrid").unwrap().contains("valid"));
+        assert!(folder.says("a.hgrid --size 16").unwrap().contains("3 triangles"));
+    }
+
+    let blob = fs::read(folder.0.join("a.hgrid")).unwrap();
+    fs::write(folder.0.join("cut.hgrid"), &blob[..blob.len() - 64]).unwrap();
+    assert!(folder.fails("validate cut.hgrid").unwrap().contains("it is cut off"));
+    // A damaged bit in the boxes or the ids of the tree.
+    let mut damaged = blob;
+    damaged[128 + 20] ^= 0x40;
+    fs::write(folder.0.join("damaged.hgrid"), damaged).unwrap();
+    assert!(folder.fails("validate damaged.hgrid").unwrap().contains("damaged"));
+    assert!(folder.fails("validate a.obj").unwrap().contains("not a blob"));
+    assert!(folder.fails("validate a.hgrid --mesh a.obj").unwrap().contains("leave out --mesh"));
+    assert!(folder.fails("info nothing.hgrid").unwrap().contains("cannot open it"));
+}
+
+#[test]
+fn a_blob_can_be_an_array_of_c() {
+    let folder = Folder::new("c").unwrap();
+    folder.says("pack a.obj -o a.hgrid").unwrap();
+    folder.says("pack a.obj -o a.c --c-array scene_1").unwrap();
+    let blob = fs::read(folder.0.join("a.hgrid")).unwrap();
+    let text = fs::read_to_string(folder.0.join("a.c")).unwrap();
+    let (head, body) = text.split_once("= {").unwrap();
+    assert!(head.contains(&format!("HGRID_ALIGNED const unsigned char scene_1[{}]", blob.len())));
+    let numbers = body.trim_end_matches("};\n").split(',').map(str::trim);
+    let numbers =
+        numbers.filter(|number| !number.is_empty()).map(|number| number.parse::<u8>().unwrap());
+    assert!(numbers.eq(blob));
+
+    for (words, expected) in [
+        ("pack a.obj -o a.c", "add --c-array NAME"),
+        ("pack a.obj -o b.hgrid --c-array b", "is not C by its name"),
+        ("pack a.obj -o b.c --c-array 1b", "is no name in C"),
+        ("pack a.obj -o b.ply", "would be a mesh by its name"),
+        ("pack a.obj -o b.hgrid --depth 2", "--depth is for recursive"),
+    ] {
+        let message = folder.fails(words).unwrap();
+        assert!(message.contains(expected), "{message}");
+    }
+}
