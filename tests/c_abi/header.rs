@@ -253,7 +253,7 @@ pub(crate) fn structs() -> Vec<(String, Vec<String>)> {
         } else if line.starts_with('}') {
             is_inside = false;
         } else if is_inside && line.starts_with("    ") && !line[4..].starts_with([' ', '*', '/']) {
-            // `float origin[3]`, `const void *masks`, `bool (*progress)(void *context, float done)`
+            // `float origin[3]`, `const void *masks`, `bool (*progress)(void *context, uint32_t done)`
             let name = line.split_once("(*").map_or_else(
                 || line.trim_end_matches(';').rsplit([' ', '*']).next().unwrap_or_default(),
                 |(_, behind)| behind,
