@@ -106,7 +106,7 @@ impl Sum {
     #[inline(never)]
     fn sign(&self) -> Ordering {
         let (mut carry, mut rest) = (0, 0);
-        for limb in self.0 {
+        for limb in &self.0 {
             let limb = limb + carry;
             rest |= limb & 0xffff_ffff;
             carry = limb >> 32;

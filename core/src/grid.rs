@@ -4,7 +4,7 @@ use core::fmt;
 
 use glam::Vec3A;
 
-use crate::aabb::Aabb;
+use crate::aabb::{Aabb, MAX_COORDINATE};
 use crate::approach::Approach;
 use crate::arena::check_alignment;
 use crate::batch::Together;
@@ -26,14 +26,10 @@ use crate::options::{Choice, Cull, QueryOptions};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
 use crate::recursive::{self, Recursive};
 use crate::search::{Any, Closest, Outcome, Search};
-use crate::simd::{HAS_VECTORS, SimdLevel, dispatch};
+use crate::simd::{HAS_VECTORS, IS_SMALL, SimdLevel, dispatch};
 use crate::triangle::TriangleTest;
 use crate::variable::{self, Variable};
 use crate::visit::Visitor;
-
-/// On a microcontroller flash is dearer than a few instructions a ray: questions without options are
-/// asked as those with the defaults, so that a program has one walk of a kind.
-const IS_SMALL: bool = cfg!(all(target_os = "none", target_pointer_width = "32"));
 
 /// A built grid and the mesh it was built for, ready for queries.
 ///
@@ -302,6 +298,7 @@ impl<'a> Grid<'a> {
     /// ```
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        // One walk of a kind: questions without options are asked as those with the defaults.
         if IS_SMALL {
             return self.intersect_with(ray, &mut QueryOptions::default());
         }
@@ -450,7 +447,8 @@ impl<'a> Grid<'a> {
     fn test_all<F: Search, T: Tally>(&self, test: &TriangleTest, search: &mut F, tally: &mut T) {
         for id in 0..self.mesh.triangle_count() {
             // Of those that the structure has: with finite corners.
-            if self.mesh.corners(id).and_then(Aabb::of).is_none() {
+            let is_finite = |corner: &[f32; 3]| corner.iter().all(|c| c.abs() <= MAX_COORDINATE);
+            if !self.mesh.triangle(id).is_some_and(|triangle| triangle.iter().all(is_finite)) {
                 continue;
             }
             tally.primitive_test();

@@ -91,6 +91,9 @@ impl SimdLevel {
     }
 }
 
+/// Whether the target is a microcontroller, where flash is dearer than a few instructions a ray.
+pub(crate) const IS_SMALL: bool = cfg!(all(target_os = "none", target_pointer_width = "32"));
+
 /// Whether the target has vectors at all. Without them eight or sixteen lanes one after the other
 /// are up to twice the work, much code, and minutes of compilation.
 pub(crate) const HAS_VECTORS: bool = cfg!(any(

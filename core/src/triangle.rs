@@ -52,6 +52,7 @@ use crate::filter::RayFilter;
 use crate::mesh::{Triangle, TriangleMesh};
 use crate::options::Cull;
 use crate::ray::{Hit, Ray, round};
+use crate::simd::IS_SMALL;
 
 /// Where a ray meets a triangle, before anyone asked whether it is the closest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -219,6 +220,9 @@ impl TriangleTest {
     #[inline(never)]
     pub(crate) fn decide_for(ray: &Ray, cull: Cull, mesh: &TriangleMesh<'_>, id: u32) -> Hit {
         let test = Self::with(ray, RayFilter::NONE).culling(cull);
+        if IS_SMALL {
+            return test.decide(mesh, id);
+        }
         let hit = mesh.triangle(id).and_then(
             #[inline(always)]
             |triangle| test.resolve(&triangle),
@@ -415,14 +419,16 @@ fn difference(x: [f64; 2], y: [f64; 2]) -> f64 {
     high + (rest + (low + least))
 }
 
-/// A sum of two numbers, rounded, and what is left.
+/// A sum of two numbers, rounded, and what is left. Out of line: rare, and long where f64 is software.
+#[inline(never)]
 fn sum(a: f64, b: f64) -> [f64; 2] {
     let sum = a + b;
     let part = sum - a;
     [sum, (a - (sum - part)) + (b - part)]
 }
 
-/// A product of two numbers, rounded, and what is left.
+/// A product of two numbers, rounded, and what is left. Out of line, too.
+#[inline(never)]
 fn product([a, b]: [f64; 2]) -> [f64; 2] {
     let product = a * b;
     let ([a, a_rest], [b, b_rest]) = (halves(a), halves(b));

@@ -63,23 +63,24 @@ fn is_fetched(target: &str) -> bool {
 
 /// Builds the C library, and core for it, and returns the folder it is in: one for each target, so
 /// that no build waits for the other. Arguments may leave methods out.
-fn build(target: &str, arguments: &[&str]) -> PathBuf {
+fn build(target: &str, profile: &str, arguments: &[&str]) -> PathBuf {
     let dir = target_dir().join("no_std").join(target);
     let mut build = cargo_in(&dir, "build");
-    run(build.args(["--release", "-p", "hgrid-capi", "--target", target]).args(arguments));
-    dir.join(target).join("release")
+    let library = ["--profile", profile, "-p", "hgrid-capi", "--target", target];
+    run(build.args(library).args(arguments));
+    dir.join(target).join(profile)
 }
 
 #[test]
 fn a_microcontroller_gets_a_static_library() {
     let target = "thumbv7em-none-eabihf";
     if is_available(target) {
-        let archive = build(target, &[]).join("libhgrid.a");
+        let archive = build(target, "small", &[]).join("libhgrid.a");
         let bytes = fs::read(&archive).expect("the C library");
         assert!(bytes.starts_with(b"!<arch>\n"));
         check_flash("| all | ", &archive);
         for method in ["one-level", "fixed", "bvh"] {
-            build(target, &["--no-default-features", "--features", method]);
+            build(target, "small", &["--no-default-features", "--features", method]);
             check_flash(&format!("| `{method}` | "), &archive);
         }
     }
@@ -114,7 +115,7 @@ fn check_flash(row: &str, archive: &Path) {
 fn a_web_page_gets_a_module_that_needs_nothing() {
     let target = "wasm32-unknown-unknown";
     if is_available(target) {
-        let dir = build(target, &[]);
+        let dir = build(target, "release", &[]);
         let module = fs::read(dir.join("hgrid.wasm")).expect("the module");
         let sections = sections(&module);
         assert!(sections.contains(&EXPORTS) && !sections.contains(&IMPORTS), "{sections:?}");

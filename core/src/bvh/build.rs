@@ -50,7 +50,7 @@ use crate::config::{Config, Quality};
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
-use crate::simd::{Kernel, SimdLevel, dispatch};
+use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
 use crate::sizes::Sizes;
 use crate::tasks::{Shared, run, task_count};
 
@@ -100,8 +100,8 @@ pub(crate) fn build<'a>(
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
     check_count(mesh)?;
-    // Room on the stack for as many tasks as there may be, or for one.
-    let header = if control.tasks > 1 {
+    // Room on the stack for as many tasks as there may be, or for one: a microcontroller has one core.
+    let header = if control.tasks > 1 && !IS_SMALL {
         const MOST: usize = Control::MAX_TASKS as usize;
         header_of::<MOST>(mesh, config, Some(&mut *index), scratch, control, watch)
     } else {

@@ -102,12 +102,15 @@ impl Kernel for Build<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { subtree, mesh, entries, first, child, least, by } = self;
+        let Self { subtree, mesh, entries, first, child, least, mut by } = self;
         let entries = entries.get(..entries.len().min(MOST_ROOT)).unwrap_or_default();
         subtree.read(simd, mesh, entries);
-        subtree.shape(simd, by);
-        if by == Cut::Keys && subtree.count > 1 + most_of_root(entries.len()) {
-            subtree.shape(simd, Cut::Halves);
+        loop {
+            subtree.shape(simd, by);
+            if by == Cut::Halves || subtree.count <= 1 + most_of_root(entries.len()) {
+                break;
+            }
+            by = Cut::Halves;
         }
         // Quantise, children before parents.
         for at in (0..subtree.count).rev() {
