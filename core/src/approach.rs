@@ -33,6 +33,13 @@ const REMOTE_EXTENTS: f64 = (1 << 29) as f64;
 /// By how much a ray from afar may be off, in parts of its distance: 2^-49.
 const OFF: f64 = 8.0 * f64::EPSILON;
 
+/// A ray without a range, in f64.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LineF64 {
+    pub(crate) origin: [f64; 3],
+    pub(crate) direction: [f64; 3],
+}
+
 /// Where a ray meets a box.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Approach {
@@ -82,22 +89,28 @@ impl Approach {
                 is_remote: false,
             });
         }
-        Self::from_afar(ray, ray.origin.map(f64::from), bounds, inverse)
+        let line =
+            LineF64 { origin: ray.origin.map(f64::from), direction: ray.direction.map(f64::from) };
+        Self::from_afar(ray, &line, bounds, inverse)
     }
 
-    /// Brings a ray whose origin is given in f64 to a box that holds boxes, not triangles. `ray` has the
-    /// rounded origin.
+    /// Brings a ray that is given in f64 to a box that holds boxes, not triangles. `ray` is that line, rounded.
     #[inline(never)]
-    pub(crate) fn of_wide(ray: &Ray, origin: [f64; 3], bounds: &Aabb) -> Option<Self> {
+    pub(crate) fn of_line(ray: &Ray, line: &LineF64, bounds: &Aabb) -> Option<Self> {
         if !ray.is_valid() {
             return None;
         }
-        let inverse = ray.direction.map(|d| 1.0 / f64::from(d));
+        let LineF64 { origin, direction } = *line;
+        let inverse = direction.map(|d| 1.0 / d);
         let center = ((bounds.min + bounds.max) * 0.5).to_array();
         let away = |axis: usize| (origin[axis] - f64::from(center[axis])).abs();
         let distance = greater(away(0), greater(away(1), away(2)));
-        if distance > f64::from(FAR_EXTENTS * bounds.size().max_element()) {
-            return Self::from_afar(ray, origin, bounds, inverse);
+        let extent = bounds.size().max_element();
+        // The ray passes no more than five extents on each axis, and its direction was rounded by half an ulp.
+        let bent = 4.0 * extent * f32::EPSILON;
+        if distance > f64::from(FAR_EXTENTS * extent) {
+            let approach = Self::from_afar(ray, line, bounds, inverse)?;
+            return Some(Self { slack: (approach.slack + bent).next_up(), ..approach });
         }
         let [x, y, z] = ray.origin.map(f32::abs);
         Some(Self {
@@ -107,7 +120,7 @@ impl Approach {
             far: 0.0,
             inverse,
             // The origin was rounded by half an ulp of a coordinate.
-            slack: greater(x, greater(y, z)) * f32::EPSILON,
+            slack: (greater(x, greater(y, z)) * f32::EPSILON + bent).next_up(),
             reach: Reach::of(bounds, ray.origin),
             is_remote: false,
         })
@@ -116,7 +129,8 @@ impl Approach {
     /// The same for a ray whose origin is far away.
     #[cold]
     #[inline(never)]
-    fn from_afar(ray: &Ray, origin: [f64; 3], bounds: &Aabb, inverse: [f64; 3]) -> Option<Self> {
+    fn from_afar(ray: &Ray, line: &LineF64, bounds: &Aabb, inverse: [f64; 3]) -> Option<Self> {
+        let LineF64 { origin, direction } = *line;
         // In f64: the distance may be larger than any f32.
         let from_origin = Reach::of(bounds, ray.origin);
         let off = from_origin.distance * OFF;
@@ -139,7 +153,7 @@ impl Approach {
             });
         }
         let (t, _) = bounds.clip(origin, inverse)?;
-        let at = |axis: usize| round(origin[axis] + t * f64::from(ray.direction[axis]));
+        let at = |axis: usize| round(origin[axis] + t * direction[axis]);
         let anchor = [at(0), at(1), at(2)];
         let (near, far) = bounds.clip(anchor.map(f64::from), inverse)?;
         let [x, y, z] = anchor.map(|coordinate| f64::from(coordinate.abs()));

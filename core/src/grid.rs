@@ -5,7 +5,7 @@ use core::fmt;
 use glam::Vec3A;
 
 use crate::aabb::{Aabb, MAX_COORDINATE};
-use crate::approach::Approach;
+use crate::approach::{Approach, LineF64};
 use crate::arena::check_alignment;
 use crate::batch::Together;
 use crate::blob::{Header, corrupt};
@@ -23,7 +23,7 @@ use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::TriangleMesh;
 use crate::one_level::{self, OneLevel};
 use crate::options::{Choice, Cull, QueryOptions};
-use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
+use crate::ray::{Hit, INVALID_ID, Ray, RayF64, round};
 use crate::recursive::{self, Recursive};
 use crate::search::{Any, Closest, Outcome, Search};
 use crate::simd::{HAS_VECTORS, IS_SMALL, SimdLevel, dispatch};
@@ -406,13 +406,38 @@ impl<'a> Grid<'a> {
         if narrow.origin.map(|c| f64::from(c).to_bits()) == ray.origin.map(f64::to_bits) {
             return self.search_tree(bvh, narrow, ray.t_min, Cull::None, search, tally);
         }
-        let bounds = &self.lattice.bounds();
-        let Some(approach) = Approach::of_wide(narrow, ray.origin, bounds) else { return };
-        if approach.is_remote {
-            return self.test_all(&TriangleTest::from(narrow, &approach), search, tally);
+        if !narrow.is_valid() {
+            return;
         }
-        let afar = (bvh::Slab::new(narrow, ray.t_min, &approach), RayFilter::NONE);
-        self.walk(bvh, narrow, ray.t_min, Cull::None, bounds, Some(&afar), search, tally);
+        let line = LineF64 { origin: ray.origin, direction: ray.direction.map(f64::from) };
+        self.search_boxes_along(&line, 1.0, [ray.t_min, ray.t_max], search, tally);
+    }
+
+    /// The same for a line, and a range of `t`. The `t` along the line is `scale` times that.
+    pub(crate) fn search_boxes_along<F: Search, T: Tally>(
+        &self,
+        line: &LineF64,
+        scale: f64,
+        [t_min, t_max]: [f32; 2],
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        let Structure::Bvh(bvh) = &self.structure else { return };
+        if !HAS_BVH {
+            return;
+        }
+        let bounds = &self.lattice.bounds();
+        // Beyond f32 every origin is remote.
+        let most = f64::from(f32::MAX);
+        let origin = line.origin.map(|c| round(c.clamp(-most, most)));
+        let ray = &Ray { origin, t_min, direction: line.direction.map(round), t_max };
+        let Some(approach) = Approach::of_line(ray, line, bounds) else { return };
+        if approach.is_remote {
+            return self.test_all(&TriangleTest::from(ray, &approach), search, tally);
+        }
+        let slab = bvh::Slab::along(ray, &approach, scale);
+        let afar = (slab, RayFilter::NONE);
+        self.walk(bvh, ray, t_min, Cull::None, bounds, Some(&afar), search, tally);
     }
 
     /// Walks a ray through a tree; false if it comes from afar and must be brought to the box.

@@ -120,39 +120,26 @@ fn a_scene_answers_as_each_of_its_instances_alone() {
 
 #[test]
 fn a_scene_answers_as_triangles_that_were_moved_in_f64() {
-    with_grids(|objects, meshes| {
+    with_grids(|objects, _| {
         let width = 4.0;
         let instances = scattered(40, 3, width, 21);
         let built = Built::scene(&instances, objects, &Config::default()).unwrap();
         let scene = built.open(objects).unwrap();
-        let moved: Vec<(u32, u32, [[f64; 3]; 3])> = (0..)
-            .zip(&instances)
-            .flat_map(|(number, instance)| {
-                let mesh = meshes[instance.object as usize].view();
-                (0..mesh.triangle_count()).map(move |id| {
-                    let corners = mesh.triangle(id).unwrap().map(|p| {
-                        std::array::from_fn(|k| {
-                            let row = instance.linear[k];
-                            let sum: f64 =
-                                (0..3).map(|j| f64::from(row[j]) * f64::from(p[j])).sum();
-                            sum + instance.translation[k]
-                        })
-                    });
-                    (number, id, corners)
-                })
-            })
-            .collect();
+        let moved = flattened(&instances, objects, &|object| match object {
+            Object::Grid(grid) => Shown::Mesh(*grid.mesh()),
+            _ => panic!("a grid"),
+        });
         let mut random = Random(6);
         let mut hits = 0;
         for round in 0..400 {
             let ray = ray(&mut random, 5 * (round / 4) + round % 3, width as f32);
             let hit = scene.intersect(&ray);
             let mut is_confirmed = hit.is_none();
-            for (number, id, corners) in &moved {
+            for Moved { path, id, corners, .. } in &moved {
                 let Some((t, inside)) = meet(corners, &ray) else { continue };
                 let slack = 1e-4 * (1.0 + t.abs());
                 if let Some(hit) = hit
-                    && (hit.path[0], hit.primitive) == (*number, *id)
+                    && (hit.path, hit.primitive) == (*path, *id)
                 {
                     is_confirmed |= inside > -1e-3 && (f64::from(hit.t) - t).abs() <= slack;
                 }
@@ -160,7 +147,7 @@ fn a_scene_answers_as_triangles_that_were_moved_in_f64() {
                 let end = hit.map_or(f64::INFINITY, |hit| f64::from(hit.t));
                 assert!(
                     inside < 1e-3 || t < least || t > most || end <= t + slack,
-                    "instance {number} triangle {id} at {t}, found {hit:?} {ray:?}"
+                    "instance {path:?} triangle {id} at {t}, found {hit:?} {ray:?}"
                 );
             }
             assert!(is_confirmed, "{hit:?} {ray:?}");
@@ -170,14 +157,88 @@ fn a_scene_answers_as_triangles_that_were_moved_in_f64() {
     });
 }
 
+/// What an object shows.
+enum Shown<'o> {
+    Mesh(TriangleMesh<'o>),
+    Scene(&'o [Instance], &'o [Object<'o>]),
+}
+
+/// A triangle where it stands in the outermost scene.
+struct Moved {
+    path: [u32; 4],
+    id: u32,
+    corners: [[f64; 3]; 3],
+    /// Its normal, of any length, as its own mesh has it.
+    normal: [f64; 3],
+}
+
+/// All triangles of some instances, moved in f64.
+fn flattened<'o>(
+    instances: &[Instance],
+    objects: &[Object<'o>],
+    show: &dyn Fn(&Object<'o>) -> Shown<'o>,
+) -> Vec<Moved> {
+    let mut all = Vec::new();
+    for (number, instance) in (0..).zip(instances) {
+        let rows = instance.linear.map(|row| row.map(f64::from));
+        let turn = |p: [f64; 3]| rows.map(|[a, b, c]| a * p[0] + b * p[1] + c * p[2]);
+        let mirrors = dot(rows[0], cross(rows[1], rows[2])).signum();
+        let place = |Moved { path: [a, b, c, _], id, corners, normal }| {
+            let corners = corners.map(|p| {
+                let p = turn(p);
+                std::array::from_fn(|k| p[k] + instance.translation[k])
+            });
+            // The normal of the moved corners, turned round where the matrix mirrors.
+            let [p, q, r] = &corners;
+            let flat = cross(minus(q, p), minus(r, p));
+            let before = cross(turn(across(normal)[0]), turn(across(normal)[1]));
+            let sign = mirrors * dot(flat, before).signum();
+            Moved { path: [number, a, b, c], id, corners, normal: flat.map(|c| c * sign) }
+        };
+        match show(&objects[instance.object as usize]) {
+            Shown::Mesh(mesh) => all.extend((0..mesh.triangle_count()).map(|id| {
+                let corners = mesh.triangle(id).unwrap().map(|p| p.map(f64::from));
+                let [a, b, c] = &corners;
+                let normal = cross(minus(b, a), minus(c, a));
+                place(Moved { path: [u32::MAX; 4], id, corners, normal })
+            })),
+            Shown::Scene(inner, objects) => {
+                all.extend(flattened(inner, objects, show).into_iter().map(place));
+            }
+        }
+    }
+    all
+}
+
+/// Two directions with this normal.
+fn across(normal: [f64; 3]) -> [[f64; 3]; 2] {
+    let [x, y, z] = normal.map(f64::abs);
+    let axis = if x <= y && x <= z {
+        [1.0, 0.0, 0.0]
+    } else if y <= z {
+        [0.0, 1.0, 0.0]
+    } else {
+        [0.0, 0.0, 1.0]
+    };
+    let first = cross(axis, normal);
+    [first, cross(normal, first)]
+}
+
+fn minus(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
 /// Where a line meets the plane of a triangle, and how far inside, as the least weight of a corner; `None` if it
 /// runs along the plane.
 fn meet([a, b, c]: &[[f64; 3]; 3], ray: &RayF64) -> Option<(f64, f64)> {
-    let minus = |a: &[f64; 3], b: &[f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
     let d = ray.direction.map(f64::from);
     let (ab, ac, from) = (minus(b, a), minus(c, a), minus(&ray.origin, a));
     let (p, q) = (cross(d, ac), cross(from, ab));
@@ -263,6 +324,79 @@ fn scenes_in_scenes_name_the_way_to_the_hit() {
         let twice = [Object::Scene(&scene)];
         let error = Built::scene(&[Instance::new(0)], &twice, &Config::default()).unwrap_err();
         assert_eq!(error, hgrid_core::Error::TooDeep);
+    });
+}
+
+#[test]
+fn rays_from_afar_hit_what_stands_in_scenes_in_scenes() {
+    with_grids(|objects, _| {
+        let inner = scattered(3, 3, 2.0, 51);
+        let inner_built = Built::scene(&inner, objects, &Config::default()).unwrap();
+        let inner_scene = inner_built.open(objects).unwrap();
+        let middle_objects = [Object::Scene(&inner_scene), objects[0]];
+        let middle = scattered(4, 2, 5.0, 52);
+        let middle_built = Built::scene(&middle, &middle_objects, &Config::default()).unwrap();
+        let middle_scene = middle_built.open(&middle_objects).unwrap();
+        let outer_objects = [Object::Scene(&middle_scene), objects[1]];
+        let outer = scattered(8, 2, 6.0, 53);
+        let built = Built::scene(&outer, &outer_objects, &Config::default()).unwrap();
+        let scene = built.open(&outer_objects).unwrap();
+        let moved = flattened(&outer, &outer_objects, &|object| match object {
+            Object::Grid(grid) => Shown::Mesh(*grid.mesh()),
+            Object::Scene(found) if std::ptr::eq(*found, &raw const middle_scene) => {
+                Shown::Scene(&middle, &middle_objects)
+            }
+            _ => Shown::Scene(&inner, objects),
+        });
+        let depth_of = |path: &[u32; 4]| path.iter().filter(|&&number| number != u32::MAX).count();
+        let by_depth = [1, 2, 3]
+            .map(|depth| moved.iter().filter(|moved| depth_of(&moved.path) == depth).collect());
+        let by_depth: [Vec<&Moved>; 3] = by_depth;
+        let mut random = Random(7);
+        for distance in [1.0, 1e2, 1e4, 1e6, 1e8] {
+            let mut depths = [0; 4];
+            for round in 0..120 {
+                // Towards one of the triangles, from so many units away.
+                let near = &by_depth[round / 3 % 3];
+                let aim = near[random.below(near.len())];
+                let [a, b, c] = aim.corners;
+                let middle: [f64; 3] = std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0);
+                let size = [1e-20, 1.0, 1e12][round % 3];
+                let direction = random.point().map(|c| c * size);
+                let back =
+                    distance / dot(direction.map(f64::from), direction.map(f64::from)).sqrt();
+                let ray = RayF64 {
+                    origin: std::array::from_fn(|k| middle[k] - f64::from(direction[k]) * back),
+                    ..RayF64::new([0.0; 3], direction)
+                };
+                // The rounding of t, and of where the ray is.
+                let slack = 1e-6 * back + 1e-4 * back / distance;
+                let hit = scene.intersect(&ray);
+                assert_eq!(scene.occluded(&ray), hit.is_some());
+                let mut is_confirmed = hit.is_none();
+                for Moved { path, id, corners, normal } in &moved {
+                    let Some((t, inside)) = meet(corners, &ray) else { continue };
+                    if let Some(hit) = hit
+                        && (hit.path, hit.primitive) == (*path, *id)
+                    {
+                        is_confirmed |= inside > -1e-3 && (f64::from(hit.t) - t).abs() <= slack;
+                        let found = scene.triangle_normal(&hit).unwrap().map(f64::from);
+                        let cosine = dot(found, *normal) / dot(*normal, *normal).sqrt();
+                        assert!(cosine > 1.0 - 1e-3, "{cosine} {hit:?}");
+                    }
+                    let end = hit.map_or(f64::INFINITY, |hit| f64::from(hit.t));
+                    assert!(
+                        inside < 1e-3 || t < slack || end <= t + slack,
+                        "{path:?} triangle {id} at {t}, found {hit:?} {ray:?}"
+                    );
+                }
+                assert!(is_confirmed, "{hit:?} {ray:?}");
+                if let Some(hit) = hit {
+                    depths[depth_of(&hit.path)] += 1;
+                }
+            }
+            assert!(depths[1..].iter().all(|&hits| hits > 5), "{depths:?}");
+        }
     });
 }
 

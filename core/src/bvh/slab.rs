@@ -155,9 +155,21 @@ impl Slab {
         slab
     }
 
+    /// The same for a ray whose `t` is `scale` times the `t` of its range and of hits.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn along(ray: &Ray, approach: &Approach, scale: f64) -> Self {
+        let mut slab = Self::new(ray, ray.t_min, approach);
+        (slab.t, slab.scale) = (slab.t / scale, slab.scale * scale);
+        (slab.start, slab.end) = (slab.earliest(ray.t_min), slab.latest(ray.t_max));
+        slab
+    }
+
     /// A distance no farther than a `t` and all that rounds to it.
     fn earliest(&self, t: f32) -> f32 {
         let distance = round((f64::from(t.next_down()) - self.t) * self.scale);
+        // Infinity has no margin to take off.
+        let distance = lesser(distance, f32::MAX);
         (distance - distance.abs() * EARLIER) - TINY
     }
 

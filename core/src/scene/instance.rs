@@ -5,20 +5,23 @@
 //! blob    object = inverse * (scene - translation)      the same struct, with the inverse as its nine
 //! ```
 //!
-//! Origins are moved in f64, so that what f32 rounds is the ray near the object, not near the scene's zero.
-//! The direction is scaled by a power of two, which changes no digit, and the `t` of the object's ray with it:
+//! Origins and directions are moved in f64, through all scenes on the way, and rounded to f32 once, for the
+//! object: near the object, not near the scene's zero. A direction that was rounded before would miss an object
+//! at a distance of 2^24 extents. The direction is scaled by a power of two, which changes no digit, and the `t`
+//! of the object's ray with it:
 //!
 //! ```text
 //! t of the object's ray = t * scale - shift
 //! shift   0; for an origin more than four extents away from the object the place where the ray enters its box
 //! ```
 //!
-//! The object's ray is a function of the scene's ray, the instance and the object's box alone, so every path
-//! to an instance asks the object the same.
+//! The `t` of a ray in a scene inside another is that of the outermost scene. The object's ray is a function of
+//! that ray, the instances on the path and the object's box alone, so every query asks the object the same.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::aabb::{MAX_COORDINATE, greater, lesser};
+use crate::approach::LineF64;
 use crate::ray::{Ray, RayF64, round};
 
 /// An object at a place in a scene: 72 bytes.
@@ -148,23 +151,12 @@ impl Placed {
         [0, 1, 2].map(|axis| a[axis] * x + b[axis] * y + c[axis] * z)
     }
 
-    /// The ray that the object sees, if the ray has a direction there.
-    pub(super) fn ray(&self, ray: &RayF64) -> Option<Seen> {
+    /// The line that the object sees, with the `t` of this one.
+    pub(super) fn line(&self, line: &LineF64) -> LineF64 {
         let inverse = self.inverse();
-        let [x, y, z] = ray.direction.map(f64::from);
-        let direction = inverse.map(|[a, b, c]| a * x + b * y + c * z);
-        let [x, y, z] = [0, 1, 2].map(|axis| ray.origin[axis] - self.0.translation[axis]);
-        let origin = inverse.map(|[a, b, c]| a * x + b * y + c * z);
-        let [x, y, z] = direction.map(f64::abs);
-        let longest = greater(x, greater(y, z));
-        let exponent = longest.to_bits() & 0x7ff0_0000_0000_0000;
-        let scale = f64::from_bits(exponent);
-        // Neither zero nor NaN nor beyond what can be divided by.
-        let is_ray = (1e-300..1e300).contains(&longest);
-        is_ray.then(|| {
-            let unit = 1.0 / scale;
-            Seen { origin, direction: direction.map(|d| round(d * unit)), shift: 0.0, scale }
-        })
+        let turned = |[x, y, z]: [f64; 3]| inverse.map(|[a, b, c]| a * x + b * y + c * z);
+        let from = [0, 1, 2].map(|axis| line.origin[axis] - self.0.translation[axis]);
+        LineF64 { origin: turned(from), direction: turned(line.direction) }
     }
 }
 
@@ -195,43 +187,47 @@ fn inverse_of([a, b, c]: &Matrix) -> Option<Matrix> {
 /// A ray as an object sees it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seen {
-    origin: [f64; 3],
-    direction: [f32; 3],
+    /// Its direction is scaled: the largest component lies between 1 and 2.
+    pub(super) line: LineF64,
     /// `t` of this ray = `t` of the scene's ray * scale - shift.
+    pub(super) scale: f64,
     shift: f64,
-    scale: f64,
 }
 
 /// Objects farther away than so many of their extents are seen from where the ray enters their box.
 const FAR_EXTENTS: f64 = 4.0;
 
 impl Seen {
-    /// The ray as one in f64, with the range of the scene's ray.
-    pub(super) fn wide(&self, ray: &RayF64) -> RayF64 {
-        RayF64 {
-            origin: self.origin,
-            direction: self.direction,
-            t_min: self.inward(ray.t_min),
-            t_max: self.inward(ray.t_max),
-            reserved: 0,
-        }
+    /// `None` if the line has no direction.
+    pub(super) fn new(line: &LineF64) -> Option<Self> {
+        let [x, y, z] = line.direction.map(f64::abs);
+        let longest = greater(x, greater(y, z));
+        let exponent = longest.to_bits() & 0x7ff0_0000_0000_0000;
+        let scale = f64::from_bits(exponent);
+        // Neither zero nor NaN nor beyond what can be divided by.
+        let is_ray = (1e-300..1e300).contains(&longest);
+        is_ray.then(|| {
+            let unit = 1.0 / scale;
+            let direction = line.direction.map(|d| d * unit);
+            Self { line: LineF64 { direction, ..*line }, scale, shift: 0.0 }
+        })
     }
 
     /// The ray in f32 for an object with this box: from near the box. `None` if it passes the box.
     pub(super) fn narrow(&mut self, ray: &RayF64, bounds: &([f32; 3], [f32; 3])) -> Option<Ray> {
+        let LineF64 { origin, direction } = self.line;
         let (center, half) = grown(bounds);
-        let away = |axis: usize| (self.origin[axis] - center[axis]).abs();
+        let away = |axis: usize| (origin[axis] - center[axis]).abs();
         let extent = 2.0 * greater(half[0], greater(half[1], half[2]));
         let is_far = greater(away(0), greater(away(1), away(2))) > FAR_EXTENTS * extent;
         if is_far {
             self.shift = self.entry(&center, &half)?;
         }
-        let at =
-            |axis: usize| round(self.origin[axis] + self.shift * f64::from(self.direction[axis]));
+        let at = |axis: usize| round(origin[axis] + self.shift * direction[axis]);
         Some(Ray {
             origin: [at(0), at(1), at(2)],
             t_min: self.inward(ray.t_min),
-            direction: self.direction,
+            direction: direction.map(round),
             t_max: self.inward(ray.t_max),
         })
     }
@@ -241,8 +237,8 @@ impl Seen {
     fn entry(&self, center: &[f64; 3], half: &[f64; 3]) -> Option<f64> {
         let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
         for axis in 0..3 {
-            let direction = f64::from(self.direction[axis]);
-            let away = center[axis] - self.origin[axis];
+            let direction = self.line.direction[axis];
+            let away = center[axis] - self.line.origin[axis];
             let (low, high) = (away - half[axis], away + half[axis]);
             if direction.abs() > 0.0 {
                 let (a, b) = (low / direction, high / direction);

@@ -6,6 +6,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::instance::Seen;
 use super::{MAX_NESTING, Object, Scene};
+use crate::approach::LineF64;
 use crate::counters::Counters;
 use crate::options::{Cull, QueryOptions, Verdict};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
@@ -178,16 +179,20 @@ impl Scene<'_> {
             }
             None => None,
         };
-        let hit = self.trace(ray, f32::INFINITY, 0, &question, filter, work.as_mut());
+        let line = LineF64 { origin: ray.origin, direction: ray.direction.map(f64::from) };
+        let hit = self.trace(&line, ray, f32::INFINITY, 0, &question, filter, work.as_mut());
         if let (Some(counters), Some(work)) = (&mut options.counters, work) {
             counters.add(&work);
         }
         hit
     }
 
-    /// The closest hit of a ray no farther than a limit, or any; at a level of nesting.
+    /// The closest hit of a ray no farther than a limit, or any; at a level of nesting. `line` is the ray as this
+    /// scene sees it, `ray` that of the outermost scene.
+    #[expect(clippy::too_many_arguments, reason = "each is its own")]
     fn trace(
         &self,
+        line: &LineF64,
         ray: &RayF64,
         limit: f32,
         level: usize,
@@ -199,9 +204,10 @@ impl Scene<'_> {
             return None;
         }
         let mut work = counters.is_some().then(Counters::default);
-        let cut = RayF64 { t_max: if limit < ray.t_max { limit } else { ray.t_max }, ..*ray };
+        let t_max = if limit < ray.t_max { limit } else { ray.t_max };
         let mut offered = Offered {
             scene: self,
+            line,
             ray,
             level,
             question,
@@ -211,10 +217,17 @@ impl Scene<'_> {
             counters: work.as_mut(),
         };
         let mut steps = Counters::default();
-        if offered.counters.is_some() {
-            self.tree.search_boxes(&cut, &mut offered, &mut steps);
+        if level == 0 {
+            let cut = RayF64 { t_max, ..*ray };
+            if offered.counters.is_some() {
+                self.tree.search_boxes(&cut, &mut offered, &mut steps);
+            } else {
+                self.tree.search_boxes(&cut, &mut offered, &mut ());
+            }
         } else {
-            self.tree.search_boxes(&cut, &mut offered, &mut ());
+            let Seen { line, scale, .. } = Seen::new(line)?;
+            let range = [ray.t_min, t_max];
+            self.tree.search_boxes_along(&line, scale, range, &mut offered, &mut steps);
         }
         let best = offered.best;
         if let (Some(counters), Some(work)) = (counters, work) {
@@ -239,6 +252,7 @@ type Shown<'f> = dyn FnMut(&SceneHit) -> Verdict + 'f;
 /// Instances are asked as they are met.
 struct Offered<'q, 'f> {
     scene: &'q Scene<'q>,
+    line: &'q LineF64,
     ray: &'q RayF64,
     level: usize,
     question: &'q Question,
@@ -271,20 +285,19 @@ impl Search for Offered<'_, '_> {
 impl Offered<'_, '_> {
     /// What a ray hits in an instance, no farther than what was hit before.
     fn ask(&mut self, number: u32) -> Option<SceneHit> {
-        let Self { scene, ray, level, question, .. } = *self;
+        let Self { scene, line, ray, level, question, .. } = *self;
         let &Question { mask, cull, is_any } = question;
         if mask != u32::MAX && scene.tree.mesh().mask(number) & mask == 0 {
             return None;
         }
         let placed = scene.instances.get(number as usize)?;
         let object = scene.objects.get(placed.object() as usize)?;
-        let mut seen = placed.ray(ray)?;
+        let line = placed.line(line);
 
-        // Inside a scene the ray keeps its origin in f64, and the hit its path.
+        // Inside a scene the ray keeps its f64 and its `t`.
         if let Object::Scene(inner) = object {
-            let inside = seen.wide(ray);
             let outward = |hit: &SceneHit| {
-                let mut hit = SceneHit { t: seen.outward(hit.t, ray), ..*hit };
+                let mut hit = *hit;
                 if let Some(place) = hit.path.get_mut(level) {
                     *place = number;
                 }
@@ -298,12 +311,12 @@ impl Offered<'_, '_> {
                 }
                 None => None,
             };
-            let limit = seen.limit(self.limit);
-            let counters = self.counters.as_deref_mut();
-            let hit = inner.trace(&inside, limit, level + 1, question, filter, counters)?;
+            let (limit, counters) = (self.limit, self.counters.as_deref_mut());
+            let hit = inner.trace(&line, ray, limit, level + 1, question, filter, counters)?;
             return Some(outward(&hit));
         }
 
+        let mut seen = Seen::new(&line)?;
         let bounds = object.bounds();
         let mut inside = seen.narrow(ray, &bounds)?;
         let limit = seen.limit(self.limit);
