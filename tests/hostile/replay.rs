@@ -1,38 +1,65 @@
 //! What fuzzing found, and what it found worth keeping: both run again.
+//!
+//! The inputs worth keeping are an archive for each target, corpus/TARGET.tar. The finds are files, whose names
+//! say what they did.
 
 use std::fs;
-use std::path::Path;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
 
 use hgrid_tests::hostile::TARGETS;
+use tar::Archive;
 
-/// Runs all files in a target's folder; how many there were.
-fn run_all(kind: &str, name: &str, run: fn(&[u8])) -> usize {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hostile").join(kind).join(name);
-    let Ok(entries) = fs::read_dir(&folder) else { return 0 };
+/// A file or folder beside this source.
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("hostile").join(name)
+}
+
+/// The names and bytes of a target's archive, in its order.
+fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
+    let path = path("corpus").join(target).with_extension("tar");
+    let mut archive = Archive::new(fs::File::open(path).expect("an archive for each target"));
+    let entries = archive.entries().expect("an archive");
+    let read = entries.map(|entry| {
+        let mut entry = entry.expect("a whole archive");
+        let name = entry.path().expect("a name").display().to_string();
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes).expect("a whole archive");
+        (name, bytes)
+    });
+    read.collect()
+}
+
+/// The names and bytes of the finds of a target, which may have none.
+fn found(target: &str) -> Vec<(String, Vec<u8>)> {
+    let Ok(entries) = fs::read_dir(path("regressions").join(target)) else { return Vec::new() };
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     files.sort();
-    for file in &files {
+    files.iter().map(|file| (file.display().to_string(), fs::read(file).unwrap())).collect()
+}
+
+/// Runs a target on inputs; how many there were.
+fn run_all(run: fn(&[u8]), inputs: &[(String, Vec<u8>)]) -> usize {
+    for (name, bytes) in inputs {
         // Shown if the test fails.
-        println!("{}", file.display());
-        run(&fs::read(file).unwrap());
+        println!("{name}");
+        run(bytes);
     }
-    files.len()
+    inputs.len()
 }
 
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn what_fuzzing_kept_does_no_harm() {
     for target in TARGETS {
-        assert!(run_all("corpus", target.name, target.run) > 100, "{}", target.name);
+        println!("{}", target.name);
+        assert!(run_all(target.run, &kept(target.name)) > 200, "{}", target.name);
     }
 }
 
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn what_fuzzing_found_does_no_harm_any_more() {
-    let mut count = 0;
-    for target in TARGETS {
-        count += run_all("regressions", target.name, target.run);
-    }
-    assert!(count > 1, "{count}");
+    let counts = TARGETS.map(|target| run_all(target.run, &found(target.name)));
+    assert!(counts.iter().sum::<usize>() > 1, "{counts:?}");
 }
