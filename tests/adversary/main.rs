@@ -1,16 +1,14 @@
 //! Does every query hold against a reference that shares nothing with the library?
 //!
 //! A pair is one ray put to one method. For each ray the reference decides about every triangle, without
-//! rounding ([`reference`]), and every entry point of every method has to agree, with every kind of
+//! rounding (`hgrid_tests::reference`), and every entry point of every method has to agree, with every kind of
 //! vectors, masks, culling, the triangle to skip and filters ([`run`]).
 //!
 //! `HGRID_PAIRS` says how many, `HGRID_SEED` which, `HGRID_FIRST` from which mesh on. A long run prints
 //! what it did as JSON; record.json has such runs.
 
-mod dyadic;
 mod meshes;
 mod rays;
-mod reference;
 mod run;
 
 use std::time::{SystemTime, UNIX_EPOCH};

@@ -8,10 +8,10 @@ use hgrid_tests::meshes::Mesh;
 use hgrid_tests::methods::{configs, configs_with};
 use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
+use hgrid_tests::reference::{Answer, Line};
 
 use super::meshes;
 use super::rays::Aims;
-use super::reference::{Answer, Line};
 
 /// Rays of a batch: a few more than go down together.
 const BATCH: usize = 72;

@@ -2,9 +2,9 @@
 
 use hgrid_core::{Config, IndexType, Method, Strided, TriangleMesh};
 use hgrid_tests::meshes::{ball, soup};
-use hgrid_tests::methods;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
+use hgrid_tests::{methods, oracle};
 
 /// Elements as bytes, one every `stride` bytes from an odd address, junk between them and nothing
 /// behind the last.
@@ -58,6 +58,9 @@ fn strides_types_and_alignment_do_not_matter() {
             for _ in 0..200 {
                 let ray = hgrid_core::Ray::new(random.point().map(|c| c * 3.0), random.point());
                 assert_eq!(grid.intersect(&ray), reference.intersect(&ray));
+                if position_stride == 13 {
+                    oracle::check(&grid, &ray);
+                }
             }
         }
     }

@@ -1,26 +1,20 @@
 //! A hit is a function of the ray and the triangle: not of the mesh around it, the grid's box, the
 //! method or the way a ray is asked about.
 
-use hgrid_core::{
-    Coherence, Config, Grid, Hit, QueryOptions, Ray, Strided, StridedMut, TriangleTest,
-};
+use hgrid_core::{Coherence, Config, Cull, Grid, Hit, QueryOptions, Ray, Strided, StridedMut};
 use hgrid_tests::meshes::{Mesh, ball, soup};
-use hgrid_tests::methods;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
+use hgrid_tests::{methods, oracle};
 
 fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
 }
 
-/// The hits of a ray with the first triangles, as the test gives them one by one.
+/// The hits of a ray with the first triangles, one by one.
 fn expected(mesh: &Mesh, count: usize, ray: &Ray) -> Vec<Hit> {
-    let test = TriangleTest::new(ray).unwrap();
-    let view = mesh.view();
-    let hit = |id: usize| Some(test.test(&view.triangle(id as u32)?)?.on(id as u32));
-    let mut hits: Vec<Hit> = (0..count).filter_map(hit).collect();
-    hits.sort_by(|a, b| a.t.total_cmp(&b.t));
-    hits
+    let first = Mesh { indices: mesh.indices[..count].to_vec(), ..mesh.clone() };
+    oracle::hits_of(&first.view(), ray, Cull::None)
 }
 
 fn check_all(grid: &Grid<'_>, ray: &Ray, count: usize, expected: &[Hit]) {

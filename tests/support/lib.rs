@@ -8,6 +8,7 @@ struct Readme;
 #[cfg(feature = "full")]
 pub mod artefact;
 pub mod copy;
+pub mod dyadic;
 pub mod guarded;
 pub mod hostile;
 pub mod joined;
@@ -18,6 +19,7 @@ pub mod owned;
 pub mod random;
 #[cfg(feature = "full")]
 pub mod readme;
+pub mod reference;
 #[cfg(feature = "full")]
 pub mod scans;
 pub mod scenes;

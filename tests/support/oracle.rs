@@ -1,27 +1,77 @@
 //! Brute force: every triangle, no structure, the lowest `t`, then the lowest id.
 //!
-//! This is what every query path must answer, bit for bit. It shares the ray-triangle test with the
-//! library, because which side of an edge a ray passes is decided there once; that test itself is
-//! held against exact arithmetic in `agree/exact.rs`.
+//! Exact arithmetic decides which triangles a ray hits and whether they show their front ([`Line`]), and
+//! holds the numbers of each hit against its own. Only the last bits of `t`, `u` and `v`, which the documented
+//! rule leaves open, come from the library's ray-triangle test. Every query must give them.
 
-use hgrid_core::{Counters, Cull, Grid, Hit, INVALID_ID, QueryOptions, Ray, TriangleTest, Verdict};
+use hgrid_core::{
+    Counters, Cull, Grid, Hit, INVALID_ID, QueryOptions, Ray, TriangleMesh, TriangleTest, Verdict,
+};
 
-/// All hits of a ray with the grid's mesh, the nearest first.
-pub fn all_hits(grid: &Grid<'_>, ray: &Ray, cull: Cull) -> Vec<Hit> {
-    let Some(test) = TriangleTest::new(ray) else { return Vec::new() };
-    let test = test.culling(cull);
+use crate::reference::{Answer, Line};
+
+/// A triangle by its number, and its corners.
+type Numbered = (u32, [[f32; 3]; 3]);
+
+/// The triangles that the whole line of a ray passes through.
+fn passed(mesh: &TriangleMesh<'_>, ray: &Ray) -> Vec<Numbered> {
+    let whole = Ray { t_min: f32::NEG_INFINITY, t_max: f32::INFINITY, ..*ray };
+    let Some(line) = Line::new(&whole) else { return Vec::new() };
+    let triangle = |id| mesh.triangle(id).expect("the mesh is sound");
+    let all = (0..mesh.triangle_count()).map(|id| (id, triangle(id)));
+    all.filter(|(_, triangle)| line.passes(triangle)).collect()
+}
+
+/// The hit with a triangle and whether it shows its front, if there is one.
+fn hit_on((id, triangle): &Numbered, line: &Line, ray: &Ray) -> Option<(Hit, bool)> {
+    let answer = line.answer_of_passed(triangle);
+    if answer == Answer::Miss {
+        return None;
+    }
+    let hit = TriangleTest::new(ray).and_then(|test| test.test(triangle));
+    let Some(hit) = hit else {
+        assert_eq!(answer, Answer::Either, "missed {id} {triangle:?} {ray:?}");
+        return None;
+    };
+    let hit = hit.on(*id);
+    assert!(line.holds_numbers(triangle, &hit), "{hit:?} {triangle:?} {ray:?}");
+    Some((hit, line.sees_front(triangle)))
+}
+
+/// The hits among the triangles that the line of a ray passes through, the nearest first.
+fn hits_among(passed: &[Numbered], ray: &Ray, cull: Cull) -> Vec<Hit> {
+    let Some(line) = Line::new(ray) else { return Vec::new() };
     let mut hits = Vec::new();
-    for id in 0..grid.mesh().triangle_count() {
-        let triangle = grid.mesh().triangle(id).expect("the mesh is sound");
-        // Skipped triangles are no triangles: say it here in other words than the library does.
-        if triangle.iter().flatten().any(|c| c.is_nan() || c.abs() > hgrid_core::MAX_COORDINATE) {
-            continue;
-        }
-        hits.extend(test.test(&triangle).map(|hit| hit.on(id)));
+    // A triangle like the one before it is hit like it.
+    let mut last: Option<(&Numbered, Option<(Hit, bool)>)> = None;
+    for numbered in passed {
+        let found = match last {
+            Some((before, found)) if before.1 == numbered.1 => {
+                found.map(|(hit, is_front)| (Hit { primitive: numbered.0, ..hit }, is_front))
+            }
+            _ => hit_on(numbered, &line, ray),
+        };
+        last = Some((numbered, found));
+        let is_shown = |is_front| match cull {
+            Cull::None => true,
+            Cull::Back => is_front,
+            Cull::Front => !is_front,
+        };
+        hits.extend(found.filter(|(_, is_front)| is_shown(*is_front)).map(|(hit, _)| hit));
     }
     // Stable: at equal `t` the ids stay ascending.
     hits.sort_by(|a, b| a.t.partial_cmp(&b.t).expect("no hit is at NaN"));
     hits
+}
+
+/// All hits of a ray with a mesh, the nearest first.
+pub fn hits_of(mesh: &TriangleMesh<'_>, ray: &Ray, cull: Cull) -> Vec<Hit> {
+    hits_among(&passed(mesh, ray), ray, cull)
+}
+
+/// The same for the mesh of a grid.
+pub fn all_hits(grid: &Grid<'_>, ray: &Ray, cull: Cull) -> Vec<Hit> {
+    hits_of(grid.mesh(), ray, cull)
 }
 
 /// The closest hit among all triangles of the grid's mesh.
@@ -29,42 +79,77 @@ pub fn brute_force(grid: &Grid<'_>, ray: &Ray) -> Option<Hit> {
     all_hits(grid, ray, Cull::None).first().copied()
 }
 
+/// What brute force says of a ray.
+struct Expected {
+    ray: Ray,
+    /// All hits, the nearest first, and those of them that show their front.
+    all: Vec<Hit>,
+    front: Vec<Hit>,
+    /// Ranges that end at the closest hit, or next to it, and the closest hit in each: the exact t lies on
+    /// either side of the rounded one.
+    parts: Vec<(Ray, Option<Hit>)>,
+}
+
+impl Expected {
+    fn new(mesh: &TriangleMesh<'_>, ray: &Ray) -> Self {
+        let passed = passed(mesh, ray);
+        let [all, front] = [Cull::None, Cull::Back].map(|cull| hits_among(&passed, ray, cull));
+        let mut parts = Vec::new();
+        if let Some(hit) = all.first() {
+            let (before, behind) = (hit.t.next_down(), hit.t.next_up());
+            for (t_min, t_max) in [
+                (hit.t, hit.t),
+                (ray.t_min, hit.t),
+                (hit.t, ray.t_max),
+                (ray.t_min, before),
+                (behind, ray.t_max),
+                (before, behind),
+            ] {
+                let part = Ray { t_min, t_max, ..*ray };
+                parts.push((part, hits_among(&passed, &part, Cull::None).first().copied()));
+            }
+        }
+        Self { ray: *ray, all, front, parts }
+    }
+
+    /// Compares every entry point of a grid with it.
+    fn check(&self, grid: &Grid<'_>) {
+        let Self { ray, all, front, parts } = self;
+        let expected = all.first().copied();
+        assert_eq!(grid.intersect(ray), expected, "intersect {:?} {ray:?}", grid.method());
+        assert_eq!(grid.occluded(ray), expected.is_some(), "occluded {ray:?}");
+        for (part, expected) in parts {
+            assert_eq!(grid.intersect(part), *expected, "part of the ray {part:?}");
+            assert_eq!(grid.occluded(part), expected.is_some(), "part of the ray {part:?}");
+        }
+        // Without memory for more, the ray is walked again for each few hits: not with a million.
+        if all.len() > 1000 {
+            let mut hits = vec![Hit::MISS; all.len() + 1];
+            let count = grid.intersect_all(ray, &mut QueryOptions::default(), &mut hits);
+            assert_eq!(hits[..count], *all, "intersect_all {ray:?}");
+            return;
+        }
+        check_order(grid, ray, all);
+        check_selection(grid, ray, all, front);
+    }
+}
+
 /// Asks every entry point of a grid about a ray and compares with brute force.
 ///
 /// # Panics
 /// On the first difference, with the ray.
 pub fn check(grid: &Grid<'_>, ray: &Ray) {
-    let all = all_hits(grid, ray, Cull::None);
-    let expected = all.first().copied();
-    assert_eq!(grid.intersect(ray), expected, "intersect {:?} {ray:?}", grid.method());
-    assert_eq!(grid.occluded(ray), expected.is_some(), "occluded {ray:?}");
+    Expected::new(grid.mesh(), ray).check(grid);
+}
 
-    // Ranges that end at the hit, or next to it: the exact t lies on either side of the rounded one.
-    if let Some(hit) = expected {
-        let (before, behind) = (hit.t.next_down(), hit.t.next_up());
-        for (t_min, t_max) in [
-            (hit.t, hit.t),
-            (ray.t_min, hit.t),
-            (hit.t, ray.t_max),
-            (ray.t_min, before),
-            (behind, ray.t_max),
-            (before, behind),
-        ] {
-            let part = Ray { t_min, t_max, ..*ray };
-            let expected = brute_force(grid, &part);
-            assert_eq!(grid.intersect(&part), expected, "part of the ray {part:?}");
-            assert_eq!(grid.occluded(&part), expected.is_some(), "part of the ray {part:?}");
-        }
-    }
-    // Without memory for more, the ray is walked again for each few hits: not with a million.
-    if all.len() > 1000 {
-        let mut hits = vec![Hit::MISS; all.len() + 1];
-        let count = grid.intersect_all(ray, &mut QueryOptions::default(), &mut hits);
-        assert_eq!(hits[..count], all, "intersect_all {ray:?}");
-        return;
-    }
-    check_order(grid, ray, &all);
-    check_selection(grid, ray, &all);
+/// The same of grids that have one mesh.
+///
+/// # Panics
+/// On the first difference, with the ray.
+pub fn check_all(grids: &[Grid<'_>], ray: &Ray) {
+    let Some(first) = grids.first() else { return };
+    let expected = Expected::new(first.mesh(), ray);
+    grids.iter().for_each(|grid| expected.check(grid));
 }
 
 /// All hits, and filters that let the first few pass: in order, none twice.
@@ -104,10 +189,9 @@ fn check_order(grid: &Grid<'_>, ray: &Ray, all: &[Hit]) {
     }
 }
 
-/// Masks, culling, the triangle to skip, and the counters.
-fn check_selection(grid: &Grid<'_>, ray: &Ray, all: &[Hit]) {
+/// Masks, culling, the triangle to skip, and the counters. Of all hits, `front` are those on the front of a triangle.
+fn check_selection(grid: &Grid<'_>, ray: &Ray, all: &[Hit], front: &[Hit]) {
     let skip = all.first().map_or(INVALID_ID, |hit| hit.primitive);
-    let front = all_hits(grid, ray, Cull::Back);
     for (mask, cull, skip) in [
         (u32::MAX, Cull::None, INVALID_ID),
         (u32::MAX, Cull::None, skip),

@@ -19,14 +19,16 @@ use std::cmp::Ordering;
 
 use hgrid_core::{Hit, MAX_COORDINATE, Ray};
 
-use super::dyadic::Dyadic;
+use crate::dyadic::Dyadic;
 
 type Corners = [[f32; 3]; 3];
 
 /// What is known of a ray and a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Answer {
+pub enum Answer {
+    /// A miss.
     Miss,
+    /// A hit.
     Hit,
     /// The rule leaves it open: rounding decides, within the errors that are documented.
     Either,
@@ -34,7 +36,7 @@ pub(crate) enum Answer {
 
 /// A ray that can hit something.
 #[derive(Debug)]
-pub(crate) struct Line {
+pub struct Line {
     /// The axes so that the longest is the last.
     axes: [usize; 3],
     origin: [f64; 3],
@@ -49,7 +51,8 @@ type Place = [f64; 3];
 
 impl Line {
     /// `None` for a ray that hits nothing, whatever there is.
-    pub(crate) fn new(ray: &Ray) -> Option<Self> {
+    #[must_use]
+    pub fn new(ray: &Ray) -> Option<Self> {
         let Ray { origin, t_min, direction, t_max } = *ray;
         let is_ray = origin.iter().chain(&direction).all(|c| c.is_finite())
             && direction.iter().any(|&c| c != 0.0)
@@ -82,22 +85,41 @@ impl Line {
     }
 
     /// What the rule says of a triangle.
-    pub(crate) fn answer(&self, corners: &Corners) -> Answer {
+    #[must_use]
+    pub fn answer(&self, corners: &Corners) -> Answer {
+        if self.passes(corners) { self.answer_of_passed(corners) } else { Answer::Miss }
+    }
+
+    /// The same of a triangle that the whole line passes through.
+    #[must_use]
+    pub fn answer_of_passed(&self, corners: &Corners) -> Answer {
+        self.range_answer(corners, &self.places(corners))
+    }
+
+    /// Whether the whole line, whatever the ray's range, passes through a triangle.
+    #[must_use]
+    pub fn passes(&self, corners: &Corners) -> bool {
         // A NaN is not small enough.
         if !corners.iter().flatten().all(|c| c.abs() <= MAX_COORDINATE) {
-            return Answer::Miss;
+            return false;
         }
         let places = self.places(corners);
+        // Nothing that lies on one side of the line surrounds it: then two edge functions have opposite signs,
+        // or all are 0.
+        let is_beside = |k: usize| {
+            places.iter().all(|place| place[k] < 0.0) || places.iter().all(|place| place[k] > 0.0)
+        };
+        if is_beside(0) || is_beside(1) {
+            return false;
+        }
         let signs = edges(&places).map(|(p, q)| edge_sign(p, q));
         let has = |sign| signs.contains(&sign);
-        if has(Ordering::Less) == has(Ordering::Greater) {
-            return Answer::Miss;
-        }
-        self.range_answer(corners, &places)
+        has(Ordering::Less) != has(Ordering::Greater)
     }
 
     /// Whether a triangle that the line passes through shows its front.
-    pub(crate) fn sees_front(&self, corners: &Corners) -> bool {
+    #[must_use]
+    pub fn sees_front(&self, corners: &Corners) -> bool {
         let signs = edges(&self.places(corners)).map(|(p, q)| edge_sign(p, q));
         signs.contains(&Ordering::Greater) == (self.direction[2] > 0.0)
     }
@@ -186,7 +208,8 @@ impl Line {
     /// Whether the numbers of a hit are as exact as they are said to be: `u` and `v` to
     /// (2^-24 + 2^-38) of their value, `t` to 2^-24 |t| + 2^-38 (|t| + Z), all to 2^-149. The `t` lies
     /// in the range: of a triangle that is grazed, whose `t` does not, it is the end.
-    pub(crate) fn holds_numbers(&self, corners: &Corners, hit: &Hit) -> bool {
+    #[must_use]
+    pub fn holds_numbers(&self, corners: &Corners, hit: &Hit) -> bool {
         let [first, last] = self.range;
         let t = f64::from(hit.t);
         let is_in = first <= t && t <= last;
@@ -256,7 +279,8 @@ impl Line {
 
     /// Whether the places of a triangle's corners are up to 2^-50 L from where the corners are, L the
     /// largest difference of a coordinate between the origin and a corner.
-    pub(crate) fn holds_places(&self, corners: &Corners) -> bool {
+    #[must_use]
+    pub fn holds_places(&self, corners: &Corners) -> bool {
         let exact = |v: [f64; 3]| v.map(Dyadic::new);
         let (origin, direction) = (exact(self.origin), exact(self.direction));
         let from_origin = corners.map(|corner| minus(&exact(self.turned(corner)), &origin));
@@ -283,15 +307,23 @@ fn edges([a, b, c]: &[Place; 3]) -> [(Place, Place); 3] {
 /// The sign of `p.x q.y - p.y q.x`.
 ///
 /// Two products and a difference are off by 2^-53 of themselves, 2^-52 of the products in all: no
-/// place is smaller than 2^-430 unless it is 0, so nothing underflows.
+/// place is smaller than 2^-430 unless it is 0, so nothing underflows. Where that does not decide, the products
+/// are so close that their difference is exact, and what each lost to rounding is an f64, too.
 fn edge_sign(p: Place, q: Place) -> Ordering {
     let (one, other) = (p[0] * q[1], p[1] * q[0]);
     let edge = one - other;
     let size = one.abs() + other.abs();
+    let compare = |a: f64, b: f64| a.partial_cmp(&b).expect("places are finite");
     if edge.abs() > 2_f64.powi(-51) * size || size == 0.0 {
-        return edge.partial_cmp(&0.0).expect("places are finite");
+        return compare(edge, 0.0);
     }
-    exact_edge(p, q).sign()
+    // The sign of edge - (lost - kept). Rounding keeps the order, so that only equals need what it takes away
+    // (Knuth 1969: the error of a sum).
+    let (kept, lost) = (p[0].mul_add(q[1], -one), p[1].mul_add(q[0], -other));
+    let rounded = lost - kept;
+    let part = lost - rounded;
+    let error = (lost - (rounded + part)) + (part - kept);
+    compare(edge, rounded).then(compare(0.0, error))
 }
 
 fn exact_edge(p: Place, q: Place) -> Dyadic {
@@ -324,4 +356,25 @@ fn cross(a: &[Dyadic; 3], b: &[Dyadic; 3]) -> [Dyadic; 3] {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
         &(&a[i] * &b[j]) - &(&a[j] * &b[i])
     })
+}
+
+#[test]
+fn edges_are_exact() {
+    let mut random = crate::random::Random(7);
+    let mut count = [0; 3];
+    for round in 0..20_000 {
+        let number = |random: &mut crate::random::Random| {
+            let bits = random.bits() >> 12 | 1023 << 52;
+            f64::from_bits(bits) * if random.below(2) == 0 { 1.0 } else { -1.0 }
+        };
+        let p = [number(&mut random), number(&mut random), 0.0];
+        // Nearly a multiple of p, and now and then exactly one.
+        let by = [1.0, 0.5, 3.0, number(&mut random)][round % 4];
+        let off = [0.0, f64::EPSILON, -f64::EPSILON][random.below(3)];
+        let q = [p[0] * by, p[1] * by * (1.0 + off), 0.0];
+        let sign = edge_sign(p, q);
+        assert_eq!(sign, exact_edge(p, q).sign(), "{p:?} {q:?}");
+        count[(sign as i8 + 1) as usize] += 1;
+    }
+    assert!(count.iter().all(|&count| count > 1000), "{count:?}");
 }

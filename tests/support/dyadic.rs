@@ -7,14 +7,18 @@ use num_bigint::{BigInt, Sign};
 
 /// `number * 2^exponent`.
 #[derive(Debug, Clone)]
-pub(crate) struct Dyadic {
+pub struct Dyadic {
     number: BigInt,
     exponent: i32,
 }
 
 impl Dyadic {
     /// A finite f64, exactly.
-    pub(crate) fn new(number: f64) -> Self {
+    ///
+    /// # Panics
+    /// If it is not finite.
+    #[must_use]
+    pub fn new(number: f64) -> Self {
         assert!(number.is_finite(), "{number}");
         let bits = number.to_bits();
         let (power, fraction) = ((bits >> 52 & 0x7ff) as i32, bits & ((1 << 52) - 1));
@@ -25,17 +29,21 @@ impl Dyadic {
     }
 
     /// The number times a power of two.
-    pub(crate) fn scaled(mut self, power: i32) -> Self {
+    #[must_use]
+    pub fn scaled(mut self, power: i32) -> Self {
         self.exponent += power;
         self
     }
 
-    pub(crate) fn abs(self) -> Self {
+    /// The number without its sign.
+    #[must_use]
+    pub fn abs(self) -> Self {
         if self.sign() == Ordering::Less { -self } else { self }
     }
 
     /// The number compared with 0.
-    pub(crate) fn sign(&self) -> Ordering {
+    #[must_use]
+    pub fn sign(&self) -> Ordering {
         match self.number.sign() {
             Sign::Minus => Ordering::Less,
             Sign::NoSign => Ordering::Equal,
