@@ -232,3 +232,23 @@ pub fn run(command: &mut Command) -> Output {
 pub fn output(command: &mut Command) -> Output {
     command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"))
 }
+
+/// Runs a program that was compiled with `ThreadSanitizer`; `None` where the kernel does not let it run.
+///
+/// Kernels that scatter addresses widely put something where the sanitizer wants its own memory, so it
+/// runs again without that.
+#[must_use]
+pub fn output_watching_threads(program: &mut Command) -> Option<Output> {
+    let is_refused = |output: &Output| {
+        let said = String::from_utf8_lossy(&output.stderr);
+        // Of the sanitizer and of setarch.
+        ["unexpected memory mapping", "personality"].iter().any(|words| said.contains(words))
+    };
+    let first = output(program);
+    if !is_refused(&first) {
+        return Some(first);
+    }
+    let mut fixed = Command::new("setarch");
+    fixed.arg("-R").arg(program.get_program()).args(program.get_args());
+    fixed.output().ok().filter(|second| !is_refused(second))
+}

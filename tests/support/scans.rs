@@ -2,12 +2,12 @@
 //!
 //! They are not part of the project (their makers hold the rights). A test that wants one looks in
 //! the folder that `HGRID_SCENES` names, or in `../shared/scenes` beside the checkout, and skips
-//! with one line if it is not there.
+//! with one line if it is not there, whatever `HGRID_REQUIRE_ALL` says.
 
 use std::path::{Path, PathBuf};
 
 use crate::meshes::Mesh;
-use crate::tools::skip;
+use crate::tools::leave_out;
 
 /// The scan of this name, or `None` after a line that says so.
 ///
@@ -16,7 +16,7 @@ use crate::tools::skip;
 pub fn load(name: &str) -> Option<Mesh> {
     let path = folder().join(name).with_extension("ply");
     if !path.is_file() {
-        skip(&format!("{name}.ply is not here (HGRID_SCENES names the folder that has it)"));
+        leave_out(&format!("{name}.ply is not here (HGRID_SCENES names the folder that has it)"));
         return None;
     }
     let path = path.to_str().expect("a path in UTF-8");

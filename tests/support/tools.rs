@@ -2,7 +2,7 @@
 //!
 //! A test that wants more than Rust, a C compiler, the C library and POSIX commands asks here. The
 //! variable `HGRID_WITHOUT` names what to treat as missing, so that a machine with every program can
-//! run the tests as one with few of them does.
+//! run the tests as one with few of them does. `HGRID_REQUIRE_ALL=1` makes a failure of every skip but those.
 
 use std::collections::BTreeSet;
 use std::env;
@@ -15,17 +15,24 @@ use std::thread;
 use crate::artefact::cpp_path;
 
 /// The names that `HGRID_WITHOUT` takes, and the programs that come with each. Those without a
-/// program are libraries. tests/README.md tells how to install them.
-pub const OPTIONAL: [(&str, &[&str]); 13] = [
+/// program are libraries, or what only scripts of .ci ask for. tests/README.md tells how to install them.
+pub const OPTIONAL: [(&str, &[&str]); 20] = [
+    ("asan", &[]),
     ("binutils", &["ar", "nm", "objcopy", "objdump", "readelf"]),
     ("c++", &["c++"]),
     ("cargo-c", &["cargo-cinstall"]),
+    ("cargo-fuzz", &[]),
     ("clang", &["clang", "clang++"]),
     ("cmake", &["cmake"]),
+    ("embree", &[]),
+    ("i686", &[]),
     ("libclang-rt", &[]),
     ("make", &["make"]),
+    ("miri", &[]),
     ("mpi", &["mpicc", "mpirun"]),
+    ("msrv", &[]),
     ("pkg-config", &["pkg-config"]),
+    ("powerpc", &[]),
     ("rust-targets", &[]),
     ("rustup", &["rustup"]),
     ("script", &["script"]),
@@ -65,7 +72,7 @@ pub fn is_installed(name: &str) -> bool {
     let entry = OPTIONAL.iter().find(|(known, _)| *known == name);
     let (_, programs) = entry.unwrap_or_else(|| panic!("`{name}` is not in OPTIONAL"));
     if left_out().contains(name) {
-        skip(&format!("HGRID_WITHOUT names {name}"));
+        leave_out(&format!("HGRID_WITHOUT names {name}"));
         return false;
     }
     let missing = programs.iter().find(|program| !runs(program));
@@ -87,10 +94,21 @@ pub fn command(program: &str) -> Command {
     Command::new(path(program))
 }
 
-/// Says once for each test why a part of it, or all of it, is skipped.
+/// Skips a part of a test, or all of it, for want of something that another machine may have.
+///
+/// # Panics
+/// If `HGRID_REQUIRE_ALL` is 1: then nothing may be missing.
+pub fn skip(reason: &str) {
+    let is_required = env::var_os("HGRID_REQUIRE_ALL").is_some_and(|value| value == "1");
+    assert!(!is_required, "HGRID_REQUIRE_ALL forbids to skip this: {reason}");
+    leave_out(reason);
+}
+
+/// Says once for each test why a part of it, or all of it, is left out: because somebody asked for that, or
+/// because it asks nothing about this machine.
 ///
 /// The line goes past the test harness, which shows what a test prints only if the test fails.
-pub fn skip(reason: &str) {
+pub fn leave_out(reason: &str) {
     static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     let thread = thread::current();
     let line = format!("skipped in {}: {reason}\n", thread.name().unwrap_or("a thread"));
