@@ -169,21 +169,25 @@ fn a_small_object_in_a_large_scene() {
 }
 
 #[test]
+#[ignore = "slow: brute force over a scan"]
 fn bunny() {
     scan("bunny");
 }
 
 #[test]
+#[ignore = "slow: brute force over a scan"]
 fn dragon() {
     scan("dragon");
 }
 
 #[test]
+#[ignore = "slow: brute force over a scan"]
 fn buddha() {
     scan("buddha");
 }
 
 #[test]
+#[ignore = "slow: brute force over a scan"]
 fn sponza() {
     scan("sponza");
 }

@@ -12,6 +12,7 @@ use crate::header::{examples, seen_by};
 use crate::programs::compile;
 
 #[test]
+#[ignore = "slow: valgrind"]
 fn it_leaks_nothing() {
     if !is_installed("valgrind") {
         return;

@@ -10,8 +10,8 @@ use std::sync::{Mutex, OnceLock};
 use std::{env, fs, thread};
 
 use hgrid_tests::artefact::{
-    Flavour, clang, compiler, compilers, cpp_compiler, is_cpp, library_dir, output, root, run,
-    static_library,
+    Flavour, clang, compiler, compilers, cpp_compiler, is_cpp, library_dir, output,
+    output_watching_threads, root, run, static_library,
 };
 use hgrid_tests::tools::{command, is_installed, skip};
 use tempfile::TempDir;
@@ -167,6 +167,7 @@ fn run_in_valgrind(programs: &[PathBuf], options: &[&str]) {
 }
 
 #[test]
+#[ignore = "slow: valgrind"]
 fn they_pass_under_valgrind() {
     if !is_installed("valgrind") {
         return;
@@ -176,15 +177,21 @@ fn they_pass_under_valgrind() {
     run_in_valgrind(&programs.filter(|path| !path.ends_with("threads")).collect::<Vec<_>>(), &[]);
 }
 
+/// Queries side by side, and builds.
+#[test]
+#[ignore = "slow: valgrind"]
+fn valgrind_sees_no_thread_get_in_the_way_of_another() {
+    if !is_installed("valgrind") {
+        return;
+    }
+    let is_about = |path: &PathBuf| path.ends_with("threads") || path.ends_with("parallel");
+    let programs: Vec<_> = plain().map(|(program, _)| program).filter(is_about).collect();
+    assert_eq!(programs.len(), 2);
+    run_in_valgrind(&programs, &["--tool=drd"]);
+}
+
 #[test]
 fn no_thread_gets_in_the_way_of_another() {
-    if is_installed("valgrind") {
-        // Queries side by side, and builds.
-        let is_about = |path: &PathBuf| path.ends_with("threads") || path.ends_with("parallel");
-        let programs: Vec<_> = plain().map(|(program, _)| program).filter(is_about).collect();
-        assert_eq!(programs.len(), 2);
-        run_in_valgrind(&programs, &["--tool=drd"]);
-    }
     let dir = TempDir::new().expect("a folder");
     let flags = ["-fsanitize=thread"];
     let [source, empty] = ["empty.c", "empty"].map(|name| dir.path().join(name));
@@ -199,13 +206,11 @@ fn no_thread_gets_in_the_way_of_another() {
             continue;
         }
         let program = compile("threads", compiler, &flags, &static_library(), dir.path());
-        let output = output(&mut Command::new(program));
-        let said = String::from_utf8_lossy(&output.stderr);
-        if said.contains("unexpected memory mapping") {
+        let Some(output) = output_watching_threads(&mut Command::new(program)) else {
             skip("ThreadSanitizer cannot run on this kernel");
             continue;
-        }
-        assert!(output.status.success(), "{said}");
+        };
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     }
 }
 

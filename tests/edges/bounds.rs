@@ -184,6 +184,8 @@ fn all_hits_of_grids_take_a_walk_for_each_sixteen() {
             assert_eq!(grid.intersect_all(&ray, options, &mut hits), N as usize);
             let walks = if room > N as usize { 1 } else { 2 + u64::from(N) / 16 };
             hold("same", &grid, &work, walks);
+            // It is reached: all triangles lie at one t, and each walk is shown every one.
+            assert!(work.primitive_tests >= walks / 2 * u64::from(N), "{work:?}");
         }
     }
 }

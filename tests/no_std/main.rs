@@ -61,26 +61,40 @@ fn is_fetched(target: &str) -> bool {
     false
 }
 
-/// Builds the C library, and core for it, and returns the folder it is in: one for each target, so
-/// that no build waits for the other. Arguments may leave methods out.
+/// What leaves out all methods but one.
+fn only(method: &str) -> [&str; 3] {
+    ["--no-default-features", "--features", method]
+}
+
+/// Builds the C library, and core for it, and returns the folder it is in: one for each target and its
+/// methods, so that no build waits for the other. Arguments may leave methods out.
 fn build(target: &str, profile: &str, arguments: &[&str]) -> PathBuf {
-    let dir = target_dir().join("no_std").join(target);
+    let dir = target_dir().join("no_std").join(target).join(arguments.last().unwrap_or(&"all"));
     let mut build = cargo_in(&dir, "build");
     let library = ["--profile", profile, "-p", "hgrid-capi", "--target", target];
     run(build.args(library).args(arguments));
     dir.join(target).join(profile)
 }
 
+const MICROCONTROLLER: &str = "thumbv7em-none-eabihf";
+
 #[test]
 fn a_microcontroller_gets_a_static_library() {
-    let target = "thumbv7em-none-eabihf";
-    if is_available(target) {
-        let archive = build(target, "small", &[]).join("libhgrid.a");
+    if is_available(MICROCONTROLLER) {
+        let archive = build(MICROCONTROLLER, "small", &only("one-level")).join("libhgrid.a");
         let bytes = fs::read(&archive).expect("the C library");
         assert!(bytes.starts_with(b"!<arch>\n"));
-        check_flash("| all | ", &archive);
-        for method in ["one-level", "fixed", "bvh"] {
-            build(target, "small", &["--no-default-features", "--features", method]);
+        check_flash("| `one-level` | ", &archive);
+    }
+}
+
+#[test]
+#[ignore = "slow: three more libraries, optimised as a whole"]
+fn each_method_takes_as_much_flash_as_the_page_says() {
+    if is_available(MICROCONTROLLER) {
+        check_flash("| all | ", &build(MICROCONTROLLER, "small", &[]).join("libhgrid.a"));
+        for method in ["fixed", "bvh"] {
+            let archive = build(MICROCONTROLLER, "small", &only(method)).join("libhgrid.a");
             check_flash(&format!("| `{method}` | "), &archive);
         }
     }
@@ -113,9 +127,19 @@ fn check_flash(row: &str, archive: &Path) {
 
 #[test]
 fn a_web_page_gets_a_module_that_needs_nothing() {
+    check_module(&only("one-level"));
+}
+
+#[test]
+#[ignore = "slow: one more library, optimised as a whole"]
+fn a_web_page_gets_all_methods() {
+    check_module(&[]);
+}
+
+fn check_module(arguments: &[&str]) {
     let target = "wasm32-unknown-unknown";
     if is_available(target) {
-        let dir = build(target, "release", &[]);
+        let dir = build(target, "release", arguments);
         let module = fs::read(dir.join("hgrid.wasm")).expect("the module");
         let sections = sections(&module);
         assert!(sections.contains(&EXPORTS) && !sections.contains(&IMPORTS), "{sections:?}");

@@ -2,6 +2,7 @@
 //! does not stay one that a small machine can carry.
 
 use std::fs;
+use std::sync::{Mutex, PoisonError};
 
 use crate::artefact::root;
 
@@ -13,6 +14,9 @@ const PAGE: &str = "docs/embedded.md";
 /// # Panics
 /// If it says something else, or lacks the words.
 pub fn check_sizes<const N: usize>(words: [&str; N], sizes: [u64; N]) {
+    // One test after the other, so that none writes over what another wrote.
+    static WRITES: Mutex<()> = Mutex::new(());
+    let _alone = WRITES.lock().unwrap_or_else(PoisonError::into_inner);
     let path = root().join(PAGE);
     let readme = fs::read_to_string(&path).expect(PAGE);
     let is_blessed = std::env::var_os("HGRID_BLESS").is_some();
