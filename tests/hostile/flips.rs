@@ -4,6 +4,7 @@
 //! Each `cargo test` takes the smallest blobs in full and of others every fifth bit, which is each bit of a byte in
 //! turn; the slow tests take every bit of all.
 
+use std::ops::Range;
 use std::thread;
 
 use hgrid_core::{Error, Grid, Method};
@@ -12,8 +13,11 @@ use hgrid_tests::hostile::{Seed, agrees, ends, fixed_rays, seeds};
 use hgrid_tests::owned::{Owned, prove};
 
 /// Where the header has what a build was told: method, density, macrocell factor, what subgrids
-/// hold at least, depth, width of a cell. With others there may well be the same grid.
-const TOLD: [usize; 6] = [40, 44, 92, 96, 100, 104];
+/// hold at least, depth. With others there may well be the same grid.
+const TOLD: [usize; 5] = [40, 44, 92, 96, 100];
+
+/// Where the header says what a blob is built over.
+const CONTENT: Range<usize> = 104..108;
 
 /// Where the header has the quality of a tree.
 const QUALITY: usize = 120;
@@ -37,6 +41,8 @@ fn is_fit(at: usize, copy: &Copy, grid: &Grid<'_>) -> bool {
 struct Ends {
     /// Opening refused it.
     refused: u32,
+    /// Opening refused it for what it is built over.
+    other: u32,
     /// Only `validate` did.
     found: u32,
     /// It is valid, and right.
@@ -68,6 +74,15 @@ fn flip_all(seed: &Seed, rays: usize, step: usize) -> Ends {
             copy.sign();
         }
         match Grid::open(copy.bytes(), view) {
+            Err(error) if CONTENT.contains(&at) => {
+                let is_fit = match error {
+                    Error::OtherContent(content) => copy.word(CONTENT.start) == content as u32,
+                    Error::Corrupt { offset } => offset == CONTENT.start as u64,
+                    _ => false,
+                };
+                assert!(is_fit, "{what}: {error:?}");
+                ended.other += 1;
+            }
             Err(_) => ended.refused += 1,
             Ok(grid) => {
                 let rays = fixed_rays(grid.bounds(), rays);
@@ -106,8 +121,10 @@ fn flip(method: Method, step: usize) {
         assert!(ended.refused > 400 / step as u32, "{ended:?}");
         assert!(is_tree || ended.valid < 80, "{ended:?}");
         let share = if is_tree { 1 } else { 2 };
-        // The 32 bits that say what a blob is built over are refused before there is a proof.
-        assert!(ended.found + 32 > share * ended.valid, "{ended:?}");
+        // Opening refuses what else would be found: that a blob is built over something else.
+        let bits = 8 * CONTENT.start..8 * CONTENT.end;
+        assert_eq!(ended.other as usize, bits.filter(|bit| bit % step == 0).count(), "{ended:?}");
+        assert!(ended.found + ended.other > share * ended.valid, "{ended:?}");
     }
 }
 
