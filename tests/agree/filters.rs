@@ -45,13 +45,31 @@ impl Asked {
     }
 }
 
-/// What is true of a ray: its hits that are there, whatever the filter says.
-fn there(grid: &Grid<'_>, ray: &Ray, asked: Asked) -> Vec<Hit> {
-    let mesh = grid.mesh();
-    let is_seen = |id| asked.mask == u32::MAX || mesh.mask(id) & asked.mask != 0;
-    let mut hits = oracle::all_hits(grid, ray, asked.cull);
-    hits.retain(|hit| hit.primitive != asked.skip && is_seen(hit.primitive));
-    hits
+/// What is true of rays: of each all hits, for each way to cull.
+struct Truth([Vec<Vec<Hit>>; 3]);
+
+impl Truth {
+    fn of(grid: &Grid<'_>, rays: &[Ray]) -> Self {
+        let hits = |cull| rays.iter().map(|ray| oracle::all_hits(grid, ray, cull)).collect();
+        Self([Cull::None, Cull::Back, Cull::Front].map(hits))
+    }
+
+    fn culling(&self, cull: Cull) -> &[Vec<Hit>] {
+        let [none, back, front] = &self.0;
+        match cull {
+            Cull::None => none,
+            Cull::Back => back,
+            Cull::Front => front,
+        }
+    }
+
+    /// Of each ray the hits that are there, whatever the filter says.
+    fn there(&self, mesh: &TriangleMesh<'_>, asked: Asked) -> Vec<Vec<Hit>> {
+        let is_seen = |id| asked.mask == u32::MAX || mesh.mask(id) & asked.mask != 0;
+        let is_there = |hit: &&Hit| hit.primitive != asked.skip && is_seen(hit.primitive);
+        let there = |hits: &Vec<Hit>| hits.iter().filter(is_there).copied().collect();
+        self.culling(asked.cull).iter().map(there).collect()
+    }
 }
 
 /// The hits that a filter is shown until one counts, and that one.
@@ -63,9 +81,10 @@ fn walk(grid: &Grid<'_>, hits: &[Hit], asked: Asked) -> (Vec<Hit>, Hit) {
     (shown.copied().collect(), first.map_or(Hit::MISS, |at| hits[at]))
 }
 
-/// Those of a ray among the hits that a filter was shown.
+/// Those of a ray among the hits that a filter was shown, in the order of rays.
 fn of(shown: &[(usize, Hit)], place: usize) -> Vec<Hit> {
-    shown.iter().filter(|(at, _)| *at == place).map(|(_, hit)| *hit).collect()
+    let start = shown.partition_point(|(at, _)| *at < place);
+    shown[start..].iter().take_while(|(at, _)| *at == place).map(|(_, hit)| *hit).collect()
 }
 
 /// One ray at a time: everything is asked near to far.
@@ -208,11 +227,10 @@ fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
         // Tiles, strangers and odd rays; and rays without order, enough of them to be sorted.
         let tiles = rays(grid.bounds())[CLOSE - 64..].to_vec();
         for rays in [tiles, scattered(1200, 2)] {
-            let whole = Asked { filter_mask: 0, ..choices(INVALID_ID)[0] };
-            let first = rays.iter().flat_map(|ray| there(&grid, ray, whole)).next();
-            let choices = choices(first.expect("some hit").primitive);
-            for asked in choices {
-                let hits: Vec<_> = rays.iter().map(|ray| there(&grid, ray, asked)).collect();
+            let truth = Truth::of(&grid, &rays);
+            let first = truth.culling(Cull::None).iter().flatten().next().expect("some hit");
+            for asked in choices(first.primitive) {
+                let hits = truth.there(&view, asked);
                 for (ray, hits) in rays.iter().zip(&hits).step_by(5) {
                     check_single(&grid, ray, hits, asked);
                 }
@@ -275,13 +293,14 @@ fn what_is_named_blocks_the_ray() {
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
         let rays = [rays(grid.bounds())[CLOSE - 256..].to_vec(), scattered(1500, 2)].concat();
+        let truth = Truth::of(&grid, &rays);
         for asked in [Cull::None, Cull::Back, Cull::Front].map(|cull| Asked {
             cull,
             filter_mask: 0,
             ..choices(INVALID_ID)[0]
         }) {
-            let hits: Vec<_> = rays.iter().map(|ray| there(&grid, ray, asked)).collect();
-            for (ray, hits) in rays.iter().zip(&hits) {
+            let hits = truth.culling(asked.cull);
+            for (ray, hits) in rays.iter().zip(hits) {
                 let named = grid.occluder(ray, &mut asked.options()).unwrap_or(INVALID_ID);
                 check_occluder(&grid, hits, asked, named, "alone");
                 let mut counters = Counters::default();

@@ -8,7 +8,7 @@ use std::process::Command;
 use hgrid_tests::artefact::{
     bare_compiler, compiler, cpp_compiler, library_dir, root, run, static_library, warnings,
 };
-use hgrid_tests::tools::{OPTIONAL, skip};
+use hgrid_tests::tools::OPTIONAL;
 use tempfile::TempDir;
 
 fn page(name: &str) -> String {
@@ -71,8 +71,6 @@ fn the_programs_of_docs_print_what_they_say() {
     let (program, expected) = program_of("docs/cpp.md", "cpp");
     if let Some(compiler) = cpp_compiler("c++17") {
         assert_eq!(printed(&program, compiler, "prog.cpp"), expected);
-    } else {
-        skip("no C++ compiler for docs/cpp.md");
     }
 }
 
@@ -106,7 +104,7 @@ fn programs_that_may_be_missing_are_listed() {
     assert_eq!(rows.collect::<Vec<_>>(), names);
 
     let ci = page(".ci/run");
-    let list = ci.lines().find_map(|line| line.strip_prefix("HGRID_WITHOUT="));
+    let list = ci.lines().find_map(|line| line.trim_start().strip_prefix("HGRID_WITHOUT="));
     let list = list.and_then(|line| line.split(' ').next()).expect("a run without them");
     let without: Vec<_> = names.into_iter().filter(|name| *name != "make").collect();
     assert_eq!(list.split(',').collect::<Vec<_>>(), without);

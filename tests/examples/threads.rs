@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use hgrid_tests::artefact::{output_watching_threads, run};
-use hgrid_tests::tools::skip;
+use hgrid_tests::tools::{is_installed, skip};
 use tempfile::TempDir;
 
 use crate::pictures::ascii;
@@ -39,6 +39,9 @@ fn any_number_of_threads_draws_the_same_picture() {
 
 #[test]
 fn its_threads_do_not_race() {
+    if !is_installed("tsan") {
+        return;
+    }
     let dir = TempDir::new().expect("a folder");
     let scene = dir.path().join("house.ply");
     fs::write(&scene, ascii()).expect("a file");

@@ -91,6 +91,7 @@ fn rustless_cmake() -> Command {
 }
 
 #[test]
+#[ignore = "slow: an archive for this machine, made from nothing"]
 fn the_archive_has_what_it_says() {
     let Some((_dir, folder)) = unpacked() else { return };
     let shared = format!("lib/libhgrid.so.{VERSION}");
@@ -136,6 +137,7 @@ fn the_archive_has_what_it_says() {
 }
 
 #[test]
+#[ignore = "slow: an archive for this machine, made from nothing"]
 fn the_archive_has_a_name_and_a_sum() {
     let Some(archive) = archive() else { return };
     let name = archive.file_name().and_then(|name| name.to_str()).expect("a name");
@@ -151,6 +153,7 @@ fn the_archive_has_a_name_and_a_sum() {
 
 /// As the README in the archive says.
 #[test]
+#[ignore = "slow: an archive for this machine, made from nothing"]
 fn the_archive_brings_a_program_that_checks_it() {
     let Some((_dir, folder)) = unpacked() else { return };
     let mut compile = without_rust(bare_compiler());
@@ -161,6 +164,7 @@ fn the_archive_brings_a_program_that_checks_it() {
 }
 
 #[test]
+#[ignore = "slow: an archive for this machine, made from nothing"]
 fn an_empty_project_finds_the_package_in_the_archive() {
     if !has_cmake() {
         return;
@@ -174,6 +178,7 @@ fn an_empty_project_finds_the_package_in_the_archive() {
 }
 
 #[test]
+#[ignore = "slow: an archive for this machine, made from nothing"]
 fn pkg_config_finds_the_library_in_the_archive() {
     if !is_installed("pkg-config") {
         return;
@@ -208,6 +213,7 @@ pub(crate) fn build_within(cmake: fn() -> Command, hgrid: &Path, options: &[Stri
 }
 
 #[test]
+#[ignore = "slow: an archive for this machine, made from nothing"]
 fn a_project_has_the_archive_in_a_folder_of_its_own() {
     if !has_cmake() || !is_installed("c++") {
         return;
@@ -219,6 +225,7 @@ fn a_project_has_the_archive_in_a_folder_of_its_own() {
 }
 
 #[test]
+#[ignore = "slow: an archive for this machine, made from nothing"]
 fn a_checkout_takes_an_archive_in_place_of_cargo() {
     if !has_cmake() || !is_installed("c++") {
         return;
@@ -249,6 +256,7 @@ fn a_checkout_without_cargo_says_how_to_get_it() {
 }
 
 #[test]
+#[ignore = "slow: an archive for this machine, made from nothing"]
 fn an_archive_for_an_unknown_target_is_refused() {
     let mut make = Command::new(root().join("dist/make"));
     make.arg("pdp11-dec-rsx")

@@ -16,7 +16,9 @@ use crate::artefact::cpp_path;
 
 /// The names that `HGRID_WITHOUT` takes, and the programs that come with each. Those without a
 /// program are libraries, or what only scripts of .ci ask for. tests/README.md tells how to install them.
-pub const OPTIONAL: [(&str, &[&str]); 20] = [
+pub const OPTIONAL: [(&str, &[&str]); 25] = [
+    ("aarch64", &[]),
+    ("armv7", &[]),
     ("asan", &[]),
     ("binutils", &["ar", "nm", "objcopy", "objdump", "readelf"]),
     ("c++", &["c++"]),
@@ -24,6 +26,7 @@ pub const OPTIONAL: [(&str, &[&str]); 20] = [
     ("cargo-fuzz", &[]),
     ("clang", &["clang", "clang++"]),
     ("cmake", &["cmake"]),
+    ("crates.io", &[]),
     ("embree", &[]),
     ("i686", &[]),
     ("libclang-rt", &[]),
@@ -36,7 +39,9 @@ pub const OPTIONAL: [(&str, &[&str]); 20] = [
     ("rust-targets", &[]),
     ("rustup", &["rustup"]),
     ("script", &["script"]),
+    ("tsan", &[]),
     ("valgrind", &["valgrind"]),
+    ("wasm", &[]),
 ];
 
 /// The names in `HGRID_WITHOUT`.
