@@ -20,6 +20,12 @@ fn calls_from_c() {
     run(c_abi, if cfg!(miri) { 60 } else { 3000 }, 600);
 }
 
+/// Few enough for each run of Miri.
+#[test]
+fn a_few_calls_from_c() {
+    run(c_abi, 5, 300);
+}
+
 #[test]
 fn meshes() {
     run(build_mesh, if cfg!(miri) { 2 } else { 500 }, 400);
