@@ -108,11 +108,13 @@ impl Meshes {
     /// The caller's promise.
     unsafe fn get(&self, at: usize) -> Result<TriangleMesh<'static>, hgrid_status> {
         let description = self.start.wrapping_byte_add(at * self.size);
-        // SAFETY: the caller's promise, and within the array.
-        let description = unsafe { read_sized(description) }?;
-        if description.struct_size as usize != self.size {
+        // Before what a larger one would have: it may lie behind the array.
+        // SAFETY: the caller's promise, and within the array; the size comes first.
+        if unsafe { read(description.cast::<u32>()) }? as usize != self.size {
             return Err(HGRID_ERROR_STRUCT_SIZE);
         }
+        // SAFETY: the caller's promise, and within the array.
+        let description = unsafe { read_sized(description) }?;
         if description.has_parts() {
             return Err(HGRID_ERROR_INVALID_PARTS);
         }

@@ -32,7 +32,11 @@ impl Caller<'_> {
     pub(super) fn join(&self, u: &mut Unstructured<'_>) -> Result<()> {
         let mut meshes = Vec::new();
         for _ in 0..u.int_in_range(0..=4)? {
-            let mesh = *self.mesh(u)?.value();
+            let mut mesh = *self.mesh(u)?.value();
+            // The first one says how large all are, and behind it nothing is that belongs to it alone.
+            if meshes.is_empty() {
+                mesh.struct_size = mesh.struct_size.min(EMPTY.struct_size);
+            }
             meshes.push(if rarely(u, 4)? { EMPTY } else { mesh });
         }
         let parts = Memory::new(meshes.len() * size_of::<hgrid_part>());
