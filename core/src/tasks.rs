@@ -80,6 +80,7 @@ pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
 mod with_atomics {
     use core::sync::atomic::{AtomicU32, Ordering};
 
+    use try_lock::TryLock;
     use zerocopy::{FromBytes as _, IntoBytes as _};
 
     use super::Control;
@@ -90,11 +91,11 @@ mod with_atomics {
     pub(crate) use core::marker::Sync as Lendable;
 
     /// A place from which one of several threads takes something.
-    pub(super) struct Slot<T>(spin::Mutex<T>);
+    pub(super) struct Slot<T>(TryLock<T>);
 
     impl<T> Slot<T> {
         pub(super) const fn new(value: T) -> Self {
-            Self(spin::Mutex::new(value))
+            Self(TryLock::new(value))
         }
 
         /// What was there, if nobody else is looking: only who runs the same task could be.
