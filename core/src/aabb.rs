@@ -2,9 +2,7 @@
 
 use glam::Vec3A;
 
-/// Coordinates beyond this magnitude count as non-finite: the largest power of two for which the
-/// extent of a box, its cells and the distances along a ray all stay far from overflow.
-pub const MAX_COORDINATE: f32 = f32::from_bits(0x7b80_0000); // 2^120, about 1.3e36
+use crate::limits::MAX_COORDINATE;
 
 /// The smallest box around some points.
 #[derive(Debug, Clone, Copy, PartialEq)]

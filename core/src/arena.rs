@@ -9,9 +9,42 @@ use core::fmt;
 use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
 
 use crate::error::{Error, Region};
+use crate::limits::ALIGNMENT;
 
-/// Regions start at a multiple of this many bytes, and so does every section in them.
-pub const ALIGNMENT: usize = 64;
+/// Bytes of the two regions that a build takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// For the region that keeps the grid.
+    pub index_bytes: usize,
+    /// For the region that only the build needs.
+    pub scratch_bytes: usize,
+    /// Whether `index_bytes` is what the build needs, to the byte, or only no less than
+    /// that. `scratch_bytes` is enough; for
+    /// one-level and fixed grids it is exact.
+    pub is_exact: bool,
+}
+
+impl Sizes {
+    /// Sizes from counts in 64 bits; an error if they do not fit the machine's address space. A
+    /// bound is never larger than the largest region that the machine can have.
+    pub(crate) fn new(index_bytes: u64, scratch_bytes: u64, is_exact: bool) -> Result<Self, Error> {
+        let largest = if is_exact { u64::MAX } else { isize::MAX.unsigned_abs() as u64 };
+        let index_bytes = index_bytes.min(largest);
+        let fit = |needed_bytes: u64, region| {
+            let available_bytes = usize::MAX as u64;
+            usize::try_from(needed_bytes).map_err(|_| Error::OutOfMemory {
+                region,
+                needed_bytes,
+                available_bytes,
+            })
+        };
+        Ok(Self {
+            index_bytes: fit(index_bytes, Region::Index)?,
+            scratch_bytes: fit(scratch_bytes, Region::Scratch)?,
+            is_exact,
+        })
+    }
+}
 
 /// 64 aligned bytes: the unit from which Rust callers make regions.
 ///
@@ -96,4 +129,11 @@ pub(crate) fn split<T: AnyBitPattern>(bytes: &[u8], count: u64) -> Option<(&[T],
         return None;
     }
     Some((bytemuck::try_cast_slice(words).ok()?, rest))
+}
+
+/// Copies words between sections of the same length.
+pub(crate) fn copy<T: Copy>(from: &[T], to: &mut [T]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
+    }
 }

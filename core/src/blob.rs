@@ -15,14 +15,16 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
-use crate::arena::{self, ALIGNMENT};
+use crate::arena;
 use crate::bits::halves;
-use crate::cell::{Lattice, MAX_RESOLUTION};
-use crate::config::{BuildFlags, Config, Method, Quality, REMOVED_METHOD};
+use crate::cell::Lattice;
+use crate::config::{BuildFlags, Config};
 use crate::control::Watch;
 use crate::error::{Error, Region};
 use crate::hash::Hash;
-use crate::mesh::{Content, TriangleMesh};
+use crate::limits::{ALIGNMENT, MAX_RESOLUTION};
+use crate::mesh::TriangleMesh;
+use crate::method::{Content, Method, Quality, REMOVED_METHOD};
 use crate::survey::Survey;
 
 /// The version of the blob format. A blob of another version is refused.

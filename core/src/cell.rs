@@ -18,9 +18,7 @@
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
-
-/// The most cells on an axis. f32 positions keep 11 bits for the place inside a cell.
-pub const MAX_RESOLUTION: u32 = 4096;
+use crate::limits::MAX_RESOLUTION;
 
 /// Smallest margin, so that a scene of a single point still has a box, and one whose cells per unit
 /// do not overflow.
@@ -58,6 +56,12 @@ impl CellRange {
     pub(crate) fn contains(&self, cell: [u32; 3]) -> bool {
         (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&cell[axis]))
     }
+}
+
+/// The row of the cells with this y and z.
+#[inline(always)]
+pub(crate) const fn row(height: u32, y: u32, z: u32) -> usize {
+    z as usize * height as usize + y as usize
 }
 
 /// A box cut into equal cells. Plain arrays, so that views of

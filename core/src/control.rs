@@ -4,7 +4,9 @@ use core::cell::Cell;
 use core::fmt;
 
 use crate::error::Error;
-use crate::tasks::Task;
+
+/// What a build hands to the caller's loop: does the task with a number.
+pub type Task<'t> = dyn Fn(u32) + Sync + 't;
 
 /// How a build is run: by the caller's threads, under the caller's eyes. `Control::default()` is
 /// one task after the other, and silence.

@@ -19,8 +19,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 
 use crate::filter::RayFilter;
-use crate::mesh::TriangleMesh;
-use crate::parts::Near;
+use crate::mesh::{Near, TriangleMesh};
 use crate::ray::Ray;
 
 /// How many triangles are tested at once.

@@ -6,8 +6,8 @@
 
 use core::fmt;
 
-use crate::config::Method;
-use crate::mesh::Content;
+use crate::limits;
+use crate::method::{Content, Method};
 
 /// Which of the caller's two memory regions an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,12 +48,12 @@ pub enum ConfigField {
     /// Not a method of this version.
     Method,
     /// Zero, negative, NaN, or so large that an axis would need more than
-    /// [`MAX_RESOLUTION`](crate::MAX_RESOLUTION) cells (1023 in a recursive grid), or ids and subgrids
+    /// [`MAX_RESOLUTION`](limits::MAX_RESOLUTION) cells (1023 in a recursive grid), or ids and subgrids
     /// more than 8 GiB.
     Density,
     /// Below 2, for a method with macrocells.
     MacrocellFactor,
-    /// 0 or above [`MAX_DEPTH`](crate::MAX_DEPTH), for a method with nested grids.
+    /// 0 or above [`MAX_DEPTH`](limits::MAX_DEPTH), for a method with nested grids.
     Depth,
     /// A flag that this version does not know.
     Flags,
@@ -72,14 +72,14 @@ pub enum Error {
         /// Bytes that the region has.
         available_bytes: u64,
     },
-    /// A region does not start at a multiple of [`ALIGNMENT`](crate::ALIGNMENT).
+    /// A region does not start at a multiple of [`ALIGNMENT`](limits::ALIGNMENT).
     Misaligned {
         /// The region that is misaligned.
         region: Region,
     },
     /// The mesh description contradicts itself.
     InvalidMesh(MeshField),
-    /// More triangles than 32-bit ids can name ([`MAX_TRIANGLES`](crate::MAX_TRIANGLES)).
+    /// More triangles than 32-bit ids can name ([`MAX_TRIANGLES`](limits::MAX_TRIANGLES)).
     TooManyTriangles,
     /// A triangle names a vertex that the mesh does not have.
     IndexOutOfRange {
@@ -148,7 +148,7 @@ pub enum Error {
         /// Objects that there are.
         available: u32,
     },
-    /// More scenes stand inside one another than [`MAX_NESTING`](crate::MAX_NESTING).
+    /// More scenes stand inside one another than [`MAX_NESTING`](limits::MAX_NESTING).
     TooDeep,
     /// The grid is no tree, or its mesh is packed behind it: only trees without a mesh can be refitted.
     CannotRefit,
@@ -175,7 +175,7 @@ impl fmt::Display for Error {
                 write!(f, "the {region} region has {available_bytes} bytes and needs {needed_bytes}")
             }
             Self::Misaligned { region } => {
-                write!(f, "the {region} region must start at a multiple of {}", crate::ALIGNMENT)
+                write!(f, "the {region} region must start at a multiple of {}", limits::ALIGNMENT)
             }
             Self::InvalidMesh(MeshField::Positions) => {
                 f.write_str("the position bytes end before the last vertex, or the stride is below 12")
@@ -192,7 +192,7 @@ impl fmt::Display for Error {
                  are too many",
             ),
             Self::TooManyTriangles => {
-                write!(f, "a grid takes at most {} triangles", crate::MAX_TRIANGLES)
+                write!(f, "a grid takes at most {} triangles", limits::MAX_TRIANGLES)
             }
             Self::IndexOutOfRange { triangle } => {
                 write!(f, "triangle {triangle} names a vertex that the mesh does not have")
@@ -223,14 +223,14 @@ impl fmt::Display for Error {
                 f,
                 "density must be above 0 and ask for at most {} cells on an axis, {} in a recursive \
                  grid, and 8 GiB of ids",
-                crate::MAX_RESOLUTION,
-                crate::recursive::MAX_RESOLUTION
+                limits::MAX_RESOLUTION,
+                limits::MAX_RESOLUTION_OF_RECURSIVE
             ),
             Self::InvalidConfig(ConfigField::MacrocellFactor) => {
                 f.write_str("macrocell_factor must be at least 2")
             }
             Self::InvalidConfig(ConfigField::Depth) => {
-                write!(f, "depth must be 1 to {}", crate::MAX_DEPTH)
+                write!(f, "depth must be 1 to {}", limits::MAX_DEPTH)
             }
             Self::InvalidConfig(ConfigField::Flags) => f.write_str("unknown build flag"),
             Self::InvalidParallelFor => {
@@ -276,13 +276,13 @@ impl Error {
             Self::InstanceWithoutInverse { instance } => write!(
                 f,
                 "the matrix of instance {instance} is singular or not finite, or takes its object beyond {:e}",
-                crate::MAX_COORDINATE
+                limits::MAX_COORDINATE
             ),
             Self::MissingObjects { needed, available } => {
                 write!(f, "the scene needs {needed} objects and was given {available}")
             }
             Self::TooDeep => {
-                write!(f, "more than {} scenes stand inside one another", crate::MAX_NESTING)
+                write!(f, "more than {} scenes stand inside one another", limits::MAX_NESTING)
             }
             _ => Ok(()),
         }

@@ -4,31 +4,24 @@ use core::fmt;
 
 use glam::Vec3A;
 
-use crate::aabb::{Aabb, MAX_COORDINATE};
+use crate::aabb::Aabb;
 use crate::approach::{Approach, LineF64};
 use crate::arena::check_alignment;
-use crate::batch::Together;
 use crate::blob::{Header, corrupt};
-use crate::bvh::{self, Bvh, Nearest};
 use crate::cell::Lattice;
-use crate::config::{
-    Config, HAS_BVH, HAS_FIXED, HAS_GRIDS, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
-};
+use crate::config::Config;
 use crate::control::{Control, Watch};
 use crate::counters::Tally;
 use crate::dda::Line;
 use crate::error::{Error, Region};
-use crate::filter::RayFilter;
-use crate::fixed::{Fixed, Macrocells};
 use crate::mesh::TriangleMesh;
-use crate::one_level::{self, OneLevel};
-use crate::options::{Choice, Cull, QueryOptions};
-use crate::ray::{Hit, INVALID_ID, Ray, RayF64, round};
-use crate::recursive::{self, Recursive};
-use crate::search::{Any, Closest, Outcome, Search};
-use crate::simd::{HAS_VECTORS, IS_SMALL, SimdLevel, dispatch};
+use crate::method::Method;
+use crate::options::{Cull, QueryOptions};
+use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
+use crate::search::{Any, Closest, Outcome, Search, test_all};
+use crate::simd::{IS_SMALL, SimdLevel};
+use crate::structure::{self, Structure, by_kind};
 use crate::triangle::TriangleTest;
-use crate::variable::{self, Variable};
 use crate::visit::Visitor;
 
 /// A built grid and the mesh it was built for, ready for queries.
@@ -44,15 +37,6 @@ pub struct Grid<'a> {
     lattice: Lattice,
     structure: Structure<'a>,
     simd: SimdLevel,
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Structure<'a> {
-    OneLevel(OneLevel<'a>),
-    Fixed(Fixed<'a>),
-    Variable(Variable<'a>),
-    Recursive(Recursive<'a>),
-    Bvh(Bvh<'a>),
 }
 
 impl<'a> Grid<'a> {
@@ -140,22 +124,7 @@ impl<'a> Grid<'a> {
         check_alignment(scratch, Region::Scratch)?;
         let watch = Watch::new(control);
         watch.at(0.0)?;
-        let blob = match config.method {
-            Method::OneLevel if HAS_ONE_LEVEL => {
-                one_level::build(&mesh, config, &(), index, scratch, &watch)?
-            }
-            Method::Fixed if HAS_FIXED => {
-                one_level::build(&mesh, config, &Macrocells::of(config), index, scratch, &watch)?
-            }
-            Method::Variable if HAS_VARIABLE => {
-                variable::build(&mesh, config, index, scratch, &watch)?
-            }
-            Method::Recursive if HAS_RECURSIVE => {
-                recursive::build(&mesh, config, index, scratch, &watch)?
-            }
-            Method::Bvh if HAS_BVH => bvh::build(&mesh, config, index, scratch, control, &watch)?,
-            method => return Err(Error::MethodLeftOut(method)),
-        };
+        let blob = structure::build(&mesh, config, index, scratch, control, &watch)?;
         let grid = Self::open(blob, mesh)?;
         watch.end();
         Ok(grid)
@@ -198,20 +167,7 @@ impl<'a> Grid<'a> {
         let blob = bytes.ok_or(corrupt(core::mem::offset_of!(Header, blob_bytes)))?;
         let method = Method::from_u32(header.method)
             .ok_or(corrupt(core::mem::offset_of!(Header, method)))?;
-        let structure = match method {
-            Method::OneLevel if HAS_ONE_LEVEL => {
-                Structure::OneLevel(OneLevel::open(&header, &lattice, &(), blob)?)
-            }
-            Method::Fixed if HAS_FIXED => Structure::Fixed(Fixed::open(&header, &lattice, blob)?),
-            Method::Variable if HAS_VARIABLE => {
-                Structure::Variable(Variable::open(&header, &lattice, blob)?)
-            }
-            Method::Recursive if HAS_RECURSIVE => {
-                Structure::Recursive(Recursive::open(&header, blob)?)
-            }
-            Method::Bvh if HAS_BVH => Structure::Bvh(Bvh::open(&header, blob)?),
-            method => return Err(Error::MethodLeftOut(method)),
-        };
+        let structure = Structure::open(method, &header, &lattice, blob)?;
         Ok(Self { mesh, blob, lattice, structure, simd: SimdLevel::detect() })
     }
 
@@ -246,38 +202,15 @@ impl<'a> Grid<'a> {
             return Err(corrupt(core::mem::offset_of!(Header, macrocell_factor)));
         }
         self.check_parts()?;
-        match &self.structure {
-            Structure::OneLevel(grid) if HAS_ONE_LEVEL => {
-                grid.validate(&header, &self.lattice, self.blob, &self.mesh)
-            }
-            Structure::Fixed(grid) if HAS_FIXED => {
-                grid.validate(&header, &self.lattice, self.blob, &self.mesh)
-            }
-            Structure::Variable(grid) if HAS_VARIABLE => {
-                grid.validate(&header, &self.lattice, self.blob, &self.mesh)
-            }
-            Structure::Recursive(grid) if HAS_RECURSIVE => {
-                grid.validate(&header, &self.lattice, &self.mesh)
-            }
-            Structure::Bvh(bvh) if HAS_BVH => {
-                bvh.validate(&header, &self.lattice, &self.mesh, scratch)
-            }
-            Structure::OneLevel(_)
-            | Structure::Fixed(_)
-            | Structure::Variable(_)
-            | Structure::Recursive(_)
-            | Structure::Bvh(_) => Err(Error::MethodLeftOut(self.method())),
-        }
+        self.structure.validate(&header, &self.lattice, self.blob, &self.mesh, scratch)
     }
 
     /// Bytes of scratch that [`validate`](Self::validate) takes: at most one for eight triangles.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "an eighth of what 32 bits count")]
     pub const fn validate_bytes(&self) -> usize {
-        match self.structure {
-            Structure::Bvh(_) => bvh::proof_bytes(self.mesh.triangle_count()) as usize,
-            _ => 0,
-        }
+        let triangles = self.mesh.triangle_count();
+        by_kind!(self.structure, _ => crate::bvh::proof_bytes(triangles) as usize, 0)
     }
 
     /// The closest hit of a ray. Where several triangles are hit at the same `t`, the one with the
@@ -349,140 +282,32 @@ impl<'a> Grid<'a> {
         search: &mut F,
         tally: &mut T,
     ) {
-        if HAS_BVH && let Structure::Bvh(bvh) = &self.structure {
-            return self.search_tree(bvh, ray, begin, cull, search, tally);
-        }
-        if !HAS_GRIDS {
-            return;
-        }
+        by_kind!(
+            &self.structure,
+            tree => tree.search(&self.scope(), ray, begin, cull, search, tally),
+            self.search_cells(ray, begin, cull, search, tally)
+        );
+    }
+
+    /// The same in a grid of cells.
+    #[inline(always)]
+    fn search_cells<F: Search, T: Tally>(
+        &self,
+        ray: &Ray,
+        begin: f32,
+        cull: Cull,
+        search: &mut F,
+        tally: &mut T,
+    ) {
         let Some(approach) = Approach::new(ray, &self.lattice.bounds()) else { return };
         let test = TriangleTest::from(ray, &approach).culling(cull);
         if approach.is_remote {
-            return self.test_all(&test, search, tally);
+            return test_all(&self.mesh, &test, search, tally);
         }
         // The test has the ray's own range: the same hit, whichever part of the ray is walked.
         let part = Ray { t_min: begin, ..*ray };
         let Some(line) = Line::new(&self.lattice, &part, &approach) else { return };
         self.traverse(&line, &test, search, tally);
-    }
-
-    /// Walks a ray through a tree and shows a search what it hits.
-    #[inline(always)]
-    fn search_tree<F: Search, T: Tally>(
-        &self,
-        bvh: &Bvh<'_>,
-        ray: &Ray,
-        begin: f32,
-        cull: Cull,
-        search: &mut F,
-        tally: &mut T,
-    ) {
-        let bounds = &self.lattice.bounds();
-        if self.walk(bvh, ray, begin, cull, bounds, None, search, tally) {
-            return;
-        }
-        let Some(approach) = Approach::new(ray, bounds) else { return };
-        let test = TriangleTest::from(ray, &approach).culling(cull);
-        if approach.is_remote {
-            return self.test_all(&test, search, tally);
-        }
-        let afar = (bvh::Slab::new(ray, begin, &approach), test.filter);
-        self.walk(bvh, ray, begin, cull, bounds, Some(&afar), search, tally);
-    }
-
-    /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it
-    /// meets.
-    pub(crate) fn search_boxes<F: Search, T: Tally>(
-        &self,
-        ray: &RayF64,
-        search: &mut F,
-        tally: &mut T,
-    ) {
-        let Structure::Bvh(bvh) = &self.structure else { return };
-        let narrow = &ray.rounded();
-        if !HAS_BVH {
-            return;
-        }
-        if narrow.origin.map(|c| f64::from(c).to_bits()) == ray.origin.map(f64::to_bits) {
-            return self.search_tree(bvh, narrow, ray.t_min, Cull::None, search, tally);
-        }
-        if !narrow.is_valid() {
-            return;
-        }
-        let line = LineF64 { origin: ray.origin, direction: ray.direction.map(f64::from) };
-        self.search_boxes_along(&line, 1.0, [ray.t_min, ray.t_max], search, tally);
-    }
-
-    /// The same for a line, and a range of `t`. The `t` along the line is `scale` times that.
-    pub(crate) fn search_boxes_along<F: Search, T: Tally>(
-        &self,
-        line: &LineF64,
-        scale: f64,
-        [t_min, t_max]: [f32; 2],
-        search: &mut F,
-        tally: &mut T,
-    ) {
-        let Structure::Bvh(bvh) = &self.structure else { return };
-        if !HAS_BVH {
-            return;
-        }
-        let bounds = &self.lattice.bounds();
-        // Beyond f32 every origin is remote.
-        let most = f64::from(f32::MAX);
-        let origin = line.origin.map(|c| round(c.clamp(-most, most)));
-        let ray = &Ray { origin, t_min, direction: line.direction.map(round), t_max };
-        let Some(approach) = Approach::of_line(ray, line, bounds) else { return };
-        if approach.is_remote {
-            return self.test_all(&TriangleTest::from(ray, &approach), search, tally);
-        }
-        let slab = bvh::Slab::along(ray, &approach, scale);
-        let afar = (slab, RayFilter::NONE);
-        self.walk(bvh, ray, t_min, Cull::None, bounds, Some(&afar), search, tally);
-    }
-
-    /// Walks a ray through a tree; false if it comes from afar and must be brought to the box.
-    #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "each is its own")]
-    fn walk<F: Search, T: Tally>(
-        &self,
-        bvh: &Bvh<'_>,
-        ray: &Ray,
-        begin: f32,
-        cull: Cull,
-        bounds: &Aabb,
-        afar: Option<&(bvh::Slab, RayFilter)>,
-        search: &mut F,
-        tally: &mut T,
-    ) -> bool {
-        let mesh = &self.mesh;
-        let simd = self.simd;
-        bvh.with_stack(
-            #[inline(always)]
-            |stack| {
-                let mut ray =
-                    bvh::OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
-                dispatch(simd, &mut ray)
-            },
-        )
-    }
-
-    /// Shows a search what a ray hits of all triangles.
-    #[cold]
-    #[inline(never)]
-    fn test_all<F: Search, T: Tally>(&self, test: &TriangleTest, search: &mut F, tally: &mut T) {
-        for id in 0..self.mesh.triangle_count() {
-            // Of those that the structure has: with finite corners.
-            let is_finite = |corner: &[f32; 3]| corner.iter().all(|c| c.abs() <= MAX_COORDINATE);
-            if !self.mesh.triangle(id).is_some_and(|triangle| triangle.iter().all(is_finite)) {
-                continue;
-            }
-            tally.primitive_test();
-            let outcome =
-                if F::OF_BOXES { search.offer(id) } else { search.decide(test, &self.mesh, id) };
-            if outcome == Outcome::Done {
-                return;
-            }
-        }
     }
 
     /// Walks a ray through a structure that shows its triangles one by one.
@@ -498,7 +323,7 @@ impl<'a> Grid<'a> {
     ) {
         let mut limit = line.end;
         // A ray meets every list at most once; damaged bytes may list everything in every cell.
-        let mut unread = self.list_words();
+        let mut unread = self.structure.list_words();
         let leaf = |references: &[u32], tally: &mut T| {
             let Some(rest) = unread.checked_sub(references.len()) else { return f32::NEG_INFINITY };
             unread = rest;
@@ -516,36 +341,55 @@ impl<'a> Grid<'a> {
             }
             limit
         };
-        match &self.structure {
-            Structure::OneLevel(grid) if HAS_ONE_LEVEL => grid.traverse(line, tally, leaf),
-            Structure::Fixed(grid) if HAS_FIXED => grid.traverse(line, tally, leaf),
-            Structure::Variable(grid) if HAS_VARIABLE => grid.traverse(line, tally, leaf),
-            Structure::Recursive(grid) if HAS_RECURSIVE => grid.traverse(line, tally, leaf),
-            Structure::OneLevel(_)
-            | Structure::Fixed(_)
-            | Structure::Variable(_)
-            | Structure::Recursive(_)
-            | Structure::Bvh(_) => {}
-        }
+        self.structure.traverse(line, tally, leaf);
     }
 
     /// Shows the lists of all cells that a box meets, and perhaps some others.
     pub(crate) fn visit(&self, bounds: &Aabb, leaf: &mut dyn FnMut(&[u32])) {
         // What lies outside belongs to the cells at the border.
         let reach = self.lattice.reach(bounds);
-        let visitor = &mut Visitor::new(self.list_words(), leaf);
-        match &self.structure {
-            Structure::OneLevel(grid) if HAS_ONE_LEVEL => grid.visit(&reach, visitor),
-            Structure::Fixed(grid) if HAS_FIXED => grid.visit(&reach, visitor),
-            Structure::Variable(grid) if HAS_VARIABLE => grid.visit(&reach, visitor),
-            Structure::Recursive(grid) if HAS_RECURSIVE => grid.visit(&reach, visitor),
-            Structure::Bvh(bvh) if HAS_BVH => bvh.visit(visitor),
-            Structure::OneLevel(_)
-            | Structure::Fixed(_)
-            | Structure::Variable(_)
-            | Structure::Recursive(_)
-            | Structure::Bvh(_) => true,
-        };
+        let visitor = &mut Visitor::new(self.structure.list_words(), leaf);
+        self.structure.visit(&reach, visitor);
+    }
+
+    /// What a tree is searched with.
+    #[cfg(feature = "bvh")]
+    #[inline(always)]
+    pub(crate) fn scope(&self) -> crate::bvh::Scope<'_> {
+        crate::bvh::Scope { mesh: &self.mesh, bounds: self.lattice.bounds(), simd: self.simd }
+    }
+
+    /// The tree, if it is one.
+    #[cfg(feature = "bvh")]
+    pub(crate) const fn tree(&self) -> Option<&crate::bvh::Bvh<'a>> {
+        by_kind!(&self.structure, tree => Some(tree), None)
+    }
+
+    /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it
+    /// meets.
+    pub(crate) fn search_boxes<F: Search, T: Tally>(
+        &self,
+        ray: &RayF64,
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        by_kind!(&self.structure, tree => tree.search_boxes(&self.scope(), ray, search, tally), ());
+    }
+
+    /// The same for a line, and a range of `t`. The `t` along the line is `scale` times that.
+    pub(crate) fn search_boxes_along<F: Search, T: Tally>(
+        &self,
+        line: &LineF64,
+        scale: f64,
+        range: [f32; 2],
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        by_kind!(
+            &self.structure,
+            tree => tree.search_boxes_along(&self.scope(), line, scale, range, search, tally),
+            ()
+        );
     }
 
     /// Shows `test` the triangles that may be within a distance of a point, the nearest first, where the
@@ -557,42 +401,19 @@ impl<'a> Grid<'a> {
         test: impl FnMut(u32) -> f32,
         tally: &mut T,
     ) -> bool {
-        let Structure::Bvh(bvh) = &self.structure else { return false };
-        if !HAS_BVH {
-            return false;
-        }
-        let (mesh, bounds) = (&self.mesh, &self.lattice.bounds());
-        let simd = self.simd;
-        bvh.with_stack(
-            #[inline(always)]
-            |stack| {
-                let mut nearest = Nearest { bvh, mesh, bounds, point, within, test, tally, stack };
-                dispatch(simd, &mut nearest);
+        by_kind!(
+            &self.structure,
+            tree => {
+                tree.nearest(&self.scope(), point, within, test, tally);
+                true
             },
-        );
-        true
+            false
+        )
     }
 
     /// The extent of a cell on each axis.
     pub(crate) fn cell_size(&self) -> Vec3A {
         self.lattice.cell_size()
-    }
-
-    /// Traces rays of any kind together where the structure can; tells whether it does. With
-    /// memory they are sorted first.
-    pub(crate) fn groups<const ANY: bool>(
-        &self,
-        choice: Choice,
-        memory: &mut [bvh::Entry],
-        batch: &mut (impl Together + ?Sized),
-    ) -> bool {
-        if !HAS_VECTORS || !HAS_BVH {
-            return false;
-        }
-        let Structure::Bvh(bvh) = &self.structure else { return false };
-        let (mesh, bounds) = (&self.mesh, self.lattice.bounds());
-        dispatch(self.simd, bvh::Groups::<_, ANY> { bvh, mesh, bounds, choice, memory, batch });
-        true
     }
 
     /// The same grid with queries that use no more than these instructions: the same hits, slower.
@@ -603,19 +424,7 @@ impl<'a> Grid<'a> {
 
     /// Returns true if a ray is shown each triangle at most once.
     pub(crate) const fn shows_once(&self) -> bool {
-        HAS_BVH && matches!(self.structure, Structure::Bvh(_))
-    }
-
-    /// No ray is shown more primitives than this.
-    #[inline]
-    const fn list_words(&self) -> usize {
-        match &self.structure {
-            Structure::OneLevel(grid) => grid.lists().len(),
-            Structure::Fixed(grid) => grid.list_words(),
-            Structure::Variable(grid) => grid.list_words(),
-            Structure::Recursive(grid) => grid.list_words(),
-            Structure::Bvh(bvh) => bvh.list_words(),
-        }
+        by_kind!(self.structure, _ => true, false)
     }
 
     /// The mesh that the grid was built for.
@@ -642,16 +451,8 @@ impl<'a> Grid<'a> {
     /// where a bump allocator gave it.
     #[must_use]
     pub fn scratch_bytes(&self) -> u64 {
-        let resolution = self.lattice.resolution;
         let triangles = self.mesh.triangle_count();
-        match self.structure {
-            Structure::OneLevel(_) | Structure::Fixed(_) => one_level::scratch_bytes(resolution),
-            Structure::Recursive(_) => recursive::scratch_bytes(triangles, &self.config()),
-            Structure::Bvh(_) => bvh::bound(triangles, self.config().quality, 1).1,
-            Structure::Variable(_) => {
-                variable::scratch_bytes_at_most(resolution, triangles, self.density())
-            }
-        }
+        self.structure.scratch_bytes(triangles, &self.config(), self.lattice.resolution)
     }
 
     /// The least and the greatest corner of the grid's box, in scene units: the mesh's box and a
@@ -670,13 +471,7 @@ impl<'a> Grid<'a> {
     /// The structure.
     #[must_use]
     pub const fn method(&self) -> Method {
-        match self.structure {
-            Structure::OneLevel(_) => Method::OneLevel,
-            Structure::Fixed(_) => Method::Fixed,
-            Structure::Variable(_) => Method::Variable,
-            Structure::Recursive(_) => Method::Recursive,
-            Structure::Bvh(_) => Method::Bvh,
-        }
+        self.structure.method()
     }
 
     /// The density that the grid has: the configured one, or a half, a quarter, ... of it where the
@@ -715,7 +510,7 @@ impl<'a> Grid<'a> {
     #[cfg(feature = "alloc")]
     pub(crate) fn nothing() -> Self {
         let (mesh, blob) = (TriangleMesh::EMPTY, &[]);
-        let (lattice, structure) = (Lattice::NOTHING, Structure::Bvh(Bvh::NOTHING));
+        let (lattice, structure) = (Lattice::NOTHING, Structure::NOTHING);
         Self { mesh, blob, lattice, structure, simd: SimdLevel::detect() }
     }
 

@@ -43,6 +43,11 @@
 //! *Compact, Fast and Robust Grids for Ray Tracing*, 2008.
 #![no_std]
 #![deny(unsafe_code)]
+// The methods share their helpers: without some methods, some helpers have nobody to help.
+#![cfg_attr(
+    not(all(feature = "fixed", feature = "variable", feature = "recursive", feature = "bvh")),
+    allow(unused, reason = "the build with all methods tells what nobody uses")
+)]
 
 #[cfg(any(test, feature = "alloc"))]
 extern crate alloc;
@@ -60,6 +65,12 @@ compile_error!(
      bits than everywhere else. Build for i686 or x86_64, or with `-C target-feature=+sse2`"
 );
 
+#[cfg(not(any(feature = "one-level", feature = "recursive", feature = "bvh")))]
+compile_error!(
+    "hgrid has no method to build grids with: turn on at least one of the features one-level, fixed, \
+     variable, recursive and bvh"
+);
+
 mod aabb;
 mod approach;
 mod arena;
@@ -67,6 +78,7 @@ mod batch;
 mod bits;
 mod blob;
 mod bump;
+#[cfg(feature = "bvh")]
 mod bvh;
 mod cell;
 mod closest;
@@ -78,20 +90,25 @@ mod eight;
 mod error;
 mod exact;
 mod filter;
+#[cfg(feature = "fixed")]
 mod fixed;
 mod grid;
 mod hash;
 mod inspect;
+mod limits;
 mod lists;
 mod mesh;
+mod method;
+#[cfg(feature = "one-level")]
 mod one_level;
 mod options;
 #[cfg(feature = "alloc")]
 mod owned;
 mod packed;
 mod pairs;
-mod parts;
+mod query;
 mod ray;
+#[cfg(feature = "recursive")]
 mod recursive;
 mod refit;
 mod scene;
@@ -100,40 +117,39 @@ mod shapes;
 mod simd;
 mod sizes;
 mod spans;
+mod structure;
 mod surface;
 mod survey;
 mod tasks;
 mod triangle;
+#[cfg(feature = "variable")]
 mod variable;
 mod visit;
 
-pub use aabb::MAX_COORDINATE;
-pub use arena::{ALIGNMENT, Block};
+pub use arena::{Block, Sizes};
 pub use batch::{Batch, Coherence, StridedMut};
 pub use blob::BLOB_VERSION;
-pub use cell::MAX_RESOLUTION;
 pub use closest::ClosestPoint;
-pub use config::{BuildFlags, Config, Method, Quality};
-pub use control::Control;
+pub use config::{BuildFlags, Config};
+pub use control::{Control, Task};
 pub use counters::Counters;
 pub use error::{BatchField, ConfigField, Error, MeshField, Region};
 pub use grid::Grid;
 pub use inspect::Statistics;
-pub use mesh::{Content, IndexType, MAX_TRIANGLES, Strided, Triangle, TriangleMesh};
+pub use limits::{
+    ALIGNMENT, MAX_COORDINATE, MAX_DEPTH, MAX_NESTING, MAX_RESOLUTION, MAX_TRIANGLES,
+};
+pub use mesh::{IndexType, MeshPart, Strided, Triangle, TriangleMesh};
+pub use method::{Content, Method, Quality};
 pub use options::{Cull, Filter, QueryOptions, Verdict};
 #[cfg(feature = "alloc")]
 pub use owned::{OwnedGrid, OwnedMesh, OwnedStrided};
 pub use packed::BlobInfo;
-pub use parts::MeshPart;
 pub use ray::{Hit, INVALID_ID, Ray, RayF64};
-pub use recursive::MAX_DEPTH;
 pub use refit::{Refit, refit};
-pub use scene::{
-    Instance, MAX_NESTING, Object, ObjectTest, Scene, SceneFilter, SceneHit, SceneOptions,
-};
+pub use scene::{Instance, Object, ObjectTest, Scene, SceneFilter, SceneHit, SceneOptions};
 pub use shapes::{Boxes, ShapeHit, ShapeTest, Shapes};
 pub use simd::SimdLevel;
-pub use sizes::{Sizes, fit, sizes, sizes_with};
+pub use sizes::{fit, sizes, sizes_with};
 pub use surface::Surface;
-pub use tasks::Task;
 pub use triangle::{TriangleHit, TriangleTest};

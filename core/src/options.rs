@@ -1,19 +1,10 @@
-//! What a query may be told beyond its ray, and the queries that take it.
-//!
-//! Masks, culling and the triangle to skip are looked up when a ray hits. A filter is asked about
-//! hits in order, from near to far and never twice about the same triangle, though a grid has
-//! neither order nor memory of what it has shown: a walk collects the few nearest hits in order,
-//! the filter is asked about those, and if it wants none of them the next walk starts where the
-//! last hit was. The first walk collects one hit, the next two, and so on: whoever accepts the
-//! first pays nothing for the order.
+//! What a query may be told beyond its ray.
 
 use core::fmt;
 
 use crate::counters::Counters;
-use crate::grid::Grid;
 use crate::mesh::TriangleMesh;
-use crate::ray::{Hit, INVALID_ID, Ray};
-use crate::search::{All, Nearest};
+use crate::ray::{Hit, INVALID_ID};
 
 /// Which sides of triangles a ray does not hit.
 ///
@@ -40,7 +31,7 @@ pub enum Verdict {
     /// The hit counts.
     Accept = 1,
     /// The hit counts, and it is the last one: the same as [`Accept`](Self::Accept), but for
-    /// [`Grid::intersect_all`].
+    /// [`Grid::intersect_all`](crate::Grid::intersect_all).
     AcceptAndStop = 2,
 }
 
@@ -75,7 +66,7 @@ pub struct QueryOptions<'q> {
     /// Says of a hit whether it counts: gets the place of the ray in its batch, 0 for a single one,
     /// and the hit. Asked about hits from near to far, where `t` is equal by ascending id, and about
     /// each triangle at most once for each ray; all about one ray of a batch before the next, in their
-    /// order. A ray of [`occluded_with`](Grid::occluded_with) and its like that an opaque triangle
+    /// order. A ray of [`occluded_with`](crate::Grid::occluded_with) and its like that an opaque triangle
     /// blocks may be asked about or not.
     pub filter: Option<&'q mut Filter<'q>>,
     /// The filter is asked about a triangle if a bit of this is set in its mask, too; the others are
@@ -192,273 +183,5 @@ impl<'q> Selection<'q> {
     /// Whether a triangle is one of them.
     pub(crate) fn has(&self, primitive: u32) -> bool {
         self.choice.has(self.mesh, primitive)
-    }
-}
-
-/// The most hits that a walk collects.
-const ROOM: usize = 16;
-
-impl Grid<'_> {
-    /// The closest hit of a ray, of those that the options let count.
-    ///
-    /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
-    /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
-    /// let hit = grid.intersect(&ray).expect("in front of the camera");
-    ///
-    /// // Leave the surface: the triangle itself is named, and needs no epsilon.
-    /// let from = Ray::new([0.25, 0.25, 0.0], [0.0, 0.0, 1.0]);
-    /// let mut options = QueryOptions { skip: hit.primitive, ..QueryOptions::default() };
-    /// assert!(grid.occluded(&from) && !grid.occluded_with(&from, &mut options));
-    /// # Ok::<(), Error>(())
-    /// ```
-    #[must_use]
-    pub fn intersect_with(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> Option<Hit> {
-        self.intersect_at(0, ray, options)
-    }
-
-    /// The same for the ray at a place of a batch.
-    pub(crate) fn intersect_at(
-        &self,
-        place: usize,
-        ray: &Ray,
-        options: &mut QueryOptions<'_>,
-    ) -> Option<Hit> {
-        self.intersect_behind((place, ray), options, None, 1)
-    }
-
-    /// The same once the first hit is known, which the filter is asked about.
-    pub(crate) fn intersect_from(
-        &self,
-        place: usize,
-        ray: &Ray,
-        options: &mut QueryOptions<'_>,
-        first: &Hit,
-    ) -> Option<Hit> {
-        let verdict = options.filter.as_mut().map(|filter| filter(place, first));
-        if verdict == Some(Verdict::Reject) {
-            return self.intersect_behind((place, ray), options, Some(*first), 2);
-        }
-        Some(*first)
-    }
-
-    /// The first hit behind another that counts. The first walk collects `room` hits.
-    fn intersect_behind(
-        &self,
-        ray: (usize, &Ray),
-        options: &mut QueryOptions<'_>,
-        after: Option<Hit>,
-        room: usize,
-    ) -> Option<Hit> {
-        let mut closest = None;
-        self.in_order(ray, options, after, room, |hit| {
-            closest = Some(*hit);
-            false
-        });
-        closest
-    }
-
-    /// Whether anything is hit that the options let count.
-    ///
-    /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
-    /// // Is a window before the light? The triangle lets it through.
-    /// let mut through_windows = |_, _: &Hit| Verdict::Reject;
-    /// let mut options =
-    ///     QueryOptions { filter: Some(&mut through_windows), ..QueryOptions::default() };
-    /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
-    /// assert!(!grid.occluded_with(&ray, &mut options));
-    /// # Ok::<(), Error>(())
-    /// ```
-    #[must_use]
-    pub fn occluded_with(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> bool {
-        self.occluder_at(0, ray, options).is_some()
-    }
-
-    /// A triangle that blocks a ray, of those that the options let count; `None` if the ray is not
-    /// [`occluded`](Grid::occluded_with).
-    ///
-    /// It is hit within the ray's range, but need not be the closest, and another one may be named in a
-    /// batch or on another machine.
-    ///
-    /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
-    /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
-    /// assert_eq!(grid.occluder(&ray, &mut QueryOptions::default()), Some(0));
-    /// # Ok::<(), Error>(())
-    /// ```
-    #[must_use]
-    pub fn occluder(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> Option<u32> {
-        self.occluder_at(0, ray, options)
-    }
-
-    /// The same for the ray at a place of a batch.
-    pub(crate) fn occluder_at(
-        &self,
-        place: usize,
-        ray: &Ray,
-        options: &mut QueryOptions<'_>,
-    ) -> Option<u32> {
-        if options.are_plain() {
-            let id = self.any(ray);
-            return (id != INVALID_ID).then_some(id);
-        }
-        if options.filter.is_some() {
-            return self.intersect_at(place, ray, options).map(|hit| hit.primitive);
-        }
-        // Nobody is promised an order.
-        let mut hit = Hit::MISS;
-        let found = self.nearest(ray, options, None, core::slice::from_mut(&mut hit), true);
-        (found > 0).then_some(hit.primitive)
-    }
-
-    /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.
-    ///
-    /// Writes as many of them as `hits` has room for, the nearest, and returns how many there
-    /// are. Without a filter, a tree ([`Method::Bvh`](crate::Method::Bvh)) is walked once and keeps
-    /// the nearest in a heap, in time of the number of hits times the logarithm of the room. With a
-    /// filter, and with the other methods where there is not room for more hits than there are, the
-    /// ray is walked once more for each sixteen hits, from where it got to: so no memory is taken,
-    /// whatever their number, but thousands of hits in one cell take long, as the square of their
-    /// number.
-    ///
-    /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.5]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2], [3, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
-    /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
-    /// let mut hits = [Hit::MISS; 4];
-    /// assert_eq!(grid.intersect_all(&ray, &mut QueryOptions::default(), &mut hits), 2);
-    /// assert_eq!([hits[0].primitive, hits[1].primitive], [1, 0]);
-    /// # Ok::<(), Error>(())
-    /// ```
-    pub fn intersect_all(
-        &self,
-        ray: &Ray,
-        options: &mut QueryOptions<'_>,
-        hits: &mut [Hit],
-    ) -> usize {
-        let mut count = 0;
-        let mut after = None;
-        if options.filter.is_none() && self.shows_once() {
-            return self.heap(ray, options, hits);
-        }
-        // Without a filter all that is found counts: collect it where it is wanted.
-        if options.filter.is_none() && hits.len() > ROOM {
-            count = self.nearest(ray, options, None, hits, false);
-            match hits.last() {
-                Some(last) if count == hits.len() => after = Some(*last),
-                _ => return count,
-            }
-        }
-        self.in_order((0, ray), options, after, ROOM, |hit| {
-            if let Some(slot) = hits.get_mut(count) {
-                *slot = *hit;
-            }
-            count += 1;
-            true
-        });
-        count
-    }
-
-    /// Walks a ray through a tree once, and keeps the nearest hits in order; returns how many there are.
-    fn heap(&self, ray: &Ray, options: &mut QueryOptions<'_>, hits: &mut [Hit]) -> usize {
-        let selection = Selection::new(self.mesh(), options);
-        let mut all = All { selection: &selection, hits, count: 0 };
-        let mut work = Counters::default();
-        self.search(ray, ray.t_min, options.cull, &mut all, &mut work);
-        all.sort();
-        if let Some(counters) = &mut options.counters {
-            counters.add(&work);
-        }
-        all.count
-    }
-
-    /// Shows `take` the hits that count and lie behind one, in order, until it answers that it has
-    /// enough. The first walk collects `room` hits.
-    fn in_order(
-        &self,
-        (place, ray): (usize, &Ray),
-        options: &mut QueryOptions<'_>,
-        mut after: Option<Hit>,
-        mut room: usize,
-        mut take: impl FnMut(&Hit) -> bool,
-    ) {
-        let mut buffer = [Hit::MISS; ROOM];
-        let choice = options.choice();
-        loop {
-            let space = buffer.get_mut(..room).unwrap_or_default();
-            let found = self.nearest(ray, options, after, space, false);
-            for hit in buffer.iter().take(found) {
-                let verdict = match &mut options.filter {
-                    Some(filter) if choice.asks(self.mesh(), hit.primitive) => filter(place, hit),
-                    _ => Verdict::Accept,
-                };
-                let is_enough = match verdict {
-                    Verdict::Reject => false,
-                    Verdict::Accept => !take(hit),
-                    Verdict::AcceptAndStop => {
-                        take(hit);
-                        true
-                    }
-                };
-                if is_enough {
-                    return;
-                }
-                after = Some(*hit);
-            }
-            // With room to spare, there is nothing behind the last one.
-            if found < room {
-                return;
-            }
-            room = (2 * room).min(ROOM);
-        }
-    }
-
-    /// Walks a ray from a hit on, collects as many of the hits behind it as there is room for, and
-    /// returns how many: the nearest, or any.
-    fn nearest(
-        &self,
-        ray: &Ray,
-        options: &mut QueryOptions<'_>,
-        after: Option<Hit>,
-        hits: &mut [Hit],
-        is_any: bool,
-    ) -> usize {
-        let selection = Selection::new(self.mesh(), options);
-        let mut nearest = Nearest { selection: &selection, after, hits, count: 0, is_any };
-        let begin = after.map_or(ray.t_min, |after| after.t);
-        let mut work = Counters::default();
-        self.search(ray, begin, options.cull, &mut nearest, &mut work);
-        if let Some(counters) = &mut options.counters {
-            counters.add(&work);
-        }
-        nearest.count
     }
 }

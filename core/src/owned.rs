@@ -20,12 +20,13 @@ use core::marker::PhantomData;
 use bytemuck::NoUninit;
 use bytemuck::allocation::try_zeroed_vec;
 
-use crate::arena::ALIGNMENT;
-use crate::config::{Config, Method};
+use crate::config::Config;
 use crate::control::Control;
 use crate::error::{Error, Region};
 use crate::grid::Grid;
+use crate::limits::ALIGNMENT;
 use crate::mesh::{IndexType, Strided, TriangleMesh};
+use crate::method::Method;
 use crate::refit::{Refit, refit};
 use crate::sizes::sizes_with;
 

@@ -15,12 +15,13 @@
 
 use core::mem::offset_of;
 
-use crate::arena::{ALIGNMENT, align_up, check_alignment, section_bytes};
+use crate::arena::{align_up, check_alignment, section_bytes};
 use crate::blob::{BLOB_VERSION, HEADER_BYTES, HasMesh, Header, corrupt};
-use crate::config::Method;
 use crate::error::{Error, Region};
 use crate::grid::Grid;
-use crate::mesh::{Content, IndexType, MAX_TRIANGLES, Strided, TriangleMesh};
+use crate::limits::{ALIGNMENT, MAX_TRIANGLES};
+use crate::mesh::{IndexType, Strided, TriangleMesh};
+use crate::method::{Content, Method};
 use crate::scene::ends_of;
 
 /// What the header of a blob says, whether or not the rest of it is there.

@@ -121,6 +121,9 @@ pub struct Hit {
 }
 
 impl Hit {
+    /// What a batch writes for a ray that hits nothing.
+    pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: INVALID_ID };
+
     /// Whether this hit is reported rather than the other: smaller `t`, then smaller id.
     #[inline(always)]
     #[must_use]

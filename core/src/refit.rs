@@ -1,11 +1,11 @@
 //! Grids of meshes that move: new boxes for the same leaves, in place.
 
 use crate::blob::{HasMesh, Header};
-use crate::bvh;
-use crate::config::{HAS_BVH, Method};
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::mesh::TriangleMesh;
+use crate::method::Method;
+use crate::structure;
 
 /// What a refit did to a tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,10 +67,10 @@ pub(crate) fn refit_content(index: &mut [u8], mesh: &TriangleMesh<'_>) -> Result
     let grid = Grid::open(index, *mesh)?;
     let (method, blob_bytes) = (grid.method(), grid.blob_bytes());
     let header = Header::read(index, mesh)?;
-    if !HAS_BVH || method != Method::Bvh || header.has_mesh()? != HasMesh::No {
+    if method != Method::Bvh || header.has_mesh()? != HasMesh::No {
         return Err(Error::CannotRefit);
     }
     let [cost_before, cost_after] =
-        bvh::refit(index.get_mut(..blob_bytes).unwrap_or_default(), mesh)?;
+        structure::refit(index.get_mut(..blob_bytes).unwrap_or_default(), mesh)?;
     Ok(Refit { cost_before, cost_after })
 }

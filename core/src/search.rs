@@ -3,6 +3,8 @@
 //! A walk shows a search every hit that it finds: about from near to far, but not quite, and a
 //! triangle that lies in several cells more than once. The search answers where the ray now ends.
 
+use crate::counters::Tally;
+use crate::limits::MAX_COORDINATE;
 use crate::mesh::TriangleMesh;
 use crate::options::Selection;
 use crate::ray::{Hit, INVALID_ID};
@@ -222,6 +224,29 @@ impl Search for Nearest<'_> {
         match self.hits.last() {
             Some(last) if !self.is_any => Outcome::EndsAt(last.t),
             _ => Outcome::Done,
+        }
+    }
+}
+
+/// Shows a search what a ray hits of all triangles.
+#[cold]
+#[inline(never)]
+pub(crate) fn test_all<F: Search, T: Tally>(
+    mesh: &TriangleMesh<'_>,
+    test: &TriangleTest,
+    search: &mut F,
+    tally: &mut T,
+) {
+    for id in 0..mesh.triangle_count() {
+        // Of those that the structure has: with finite corners.
+        let is_finite = |corner: &[f32; 3]| corner.iter().all(|c| c.abs() <= MAX_COORDINATE);
+        if !mesh.triangle(id).is_some_and(|triangle| triangle.iter().all(is_finite)) {
+            continue;
+        }
+        tally.primitive_test();
+        let outcome = if F::OF_BOXES { search.offer(id) } else { search.decide(test, mesh, id) };
+        if outcome == Outcome::Done {
+            return;
         }
     }
 }

@@ -11,18 +11,19 @@
 
 use core::fmt;
 
+use crate::arena::Sizes;
 use crate::config::Config;
-use crate::config::Method;
 use crate::control::Control;
 use crate::counters::Counters;
 use crate::error::{ConfigField, Error};
 use crate::grid::Grid;
-use crate::mesh::{Content, Strided, TriangleMesh};
+use crate::mesh::{Strided, TriangleMesh};
+use crate::method::{Content, Method};
 use crate::options::{Cull, QueryOptions, Selection};
 use crate::ray::{Hit, Ray};
 use crate::refit::{Refit, refit_content};
 use crate::search::{Outcome, Search};
-use crate::sizes::{Sizes, sizes_with};
+use crate::sizes::sizes_with;
 
 /// A view of the boxes of the caller's shapes: six floats each, two opposite corners.
 ///

@@ -1,30 +1,13 @@
 //! How much memory a build takes, asked before the build.
 
-use crate::bvh;
-use crate::config::{
-    Config, HAS_BVH, HAS_FIXED, HAS_ONE_LEVEL, HAS_RECURSIVE, HAS_VARIABLE, Method,
-};
+use crate::arena::{Sizes, check_alignment};
+use crate::config::Config;
 use crate::control::Control;
 use crate::error::{ConfigField, Error, Region};
-use crate::fixed;
 use crate::mesh::TriangleMesh;
-use crate::one_level;
+use crate::method::Method;
 use crate::ray::round;
-use crate::recursive;
-use crate::variable;
-
-/// Bytes of the two regions that a build takes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sizes {
-    /// For the region that keeps the grid.
-    pub index_bytes: usize,
-    /// For the region that only the build needs.
-    pub scratch_bytes: usize,
-    /// Whether `index_bytes` is what the build needs, to the byte, or only no less than
-    /// that. `scratch_bytes` is enough; for
-    /// one-level and fixed grids it is exact.
-    pub is_exact: bool,
-}
+use crate::structure;
 
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
@@ -63,45 +46,14 @@ impl Sizes {
         if config.check().is_err() {
             return None;
         }
-        let (index, scratch) = match config.method {
-            Method::OneLevel if HAS_ONE_LEVEL => one_level::bound(triangles, config.density, 0),
-            Method::Fixed if HAS_FIXED => fixed::bound(triangles, config),
-            Method::Variable if HAS_VARIABLE => variable::bound(triangles, config),
-            Method::Recursive if HAS_RECURSIVE => recursive::bound(triangles, config),
-            Method::Bvh if HAS_BVH && triangles <= bvh::MOST_TRIANGLES => {
-                bvh::bound(triangles, config.quality, tasks)
-            }
-            Method::OneLevel
-            | Method::Fixed
-            | Method::Variable
-            | Method::Recursive
-            | Method::Bvh => return None,
+        let Some((index, scratch)) = structure::bound(triangles, config, tasks) else {
+            return None;
         };
         if index > usize::MAX as u64 || scratch > usize::MAX as u64 {
             return None;
         }
         let (index_bytes, scratch_bytes) = (index as usize, scratch as usize);
         Some(Self { index_bytes, scratch_bytes, is_exact: false })
-    }
-
-    /// Sizes from counts in 64 bits; an error if they do not fit the machine's address space. A
-    /// bound is never larger than the largest region that the machine can have.
-    pub(crate) fn new(index_bytes: u64, scratch_bytes: u64, is_exact: bool) -> Result<Self, Error> {
-        let largest = if is_exact { u64::MAX } else { isize::MAX.unsigned_abs() as u64 };
-        let index_bytes = index_bytes.min(largest);
-        let fit = |needed_bytes: u64, region| {
-            let available_bytes = usize::MAX as u64;
-            usize::try_from(needed_bytes).map_err(|_| Error::OutOfMemory {
-                region,
-                needed_bytes,
-                available_bytes,
-            })
-        };
-        Ok(Self {
-            index_bytes: fit(index_bytes, Region::Index)?,
-            scratch_bytes: fit(scratch_bytes, Region::Scratch)?,
-            is_exact,
-        })
     }
 }
 
@@ -157,17 +109,8 @@ pub fn sizes_with(
     control: &Control<'_>,
 ) -> Result<Sizes, Error> {
     config.check()?;
-    crate::arena::check_alignment(scratch, Region::Scratch)?;
-    match config.method {
-        Method::OneLevel if HAS_ONE_LEVEL => one_level::sizes(mesh, config, &(), scratch),
-        Method::Fixed if HAS_FIXED => {
-            one_level::sizes(mesh, config, &fixed::Macrocells::of(config), scratch)
-        }
-        Method::Variable if HAS_VARIABLE => variable::sizes(mesh, config, scratch),
-        Method::Recursive if HAS_RECURSIVE => recursive::sizes(mesh, config, scratch),
-        Method::Bvh if HAS_BVH => bvh::sizes(mesh, config, scratch, control),
-        method => Err(Error::MethodLeftOut(method)),
-    }
+    check_alignment(scratch, Region::Scratch)?;
+    structure::sizes(mesh, config, scratch, control)
 }
 
 /// The finest grid of a method that fits into so many bytes of index, and what it takes: a

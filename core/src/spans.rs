@@ -8,9 +8,9 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 
-use crate::aabb::MAX_COORDINATE;
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::eight::{Row, corner, corners_of, join, load};
+use crate::limits::MAX_COORDINATE;
 use crate::mesh::WideMesh;
 
 /// The first and the last cell of eight triangles on an axis.

@@ -4,8 +4,7 @@ use crate::aabb::Aabb;
 use crate::config::BuildFlags;
 use crate::control::Watch;
 use crate::error::Error;
-use crate::mesh::TriangleMesh;
-use crate::parts::Piece;
+use crate::mesh::{Piece, TriangleMesh};
 
 /// What part of a build the survey is, about.
 const SHARE: [f32; 2] = [0.0, 0.15];
@@ -55,4 +54,13 @@ impl Survey {
 pub(crate) fn boxes<'m>(mesh: &'m TriangleMesh<'_>) -> impl Iterator<Item = (u32, Aabb)> + 'm {
     let triangles = mesh.pieces(0..mesh.triangle_count()).flat_map(Piece::each);
     triangles.filter_map(|(id, corners)| Some((id, Aabb::of(corners?)?)))
+}
+
+/// The most references a grid of so many triangles may have.
+pub(crate) const fn reference_limit(triangles: u32) -> u32 {
+    /// Several times what any scan needs, and what a scene of walls and floors needs.
+    const PER_TRIANGLE: u32 = 16;
+    /// So that a handful of triangles is not denied the few cells it asks for.
+    const AT_LEAST: u32 = 64;
+    triangles.saturating_mul(PER_TRIANGLE).saturating_add(AT_LEAST)
 }

@@ -11,9 +11,6 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use crate::control::Control;
 use crate::error::Error;
 
-/// What a build hands to the caller's loop: does the task with a number.
-pub type Task<'t> = dyn Fn(u32) + Sync + 't;
-
 /// What is in the slot of a task.
 enum State<T, R> {
     /// There is no such task, or it is being run.

@@ -8,6 +8,7 @@ mod archive;
 mod checkout;
 mod cmake;
 mod crates;
+mod imports;
 mod installed;
 mod pkg_config;
 mod prefix;

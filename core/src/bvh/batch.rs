@@ -7,13 +7,37 @@ use super::group::{Group, Stack};
 use super::order::{self, Entry, Sorted};
 use super::rays::{GROUP, Rays};
 use crate::aabb::Aabb;
-use crate::batch::Together;
 use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
 use crate::options::{Choice, Cull};
-use crate::ray::{Hit, INVALID_ID};
+use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::simd::Kernel;
 use crate::triangle::TriangleTest;
+
+/// A batch as a kernel sees it.
+pub(crate) trait Together {
+    /// Number of rays.
+    fn count(&self) -> usize;
+
+    /// The ray at a place.
+    fn ray(&self, place: usize) -> Ray;
+
+    /// Answers for a ray that was traced with others: its hit or [`Hit::MISS`].
+    fn found(&mut self, place: usize, hit: &Hit);
+
+    /// Traces a ray alone, and answers for it.
+    fn alone(&mut self, place: usize);
+
+    /// Returns true if [`alone`](Self::alone) and [`ask`](Self::ask) have to be called in the order of
+    /// places: a filter is asked there.
+    fn keeps_order(&self) -> bool;
+
+    /// Returns true if the filter has to be asked about the first hit of a ray.
+    fn asks(&self, hit: &Hit) -> bool;
+
+    /// Asks the filter about the first hit of a ray, goes on alone if it wants another, and answers.
+    fn ask(&mut self, place: usize, hit: &Hit);
+}
 
 /// The rays of a batch, which go in groups.
 pub(crate) struct Groups<'r, C: ?Sized, const ANY: bool> {

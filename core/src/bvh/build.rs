@@ -43,20 +43,26 @@ use super::subtree::Subtree;
 use super::top::{self, ITEM, Item, Top};
 use super::units::{SEAM, Units, is_seam, starts};
 use crate::aabb::Aabb;
+use crate::arena::Sizes;
 use crate::arena::{section_bytes, split_mut};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
-use crate::config::{Config, Quality};
+use crate::config::Config;
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
+use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
-use crate::sizes::Sizes;
 use crate::tasks::{Shared, run, task_count};
 
 /// The memory that any mesh with so many triangles and a build with so many tasks needs.
-pub(crate) const fn bound(triangles: u32, quality: Quality, tasks: u32) -> (u64, u64) {
-    match quality {
+pub(crate) const fn bound(triangles: u32, config: &Config, tasks: u32) -> Option<(u64, u64)> {
+    if triangles > MOST_TRIANGLES { None } else { Some(bytes(triangles, config, tasks)) }
+}
+
+/// Bytes of index and scratch that are enough.
+pub(super) const fn bytes(triangles: u32, config: &Config, tasks: u32) -> (u64, u64) {
+    match config.quality {
         Quality::Fast => fast_bound(triangles, tasks),
         Quality::High => high::bound(triangles),
     }
@@ -77,7 +83,7 @@ pub(crate) fn sizes(
 ) -> Result<Sizes, Error> {
     check_count(mesh)?;
     let (index, needed) =
-        bound(mesh.triangle_count(), config.quality, control.tasks.clamp(1, Control::MAX_TASKS));
+        bytes(mesh.triangle_count(), config, control.tasks.clamp(1, Control::MAX_TASKS));
     if control.tasks <= 1 && scratch.len() as u64 >= needed {
         let watch = &Watch::none();
         let header = header_of::<1>(mesh, config, None, scratch, &Control::SERIAL, watch)?;

@@ -4,12 +4,13 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};
 use glam::Vec3A;
 
-use crate::aabb::{Aabb, MAX_COORDINATE};
+use crate::aabb::Aabb;
 use crate::config::BuildFlags;
 use crate::control::Control;
 use crate::error::Error;
+use crate::limits::MAX_COORDINATE;
+use crate::mesh::Piece;
 use crate::mesh::TriangleMesh;
-use crate::parts::Piece;
 use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
 use crate::spans::{Corners, four};
 use crate::tasks::run;

@@ -31,6 +31,7 @@ mod order;
 mod rays;
 mod refit;
 mod roots;
+mod search;
 mod slab;
 mod sort;
 mod subtree;
@@ -41,22 +42,25 @@ mod walk;
 
 use crate::arena::split;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::config::Config;
 use crate::error::Error;
 use crate::visit::Visitor;
-pub(crate) use batch::Groups;
+pub(crate) use batch::{Groups, Together};
 pub(crate) use build::{bound, build, sizes};
-pub(crate) use layout::MOST_TRIANGLES;
-pub(crate) use nearest::Nearest;
 use node::{LEAF, Node};
 pub(crate) use order::Entry;
 pub(crate) use refit::refit;
-pub(crate) use slab::Slab;
+pub(crate) use search::Scope;
 pub(crate) use validate::proof_bytes;
-pub(crate) use walk::OneRay;
 
 /// Levels of nodes, at most: 20 by SAH and 9 that halve roots ([`top`]), 32 of a subtree, whose nodes take
 /// seven triangles each ([`subtree`]).
 pub(crate) const LEVELS: u32 = 64;
+
+/// The scratch that a build takes.
+pub(crate) const fn scratch_bytes(triangles: u32, config: &Config) -> u64 {
+    build::bytes(triangles, config, 1).1
+}
 
 /// A view of a built tree.
 #[derive(Debug, Clone, Copy)]

@@ -12,9 +12,9 @@
 //! where there are too few rays for groups that share anything.
 
 use crate::aabb::Aabb;
-use crate::batch::Together;
 use crate::ray::Ray;
 
+use super::batch::Together;
 use super::rays::GROUP;
 
 /// A ray that is sorted: its key above its place in the window.

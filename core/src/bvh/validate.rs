@@ -14,9 +14,9 @@ use crate::aabb::Aabb;
 use crate::arena::section_bytes;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::Lattice;
-use crate::config::Quality;
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
+use crate::method::Quality;
 
 /// Bytes of scratch that a proof takes.
 pub(crate) const fn proof_bytes(triangles: u32) -> u64 {

@@ -15,7 +15,7 @@ use core::num::NonZeroU32;
 use core::ops::Range;
 
 use crate::bits::{WORD_BITS, extent, is_set, load, low_bits, set_range};
-use crate::cell::MAX_RESOLUTION;
+use crate::limits::MAX_RESOLUTION;
 
 /// A level of so few cells needs no coarser one above it.
 const FEW_CELLS: u64 = 10_000;

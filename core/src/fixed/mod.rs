@@ -15,25 +15,29 @@ mod levels;
 mod validate;
 
 use crate::aabb::Aabb;
+use crate::arena::Sizes;
 use crate::blob::{Header, corrupt};
 use crate::cell::{Lattice, as_f32};
 use crate::config::Config;
+use crate::control::Watch;
 use crate::counters::Tally;
 use crate::dda::{Line, NEVER, Step};
 use crate::error::Error;
+use crate::mesh::TriangleMesh;
+pub(crate) use crate::one_level::scratch_bytes;
 use crate::one_level::{self, OneLevel, Overlay};
 use crate::visit::Visitor;
 use levels::{Levels, MAX_LEVELS};
 
 /// The macrocell levels as the overlay of a one-level grid.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Macrocells {
+struct Macrocells {
     factor: u32,
 }
 
 impl Macrocells {
     /// Those that a configuration asks for.
-    pub(crate) const fn of(config: &Config) -> Self {
+    const fn of(config: &Config) -> Self {
         Self { factor: config.macrocell_factor }
     }
 }
@@ -58,7 +62,27 @@ pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
     // A box with the most cells on every axis has the most macrocells on every level.
     let longest = one_level::longest(triangles, config.density) as u32 + 1;
     let levels = Levels::new([longest; 3], config.macrocell_factor);
-    one_level::bound(triangles, config.density, levels.words())
+    one_level::bound_under(triangles, config.density, levels.words())
+}
+
+/// The memory that a mesh needs: exact if the scratch is large enough to plan in.
+pub(crate) fn sizes(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+) -> Result<Sizes, Error> {
+    one_level::sizes_under(mesh, config, &Macrocells::of(config), scratch)
+}
+
+/// Builds in memory of which [`sizes`] tells how much there must be.
+pub(crate) fn build<'a>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &'a mut [u8],
+    scratch: &mut [u8],
+    watch: &Watch<'_>,
+) -> Result<&'a [u8], Error> {
+    one_level::build_under(mesh, config, &Macrocells::of(config), index, scratch, watch)
 }
 
 /// A view of a built fixed grid.
@@ -69,19 +93,23 @@ pub(crate) struct Fixed<'a> {
 }
 
 impl<'a> Fixed<'a> {
+    #[cfg(feature = "alloc")]
+    pub(crate) const NOTHING: Self =
+        Self { cells: OneLevel::NOTHING, levels: Levels::new([1; 3], 2) };
+
     /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
     pub(crate) fn open(header: &Header, lattice: &Lattice, blob: &'a [u8]) -> Result<Self, Error> {
         let factor = header.macrocell_factor;
         if factor < 2 {
             return Err(corrupt(core::mem::offset_of!(Header, macrocell_factor)));
         }
-        let cells = OneLevel::open(header, lattice, &Macrocells { factor }, blob)?;
+        let cells = OneLevel::open_under(header, lattice, &Macrocells { factor }, blob)?;
         Ok(Self { cells, levels: Levels::new(lattice.resolution, factor) })
     }
 
     /// No ray is shown more primitives than this.
     pub(crate) const fn list_words(&self) -> usize {
-        self.cells.lists().len()
+        self.cells.list_words()
     }
 
     /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.

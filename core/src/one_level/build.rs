@@ -20,13 +20,14 @@ use super::displacement::displace;
 use super::layout::{Layout, Scratch};
 use super::spread::{count_references, fill, mark};
 use super::triangles::MeshSpread;
+use crate::arena::copy;
 use crate::blob::Header;
 use crate::cell::{Lattice, woo};
 use crate::config::Config;
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
-use crate::survey::Survey;
+use crate::survey::{Survey, reference_limit};
 
 /// What a structure keeps behind the sections of its one-level grid.
 pub(crate) trait Overlay {
@@ -44,15 +45,6 @@ impl Overlay for () {
     }
 
     fn fill(&self, _: [u32; 3], _: &[u64], _: &mut [u64]) {}
-}
-
-/// The most references a grid of so many triangles may have.
-pub(crate) const fn reference_limit(triangles: u32) -> u32 {
-    /// Several times what any scan needs, and what a scene of walls and floors needs.
-    const PER_TRIANGLE: u32 = 16;
-    /// So that a handful of triangles is not denied the few cells it asks for.
-    const AT_LEAST: u32 = 64;
-    triangles.saturating_mul(PER_TRIANGLE).saturating_add(AT_LEAST)
 }
 
 /// The rows of cells, once they are marked and displaced.
@@ -141,7 +133,7 @@ impl<'s> Plan<'s> {
 }
 
 /// Builds into `index` and returns the part of it that is the blob.
-pub(crate) fn build<'a>(
+pub(crate) fn build_under<'a>(
     mesh: &TriangleMesh<'_>,
     config: &Config,
     overlay: &impl Overlay,
@@ -174,11 +166,4 @@ pub(crate) fn build<'a>(
     overlay.fill(plan.lattice.resolution, sections.domain_bits, sections.overlay);
     *sections.header = plan.header(config, mesh).to_bytes();
     Ok(blob)
-}
-
-/// Copies words between sections of the same length.
-pub(crate) fn copy<T: Copy>(from: &[T], to: &mut [T]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to = *from;
-    }
 }

@@ -15,7 +15,9 @@
 use crate::arena::{section_bytes, split, split_mut};
 use crate::bits::WORD_BITS;
 use crate::blob::HEADER_BYTES;
-use crate::cell::{MAX_RESOLUTION, cube_root};
+use crate::cell::cube_root;
+use crate::limits::MAX_RESOLUTION;
+use crate::survey::reference_limit;
 
 /// The counts from which all sizes follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +42,12 @@ pub(crate) struct Sections<'a> {
     pub(crate) hash: &'a [u32],
     pub(crate) references: &'a [u32],
     pub(crate) overlay: &'a [u64],
+}
+
+impl Sections<'_> {
+    #[cfg(feature = "alloc")]
+    pub(crate) const NOTHING: Self =
+        Self { row_offsets: &[], domain_bits: &[], hash: &[], references: &[], overlay: &[] };
 }
 
 /// The same sections while they are written.
@@ -94,7 +102,7 @@ impl Layout {
             rows,
             cells,
             hash_count: if cells < u32::MAX as u64 { cells as u32 } else { u32::MAX },
-            reference_count: super::reference_limit(triangles),
+            reference_count: reference_limit(triangles),
             overlay_words,
         }
     }
@@ -200,7 +208,7 @@ mod tests {
                     let size = glam::Vec3A::from_array(size);
                     let resolution = crate::cell::woo(size, f64::from(density), triangles).unwrap();
                     let most = u32::try_from(Layout::new(resolution, 0, 0, 0).cells).unwrap();
-                    let limit = super::super::reference_limit(triangles);
+                    let limit = reference_limit(triangles);
                     let layout = Layout::new(resolution, most, limit, 0);
                     assert!(layout.index_bytes() <= bound.index_bytes());
                     assert!(layout.scratch_bytes() <= bound.scratch_bytes());

@@ -23,18 +23,18 @@ mod triangles;
 mod validate;
 
 use crate::aabb::Aabb;
+use crate::arena::Sizes;
 use crate::bits::{each_one, is_set};
 use crate::blob::{Header, corrupt};
-use crate::cell::{Lattice, cells_between};
+use crate::cell::{Lattice, cells_between, row};
 use crate::config::Config;
 use crate::control::Watch;
 use crate::counters::Tally;
 use crate::dda::{Line, NEVER, Step};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
-use crate::sizes::Sizes;
 use crate::visit::Visitor;
-pub(crate) use build::{Overlay, Plan, Rows, build, copy, reference_limit};
+pub(crate) use build::{Overlay, Plan, Rows, build_under};
 pub(crate) use displacement::displace;
 use layout::Sections;
 pub(crate) use layout::{Layout, longest};
@@ -50,12 +50,6 @@ pub(crate) struct OneLevel<'a> {
     sections: Sections<'a>,
 }
 
-/// The row of the cells with this y and z.
-#[inline(always)]
-pub(crate) const fn row(height: u32, y: u32, z: u32) -> usize {
-    z as usize * height as usize + y as usize
-}
-
 /// The slot of a cell in the hash table.
 #[inline(always)]
 pub(crate) fn slot(row_offset: i32, x: u32) -> Option<usize> {
@@ -63,18 +57,32 @@ pub(crate) fn slot(row_offset: i32, x: u32) -> Option<usize> {
 }
 
 /// The most memory that a mesh with so many triangles can need.
-pub(crate) const fn bound(triangles: u32, density: f32, overlay_words: u64) -> (u64, u64) {
-    let layout = Layout::bound(triangles, density, overlay_words);
+pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
+    bound_under(triangles, config.density, 0)
+}
+
+/// The same with so many words of another structure on top.
+pub(crate) const fn bound_under(triangles: u32, density: f32, words: u64) -> (u64, u64) {
+    let layout = Layout::bound(triangles, density, words);
     (layout.index_bytes(), layout.scratch_bytes())
 }
 
 /// The scratch that a build with this resolution takes.
-pub(crate) const fn scratch_bytes(resolution: [u32; 3]) -> u64 {
+pub(crate) const fn scratch_bytes(_: u32, _: &Config, resolution: [u32; 3]) -> u64 {
     Layout::new(resolution, 0, 0, 0).scratch_bytes()
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to plan in.
 pub(crate) fn sizes(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    scratch: &mut [u8],
+) -> Result<Sizes, Error> {
+    sizes_under(mesh, config, &(), scratch)
+}
+
+/// The same with another structure on top.
+pub(crate) fn sizes_under(
     mesh: &TriangleMesh<'_>,
     config: &Config,
     overlay: &impl Overlay,
@@ -84,9 +92,28 @@ pub(crate) fn sizes(
     Sizes::new(plan.layout.index_bytes(), plan.layout.scratch_bytes(), plan.is_exact())
 }
 
+/// Builds in memory of which [`sizes`] tells how much there must be.
+pub(crate) fn build<'a>(
+    mesh: &TriangleMesh<'_>,
+    config: &Config,
+    index: &'a mut [u8],
+    scratch: &mut [u8],
+    watch: &Watch<'_>,
+) -> Result<&'a [u8], Error> {
+    build_under(mesh, config, &(), index, scratch, watch)
+}
+
 impl<'a> OneLevel<'a> {
+    #[cfg(feature = "alloc")]
+    pub(crate) const NOTHING: Self = Self { last: [0; 3], sections: Sections::NOTHING };
+
     /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
-    pub(crate) fn open(
+    pub(crate) fn open(header: &Header, lattice: &Lattice, blob: &'a [u8]) -> Result<Self, Error> {
+        Self::open_under(header, lattice, &(), blob)
+    }
+
+    /// The same with another structure on top.
+    pub(crate) fn open_under(
         header: &Header,
         lattice: &Lattice,
         overlay: &impl Overlay,
@@ -105,6 +132,11 @@ impl<'a> OneLevel<'a> {
     /// The last cell on each axis.
     pub(crate) const fn last(&self) -> [u32; 3] {
         self.last
+    }
+
+    /// Words of all lists.
+    pub(crate) const fn list_words(&self) -> usize {
+        self.lists().len()
     }
 
     /// All lists, one behind the other.

@@ -7,9 +7,9 @@
 
 use core::ops::Range;
 
-use super::row;
 use super::spread::Spread;
 use crate::cell::CellRange;
+use crate::cell::row;
 use crate::control::{OFTEN, Watch};
 use crate::eight::LANES;
 use crate::error::Error;

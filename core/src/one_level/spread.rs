@@ -135,7 +135,8 @@ mod tests {
 
     use super::*;
     use crate::bits::is_set;
-    use crate::one_level::{displace, row};
+    use crate::cell::row;
+    use crate::one_level::displace;
 
     /// Primitives whose cells are written down.
     struct Written {

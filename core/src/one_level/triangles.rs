@@ -105,7 +105,7 @@ mod tests {
 
     use super::*;
     use crate::cell::as_f32;
-    use crate::one_level::row;
+    use crate::cell::row;
 
     /// The rows of cells of a batch's primitives, and their number of cells.
     fn rows(batch: &Batch, spread: &MeshSpread<'_>, places: Range<u32>) -> (Vec<[usize; 4]>, u64) {

@@ -14,11 +14,11 @@
 
 use super::spread::count_references;
 use super::triangles::MeshSpread;
-use super::{OneLevel, row, slot};
+use super::{OneLevel, slot};
 use crate::aabb::Aabb;
 use crate::bits::{WORD_BITS, each_one, extent};
 use crate::blob::{Header, corrupt};
-use crate::cell::{Lattice, woo};
+use crate::cell::{Lattice, row, woo};
 use crate::control::Watch;
 use crate::error::Error;
 use crate::lists::{ascends, pairs};

@@ -19,20 +19,19 @@
 use glam::Vec3A;
 
 use super::FEW;
-use super::node::{HEAD_WORDS, MAX_RESOLUTION, Node};
+use super::node::{HEAD_WORDS, Node};
 use super::overlap::Overlap;
 use crate::aabb::Aabb;
-use crate::arena::{section_bytes, split_mut};
+use crate::arena::{Sizes, copy, section_bytes, split_mut};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::bump::{Bump, GRID, finish};
-use crate::cell::{CellRange, Lattice, as_f32, whole};
+use crate::cell::{CellRange, Lattice, as_f32, row, whole};
 use crate::config::Config;
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
+use crate::limits::MAX_RESOLUTION_OF_RECURSIVE;
 use crate::mesh::TriangleMesh;
-use crate::one_level::{copy, reference_limit, row};
-use crate::sizes::Sizes;
-use crate::survey::{Survey, boxes};
+use crate::survey::{Survey, boxes, reference_limit};
 
 /// Cells that grids below the root may look at for each triangle: several times what scans take.
 const LOOKS: u64 = 512;
@@ -56,7 +55,12 @@ const fn scratch_words(primitives: u32, density: f32) -> u64 {
 
 /// Bytes of scratch for so many triangles, whatever they look like: their ids, and one grid on each
 /// level.
-pub(crate) const fn scratch_bytes(triangles: u32, config: &Config) -> u64 {
+pub(crate) const fn scratch_bytes(triangles: u32, config: &Config, _: [u32; 3]) -> u64 {
+    most_scratch(triangles, config)
+}
+
+/// The same, of which no resolution tells more.
+const fn most_scratch(triangles: u32, config: &Config) -> u64 {
     let level = scratch_words(triangles, config.density);
     section_bytes::<u32>(
         (triangles as u64).saturating_add(level.saturating_mul(config.depth as u64)),
@@ -86,7 +90,7 @@ pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
     let most = scratch_words(triangles, config.density).saturating_add(2 * looks(triangles));
     let most = if most < GRID as u64 { most } else { GRID as u64 };
     let words = if words < most as f64 { words as u64 } else { most };
-    (HEADER_BYTES as u64 + section_bytes::<u32>(words), scratch_bytes(triangles, config))
+    (HEADER_BYTES as u64 + section_bytes::<u32>(words), most_scratch(triangles, config))
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to build in.
@@ -168,7 +172,7 @@ fn run(
 ) -> Result<Header, Error> {
     let Root { survey, lattice, density, rule } = Root::of(mesh, config, watch)?;
     let available_bytes = scratch.len() as u64;
-    let needed_bytes = scratch_bytes(mesh.triangle_count(), config);
+    let needed_bytes = most_scratch(mesh.triangle_count(), config);
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
     if available_bytes < needed_bytes {
         return Err(too_small);
@@ -236,7 +240,7 @@ impl Rule {
                 }
             }
         }
-        if parts.iter().any(|&part| part + 0.5 >= f64::from(MAX_RESOLUTION + 1)) {
+        if parts.iter().any(|&part| part + 0.5 >= f64::from(MAX_RESOLUTION_OF_RECURSIVE + 1)) {
             return None;
         }
         let resolution = parts.map(rounded);
@@ -289,7 +293,11 @@ fn root(x: f64, degree: u32) -> f64 {
 }
 
 /// The nearest whole number of cells, at least one.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to MAX_RESOLUTION")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "1 to MAX_RESOLUTION_OF_RECURSIVE"
+)]
 const fn rounded(part: f64) -> u32 {
     let cells = (part + 0.5) as u32;
     if cells > 1 { cells } else { 1 }

@@ -25,19 +25,17 @@ mod validate;
 use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::cell::Lattice;
 use crate::counters::Tally;
 use crate::dda::{Line, Step};
 use crate::error::Error;
+use crate::limits::MAX_DEPTH;
 use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes, sizes};
-pub(crate) use node::MAX_RESOLUTION;
 use node::{Content, Node};
 
 /// A cell with no more primitives than this is not divided.
 const FEW: usize = 4;
-
-/// The deepest that grids may be nested: a query keeps one walk for each level.
-pub const MAX_DEPTH: u32 = 4;
 
 /// A view of a built recursive grid.
 #[derive(Debug, Clone, Copy)]
@@ -46,8 +44,11 @@ pub(crate) struct Recursive<'a> {
 }
 
 impl<'a> Recursive<'a> {
+    #[cfg(feature = "alloc")]
+    pub(crate) const NOTHING: Self = Self { pool: &[] };
+
     /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
-    pub(crate) fn open(header: &Header, blob: &'a [u8]) -> Result<Self, Error> {
+    pub(crate) fn open(header: &Header, _: &Lattice, blob: &'a [u8]) -> Result<Self, Error> {
         let words = u64::from(header.reference_count);
         let is_whole = header.blob_bytes == HEADER_BYTES as u64 + section_bytes::<u32>(words);
         let pool =

@@ -4,15 +4,12 @@ use glam::Vec3A;
 
 use crate::aabb::Aabb;
 use crate::bump::GRID;
-use crate::cell::{CellRange, as_f32, cells_between};
+use crate::cell::{CellRange, as_f32, cells_between, row};
 use crate::dda::{Line, Walk};
-use crate::one_level::row;
-
-/// The most cells of a grid on an axis: three such numbers share a word.
-pub(crate) const MAX_RESOLUTION: u32 = (1 << RESOLUTION_BITS) - 1;
+use crate::limits::MAX_RESOLUTION_OF_RECURSIVE;
 
 pub(super) const HEAD_WORDS: usize = 7;
-const RESOLUTION_BITS: u32 = 10;
+const RESOLUTION_BITS: u32 = (MAX_RESOLUTION_OF_RECURSIVE + 1).ilog2();
 
 /// What a cell holds.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +60,7 @@ impl Node {
     #[inline]
     pub(super) fn open(pool: &[u32], at: usize) -> Option<Self> {
         let [a, b, c, d, e, f, cells] = *pool.get(at..)?.first_chunk::<HEAD_WORDS>()?;
-        let axis = |shift: u32| cells >> shift & MAX_RESOLUTION;
+        let axis = |shift: u32| cells >> shift & MAX_RESOLUTION_OF_RECURSIVE;
         let resolution = [axis(0), axis(RESOLUTION_BITS), axis(2 * RESOLUTION_BITS)];
         let node = Self {
             entries: at + HEAD_WORDS,

@@ -11,14 +11,15 @@
 
 use super::build::{Placed, Rule, inside};
 use super::node::{Content, HEAD_WORDS, Node};
-use super::{FEW, MAX_DEPTH, Recursive};
+use super::{FEW, Recursive};
 use crate::aabb::Aabb;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::{CellRange, Lattice};
 use crate::error::Error;
+use crate::limits::MAX_DEPTH;
 use crate::lists::ascends;
 use crate::mesh::TriangleMesh;
-use crate::one_level::reference_limit;
+use crate::survey::reference_limit;
 
 /// A cell and the grid that it is a cell of.
 type Place = (Node, [u32; 3]);
@@ -63,6 +64,7 @@ impl Recursive<'_> {
         &self,
         header: &Header,
         lattice: &Lattice,
+        _: &[u8],
         mesh: &TriangleMesh<'_>,
     ) -> Result<(), Error> {
         if !(1..=MAX_DEPTH).contains(&header.depth) {

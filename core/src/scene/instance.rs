@@ -20,8 +20,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::aabb::{MAX_COORDINATE, greater, lesser};
+use crate::aabb::{greater, lesser};
 use crate::approach::LineF64;
+use crate::limits::MAX_COORDINATE;
 use crate::ray::{Ray, RayF64, round};
 
 /// An object at a place in a scene: 72 bytes.

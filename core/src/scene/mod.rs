@@ -19,15 +19,13 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable};
 
 use crate::grid::Grid;
+use crate::limits::MAX_NESTING;
 use crate::ray::Ray;
 use crate::shapes::{ShapeHit, Shapes};
 pub use instance::Instance;
 use instance::Placed;
 pub use query::{SceneFilter, SceneHit, SceneOptions};
 pub(crate) use store::ends_of;
-
-/// Scenes inside one another, at most, the outermost included.
-pub const MAX_NESTING: usize = 4;
 
 /// Tests the shapes of an object in a scene, from any number of threads at once. Every function like a
 /// [`ShapeTest`](crate::ShapeTest) that needs no `&mut` is one.

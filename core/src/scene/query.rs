@@ -5,9 +5,10 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable};
 
 use super::instance::Seen;
-use super::{MAX_NESTING, Object, Scene};
+use super::{Object, Scene};
 use crate::approach::LineF64;
 use crate::counters::Counters;
+use crate::limits::MAX_NESTING;
 use crate::options::{Cull, QueryOptions, Verdict};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
 use crate::search::{Outcome, Search};

@@ -3,16 +3,17 @@
 use core::mem::offset_of;
 
 use super::instance::{Instance, Placed};
-use super::{MAX_NESTING, Object, Scene, Table};
-use crate::arena::{align_up, check_alignment, section_bytes, split, split_mut};
+use super::{Object, Scene, Table};
+use crate::arena::{Sizes, align_up, check_alignment, section_bytes, split, split_mut};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
-use crate::config::{Config, Method};
+use crate::config::Config;
 use crate::control::Control;
 use crate::error::{ConfigField, Error, Region};
 use crate::grid::Grid;
-use crate::mesh::{BOX_BYTES, Content, Strided, TriangleMesh};
+use crate::limits::{ALIGNMENT, MAX_NESTING};
+use crate::mesh::{BOX_BYTES, Strided, TriangleMesh};
+use crate::method::{Content, Method};
 use crate::refit::{Refit, refit_content};
-use crate::sizes::Sizes;
 
 type Sides = [f32; 6];
 
@@ -145,7 +146,7 @@ impl<'a> Scene<'a> {
 
         // Put boxes and instances at the end of the index, and the tree at its start.
         let space = usize::try_from(behind).ok();
-        let room = (index.len() & !(crate::ALIGNMENT - 1)).checked_sub(space.unwrap_or(usize::MAX));
+        let room = (index.len() & !(ALIGNMENT - 1)).checked_sub(space.unwrap_or(usize::MAX));
         let room = room.ok_or(short(HEADER_BYTES as u64))?;
         let (head, tail) = index.split_at_mut_checked(room).ok_or(short(0))?;
         let sections = split_mut::<Table>(tail, 1).and_then(|(table, rest)| {

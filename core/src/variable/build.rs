@@ -12,7 +12,7 @@
 
 use super::subgrid::{Frame, SubLayout};
 use crate::aabb::Aabb;
-use crate::arena::{section_bytes, split_mut};
+use crate::arena::{Sizes, copy, section_bytes, split_mut};
 use crate::bits::{WORD_BITS, each_one, halves};
 use crate::blob::Header;
 use crate::bump::{Bump, GRID, finish};
@@ -22,10 +22,8 @@ use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::lists::pairs;
 use crate::mesh::TriangleMesh;
-use crate::one_level::{
-    Layout, MeshSpread, Plan, Rows, Spread, copy, displace, fill, mark, reference_limit, slot,
-};
-use crate::sizes::Sizes;
+use crate::one_level::{Layout, MeshSpread, Plan, Rows, Spread, displace, fill, mark, slot};
+use crate::survey::reference_limit;
 
 /// The primitives of one cell over its subgrid.
 struct CellSpread<'m> {
@@ -94,7 +92,7 @@ impl<'s> Lists<'s> {
 }
 
 /// Bytes of scratch that are enough for a top with this layout, whatever its lists turn out to be.
-const fn scratch_bytes(layout: &Layout, triangles: u32, density: f32) -> u64 {
+const fn scratch_bytes_of(layout: &Layout, triangles: u32, density: f32) -> u64 {
     layout.scratch_bytes()
         + section_bytes::<u32>(layout.cells + 1)
         + section_bytes::<u32>(layout.reference_count as u64)
@@ -103,13 +101,9 @@ const fn scratch_bytes(layout: &Layout, triangles: u32, density: f32) -> u64 {
 }
 
 /// The same for a grid of which only the resolution is known.
-pub(crate) const fn scratch_bytes_at_most(
-    resolution: [u32; 3],
-    triangles: u32,
-    density: f32,
-) -> u64 {
+pub(crate) const fn scratch_bytes(triangles: u32, config: &Config, resolution: [u32; 3]) -> u64 {
     let layout = Layout::new(resolution, 0, reference_limit(triangles), 0);
-    scratch_bytes(&layout, triangles, density)
+    scratch_bytes_of(&layout, triangles, config.density)
 }
 
 /// The most words of pool that so many references in the top can lead to.
@@ -129,7 +123,7 @@ const fn pool_words(references: u32, config: &Config) -> u32 {
 pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
     let top = Layout::bound(triangles, config.density, 0);
     let index = top.with_references(pool_words(top.reference_count, config)).index_bytes();
-    (index, scratch_bytes(&top, triangles, config.density))
+    (index, scratch_bytes_of(&top, triangles, config.density))
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to plan in.
@@ -185,7 +179,7 @@ impl<'s> TopPlan<'s> {
         if top.layout.cells >= u64::from(NOBODY) {
             return Err(Error::InvalidConfig(ConfigField::Density));
         }
-        let scratch_bytes = scratch_bytes(&top.layout, mesh.triangle_count(), config.density);
+        let scratch_bytes = scratch_bytes_of(&top.layout, mesh.triangle_count(), config.density);
         Ok(Self { top, scratch_bytes, available_bytes })
     }
 }

@@ -30,7 +30,7 @@ use crate::dda::{Line, NEVER, Step};
 use crate::error::Error;
 use crate::one_level::OneLevel;
 use crate::visit::Visitor;
-pub(crate) use build::{bound, build, scratch_bytes_at_most, sizes};
+pub(crate) use build::{bound, build, scratch_bytes, sizes};
 use subgrid::Subgrid;
 
 /// What a cell of the top holds.
@@ -49,14 +49,17 @@ pub(crate) struct Variable<'a> {
 }
 
 impl<'a> Variable<'a> {
+    #[cfg(feature = "alloc")]
+    pub(crate) const NOTHING: Self = Self { top: OneLevel::NOTHING };
+
     /// The view of a blob, in O(1). Nothing behind the header is trusted, now or later.
     pub(crate) fn open(header: &Header, lattice: &Lattice, blob: &'a [u8]) -> Result<Self, Error> {
-        Ok(Self { top: OneLevel::open(header, lattice, &(), blob)? })
+        Ok(Self { top: OneLevel::open(header, lattice, blob)? })
     }
 
     /// No ray is shown more primitives than this.
     pub(crate) const fn list_words(&self) -> usize {
-        self.top.lists().len()
+        self.top.list_words()
     }
 
     /// What a cell holds; `None` if it is empty.

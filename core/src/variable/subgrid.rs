@@ -12,10 +12,10 @@
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
-use crate::cell::{CellRange, as_f32, cells_between, woo};
+use crate::cell::{CellRange, as_f32, cells_between, row, woo};
 use crate::dda::{Line, Walk};
 use crate::lists::pairs;
-use crate::one_level::{row, slot, slots_are_sound};
+use crate::one_level::{slot, slots_are_sound};
 use crate::visit::Visitor;
 
 /// The most cells of a subgrid on an axis.

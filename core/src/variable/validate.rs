@@ -24,8 +24,8 @@ use crate::cell::{CellRange, Lattice};
 use crate::error::Error;
 use crate::lists::{ascends, pairs};
 use crate::mesh::TriangleMesh;
-use crate::one_level::{check_header, reference_limit, slots_are_sound};
-use crate::survey::boxes;
+use crate::one_level::{check_header, slots_are_sound};
+use crate::survey::{boxes, reference_limit};
 
 impl Variable<'_> {
     /// Whether this is what a build makes of the mesh.

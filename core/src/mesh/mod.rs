@@ -8,18 +8,20 @@
 //! The last element needs only its own bytes, not its stride. Nothing has to be aligned: every
 //! read goes through bytes, which costs nothing on the machines that matter and removes a rule.
 
+mod parts;
+
 use core::fmt;
 use core::ops::Range;
 
+use bytemuck::{Pod, pod_read_unaligned};
 use glam::{Vec3A, Vec4};
 
-use crate::aabb::{Aabb, MAX_COORDINATE};
+use crate::aabb::Aabb;
 use crate::error::{Error, MeshField};
-use crate::parts::MeshPart;
-
-/// The most triangles a mesh may have: ids are 32 bits and one of them means "none". A tree
-/// takes half as many.
-pub const MAX_TRIANGLES: usize = u32::MAX as usize - 1;
+use crate::limits::{MAX_COORDINATE, MAX_TRIANGLES};
+use crate::method::Content;
+pub use parts::MeshPart;
+pub(crate) use parts::{Near, Piece};
 
 /// Three corners, in scene units.
 pub type Triangle = [[f32; 3]; 3];
@@ -58,30 +60,6 @@ enum Layout<'a> {
     Joined(&'a [MeshPart<'a>]),
 }
 
-/// What a blob is built over.
-#[repr(u32)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Content {
-    /// The triangles of a mesh: [`Grid`](crate::Grid).
-    Triangles = 0,
-    /// The boxes of the caller's own shapes: [`Shapes`](crate::Shapes).
-    Shapes = 1,
-    /// Instances of other blobs: [`Scene`](crate::Scene).
-    Instances = 2,
-}
-
-impl Content {
-    /// What a number in a blob means.
-    pub(crate) const fn from_u32(value: u32) -> Option<Self> {
-        match value {
-            0 => Some(Self::Triangles),
-            1 => Some(Self::Shapes),
-            2 => Some(Self::Instances),
-            _ => None,
-        }
-    }
-}
-
 /// Bytes of a box: least x, y, z, greatest x, y, z.
 pub(crate) const BOX_BYTES: usize = size_of::<[f32; 6]>();
 
@@ -107,6 +85,27 @@ impl fmt::Debug for Strided<'_> {
 }
 
 impl<'a> Strided<'a> {
+    /// Elements that lie side by side.
+    ///
+    /// ```
+    /// use hgrid_core::{Ray, Strided};
+    /// let rays = [Ray::new([0.0; 3], [0.0, 0.0, 1.0]); 3];
+    /// assert_eq!((Strided::new(&rays).stride, Strided::new(&rays).count), (32, 3));
+    /// ```
+    #[must_use]
+    pub fn new<T: Pod>(elements: &'a [T]) -> Self {
+        let count = elements.len();
+        Self { bytes: bytemuck::cast_slice(elements), stride: size_of::<T>(), count }
+    }
+
+    /// Element `index`, or zeros if there is none.
+    #[inline(always)]
+    pub(crate) fn read<T: Pod>(&self, index: usize) -> T {
+        let start = index.saturating_mul(self.stride);
+        let bytes = self.bytes.get(start..).and_then(|rest| rest.get(..size_of::<T>()));
+        bytes.map_or_else(T::zeroed, pod_read_unaligned)
+    }
+
     /// No elements.
     const NONE: Self = Self { bytes: &[], stride: 0, count: 0 };
 

@@ -15,19 +15,19 @@
 //!           the hit, go on behind it alone
 //! ```
 
+#[cfg(feature = "bvh")]
+mod groups;
+
 use core::fmt;
-use core::marker::PhantomData;
-use core::ops::Range;
 
-use bytemuck::{Pod, bytes_of, pod_read_unaligned};
+use bytemuck::{Pod, bytes_of};
 
-use crate::bvh;
-use crate::config::Method;
 use crate::error::{BatchField, Error};
 use crate::grid::Grid;
 use crate::mesh::Strided;
 use crate::options::QueryOptions;
 use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::simd::HAS_VECTORS;
 
 /// Says what the caller knows about the rays of a batch, so that the grid can choose their order. It
 /// changes how fast the answers come, never the answers.
@@ -96,34 +96,6 @@ impl<'a> StridedMut<'a> {
             slot.copy_from_slice(bytes_of(value));
         }
     }
-}
-
-impl<'a> Strided<'a> {
-    /// Elements that lie side by side.
-    ///
-    /// ```
-    /// use hgrid_core::{Ray, Strided};
-    /// let rays = [Ray::new([0.0; 3], [0.0, 0.0, 1.0]); 3];
-    /// assert_eq!((Strided::new(&rays).stride, Strided::new(&rays).count), (32, 3));
-    /// ```
-    #[must_use]
-    pub fn new<T: Pod>(elements: &'a [T]) -> Self {
-        let count = elements.len();
-        Self { bytes: bytemuck::cast_slice(elements), stride: size_of::<T>(), count }
-    }
-
-    /// Element `index`, or zeros if there is none.
-    #[inline(always)]
-    pub(crate) fn read<T: Pod>(&self, index: usize) -> T {
-        let start = index.saturating_mul(self.stride);
-        let bytes = self.bytes.get(start..).and_then(|rest| rest.get(..size_of::<T>()));
-        bytes.map_or_else(T::zeroed, pod_read_unaligned)
-    }
-}
-
-impl Hit {
-    /// What a batch writes for a ray that hits nothing.
-    pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: INVALID_ID };
 }
 
 /// Rays that are asked about together, and places for their answers, wherever they lie.
@@ -305,7 +277,7 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) {
-        Asked::<_, Hit, false>::trace::<false>(self, batch, coherence, options);
+        trace::<_, false>(self, batch, coherence, options);
     }
 
     /// For each ray a byte: 1 if anything is hit, 0 if not.
@@ -382,7 +354,7 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) {
-        Asked::<_, bool, false>::trace::<true>(self, batch, coherence, options);
+        trace::<_, true>(self, batch, coherence, options);
     }
 
     /// For each ray a `u32`: a triangle that blocks it, of those that the options let count, as
@@ -410,7 +382,7 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) {
-        Asked::<_, u32, false>::trace::<true>(self, batch, coherence, options);
+        trace::<_, true>(self, batch, coherence, options);
     }
 }
 
@@ -503,165 +475,39 @@ impl Answer for u32 {
     }
 }
 
-/// A batch as a kernel sees it.
-pub(crate) trait Together {
-    /// Number of rays.
-    fn count(&self) -> usize;
-
-    /// The ray at a place.
-    fn ray(&self, place: usize) -> Ray;
-
-    /// Answers for a ray that was traced with others: its hit or [`Hit::MISS`].
-    fn found(&mut self, place: usize, hit: &Hit);
-
-    /// Traces a ray alone, and answers for it.
-    fn alone(&mut self, place: usize);
-
-    /// Returns true if [`alone`](Self::alone) and [`ask`](Self::ask) have to be called in the order of
-    /// places: a filter is asked there.
-    fn keeps_order(&self) -> bool;
-
-    /// Returns true if the filter has to be asked about the first hit of a ray.
-    fn asks(&self, hit: &Hit) -> bool;
-
-    /// Asks the filter about the first hit of a ray, goes on alone if it wants another, and answers.
-    fn ask(&mut self, place: usize, hit: &Hit);
+/// Answers all rays of a batch: a tree's in groups, others one by one.
+#[inline(always)]
+fn trace<A: Answer, const ANY: bool>(
+    grid: &Grid<'_>,
+    batch: &mut impl Batch<A>,
+    coherence: Coherence,
+    options: &mut QueryOptions<'_>,
+) {
+    #[cfg(feature = "bvh")]
+    if HAS_VECTORS
+        && !options.are_for_single_rays()
+        && let Some(tree) = grid.tree()
+    {
+        return groups::trace::<A, ANY>(grid, tree, batch, coherence, options);
+    }
+    let is_plain = options.are_plain();
+    for place in 0..batch.count() {
+        alone(grid, batch, place, is_plain, options);
+    }
 }
 
-/// A batch and what it is asked for; `ASKS` if a filter is asked, too.
-struct Asked<'r, 'm, 'q, B, A, const ASKS: bool> {
-    grid: &'r Grid<'m>,
-    batch: &'r mut B,
-    options: &'r mut QueryOptions<'q>,
-    /// Whether the options change nothing.
+/// Answers one ray. It is plain if the options change nothing.
+#[inline(never)]
+fn alone<A: Answer>(
+    grid: &Grid<'_>,
+    batch: &mut impl Batch<A>,
+    place: usize,
     is_plain: bool,
-    answers: PhantomData<A>,
-}
-
-impl<A: Answer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_, B, A, ASKS> {
-    #[inline(always)]
-    fn count(&self) -> usize {
-        self.batch.count()
-    }
-
-    #[inline(always)]
-    fn ray(&self, place: usize) -> Ray {
-        self.batch.ray(place)
-    }
-
-    #[inline(always)]
-    fn found(&mut self, place: usize, hit: &Hit) {
-        self.batch.answer(place, A::of(hit));
-    }
-
-    #[inline(never)]
-    fn alone(&mut self, place: usize) {
-        let ray = self.batch.ray(place);
-        let answer = if self.is_plain {
-            A::plain(self.grid, &ray)
-        } else {
-            A::with(self.grid, place, &ray, self.options)
-        };
-        self.batch.answer(place, answer);
-    }
-
-    #[inline(always)]
-    fn keeps_order(&self) -> bool {
-        ASKS
-    }
-
-    #[inline(always)]
-    fn asks(&self, hit: &Hit) -> bool {
-        let (id, mesh) = (hit.primitive, self.grid.mesh());
-        ASKS && id != INVALID_ID && self.options.choice().asks(mesh, id)
-    }
-
-    #[inline(never)]
-    fn ask(&mut self, place: usize, hit: &Hit) {
-        if ASKS {
-            let ray = self.batch.ray(place);
-            let found = self.grid.intersect_from(place, &ray, self.options, hit);
-            self.batch.answer(place, A::of(&found.unwrap_or(Hit::MISS)));
-        }
-    }
-}
-
-/// Rays of a window that is sorted on the stack.
-const FEW: usize = 256;
-
-impl<'r, 'm, 'q, A: Answer, B: Batch<A>> Asked<'r, 'm, 'q, B, A, false> {
-    /// Traces all rays of a batch.
-    #[inline(always)]
-    fn trace<const ANY: bool>(
-        grid: &'r Grid<'m>,
-        batch: &'r mut B,
-        coherence: Coherence,
-        options: &'r mut QueryOptions<'q>,
-    ) {
-        let is_plain = options.are_plain();
-        if options.filter.is_none() {
-            Self { grid, batch, options, is_plain, answers: PhantomData }.all::<ANY>(coherence);
-        } else {
-            Asked::<B, A, true> { grid, batch, options, is_plain, answers: PhantomData }
-                .all::<ANY>(coherence);
-        }
-    }
-}
-
-impl<A: Answer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
-    /// Traces all rays, together where the grid can.
-    #[inline(always)]
-    fn all<const ANY: bool>(&mut self, coherence: Coherence) {
-        let is_one_by_one = self.options.are_for_single_rays();
-        match (self.grid.method(), coherence) {
-            (Method::Bvh, Coherence::Coherent) if !is_one_by_one => self.groups::<ANY>(&mut []),
-            (Method::Bvh, Coherence::Incoherent) if !is_one_by_one => self.sorted::<ANY>(),
-            _ => self.one_by_one(0..self.batch.count()),
-        }
-    }
-
-    fn one_by_one(&mut self, places: Range<usize>) {
-        places.for_each(|place| self.alone(place));
-    }
-
-    /// Traces rays in groups, in the order that a window of them is sorted into.
-    #[inline(always)]
-    fn sorted<const ANY: bool>(&mut self) {
-        let lent = core::mem::take(&mut self.options.scratch);
-        let (_, memory, _) = bytemuck::pod_align_to_mut(lent);
-        if memory.len() < 2 * FEW {
-            self.sorted_on_the_stack::<ANY>();
-        } else {
-            self.groups::<ANY>(memory);
-        }
-        self.options.scratch = lent;
-    }
-
-    /// Out of line: the window takes stack only where it is wanted.
-    #[inline(never)]
-    fn sorted_on_the_stack<const ANY: bool>(&mut self) {
-        self.groups::<ANY>(&mut [0; 2 * FEW]);
-    }
-
-    /// Traces rays in groups, in windows that are sorted in memory or as given.
-    #[inline(never)]
-    fn groups<const ANY: bool>(&mut self, memory: &mut [bvh::Entry]) {
-        let (grid, choice) = (self.grid, self.options.choice());
-        let are_done = if ASKS || A::IS_RARE {
-            let batch: &mut dyn Together = self;
-            // If no hit can end a ray unasked, the first one is sooner found as the closest.
-            if ANY && !choice.asks_all(grid.mesh()) {
-                grid.groups::<true>(choice, memory, batch)
-            } else {
-                grid.groups::<false>(choice, memory, batch)
-            }
-        } else {
-            grid.groups::<ANY>(choice, memory, self)
-        };
-        if !are_done {
-            self.one_by_one(0..self.batch.count());
-        }
-    }
+    options: &mut QueryOptions<'_>,
+) {
+    let ray = batch.ray(place);
+    let answer = if is_plain { A::plain(grid, &ray) } else { A::with(grid, place, &ray, options) };
+    batch.answer(place, answer);
 }
 
 fn check(rays: &Strided<'_>, answers: &StridedMut<'_>, size: usize) -> Result<(), Error> {

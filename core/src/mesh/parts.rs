@@ -15,8 +15,9 @@ use core::ops::Range;
 
 use glam::Vec3A;
 
+use super::{Triangle, TriangleMesh, WideMesh};
 use crate::error::{Error, MeshField};
-use crate::mesh::{MAX_TRIANGLES, Triangle, TriangleMesh, WideMesh};
+use crate::limits::MAX_TRIANGLES;
 
 /// The most parts of a mesh: their number shares a word with two bits in the header of a packed blob.
 const MAX_PARTS: usize = u32::MAX as usize >> 2;

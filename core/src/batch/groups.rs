@@ -1,0 +1,132 @@
+//! Batches on a tree, in groups of rays.
+
+use core::marker::PhantomData;
+
+use super::{Answer, Batch, Coherence, alone};
+use crate::bvh::{Bvh, Entry, Groups, Scope, Together};
+use crate::grid::Grid;
+use crate::options::QueryOptions;
+use crate::ray::{Hit, INVALID_ID, Ray};
+use crate::simd::dispatch;
+
+/// A batch and what it is asked for; `ASKS` if a filter is asked, too.
+struct Asked<'r, 'm, 'q, B, A, const ASKS: bool> {
+    grid: &'r Grid<'m>,
+    tree: &'r Bvh<'m>,
+    batch: &'r mut B,
+    options: &'r mut QueryOptions<'q>,
+    /// Whether the options change nothing.
+    is_plain: bool,
+    answers: PhantomData<A>,
+}
+
+impl<A: Answer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_, B, A, ASKS> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.batch.count()
+    }
+
+    #[inline(always)]
+    fn ray(&self, place: usize) -> Ray {
+        self.batch.ray(place)
+    }
+
+    #[inline(always)]
+    fn found(&mut self, place: usize, hit: &Hit) {
+        self.batch.answer(place, A::of(hit));
+    }
+
+    #[inline(always)]
+    fn alone(&mut self, place: usize) {
+        alone(self.grid, self.batch, place, self.is_plain, self.options);
+    }
+
+    #[inline(always)]
+    fn keeps_order(&self) -> bool {
+        ASKS
+    }
+
+    #[inline(always)]
+    fn asks(&self, hit: &Hit) -> bool {
+        let (id, mesh) = (hit.primitive, self.grid.mesh());
+        ASKS && id != INVALID_ID && self.options.choice().asks(mesh, id)
+    }
+
+    #[inline(never)]
+    fn ask(&mut self, place: usize, hit: &Hit) {
+        if ASKS {
+            let ray = self.batch.ray(place);
+            let found = self.grid.intersect_from(place, &ray, self.options, hit);
+            self.batch.answer(place, A::of(&found.unwrap_or(Hit::MISS)));
+        }
+    }
+}
+
+/// Rays of a window that is sorted on the stack.
+const FEW: usize = 256;
+
+/// Answers all rays of a batch.
+#[inline(always)]
+pub(super) fn trace<A: Answer, const ANY: bool>(
+    grid: &Grid<'_>,
+    tree: &Bvh<'_>,
+    batch: &mut impl Batch<A>,
+    coherence: Coherence,
+    options: &mut QueryOptions<'_>,
+) {
+    let (is_plain, answers) = (options.are_plain(), PhantomData::<A>);
+    if options.filter.is_none() {
+        Asked::<_, A, false> { grid, tree, batch, options, is_plain, answers }
+            .all::<ANY>(coherence);
+    } else {
+        Asked::<_, A, true> { grid, tree, batch, options, is_plain, answers }.all::<ANY>(coherence);
+    }
+}
+
+impl<A: Answer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
+    /// Traces all rays, in the order in which they go together best.
+    #[inline(always)]
+    fn all<const ANY: bool>(&mut self, coherence: Coherence) {
+        match coherence {
+            Coherence::Coherent => self.groups::<ANY>(&mut []),
+            Coherence::Incoherent => self.sorted::<ANY>(),
+        }
+    }
+
+    /// Traces rays in groups, in the order that a window of them is sorted into.
+    #[inline(always)]
+    fn sorted<const ANY: bool>(&mut self) {
+        let lent = core::mem::take(&mut self.options.scratch);
+        let (_, memory, _) = bytemuck::pod_align_to_mut(lent);
+        if memory.len() < 2 * FEW {
+            self.sorted_on_the_stack::<ANY>();
+        } else {
+            self.groups::<ANY>(memory);
+        }
+        self.options.scratch = lent;
+    }
+
+    /// Out of line: the window takes stack only where it is wanted.
+    #[inline(never)]
+    fn sorted_on_the_stack<const ANY: bool>(&mut self) {
+        self.groups::<ANY>(&mut [0; 2 * FEW]);
+    }
+
+    /// Traces rays in groups, in windows that are sorted in memory or as given.
+    #[inline(never)]
+    fn groups<const ANY: bool>(&mut self, memory: &mut [Entry]) {
+        let Scope { mesh, bounds, simd } = self.grid.scope();
+        let (bvh, choice) = (self.tree, self.options.choice());
+        if !ASKS && !A::IS_RARE {
+            let batch = self;
+            return dispatch(simd, Groups::<_, ANY> { bvh, mesh, bounds, choice, memory, batch });
+        }
+        let batch: &mut dyn Together = self;
+        // If no hit can end a ray unasked, the first one is sooner found as the closest.
+        if ANY && !choice.asks_all(mesh) {
+            dispatch(simd, Groups::<_, true> { bvh, mesh, bounds, choice, memory, batch });
+        } else {
+            dispatch(simd, Groups::<_, false> { bvh, mesh, bounds, choice, memory, batch });
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! What is asked of a tree: one ray, one ray in f64 through boxes, the nearest to a point.
+
+use super::Bvh;
+use super::nearest::Nearest;
+use super::slab::Slab;
+use super::walk::OneRay;
+use crate::aabb::Aabb;
+use crate::approach::{Approach, LineF64};
+use crate::counters::Tally;
+use crate::filter::RayFilter;
+use crate::mesh::TriangleMesh;
+use crate::options::Cull;
+use crate::ray::{Ray, RayF64, round};
+use crate::search::{Search, test_all};
+use crate::simd::{SimdLevel, dispatch};
+use crate::triangle::TriangleTest;
+
+/// What a tree is searched with.
+pub(crate) struct Scope<'m> {
+    pub(crate) mesh: &'m TriangleMesh<'m>,
+    pub(crate) bounds: Aabb,
+    pub(crate) simd: SimdLevel,
+}
+
+impl Bvh<'_> {
+    /// Walks a ray through a tree and shows a search what it hits.
+    #[inline(always)]
+    pub(crate) fn search<F: Search, T: Tally>(
+        &self,
+        scope: &Scope<'_>,
+        ray: &Ray,
+        begin: f32,
+        cull: Cull,
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        if self.walk(scope, ray, begin, cull, None, search, tally) {
+            return;
+        }
+        let Some(approach) = Approach::new(ray, &scope.bounds) else { return };
+        let test = TriangleTest::from(ray, &approach).culling(cull);
+        if approach.is_remote {
+            return test_all(scope.mesh, &test, search, tally);
+        }
+        let afar = (Slab::new(ray, begin, &approach), test.filter);
+        self.walk(scope, ray, begin, cull, Some(&afar), search, tally);
+    }
+
+    /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it
+    /// meets.
+    #[inline(always)]
+    pub(crate) fn search_boxes<F: Search, T: Tally>(
+        &self,
+        scope: &Scope<'_>,
+        ray: &RayF64,
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        let narrow = &ray.rounded();
+        if narrow.origin.map(|c| f64::from(c).to_bits()) == ray.origin.map(f64::to_bits) {
+            return self.search(scope, narrow, ray.t_min, Cull::None, search, tally);
+        }
+        if !narrow.is_valid() {
+            return;
+        }
+        let line = LineF64 { origin: ray.origin, direction: ray.direction.map(f64::from) };
+        self.search_boxes_along(scope, &line, 1.0, [ray.t_min, ray.t_max], search, tally);
+    }
+
+    /// The same for a line, and a range of `t`. The `t` along the line is `scale` times that.
+    pub(crate) fn search_boxes_along<F: Search, T: Tally>(
+        &self,
+        scope: &Scope<'_>,
+        line: &LineF64,
+        scale: f64,
+        [t_min, t_max]: [f32; 2],
+        search: &mut F,
+        tally: &mut T,
+    ) {
+        // Beyond f32 every origin is remote.
+        let most = f64::from(f32::MAX);
+        let origin = line.origin.map(|c| round(c.clamp(-most, most)));
+        let ray = &Ray { origin, t_min, direction: line.direction.map(round), t_max };
+        let Some(approach) = Approach::of_line(ray, line, &scope.bounds) else { return };
+        if approach.is_remote {
+            return test_all(scope.mesh, &TriangleTest::from(ray, &approach), search, tally);
+        }
+        let afar = (Slab::along(ray, &approach, scale), RayFilter::NONE);
+        self.walk(scope, ray, t_min, Cull::None, Some(&afar), search, tally);
+    }
+
+    /// Walks a ray through a tree; false if it comes from afar and must be brought to the box.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "each is its own")]
+    fn walk<F: Search, T: Tally>(
+        &self,
+        scope: &Scope<'_>,
+        ray: &Ray,
+        begin: f32,
+        cull: Cull,
+        afar: Option<&(Slab, RayFilter)>,
+        search: &mut F,
+        tally: &mut T,
+    ) -> bool {
+        let Scope { mesh, bounds, simd } = scope;
+        self.with_stack(
+            #[inline(always)]
+            |stack| {
+                let bvh = self;
+                let mut ray =
+                    OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
+                dispatch(*simd, &mut ray)
+            },
+        )
+    }
+
+    /// Shows `test` the triangles that may be within a distance of a point, the nearest first. It answers
+    /// within which distance triangles matter.
+    #[inline(always)]
+    pub(crate) fn nearest<T: Tally>(
+        &self,
+        scope: &Scope<'_>,
+        point: [f32; 3],
+        within: f32,
+        test: impl FnMut(u32) -> f32,
+        tally: &mut T,
+    ) {
+        let Scope { mesh, bounds, simd } = scope;
+        self.with_stack(
+            #[inline(always)]
+            |stack| {
+                let bvh = self;
+                let mut nearest = Nearest { bvh, mesh, bounds, point, within, test, tally, stack };
+                dispatch(*simd, &mut nearest);
+            },
+        );
+    }
+}

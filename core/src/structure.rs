@@ -1,0 +1,214 @@
+//! The methods of the library: the one place that lists what is done by method.
+//!
+//! A method is a folder with a feature of its name. Without the feature the folder is no part of the library,
+//! and who asks for the method gets [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes` and
+//! `build` and a type that reads what was built; [`Structure`] is one of these types. A new method is a line
+//! of the list at the end and a module in lib.rs.
+
+use crate::aabb::Aabb;
+use crate::arena::Sizes;
+use crate::blob::Header;
+use crate::cell::Lattice;
+use crate::config::Config;
+use crate::control::{Control, Watch};
+use crate::counters::Tally;
+use crate::dda::Line;
+use crate::error::Error;
+use crate::mesh::TriangleMesh;
+use crate::method::Method;
+use crate::visit::Visitor;
+
+/// What is done with a tree, or else with a grid of cells.
+macro_rules! by_kind {
+    ($structure:expr, $tree:pat => $with_tree:expr, $with_cells:expr) => {
+        match $structure {
+            #[cfg(feature = "bvh")]
+            $crate::structure::Structure::Bvh($tree) => $with_tree,
+            #[cfg(any(feature = "one-level", feature = "recursive"))]
+            _ => $with_cells,
+        }
+    };
+}
+pub(crate) use by_kind;
+
+/// Fits the boxes of a tree to a mesh that moved, and returns what a ray costs before and after.
+pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2], Error> {
+    #[cfg(feature = "bvh")]
+    return crate::bvh::refit(blob, mesh);
+    #[cfg(not(feature = "bvh"))]
+    return Err(Error::CannotRefit);
+}
+
+macro_rules! methods {
+    (
+        cells: $($feature:literal $Cells:ident $cells:ident,)*
+        trees: $($of_tree:literal $Tree:ident $tree:ident,)*
+    ) => {
+        /// What a build wrote, as its method reads it.
+        #[derive(Debug, Clone, Copy)]
+        pub(crate) enum Structure<'a> {
+            $(#[cfg(feature = $feature)] $Cells(crate::$cells::$Cells<'a>),)*
+            $(#[cfg(feature = $of_tree)] $Tree(crate::$tree::$Tree<'a>),)*
+        }
+
+        /// Enough bytes of index and scratch for any mesh of so many triangles.
+        pub(crate) const fn bound(triangles: u32, config: &Config, tasks: u32) -> Option<(u64, u64)> {
+            match config.method {
+                $(#[cfg(feature = $feature)]
+                Method::$Cells => Some(crate::$cells::bound(triangles, config)),
+                #[cfg(not(feature = $feature))]
+                Method::$Cells => None,)*
+                $(#[cfg(feature = $of_tree)]
+                Method::$Tree => crate::$tree::bound(triangles, config, tasks),
+                #[cfg(not(feature = $of_tree))]
+                Method::$Tree => None,)*
+            }
+        }
+
+        /// How much memory a build takes; exactly, if there is scratch enough to find out.
+        pub(crate) fn sizes(
+            mesh: &TriangleMesh<'_>,
+            config: &Config,
+            scratch: &mut [u8],
+            control: &Control<'_>,
+        ) -> Result<Sizes, Error> {
+            match config.method {
+                $(#[cfg(feature = $feature)]
+                Method::$Cells => crate::$cells::sizes(mesh, config, scratch),)*
+                $(#[cfg(feature = $of_tree)]
+                Method::$Tree => crate::$tree::sizes(mesh, config, scratch, control),)*
+                $(#[cfg(not(feature = $feature))]
+                Method::$Cells => Err(Error::MethodLeftOut(config.method)),)*
+                $(#[cfg(not(feature = $of_tree))]
+                Method::$Tree => Err(Error::MethodLeftOut(config.method)),)*
+            }
+        }
+
+        /// Builds, and returns the bytes of the index that are the blob.
+        pub(crate) fn build<'a>(
+            mesh: &TriangleMesh<'_>,
+            config: &Config,
+            index: &'a mut [u8],
+            scratch: &mut [u8],
+            control: &Control<'_>,
+            watch: &Watch<'_>,
+        ) -> Result<&'a [u8], Error> {
+            match config.method {
+                $(#[cfg(feature = $feature)]
+                Method::$Cells => crate::$cells::build(mesh, config, index, scratch, watch),)*
+                $(#[cfg(feature = $of_tree)]
+                Method::$Tree => crate::$tree::build(mesh, config, index, scratch, control, watch),)*
+                $(#[cfg(not(feature = $feature))]
+                Method::$Cells => Err(Error::MethodLeftOut(config.method)),)*
+                $(#[cfg(not(feature = $of_tree))]
+                Method::$Tree => Err(Error::MethodLeftOut(config.method)),)*
+            }
+        }
+
+        impl<'a> Structure<'a> {
+            /// Nothing at all, by whatever method there is.
+            #[cfg(feature = "alloc")]
+            pub(crate) const NOTHING: Self = [
+                $(#[cfg(feature = $feature)] Self::$Cells(crate::$cells::$Cells::NOTHING),)*
+                $(#[cfg(feature = $of_tree)] Self::$Tree(crate::$tree::$Tree::NOTHING),)*
+            ][0];
+
+            /// Reads the sections of a blob; O(1).
+            pub(crate) fn open(
+                method: Method,
+                header: &Header,
+                lattice: &Lattice,
+                blob: &'a [u8],
+            ) -> Result<Self, Error> {
+                match method {
+                    $(#[cfg(feature = $feature)]
+                    Method::$Cells => {
+                        crate::$cells::$Cells::open(header, lattice, blob).map(Self::$Cells)
+                    })*
+                    $(#[cfg(feature = $of_tree)]
+                    Method::$Tree => crate::$tree::$Tree::open(header, blob).map(Self::$Tree),)*
+                    $(#[cfg(not(feature = $feature))]
+                    Method::$Cells => Err(Error::MethodLeftOut(method)),)*
+                    $(#[cfg(not(feature = $of_tree))]
+                    Method::$Tree => Err(Error::MethodLeftOut(method)),)*
+                }
+            }
+
+            /// The method that it was built with.
+            pub(crate) const fn method(&self) -> Method {
+                match self {
+                    $(#[cfg(feature = $feature)] Self::$Cells(_) => Method::$Cells,)*
+                    $(#[cfg(feature = $of_tree)] Self::$Tree(_) => Method::$Tree,)*
+                }
+            }
+
+            /// Proves that a build wrote it. A tree needs scratch for that.
+            pub(crate) fn validate(
+                &self,
+                header: &Header,
+                lattice: &Lattice,
+                blob: &[u8],
+                mesh: &TriangleMesh<'_>,
+                scratch: &mut [u8],
+            ) -> Result<(), Error> {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$Cells(cells) => cells.validate(header, lattice, blob, mesh),)*
+                    $(#[cfg(feature = $of_tree)]
+                    Self::$Tree(tree) => tree.validate(header, lattice, mesh, scratch),)*
+                }
+            }
+
+            /// Walks along a ray through the cells, and calls `leaf` with each list that it meets.
+            #[inline(always)]
+            pub(crate) fn traverse<T: Tally>(
+                &self,
+                line: &Line,
+                tally: &mut T,
+                leaf: impl FnMut(&[u32], &mut T) -> f32,
+            ) {
+                match self {
+                    $(#[cfg(feature = $feature)] Self::$Cells(cells) => cells.traverse(line, tally, leaf),)*
+                    $(#[cfg(feature = $of_tree)] Self::$Tree(_) => {})*
+                }
+            }
+
+            /// Shows the lists that a box meets, in a fixed order; a tree shows all. False if there was no end.
+            pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)] Self::$Cells(cells) => cells.visit(reach, visitor),)*
+                    $(#[cfg(feature = $of_tree)] Self::$Tree(tree) => tree.visit(visitor),)*
+                }
+            }
+
+            /// Words of all lists: what a ray may read before it goes in circles.
+            #[inline]
+            pub(crate) const fn list_words(&self) -> usize {
+                match self {
+                    $(#[cfg(feature = $feature)] Self::$Cells(cells) => cells.list_words(),)*
+                    $(#[cfg(feature = $of_tree)] Self::$Tree(tree) => tree.list_words(),)*
+                }
+            }
+
+            /// Bytes of scratch with which a mesh of so many triangles becomes it again.
+            pub(crate) fn scratch_bytes(&self, triangles: u32, config: &Config, resolution: [u32; 3]) -> u64 {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$Cells(_) => crate::$cells::scratch_bytes(triangles, config, resolution),)*
+                    $(#[cfg(feature = $of_tree)]
+                    Self::$Tree(_) => crate::$tree::scratch_bytes(triangles, config),)*
+                }
+            }
+        }
+    };
+}
+
+methods! {
+    cells:
+        "one-level" OneLevel one_level,
+        "fixed" Fixed fixed,
+        "variable" Variable variable,
+        "recursive" Recursive recursive,
+    trees:
+        "bvh" Bvh bvh,
+}
