@@ -207,7 +207,7 @@ impl<'a> Grid<'a> {
 
     /// Bytes of scratch that [`validate`](Self::validate) takes: at most one for eight triangles.
     #[must_use]
-    #[expect(clippy::cast_possible_truncation, reason = "an eighth of what 32 bits count")]
+    #[allow(clippy::cast_possible_truncation, reason = "an eighth of what 32 bits count")]
     pub const fn validate_bytes(&self) -> usize {
         let triangles = self.mesh.triangle_count();
         by_kind!(self.structure, _ => crate::bvh::proof_bytes(triangles) as usize, 0)
@@ -361,6 +361,7 @@ impl<'a> Grid<'a> {
 
     /// The tree, if it is one.
     #[cfg(feature = "bvh")]
+    #[allow(clippy::unnecessary_wraps, reason = "in a build with other methods it may be none")]
     pub(crate) const fn tree(&self) -> Option<&crate::bvh::Bvh<'a>> {
         by_kind!(&self.structure, tree => Some(tree), None)
     }

@@ -25,12 +25,21 @@
 //! # Ok::<(), hgrid_core::Error>(())
 //! ```
 //!
-//! The house, from the ground up: nouns (`error`, `ray`, `aabb`, `mesh`, `parts`, `approach`, `triangle`,
-//! `simd`, `eight`, `filter`, `exact`, `pairs`, `config`, `control`, `search`, `visit`, `arena`, `bump`, `bits`, `lists`,
-//! `hash`, `cell`, `spans`, `dda`, `counters`, `survey`, `tasks`, `blob`), one folder per structure
-//! above them (`one_level`; `fixed` and `variable` on top of it; `recursive`; `bvh`), and `grid`:
-//! the view that queries run on. Then the questions: `sizes`, `options`, `batch`, `closest`,
-//! `surface`, `inspect`, `packed`, `refit`, `owned`. core/DESIGN.md tells how it all works and what was left out.
+//! The house, from the ground up. No module imports one that imports it; a test sees to that.
+//!
+//! | floor | modules |
+//! |---|---|
+//! | what callers bring and get | `limits`, `error`, `method`, `config`, `control`, `ray`, `mesh`, `options`, `counters` |
+//! | memory | `arena`, `bump`, `bits`, `lists`, `hash`, `blob`, `tasks`, `survey` |
+//! | rays and triangles | `aabb`, `simd`, `approach`, `filter`, `exact`, `eight`, `pairs`, `triangle`, `surface` |
+//! | cells | `cell`, `spans`, `dda` |
+//! | what a query does with what it meets | `search`, `visit` |
+//! | structures, a folder each | `one_level`; `fixed` and `variable` on top of it; `recursive`; `bvh` |
+//! | all of them in one list, and the view that queries run on | `structure`, `grid` |
+//! | questions | `sizes`, `query`, `batch`, `closest`, `inspect`, `refit` |
+//! | on top of grids | `owned`, `shapes`, `scene`, `packed` |
+//!
+//! core/DESIGN.md tells how it all works, core/REJECTED.md what was left out.
 //!
 //! Each structure has a feature of the package (`one-level`, `fixed`, `variable`, `recursive` and
 //! `bvh`, all on by default), so that a program with little flash takes the ones it needs:
