@@ -68,12 +68,12 @@ fn only(method: &str) -> [&str; 3] {
 
 /// Builds the C library, and core for it, and returns the folder it is in: one for each target and its
 /// methods, so that no build waits for the other. Arguments may leave methods out.
-fn build(target: &str, profile: &str, arguments: &[&str]) -> PathBuf {
+fn build(target: &str, arguments: &[&str]) -> PathBuf {
     let dir = target_dir().join("no_std").join(target).join(arguments.last().unwrap_or(&"all"));
     let mut build = cargo_in(&dir, "build");
-    let library = ["--profile", profile, "-p", "hgrid-capi", "--target", target];
+    let library = ["--release", "-p", "hgrid-capi", "--target", target];
     run(build.args(library).args(arguments));
-    dir.join(target).join(profile)
+    dir.join(target).join("release")
 }
 
 const MICROCONTROLLER: &str = "thumbv7em-none-eabihf";
@@ -81,7 +81,7 @@ const MICROCONTROLLER: &str = "thumbv7em-none-eabihf";
 #[test]
 fn a_microcontroller_gets_a_static_library() {
     if is_available(MICROCONTROLLER) {
-        let archive = build(MICROCONTROLLER, "small", &only("one-level")).join("libhgrid.a");
+        let archive = build(MICROCONTROLLER, &only("one-level")).join("libhgrid.a");
         let bytes = fs::read(&archive).expect("the C library");
         assert!(bytes.starts_with(b"!<arch>\n"));
         check_flash("| `one-level` | ", &archive);
@@ -92,9 +92,9 @@ fn a_microcontroller_gets_a_static_library() {
 #[ignore = "slow: three more libraries, optimised as a whole"]
 fn each_method_takes_as_much_flash_as_the_page_says() {
     if is_available(MICROCONTROLLER) {
-        check_flash("| all | ", &build(MICROCONTROLLER, "small", &[]).join("libhgrid.a"));
+        check_flash("| all | ", &build(MICROCONTROLLER, &[]).join("libhgrid.a"));
         for method in ["fixed", "bvh"] {
-            let archive = build(MICROCONTROLLER, "small", &only(method)).join("libhgrid.a");
+            let archive = build(MICROCONTROLLER, &only(method)).join("libhgrid.a");
             check_flash(&format!("| `{method}` | "), &archive);
         }
     }
@@ -139,7 +139,7 @@ fn a_web_page_gets_all_methods() {
 fn check_module(arguments: &[&str]) {
     let target = "wasm32-unknown-unknown";
     if is_available(target) {
-        let dir = build(target, "release", arguments);
+        let dir = build(target, arguments);
         let module = fs::read(dir.join("hgrid.wasm")).expect("the module");
         let sections = sections(&module);
         assert!(sections.contains(&EXPORTS) && !sections.contains(&IMPORTS), "{sections:?}");
