@@ -260,11 +260,13 @@ impl Node {
 
     /// Half the surface of the box around all children.
     fn surface(&self) -> f64 {
-        let [x, y, z] = [0, 1, 2].map(|axis| {
-            let low = self.bounds[axis].iter().min().copied().unwrap_or(0);
-            let high = self.bounds[axis + 3].iter().max().copied().unwrap_or(0);
+        let extent = |low: &[u8; 8], high: &[u8; 8]| {
+            let low = low.iter().min().copied().unwrap_or(0);
+            let high = high.iter().max().copied().unwrap_or(0);
             u32::from(high.saturating_sub(low))
-        });
+        };
+        let [min_x, min_y, min_z, max_x, max_y, max_z] = &self.bounds;
+        let [x, y, z] = [extent(min_x, max_x), extent(min_y, max_y), extent(min_z, max_z)];
         self.area([x * y, y * z, z * x])
     }
 
