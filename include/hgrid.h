@@ -20,8 +20,8 @@
  * hgrid_surface_at knows the normal of a hit, and where rays start that leave it. hgrid_join takes
  * several meshes into one grid, and hgrid_locate tells which of them was hit. Trees of your own shapes
  * begin with hgrid_build_shapes, scenes of instances with hgrid_build_scene. For grids that are
- * stored there are hgrid_open, hgrid_peek, hgrid_pack, hgrid_mesh_of and hgrid_validate, and
- * hgrid_inspect looks at all of one. hgrid_refit moves a tree with its vertices.
+ * stored there are hgrid_open, hgrid_peek, hgrid_pack, hgrid_mesh_of and hgrid_validate, for scenes
+ * with all that they show hgrid_pack_scene; hgrid_inspect looks at all of a grid. hgrid_refit moves a tree with its vertices.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -403,6 +403,26 @@
  * counter-clockwise.
  */
 #define HGRID_CULL_FRONT 2
+
+/**
+ * A blob that is built over the triangles of a mesh: `hgrid_open`.
+ */
+#define HGRID_CONTENT_TRIANGLES 0
+
+/**
+ * A blob that is built over shapes: `hgrid_open_shapes`.
+ */
+#define HGRID_CONTENT_SHAPES 1
+
+/**
+ * A blob that is built over instances: `hgrid_open_scene`.
+ */
+#define HGRID_CONTENT_INSTANCES 2
+
+/**
+ * A scene with all that it shows: `hgrid_open_packed_scene`.
+ */
+#define HGRID_CONTENT_PACKED_SCENE 3
 
 /**
  * Scenes inside one another, at most, the outermost included.
@@ -1008,15 +1028,15 @@ typedef struct hgrid_blob_info {
      */
     uint32_t method;
     /**
-     * 1 if the mesh is in it, as `hgrid_pack` writes it; 0 if not.
+     * 1 if the mesh is in it, as `hgrid_pack` writes it, or all that a scene shows; 0 if not.
      */
     uint32_t has_mesh;
     /**
-     * Vertices of its mesh.
+     * Vertices of its mesh; twice the number of shapes or instances.
      */
     uint64_t vertex_count;
     /**
-     * Triangles of its mesh.
+     * Triangles of its mesh; shapes or instances; grids and scenes that a packed scene shows.
      */
     uint64_t triangle_count;
     /**
@@ -1024,9 +1044,17 @@ typedef struct hgrid_blob_info {
      */
     uint64_t grid_bytes;
     /**
-     * Bytes of all of it: of the grid, and of the mesh if that is in it.
+     * Bytes of all of it: of the grid, and of what is packed with it.
      */
     uint64_t total_bytes;
+    /**
+     * What it is built over: one of `HGRID_CONTENT_...`.
+     */
+    uint32_t content;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
 } hgrid_blob_info;
 
 /**
@@ -1171,7 +1199,7 @@ typedef struct hgrid_object {
 
 /**
  * A built scene and its objects, ready for queries: a view, held by value as a `hgrid_grid`. It holds the addresses of its
- * blob and of the array of its objects.
+ * blob and of the array of its objects, or of the `views` of a packed scene.
  */
 typedef struct hgrid_scene {
     /**
@@ -2723,6 +2751,65 @@ hgrid_status hgrid_validate_scene(const struct hgrid_scene *scene,
                                   size_t scratch_bytes);
 
 /**
+ * Writes a scene and all grids, meshes and scenes that it shows as one blob, which `hgrid_open_packed_scene` needs nothing
+ * else for: `hgrid_pack` for scenes.
+ *
+ * A grid or scene is stored once, however many instances and scenes show it: the same address of a view is the same grid.
+ * Shapes cannot be stored: their boxes and test are yours.
+ *
+ * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps nothing that the scene refers to, nor any argument of this
+ * call. It may be NULL if `capacity` is 0: to ask for the size. `scene` and `bytes` may not be NULL. The time is that
+ * of the copy, and of comparing each object with each.
+ *
+ * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both cases
+ * `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
+ * `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing; or
+ * `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is needed is not
+ * touched.
+ *
+ * Threads: any number of calls and queries on the same scene at once, each with memory of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_pack_scene(const struct hgrid_scene *scene,
+                              void *to,
+                              size_t capacity,
+                              uint64_t *bytes);
+
+/**
+ * Opens a blob that `hgrid_pack_scene` wrote where it lies: in time proportional to the grids in it, without a copy.
+ *
+ * `blob` starts at a multiple of `HGRID_ALIGNMENT`; bytes behind it are ignored. `views` is memory for the views of what is
+ * in it, at a multiple of `HGRID_ALIGNMENT` as well: like the blob, it stays where it is and as it is for as long as the
+ * scene is queried. It may be NULL if `views_bytes` is 0: to ask for the size.
+ *
+ * With `scratch` all grids and scenes in the blob are proven, as `hgrid_validate` and `hgrid_validate_scene` do: a 64th of
+ * the blob's bytes is enough, at any address. With NULL, and `scratch_bytes` 0, nothing is proven, and what `hgrid_open` says of damaged
+ * bytes holds. Blob, views and scratch do not overlap.
+ *
+ * `blob`, `bytes` and `scene` may not be NULL. Returns `HGRID_OK` and writes the view to `scene`, or
+ * `HGRID_ERROR_INDEX_TOO_SMALL` if the views have too little memory; in both cases `bytes` becomes what the views
+ * take. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+ * `HGRID_ERROR_OTHER_CONTENT` for a blob that is no packed scene, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_CORRUPT`,
+ * `HGRID_ERROR_SCRATCH_TOO_SMALL`, what `hgrid_open_scene` returns and what `hgrid_validate` returns. Unless it
+ * returns `HGRID_OK`, `scene` stays as it was, and the views hold nothing of use.
+ *
+ * Threads: any number of calls at once, also on the same blob, each with a view and memory of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_open_packed_scene(const void *blob,
+                                     size_t blob_bytes,
+                                     void *views,
+                                     size_t views_bytes,
+                                     void *scratch,
+                                     size_t scratch_bytes,
+                                     uint64_t *bytes,
+                                     struct hgrid_scene *scene);
+
+/**
  * Finds the closest thing in a scene that a ray hits.
  *
  * Returns true and writes `hit`; or returns false and writes nothing. Where several are hit at the same `t`, that of the
@@ -2771,6 +2858,24 @@ bool hgrid_scene_normal(const struct hgrid_scene *scene,
                         const struct hgrid_scene_hit *hit,
                         const float *object_normal,
                         float *normal);
+
+/**
+ * Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid that it shows.
+ *
+ * For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob. The
+ * matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and `grid` may be
+ * NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or `hit` is NULL, or the
+ * hit names nothing in the scene.
+ *
+ * Threads: any number of calls and queries on the same scene at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_scene_locate(const struct hgrid_scene *scene,
+                        const struct hgrid_scene_hit *hit,
+                        struct hgrid_instance *instance,
+                        struct hgrid_grid *grid);
 
 #if defined(HGRID_STD)
 /**
@@ -2953,7 +3058,7 @@ bool hgrid_has_method(uint32_t method);
 /**
  * The header of a blob before it is read.
  */
-#define HGRID_BLOB_INFO_INIT {sizeof(hgrid_blob_info), 0, 0, 0, 0, 0, 0, 0}
+#define HGRID_BLOB_INFO_INIT {sizeof(hgrid_blob_info), 0, 0, 0, 0, 0, 0, 0, 0, 0}
 
 /**
  * The report of a refit before its call.

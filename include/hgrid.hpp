@@ -1762,6 +1762,49 @@ public:
     {
         return detail::said(::hgrid_validate_scene(&raw_, scratch.data(), scratch.size()));
     }
+    /// Bytes that `pack` writes; 0 for a view of nothing, and for a scene that shows shapes.
+    std::uint64_t packed_bytes() const noexcept
+    {
+        std::uint64_t bytes = 0;
+        static_cast<void>(::hgrid_pack_scene(&raw_, nullptr, 0, &bytes));
+        return bytes;
+    }
+    /// Writes the scene and all that it shows as one blob.
+    status pack(span<byte> to) const noexcept
+    {
+        std::uint64_t bytes = 0;
+        return detail::said(::hgrid_pack_scene(&raw_, to.data(), to.size(), &bytes));
+    }
+    /// The same in memory of its own.
+    result<memory> pack() const noexcept
+    {
+        auto packed = memory::allocate(packed_bytes());
+        if (!packed)
+            return packed;
+        const status answer = pack(*packed);
+        return answer == status::ok ? std::move(packed) : answer;
+    }
+    /// Bytes that the views of a packed scene take; 0 for another blob.
+    static std::uint64_t view_bytes(span<const byte> blob) noexcept
+    {
+        std::uint64_t bytes = 0;
+        scene opened;
+        static_cast<void>(::hgrid_open_packed_scene(blob.data(), blob.size(), nullptr, 0, nullptr, 0, &bytes,
+                                                    &opened.raw_));
+        return bytes;
+    }
+    /// Opens what `pack` wrote, where it lies, with memory for its views, both of which stay where they are. With scratch
+    /// all that is in it is proven.
+    static result<scene> open_packed(span<const byte> blob, span<byte> views,
+                                     span<byte> scratch = span<byte>()) noexcept
+    {
+        scene opened;
+        std::uint64_t bytes = 0;
+        const status answer =
+            detail::said(::hgrid_open_packed_scene(blob.data(), blob.size(), views.data(), views.size(),
+                                                   scratch.data(), scratch.size(), &bytes, &opened.raw_));
+        return answer == status::ok ? result<scene>(opened) : answer;
+    }
     /// The closest thing that a ray hits.
     optional<scene_hit> intersect(const ray_f64 &along) const noexcept
     {
@@ -1780,6 +1823,21 @@ public:
         point found = {};
         static_cast<void>(::hgrid_scene_normal(&raw_, &of, nullptr, found.data()));
         return found;
+    }
+    /// The innermost instance that a hit names; one of no object if it names none.
+    instance instance_of(const scene_hit &of) const noexcept
+    {
+        instance found = HGRID_INSTANCE_INIT;
+        found.object = HGRID_INVALID_ID;
+        static_cast<void>(::hgrid_scene_locate(&raw_, &of, &found, nullptr));
+        return found;
+    }
+    /// The grid that a hit names; a view of nothing if it names shapes or nothing.
+    view grid_of(const scene_hit &of) const noexcept
+    {
+        ::hgrid_grid found = HGRID_GRID_INIT;
+        static_cast<void>(::hgrid_scene_locate(&raw_, &of, nullptr, &found));
+        return view(found);
     }
     /// What C takes.
     const ::hgrid_scene &c() const noexcept { return raw_; }

@@ -6,7 +6,7 @@
 use core::ffi::c_void;
 
 use hgrid_core::{
-    BlobInfo, ClosestPoint, Coherence, Counters, Cull, Error, Hit, INVALID_ID, Ray, Refit,
+    BlobInfo, ClosestPoint, Coherence, Content, Counters, Cull, Error, Hit, INVALID_ID, Ray, Refit,
     Statistics, Surface, Verdict,
 };
 
@@ -281,6 +281,18 @@ pub struct hgrid_refit_report {
     pub cost_after: f64,
 }
 
+/// A blob that is built over the triangles of a mesh: `hgrid_open`.
+pub const HGRID_CONTENT_TRIANGLES: u32 = 0;
+
+/// A blob that is built over shapes: `hgrid_open_shapes`.
+pub const HGRID_CONTENT_SHAPES: u32 = 1;
+
+/// A blob that is built over instances: `hgrid_open_scene`.
+pub const HGRID_CONTENT_INSTANCES: u32 = 2;
+
+/// A scene with all that it shows: `hgrid_open_packed_scene`.
+pub const HGRID_CONTENT_PACKED_SCENE: u32 = 3;
+
 /// What the header of a blob says. Initialise it with `HGRID_BLOB_INFO_INIT`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -291,16 +303,20 @@ pub struct hgrid_blob_info {
     pub version: u32,
     /// What built it: one of `HGRID_METHOD_...`.
     pub method: u32,
-    /// 1 if the mesh is in it, as `hgrid_pack` writes it; 0 if not.
+    /// 1 if the mesh is in it, as `hgrid_pack` writes it, or all that a scene shows; 0 if not.
     pub has_mesh: u32,
-    /// Vertices of its mesh.
+    /// Vertices of its mesh; twice the number of shapes or instances.
     pub vertex_count: u64,
-    /// Triangles of its mesh.
+    /// Triangles of its mesh; shapes or instances; grids and scenes that a packed scene shows.
     pub triangle_count: u64,
     /// Bytes of the grid.
     pub grid_bytes: u64,
-    /// Bytes of all of it: of the grid, and of the mesh if that is in it.
+    /// Bytes of all of it: of the grid, and of what is packed with it.
     pub total_bytes: u64,
+    /// What it is built over: one of `HGRID_CONTENT_...`.
+    pub content: u32,
+    /// 0.
+    pub reserved: u32,
 }
 
 /// What a look at all of a grid finds. Initialise it with `HGRID_STATISTICS_INIT`.
@@ -330,6 +346,10 @@ pub struct hgrid_statistics {
     pub content_hash: u64,
 }
 
+const _: () = assert!(HGRID_CONTENT_TRIANGLES == Content::Triangles as u32);
+const _: () = assert!(HGRID_CONTENT_SHAPES == Content::Shapes as u32);
+const _: () = assert!(HGRID_CONTENT_INSTANCES == Content::Instances as u32);
+const _: () = assert!(HGRID_CONTENT_PACKED_SCENE == Content::Packed as u32);
 const _: () = assert!(HGRID_COHERENCE_INCOHERENT == Coherence::Incoherent as u32);
 const _: () = assert!(HGRID_COHERENCE_COHERENT == Coherence::Coherent as u32);
 const _: () = assert!(HGRID_REJECT == Verdict::Reject as u32);
@@ -457,7 +477,7 @@ impl hgrid_blob_info {
     pub(crate) fn note(&mut self, info: &BlobInfo) {
         let BlobInfo { version, method, has_mesh, vertex_count, triangle_count, .. } = *info;
         let (has_mesh, triangle_count) = (has_mesh.into(), triangle_count.into());
-        let BlobInfo { grid_bytes, total_bytes, .. } = *info;
+        let BlobInfo { grid_bytes, total_bytes, content, .. } = *info;
         let (struct_size, method) = (self.struct_size, method as u32);
         *self = Self {
             struct_size,
@@ -468,6 +488,8 @@ impl hgrid_blob_info {
             triangle_count,
             grid_bytes,
             total_bytes,
+            content: content as u32,
+            reserved: 0,
         };
     }
 }

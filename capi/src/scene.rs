@@ -51,7 +51,7 @@ const _: () = assert!(size_of::<Object<'_>>() == size_of::<hgrid_object>());
 const _: () = assert!(align_of::<Object<'_>>() <= align_of::<hgrid_object>());
 
 /// A built scene and its objects, ready for queries: a view, held by value as a `hgrid_grid`. It holds the addresses of its
-/// blob and of the array of its objects.
+/// blob and of the array of its objects, or of the `views` of a packed scene.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_scene {
@@ -406,6 +406,82 @@ pub unsafe extern "C" fn hgrid_validate_scene(
     unsafe { raw::validate_scene(scene, scratch) }.err().unwrap_or(HGRID_OK)
 }
 
+/// Writes a scene and all grids, meshes and scenes that it shows as one blob, which `hgrid_open_packed_scene` needs nothing
+/// else for: `hgrid_pack` for scenes.
+///
+/// A grid or scene is stored once, however many instances and scenes show it: the same address of a view is the same grid.
+/// Shapes cannot be stored: their boxes and test are yours.
+///
+/// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps nothing that the scene refers to, nor any argument of this
+/// call. It may be NULL if `capacity` is 0: to ask for the size. `scene` and `bytes` may not be NULL. The time is that
+/// of the copy, and of comparing each object with each.
+///
+/// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both cases
+/// `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
+/// `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing; or
+/// `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is needed is not
+/// touched.
+///
+/// Threads: any number of calls and queries on the same scene at once, each with memory of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_pack_scene(
+    scene: *const hgrid_scene,
+    to: *mut c_void,
+    capacity: usize,
+    bytes: *mut u64,
+) -> hgrid_status {
+    let Some(size) = NonNull::new(bytes) else { return HGRID_ERROR_NULL_ARGUMENT };
+    // SAFETY: the caller's promise.
+    let packed = unsafe { raw::pack_scene(scene, Region { start: to, bytes: capacity }, size) };
+    packed.err().unwrap_or(HGRID_OK)
+}
+
+/// Opens a blob that `hgrid_pack_scene` wrote where it lies: in time proportional to the grids in it, without a copy.
+///
+/// `blob` starts at a multiple of `HGRID_ALIGNMENT`; bytes behind it are ignored. `views` is memory for the views of what is
+/// in it, at a multiple of `HGRID_ALIGNMENT` as well: like the blob, it stays where it is and as it is for as long as the
+/// scene is queried. It may be NULL if `views_bytes` is 0: to ask for the size.
+///
+/// With `scratch` all grids and scenes in the blob are proven, as `hgrid_validate` and `hgrid_validate_scene` do: a 64th of
+/// the blob's bytes is enough, at any address. With NULL, and `scratch_bytes` 0, nothing is proven, and what `hgrid_open` says of damaged
+/// bytes holds. Blob, views and scratch do not overlap.
+///
+/// `blob`, `bytes` and `scene` may not be NULL. Returns `HGRID_OK` and writes the view to `scene`, or
+/// `HGRID_ERROR_INDEX_TOO_SMALL` if the views have too little memory; in both cases `bytes` becomes what the views
+/// take. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`,
+/// `HGRID_ERROR_OTHER_CONTENT` for a blob that is no packed scene, `HGRID_ERROR_TRUNCATED`, `HGRID_ERROR_CORRUPT`,
+/// `HGRID_ERROR_SCRATCH_TOO_SMALL`, what `hgrid_open_scene` returns and what `hgrid_validate` returns. Unless it
+/// returns `HGRID_OK`, `scene` stays as it was, and the views hold nothing of use.
+///
+/// Threads: any number of calls at once, also on the same blob, each with a view and memory of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_open_packed_scene(
+    blob: *const c_void,
+    blob_bytes: usize,
+    views: *mut c_void,
+    views_bytes: usize,
+    scratch: *mut c_void,
+    scratch_bytes: usize,
+    bytes: *mut u64,
+    scene: *mut hgrid_scene,
+) -> hgrid_status {
+    let (false, Some(size), Some(to)) = (blob.is_null(), NonNull::new(bytes), NonNull::new(scene))
+    else {
+        return HGRID_ERROR_NULL_ARGUMENT;
+    };
+    let views = Region { start: views, bytes: views_bytes };
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    // SAFETY: the caller's promise.
+    let opened = unsafe { raw::open_packed_scene((blob, blob_bytes), [views, scratch], size, to) };
+    opened.err().unwrap_or(HGRID_OK)
+}
+
 /// Finds the closest thing in a scene that a ray hits.
 ///
 /// Returns true and writes `hit`; or returns false and writes nothing. Where several are hit at the same `t`, that of the
@@ -478,4 +554,27 @@ pub unsafe extern "C" fn hgrid_scene_normal(
     // SAFETY: the caller's promise.
     unsafe { raw::write(to, found) };
     true
+}
+
+/// Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid that it shows.
+///
+/// For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob. The
+/// matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and `grid` may be
+/// NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or `hit` is NULL, or the
+/// hit names nothing in the scene.
+///
+/// Threads: any number of calls and queries on the same scene at once.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_scene_locate(
+    scene: *const hgrid_scene,
+    hit: *const hgrid_scene_hit,
+    instance: *mut hgrid_instance,
+    grid: *mut hgrid_grid,
+) -> bool {
+    let to = (NonNull::new(instance), NonNull::new(grid));
+    // SAFETY: the caller's promise.
+    matches!(unsafe { raw::scene_locate(scene, hit, to) }, Ok(Some(())))
 }

@@ -223,6 +223,22 @@ impl Header {
         Self { mesh: mesh as u32 | part_count << 2, ..self }
     }
 
+    /// The header of a packed scene whose own header this is.
+    pub(crate) const fn holding(self, members: u32, references: u64, blob_bytes: u64) -> Self {
+        Self {
+            blob_bytes,
+            vertex_count: references.saturating_add(members as u64),
+            triangle_count: members,
+            skipped_count: 0,
+            reference_count: 0,
+            content: Content::Packed as u32,
+            mesh: HasMesh::Yes as u32,
+            node_count: 0,
+            levels: 0,
+            ..self
+        }
+    }
+
     /// The lattice, if box and resolution can be one.
     pub(crate) fn lattice(&self) -> Result<Lattice, Error> {
         let bounds = Aabb { min: self.bounds_min.into(), max: self.bounds_max.into() };

@@ -270,6 +270,9 @@ impl Error {
             Self::OtherContent(Content::Instances) => {
                 f.write_str("the blob is a scene of instances: open it as a scene")
             }
+            Self::OtherContent(Content::Packed) => {
+                f.write_str("the blob is a packed scene: open it as a packed scene")
+            }
             Self::InstanceWithoutObject { instance } => {
                 write!(f, "instance {instance} names an object that there is not")
             }

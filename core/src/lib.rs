@@ -153,7 +153,7 @@ pub use method::{Content, Method, Quality};
 pub use options::{Cull, Filter, QueryOptions, Verdict};
 #[cfg(feature = "alloc")]
 pub use owned::{OwnedGrid, OwnedMesh, OwnedStrided};
-pub use packed::BlobInfo;
+pub use packed::{BlobInfo, Member};
 pub use ray::{Hit, INVALID_ID, Ray, RayF64};
 pub use refit::{Refit, refit};
 pub use scene::{Instance, Object, ObjectTest, Scene, SceneFilter, SceneHit, SceneOptions};

@@ -159,6 +159,8 @@ pub enum Content {
     Shapes = 1,
     /// Instances of other blobs: [`Scene`](crate::Scene).
     Instances = 2,
+    /// A scene with all that it shows: [`Scene::pack`](crate::Scene::pack).
+    Packed = 3,
 }
 
 impl Content {
@@ -168,6 +170,7 @@ impl Content {
             0 => Some(Self::Triangles),
             1 => Some(Self::Shapes),
             2 => Some(Self::Instances),
+            3 => Some(Self::Packed),
             _ => None,
         }
     }

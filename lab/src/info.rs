@@ -81,13 +81,16 @@ struct BlobFacts {
     format: &'static str,
     version: u32,
     method: &'static str,
-    /// What it is built over, one of the three.
+    /// What it is built over, one of the four.
     #[serde(skip_serializing_if = "Option::is_none")]
     triangles: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     shapes: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     instances: Option<u32>,
+    /// Of a packed scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    grids_and_scenes: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     vertices: Option<u64>,
     grid_bytes: u64,
@@ -219,6 +222,7 @@ impl BlobFacts {
             ("triangles", self.triangles.map(u64::from)),
             ("shapes", self.shapes.map(u64::from)),
             ("instances", self.instances.map(u64::from)),
+            ("grids and scenes", self.grids_and_scenes.map(u64::from)),
             ("vertices", self.vertices),
         ];
         rows.extend(counts.into_iter().filter_map(|(name, number)| Some((name, count(number?)))));
@@ -256,6 +260,7 @@ impl BlobFacts {
             triangles: of(Content::Triangles),
             shapes: of(Content::Shapes),
             instances: of(Content::Instances),
+            grids_and_scenes: of(Content::Packed),
             vertices: is_mesh.then_some(info.vertex_count),
             grid_bytes: info.grid_bytes,
             total_bytes: info.total_bytes,

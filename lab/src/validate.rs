@@ -1,10 +1,11 @@
 //! The proof that a blob is a grid of its mesh: the `validate` command.
 
 use std::io::{self, Write as _};
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail, ensure};
-use hgrid_core::{BlobInfo, Content, Grid, TriangleMesh};
+use hgrid_core::{BlobInfo, Content, Grid, Member, Object, Scene as Instances, TriangleMesh};
 use indicatif::HumanCount;
 
 use crate::blob::Blob;
@@ -21,8 +22,11 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
     let file = path.display();
     let blob = Blob::read(path).with_context(|| format!("cannot read `{file}`"))?;
     let info = BlobInfo::peek(blob.bytes())?;
+    if info.content == Content::Packed {
+        return prove_scene(path, &blob, &info);
+    }
     let what = match info.content {
-        Content::Triangles => None,
+        Content::Triangles | Content::Packed => None,
         Content::Shapes => Some("shapes"),
         Content::Instances => Some("instances"),
     };
@@ -47,5 +51,31 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
     let (method, triangles) = (grid.method().name(), HumanCount(info.triangle_count.into()));
     let time = seconds(start.elapsed().as_secs_f64());
     writeln!(io::stdout(), "{file}: valid, a {method} of {triangles} triangles, proved in {time}")?;
+    Ok(())
+}
+
+/// Proves a scene with all that it shows.
+fn prove_scene(path: &Path, blob: &Blob, info: &BlobInfo) -> Result<()> {
+    let file = path.display();
+    let bytes = blob.bytes();
+    ensure!(
+        info.total_bytes <= bytes.len() as u64
+            && info.vertex_count <= info.total_bytes / 4
+            && u64::from(info.triangle_count) <= info.total_bytes / 128,
+        "`{file}` is truncated or damaged"
+    );
+    let mut members = vec![Member::EMPTY; info.triangle_count as usize];
+    let mut objects = vec![Object::Nothing; usize::try_from(info.vertex_count)?];
+    let mut scratch = vec![0; bytes.len() / 64];
+    let start = Instant::now();
+    let scene = Instances::open_packed_proven(bytes, &mut members, &mut objects, &mut scratch)
+        .with_context(|| format!("`{file}` is not valid"))?;
+    let [instances, shown] =
+        [scene.instance_count(), info.triangle_count].map(|count| HumanCount(count.into()));
+    let time = seconds(start.elapsed().as_secs_f64());
+    writeln!(
+        io::stdout(),
+        "{file}: valid, a scene of {instances} instances with {shown} grids and scenes, proved in {time}"
+    )?;
     Ok(())
 }

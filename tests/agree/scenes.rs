@@ -1,13 +1,13 @@
 //! Scenes: every query agrees with a loop over all instances, and with the triangles moved in f64.
 
 use hgrid_core::{
-    Block, Boxes, Config, Counters, Grid, Instance, Method, Object, Quality, Ray, RayF64, Scene,
-    SceneHit, SceneOptions, ShapeHit, Shapes, TriangleMesh, Verdict,
+    BlobInfo, Block, Boxes, Config, Counters, Grid, Instance, Method, Object, Quality, Ray, RayF64,
+    Scene, SceneHit, SceneOptions, ShapeHit, Shapes, TriangleMesh, Verdict,
 };
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
-use hgrid_tests::scenes::{Built, scattered};
+use hgrid_tests::scenes::{Built, packed, prove_packed, scattered, with_packed};
 
 /// Objects to show: grids of some methods.
 fn with_grids(run: impl FnOnce(&[Object<'_>], &[Mesh])) {
@@ -311,11 +311,38 @@ fn scenes_in_scenes_name_the_way_to_the_hit() {
             depths[depth] += 1;
             let Some(Object::Grid(grid)) = scene.object_of(&hit) else { panic!("a grid") };
             assert!(hit.primitive < grid.mesh().triangle_count());
+            let number = hit.path[depth - 1] as usize;
+            let instances = [&outer, &middle, &inner][depth - 1];
+            assert_eq!(scene.instance_of(&hit).unwrap().id, instances[number].id);
             let normal = scene.triangle_normal(&hit).unwrap();
             let length: f32 = normal.iter().map(|c| c * c).sum();
             assert!((length - 1.0).abs() < 1e-5);
         }
         assert!(depths[1..].iter().all(|&hits| hits > 2), "{depths:?}");
+
+        // All of it in one blob, elsewhere and with something behind it: three grids and two scenes, each once.
+        let mut file = packed(&scene).unwrap();
+        file.extend([Block::ZERO; 2]);
+        let file = Block::bytes(&file);
+        let info = BlobInfo::peek(file).unwrap();
+        assert_eq!((info.triangle_count, info.vertex_count), (5, 5 + 3 + 2 + 2));
+        assert_eq!(info.total_bytes, scene.packed_bytes());
+        prove_packed(file).unwrap();
+        with_packed(file, |opened| {
+            let opened = opened.unwrap();
+            assert_eq!(opened.blob(), scene.blob());
+            for round in 0..1500 {
+                let ray = ray(&mut random, 5 * round + round % 4, 6.0);
+                let hit = opened.intersect(&ray);
+                assert_eq!(hit, scene.intersect(&ray));
+                assert_eq!(opened.occluded(&ray), hit.is_some());
+                let normal = |scene: &Scene<'_>| scene.triangle_normal(&hit?);
+                assert_eq!(normal(&opened), normal(&scene));
+            }
+            // Packed again, it has the same bytes.
+            let again = packed(&opened).unwrap();
+            assert!(Block::bytes(&again) == &file[..file.len() - 128]);
+        });
 
         // One more around it is allowed, two are not.
         let once = [Object::Scene(&scene)];

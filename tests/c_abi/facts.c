@@ -104,6 +104,8 @@ static void layout(void)
     OFFSET(hgrid_blob_info, triangle_count);
     OFFSET(hgrid_blob_info, grid_bytes);
     OFFSET(hgrid_blob_info, total_bytes);
+    OFFSET(hgrid_blob_info, content);
+    OFFSET(hgrid_blob_info, reserved);
     SIZE(hgrid_statistics);
     OFFSET(hgrid_statistics, struct_size);
     OFFSET(hgrid_statistics, skipped_count);
@@ -193,6 +195,10 @@ static void constants(void)
     NUMBER(HGRID_METHOD_VARIABLE);
     NUMBER(HGRID_METHOD_RECURSIVE);
     NUMBER(HGRID_METHOD_BVH);
+    NUMBER(HGRID_CONTENT_TRIANGLES);
+    NUMBER(HGRID_CONTENT_SHAPES);
+    NUMBER(HGRID_CONTENT_INSTANCES);
+    NUMBER(HGRID_CONTENT_PACKED_SCENE);
     NUMBER(HGRID_QUALITY_FAST);
     NUMBER(HGRID_QUALITY_HIGH);
     NUMBER(HGRID_MAX_DEPTH);
@@ -300,10 +306,11 @@ static void defaults(void)
            (unsigned long)r.reserved);
     printf("refit_report %lu %#lx %g %g\n", (unsigned long)f.struct_size,
            (unsigned long)f.triangle, f.cost_before, f.cost_after);
-    printf("blob_info %lu %lu %lu %lu %llu %llu %llu %llu\n", (unsigned long)b.struct_size,
+    printf("blob_info %lu %lu %lu %lu %llu %llu %llu %llu %lu %lu\n", (unsigned long)b.struct_size,
            (unsigned long)b.version, (unsigned long)b.method, (unsigned long)b.has_mesh,
            (unsigned long long)b.vertex_count, (unsigned long long)b.triangle_count,
-           (unsigned long long)b.grid_bytes, (unsigned long long)b.total_bytes);
+           (unsigned long long)b.grid_bytes, (unsigned long long)b.total_bytes,
+           (unsigned long)b.content, (unsigned long)b.reserved);
     printf("statistics %lu %lu %lu %#lx %llu %llu %lu %lu %llu\n", (unsigned long)s.struct_size,
            (unsigned long)s.skipped_count, (unsigned long)s.degenerate_count,
            (unsigned long)s.first_bad, (unsigned long long)s.list_count,

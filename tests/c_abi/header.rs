@@ -292,7 +292,7 @@ fn initialisers_are_the_defaults() {
         ("mesh", "0 0 0 0 0 0 0 0 0 0 0"),
         ("query_options", "0xffffffff 0 0xffffffff 0 0 0 0 0 0 0"),
         ("report", "0 0 0 0xffffffff 0 0 0 0 0 0 0"),
-        ("blob_info", "0 0 0 0 0 0 0"),
+        ("blob_info", "0 0 0 0 0 0 0 0 0"),
         ("refit_report", "0xffffffff 0 0"),
         ("statistics", "0 0 0xffffffff 0 0 0 0 0"),
         ("allocator", "0 0 0 0"),

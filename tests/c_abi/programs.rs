@@ -20,7 +20,7 @@ use crate::header::DIALECTS;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
 /// flavour of the library that they need.
-const PROGRAMS: [(&str, Flavour); 20] = [
+const PROGRAMS: [(&str, Flavour); 21] = [
     ("queries", Flavour::NoStd),
     ("options", Flavour::NoStd),
     ("batches", Flavour::NoStd),
@@ -40,6 +40,7 @@ const PROGRAMS: [(&str, Flavour); 20] = [
     ("refits", Flavour::NoStd),
     ("joined", Flavour::NoStd),
     ("scenes", Flavour::NoStd),
+    ("packed_scenes", Flavour::NoStd),
     ("create", Flavour::Std),
 ];
 

@@ -1,12 +1,12 @@
 //! Odd scenes and odd shapes: a clear error or a defined answer.
 
 use hgrid_core::{
-    Block, Boxes, BuildFlags, Config, ConfigField, Content, Error, Grid, Instance, Method, Object,
-    Ray, RayF64, Scene, ShapeHit, Shapes, Strided,
+    BlobInfo, Block, Boxes, BuildFlags, Config, ConfigField, Content, Error, Grid, Instance,
+    Member, Method, Object, Ray, RayF64, Region, Scene, ShapeHit, Shapes, Strided,
 };
 use hgrid_tests::meshes::{Mesh, one_triangle};
 use hgrid_tests::owned::Owned;
-use hgrid_tests::scenes::{Built, scattered};
+use hgrid_tests::scenes::{Built, packed, prove_packed, scattered, with_packed};
 
 fn with_triangle(run: impl FnOnce(&[Object<'_>])) {
     let mesh = one_triangle();
@@ -217,4 +217,94 @@ fn a_refit_of_other_instances_is_refused() {
         let blocks = [Block::ZERO; 2];
         assert_eq!(Scene::open(Block::bytes(&blocks), objects).unwrap_err(), Error::NotAGrid);
     });
+}
+
+#[test]
+fn packed_scenes_are_refused_for_what_they_are() {
+    with_triangle(|objects| {
+        let twice = [objects[0], Object::Nothing, objects[0]];
+        let instances = [Instance::new(0), Instance::new(1), Instance::new(2)];
+        let built = Built::scene(&instances, &twice, &Config::default()).unwrap();
+        let scene = built.open(&twice).unwrap();
+        let file = packed(&scene).unwrap();
+        let bytes = Block::bytes(&file);
+        let info = BlobInfo::peek(bytes).unwrap();
+        assert_eq!((info.content, info.has_mesh), (Content::Packed, true));
+        assert_eq!((info.triangle_count, info.vertex_count), (1, 1 + 3));
+        prove_packed(bytes).unwrap();
+
+        // What is nothing is hit by nothing, and stays nothing.
+        let ray = RayF64::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
+        with_packed(bytes, |opened| {
+            let opened = opened.unwrap();
+            assert_eq!(opened.intersect(&ray).map(|hit| hit.path[0]), Some(0));
+            assert!(matches!(
+                opened.objects(),
+                [Object::Grid(_), Object::Nothing, Object::Grid(_)]
+            ));
+        });
+        let nothing = [Object::Nothing];
+        let built = Built::scene(&[Instance::new(0)], &nothing, &Config::default()).unwrap();
+        assert_eq!(built.open(&nothing).unwrap().intersect(&ray), None);
+
+        // Room.
+        let open = |members: usize, objects: usize| {
+            let (mut members, mut objects) =
+                (vec![Member::EMPTY; members], vec![Object::Nothing; objects]);
+            Scene::open_packed(bytes, &mut members, &mut objects).map(|_| ())
+        };
+        open(1, 4).unwrap();
+        open(3, 9).unwrap();
+        assert_eq!(open(0, 4), Err(Error::MissingObjects { needed: 1, available: 0 }));
+        assert_eq!(open(1, 3), Err(Error::MissingObjects { needed: 4, available: 3 }));
+
+        // Scratch.
+        let (mut members, mut places) = ([Member::EMPTY; 1], [Object::Nothing; 4]);
+        let proven = Scene::open_packed_proven(bytes, &mut members, &mut places, &mut [0; 3]);
+        let (needed_bytes, available_bytes) = (4, 3);
+        let region = Region::Scratch;
+        let error = Error::OutOfMemory { region, needed_bytes, available_bytes };
+        assert_eq!(proven.unwrap_err(), error);
+
+        // Blobs of something else, and none.
+        let Object::Grid(grid) = objects[0] else { panic!("a grid") };
+        let other = |content| Some(Error::OtherContent(content));
+        let error = |blob: &[u8]| with_packed(blob, |opened| opened.err());
+        assert_eq!(error(grid.blob()), other(Content::Triangles));
+        assert_eq!(error(scene.blob()), other(Content::Instances));
+        assert_eq!(Scene::open(bytes, objects).err(), other(Content::Packed));
+        assert_eq!(Grid::open_packed(bytes).err(), other(Content::Packed));
+        assert_eq!(Grid::open(bytes, *grid.mesh()).err(), other(Content::Packed));
+        assert_eq!(error(&[]), Some(Error::NotAGrid));
+        assert_eq!(error(&bytes[32..]), Some(Error::Misaligned { region: Region::Index }));
+        for length in (128..bytes.len()).step_by(13) {
+            let (needed_bytes, available_bytes) = (bytes.len() as u64, length as u64);
+            let truncated = Error::Truncated { needed_bytes, available_bytes };
+            assert_eq!(error(&bytes[..length]), Some(truncated));
+        }
+    });
+}
+
+#[test]
+fn shapes_are_not_packed() {
+    let boxes = [[0.0, 0.0, 0.0, 1.0, 1.0, 1.0_f32]];
+    let boxes = Boxes::new(&boxes).unwrap();
+    let built = Built::shapes(boxes, &Config::default()).unwrap();
+    let shapes = Shapes::open(built.bytes(), boxes).unwrap();
+    let test = |_: u32, _: &Ray| None;
+    let objects = [Object::Shapes(&shapes, &test)];
+    let built = Built::scene(&[Instance::new(0)], &objects, &Config::default()).unwrap();
+    let scene = built.open(&objects).unwrap();
+    assert_eq!(scene.packed_bytes(), 0);
+    let error = scene.pack(Block::bytes_mut(&mut [Block::ZERO; 64])).err();
+    assert_eq!(error, Some(Error::OtherContent(Content::Shapes)));
+}
+
+#[test]
+fn an_empty_scene_is_packed_as_one() {
+    let built = Built::scene(&[], &[], &Config::default()).unwrap();
+    let file = packed(&built.open(&[]).unwrap()).unwrap();
+    prove_packed(Block::bytes(&file)).unwrap();
+    let count = with_packed(Block::bytes(&file), |opened| opened.unwrap().instance_count());
+    assert_eq!(count, 0);
 }

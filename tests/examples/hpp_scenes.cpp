@@ -71,6 +71,21 @@ void check_scenes()
     hgrid::report enough;
     CHECK(hgrid::scene::bound(3, hgrid::config(), enough) == hgrid::status::ok);
     CHECK(enough.index_bytes <= hgrid::scene_bound(3));
+    // Alone and with all that it shows; shapes stay the caller's.
+    CHECK(moved->packed_bytes() == 0 && moved->pack().error() == hgrid::status::other_content);
+    alignas(64) static unsigned char plain_index[hgrid::scene_bound(8) / 64 * 64 + 64];
+    const auto plain = hgrid::scene::build(hgrid::span<const hgrid::instance>(instances.data(), 2), objects,
+                                           hgrid::config(), hgrid::as_writable_bytes(plain_index),
+                                           hgrid::as_writable_bytes(scratch));
+    const auto packed = plain->pack();
+    CHECK(plain && packed && packed->size() == plain->packed_bytes());
+    auto views = hgrid::memory::allocate(hgrid::scene::view_bytes(*packed));
+    CHECK(views && views->size() > 0 && hgrid::scene::view_bytes(hgrid::as_bytes(scene_index)) == 0);
+    const auto whole = hgrid::scene::open_packed(*packed, *views);
+    CHECK(whole && whole->intersect(left)->t == 8);
+    CHECK(whole->instance_of(*found).translation[2] == -7 && whole->grid_of(*found).validate_bytes() > 0);
+    CHECK(hgrid::scene::open_packed(*packed, *views, hgrid::as_writable_bytes(scratch)));
+    CHECK(hgrid::peek(*packed)->content == HGRID_CONTENT_PACKED_SCENE);
     instances[0].object = 2;
     const auto refused = hgrid::scene::build(instances, objects, hgrid::config(),
                                              hgrid::as_writable_bytes(scene_index),

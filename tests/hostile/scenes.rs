@@ -1,11 +1,11 @@
 //! Damaged scenes: opening and asking end, and what `validate` accepts answers as the scene that was built.
 
-use hgrid_core::{Config, Grid, Object, RayF64, Scene, SceneHit};
+use hgrid_core::{Block, Config, Grid, Instance, Object, RayF64, Scene, SceneHit};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::meshes::ball;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
-use hgrid_tests::scenes::{Built, scattered};
+use hgrid_tests::scenes::{Built, packed, prove_packed, scattered, with_packed};
 use hgrid_tests::setting;
 
 fn rays() -> Vec<RayF64> {
@@ -78,4 +78,112 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
         let copy = Copy::of(&bytes[..length]);
         assert!(Scene::open(copy.bytes(), &objects).is_err(), "{length}");
     }
+}
+
+/// The words that a packed scene's own header has, its references, and the heads of all members.
+fn heads(bytes: &[u8]) -> Vec<usize> {
+    let mut words: Vec<usize> = (0..64).map(|word| 4 * word).collect();
+    let starts = (0..bytes.len()).step_by(64).filter(|&at| bytes[at..].starts_with(b"hgrid"));
+    words.extend(starts.flat_map(|at| (at..at + 128).step_by(4)));
+    words
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "hours")]
+fn damaged_packed_scenes_end_and_accepted_ones_answer_right() {
+    let mesh = ball(2, 1.0);
+    let owned = Owned::build(&mesh.view(), &Config::default()).unwrap();
+    let grid: Grid<'_> = owned.open(&mesh.view()).unwrap();
+    let grids = [Object::Grid(&grid), Object::Nothing];
+    let inner = Built::scene(&scattered(9, 2, 1.0, 4), &grids, &Config::default()).unwrap();
+    let inner = inner.open(&grids).unwrap();
+    let objects = [Object::Scene(&inner), Object::Grid(&grid)];
+    let instances = [Instance::new(1), Instance::new(0), Instance::new(0)];
+    let built = Built::scene(&instances, &objects, &Config::default()).unwrap();
+    let scene = built.open(&objects).unwrap();
+    let file = packed(&scene).unwrap();
+    let (rays, bytes) = (rays(), Block::bytes(&file));
+    let heads = heads(bytes);
+    let mut random = Random(setting("HGRID_SEED", 1));
+    let (mut opened, mut accepted) = (0, 0);
+    for round in 0..setting("HGRID_MUTANTS", 200_000) / 20 {
+        let mut copy = Copy::of(bytes);
+        for _ in 0..=round % 3 {
+            let anywhere = random.below(bytes.len() / 4) * 4;
+            let at = if random.below(2) == 0 { heads[random.below(heads.len())] } else { anywhere };
+            let word = match random.below(4) {
+                0 => copy.word(at) ^ 1 << random.below(32),
+                1 => copy.word(at).wrapping_add(1),
+                2 => copy.word(random.below(bytes.len() / 4) * 4),
+                _ => random.below(64) as u32,
+            };
+            copy.set_word(at, word);
+        }
+        // Headers whose sums are right are looked at.
+        if random.below(2) == 0 {
+            copy.sign();
+            for at in (64..bytes.len()).step_by(64) {
+                if copy.bytes()[at..].starts_with(b"hgrid") {
+                    let mut own = Copy::of(&copy.bytes()[at..]);
+                    own.sign();
+                    copy.set(at, own.bytes());
+                }
+            }
+        }
+        let is_opened = with_packed(copy.bytes(), |mutant| {
+            mutant.is_ok_and(|mutant| answers(&mutant, &rays).len() == rays.len())
+        });
+        opened += usize::from(is_opened);
+        if prove_packed(copy.bytes()).is_err() {
+            continue;
+        }
+        assert!(is_opened, "round {round}: proven, and not opened");
+        accepted += 1;
+        // Whatever it is, each hit lies on a triangle of its own meshes: the proof says that trees leave none out.
+        with_packed(copy.bytes(), |mutant| {
+            let mutant = mutant.unwrap();
+            for hit in rays.iter().filter_map(|ray| mutant.intersect(ray)) {
+                let Some(Object::Grid(grid)) = mutant.object_of(&hit) else { panic!("a grid") };
+                assert!(hit.primitive < grid.mesh().triangle_count(), "round {round}");
+            }
+        });
+    }
+    assert!(opened > 1000 && accepted > 10, "{opened} opened, {accepted} accepted");
+}
+
+#[test]
+fn a_packed_scene_refers_to_what_lies_before() {
+    let mesh = ball(1, 1.0);
+    let owned = Owned::build(&mesh.view(), &Config::default()).unwrap();
+    let grid: Grid<'_> = owned.open(&mesh.view()).unwrap();
+    let grids = [Object::Grid(&grid)];
+    let inner = Built::scene(&[Instance::new(0)], &grids, &Config::default()).unwrap();
+    let inner = inner.open(&grids).unwrap();
+    let objects = [Object::Scene(&inner)];
+    let built = Built::scene(&[Instance::new(0)], &objects, &Config::default()).unwrap();
+    let file = packed(&built.open(&objects).unwrap()).unwrap();
+    let bytes = Block::bytes(&file);
+    prove_packed(bytes).unwrap();
+    // The inner scene shows member 0, the outer one member 1; behind them there is nothing but padding.
+    let with = |at: usize, word: u32| {
+        let mut copy = Copy::of(bytes);
+        copy.set_word(at, word);
+        with_packed(copy.bytes(), |opened| opened.map(|_| ()))
+    };
+    let damaged = Err(hgrid_core::Error::Corrupt { offset: 32 });
+    assert_eq!((with(128, 0), with(132, 1)), (Ok(()), Ok(())));
+    // Itself, what comes later, what there is not, and something in the padding.
+    assert_eq!(
+        (with(128, 1), with(128, 2), with(132, 2), with(132, 9)),
+        (damaged, damaged, damaged, damaged)
+    );
+    assert_eq!(with(136, 1), damaged);
+    // The outer scene, put in place of the inner one, and a grid in place of a scene.
+    assert_eq!(with(132, 0), Ok(()));
+    let mut copy = Copy::of(bytes);
+    copy.set_word(132, 0);
+    assert!(
+        prove_packed(copy.bytes()).is_err(),
+        "the box of a ball is that of the scene around it"
+    );
 }

@@ -1,10 +1,10 @@
 //! Scenes: every size of both regions, with canaries around them.
 
-use hgrid_core::{Config, Error, Grid, Object, Region, Scene};
+use hgrid_core::{Block, Config, Error, Grid, Instance, Object, Region, Scene};
 use hgrid_tests::guarded::Guarded;
 use hgrid_tests::meshes::ball;
 use hgrid_tests::owned::Owned;
-use hgrid_tests::scenes::{Built, scattered};
+use hgrid_tests::scenes::{Built, packed, scattered};
 
 #[test]
 fn scenes_take_what_they_ask_for_and_no_byte_beside_it() {
@@ -53,4 +53,32 @@ fn scenes_take_what_they_ask_for_and_no_byte_beside_it() {
             }
         }
     }
+}
+
+#[test]
+fn packed_scenes_take_what_they_ask_for_and_no_byte_beside_it() {
+    let mesh = ball(3, 1.0);
+    let owned = Owned::build(&mesh.view(), &Config::default()).unwrap();
+    let grid: Grid<'_> = owned.open(&mesh.view()).unwrap();
+    let grids = [Object::Grid(&grid), Object::Nothing];
+    let inner = Built::scene(&scattered(9, 2, 3.0, 4), &grids, &Config::default()).unwrap();
+    let inner = inner.open(&grids).unwrap();
+    let objects = [Object::Scene(&inner), Object::Grid(&grid)];
+    let instances = [Instance::new(1), Instance::new(0)];
+    let built = Built::scene(&instances, &objects, &Config::default()).unwrap();
+    let scene = built.open(&objects).unwrap();
+    let file = packed(&scene).unwrap();
+    let exact = scene.packed_bytes() as usize;
+    for bytes in (0..exact + 200).step_by(7).chain([exact - 1, exact, exact + 1]) {
+        let mut to = Guarded::new(bytes);
+        let result = scene.pack(to.region()).map(|bytes| assert!(bytes == Block::bytes(&file)));
+        assert!(to.around_is_intact());
+        let (needed_bytes, available_bytes) = (exact as u64, bytes as u64);
+        let region = Region::Index;
+        let error = Error::OutOfMemory { region, needed_bytes, available_bytes };
+        assert_eq!(result, if bytes < exact { Err(error) } else { Ok(()) });
+    }
+    assert_eq!(scene.pack(&mut Guarded::new(exact + 64).region()[32..]).err(), {
+        Some(Error::Misaligned { region: Region::Index })
+    });
 }

@@ -1,6 +1,8 @@
 //! Scenes and trees of shapes with the memory they live in, and instances to put into them.
 
-use hgrid_core::{Block, Boxes, Config, Error, Instance, Object, Scene, Shapes, Sizes};
+use hgrid_core::{
+    BlobInfo, Block, Boxes, Config, Error, Instance, Member, Object, Scene, Shapes, Sizes,
+};
 
 use crate::random::Random;
 
@@ -64,6 +66,41 @@ impl Built {
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         Block::bytes_mut(&mut self.index)
     }
+}
+
+/// A scene with all that it shows, in memory of just the size.
+///
+/// # Errors
+/// Those of packing.
+pub fn packed(scene: &Scene<'_>) -> Result<Vec<Block>, Error> {
+    let bytes = usize::try_from(scene.packed_bytes()).expect("not so many");
+    let mut blocks = vec![Block::ZERO; Block::count_for(bytes)];
+    let length = scene.pack(Block::bytes_mut(&mut blocks))?.len();
+    assert_eq!(length, bytes);
+    Ok(blocks)
+}
+
+/// Room for a packed scene, by its header; not more than a test has.
+fn room<'a>(blob: &[u8]) -> (Vec<Member<'a>>, Vec<Object<'a>>) {
+    let (members, objects) = BlobInfo::peek(blob)
+        .map_or((0, 0), |info| (info.triangle_count as usize, info.vertex_count as usize));
+    (vec![Member::EMPTY; members.min(1000)], vec![Object::Nothing; objects.min(1000)])
+}
+
+/// Opens a packed scene in room of just the size.
+pub fn with_packed<T>(blob: &[u8], run: impl FnOnce(Result<Scene<'_>, Error>) -> T) -> T {
+    let (mut members, mut objects) = room(blob);
+    run(Scene::open_packed(blob, &mut members, &mut objects))
+}
+
+/// Proves a packed scene, in as much scratch as is enough.
+///
+/// # Errors
+/// Those of opening and of the proofs.
+pub fn prove_packed(blob: &[u8]) -> Result<(), Error> {
+    let (mut members, mut objects) = room(blob);
+    let mut scratch = vec![0xa5; blob.len() / 64];
+    Scene::open_packed_proven(blob, &mut members, &mut objects, &mut scratch).map(|_| ())
 }
 
 /// A matrix of some kind: a rotation, a mirror, a scale that is not the same on all axes, a shear.

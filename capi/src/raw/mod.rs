@@ -37,8 +37,9 @@ use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 pub(crate) use ask::{Arrays, batch, closest, locate, query, query_all, surface};
 pub(crate) use join::{join, parts_of};
 pub(crate) use scene::{
-    build_scene, build_shapes, open_scene, open_shapes, query_scene, query_shapes, refit_scene,
-    refit_shapes, scene, scene_normal, shapes, validate_scene, validate_shapes, write_object,
+    build_scene, build_shapes, open_packed_scene, open_scene, open_shapes, pack_scene, query_scene,
+    query_shapes, refit_scene, refit_shapes, scene, scene_locate, scene_normal, shapes,
+    validate_scene, validate_shapes, write_object,
 };
 
 use crate::input::Input;

@@ -3,16 +3,19 @@
 //! "The caller's promise" is the contract at the head of the module above.
 
 use core::ffi::c_void;
+use core::mem::MaybeUninit;
 use core::ptr::NonNull;
 use core::slice;
 
 use hgrid_core::{
-    Boxes, Counters, Cull, Hit, Instance, Object, ObjectTest, QueryOptions, Ray, Scene, SceneHit,
-    SceneOptions, ShapeHit, Shapes, Sizes, Verdict,
+    ALIGNMENT, BlobInfo, Boxes, Content, Counters, Cull, Hit, Instance, Member, Object, ObjectTest,
+    QueryOptions, Ray, Scene, SceneHit, SceneOptions, ShapeHit, Shapes, Sizes, Verdict,
 };
 
 use super::ask::{add, all_options};
-use super::{bytes, bytes_mut, config, read, read_sized, strided, write};
+use super::{
+    bytes, bytes_mut, config, read, read_sized, shares, span_of, strided, write, write_grid,
+};
 use crate::input::controlled;
 use crate::questions::{
     hgrid_counters, hgrid_query_options, hgrid_ray, hgrid_refit_report, verdict,
@@ -23,11 +26,12 @@ use crate::scene::{
 use crate::shapes::{hgrid_boxes, hgrid_shape_hit, hgrid_shapes};
 use crate::span::{Region, Span};
 use crate::status::{
-    HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_POSITIONS, HGRID_ERROR_NOT_A_GRID,
-    HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP, HGRID_ERROR_STRUCT_SIZE,
+    HGRID_ERROR_INDEX_TOO_SMALL, HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_POSITIONS,
+    HGRID_ERROR_MISALIGNED, HGRID_ERROR_NOT_A_GRID, HGRID_ERROR_NULL_ARGUMENT,
+    HGRID_ERROR_OTHER_CONTENT, HGRID_ERROR_OVERLAP, HGRID_ERROR_STRUCT_SIZE,
     HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
 };
-use crate::types::{Elements, hgrid_config, hgrid_report};
+use crate::types::{Elements, hgrid_config, hgrid_grid, hgrid_report};
 
 /// The test of [`hgrid_boxes`].
 type ShapeTest =
@@ -443,6 +447,119 @@ pub(crate) unsafe fn validate_scene(
     scene.validate(scratch).map_err(status_of)
 }
 
+/// Returns true if a scene reads something that lies in a span.
+fn reads(scene: &Scene<'_>, span: Span) -> bool {
+    let objects = scene.objects();
+    let array = Span::new(objects.as_ptr().cast(), size_of_val(objects));
+    let has = |object: &Object<'_>| match object {
+        Object::Grid(grid) => span_of(grid.blob()).overlaps(span) || shares(grid.mesh(), span),
+        Object::Scene(inner) => reads(inner, span),
+        Object::Shapes(..) | Object::Nothing => false,
+    };
+    span_of(scene.blob()).overlaps(span) || array.overlaps(span) || objects.iter().any(has)
+}
+
+/// Writes a scene and all that it shows.
+///
+/// # Safety
+/// That of [`scene`].
+pub(crate) unsafe fn pack_scene(
+    view: *const hgrid_scene,
+    to: Region,
+    size: NonNull<u64>,
+) -> Result<(), hgrid_status> {
+    // SAFETY: this function's contract.
+    let scene = unsafe { scene(view) }?;
+    if !to.span().is_empty() && reads(scene, to.span()) {
+        return Err(HGRID_ERROR_OVERLAP);
+    }
+    // SAFETY: the caller's promise; nothing else that this call reads lies there.
+    let to = unsafe { bytes_mut(to.start, to.bytes) }?;
+    let packed = scene.pack(to).map(|_| ()).map_err(status_of);
+    if matches!(packed, Ok(()) | Err(HGRID_ERROR_INDEX_TOO_SMALL)) {
+        // SAFETY: the caller's promise.
+        unsafe { write(size, scene.packed_bytes()) };
+    }
+    packed
+}
+
+/// Opens a scene with all that it shows, and proves it if there is scratch.
+///
+/// # Safety
+/// The caller's promise.
+pub(crate) unsafe fn open_packed_scene(
+    blob: (*const c_void, usize),
+    [views, scratch]: [Region; 2],
+    size: NonNull<u64>,
+    to: NonNull<hgrid_scene>,
+) -> Result<(), hgrid_status> {
+    let is_proven = !scratch.start.is_null();
+    let span = Span::new(blob.0, blob.1);
+    // SAFETY: the caller's promise.
+    let blob = unsafe { bytes(blob.0, blob.1) }?;
+    let is_aligned =
+        |bytes: &[u8]| bytes.is_empty() || bytes.as_ptr().addr().is_multiple_of(ALIGNMENT);
+    if !is_aligned(blob) {
+        return Err(HGRID_ERROR_MISALIGNED);
+    }
+    let info = BlobInfo::peek(blob).map_err(status_of)?;
+    if info.content != Content::Packed {
+        return Err(HGRID_ERROR_OTHER_CONTENT);
+    }
+    // SAFETY: the caller's promise.
+    let [room, scratch] = unsafe { apart([span], [views, scratch]) }?;
+    if !is_aligned(room) {
+        return Err(HGRID_ERROR_MISALIGNED);
+    }
+    let member_bytes = u64::from(info.triangle_count) * size_of::<Member<'_>>() as u64;
+    let object_bytes = info.vertex_count.saturating_mul(size_of::<Object<'_>>() as u64);
+    let needed = member_bytes.saturating_add(object_bytes);
+    if (room.len() as u64) < needed {
+        // SAFETY: the caller's promise.
+        unsafe { write(size, needed) };
+        return Err(HGRID_ERROR_INDEX_TOO_SMALL);
+    }
+    // No more than there are bytes.
+    let (members, objects) =
+        (info.triangle_count as usize, usize::try_from(info.vertex_count).unwrap_or(0));
+    let behind = views.start.wrapping_byte_add(members * size_of::<Member<'_>>());
+    // SAFETY: so many fit, from an aligned start, and nothing else lies there.
+    let members = unsafe { room_of(views.start, members, Member::EMPTY) };
+    // SAFETY: the same; a member is a multiple of what objects are aligned to.
+    let objects = unsafe { room_of(behind, objects, Object::Nothing) };
+    let opened = if is_proven {
+        Scene::open_packed_proven(blob, members, objects, scratch)
+    } else {
+        Scene::open_packed(blob, members, objects)
+    };
+    let opened = opened.map_err(status_of)?;
+    // SAFETY: the caller's promise.
+    unsafe { write(size, needed) };
+    // SAFETY: the caller's promise.
+    unsafe { write_scene(to, &opened) };
+    Ok(())
+}
+
+/// An array in memory that may hold anything, each element made empty.
+///
+/// # Safety
+/// There is room for so many, aligned, and nobody else uses it.
+unsafe fn room_of<T: Copy>(start: *mut c_void, count: usize, empty: T) -> &'static mut [T] {
+    if count == 0 {
+        return &mut [];
+    }
+    // SAFETY: this function's contract.
+    let places = unsafe { slice::from_raw_parts_mut(start.cast::<MaybeUninit<T>>(), count) };
+    for place in places {
+        place.write(empty);
+    }
+    // SAFETY: the same, and all of them were written.
+    unsafe { slice::from_raw_parts_mut(start.cast::<T>(), count) }
+}
+
+const _: () = assert!(align_of::<Member<'_>>() <= ALIGNMENT);
+const _: () = assert!(align_of::<Object<'_>>() <= align_of::<Member<'_>>());
+
 /// Asks a scene for the closest hit or any.
 ///
 /// # Safety
@@ -513,4 +630,35 @@ pub(crate) unsafe fn scene_normal(
     // SAFETY: the caller's promise: three of them.
     let normal = unsafe { read(object_normal.cast::<[f32; 3]>()) }?;
     Ok(scene.normal_of(&hit, normal))
+}
+
+/// Writes the instance and the grid that a hit names.
+///
+/// # Safety
+/// That of [`scene`].
+pub(crate) unsafe fn scene_locate(
+    view: *const hgrid_scene,
+    hit: *const hgrid_scene_hit,
+    (to_instance, to_grid): (Option<NonNull<hgrid_instance>>, Option<NonNull<hgrid_grid>>),
+) -> Result<Option<()>, hgrid_status> {
+    // SAFETY: this function's contract.
+    let scene = unsafe { scene(view) }?;
+    // SAFETY: the caller's promise.
+    let hit: SceneHit = unsafe { read(hit) }?.into();
+    let (Some(instance), Some(object)) = (scene.instance_of(&hit), scene.object_of(&hit)) else {
+        return Ok(None);
+    };
+    if let Some(to) = to_instance {
+        // SAFETY: the caller's promise; the two are laid out the same.
+        unsafe { write(to.cast(), instance) };
+    }
+    if let Some(to) = to_grid {
+        match object {
+            // SAFETY: the caller's promise.
+            Object::Grid(grid) => unsafe { write_grid(to, grid) },
+            // SAFETY: the caller's promise.
+            _ => unsafe { write(to, hgrid_grid::NONE) },
+        }
+    }
+    Ok(Some(()))
 }

@@ -42,7 +42,7 @@ impl<F: Fn(u32, &Ray) -> Option<ShapeHit> + Sync> ObjectTest for F {
 }
 
 /// What an instance shows.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub enum Object<'a> {
     /// A grid of triangles, by any method.
     Grid(&'a Grid<'a>),
@@ -50,6 +50,9 @@ pub enum Object<'a> {
     Shapes(&'a Shapes<'a>, &'a dyn ObjectTest),
     /// A scene.
     Scene(&'a Scene<'a>),
+    /// Nothing that a ray could hit: an object that is not there yet.
+    #[default]
+    Nothing,
 }
 
 impl fmt::Debug for Object<'_> {
@@ -60,6 +63,7 @@ impl fmt::Debug for Object<'_> {
                 f.debug_tuple("Shapes").field(shapes).finish_non_exhaustive()
             }
             Self::Scene(scene) => scene.fmt(f),
+            Self::Nothing => f.write_str("Nothing"),
         }
     }
 }
@@ -71,6 +75,7 @@ impl Object<'_> {
             Self::Grid(grid) => grid.bounds(),
             Self::Shapes(shapes, _) => shapes.bounds(),
             Self::Scene(scene) => scene.bounds(),
+            Self::Nothing => ([0.0; 3], [0.0; 3]),
         }
     }
 
@@ -120,6 +125,8 @@ pub struct Scene<'a> {
     objects: &'a [Object<'a>],
     /// Scenes inside one another, this one included.
     levels: usize,
+    /// One more than the largest number of an object that an instance has.
+    pub(crate) object_count: u32,
 }
 
 impl fmt::Debug for Scene<'_> {
@@ -188,6 +195,13 @@ impl<'a> Scene<'a> {
             }
         }
         None
+    }
+
+    /// The instance that shows the object that a hit names, the innermost one, as [`instance`](Self::instance) gives it.
+    #[must_use]
+    pub fn instance_of(&self, hit: &SceneHit) -> Option<Instance> {
+        let (scene, number) = self.holder(hit)?;
+        scene.instances.get(number)?.instance()
     }
 
     /// The object that a hit names: the grid or the shapes at the end of its path.

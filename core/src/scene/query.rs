@@ -357,7 +357,7 @@ impl Offered<'_, '_> {
                     shapes.intersect_with(&inside, &mut options, &mut test)
                 }
             }
-            Object::Scene(_) => None,
+            Object::Scene(_) | Object::Nothing => None,
         }?;
         Some(outward(&hit))
     }

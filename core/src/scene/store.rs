@@ -232,7 +232,16 @@ impl<'a> Scene<'a> {
             });
         }
         let levels = levels_over(objects)?;
-        Ok(Self { blob, tree, instances, objects, levels })
+        let object_count = table.object_count;
+        Ok(Self { blob, tree, instances, objects, levels, object_count })
+    }
+
+    /// How many objects a scene takes, from its bytes.
+    pub(crate) fn named_in(blob: &[u8]) -> Result<usize, Error> {
+        let (start, _) = ends_of(&Header::peek(blob)?);
+        let table = usize::try_from(start).ok().and_then(|start| blob.get(start..)?.first_chunk());
+        let count = table.map(|bytes: &[u8; 4]| u32::from_ne_bytes(*bytes));
+        Ok(count.ok_or(corrupt(offset_of!(Header, triangle_count)))? as usize)
     }
 
     /// Proves that the scene is one of its objects: the tree, and the box of every instance.

@@ -127,6 +127,8 @@ impl Caller<'_> {
             triangle_count: 7,
             grid_bytes: 7,
             total_bytes: 7,
+            content: 7,
+            reserved: 7,
         };
         let mut info = Struct::new(u, info)?;
         let from = if copy.bytes().is_empty() { null() } else { copy.bytes().as_ptr() };
@@ -145,6 +147,7 @@ impl Caller<'_> {
                 let sizes = [found.vertex_count, found.grid_bytes, found.total_bytes];
                 assert_eq!(sizes, [core.vertex_count, core.grid_bytes, core.total_bytes]);
                 assert_eq!([found.version, found.has_mesh], [core.version, core.has_mesh.into()]);
+                assert_eq!([found.content, found.reserved], [core.content as u32, 0]);
             }
         }
         Ok(())

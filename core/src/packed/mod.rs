@@ -13,6 +13,8 @@
 //! [`TriangleMesh::locate`] answers as before.
 //! Opening reads it where it lies, so there is still no copy and no allocation.
 
+mod scene;
+
 use core::mem::offset_of;
 
 use crate::arena::{align_up, check_alignment, section_bytes};
@@ -23,6 +25,7 @@ use crate::limits::{ALIGNMENT, MAX_TRIANGLES};
 use crate::mesh::{IndexType, Strided, TriangleMesh};
 use crate::method::{Content, Method};
 use crate::scene::ends_of;
+pub use scene::Member;
 
 /// What the header of a blob says, whether or not the rest of it is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,15 +36,16 @@ pub struct BlobInfo {
     pub content: Content,
     /// What built it.
     pub method: Method,
-    /// Whether it is packed: the mesh is in it.
+    /// Whether it is packed: the mesh, or all that a scene shows, is in it.
     pub has_mesh: bool,
-    /// Vertices of its mesh; twice the number of shapes or instances.
+    /// Vertices of its mesh; twice the number of shapes or instances; of a packed scene, the objects that
+    /// [`Scene::open_packed`](crate::Scene::open_packed) takes room for.
     pub vertex_count: u64,
-    /// Triangles of its mesh; shapes or instances.
+    /// Triangles of its mesh; shapes or instances; grids and scenes that a packed scene shows.
     pub triangle_count: u32,
     /// Bytes of the grid.
     pub grid_bytes: u64,
-    /// Bytes of all of it: of the grid, and of the mesh if that is in it.
+    /// Bytes of all of it: of the grid, and of what is packed with it.
     pub total_bytes: u64,
 }
 
@@ -75,6 +79,7 @@ impl BlobInfo {
         let total_bytes = match content {
             Content::Instances => ends_of(&header).1,
             Content::Triangles | Content::Shapes => Sections::of(&header)?.end,
+            Content::Packed => header.blob_bytes,
         };
         let Header { vertex_count, triangle_count, blob_bytes: grid_bytes, .. } = header;
         Ok(Self {
@@ -282,12 +287,12 @@ impl<'a> Grid<'a> {
 }
 
 /// Bytes to be written, from the front to the back.
-struct Out<'t> {
-    bytes: &'t mut [u8],
+pub(crate) struct Out<'t> {
+    pub(crate) bytes: &'t mut [u8],
 }
 
 impl Out<'_> {
-    fn put(&mut self, bytes: &[u8]) {
+    pub(crate) fn put(&mut self, bytes: &[u8]) {
         let rest = core::mem::take(&mut self.bytes);
         if let Some((to, rest)) = rest.split_at_mut_checked(bytes.len()) {
             to.copy_from_slice(bytes);
@@ -296,7 +301,7 @@ impl Out<'_> {
     }
 
     /// Writes zeros up to the next section: the end is a multiple of [`ALIGNMENT`].
-    fn pad(&mut self) {
+    pub(crate) fn pad(&mut self) {
         let padding = self.bytes.len() % ALIGNMENT;
         self.put([0; ALIGNMENT].get(..padding).unwrap_or_default());
     }
