@@ -1,9 +1,10 @@
-//! A moving mesh, built anew for every frame: the `animate` command.
+//! A moving mesh, built anew or refitted for every frame: the `animate` command.
 //!
 //! Every vertex swings along its normal, as far as a wave says that travels through the mesh and is
 //! back where it was after the last frame. Each frame is what a game does: move the vertices, build
 //! into the same memory, trace all rays in tiles. What a frame of the mesh needs is asked once,
-//! before the first one, and once more only if a later frame needs more.
+//! before the first one, and once more only if a later frame needs more. A field of instances is a scene over
+//! the grid, which is built, or refitted, after it.
 
 use core::f64::consts::TAU;
 use core::fmt;
@@ -13,11 +14,13 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use anyhow::{Context as _, Result};
-use hgrid_core::{Config, Grid, Hit, TriangleMesh};
+use anyhow::{Context as _, Result, ensure};
+use hgrid_core::{Config, Grid, Hit, Method, Object, Ray, Scene as Instances, TriangleMesh, refit};
 use serde::Serialize;
 
+use crate::camera::Up;
 use crate::cli::AnimateArgs;
+use crate::field::{self, Field, Memory};
 use crate::image;
 use crate::measure::median;
 use crate::progress::Progress;
@@ -43,7 +46,15 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
             .with_context(|| format!("cannot write into `{}`", folder.display()))?;
     }
     let scene = Scene::load(&args.scene)?;
-    let tiles = args.picture.tiles(&scene)?;
+    let is_tree = args.method == Method::Bvh;
+    ensure!(is_tree || args.instances == 0, "--instances is for bvh: scenes are trees");
+    ensure!(is_tree || !args.refit, "--refit is for bvh");
+    let up = args.picture.up.unwrap_or_else(|| Up::of(&scene));
+    let field = Field::new(scene.framed_bounds(), args.instances, up);
+    let field = (args.instances > 0).then_some(field);
+    let focus = field.map(|field| field.bounds()).or(scene.focus);
+    let shown = Scene { focus, is_z_up: Some(up == Up::Z), ..scene.clone() };
+    let tiles = args.picture.tiles(&shown)?;
     let config = args.tuning.config(args.method);
     let threads = Threads::new(args.threads)?;
     let mut progress = Progress::new("frames", args.frames.into());
@@ -51,7 +62,8 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
         Some(folder) => write_frame(folder, frame, args.picture.size, pixels),
         None => Ok(()),
     };
-    let plan = Plan { frames: args.frames, config, tiles, threads: &threads };
+    let is_refitted = args.refit;
+    let plan = Plan { frames: args.frames, config, tiles, threads: &threads, field, is_refitted };
     let report = animate(&scene, &plan, write, &mut progress)
         .with_context(|| format!("cannot animate `{}`", args.scene))?;
     drop(progress);
@@ -79,13 +91,19 @@ struct Plan<'a> {
     config: Config,
     tiles: Tiles,
     threads: &'a Threads,
+    /// Where instances of the mesh stand, if there are any.
+    field: Option<Field>,
+    /// Refit instead of building, from the second frame on.
+    is_refitted: bool,
 }
 
 /// The times of a frame in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Frame {
-    /// Building, in memory that is there.
+    /// Building the mesh's grid, or refitting it, in memory that is there.
     pub build_ms: f64,
+    /// The same for the scene of its instances; 0 without.
+    pub scene_ms: f64,
     /// Tracing and shading every pixel.
     pub render_ms: f64,
     /// Moving the vertices, building and rendering.
@@ -99,6 +117,10 @@ pub struct Report {
     pub scene: String,
     /// Its triangles.
     pub triangles: usize,
+    /// Moving instances of it; 0 if it is shown where it is.
+    pub instances: u32,
+    /// Whether later frames are refitted, not built.
+    pub is_refitted: bool,
     /// The method's name.
     pub method: &'static str,
     /// Threads that build, if the method is built in parallel, and render.
@@ -118,20 +140,25 @@ pub struct Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scene, triangles, method, threads, size, .. } = self;
+        let Self { scene, triangles, instances, method, threads, size, .. } = self;
+        write!(f, "{scene}: {triangles} triangles, ")?;
+        if *instances > 0 {
+            write!(f, "{instances} instances, ")?;
+        }
+        let (refitted, plural) = (
+            if self.is_refitted { ", refitted" } else { "" },
+            if *threads == 1 { "" } else { "s" },
+        );
+        writeln!(f, "{method}{refitted}, {size} x {size} pixels, {threads} thread{plural}\n")?;
         writeln!(
             f,
-            "{scene}: {triangles} triangles, {method}, {size} x {size} pixels, {threads} thread{}\n",
-            if *threads == 1 { "" } else { "s" }
-        )?;
-        writeln!(
-            f,
-            "{:>6}  {:>10}  {:>11}  {:>10}",
-            "frame", "build (ms)", "render (ms)", "all (ms)"
+            "{:>6}  {:>10}  {:>10}  {:>11}  {:>10}",
+            "frame", "build (ms)", "scene (ms)", "render (ms)", "all (ms)"
         )?;
         let mut row = |name: &str, frame: &Frame| {
-            let Frame { build_ms, render_ms, frame_ms } = frame;
-            writeln!(f, "{name:>6}  {build_ms:>10.2}  {render_ms:>11.2}  {frame_ms:>10.2}")
+            let Frame { build_ms, scene_ms, render_ms, frame_ms } = frame;
+            write!(f, "{name:>6}  {build_ms:>10.2}  {scene_ms:>10.2}")?;
+            writeln!(f, "  {render_ms:>11.2}  {frame_ms:>10.2}")
         };
         for (number, frame) in self.frames.iter().enumerate() {
             row(&number.to_string(), frame)?;
@@ -157,6 +184,12 @@ fn animate(
     let mut positions = scene.positions.clone();
     let mut pixels = vec![[0; 3]; plan.tiles.pixels()];
     let mut kept = None;
+    let instances = plan.field.map_or(0, |field| field.count());
+    let mut memory = Memory::new(
+        instances,
+        &Config { method: Method::Bvh, ..plan.config },
+        plan.threads.count(),
+    )?;
     let (mut frames, mut index_bytes, mut grown) = (Vec::new(), 0, 0);
     for number in 0..plan.frames {
         let start = Instant::now();
@@ -168,15 +201,36 @@ fn animate(
         };
 
         let building = Instant::now();
-        grown += plan.threads.parallel(|all| regions.rebuild(mesh, &plan.config, all))?;
+        let is_refitted = plan.is_refitted && number > 0;
+        if is_refitted {
+            refit(&mut regions.index, &mesh)?;
+        } else {
+            grown += plan.threads.parallel(|all| regions.rebuild(mesh, &plan.config, all))?;
+        }
         let build_ms = milliseconds(building);
 
         let grid = Grid::open(&regions.index, mesh)?;
         index_bytes = index_bytes.max(grid.blob_bytes());
+        let placing = Instant::now();
+        let objects = [Object::Grid(&grid)];
+        let field = match &plan.field {
+            Some(field) => {
+                let instances = field.instances(f64::from(number) / f64::from(plan.frames));
+                Some(if is_refitted {
+                    memory.refit(&instances, &objects)?
+                } else {
+                    plan.threads
+                        .parallel(|all| memory.build(&instances, &objects, &plan.config, all))?
+                })
+            }
+            None => None,
+        };
+        let scene_ms = field.map_or(0.0, |_| milliseconds(placing));
         let rendering = Instant::now();
-        render(&grid, plan, &mut pixels);
+        render(&grid, field.as_ref(), plan, &mut pixels);
         frames.push(Frame {
             build_ms,
+            scene_ms,
             render_ms: milliseconds(rendering),
             frame_ms: milliseconds(start),
         });
@@ -188,6 +242,8 @@ fn animate(
     Ok(Report {
         scene: scene.name.clone(),
         triangles: scene.indices.len(),
+        instances,
+        is_refitted: plan.is_refitted,
         method: plan.config.method.name(),
         threads: plan.threads.count(),
         size: plan.tiles.size,
@@ -195,6 +251,7 @@ fn animate(
         index_bytes,
         median: Frame {
             build_ms: middle(|frame| frame.build_ms),
+            scene_ms: middle(|frame| frame.scene_ms),
             render_ms: middle(|frame| frame.render_ms),
             frame_ms: middle(|frame| frame.frame_ms),
         },
@@ -208,13 +265,16 @@ fn milliseconds(start: Instant) -> f64 {
 
 /// Traces and shades all pixels, a band of tiles at a time.
 #[expect(clippy::cast_possible_truncation, reason = "fewer bands than pixels of a side")]
-fn render(grid: &Grid<'_>, plan: &Plan<'_>, pixels: &mut [Rgb]) {
+fn render(grid: &Grid<'_>, field: Option<&Instances<'_>>, plan: &Plan<'_>, pixels: &mut [Rgb]) {
     let shader = Shader::new(*grid.mesh(), &plan.tiles.camera);
     let bands: Vec<_> = plan.tiles.bands(pixels).map(Mutex::new).collect();
     plan.threads.each(bands.len() as u32, |at| {
         let Some(Ok(mut band)) = bands.get(at as usize).map(|band| band.lock()) else { return };
         let mut hits = [Hit::MISS; TILE_RAYS];
-        band.fill(|rays, colors| {
+        band.fill(|rays: &[Ray], colors: &mut [Rgb]| {
+            if let Some(field) = field {
+                return field::shade(field, &plan.tiles.camera, rays, colors);
+            }
             let hits = &mut hits[..rays.len()];
             intersect(grid, rays, hits);
             shader.diffuse(rays, hits, colors);
@@ -279,11 +339,25 @@ mod tests {
     use crate::camera::{Camera, Up, View};
 
     fn film(method: Method, threads: u32, frames: u32) -> (Report, Vec<Vec<Rgb>>) {
+        film_of(method, threads, frames, 0, false)
+    }
+
+    fn film_of(
+        method: Method,
+        threads: u32,
+        frames: u32,
+        instances: u32,
+        is_refitted: bool,
+    ) -> (Report, Vec<Vec<Rgb>>) {
         let scene = Scene::load("procedural:knot:3000").unwrap();
-        let camera = Camera::framing(scene.framed_bounds(), View::Front, Up::Y);
+        let field = Field::new(scene.framed_bounds(), instances, Up::Y);
+        let field = (instances > 0).then_some(field);
+        let bounds = field.map_or_else(|| scene.framed_bounds(), |field| field.bounds());
+        let camera = Camera::framing(bounds, View::ThreeQuarter, Up::Y);
         let threads = Threads::new(threads).unwrap();
         let config = Config::new(method);
-        let plan = Plan { frames, config, tiles: Tiles { camera, size: 37 }, threads: &threads };
+        let tiles = Tiles { camera, size: 37 };
+        let plan = Plan { frames, config, tiles, threads: &threads, field, is_refitted };
         let mut pictures = Vec::new();
         let show = |number: u32, pixels: &[Rgb]| {
             assert_eq!(number as usize, pictures.len());
@@ -301,6 +375,17 @@ mod tests {
         for (method, threads) in [(Method::Bvh, 3), (Method::OneLevel, 1), (Method::Fixed, 2)] {
             assert!(film(method, threads, 4).1 == expected, "{method:?}, {threads} threads");
         }
+    }
+
+    #[test]
+    fn instances_move_and_a_refit_shows_the_same() {
+        let (report, expected) = film_of(Method::Bvh, 1, 4, 9, false);
+        assert!(expected.windows(2).all(|pair| pair[0] != pair[1]));
+        assert_eq!(report.instances, 9);
+        assert!(report.frames.iter().all(|frame| frame.scene_ms > 0.0));
+        assert!(report.to_string().contains("9 instances"));
+        assert!(film_of(Method::Bvh, 2, 4, 9, true).1 == expected);
+        assert!(film_of(Method::Bvh, 1, 4, 0, true).1 == film(Method::Bvh, 1, 4).1);
     }
 
     #[test]
@@ -348,7 +433,8 @@ mod tests {
         let camera = Camera::framing(scene.framed_bounds(), View::Front, Up::Y);
         let threads = Threads::new(1).unwrap();
         let config = Config::new(Method::Bvh);
-        let plan = Plan { frames: 2, config, tiles: Tiles { camera, size: 3 }, threads: &threads };
+        let (tiles, field) = (Tiles { camera, size: 3 }, None);
+        let plan = Plan { frames: 2, config, tiles, threads: &threads, field, is_refitted: false };
         let report = animate(&scene, &plan, |_, _| Ok(()), &mut Progress::new("", 0)).unwrap();
         assert_eq!(report.frames.len(), 2);
     }

@@ -84,7 +84,7 @@ pub enum Command {
     /// Measures and draws the paper's figures: times against density, and bars for every method
     #[command(after_help = [FIGURES_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Figures(FiguresArgs),
-    /// Deforms a mesh and builds and renders it again for every frame, in the same memory
+    /// Deforms a mesh, or moves instances of it, and builds and renders it again for every frame, in the same memory
     #[command(after_help = [ANIMATE_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Animate(AnimateArgs),
     /// Measures every method and other ray tracers, its peers, over the same rays
@@ -152,6 +152,13 @@ pub struct AnimateArgs {
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub tuning: Tuning,
+    /// Show a field of so many moving instances of the mesh, in a scene that is built for every frame, too
+    #[arg(long, value_name = "NUMBER", default_value_t = 0,
+          value_parser = clap::value_parser!(u32).range(..=10_000_000))]
+    pub instances: u32,
+    /// From the second frame on, give the trees of the first one their new boxes, for `bvh`
+    #[arg(long)]
+    pub refit: bool,
     /// Threads that build, for `bvh`, and render
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = thread_parser())]
     pub threads: u32,

@@ -8,7 +8,7 @@
 //!       -> pack: grid and mesh in a file; info and validate look at such files
 //!       -> measure (hgrid_core::Grid, tiles, shade) -> table: the paper's Table 1
 //!                                                   '-> figures: its charts, by plot
-//!       -> animate: the mesh deformed, built and rendered frame after frame
+//!       -> animate: the mesh deformed, built and rendered frame after frame, alone or as a field of instances
 //!       -> compare: hgrid and other structures, over the same rays
 //! results in JSON -> pages: the tables and charts of README.md and docs/
 //! ```
@@ -22,6 +22,7 @@ pub mod blob;
 pub mod camera;
 pub mod cli;
 pub mod compare;
+pub mod field;
 pub mod figures;
 pub mod heat;
 pub mod image;

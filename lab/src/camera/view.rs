@@ -38,7 +38,7 @@ impl Up {
     }
 
     /// A vector of the scene, turned so that y is up.
-    pub(super) fn turned(self, [x, y, z]: Vector) -> Vector {
+    pub(crate) fn turned(self, [x, y, z]: Vector) -> Vector {
         match self {
             Self::Y => [x, y, z],
             Self::Z => [x, z, -y],
@@ -46,7 +46,7 @@ impl Up {
     }
 
     /// The vector of the scene that was turned.
-    pub(super) fn turned_back(self, [x, y, z]: Vector) -> Vector {
+    pub(crate) fn turned_back(self, [x, y, z]: Vector) -> Vector {
         match self {
             Self::Y => [x, y, z],
             Self::Z => [x, -z, y],

@@ -92,6 +92,8 @@ Examples:
   hgrid animate dragon.ply                   30 frames, built and rendered with one thread
   hgrid animate dragon.ply --frames 100 --threads 4
   hgrid animate bunny.ply --method one-level --size 512
+  hgrid animate bunny.ply --instances 10000  a field of moving ones, in a scene of instances
+  hgrid animate bunny.ply --instances 10000 --refit
   hgrid animate bunny.ply -o frames          every frame as a picture, too";
 
 pub(super) const REPORT_EXAMPLES: &str = "\
