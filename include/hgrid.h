@@ -1,9 +1,9 @@
 /*
  * hgrid: a ray-tracing acceleration structure that a renderer links and a microcontroller can carry.
  *
- * It turns a triangle mesh into a grid, in time proportional to the number of triangles and
- * in memory that you bring, and answers ray queries on it. This file is the whole manual. It is
- * made from the sources in capi/: change it there.
+ * It builds a tree or a grid over a triangle mesh, in time proportional to the number of triangles
+ * and in memory that you bring, and traces rays through it. All of them are called grids here. This
+ * file is the whole manual. It is made from the sources in capi/: change it there.
  *
  * Three calls
  * -----------
@@ -785,7 +785,7 @@ typedef struct hgrid_counters {
      */
     uint64_t primitive_tests;
     /**
-     * Cells and macrocells entered, empty ones included.
+     * Cells and macrocells entered, empty ones included; leaves of a tree.
      */
     uint64_t cell_steps;
     /**
@@ -1989,8 +1989,8 @@ uint32_t hgrid_occluder(const struct hgrid_grid *grid,
  * filter may look at those that it has accepted. `options` may be NULL: the defaults.
  * Returns `HGRID_OK`, or returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`,
  * `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the
- * options), `HGRID_ERROR_INVALID_ANSWERS` (a capacity that is impossible). A ray that is
- * none hits nothing: the count is 0.
+ * options), `HGRID_ERROR_INVALID_ANSWERS` (a capacity that is impossible). An invalid ray hits nothing: the
+ * count is 0.
  *
  * Threads: any number of queries on the same grid at once; each thread with hits and counters of
  * its own.
@@ -2171,7 +2171,7 @@ bool hgrid_locate(const struct hgrid_grid *grid,
  * `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and
  * `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`
  * (also of `scratch`),
- * `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no error: it misses.
+ * `HGRID_ERROR_INVALID_COHERENCE`. An invalid ray (a NaN, say, or no direction) is no error: it misses.
  *
  * The call allocates nothing and needs at most 36 KiB of stack.
  *

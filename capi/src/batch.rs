@@ -1,10 +1,9 @@
-//! What a batch of rays works on, once its arrays are checked as numbers.
+//! The arrays of a batch of rays, checked as addresses before anything is read.
 //!
-//! Rays and answers may lie in the same structs of the caller, `{ray; hit}` after `{ray; hit}`. Two
-//! references, of which one is mutable, to what is between the first and the last of them would be
-//! undefined behaviour in Rust, and so would be one to the caller's other fields, which another
-//! thread may be writing. So there are none: rays are read and answers written through their
-//! addresses, one by one.
+//! Rays and answers may lie in the same structs of the caller, `{ray; hit}` after `{ray; hit}`. In
+//! Rust, a mutable reference to bytes that another reference covers is undefined behaviour, and so
+//! is a reference to the caller's other fields, which another thread may be writing. So this module
+//! makes no references: it reads rays and writes answers through their addresses, one by one.
 
 use core::ffi::c_void;
 

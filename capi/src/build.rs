@@ -1,4 +1,4 @@
-//! How much memory, and building.
+//! The functions that join meshes, tell how much memory a build takes, and build.
 
 use core::ffi::c_void;
 use core::ptr::{NonNull, null_mut};

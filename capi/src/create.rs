@@ -1,13 +1,14 @@
-//! A grid in memory of its own, for programs that have no plan for theirs: the std flavour.
+//! `hgrid_create`: builds a grid in memory that the library allocates. Needs the feature `std`.
 //!
 //! It adds nothing to what [`hgrid_sizes`] and [`hgrid_build`] do: it asks the first, gets so much
 //! memory, and does what the second does.
 //!
 //! # Who owns what
 //!
-//! [`Memory`] is one allocation and gives itself back when it is dropped, so that no way out of
-//! [`create`] leaks. What a grid keeps is one of them: an [`Owned`] and behind it the index. The
-//! `Owned` holds the `Memory` that it lies in, until [`hgrid_destroy`] takes it out and drops it.
+//! [`Memory`] is one allocation and frees itself when it is dropped, so that no way out of
+//! [`create`] leaks. A grid keeps one `Memory`: it contains an [`Owned`] and behind it the index.
+//! The `Owned` holds the `Memory` that it lies in, until [`hgrid_destroy`] takes the `Memory` out
+//! and drops it.
 //!
 //! "The caller's promise" in a SAFETY comment is that of `raw`, and for an allocator what
 //! [`hgrid_allocator`] asks of it.

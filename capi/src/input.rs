@@ -1,4 +1,5 @@
-//! What a build or a question for sizes works on, once every pointer is checked.
+//! The inputs of a build or a size query, after every pointer was checked, and the calls to core
+//! with them.
 
 use hgrid_core::{
     Config, Control, Error, Grid, Method, Region, Task, TriangleMesh, fit, sizes_with,

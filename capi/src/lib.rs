@@ -6,12 +6,12 @@
 //! structs and threads that they rely on. `build`, `stored`, `query`, `many`, `shapes` and `scene` hold the functions,
 //! `types` and `questions` the structs, and `raw` every use of a caller's pointer.
 //!
-//! There is no allocation, no state and no thread here, and no panic that a caller could reach; a
-//! test looks for the symbols of all but the state in the library. Core remembers in one byte which
-//! vector instructions the processor has.
+//! This package allocates nothing, keeps no state, starts no thread, and has no panic that a caller could
+//! reach; a test looks in the library for the symbols of all these but the state. Core remembers in one byte
+//! which vector instructions the processor has.
 //!
-//! That is the library without the feature `std`, with which it has `create`, too: that gets memory
-//! from the caller's allocator or the system's and looks after the pointers to it.
+//! The feature `std` adds the module `create`, which does allocate: it gets memory from the caller's
+//! allocator or the system's, and keeps the pointers to it.
 #![no_std]
 
 // What C sees, in the order of the header.

@@ -61,7 +61,7 @@ use crate::types::hgrid_grid;
 /// `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and
 /// `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`
 /// (also of `scratch`),
-/// `HGRID_ERROR_INVALID_COHERENCE`. A ray that is none is no error: it misses.
+/// `HGRID_ERROR_INVALID_COHERENCE`. An invalid ray (a NaN, say, or no direction) is no error: it misses.
 ///
 /// The call allocates nothing and needs at most 36 KiB of stack.
 ///

@@ -1,4 +1,4 @@
-//! Questions about one ray or one point.
+//! The queries of one ray or one point.
 
 use core::ptr::NonNull;
 
@@ -142,8 +142,8 @@ pub unsafe extern "C" fn hgrid_occluder(
 /// filter may look at those that it has accepted. `options` may be NULL: the defaults.
 /// Returns `HGRID_OK`, or returns the reason and writes nothing: `HGRID_ERROR_NULL_ARGUMENT`,
 /// `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_INVALID_CULL` (the
-/// options), `HGRID_ERROR_INVALID_ANSWERS` (a capacity that is impossible). A ray that is
-/// none hits nothing: the count is 0.
+/// options), `HGRID_ERROR_INVALID_ANSWERS` (a capacity that is impossible). An invalid ray hits nothing: the
+/// count is 0.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with hits and counters of
 /// its own.

@@ -1,5 +1,4 @@
-//! What queries ask and what they answer: the structs that cross the boundary, as C sees
-//! them, and what they mean to core.
+//! The C structs of queries (rays, hits, options, counters), and their conversion to the types of core.
 //!
 //! The docs here are the text of `hgrid.h`: they are written for C readers.
 
@@ -87,7 +86,7 @@ pub struct hgrid_hit {
 pub struct hgrid_counters {
     /// Ray-triangle tests.
     pub primitive_tests: u64,
-    /// Cells and macrocells entered, empty ones included.
+    /// Cells and macrocells entered, empty ones included; leaves of a tree.
     pub cell_steps: u64,
     /// How often a ray went down a level, into a macrocell, a subgrid or a node; 0 for a
     /// grid of one level.

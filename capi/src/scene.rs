@@ -60,7 +60,7 @@ pub struct hgrid_scene {
 }
 
 impl hgrid_scene {
-    /// What means nothing.
+    /// The view of no scene.
     pub const NONE: Self = Self { opaque: [MaybeUninit::zeroed(); 72] };
 }
 

@@ -1,4 +1,5 @@
-//! Bringing a ray to a box, so that what follows works at the box's scale.
+//! Moves the start of a ray from far away to the scene's box, so that traversal and filter compute at the
+//! scale of the box.
 //!
 //! A cell's border minus an origin a million extents away has lost all that tells cells apart. So a
 //! ray from far away gets a new origin where it enters the box, the anchor, computed in f64; the
@@ -58,13 +59,13 @@ pub(crate) struct Approach {
     pub(crate) slack: f32,
     /// How far the box reaches from the anchor, and how large it is.
     pub(crate) reach: Reach,
-    /// Returns true if the ray comes from so far away that no structure can find its way: all
-    /// triangles have to be tested.
+    /// True if the ray starts so far away that a traversal would not be exact enough: all triangles have to
+    /// be tested.
     pub(crate) is_remote: bool,
 }
 
 impl Approach {
-    /// Brings a ray to a box; `None` if it is no valid ray or its line passes the box.
+    /// Brings a ray to a box; `None` if the ray is not valid or its line misses the box.
     #[inline]
     pub(crate) fn new(ray: &Ray, bounds: &Aabb) -> Option<Self> {
         if !ray.is_valid() {

@@ -8,8 +8,8 @@ use crate::error::Error;
 /// What a build hands to the caller's loop: does the task with a number.
 pub type Task<'t> = dyn Fn(u32) + Sync + 't;
 
-/// How a build is run: by the caller's threads, under the caller's eyes. `Control::default()` is
-/// one task after the other, and silence.
+/// How a build runs: in how many tasks, on which threads, and with which progress callback.
+/// `Control::default()` is one task and no progress callback.
 ///
 /// The grid does not depend on it, to the bit.
 ///

@@ -6,7 +6,7 @@
 pub struct Counters {
     /// Ray-triangle tests ("primitive intersections").
     pub primitive_tests: u64,
-    /// Cells and macrocells entered ("cell traversals"), empty ones included.
+    /// Cells and macrocells entered ("cell traversals"), empty ones included; leaves of a tree.
     pub cell_steps: u64,
     /// Macrocells gone down into, subgrids and nodes entered ("grid traversals"); 0 for a one-level grid.
     pub grid_steps: u64,

@@ -11,9 +11,9 @@
 //!
 //! What was measured (Zen 4, November 2026, one to eight triangles a call): rows transposed in
 //! registers beat floats written one by one to where the lanes want them (13 to 28 ns against
-//! 23 to 46 ns). Rows that went through memory on the way cost single rays a tenth of their
-//! time, and arrays of vectors that were mapped half of it: they are stored in pieces, and a
-//! load of the whole waits for the stores.
+//! 23 to 46 ns). Rows that are copied through memory cost single rays a tenth of their time, and `map` over
+//! arrays of vectors costs half of it: the pieces are stored one by one, and a load of the whole waits for
+//! these stores.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};

@@ -1,4 +1,5 @@
-//! The view that queries run on: a blob bound to its mesh, whichever method built it.
+//! [`Grid`], the view that queries run on: a blob bound to its mesh. Trees are grids here, too: every method
+//! has this one type.
 
 use core::fmt;
 
@@ -28,8 +29,7 @@ use crate::visit::Visitor;
 ///
 /// The view is small and can be copied; it borrows the blob and the mesh, owns nothing, and any
 /// number of threads may query it at once. Queries never fail, never allocate and never panic;
-/// their steps are bounded by the resolutions (one level: by their sum). A single query's stack is
-/// below 7 KiB, a batch's below 36 KiB.
+/// their steps are bounded (docs/bounds.md). A single query's stack is below 7 KiB, a batch's below 36 KiB.
 #[derive(Clone, Copy)]
 pub struct Grid<'a> {
     mesh: TriangleMesh<'a>,
@@ -271,8 +271,8 @@ impl<'a> Grid<'a> {
         any.0
     }
 
-    /// Walks a ray and shows a search what it hits from `begin` on, which is no less than `t_min`, and
-    /// perhaps some of what it hits before.
+    /// Traverses the structure along a ray and passes the hits to a search: all from `begin` on, which is no
+    /// less than `t_min`, and perhaps some before.
     #[inline(always)]
     pub(crate) fn search<F: Search, T: Tally>(
         &self,
@@ -310,7 +310,7 @@ impl<'a> Grid<'a> {
         self.traverse(&line, &test, search, tally);
     }
 
-    /// Walks a ray through a structure that shows its triangles one by one.
+    /// Traverses one of the four grids along a ray, and tests the triangles of each cell one by one.
     ///
     /// Out of line, or its stack would be that of the other, too.
     #[inline(never)]
@@ -393,8 +393,9 @@ impl<'a> Grid<'a> {
         );
     }
 
-    /// Shows `test` the triangles that may be within a distance of a point, the nearest first, where the
-    /// structure can; tells whether it does. `test` answers within which distance triangles matter.
+    /// Passes `test` the triangles of a tree that may be within a distance of a point, about from near to
+    /// far; returns false for the four grids. `test` returns the distance within which triangles matter from
+    /// then on.
     pub(crate) fn approach<T: Tally>(
         &self,
         point: [f32; 3],

@@ -1,10 +1,10 @@
 //! A ray-tracing acceleration structure that a renderer links and a microcontroller can carry.
 //!
-//! hgrid builds a grid over a triangle mesh in O(n), in memory that the caller brings, and
-//! answers ray queries on it. It implements *Multi-Level Hashed Grid Construction Methods* (Costa,
-//! Pereira, Jorge, 2010). No allocation, no threads, no I/O, no panic. `unsafe` is
-//! denied but in one place: where `simd` asks the processor which vectors it has and
-//! hands out the tokens that say so.
+//! hgrid builds an acceleration structure over a triangle mesh, in memory that the caller brings, and answers
+//! ray queries on it. The default structure is a bounding volume hierarchy ([`Method::Bvh`]); the others are
+//! the grids of *Multi-Level Hashed Grid Construction Methods* (Costa, Pereira, Jorge, 2010). The API calls
+//! each of them a grid. No allocation, no threads, no I/O, no panic. Only `simd` contains `unsafe` code: it
+//! asks the processor for its vector instructions and makes the tokens that stand for them.
 //!
 //! ```
 //! use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
@@ -43,7 +43,8 @@
 //!
 //! Each structure has a feature of the package (`one-level`, `fixed`, `variable`, `recursive` and
 //! `bvh`, all on by default), so that a program with little flash takes the ones it needs:
-//! [`Method::is_available`] and [`Error::MethodLeftOut`] tell of the others.
+//! [`Method::is_available`] tells which methods there are, and a call with another method returns
+//! [`Error::MethodLeftOut`].
 //!
 //! The feature `alloc`, off by default, brings `OwnedGrid`: grid, memory and mesh in one type without a
 //! lifetime. All else is the same with it and without.

@@ -1,4 +1,4 @@
-//! Lists of ids cut out of one array by a table of ends.
+//! Checks on lists of ids: the pairs of neighbours, and whether the ids ascend.
 
 /// Each number with the one behind it. (`windows` and `is_sorted` of the standard library keep code
 /// to panic in a release build; this keeps none.)

@@ -1,4 +1,4 @@
-//! What a query may be told beyond its ray.
+//! The options of queries: masks, culling, a triangle to skip, filters, counters.
 
 use core::fmt;
 
@@ -35,7 +35,7 @@ pub enum Verdict {
     AcceptAndStop = 2,
 }
 
-/// Says of a hit of the ray at a place of its batch, 0 for a single ray, whether it counts.
+/// Decides whether a hit counts. Gets the number of the ray in its batch, 0 for a single ray, and the hit.
 pub type Filter<'q> = dyn FnMut(usize, &Hit) -> Verdict + 'q;
 
 /// What a query may be told. `QueryOptions::default()` changes nothing.

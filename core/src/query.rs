@@ -1,11 +1,10 @@
 //! Queries of one ray that take options.
 //!
-//! Masks, culling and the triangle to skip are looked up when a ray hits. A filter is asked about
-//! hits in order, from near to far and never twice about the same triangle, though a grid has
-//! neither order nor memory of what it has shown: a walk collects the few nearest hits in order,
-//! the filter is asked about those, and if it wants none of them the next walk starts where the
-//! last hit was. The first walk collects one hit, the next two, and so on: whoever accepts the
-//! first pays nothing for the order.
+//! Masks, culling and the triangle to skip are looked up when a ray hits. A filter gets the hits from
+//! near to far, and each triangle at most once. A grid finds hits in no exact order and repeats
+//! triangles, so a walk collects a few nearest hits in order and passes them to the filter. If the
+//! filter rejects them all, the next walk starts at the last of them. The first walk collects one
+//! hit, the next two, then four: a filter that accepts the first hit costs no further walk.
 
 use crate::counters::Counters;
 use crate::grid::Grid;

@@ -1,7 +1,8 @@
-//! What a query looks for.
+//! What a query does with the hits of a traversal: keep the closest, stop at the first, or collect the
+//! nearest in order.
 //!
-//! A walk shows a search every hit that it finds: about from near to far, but not quite, and a
-//! triangle that lies in several cells more than once. The search answers where the ray now ends.
+//! The traversal passes each hit to a [`Search`], roughly from near to far, and repeats a triangle that lies
+//! in several cells. The search returns where the ray ends from then on.
 
 use crate::counters::Tally;
 use crate::limits::MAX_COORDINATE;
@@ -21,7 +22,7 @@ pub(crate) enum Outcome {
     Done,
 }
 
-/// What a walk shows its hits to.
+/// Receives the hits of a traversal.
 pub(crate) trait Search {
     /// Leaves hold boxes of the caller's shapes, which are offered, not triangles, which are tested.
     const OF_BOXES: bool = false;
@@ -88,8 +89,8 @@ impl Search for Any {
     }
 }
 
-/// As many of the nearest hits as there is room for, in order and each triangle once: of those that
-/// a selection has, and that lie behind a hit that was dealt with.
+/// The nearest hits in order, as many as there is room for, each triangle once. Only hits behind `after`
+/// count, and only triangles of the selection.
 #[derive(Debug)]
 pub(crate) struct Nearest<'q> {
     pub(crate) selection: &'q Selection<'q>,

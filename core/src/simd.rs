@@ -1,4 +1,4 @@
-//! Which vector instructions queries use: found once, asked for by name, never more than there is.
+//! Chooses the vector instructions of queries: detects them once, and never uses more than the machine has.
 //!
 //! A [`Kernel`] is code generic over the vectors of `fearless_simd`; [`dispatch`] compiles it once
 //! for each level that the target may meet and runs the one that was asked for. Every level gives

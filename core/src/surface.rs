@@ -1,8 +1,9 @@
 //! Where a ray met the mesh, and where the next one starts.
 //!
-//! A hit's point is on its triangle but for rounding, so a ray that starts there may hit the triangle
-//! that it leaves. A start above the plane does not: the triangle test decides exactly on which side
-//! of `t_min` the plane is met. How far above depends on the triangle alone, not on the scene's scale:
+//! A hit's point is off its triangle by rounding, so a ray that starts there may hit the triangle that it
+//! leaves. A ray that starts above the plane and leaves it does not: the triangle test decides exactly on
+//! which side of `t_min` the plane is met. How far above depends on the triangle alone, not on the scene's
+//! scale:
 //!
 //! ```text
 //! corners relative to the start, L the largest coordinate of these:

@@ -1,8 +1,8 @@
 //! Work cut into tasks that the caller runs, on threads of the caller's if it has any.
 //!
-//! Every task owns what it changes and is taken out of its slot by whoever runs it: a task that is
-//! run twice finds the slot empty, one that was never run is still there at the end. Words that all
-//! tasks write, each its own but in no order, are [`Shared`].
+//! Every task owns the data that it changes. Whoever runs a task takes it out of its slot: a second run finds
+//! the slot empty, and a task that was never run is still there at the end. [`Shared`] holds words that all
+//! tasks write, no two of them the same word.
 //!
 //! A processor without atomic operations has one core: there the build runs its tasks itself.
 
@@ -19,7 +19,7 @@ enum State<T, R> {
     Result(R),
 }
 
-/// Into how many tasks work is cut, of which no more than `most` would be worth the caller's thread.
+/// The number of tasks that work is cut into. More than `most` would be too small to pay for a thread.
 #[expect(clippy::cast_possible_truncation, reason = "N is MAX_TASKS at most")]
 pub(crate) fn task_count<const N: usize>(parallel: &Control<'_>, most: usize) -> u32 {
     let most = u32::try_from(most).unwrap_or(u32::MAX);

@@ -36,12 +36,12 @@
 //!
 //! # The range
 //!
-//! A t next to an end of the range is not good enough: rays leave surfaces that they must not hit.
-//! A triangle with all corners between the ends is in, one with all corners outside is out. Of
-//! another one the point T where the line meets its plane decides, exactly: in f64 with an error
-//! bound, and where that is not enough without rounding ([`exact`]), for all finite numbers. Both
-//! are asked of a triangle that the ray grazes: its t may be up to 2^-21 Z outside, no more. The t
-//! that is reported lies in the range.
+//! Next to an end of the range the rounded t may not decide: a ray must not hit the surface that it leaves. A
+//! triangle with all corners between the ends is in, one with all corners outside is out. For any other
+//! triangle the point T where the line meets its plane decides, exactly: in f64 with an error bound, and
+//! where that is not enough without rounding ([`exact`]), for all finite numbers. Both are asked of a
+//! triangle that the ray grazes: its t may be up to 2^-21 Z outside, no more. The t that is reported lies in
+//! the range.
 
 use core::cmp::Ordering;
 
@@ -54,7 +54,7 @@ use crate::options::Cull;
 use crate::ray::{Hit, Ray, round};
 use crate::simd::IS_SMALL;
 
-/// Where a ray meets a triangle, before anyone asked whether it is the closest.
+/// Where a ray meets a triangle, whether or not a closer one is hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriangleHit {
     /// Distance in multiples of the ray's direction.

@@ -1,4 +1,5 @@
-//! The lists of a grid that a box meets: for questions that are no rays.
+//! Visits the lists of all cells that a box overlaps, and of all leaves in a tree: for the queries
+//! without a ray, closest point and statistics.
 
 use crate::aabb::Aabb;
 
@@ -6,20 +7,20 @@ use crate::aabb::Aabb;
 pub(crate) const EVERYWHERE: Aabb =
     Aabb { min: glam::Vec3A::NEG_INFINITY, max: glam::Vec3A::INFINITY };
 
-/// Somebody who looks at lists of primitives.
+/// A callback for lists of primitive ids, with a budget.
 pub(crate) struct Visitor<'v> {
-    /// What may still be looked at: damaged bytes may list everything in every cell.
+    /// Words that may still be read: damaged bytes may list everything in every cell.
     rest: usize,
     leaf: &'v mut dyn FnMut(&[u32]),
 }
 
 impl<'v> Visitor<'v> {
-    /// Somebody who looks at no more than so many words.
+    /// A visitor with a budget of `words` words.
     pub(crate) fn new(words: usize, leaf: &'v mut dyn FnMut(&[u32])) -> Self {
         Self { rest: words, leaf }
     }
 
-    /// Shows a list; `false` if that was enough.
+    /// Passes a list to the callback; `false` if the budget is used up.
     pub(crate) fn list(&mut self, ids: &[u32]) -> bool {
         self.spend(ids.len()) && {
             (self.leaf)(ids);
@@ -27,7 +28,7 @@ impl<'v> Visitor<'v> {
         }
     }
 
-    /// Pays for looking at words that lead to lists; `false` if that was enough.
+    /// Takes words that lead to lists off the budget; `false` if it is used up.
     pub(crate) fn spend(&mut self, words: usize) -> bool {
         let rest = self.rest.checked_sub(words);
         self.rest = rest.unwrap_or(0);

@@ -8,7 +8,7 @@
 //! pop a child and its rays, without those that are done or end before it begins
 //! node: decode the eight boxes
 //!       few rays: intersect each with the eight boxes
-//!       many:     intersect the beam of all rays with the eight boxes, then eight rays at a time with each
+//!       many:     intersect the beam of all rays with the eight boxes, then sixteen rays at a time with each
 //!                 box that is left
 //!       push the children with the rays that met them, those that begin nearest last
 //! leaf: filter its triangles, all at once for each ray or eight rays at a time for each triangle;

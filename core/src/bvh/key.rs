@@ -13,7 +13,7 @@ use crate::aabb::Aabb;
 /// Bits of a key.
 pub(crate) const KEY_BITS: u32 = 30;
 
-/// The key of a triangle that has none: one of its corners is not finite.
+/// In place of a key, for a triangle with a corner that is not finite.
 pub(crate) const NO_KEY: u32 = u32::MAX;
 
 /// Takes boxes to keys.

@@ -1,4 +1,4 @@
-//! A wide bounding volume hierarchy, built the way this library builds grids.
+//! A bounding volume hierarchy with eight children a node, built from a grid of the triangles' centres.
 //!
 //! Every triangle belongs to one cell of a grid, by its centre; crowded cells get a finer grid of their own.
 //! Cells in Morton order are cut into small subtrees, and above them stands a tree by SAH. A node keeps
@@ -127,7 +127,7 @@ impl<'a> Bvh<'a> {
         self.ids.get(first as usize..)?.first_chunk().copied()
     }
 
-    /// Shows all leaves; `false` if that was enough.
+    /// Passes all leaves to a visitor; `false` if its budget is used up.
     pub(crate) fn visit(&self, visitor: &mut Visitor<'_>) -> bool {
         self.nodes.iter().all(|node| {
             (0..8).all(|slot| match node.child(slot) {

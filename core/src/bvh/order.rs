@@ -1,4 +1,4 @@
-//! Rays in the order in which they go together, and their places in the caller's order.
+//! Sorts the rays of a batch for groups, and remembers their places in the caller's order.
 //!
 //! ```text
 //! window  as many rays as there is memory for, 16 bytes each
@@ -7,9 +7,9 @@
 //! ```
 //!
 //! Rays that follow one another then start near each other and go the same way, so that a group
-//! of them shares most of its nodes, and the next group finds them in the cache. Rays that are near
-//! each other as they are given stay as they are: there sorting costs more than it gains. So it does
-//! where there are too few rays for groups that share anything.
+//! of them shares most of its nodes, and the next group finds them in the cache. Rays that are near each
+//! other as they are given are not sorted, nor are too few rays for groups to share anything: there sorting
+//! costs more than it gains.
 
 use crate::aabb::Aabb;
 use crate::ray::Ray;
@@ -31,8 +31,8 @@ const DIGITS: usize = 1 << DIGIT_BITS;
 
 const _: () = assert!(3 + 3 * CELL_BITS + WITHIN_BITS == 2 * DIGIT_BITS);
 
-/// Rays that a sixty-fourth of the scene must have on average, where any start in it, for groups
-/// that share more than sorting costs.
+/// The scene is cut into 64 cells. Sorting pays if the cells in which rays start have at least this many rays
+/// on average.
 const ENOUGH: usize = 2 * GROUP;
 
 /// Rays of a group that are looked at to see whether it is scattered: every seventeenth, as rays
@@ -57,7 +57,8 @@ impl Sorted<'_> {
         }
     }
 
-    /// The rays that wait by ascending place, with their triangles. None were, if a batch defers none.
+    /// The rays that wait, by ascending place, with their triangles. Only for a batch that keeps its order:
+    /// otherwise this memory holds something else.
     #[expect(clippy::cast_possible_truncation, reason = "the low half")]
     pub(crate) fn deferred(&self) -> impl Iterator<Item = (usize, u32)> {
         let waiting = self.waiting.iter().enumerate().filter(|(_, slot)| **slot & WAITS != 0);

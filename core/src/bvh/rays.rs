@@ -1,4 +1,4 @@
-//! The rays of a group, number by number side by side, and what was found for each.
+//! The rays of a group as a structure of arrays, and the hit found for each.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};

@@ -1,4 +1,4 @@
-//! A ray as boxes see it: what a slab test needs, and how far it may be off.
+//! A ray prepared for slab tests, and the error bounds of these tests.
 //!
 //! ```text
 //! near = max over axes of (near side - origin) / direction     far = min over axes of (far side - origin) / direction
@@ -31,8 +31,8 @@ pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0
 /// What errors are relative to: 1 + 2^-20.
 pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 
-/// By how much a ray starts earlier, in parts of its start: more than far sides with a negative distance
-/// come nearer by.
+/// How much earlier a ray starts, relative to its start: more than [`WIDER`] brings a far side with a
+/// negative distance nearer.
 pub(crate) const EARLIER: f32 = 2.0 * (WIDER - 1.0);
 
 /// How much farther back near sides are taken where sides may lie behind the start: a far side with a

@@ -1,4 +1,4 @@
-//! The nodes over a few triangles in the order of their keys: what a root stands for.
+//! Builds a subtree: the nodes over up to 128 triangles that are sorted by their keys.
 //!
 //! ```text
 //! read the box of each triangle
@@ -10,8 +10,8 @@
 //! for each node, the last one first: unite the boxes of each leaf, quantise all eight
 //! ```
 //!
-//! All of a root's triangles are read in one loop, so that their loads from memory overlap. How many triangles
-//! a leaf has cannot be predicted: its box is always the union of eight, so no branch depends on the number.
+//! All of a root's triangles are read in one loop, so that their loads from memory overlap. A branch on the
+//! number of triangles in a leaf would mispredict. So the box of a leaf is always the union of eight boxes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more than MOST_ROOT triangles")]
 

@@ -1,9 +1,9 @@
 //! Bins gathered into units: what is made into roots in one go.
 //!
 //! A unit is best a single bin: bins that are neighbours in Morton order may lie far apart, and a root
-//! over both has a large box. But memory pays for no more than one root for [`PRICE`] triangles. So
-//! triangles are saved up: each unit adds its own and spends [`PRICE`] a root. A bin that cannot
-//! be paid for joins the next.
+//! over both has a large box. But memory pays for no more than one root for [`PRICE`] triangles. So triangles
+//! are counted like savings: each unit adds its triangles and spends [`PRICE`] of them a root. A bin that
+//! cannot pay for a root joins the next bin.
 
 use core::ops::Range;
 

@@ -1,4 +1,4 @@
-//! One ray through the tree: nearest child first.
+//! Traverses the tree with a single ray, nearest child first, and tests the triangles of the leaves.
 //!
 //! ```text
 //! node = root
@@ -35,7 +35,8 @@ pub(crate) const FEW_LEVELS: u32 = 14;
 /// Places on a small stack.
 pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
 
-/// A child that waits: how far it begins, in the high half, and its node and slot.
+/// A child on the stack: in the high half the bits of the distance at which the ray enters it, in the low
+/// half its node and slot.
 pub(crate) type Waiting = u64;
 
 /// A single ray, and what it looks for.
@@ -48,7 +49,7 @@ pub(crate) struct OneRay<'r, F, T> {
     pub(crate) cull: Cull,
     /// The box of the scene.
     pub(crate) bounds: &'r Aabb,
-    /// For a ray from afar, what [`Slab::nearby`] cannot find.
+    /// The slab and the filter of a ray from far away, which [`Slab::nearby`] cannot compute.
     pub(crate) afar: Option<&'r (Slab, RayFilter)>,
     pub(crate) search: &'r mut F,
     pub(crate) tally: &'r mut T,
@@ -66,9 +67,10 @@ struct Wide<S: Simd> {
     filter: Filter<f32x8<S>>,
 }
 
-/// By how many rows of a node the near side of each axis lies behind the first side: 0 or [`FLIP`].
+/// Which side is the near one on each axis: 0 for the low side, [`FLIP`] for the high side.
 pub(super) type Near = [usize; 3];
-/// Rows from a low side to the high one; from one to the other, a mask.
+/// Rows of [`Node::bounds`] from the low side of an axis to its high side. Exclusive-or with it switches
+/// sides.
 const FLIP: usize = 3;
 
 /// All boxes of a node, as bits.

@@ -43,7 +43,7 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// An object where it is.
+    /// An instance that does not move its object: the identity transform.
     #[must_use]
     pub const fn new(object: u32) -> Self {
         Self {

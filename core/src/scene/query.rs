@@ -1,4 +1,4 @@
-//! Questions to a scene.
+//! The queries of a scene: closest hit and any hit of a ray.
 
 use core::fmt;
 
@@ -53,8 +53,8 @@ pub type SceneFilter<'q> = dyn FnMut(usize, &SceneHit) -> Verdict + 'q;
 
 /// What a query of a scene may be told. `SceneOptions::default()` changes nothing.
 pub struct SceneOptions<'q> {
-    /// An instance is seen if a bit of this is set in its mask, too, and so is a triangle in it. At first all bits,
-    /// which sees everything, even what has a mask of 0.
+    /// An instance or a triangle is seen if its mask and this have a bit in common. With all bits, the
+    /// default, everything is seen, even with a mask of 0.
     pub mask: u32,
     /// Which sides of triangles are not hit. The front is decided in the space of the triangle's own mesh: an
     /// instance that mirrors does not turn it round.

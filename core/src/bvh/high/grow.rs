@@ -25,7 +25,8 @@ pub(super) struct Grow<'w> {
     pub(super) items: &'w mut [Item],
     /// Levels of nodes above.
     pub(super) level: u32,
-    /// Ranges of no more triangles wait in their node, if there is room for it.
+    /// A range of at most this many triangles is left to a task: its node stores the range, if there is room
+    /// for the node.
     pub(super) wait: u32,
     /// Where the nodes below the root go.
     pub(super) nodes: &'w mut [Node],

@@ -1,4 +1,5 @@
-//! The build for trees that are traced for long: SAH from the root down, each triangle on its own.
+//! The build of quality high, for trees that many rays traverse: binned SAH from the root down, over single
+//! triangles.
 //!
 //! ```text
 //! boxes     the box of each triangle, with its id: an item                  (mod.rs)
