@@ -998,7 +998,7 @@ typedef struct hgrid_refit_report {
      */
     uint32_t struct_size;
     /**
-     * The triangle that is to blame for an error, or `HGRID_INVALID_ID`.
+     * The triangle, shape or instance that is to blame for an error, or `HGRID_INVALID_ID`.
      */
     uint32_t triangle;
     /**
@@ -1214,7 +1214,8 @@ typedef struct hgrid_scene {
 typedef struct hgrid_instance {
     /**
      * Rows of the matrix that takes the object's directions to the scene's: `scene = linear * object + translation`.
-     * Rotations, mirrors, shears and scales of any kind, as long as the matrix has an inverse.
+     * Rotations, mirrors, shears and scales of any kind, as long as the matrix times its inverse in `float` is the
+     * identity to 2^-10: with any scales along the axes, turned ones up to a condition of about 10 000.
      */
     float linear[3][3];
     /**
@@ -2308,7 +2309,8 @@ hgrid_status hgrid_open(const void *blob,
  * the first refit after a build, and build anew once `cost_after` is well above it: times of rays grow
  * about as the cost does.
  *
- * A triangle that the build left out, because a coordinate was not finite, must not have become finite.
+ * A triangle that the build left out, because a coordinate was not finite, must not have become finite. Scenes that
+ * show the grid need `hgrid_refit_scene` next, the innermost first: they keep its box.
  *
  * `mesh`, `blob` and `grid` may not be NULL. `report` may be NULL. Returns `HGRID_OK` and writes the view
  * to `grid`; or returns the reason, and blob and `grid` are as they were:
@@ -2524,7 +2526,7 @@ hgrid_status hgrid_refit_shapes(const struct hgrid_boxes *boxes,
  * scratch.
  *
  * Returns `HGRID_OK`, `HGRID_ERROR_CORRUPT`, `HGRID_ERROR_SCRATCH_TOO_SMALL`, `HGRID_ERROR_NOT_A_GRID` for a view of
- * zeros (`HGRID_SHAPES_INIT`), or `HGRID_ERROR_NULL_ARGUMENT`. The scratch overlaps nothing that the tree refers to.
+ * zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, or `HGRID_ERROR_NULL_ARGUMENT`.
  *
  * Threads: any number of calls and queries on the same tree at once, each with scratch of its own.
  *
@@ -2719,7 +2721,8 @@ hgrid_status hgrid_open_scene(const void *blob,
  * `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the
  * reason: `HGRID_ERROR_MESH_MISMATCH` for another number of instances, what `hgrid_open_scene` returns, and
  * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are as they
- * were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX`, after which the blob holds nothing of use.
+ * were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the
+ * report's `triangle`, after which the blob holds nothing of use.
  *
  * Threads: as for `hgrid_refit`.
  *

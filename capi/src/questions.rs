@@ -272,7 +272,7 @@ pub struct hgrid_surface {
 pub struct hgrid_refit_report {
     /// `sizeof(hgrid_refit_report)`.
     pub struct_size: u32,
-    /// The triangle that is to blame for an error, or `HGRID_INVALID_ID`.
+    /// The triangle, shape or instance that is to blame for an error, or `HGRID_INVALID_ID`.
     pub triangle: u32,
     /// The cost that the tree had; 0 after an error.
     pub cost_before: f64,
@@ -463,9 +463,12 @@ impl hgrid_refit_report {
     pub(crate) fn note(&mut self, refitted: &Result<Refit, Error>) {
         (self.triangle, self.cost_before, self.cost_after) = match *refitted {
             Ok(Refit { cost_before, cost_after }) => (INVALID_ID, cost_before, cost_after),
-            Err(Error::IndexOutOfRange { triangle } | Error::NonFiniteTriangle { triangle }) => {
-                (triangle, 0.0, 0.0)
-            }
+            Err(
+                Error::IndexOutOfRange { triangle: number }
+                | Error::NonFiniteTriangle { triangle: number }
+                | Error::InstanceWithoutObject { instance: number }
+                | Error::InstanceWithoutInverse { instance: number },
+            ) => (number, 0.0, 0.0),
             Err(_) => (INVALID_ID, 0.0, 0.0),
         };
     }

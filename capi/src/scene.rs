@@ -23,7 +23,8 @@ const _: () = assert!(HGRID_MAX_NESTING == MAX_NESTING);
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_instance {
     /// Rows of the matrix that takes the object's directions to the scene's: `scene = linear * object + translation`.
-    /// Rotations, mirrors, shears and scales of any kind, as long as the matrix has an inverse.
+    /// Rotations, mirrors, shears and scales of any kind, as long as the matrix times its inverse in `float` is the
+    /// identity to 2^-10: with any scales along the axes, turned ones up to a condition of about 10 000.
     pub linear: [[f32; 3]; 3],
     /// Which of the scene's objects, from 0.
     pub object: u32,
@@ -358,7 +359,8 @@ pub unsafe extern "C" fn hgrid_open_scene(
 /// `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the
 /// reason: `HGRID_ERROR_MESH_MISMATCH` for another number of instances, what `hgrid_open_scene` returns, and
 /// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are as they
-/// were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX`, after which the blob holds nothing of use.
+/// were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the
+/// report's `triangle`, after which the blob holds nothing of use.
 ///
 /// Threads: as for `hgrid_refit`.
 ///

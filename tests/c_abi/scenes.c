@@ -381,6 +381,7 @@ static void what_shapes_refuse(void)
     ((unsigned char *)copy)[200] ^= 0x5a;
     EXPECT(HGRID_OK, hgrid_open_shapes(copy, shape_bytes, &boxes, &view));
     EXPECT(HGRID_ERROR_CORRUPT, hgrid_validate_shapes(&view, scratch, SCRATCH_BYTES));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_shapes(&view, copy, 64));
 }
 
 static void what_scenes_refuse(void)
@@ -450,13 +451,17 @@ static void what_scenes_refuse(void)
            hgrid_refit_scene(instances, INSTANCES - 1, objects, 2, copy, inner_bytes, &empty, NULL));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_refit_scene((const hgrid_instance *)copy, INSTANCES, objects, 2, copy,
                                                   inner_bytes, &empty, NULL));
+    hgrid_refit_report report = HGRID_REFIT_REPORT_INIT;
     instances[3].object = 9;
     EXPECT(HGRID_ERROR_INSTANCE_OBJECT,
-           hgrid_refit_scene(instances, INSTANCES, objects, 2, copy, inner_bytes, &empty, NULL));
+           hgrid_refit_scene(instances, INSTANCES, objects, 2, copy, inner_bytes, &empty, &report));
+    CHECK(report.triangle == 3);
+    report.triangle = 0;
     instances[3].object = 1, instances[3].linear[0][0] = 0;
     copy = guarded_copy(inner_blob, inner_bytes);
     EXPECT(HGRID_ERROR_INSTANCE_MATRIX,
-           hgrid_refit_scene(instances, INSTANCES, objects, 2, copy, inner_bytes, &empty, NULL));
+           hgrid_refit_scene(instances, INSTANCES, objects, 2, copy, inner_bytes, &empty, &report));
+    CHECK(report.triangle == 3);
     instances[3].linear[0][0] = 1;
 
     /* Boxes that are not those of the instances. */
@@ -466,6 +471,7 @@ static void what_scenes_refuse(void)
     memcpy((char *)copy + inner_bytes - 16 - 72 + 40, &elsewhere, sizeof elsewhere);
     EXPECT(HGRID_OK, hgrid_open_scene(copy, inner_bytes, objects, 2, &empty));
     EXPECT(HGRID_ERROR_CORRUPT, hgrid_validate_scene(&empty, scratch, SCRATCH_BYTES));
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate_scene(&empty, copy, 64));
 
     const hgrid_scene zeros = HGRID_SCENE_INIT;
     const hgrid_grid no_grid = HGRID_GRID_INIT;

@@ -247,7 +247,10 @@ pub(crate) unsafe fn validate_shapes(
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let tested = unsafe { shapes(view) }?;
-    // SAFETY: the caller's promise: it overlaps nothing that the view refers to.
+    if !scratch.span().is_empty() && span_of(tested.shapes.blob()).overlaps(scratch.span()) {
+        return Err(HGRID_ERROR_OVERLAP);
+    }
+    // SAFETY: the caller's promise; nothing else that this call reads lies there.
     let scratch = unsafe { bytes_mut(scratch.start, scratch.bytes) }?;
     tested.shapes.validate(scratch).map_err(status_of)
 }
@@ -442,7 +445,10 @@ pub(crate) unsafe fn validate_scene(
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let scene = unsafe { scene(view) }?;
-    // SAFETY: the caller's promise: it overlaps nothing that the view refers to.
+    if !scratch.span().is_empty() && reads(scene, scratch.span()) {
+        return Err(HGRID_ERROR_OVERLAP);
+    }
+    // SAFETY: the caller's promise; nothing else that this call reads lies there.
     let scratch = unsafe { bytes_mut(scratch.start, scratch.bytes) }?;
     scene.validate(scratch).map_err(status_of)
 }
