@@ -253,8 +253,8 @@ fn no_thread_gets_in_the_way_of_another() {
     }
 }
 
-/// The header promises 7 KiB for a ray or a point, 36 KiB for a batch, 18 KiB for a build, 96 KiB
-/// for one with tasks and 13 KiB for a task.
+/// The header promises 7 KiB for a ray or a point, 36 KiB for a batch, 18 KiB for a build, 96 KiB for one with tasks and
+/// 13 KiB for a task; for a ray in scenes 8 KiB for each of them and 7 KiB for a grid.
 #[test]
 fn queries_and_builds_take_little_stack() {
     let dir = TempDir::new().expect("a folder");
@@ -264,12 +264,19 @@ fn queries_and_builds_take_little_stack() {
         let line = printed.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
         line.and_then(|bytes| bytes.parse::<usize>().ok()).expect("a number")
     };
-    for name in ["one", "options", "closest"] {
+    for name in ["one", "options", "closest", "shapes"] {
         assert!((500..7 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
     // The buffers alone are 128 rays and 128 hits.
     assert!((128 * 48..36 << 10).contains(&most("many")), "many: {}", most("many"));
-    assert!((2000..18 << 10).contains(&most("build")), "build: {}", most("build"));
+    for name in ["build", "scenes"] {
+        assert!((2000..18 << 10).contains(&most(name)), "{name}: {}", most(name));
+    }
+    // Four of them, one inside the other.
+    for (name, scenes) in [("scene", 1), ("nested", 4)] {
+        let promised = (8 * scenes + 7) << 10;
+        assert!((1000..promised).contains(&most(name)), "{name}: {}", most(name));
+    }
     // There is room for 64 of them.
     assert!((20 << 10..96 << 10).contains(&most("tasks")), "tasks: {}", most("tasks"));
     assert!((500..13 << 10).contains(&most("task")), "task: {}", most("task"));

@@ -1,6 +1,6 @@
 /* Prints how much stack queries and builds take, in bytes, one "name most" a line: the most of all methods and
  * meshes, on a stack that was filled before: a sheet, then one with a crowd of small triangles on it, then one
- * with a crowd in the crowd. */
+ * with a crowd in the crowd. Trees also stand in scenes, and their triangles are shapes. */
 
 #include "check.h"
 
@@ -103,6 +103,95 @@ static void many(void)
             CHECK(hgrid_occluder_n(&grid, from, 0, occluders, 0, RAYS, c, &asking) == HGRID_OK);
         }
     }
+}
+
+enum { SHOWN = 12, SHOWN_SCENES = 2 };
+
+/* Scenes around a tree, each of which shows the one before; one for each level that may be nested. */
+static hgrid_object shown[HGRID_MAX_NESTING];
+static hgrid_scene around[HGRID_MAX_NESTING];
+static hgrid_shapes corners;
+HGRID_ALIGNED static unsigned char scene_blobs[HGRID_MAX_NESTING][HGRID_SCENE_BOUND(SHOWN)];
+HGRID_ALIGNED static unsigned char small_scratch[HGRID_SCRATCH_BOUND(TRIANGLES)];
+HGRID_ALIGNED static unsigned char shape_blob[HGRID_INDEX_BOUND(TRIANGLES)];
+static float corner_boxes[TRIANGLES][6];
+
+static hgrid_verdict reject_in_scene(void *context, const hgrid_scene_hit *hit)
+{
+    return context == &grid && hit->t >= 0 ? HGRID_REJECT : HGRID_ACCEPT;
+}
+
+static void ask_scene(const hgrid_scene *scene)
+{
+    hgrid_scene_options all = HGRID_SCENE_OPTIONS_INIT;
+    all.filter = reject_in_scene, all.context = &grid, all.counters = &counters;
+    for (int i = 0; i < RAYS; i++) {
+        hgrid_ray_f64 ray = {{0, 0, 0}, {0, 0, 0}, 0, INFINITY, 0};
+        for (int axis = 0; axis < 3; axis++)
+            ray.origin[axis] = (double)rays[i].origin[axis], ray.direction[axis] = rays[i].direction[axis];
+        hgrid_scene_hit hit;
+        hgrid_intersect_scene(scene, &ray, NULL, &hit);
+        hgrid_occluded_scene(scene, &ray, NULL);
+        hgrid_intersect_scene(scene, &ray, &all, &hit);
+        hgrid_occluded_scene(scene, &ray, &all);
+    }
+}
+
+static void flat_scene(void)
+{
+    ask_scene(&around[0]);
+}
+
+static void nested_scenes(void)
+{
+    ask_scene(&around[HGRID_MAX_NESTING - 1]);
+}
+
+static bool meet_middle(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
+{
+    (void)context, (void)shape;
+    hit->t = ray->t_max < 1 ? ray->t_max : 1, hit->u = 0, hit->v = 0;
+    return shape % 2 == 0;
+}
+
+static void boxes_of_triangles(void)
+{
+    hgrid_hit hit;
+    const hgrid_query_options all = options();
+    for (int i = 0; i < RAYS; i++) {
+        hgrid_intersect_shapes(&corners, &rays[i], NULL, &hit);
+        hgrid_occluded_shapes(&corners, &rays[i], NULL);
+        hgrid_intersect_shapes(&corners, &rays[i], &all, &hit);
+    }
+}
+
+/* Scenes of instances that overlap, and shapes as large as the triangles of the sheet. */
+static void build_scenes(void)
+{
+    for (int level = 0; level < HGRID_MAX_NESTING; level++) {
+        hgrid_instance instances[SHOWN];
+        for (int i = 0; i < SHOWN; i++) {
+            const hgrid_instance fresh = HGRID_INSTANCE_INIT;
+            instances[i] = fresh, instances[i].translation[i % 3] = 0.01 * i;
+        }
+        CHECK((level == 0 ? hgrid_object_grid(&grid, &shown[0]) : hgrid_object_scene(&around[level - 1], &shown[level])) ==
+              HGRID_OK);
+        CHECK(hgrid_build_scene(instances, level == 0 ? SHOWN : SHOWN_SCENES, &shown[level], 1, NULL, scene_blobs[level],
+                                sizeof scene_blobs[level], small_scratch, sizeof small_scratch, &around[level], NULL) == HGRID_OK);
+    }
+    for (int i = 0; i < TRIANGLES; i++)
+        for (int axis = 0; axis < 3; axis++) {
+            float *const low = &corner_boxes[i][axis], *const high = low + 3;
+            *low = *high = positions[indices[i][0]][axis];
+            for (int corner = 1; corner < 3; corner++) {
+                const float at = positions[indices[i][corner]][axis];
+                *low = at < *low ? at : *low, *high = at > *high ? at : *high;
+            }
+        }
+    hgrid_boxes boxes = HGRID_BOXES_INIT;
+    boxes.boxes = corner_boxes, boxes.count = TRIANGLES, boxes.test = meet_middle;
+    CHECK(hgrid_build_shapes(&boxes, NULL, shape_blob, sizeof shape_blob, small_scratch, sizeof small_scratch, &corners,
+                             NULL) == HGRID_OK);
 }
 
 /* Bytes of stack that a call takes: of two stacks the second where a call on the first asks. */
@@ -257,7 +346,9 @@ int main(void)
         void (*call)(void);
         size_t most;
     } calls[] = {{"build", build, 0}, {"tasks", tasks, 0}, {"one", one, 0},
-                 {"options", with_options, 0}, {"closest", closest, 0}, {"many", many, 0}};
+                 {"options", with_options, 0}, {"closest", closest, 0}, {"many", many, 0},
+                 {"scenes", build_scenes, 0}, {"scene", flat_scene, 0}, {"nested", nested_scenes, 0},
+                 {"shapes", boxes_of_triangles, 0}};
     enum { CALLS = sizeof calls / sizeof *calls };
     for (uint32_t crowds = 0; crowds <= CROWDS; crowds++)
         for (int method = 0; method < METHODS; method++) {
