@@ -118,9 +118,9 @@ pub unsafe extern "C" fn hgrid_bound(
 /// is 1. That takes about half the time of a build; with recursive and bvh, which have to build
 /// the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
 ///
-/// With `tasks` in the configuration the answer is for a build with so many at once: each takes
-/// scratch, the index is filled by all of them and may be a little larger; with bvh it is what any
-/// mesh takes, and `is_exact` is 0. `run` may be called for the answer, too; `progress` is not.
+/// With `tasks` above 1 in the configuration, the sizes are those of a build with so many tasks: each
+/// takes scratch, and all of them fill the index, which may be a little larger. With bvh the sizes are then
+/// bounds for any mesh, and `is_exact` is 0. The call may use `run`, too, but not `progress`.
 ///
 /// `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL
 /// if its size is 0; scratch that is too small is no error, and counts as none.
@@ -169,10 +169,10 @@ pub unsafe extern "C" fn hgrid_sizes(
 /// (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call takes at most a dozen times as long
 /// as `hgrid_sizes`. A density that is too fine for a build counts as one that does not fit.
 ///
-/// Bring as much scratch as `hgrid_sizes` without scratch says. With less the grid may get coarser
-/// than the index had to be: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` it must fit by
-/// its bound, with the other methods there must be scratch enough to plan it; where there is not
-/// for any, they answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
+/// Bring as much scratch as `hgrid_sizes` without scratch returns. With less, the grid may become coarser
+/// than the index requires: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the bound of a grid must
+/// fit, with the other methods the scratch must be large enough to plan a grid. If it is too small for all
+/// densities, the call returns `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
 /// afterwards.
 ///
 /// `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be
@@ -240,13 +240,13 @@ pub unsafe extern "C" fn hgrid_fit(
 /// what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region
 /// is too small, what both need; or the triangle that is to blame.
 ///
-/// After an error `index` is as it was, with two exceptions. After a cancelled build it may hold
-/// anything. And `HGRID_METHOD_BVH` writes into it before it has read the whole mesh: after any error
-/// of a build that began, a grid that lay there before is gone. So it is with `HGRID_METHOD_VARIABLE` and
-/// `HGRID_METHOD_RECURSIVE` after `HGRID_ERROR_INDEX_TOO_SMALL` and `HGRID_ERROR_INVALID_DENSITY`. A view of it (`grid` itself, where a build is repeated) can be asked
-/// without harm, but answers anything: set it to `HGRID_GRID_INIT`. These methods write as far as the
-/// index reaches and then go on counting: the report's `index_bytes` is exact (with bvh maybe
-/// only enough), and with so many the same call succeeds.
+/// After an error `index` is unchanged, except in three cases in which it may hold anything: after a cancelled
+/// build; with `HGRID_METHOD_BVH` after any error of a build that began; with `HGRID_METHOD_VARIABLE` and
+/// `HGRID_METHOD_RECURSIVE` after `HGRID_ERROR_INDEX_TOO_SMALL` and `HGRID_ERROR_INVALID_DENSITY`. Queries on a
+/// view of the grid that lay there before are safe, but their answers are wrong: set the view to
+/// `HGRID_GRID_INIT` (`grid` itself, if a build is repeated). If the index is too small, these three methods
+/// continue without writing and compute the size: the report's `index_bytes` is exact (with bvh maybe only
+/// enough), and the same call with that much succeeds.
 ///
 /// A build allocates nothing and needs at most 18 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
 /// `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 13

@@ -65,8 +65,8 @@ pub struct hgrid_allocator {
 /// with, and `hgrid_build`, in one call.
 ///
 /// Only in libraries that were built with the feature `std`, and declared only where `HGRID_STD` is
-/// defined. It takes as long as those three calls: who builds again for every frame brings
-/// the memory and calls `hgrid_build`.
+/// defined. It takes as long as those three calls. To build again for every frame, keep the memory and
+/// call `hgrid_build`.
 ///
 /// ```c
 /// static size_t count_hits(const hgrid_mesh *mesh, const hgrid_ray *rays, size_t count)

@@ -20,11 +20,11 @@ use crate::types::hgrid_grid;
 /// seen exactly edge-on, is not hit, up to rounding.
 ///
 /// `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
-/// or with options that break the rules for structs, nothing is hit. A view that nobody initialised,
-/// and one whose blob or mesh is gone, is undefined behaviour.
+/// or with options that break the rules for structs, nothing is hit. A query of an uninitialised view, or
+/// of one whose blob or mesh is gone, is undefined behaviour.
 ///
-/// A query allocates nothing, needs at most 7 KiB of stack, as all queries of one ray or point do,
-/// and always ends: on one level after no more steps than the three resolutions sum up to.
+/// A query allocates nothing and needs at most 7 KiB of stack, as all queries of one ray or point do. It
+/// always ends: in a grid of one level after at most as many steps as the three resolutions add up to.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///
@@ -112,17 +112,16 @@ pub unsafe extern "C" fn hgrid_occluder(
 
 /// Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
 ///
-/// Writes as many hits as there is room for, the nearest, and to `count` how many there are, which
-/// may be more. Without a filter a tree is walked once and keeps the nearest in a heap: the number of hits
-/// times the logarithm of the room. With a filter, and for the other methods where there is not room for
-/// more hits than there are, the ray is walked once more for each sixteen hits, from where it got to: so
-/// nothing is allocated, whatever their number, but thousands of hits in one cell take long, as the
-/// square of their number.
-/// Options as with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what
-/// it accepts is written and counted.
+/// Writes the nearest hits to `hits`, up to `capacity`, and the number of all hits to `count`, which may
+/// be larger; `capacity` 0 only counts. In a tree without a filter, one traversal keeps the nearest hits in
+/// a heap, in time proportional to the number of hits times the logarithm of `capacity`. With a filter, and
+/// with the other methods if `capacity` is too small for all hits, the ray is traversed again for every
+/// sixteen hits, each time from the last of them. That takes no memory, but the time for thousands of hits
+/// in one cell grows with the square of their number. Options are as with `hgrid_intersect`: a filter gets
+/// each hit, from near to far, and those that it accepts are written and counted.
 ///
-/// What is left of a light at the end of a ray (`t_max`), behind panes of one triangle each. More than
-/// 64 count as a wall. (Where two share an edge, a ray through it meets both.)
+/// The example computes how much light from the end of a ray (`t_max`) passes through panes of glass, one
+/// triangle each. More than 64 panes count as a wall. (A ray through an edge that two panes share meets both.)
 ///
 /// ```c
 /// static float light_behind(const hgrid_grid *grid, const hgrid_ray *ray, const float *share)
@@ -184,17 +183,15 @@ pub unsafe extern "C" fn hgrid_intersect_all(
 /// }
 /// ```
 ///
-/// Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts
-/// the lists or leaves that were looked at, `primitive_tests` the triangles in them, `grid_steps` the nodes
-/// of a tree. `options` may be
-/// NULL: the defaults. With anything that is not as it should be (another NULL, a view of
-/// zeros, options that break the rules, a point that is not finite, a distance that is NaN
-/// or negative) the answer is false.
+/// Of the options, `mask`, `skip` and `counters` are used: `cell_steps` counts the lists or leaves that are
+/// visited, `primitive_tests` the triangles in them, `grid_steps` the nodes of a tree. `options` may be
+/// NULL: the defaults. The call returns false for invalid arguments: another NULL, a view of zeros, options
+/// that break the rules, a point that is not finite, a distance that is NaN or negative.
 ///
 /// The call allocates nothing and always ends. With `HGRID_METHOD_BVH` it visits the nodes that are no
 /// farther than the answer, wherever the point lies. With the other methods the time grows with the
-/// triangles in a cube around the point that reaches as far as the answer: it is short near the mesh, and
-/// far outside of it that of a loop over a good part of all triangles.
+/// triangles in a cube around the point that reaches as far as the answer. So they are fast near the mesh;
+/// for points far outside they test a large part of all triangles.
 ///
 /// Threads: any number of queries on the same grid at once; each thread with counters of its own.
 ///
@@ -247,7 +244,8 @@ pub unsafe extern "C" fn hgrid_closest_point(
 /// A start lies above the plane by 1 / 2^20 of the distance to the triangle's farthest corner, far more
 /// than a test may be off. A ray nearly along the plane may still hit the triangle, as the normal is
 /// rounded. A triangle without area, or a needle thinner than 1e-9 of its length, has no normal to
-/// rely on: without any it is the one that faces the ray. `is_front` is what `cull` goes by, but for triangles seen nearly edge-on.
+/// rely on; if there is none at all, `normal` faces the ray. `is_front` agrees with `cull`, except for
+/// triangles that the ray sees nearly edge-on.
 ///
 /// Threads: any number of calls and queries on the same grid at once.
 ///

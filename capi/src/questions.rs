@@ -22,9 +22,9 @@ pub type hgrid_coherence = u32;
 pub const HGRID_COHERENCE_INCOHERENT: hgrid_coherence = 0;
 
 /// Rays that follow one another start near each other: camera rays of a tile, shadow rays and
-/// ambient occlusion from its hits. They are taken as given, with a tree in groups of 64. Best are
-/// runs of 128 rays from two tiles of 8 x 8 pixels side by side, each sixteen of them a square of
-/// 4 x 4.
+/// ambient occlusion from its hits. They are traced in the order given, with a tree in groups of 64.
+/// The best order is that of tiles of 8 x 8 pixels, two adjacent ones at a time, each in four squares of
+/// 4 x 4 pixels.
 pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
 
 /// A ray, or the part of it from `t_min` to `t_max`: 32 bytes, in the order of DXR's `RayDesc`.
@@ -52,20 +52,19 @@ pub struct hgrid_ray {
 /// triangle's vertices `a`, `b`, `c`, up to rounding. A hit is a function of the ray and the triangle
 /// alone: other triangles, the method and the box of the grid do not change a bit of it.
 ///
-/// There is no epsilon. Let L be the largest difference of a coordinate between the origin and a
-/// vertex, Z the range of `t` between the vertices. The hit is that of a triangle whose vertices lie
-/// up to 2^-50 L across the ray from where they are. Of this hit `u` and `v` are off by no more than
-/// (2^-24 + 2^-38) of their value, `t` by no more than 2^-24 |t| + 2^-38 (|t| + Z); below 1.2e-38 by
-/// 2^-149. Triangles that share a vertex share the place where it lies, so nothing slips between them.
+/// There is no epsilon, but an error bound. Let L be the largest coordinate of a vertex relative to the
+/// origin, Z the range of `t` between the vertices. The reported hit is the exact hit of a triangle whose
+/// vertices are moved by up to 2^-50 L across the ray, with these errors: `u` and `v` up to 2^-24 + 2^-38
+/// of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up to 2^-149. A vertex is
+/// moved alike for all triangles that share it, so no ray passes between them.
 ///
 /// The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the
-/// ray's line meets the plane of the vertices as they are: a ray that starts above a plane and leaves
-/// it does not hit it, however close it starts. Only an end that lies between vertices is
-/// asked about: all points of the triangle keep the other one. The `t` that is reported lies in the
-/// range, too: it is the end for a triangle that the ray grazes, whose own `t` may be up to 2^-21 Z outside. It is rounded: a range that
-/// ends at it may leave out the hit that it was reported for. An origin more than 2^50 times as far away
-/// as a triangle is large may not tell its vertices apart, and miss it. (The proof is the head of
-/// core/src/triangle.rs.)
+/// ray's line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does
+/// not hit it, however close it starts. An end of the range needs this decision only if it lies between
+/// the vertices. The reported `t` lies in the range, too: where a ray grazes a triangle, its own `t` may
+/// be up to 2^-21 Z outside, and the end of the range is reported. The reported `t` is rounded, so a range
+/// that ends at it may exclude the same hit. A triangle that is farther from the origin than 2^50 times
+/// its size may be missed. (The head of core/src/triangle.rs has the proof.)
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_hit {
@@ -118,15 +117,14 @@ pub const HGRID_CULL_BACK: u32 = 1;
 /// counter-clockwise.
 pub const HGRID_CULL_FRONT: u32 = 2;
 
-/// What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
+/// The options of a query. Initialise them with `HGRID_QUERY_OPTIONS_INIT`; NULL means these defaults.
 ///
 /// A query with options that are not the defaults is somewhat slower than one without. A tree
 /// (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are, and
 /// with a `filter` up to their first hits; with `counters`, and with the other methods, they are traced
 /// one by one.
-/// Options that break the rules for structs make
-/// a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
-/// returns what is wrong with them.
+/// With options that break the rules for structs, a query of one ray returns a miss;
+/// `hgrid_intersect_all` with the same options returns the error.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_query_options {
@@ -137,21 +135,20 @@ pub struct hgrid_query_options {
     pub mask: u32,
     /// Which sides are not hit: one of `HGRID_CULL_...`.
     pub cull: u32,
-    /// A triangle that is not hit, usually the one that the ray leaves, which then cannot
-    /// hit itself, without any epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge
-    /// still may be hit, where the origin was rounded to just below it. It is one triangle for all
-    /// rays of a batch: rays that start where `hgrid_surface_at` says need none.
+    /// A triangle that is not hit, usually the one that the ray leaves, or `HGRID_INVALID_ID`. It needs no
+    /// epsilon, but a neighbour across an edge may still be hit if rounding put the origin below it. All
+    /// rays of a batch skip the same triangle; rays from origins of `hgrid_surface_at` need not skip any.
     pub skip: u32,
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
-    /// Says of a `hit` whether it counts; or NULL: all do. `ray` is the place of the ray in
-    /// its batch, 0 for a single one.
+    /// Returns whether a `hit` counts. NULL means that all hits count. `ray` is the number of the ray in
+    /// its batch, 0 for a single ray.
     ///
-    /// Hits are offered from near to far, where `t` is equal by ascending triangle, and each
-    /// triangle at most once for each ray; those of one ray of a batch before those of the next. Which
-    /// triangles are offered, `filter_mask` says. It is called on the thread that asks, may ask the same
-    /// grid other questions, and may not be left by `longjmp` or by a C++ exception. Here is glass,
-    /// which lets shadow rays pass and weakens them:
+    /// The filter gets the hits of a ray from near to far, at equal `t` by ascending triangle, and each
+    /// triangle at most once. In a batch it gets all hits of one ray before those of the next.
+    /// `filter_mask` selects the triangles that it is called for. It runs on the thread that called the
+    /// query, may query the same grid, and must not be left by `longjmp` or by a C++ exception. Here is
+    /// glass, which lets shadow rays pass and weakens them:
     ///
     /// ```c
     /// typedef struct {
@@ -196,13 +193,13 @@ pub struct hgrid_query_options {
     /// KiB or more, the batch is sorted window by window, as many rays as fit. With still fewer a window is
     /// 256 rays on the stack. Larger windows give the answers sooner, up to millions of rays.
     pub scratch_bytes: usize,
-    /// `filter` is asked about a triangle if its mask and this have a bit in common; the others are
-    /// opaque: their hits count unasked. 0, the default, and all bits ask about every triangle, even one
-    /// whose mask is 0.
+    /// `filter` is called for the triangles whose mask has a bit in common with this one. The others are
+    /// opaque: their hits count without a call. With 0, the default, and with all bits it is called for
+    /// every triangle, even one whose mask is 0.
     ///
-    /// Rays that meet none of those triangles cost in a batch what they cost without a filter. Of a ray
-    /// that an opaque triangle blocks, `hgrid_occluded` and the other questions of that kind may offer the
-    /// filter other hits or not. Here are leaves, whose triangles have the mask 2, among walls:
+    /// In a batch, rays that meet only opaque triangles cost no more than without a filter. If an opaque
+    /// triangle blocks a ray, `hgrid_occluded` and its like may call the filter for other hits of the ray,
+    /// or not. Here are leaves, whose triangles have the mask 2, among walls:
     ///
     /// ```c
     /// static hgrid_status light_of_rays(const hgrid_grid *grid, const hgrid_ray *rays, size_t count,
@@ -318,7 +315,7 @@ pub struct hgrid_blob_info {
     pub reserved: u32,
 }
 
-/// What a look at all of a grid finds. Initialise it with `HGRID_STATISTICS_INIT`.
+/// The statistics of a grid and its mesh. Initialise it with `HGRID_STATISTICS_INIT`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_statistics {
@@ -339,9 +336,9 @@ pub struct hgrid_statistics {
     pub longest_list: u32,
     /// 0.
     pub reserved: u32,
-    /// A hash of the grid's box, resolution and lists in order, not of which cell
-    /// has which: the same for the same grid on every platform, whatever its byte
-    /// order. No defence against forgery.
+    /// A hash of the grid's box, its resolution and its lists in order, but not of the cells that they
+    /// belong to. The same grid has the same hash on every platform, whatever its byte order. It does not
+    /// protect against forgery.
     pub content_hash: u64,
 }
 

@@ -37,7 +37,7 @@ pub struct hgrid_instance {
     pub id: u32,
 }
 
-/// What instances show: a grid, a tree of shapes or a scene, by the address of its view. `hgrid_object_grid`,
+/// A grid, a tree of shapes or a scene that instances show, by the address of its view. `hgrid_object_grid`,
 /// `hgrid_object_shapes` and `hgrid_object_scene` make it.
 ///
 /// The view stays where it is, with all that it refers to, for as long as scenes that show it are queried.
@@ -98,7 +98,7 @@ pub struct hgrid_scene_hit {
     pub path: [u32; HGRID_MAX_NESTING],
 }
 
-/// What a query of a scene may be told. Initialise it with `HGRID_SCENE_OPTIONS_INIT`.
+/// The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_scene_options {

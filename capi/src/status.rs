@@ -6,7 +6,7 @@ use core::ffi::{CStr, c_char};
 
 use hgrid_core::{BatchField, ConfigField, Error, MeshField, Region};
 
-/// What a call answers: `HGRID_OK`, or below zero why not. `hgrid_status_string` has it in words.
+/// The result of a call: `HGRID_OK`, or a negative error. `hgrid_status_string` has the text of each.
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_status = i32;
 
@@ -126,13 +126,13 @@ pub const HGRID_ERROR_NO_MESH: hgrid_status = -46;
 /// The blob is no tree (`HGRID_METHOD_BVH`), or `hgrid_pack` wrote it: refit the tree, then pack it.
 pub const HGRID_ERROR_CANNOT_REFIT: hgrid_status = -47;
 
-/// An older version built the blob with a method that was removed, brick: build it again with another one.
+/// The blob was built by an older version with the method brick, which was removed: build it with another method.
 pub const HGRID_ERROR_METHOD_REMOVED: hgrid_status = -48;
 
 /// The blob is built over something else: triangles, shapes or instances. Open it with the function for these.
 pub const HGRID_ERROR_OTHER_CONTENT: hgrid_status = -49;
 
-/// An instance names an object that there is not. The report's `triangle` says which instance.
+/// An instance names an object that does not exist. The report's `triangle` is the number of the instance.
 pub const HGRID_ERROR_INSTANCE_OBJECT: hgrid_status = -60;
 
 /// The matrix of an instance has no inverse that float can hold, is not finite, or takes its object beyond 2^120. The

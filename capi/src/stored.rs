@@ -22,10 +22,9 @@ use crate::types::{hgrid_grid, hgrid_mesh};
 /// `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL. With a mesh that one is used, its
 /// masks included, and the one in the blob is not looked at.
 ///
-/// What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
-/// nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
-/// not change while the grid is in use: a file that others may write is not for mapping,
-/// read it into memory of your own.
+/// The call does not check the whole blob. On damaged bytes queries may answer wrongly, but they end, and
+/// they read nothing outside the blob and the mesh. `hgrid_validate` proves a blob. The bytes must not
+/// change while the grid is in use: do not map a file that others may write, read it into your own memory.
 ///
 /// `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`; or returns
 /// what is wrong and leaves `grid` as it was:
@@ -228,9 +227,9 @@ pub unsafe extern "C" fn hgrid_mesh_of(
 /// address, overlaps neither blob nor mesh nor any argument of this call, and may be NULL if
 /// `scratch_bytes` is 0. It may hold anything before and holds nothing of use afterwards.
 ///
-/// Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
-/// that is damaged; `HGRID_ERROR_SCRATCH_TOO_SMALL` and `HGRID_ERROR_OVERLAP` if it is the scratch that
-/// will not do; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
+/// Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`; `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged;
+/// `HGRID_ERROR_SCRATCH_TOO_SMALL` or `HGRID_ERROR_OVERLAP` if the scratch is too small or overlaps;
+/// `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
 /// `HGRID_ERROR_NULL_ARGUMENT`.
 ///
 /// Threads: any number of calls and queries on the same grid at once, each with scratch of its own.

@@ -99,7 +99,7 @@ pub const HGRID_METHOD_BVH: u32 = 6;
 /// Choose it for scenes that change, and for the first image.
 pub const HGRID_QUALITY_FAST: u32 = 0;
 
-/// The quality of a tree whose every node SAH chooses, each triangle on its own.
+/// The quality of a tree that is built with SAH at every node, down to single triangles.
 ///
 /// Choose it for a scene that is traced for long, above all where large and small triangles mix, as in
 /// architecture. Rays are answered sooner and the index is smaller; the build takes about ten times
@@ -117,7 +117,7 @@ pub const HGRID_BUILD_STRICT: u32 = 1;
 /// The most tasks that a parallel build runs at once.
 pub const HGRID_MAX_TASKS: u32 = 64;
 
-/// What `progress` of `hgrid_config` is told when all is done.
+/// The value that `progress` of `hgrid_config` gets when the build is done.
 pub const HGRID_PROGRESS_END: u32 = 1000;
 
 const _: () = assert!(HGRID_ALIGNMENT == hgrid_core::ALIGNMENT);
@@ -178,12 +178,12 @@ pub struct hgrid_part {
     pub opaque: [MaybeUninit<u64>; 24],
 }
 
-/// What a build may be told: which grid, and how to go about it. Initialise it with
+/// The configuration of a build: the method with its parameters, tasks and progress. Initialise it with
 /// `HGRID_CONFIG_INIT`, which is also what NULL means, or with the macro of another method:
 /// `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`, `_RECURSIVE`.
 ///
-/// Each macro sets all fields to what the method's authors use. To change the method later, set
-/// `method` and `density`: a field that belongs to another method is not looked at.
+/// Each macro sets all fields to the values that the method's authors use. To change the method later,
+/// set `method` and `density`: fields of other methods are ignored.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_config {
@@ -208,12 +208,12 @@ pub struct hgrid_config {
     pub reserved: u32,
     /// 0 or `HGRID_BUILD_STRICT`.
     pub flags: u32,
-    /// For `HGRID_METHOD_BVH`: the most tasks that are run at once, usually the
-    /// number of cores; each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
-    /// `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer, down to one. With 0 and 1 nothing
-    /// is parallel, and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL,
-    /// not even for `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the
-    /// thread that calls, and look at neither.
+    /// For `HGRID_METHOD_BVH`: the most tasks that run at once, usually the number of cores. Each needs
+    /// scratch, which `hgrid_bound` and `hgrid_sizes` include and `HGRID_SCRATCH_BOUND` does not; with
+    /// less scratch the build runs fewer tasks, down to one. 0 and 1 mean a serial build; a number above
+    /// `HGRID_MAX_TASKS` counts as `HGRID_MAX_TASKS`. Above 1 `run` may not be NULL, not even for
+    /// `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the calling thread
+    /// and ignore `tasks` and `run`.
     pub tasks: u32,
     /// For `HGRID_METHOD_BVH`: `HGRID_QUALITY_FAST`, which is 0, or `HGRID_QUALITY_HIGH`. The other methods do not
     /// look at it.
@@ -230,9 +230,9 @@ pub struct hgrid_config {
     ///
     /// A task that is called twice, even at the same time, one that is never called, and an index
     /// that is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`.
-    /// Undefined behaviour, as nothing can detect it, is a call of `task` that is made or still
-    /// running after `run` has returned, or with another `task_context`; a `run` that is left by
-    /// `longjmp` or by a C++ exception; and one that changes what the build works on.
+    /// The following cannot be detected and are undefined behaviour: a call of `task` that is made or still
+    /// running after `run` has returned, or that gets another `task_context`; a `run` that is left by
+    /// `longjmp` or by a C++ exception; a `run` that changes the mesh or the regions of the build.
     pub run: Option<
         unsafe extern "C" fn(
             context: *mut c_void,
@@ -241,13 +241,13 @@ pub struct hgrid_config {
             task_context: *mut c_void,
         ),
     >,
-    /// Told how much of a build is `done`, in thousandths from 0 to `HGRID_PROGRESS_END`, and answers
-    /// whether to go on; or NULL. It is called on the thread that builds, a few times to a few hundred
-    /// times; `done` grows from call to call, and in the last call of a build that succeeds it is
-    /// `HGRID_PROGRESS_END`, whatever the answer. After false the build ends with
-    /// `HGRID_ERROR_CANCELLED`, at the latest when a pass over the mesh is over. It may ask other grids
-    /// questions and build other grids, but not touch the regions of this build nor change its mesh, and
-    /// may not be left by `longjmp` or by a C++ exception.
+    /// Gets how much of a build is `done`, in thousandths from 0 to `HGRID_PROGRESS_END`, and returns true
+    /// to continue or false to cancel. May be NULL. It is called on the thread that builds, a few times to
+    /// a few hundred times. `done` grows from call to call; the last call of a build that succeeds gets
+    /// `HGRID_PROGRESS_END`, and its result is ignored. After false the build ends with
+    /// `HGRID_ERROR_CANCELLED`, after the current pass over the mesh at the latest. The callback may query
+    /// and build other grids. It must not touch the regions of this build, change its mesh, or be left by
+    /// `longjmp` or by a C++ exception.
     pub progress: Option<unsafe extern "C" fn(context: *mut c_void, done: u32) -> bool>,
 }
 
@@ -259,12 +259,12 @@ pub struct hgrid_config {
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_task = unsafe extern "C" fn(task_context: *mut c_void, index: u32);
 
-/// What a build, or a question for sizes, found out. Initialise it with `HGRID_REPORT_INIT`.
+/// The results of a build, or of a call that computes sizes. Initialise it with `HGRID_REPORT_INIT`.
 ///
-/// Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
-/// what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another
-/// pass over mesh and grid, `hgrid_inspect` tells: triangles with two equal corners, the first bad
-/// one, the longest list, a hash of the content.
+/// Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails.
+/// Fields that the call does not compute become 0, and `triangle` becomes `HGRID_INVALID_ID`.
+/// `hgrid_inspect` has the statistics that take another pass over mesh and grid: triangles with two
+/// equal corners, the first bad triangle, the longest list, a hash of the content.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_report {
@@ -275,9 +275,9 @@ pub struct hgrid_report {
     pub is_exact: u32,
     /// Bytes that the index region needs; after a build, the size of the blob.
     pub index_bytes: u64,
-    /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it
-    /// is enough, but not exact, and after a build an upper bound of that. After a build with
-    /// several tasks, whether it succeeds or fails, it is that of a build with one.
+    /// Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it is enough but not exact, before
+    /// a build and after it. After a build with several tasks, whether it succeeds or fails, it is the need
+    /// of a build with one task.
     pub scratch_bytes: u64,
     /// The first triangle that is to blame for the error, or `HGRID_INVALID_ID`. Of joined meshes it is counted
     /// through all of them.

@@ -52,8 +52,8 @@ pub const extern "C" fn hgrid_version_string() -> *const c_char {
     VERSION.as_ptr()
 }
 
-/// Whether the library that is linked has a method, `HGRID_METHOD_ONE_LEVEL` and so on. False for a
-/// number that is no method.
+/// Tells whether the linked library has a method, `HGRID_METHOD_ONE_LEVEL` and so on; false for a number
+/// that is no method.
 ///
 /// It has all of them unless it was built with fewer, to be smaller: `cargo build --release -p
 /// hgrid-capi --no-default-features --features one-level`, say.

@@ -53,10 +53,9 @@ impl<'a> Grid<'a> {
     /// [`Error::OutOfMemory`] names the region and its need, [`Error::Misaligned`] the region;
     /// [`Error::IndexOutOfRange`] and, with [`STRICT`](crate::BuildFlags::STRICT),
     /// [`Error::NonFiniteTriangle`] the triangle; [`Error::InvalidConfig`] the field,
-    /// [`Error::MethodLeftOut`] the method. After an error the index region is as it was, but for
-    /// variable and recursive grids and trees, which fill it as they go: there it holds nothing of
-    /// use.
-    /// Either way both regions can be used again.
+    /// [`Error::MethodLeftOut`] the method. After an error the index region is unchanged, except with trees,
+    /// variable and recursive grids, which write to it while they build: then it holds nothing of use. Both
+    /// regions can be used again.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
@@ -83,7 +82,7 @@ impl<'a> Grid<'a> {
         Self::build_with(mesh, config, index, scratch, &Control::SERIAL)
     }
 
-    /// Builds a grid on the caller's threads: [`build`](Self::build), and bit by bit the same grid.
+    /// Builds a grid on the caller's threads. It is the same grid as that of [`build`](Self::build), bit for bit.
     ///
     /// Only [`Method::Bvh`] is cut into tasks; the other methods build on the thread
     /// that calls. [`sizes_with`](crate::sizes_with) and
@@ -92,7 +91,7 @@ impl<'a> Grid<'a> {
     ///
     /// # Errors
     /// Those of [`build`](Self::build), [`Error::InvalidParallelFor`] if a task was run twice or
-    /// not at all, and [`Error::Cancelled`] if the progress callback had enough; after these two
+    /// not at all, and [`Error::Cancelled`] if the progress callback returned false; after these two
     /// the index holds nothing of use.
     ///
     /// ```
@@ -105,7 +104,7 @@ impl<'a> Grid<'a> {
     /// let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
     /// let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
     ///
-    /// // Whoever waits for this build has gone away.
+    /// // The grid is no longer needed: cancel the build.
     /// let progress = |_| false;
     /// let control = Control { progress: Some(&progress), ..Control::default() };
     /// let built = Grid::build_with(mesh, &config, index, scratch, &control);
@@ -180,7 +179,7 @@ impl<'a> Grid<'a> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`] if there is less scratch;
-    /// [`Error::Corrupt`] with a byte that a build would not have written so;
+    /// [`Error::Corrupt`] with the position of a byte that no build writes;
     /// [`Error::IndexOutOfRange`] if the mesh itself is damaged.
     ///
     /// ```
@@ -231,7 +230,7 @@ impl<'a> Grid<'a> {
     /// ```
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        // One walk of a kind: questions without options are asked as those with the defaults.
+        // Save flash: use the traversal for queries with options, so that the program has only that one.
         if IS_SMALL {
             return self.intersect_with(ray, &mut QueryOptions::default());
         }
@@ -240,7 +239,7 @@ impl<'a> Grid<'a> {
         closest.0
     }
 
-    /// Whether anything is hit: what [`intersect`](Self::intersect) would find, found sooner.
+    /// Returns true if [`intersect`](Self::intersect) would find a hit. It stops at the first hit, so it is faster.
     ///
     /// ```
     /// # use hgrid_core::*;
@@ -312,7 +311,7 @@ impl<'a> Grid<'a> {
 
     /// Traverses one of the four grids along a ray, and tests the triangles of each cell one by one.
     ///
-    /// Out of line, or its stack would be that of the other, too.
+    /// Out of line: otherwise traversals of a tree would take its stack, too.
     #[inline(never)]
     fn traverse<F: Search, T: Tally>(
         &self,
@@ -352,7 +351,7 @@ impl<'a> Grid<'a> {
         self.structure.visit(&reach, visitor);
     }
 
-    /// What a tree is searched with.
+    /// Returns what a traversal needs besides the tree.
     #[cfg(feature = "bvh")]
     #[inline(always)]
     pub(crate) fn scope(&self) -> crate::bvh::Scope<'_> {

@@ -25,18 +25,18 @@
 //! # Ok::<(), hgrid_core::Error>(())
 //! ```
 //!
-//! The house, from the ground up. No module imports one that imports it; a test sees to that.
+//! The modules in layers, lowest first. Imports form no cycle; a test checks this.
 //!
-//! | floor | modules |
+//! | layer | modules |
 //! |---|---|
-//! | what callers bring and get | `limits`, `error`, `method`, `config`, `control`, `ray`, `mesh`, `options`, `counters` |
+//! | plain types of the API | `limits`, `error`, `method`, `config`, `control`, `ray`, `mesh`, `options`, `counters` |
 //! | memory | `arena`, `bump`, `bits`, `lists`, `hash`, `blob`, `tasks`, `survey` |
 //! | rays and triangles | `aabb`, `simd`, `approach`, `filter`, `exact`, `eight`, `pairs`, `triangle`, `surface` |
 //! | cells | `cell`, `spans`, `dda` |
-//! | what a query does with what it meets | `search`, `visit` |
+//! | receivers of a traversal: of hits, of id lists | `search`, `visit` |
 //! | structures, a folder each | `one_level`; `fixed` and `variable` on top of it; `recursive`; `bvh` |
-//! | all of them in one list, and the view that queries run on | `structure`, `grid` |
-//! | questions | `sizes`, `query`, `batch`, `closest`, `inspect`, `refit` |
+//! | the list of structures, and the view that queries run on | `structure`, `grid` |
+//! | operations: sizes, queries, statistics, refit | `sizes`, `query`, `batch`, `closest`, `inspect`, `refit` |
 //! | on top of grids | `owned`, `shapes`, `scene`, `packed` |
 //!
 //! core/DESIGN.md tells how it all works, core/REJECTED.md what was left out.
@@ -46,17 +46,17 @@
 //! [`Method::is_available`] tells which methods there are, and a call with another method returns
 //! [`Error::MethodLeftOut`].
 //!
-//! The feature `alloc`, off by default, brings `OwnedGrid`: grid, memory and mesh in one type without a
-//! lifetime. All else is the same with it and without.
+//! The feature `alloc`, off by default, adds `OwnedGrid`, which owns its memory and its mesh and has no lifetime
+//! parameter. It changes nothing else.
 //!
 //! Keys used in these pages: **CP10** Costa, Pereira, Jorge 2010; **LD08** Lagae and Dutré,
 //! *Compact, Fast and Robust Grids for Ray Tracing*, 2008.
 #![no_std]
 #![deny(unsafe_code)]
-// The methods share their helpers: without some methods, some helpers have nobody to help.
+// Methods share helpers: with some methods left out, some helpers are unused.
 #![cfg_attr(
     not(all(feature = "fixed", feature = "variable", feature = "recursive", feature = "bvh")),
-    allow(unused, reason = "the build with all methods tells what nobody uses")
+    allow(unused, reason = "the build with all methods reports unused code")
 )]
 
 #[cfg(any(test, feature = "alloc"))]

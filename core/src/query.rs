@@ -82,7 +82,7 @@ impl Grid<'_> {
         closest
     }
 
-    /// Whether anything is hit that the options let count.
+    /// Returns true if the ray hits a triangle that the options let count.
     ///
     /// ```
     /// # use hgrid_core::*;
@@ -93,7 +93,7 @@ impl Grid<'_> {
     /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
     /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
     /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
-    /// // Is a window before the light? The triangle lets it through.
+    /// // The triangle is a window: the filter rejects its hit, so the ray reaches the light.
     /// let mut through_windows = |_, _: &Hit| Verdict::Reject;
     /// let mut options =
     ///     QueryOptions { filter: Some(&mut through_windows), ..QueryOptions::default() };
@@ -144,7 +144,7 @@ impl Grid<'_> {
         if options.filter.is_some() {
             return self.intersect_at(place, ray, options).map(|hit| hit.primitive);
         }
-        // Nobody is promised an order.
+        // Without a filter no order is promised: any hit that counts will do.
         let mut hit = Hit::MISS;
         let found = self.nearest(ray, options, None, core::slice::from_mut(&mut hit), true);
         (found > 0).then_some(hit.primitive)
@@ -154,11 +154,10 @@ impl Grid<'_> {
     ///
     /// Writes as many of them as `hits` has room for, the nearest, and returns how many there
     /// are. Without a filter, a tree ([`Method::Bvh`](crate::Method::Bvh)) is walked once and keeps
-    /// the nearest in a heap, in time of the number of hits times the logarithm of the room. With a
-    /// filter, and with the other methods where there is not room for more hits than there are, the
-    /// ray is walked once more for each sixteen hits, from where it got to: so no memory is taken,
-    /// whatever their number, but thousands of hits in one cell take long, as the square of their
-    /// number.
+    /// the nearest in a heap, in time proportional to the number of hits times the logarithm of the room.
+    /// With a filter, and with the other methods if `hits` is too short for all hits, the ray is traversed
+    /// again for every sixteen hits, each time from the last of them. That takes no memory, but the time for
+    /// thousands of hits in one cell grows with the square of their number.
     ///
     /// ```
     /// # use hgrid_core::*;
@@ -217,8 +216,8 @@ impl Grid<'_> {
         all.count
     }
 
-    /// Shows `take` the hits that count and lie behind one, in order, until it answers that it has
-    /// enough. The first walk collects `room` hits.
+    /// Passes the hits behind `after` that count to `take`, in order, until `take` returns false. The first
+    /// walk collects `room` hits.
     fn in_order(
         &self,
         (place, ray): (usize, &Ray),
@@ -250,7 +249,7 @@ impl Grid<'_> {
                 }
                 after = Some(*hit);
             }
-            // With room to spare, there is nothing behind the last one.
+            // The walk had room for more hits, so there are no others.
             if found < room {
                 return;
             }

@@ -1,9 +1,9 @@
 //! The methods of the library: the one place that lists what is done by method.
 //!
-//! A method is a folder with a feature of its name. Without the feature the folder is no part of the library,
-//! and who asks for the method gets [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes` and
-//! `build` and a type that reads what was built; [`Structure`] is one of these types. A new method is a line
-//! of the list at the end and a module in lib.rs.
+//! A method is a folder with a cargo feature of its name. Without the feature the folder is not compiled, and calls
+//! with the method return [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes` and `build` and a
+//! type that reads what was built; [`Structure`] is an enum of these types. A new method is a line of the list at the
+//! end and a module in lib.rs.
 
 use crate::aabb::Aabb;
 use crate::arena::Sizes;
@@ -18,7 +18,7 @@ use crate::mesh::TriangleMesh;
 use crate::method::Method;
 use crate::visit::Visitor;
 
-/// What is done with a tree, or else with a grid of cells.
+/// Evaluates the first expression for a tree, the second for a grid of cells.
 macro_rules! by_kind {
     ($structure:expr, $tree:pat => $with_tree:expr, $with_cells:expr) => {
         match $structure {
@@ -65,7 +65,7 @@ macro_rules! methods {
             }
         }
 
-        /// How much memory a build takes; exactly, if there is scratch enough to find out.
+        /// Returns the memory that a build takes: the exact size if `scratch` is large enough, else a bound.
         pub(crate) fn sizes(
             mesh: &TriangleMesh<'_>,
             config: &Config,
@@ -173,7 +173,7 @@ macro_rules! methods {
                 }
             }
 
-            /// Shows the lists that a box meets, in a fixed order; a tree shows all. False if there was no end.
+            /// Visits the lists that a box meets, in a fixed order; a tree visits all. False if the budget ran out.
             pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
                 match self {
                     $(#[cfg(feature = $feature)] Self::$Cells(cells) => cells.visit(reach, visitor),)*
@@ -181,7 +181,7 @@ macro_rules! methods {
                 }
             }
 
-            /// Words of all lists: what a ray may read before it goes in circles.
+            /// Words of all lists. A ray that reads more has met damaged bytes.
             #[inline]
             pub(crate) const fn list_words(&self) -> usize {
                 match self {
@@ -190,7 +190,7 @@ macro_rules! methods {
                 }
             }
 
-            /// Bytes of scratch with which a mesh of so many triangles becomes it again.
+            /// Bytes of scratch that a build of this structure over so many triangles takes.
             pub(crate) fn scratch_bytes(&self, triangles: u32, config: &Config, resolution: [u32; 3]) -> u64 {
                 match self {
                     $(#[cfg(feature = $feature)]

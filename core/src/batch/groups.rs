@@ -9,7 +9,7 @@ use crate::options::QueryOptions;
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::simd::dispatch;
 
-/// A batch and what it is asked for; `ASKS` if a filter is asked, too.
+/// A batch with its grid and its options; `ASKS` is true if the options have a filter.
 struct Asked<'r, 'm, 'q, B, A, const ASKS: bool> {
     grid: &'r Grid<'m>,
     tree: &'r Bvh<'m>,

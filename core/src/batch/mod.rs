@@ -5,7 +5,7 @@
 //! given or sorted first, and one by one where their origins lie far apart. The other methods trace one
 //! ray after the other.
 //!
-//! A filter is asked in the order of the rays, all about one before the next. In groups, too:
+//! A filter sees all hits of one ray before those of the next, in the order of the rays. Groups keep this order:
 //!
 //! ```text
 //! closest   the group finds the closest hit of each ray among all triangles; a miss or an opaque one is
@@ -41,9 +41,8 @@ pub enum Coherence {
     #[default]
     Incoherent = 0,
     /// Rays that follow one another start near each other: camera rays of a tile, shadow rays and
-    /// ambient occlusion from its hits. They are taken as given, with a tree in groups of 64. Best are
-    /// runs of 128 rays from two tiles of 8 x 8 pixels side by side, each sixteen of them a square of
-    /// 4 x 4.
+    /// ambient occlusion from its hits. They are traced in the order given, with a tree in groups of 64. The best
+    /// order is that of tiles of 8 x 8 pixels, two adjacent ones at a time, each in four squares of 4 x 4 pixels.
     Coherent = 1,
 }
 
@@ -81,7 +80,7 @@ impl<'a> StridedMut<'a> {
         Self { bytes: bytemuck::cast_slice_mut(elements), stride: size_of::<T>(), count }
     }
 
-    /// Whether all elements of `size` bytes lie inside the bytes and apart.
+    /// Returns true if all elements of `size` bytes lie inside `bytes` and do not overlap.
     fn holds(&self, size: usize) -> bool {
         let Some(last) = self.count.checked_sub(1) else { return true };
         let end = last.checked_mul(self.stride).and_then(|start| start.checked_add(size));
@@ -347,8 +346,8 @@ impl Grid<'_> {
         Ok(())
     }
 
-    /// Whether each ray hits anything: [`occluded_n_with`](Self::occluded_n_with), wherever rays
-    /// and answers lie.
+    /// Tells for each ray whether it hits anything: [`occluded_n_with`](Self::occluded_n_with) for rays and
+    /// answers of any layout.
     pub fn occluded_batch(
         &self,
         batch: &mut impl Batch<bool>,
@@ -387,24 +386,24 @@ impl Grid<'_> {
     }
 }
 
-/// What a ray is asked for in a batch.
+/// The answer to one ray of a batch: a hit, a flag, or the id of a triangle.
 trait Answer: Sized {
-    /// Whether batches of this kind are rare: they share a kernel, which costs a call for each ray and
-    /// answer and saves the code of another one.
+    /// True if batches of this kind share a kernel with others, which saves code and costs a call for each ray and
+    /// each answer.
     const IS_RARE: bool = false;
 
-    /// What stands in an array of answers.
+    /// The type of an element in an array of answers.
     type Stored: Pod;
 
     fn stored(self) -> Self::Stored;
 
-    /// What a ray that was traced with others says.
+    /// Makes the answer from the hit that a group found.
     fn of(hit: &Hit) -> Self;
 
-    /// What a ray says alone.
+    /// Traces a ray alone, without options.
     fn plain(grid: &Grid<'_>, ray: &Ray) -> Self;
 
-    /// What a ray at a place says alone, with options.
+    /// Traces the ray at a place of the batch alone, with options.
     fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self;
 }
 

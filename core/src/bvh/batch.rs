@@ -45,7 +45,7 @@ pub(crate) struct Groups<'r, C: ?Sized, const ANY: bool> {
     pub(crate) mesh: &'r TriangleMesh<'r>,
     pub(crate) bounds: Aabb,
     pub(crate) choice: Choice,
-    /// Where rays may be sorted; nothing if they are taken as given.
+    /// The memory to sort rays in; empty if rays keep their order.
     pub(crate) memory: &'r mut [Entry],
     pub(crate) batch: &'r mut C,
 }

@@ -11,10 +11,9 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | bench |
 //! ```
 //!
-//! The exact size takes a build without an index: keys lie on the bench, ids and nodes are counted. Keys lie
-//! there, too, if the index has no room for them: it holds no ids of skipped triangles.
-//!
-//! While the exact size is sought, the top tree goes to the bench.
+//! The bench is the second buffer of the sort. `sizes` computes the exact size by a build without an index: it puts the
+//! keys and the top tree on the bench and only counts ids and nodes. A build also puts the keys on the bench if they do
+//! not fit into the index: an index of exact size has no room for keys of triangles that are skipped.
 //!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
 //! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up
@@ -139,13 +138,13 @@ fn header_of<const N: usize>(
     }
 }
 
-/// How far the steps of a build are, about.
+/// The progress at which each step of a build begins, as an approximate fraction.
 const CENSUS: f32 = 0.02;
 const SCATTER: f32 = 0.15;
 const ROOTS: f32 = 0.25;
 const TOP: f32 = 0.8;
 
-/// Builds all but the header, which it returns; without an index it only finds out how large that is.
+/// Builds everything but the header, which it returns. Without an index it only computes the size.
 #[inline(never)]
 fn build_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
@@ -164,7 +163,7 @@ fn build_in<const N: usize>(
         available_bytes: index_available,
     };
     let available_bytes = scratch.len() as u64;
-    // Ask for a bench that holds all entries: the census, which tells if bins are crowded, comes later.
+    // Report the need of a whole bench: only the census, below, shows whether bins are crowded.
     let needed_bytes = scratch_bytes(all, 1, all);
     let scratch_error =
         Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
@@ -201,7 +200,7 @@ fn build_in<const N: usize>(
     let bench = whole::<Entry>(bench);
     let has_whole_bench = bench.len() as u64 >= all;
     let behind = index.as_mut().and_then(|index| {
-        // No header in front of what is not its tree, should the build end early.
+        // Clear the header first: if the build ends early, the region must not open as a grid.
         index.first_chunk_mut::<HEADER_BYTES>()?.fill(0);
         index.get_mut(HEADER_BYTES..)
     });
@@ -318,7 +317,7 @@ fn vertex_bounds<const N: usize>(
     Ok(boxes.into_iter().flatten().fold(Aabb::EMPTY, |all, part| all.union(&part)))
 }
 
-/// Turns counts of bins into where each task writes: in a bin, the first task's entries come first.
+/// Turns the bin counts of all tasks into write positions: within a bin, entries are in the order of the tasks.
 fn place_tasks<const N: usize>(sizes: &mut [u32], counts: &mut [Option<&mut [u32]>; N]) {
     let mut next = starts(sizes);
     for (bin, &size) in sizes.iter().enumerate() {
@@ -474,7 +473,7 @@ impl Work<'_> {
             all.nodes += made.nodes;
             all.roots += made.roots;
             if made.roots == 1 {
-                // Write the record again: a root of a few entries had no room for it in them.
+                // Write the record again: a task with fewer entries than a record takes had no room for it.
                 all.last = last;
                 all.last.node.child -= moved;
                 all.last.write(entries.get_mut(to..));

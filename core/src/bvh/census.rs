@@ -77,7 +77,7 @@ pub(crate) fn count<const N: usize>(
     Ok(census)
 }
 
-/// Where the first of so many tasks end that share a number of things.
+/// Returns the end of the first `task` shares, if `things` elements are divided evenly among `tasks` tasks.
 #[expect(clippy::cast_possible_truncation, reason = "no more than there are things")]
 pub(crate) const fn share(things: usize, task: usize, tasks: usize) -> usize {
     let all = things as u64 * task as u64;

@@ -29,10 +29,10 @@ use crate::eight::{Eight, first_eight};
 use crate::mesh::TriangleMesh;
 use crate::simd::Kernel;
 
-/// From more rays on the beam of all is worth asking.
+/// With more rays than this, the beam of all rays is tested before the rays.
 const FEW_RAYS: u32 = 8;
 
-/// Vectors of eight rays in which some are left.
+/// Counts the vectors of eight rays that hold at least one of some rays.
 #[inline(always)]
 const fn octets(rays: u64) -> u32 {
     let pairs = rays | rays >> 1;
@@ -90,8 +90,8 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
                     let boxes = Boxes::decode(simd, node, rays.center, rays.spread);
                     let count = mask.count_ones();
-                    // Leave out children that are not there: this slab test takes either side as the near
-                    // one, so it meets their boxes, which are inside out.
+                    // Mask unused slots: their boxes are inside out, but this slab test sorts near and far side
+                    // itself and would meet them.
                     let (mut some, mut all, mut enter) = (node.used(), 0, f32x8::splat(simd, 0.0));
                     if count > FEW_RAYS {
                         let beam = boxes.meet_beam(simd, &beam);
@@ -253,7 +253,7 @@ fn side_by_side<S: Simd>(
                 continue;
             }
             let (near, met) = child.meet(simd, &rays.sixteen(simd, which));
-            // A ray that is none may have a distance that is no number.
+            // An invalid ray may have a NaN distance.
             let met = met & mask32x16::from_bitmask(simd, of_sixteen);
             masks[slot] |= met.to_bitmask() << (16 * which);
             least = least.min(met.select(near, far_away));

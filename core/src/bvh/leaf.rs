@@ -60,15 +60,15 @@ fn rows(mesh: &TriangleMesh<'_>, id: u32) -> [Row; 2] {
 /// A 2^40th.
 const PAD: f32 = 1.0 / (1_048_576.0 * 1_048_576.0);
 
-/// What sides of boxes are moved out by, on the ray's way: a 2^40th of the scene, which times the steepest inverse
-/// is far behind the scene.
+/// Returns the distance by which the sides of boxes are moved outwards: 2^-40 of the scene's extent. Times the steepest
+/// inverse, it is a distance far behind the scene.
 #[inline(always)]
 pub(super) fn pad_of(bounds: &Aabb) -> f32 {
     (bounds.size().max_element() * PAD).max(f32::MIN_POSITIVE)
 }
 
-/// Which boxes of a leaf a ray meets before its end, as bits, and where it enters each, box by box: for
-/// machines without vectors.
+/// Intersects a ray with the boxes of a leaf one by one, for machines without vectors. Returns a mask of the boxes that
+/// it meets before its end, and the entry distances.
 #[inline(never)]
 pub(super) fn meet_leaf(
     slab: &Slab,

@@ -35,7 +35,7 @@ use crate::eight::{Eight, first_eight};
 use crate::mesh::TriangleMesh;
 use crate::simd::Kernel;
 
-/// By how much the reach is wider than errors of 2^-20 ask for: see above.
+/// The factor that widens the reach by relative errors of up to 2^-20: see above.
 const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 /// More than what underflows in a squared distance.
 const TINY: f32 = f32::MIN_POSITIVE;
@@ -118,9 +118,9 @@ type Vectors<S> = [f32x8<S>; 3];
 
 /// Lower bounds of the squared distances from the point to eight triangles.
 ///
-/// A triangle lies behind the plane through its nearest corner across any direction. Two directions are
-/// tried: to the nearest point of an edge, and the triangle's normal. One of them is that of the closest
-/// point, so the bound is as good as rounding allows; and however wrong they are, it is a bound.
+/// For any direction, the plane across it through the triangle's nearest corner has the whole triangle behind it, so
+/// its distance is a lower bound. Two directions are tried: to the nearest point of an edge, and the normal. One of
+/// them leads to the closest point, so the bound is tight up to rounding; a wrong direction only makes it smaller.
 #[inline(always)]
 fn triangles<S: Simd>(simd: S, corners: &[Vectors<S>; 3], point: &Point) -> f32x8<S> {
     let (scale, at) = (f32x8::splat(simd, point.scale), splat(simd, point.at));
@@ -268,7 +268,7 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut Nearest<'_, F, T> {
                             }
                         }
                         rest &= !(1 << lane);
-                        // Go on with others: a bound may be NaN, which says nothing.
+                        // Continue, do not break: a lane whose bound is NaN must be tested, too.
                         if away[lane % WIDTH] > reach {
                             continue;
                         }

@@ -267,7 +267,7 @@ impl<S: Simd> Rule<S> {
     }
 }
 
-/// By how much of a step a quantised box is larger than the exact one, at least.
+/// The least margin of a quantised box around the exact one, in steps.
 const MARGIN: f32 = 1.0 / 64.0;
 /// A box is at least this part of its coordinates wide, so that a quarter of a step is no less than
 /// their rounding.
@@ -275,7 +275,7 @@ const LEAST_STEPS: f32 = 254.0 / 2_097_152.0;
 /// Adding this rounds a small number to a whole one and leaves that in the low bits.
 const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 
-/// The exponent bits of the smallest power of two of which 254 make up an extent.
+/// Returns the exponent bits of a power of two: the next one above a 254th of an extent.
 fn exponent_for(extent: f32) -> u8 {
     let least = extent * (1.0 / 254.0);
     let exponent = (least.to_bits() >> 23) & 0xff;

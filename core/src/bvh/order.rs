@@ -35,8 +35,8 @@ const _: () = assert!(3 + 3 * CELL_BITS + WITHIN_BITS == 2 * DIGIT_BITS);
 /// on average.
 const ENOUGH: usize = 2 * GROUP;
 
-/// Rays of a group that are looked at to see whether it is scattered: every seventeenth, as rays
-/// that start at two or four places in turn are scattered, too.
+/// The stride at which rays of a group are sampled to tell whether it is scattered. It is odd, so that rays which start
+/// at two or four places in turn count as scattered.
 const SAMPLE: usize = GROUP / 4 + 1;
 
 /// The rays of a window in order, and which of them wait until all others are done.
@@ -46,7 +46,7 @@ pub(crate) struct Sorted<'m> {
     waiting: &'m mut [Entry],
 }
 
-/// Marks a ray that waits; below it stands what it waits for.
+/// The bit of a deferred ray; the bits below it hold the triangle of its first hit, or `INVALID_ID`.
 const WAITS: Entry = 1 << 32;
 
 impl Sorted<'_> {

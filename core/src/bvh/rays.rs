@@ -31,7 +31,7 @@ pub(crate) struct Rays {
     pub(crate) alive: u64,
     /// The triangles that they see.
     choice: Choice,
-    /// Where boxes and origins are measured from, and by how much boxes grow for that.
+    /// The point that boxes and origins are relative to, and the growth of boxes that covers the rounding.
     pub(crate) center: [f32; 3],
     pub(crate) spread: f32,
     /// Relative to the center.
@@ -95,9 +95,8 @@ impl Rays {
         &mut self.given
     }
 
-    /// Makes the first `count` rays ready, to be asked about triangles in a box. Returns those that must be
-    /// traced alone: they come from afar, begin behind their origin, or their direction is longer or shorter
-    /// than f32 divides by.
+    /// Prepares the first `count` rays for triangles inside `bounds`. Returns a mask of the valid rays that must be
+    /// traced alone: the origin is far away, `t_min` is negative, or the direction is too long or too short for f32.
     #[inline(always)]
     pub(crate) fn prepare<S: Simd>(&mut self, simd: S, count: usize, bounds: &Aabb) -> u64 {
         let (alive, special) = (&mut 0, &mut 0);
@@ -161,7 +160,7 @@ impl Rays {
             self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + tiny)).into();
             self.scale[octet] = scale.into();
 
-            // What the filter may be wrong by: see its proof.
+            // Compute the error bound of the filter: filter.rs has the proof.
             let distance = (a + half[0]).max(b + half[1]).max(c + half[2]);
             let filter = Filter::scaled(simd, origin, scaled, distance, extent);
             self.slope[octet] = filter.slope.into();
@@ -376,8 +375,8 @@ impl Rays {
 
     /// Keeps a hit if it is the closest so far.
     ///
-    /// `ANY`: a hit ends its ray, unless the filter has to be asked about it: of those the closest one is
-    /// kept until the ray ends at another.
+    /// With `ANY`, an opaque hit ends its ray. Of the hits that the filter callback must judge, the closest is kept,
+    /// until an opaque hit replaces it.
     #[inline(always)]
     fn found<const ANY: bool>(&mut self, mesh: &TriangleMesh<'_>, ray: u32, hit: Hit) {
         let at = ray as usize % GROUP;

@@ -61,7 +61,7 @@ impl Bvh<'_> {
         if let Some(word) = self.ids.iter().position(|&id| id >= triangles) {
             return Err(at(ids_at + word as u64 * size_of::<u32>() as u64));
         }
-        // Triangles were left out, so some of those in leaves may be new among those that are not finite.
+        // The build left triangles out, so the mesh may have non-finite ones: none of them may be in a leaf.
         if header.skipped_count > 0 {
             let mut reader = mesh.reader();
             for &triangle in self.ids {
@@ -197,8 +197,8 @@ impl Tree<'_> {
     }
 }
 
-/// Checks that the triangles of a mesh are those of a tree: each has its vertices, and as many as then have
-/// none that are not finite.
+/// Checks that every triangle names vertices of the mesh, and that at least as many triangles are non-finite as the
+/// build left out.
 fn check_mesh(header: &Header, mesh: &TriangleMesh<'_>) -> Result<(), Error> {
     // Most meshes are finite, which vertices tell sooner than triangles.
     if header.skipped_count == 0 && mesh.is_finite() {

@@ -72,9 +72,9 @@ pub(crate) struct Roots<'w> {
     pub(crate) least: f32,
     /// Where the entries are, and where the records go.
     pub(crate) entries: &'w mut [Entry],
-    /// Room for as many, or only for the largest bin.
+    /// The second buffer of the sort: as long as `entries`, or long enough for any unit that is sorted.
     pub(crate) bench: &'w mut [Entry],
-    /// The ids, each where an entry was; nothing if nobody wants them.
+    /// The ids, each at the place of its entry; empty if only the size is computed.
     pub(crate) ids: &'w mut [u32],
     /// Where the ids lie in the index.
     pub(crate) first: u32,
@@ -134,8 +134,8 @@ impl<'w> Roots<'w> {
         }
     }
 
-    /// Makes the roots of a unit: of bins that are in order, chosen by what is above the lowest `shift`
-    /// bits of a key. It was divided `depth` times.
+    /// Makes the roots of a unit that lies `depth` divisions deep. Its bins are in order; the keys of one bin differ
+    /// only in their lowest `shift` bits.
     pub(crate) fn unit(&mut self, range: Range<usize>, side: Side, shift: u32, depth: u32) {
         if range.len() > MOST_UNIT {
             let centers = self.centers(range.clone(), side);
@@ -265,7 +265,7 @@ impl<'w> Roots<'w> {
         while start < range.end {
             let mut end = self.bin_end(start..range.end, other, shift);
             if end - start <= CROWD {
-                // Seams are places in the tree, wherever this task starts.
+                // Seams are counted from the first entry of the tree, not from that of this task.
                 let before = self.first as usize;
                 while end < range.end
                     && !savings.pay(&(before + start..before + end), range.end - end)
@@ -307,8 +307,8 @@ impl<'w> Roots<'w> {
     }
 }
 
-/// The part of a bench that a bin is sorted on: its start, as few pages as that is, or the bin's own place
-/// while other bins lie there.
+/// Returns the part of the bench that a bin is sorted in: its start, which touches few pages, or, in a division, where
+/// other bins lie on the bench, the bin's own range.
 fn bench_for<'b>(
     bench: &'b mut [Entry],
     range: &Range<usize>,

@@ -1,4 +1,4 @@
-//! What is asked of a tree: one ray, one ray in f64 through boxes, the nearest to a point.
+//! Queries of a tree: a ray against triangles, a ray with an f64 origin against boxes, triangles near a point.
 
 use super::Bvh;
 use super::nearest::Nearest;
@@ -15,7 +15,7 @@ use crate::search::{Search, test_all};
 use crate::simd::{SimdLevel, dispatch};
 use crate::triangle::TriangleTest;
 
-/// What a tree is searched with.
+/// The mesh, its box and the vector instructions: what a traversal needs besides the tree.
 pub(crate) struct Scope<'m> {
     pub(crate) mesh: &'m TriangleMesh<'m>,
     pub(crate) bounds: Aabb,
@@ -114,8 +114,8 @@ impl Bvh<'_> {
         )
     }
 
-    /// Shows `test` the triangles that may be within a distance of a point, the nearest first. It answers
-    /// within which distance triangles matter.
+    /// Passes `test` the triangles that may lie within a distance of a point, roughly nearest first. `test` returns the
+    /// distance within which triangles matter from then on.
     #[inline(always)]
     pub(crate) fn nearest<T: Tally>(
         &self,

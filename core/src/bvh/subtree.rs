@@ -120,7 +120,7 @@ impl Kernel for Build<'_> {
 }
 
 impl Subtree {
-    /// Zeros, which are written where it lies: anything else would be made elsewhere and copied.
+    /// Returns all zeros, which the compiler writes in place; any other value would be made elsewhere and copied.
     pub(crate) fn new() -> Self {
         Self {
             nodes: [Node::zeroed(); MOST_NODES],
@@ -176,7 +176,7 @@ impl Subtree {
             let (a, b, c) = (load(simd, a), load(simd, b), load(simd, c));
             let low: f32x4<S> = a.min(b).min(c);
             let high: f32x4<S> = a.max(b).max(c);
-            // As a whole: what is stored in halves is waited for.
+            // Store all eight numbers at once: a load that spans two stores would wait for both.
             low.combine(f32x4::splat(simd, 0.0) - high).store_slice(sides);
         }
         let count = entries.len();
@@ -233,7 +233,7 @@ impl Subtree {
                 }
                 continue;
             }
-            // Eight ids, of which the next leaf writes over those that are too many.
+            // Copy eight ids; the next leaf overwrites those beyond `count`.
             node.counts[slot] = count as u8;
             let from = self.sources.get(usize::from(part.start)..);
             let to = self.ids.get_mut(self.id_count..);
@@ -269,8 +269,8 @@ impl Subtree {
             if count == 0 {
                 break;
             }
-            // Unite eight boxes, the last of a leaf again and again, or the one of a node: what a child is
-            // and how many triangles it has would mispredict as a branch.
+            // Unite eight boxes, as branches on the kind and size of a child would mispredict: a leaf repeats its last
+            // box, a node its only one.
             let is_node = count > LEAF;
             let (first, last) = if is_node { (OF_NODES + child, 0) } else { (start, count - 1) };
             child += usize::from(is_node);

@@ -73,7 +73,7 @@ struct Part {
     start: u32,
     end: u32,
     bounds: Aabb,
-    /// Its surface, or its number of items where parts are halved; negative if it cannot be cut.
+    /// The surface of the part, or its number of items where parts are halved; negative if it has one item or none.
     priority: f32,
 }
 
@@ -102,8 +102,8 @@ pub(crate) struct Top {
     pub(crate) levels: u32,
 }
 
-/// Makes the nodes over some items; all but the root of all go into `nodes`. `record` gives the node of
-/// a root, which becomes a child, and its levels. Returns `None` if there is no room for them.
+/// Makes the nodes over some items and writes all but the topmost to `nodes`. `record` returns the node of a subtree,
+/// which becomes a child, and its levels. Returns `None` if `nodes` is too short.
 ///
 /// `child` is where `nodes` will lie in the index. No step is smaller than that of a box of size
 /// `least`.
@@ -291,7 +291,7 @@ fn partition(items: &mut [Item], is_first: impl Fn(&Item) -> bool) -> usize {
     let mut count = 0;
     for at in 0..items.len() {
         if items.get(at).is_some_and(&is_first) {
-            // Of a place that stays the same there is only one.
+            // Equal places are an error here, and need no swap.
             if let Ok([first, other]) = items.get_disjoint_mut([count, at]) {
                 core::mem::swap(first, other);
             }

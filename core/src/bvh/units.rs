@@ -1,9 +1,8 @@
-//! Bins gathered into units: what is made into roots in one go.
+//! Groups bins into units, each of which is cut into roots by itself.
 //!
-//! A unit is best a single bin: bins that are neighbours in Morton order may lie far apart, and a root
-//! over both has a large box. But memory pays for no more than one root for [`PRICE`] triangles. So triangles
-//! are counted like savings: each unit adds its triangles and spends [`PRICE`] of them a root. A bin that
-//! cannot pay for a root joins the next bin.
+//! A unit should be a single bin: neighbours in Morton order may lie far apart, and a root over both has a large box.
+//! But the memory bound allows only one root for [`PRICE`] triangles. So a balance is kept, like savings: each unit
+//! adds its triangles and subtracts [`PRICE`] for each root. A bin for which the balance is too small joins the next.
 
 use core::ops::Range;
 
@@ -20,8 +19,8 @@ pub(crate) fn starts(sizes: &[u32]) -> [u32; 2] {
 pub(crate) struct Savings(usize);
 
 impl Savings {
-    /// Pays for the roots of a unit, if that leaves enough for what lies behind it: a root of some more
-    /// triangles, or nothing.
+    /// Subtracts the roots of a unit from the balance and returns true; returns false if the balance is too small, or
+    /// would be too small for a root over the `rest` entries behind the unit.
     pub(crate) fn pay(&mut self, unit: &Range<usize>, rest: usize) -> bool {
         let count = unit.len();
         let roots = if count > MOST_ROOT { count / LEAST_PIECE } else { 1 };

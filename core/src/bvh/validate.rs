@@ -38,7 +38,7 @@ struct Level {
 }
 
 impl Bvh<'_> {
-    /// Whether this tree answers right; the error names the first byte that does not.
+    /// Proves that every query of this tree is answered correctly; the error names the first byte that is wrong.
     pub(crate) fn validate(
         &self,
         header: &Header,
@@ -144,8 +144,8 @@ impl Bvh<'_> {
 const LEAST_STEP: f64 = 0.5 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^-61
 
 impl Node {
-    /// Whether a build could have written what is not a box: steps that are numbers and not too small, and
-    /// children that are one thing each, of which there is one unless all are missing as they may.
+    /// Returns `None` if no build writes such a node. Its origin and steps must be finite, its steps not too small.
+    /// Each child must be a node or a leaf, not both. It must have a child, unless it `may_be_empty`.
     fn check(&self, least: f64, may_be_empty: bool) -> Option<()> {
         let steps = self.steps().map(f64::from);
         let are_steps = self.exponents().iter().all(|exponent| (1..=253).contains(exponent))

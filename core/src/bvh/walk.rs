@@ -5,7 +5,7 @@
 //! loop: intersect the ray with the eight boxes of the node
 //!       descend into the nearest child that is met, push the others, the nearest last
 //!       a leaf: test its triangles at once; a hit ends the ray there
-//!       pop what does not begin behind that end
+//!       pop the next child that the ray enters before its end
 //! ```
 
 use fearless_simd::prelude::*;
@@ -30,7 +30,7 @@ use crate::triangle::TriangleTest;
 /// Places on the stack of a ray: seven a level, and one.
 pub(crate) const STACK: usize = 7 * super::LEVELS as usize + 1;
 
-/// Levels of a tree for which a small stack is enough, as for nearly all: a stack is set to zeros first.
+/// The most levels of a tree that uses the small stack, as nearly all do: every query zeroes its stack first.
 pub(crate) const FEW_LEVELS: u32 = 14;
 /// Places on a small stack.
 pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
@@ -39,12 +39,12 @@ pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
 /// half its node and slot.
 pub(crate) type Waiting = u64;
 
-/// A single ray, and what it looks for.
+/// The traversal of a single ray: the ray, and the search that receives its hits.
 pub(crate) struct OneRay<'r, F, T> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
     pub(crate) ray: &'r Ray,
-    /// Where the ray begins to matter: no less than its `t_min`.
+    /// The `t` from which hits matter: `t_min`, or the `t` of the last hit that was found before.
     pub(crate) begin: f32,
     pub(crate) cull: Cull,
     /// The box of the scene.
@@ -69,8 +69,7 @@ struct Wide<S: Simd> {
 
 /// Which side is the near one on each axis: 0 for the low side, [`FLIP`] for the high side.
 pub(super) type Near = [usize; 3];
-/// Rows of [`Node::bounds`] from the low side of an axis to its high side. Exclusive-or with it switches
-/// sides.
+/// The distance in rows of [`Node::bounds`] from the low side of an axis to its high side. XOR with it swaps the sides.
 const FLIP: usize = 3;
 
 /// All boxes of a node, as bits.
@@ -89,7 +88,7 @@ impl<S: Simd> Wide<S> {
         }
     }
 
-    /// Which triangles of a leaf pass the filter, as bits.
+    /// Filters the triangles of a leaf; returns a mask of those that pass.
     #[inline(always)]
     fn survivors(
         &self,
@@ -99,7 +98,7 @@ impl<S: Simd> Wide<S> {
         first: u32,
         ids: &[u32],
     ) -> u32 {
-        // Without a copy where eight ids follow, of this leaf or not.
+        // Read eight ids at once if the array has so many from here on; those behind the leaf are masked.
         let lanes = match bvh.eight(first) {
             Some(lanes) => lanes,
             None => first_eight(ids),
@@ -110,10 +109,11 @@ impl<S: Simd> Wide<S> {
         !dropped & triangles.used
     }
 
-    /// Which boxes of a node the ray misses or meets behind its end, as bits, and where it enters each.
+    /// Intersects the ray with the boxes of a node. Returns a mask of those that it does not enter before its end, and
+    /// the entry distances.
     #[inline(always)]
     fn meet(&self, simd: S, node: &Node, flips: Near, end: f32) -> (u32, f32x8<S>) {
-        // As integers, or numbers are loaded into one lane and then spread.
+        // Splat integers: floats would be loaded into one lane first and then broadcast.
         let [x, y, z] = node.origin;
         let origin = [u32x8::splat(simd, x), u32x8::splat(simd, y), u32x8::splat(simd, z)];
         let word = u32x8::splat(simd, node.word);
@@ -138,7 +138,8 @@ impl<S: Simd> Wide<S> {
 }
 
 impl<S: Simd> Wide<S> {
-    /// Which boxes of a leaf the ray meets before its end, as bits, and where it enters each.
+    /// Intersects the ray with the boxes of a leaf. Returns a mask of those that it enters before its end, and the
+    /// entry distances.
     #[inline(always)]
     fn meet_leaf(
         &self,
@@ -173,7 +174,7 @@ pub(super) fn flips_of(slab: &Slab) -> Near {
     slab.inverse.map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
 }
 
-/// What [`Wide::meet`] finds, box by box: for machines without vectors.
+/// Does the same as [`Wide::meet`] box by box, for machines without vectors.
 #[inline(never)]
 fn meet<S: Simd>(simd: S, slab: &Slab, node: &Node, end: f32) -> (u32, f32x8<S>) {
     let flips = flips_of(slab);
@@ -231,7 +232,7 @@ fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
 }
 
 impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
-    /// Returns false if the ray comes from afar, and nothing was done.
+    /// False if the ray starts too far away for [`Slab::nearby`]; nothing was traversed then.
     type Output = bool;
 
     #[inline(always)]
@@ -242,8 +243,8 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
         let Some((slab, filter)) = nearby else { return false };
         let slab = &slab;
         let given = ray;
-        // Hidden from the compiler: it would subtract and multiply in one lane and spread the result, which
-        // makes the way from one node to the next longer.
+        // Hide the vectors from the compiler: it would compute in one lane and broadcast the result, which lengthens
+        // the dependency chain from one node to the next.
         let wide = HAS_VECTORS.then(
             #[inline(always)]
             || Wide::new(simd, slab, &filter),
@@ -270,7 +271,7 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                     child = next;
                     continue;
                 }
-                // One is met: the bits above the eight do not matter to the first.
+                // At least one box is met, so the lowest set bit is one of the eight.
                 let first = (!missed).trailing_zeros();
                 let others = !missed & (!missed - 1) & ALL;
                 if others == 0 {
@@ -285,7 +286,7 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 let mut rest = others & (others - 1);
                 let base = top;
                 if rest == 0 {
-                    // A branch, where a choice would wait for the distances.
+                    // Branch: a select would wait for both distances.
                     if at(second) < at(first) {
                         push(stack, &mut top, base, number, first, bits_at(first));
                         child = node.child(second);
@@ -383,8 +384,8 @@ fn offer_leaf<S: Simd, F: Search>(
     false
 }
 
-/// Pushes a child behind those of the same node that begin farther away. `near` is the bits of a distance: a
-/// number and an integer would be stored apart, and popping both at once would wait for the two.
+/// Pushes a child so that the nearest child of a node is popped first. `near` holds the bits of a distance: distance
+/// and child are stored as one integer, because a pop that spans two stores would wait for both.
 #[inline(always)]
 fn push(stack: &mut [Waiting], top: &mut usize, base: usize, node: u32, slot: u32, near: u32) {
     let waiting = u64::from(near) << 32 | u64::from(node << 3 | slot);

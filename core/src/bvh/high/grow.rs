@@ -14,7 +14,7 @@ use crate::simd::Kernel;
 /// Levels from which on ranges are halved.
 const DEEP: u32 = 24;
 
-/// Levels of nodes, at most: halves of halves of halves are an eighth, so ten levels halve any range to leaves.
+/// Levels of nodes, at most. Where parts are halved, a level divides a range by eight, so ten levels reach the leaves.
 pub(super) const MOST_LEVELS: u32 = DEEP + 11;
 
 const _: () = assert!(MOST_LEVELS <= LEVELS);
@@ -36,13 +36,13 @@ pub(super) struct Grow<'w> {
     pub(super) ids: &'w mut [u32],
     /// Where the first of them lies in the index.
     pub(super) first: u32,
-    /// What a length is multiplied by before areas are made of lengths.
+    /// The factor that scales lengths before areas are computed from them.
     pub(super) unit: f32,
     /// No step of a node is smaller than that of a box of this size.
     pub(super) least: f32,
 }
 
-/// What grew.
+/// The result of [`Grow`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grown {
     pub(super) root: Node,
@@ -300,7 +300,7 @@ impl Cursor {
     }
 }
 
-/// What a task leaves of a range in the place of its first triangles.
+/// The result of a task for one range, written over the first items of the range.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, bytemuck::Pod, Zeroable)]
 pub(super) struct Record {

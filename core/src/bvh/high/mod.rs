@@ -55,7 +55,7 @@ const fn most_nodes(triangles: u64) -> u64 {
 /// The memory that any mesh with so many triangles needs, for a build with any number of tasks.
 pub(crate) const fn bound(triangles: u32) -> (u64, u64) {
     let triangles = triangles as u64;
-    // Of nothing, too, there is some scratch: callers allocate it.
+    // Never ask for 0 bytes of scratch: callers allocate what they are told.
     let items = if triangles < 1 { 1 } else { triangles };
     (index_bytes(triangles, most_nodes(triangles)), section_bytes::<Item>(items))
 }
@@ -65,7 +65,7 @@ fn most_of_range(triangles: usize) -> u32 {
     (triangles / 64).max(4096) as u32
 }
 
-/// How far the steps of a build are, about.
+/// The progress at which each step of a build begins, as an approximate fraction.
 const BOXES: f32 = 0.02;
 const TOP: f32 = 0.1;
 const BELOW: f32 = 0.35;
@@ -77,7 +77,7 @@ const LEAST_TASK: usize = 4096;
 /// No step of a node is smaller than that of a box of this part of the scene's extent.
 const LEAST_NODE: f32 = super::build::LEAST_NODE;
 
-/// Builds all but the header, which it returns; without an index it only finds out how large that is.
+/// Builds everything but the header, which it returns. Without an index it only computes the size.
 #[inline(never)]
 pub(super) fn build_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
@@ -98,13 +98,13 @@ pub(super) fn build_in<const N: usize>(
         Some((items, _)) => items,
         None => &mut [],
     };
-    // Tasks fill their parts of the index side by side: there is room for that, or there is one.
+    // Tasks fill their parts of the index side by side, which takes the bound. With less room, run one task.
     let mut tasks = task_count::<N>(control, triangles as usize / LEAST_TASK);
     if index_available < index_bound {
         tasks = 1;
     }
     let behind = index.as_mut().and_then(|index| {
-        // No header in front of what is not its tree, should the build end early.
+        // Clear the header first: if the build ends early, the region must not open as a grid.
         index.first_chunk_mut::<HEADER_BYTES>()?.fill(0);
         index.get_mut(HEADER_BYTES..)
     });
@@ -259,7 +259,7 @@ struct Part<'w> {
     top: &'w [Node],
     /// How many ranges.
     ranges: u32,
-    /// Which of all items its own start with.
+    /// The number of its first item among all.
     start: u32,
     items: &'w mut [Item],
     ids: &'w mut [u32],

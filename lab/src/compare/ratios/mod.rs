@@ -125,9 +125,8 @@ fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>
         let (what, theirs) = medium(what, workload)?;
         Ratio::new(what, &Entry::best(hgrid, workload)?, &theirs)
     };
-    let random = || {
-        let (what, theirs) =
-            best(Peer::EmbreeLow, "LOW", "random rays in one call", Workload::Random)?;
+    let random = |peer, quality| {
+        let (what, theirs) = best(peer, quality, "random rays in one call", Workload::Random)?;
         Ratio::new(what, &Entry::in_mode(hgrid, Workload::Random, Mode::Batch)?, &theirs)
     };
     let points = |what: &str, workload| {
@@ -140,7 +139,8 @@ fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>
         single(),
         secondary("ambient occlusion", Workload::Ao),
         secondary("diffuse bounces", Workload::Bounce),
-        random(),
+        random(Peer::EmbreeMedium, "MEDIUM"),
+        random(Peer::EmbreeLow, "LOW"),
         points("near the surface", Workload::Near),
         points("far outside", Workload::Far),
     ]
