@@ -6,7 +6,7 @@
 
 use core::fmt;
 
-use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use crate::error::{Error, Region};
 use crate::limits::ALIGNMENT;
@@ -55,7 +55,7 @@ impl Sizes {
 /// assert_eq!(Block::bytes_mut(&mut index).len(), 1024);
 /// ```
 #[repr(C, align(64))]
-#[derive(Clone, Copy, Pod, Zeroable)]
+#[derive(Clone, Copy, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Block([u8; ALIGNMENT]);
 
 impl fmt::Debug for Block {
@@ -77,13 +77,13 @@ impl Block {
     /// The blocks as a region to build or open a grid in.
     #[must_use]
     pub fn bytes(blocks: &[Self]) -> &[u8] {
-        bytemuck::cast_slice(blocks)
+        blocks.as_bytes()
     }
 
     /// The blocks as a region to build a grid in.
     #[must_use]
     pub fn bytes_mut(blocks: &mut [Self]) -> &mut [u8] {
-        bytemuck::cast_slice_mut(blocks)
+        blocks.as_mut_bytes()
     }
 }
 
@@ -106,29 +106,34 @@ pub(crate) const fn section_bytes<T>(count: u64) -> u64 {
 
 /// A section of `count` words at the start of `bytes`, and the bytes behind it. The padding is
 /// zeroed, the words are whatever was there.
-pub(crate) fn split_mut<T: AnyBitPattern + NoUninit>(
+pub(crate) fn split_mut<T: FromBytes + IntoBytes>(
     bytes: &mut [u8],
     count: u64,
 ) -> Option<(&mut [T], &mut [u8])> {
     let section = usize::try_from(section_bytes::<T>(count)).ok()?;
     let (section, rest) = bytes.split_at_mut_checked(section)?;
-    let used = usize::try_from(count).ok()?.checked_mul(size_of::<T>())?;
-    let (words, padding) = section.split_at_mut_checked(used)?;
+    let count = usize::try_from(count).ok()?;
+    let (words, padding) = <[T]>::mut_from_prefix_with_elems(section, count).ok()?;
     padding.fill(0);
-    Some((bytemuck::try_cast_slice_mut(words).ok()?, rest))
+    Some((words, rest))
 }
 
 /// A section of `count` words at the start of `bytes`, and the bytes behind it. `None` also if the
 /// padding is not zero, as every build leaves it.
-pub(crate) fn split<T: AnyBitPattern>(bytes: &[u8], count: u64) -> Option<(&[T], &[u8])> {
+pub(crate) fn split<T: FromBytes + Immutable>(bytes: &[u8], count: u64) -> Option<(&[T], &[u8])> {
     let section = usize::try_from(section_bytes::<T>(count)).ok()?;
     let (section, rest) = bytes.split_at_checked(section)?;
-    let used = usize::try_from(count).ok()?.checked_mul(size_of::<T>())?;
-    let (words, padding) = section.split_at_checked(used)?;
+    let count = usize::try_from(count).ok()?;
+    let (words, padding) = <[T]>::ref_from_prefix_with_elems(section, count).ok()?;
     if padding.iter().any(|&byte| byte != 0) {
         return None;
     }
-    Some((bytemuck::try_cast_slice(words).ok()?, rest))
+    Some((words, rest))
+}
+
+/// The whole elements of some bytes; none if the bytes are not aligned for them.
+pub(crate) fn whole<T: FromBytes + IntoBytes>(bytes: &mut [u8]) -> &mut [T] {
+    <[T]>::mut_from_prefix(bytes).map_or(&mut [], |(elements, _)| elements)
 }
 
 /// Copies words between sections of the same length.

@@ -11,8 +11,8 @@
 //! copied, mapped from a file, sent, or put in flash. It is in the byte order of its machine; the
 //! other order is recognised and refused.
 
-use bytemuck::{Pod, Zeroable};
 use glam::Vec3A;
+use zerocopy::{FromBytes, FromZeros, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
 use crate::arena;
@@ -38,7 +38,7 @@ const BYTE_ORDER: u32 = 0x0102_0304;
 
 /// The first 128 bytes of every blob.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes)]
 pub(crate) struct Header {
     magic: [u8; 8],
     byte_order: u32,
@@ -120,19 +120,19 @@ impl Header {
             bounds_min: lattice.min,
             bounds_max: lattice.max,
             resolution: lattice.resolution,
-            ..Self::zeroed()
+            ..Self::new_zeroed()
         }
     }
 
     /// The header as the first bytes of a blob.
     pub(crate) fn to_bytes(mut self) -> [u8; HEADER_BYTES] {
         self.checksum = self.sum();
-        bytemuck::cast(self)
+        transmute!(self)
     }
 
     /// A hash of the words before the checksum.
     fn sum(&self) -> u32 {
-        let words: [u32; HEADER_BYTES / size_of::<u32>()] = bytemuck::cast(*self);
+        let words: [u32; HEADER_BYTES / size_of::<u32>()] = transmute!(*self);
         let (_, words) = words.split_last().unwrap_or((&0, &[]));
         let mut sum = Hash::new();
         for &word in words {
@@ -166,7 +166,7 @@ impl Header {
 
     /// Reads the header of foreign bytes, of which there may be no more.
     pub(crate) fn peek(bytes: &[u8]) -> Result<Self, Error> {
-        let Some(head) = bytes.get(..HEADER_BYTES) else {
+        let Ok((header, _)) = Self::read_from_prefix(bytes) else {
             return Err(if bytes.starts_with(&MAGIC) {
                 Error::Truncated {
                     needed_bytes: HEADER_BYTES as u64,
@@ -176,7 +176,6 @@ impl Header {
                 Error::NotAGrid
             });
         };
-        let header: Self = bytemuck::pod_read_unaligned(head);
         if header.magic != MAGIC {
             return Err(Error::NotAGrid);
         }

@@ -8,7 +8,7 @@
 //! blob | header | fixed sections, if any | pool of words, list after list ->     | padding |
 //! ```
 
-use crate::arena::section_bytes;
+use crate::arena::{section_bytes, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::error::{ConfigField, Error, Region};
 
@@ -28,9 +28,7 @@ pub(crate) struct Bump<'a> {
 impl<'a> Bump<'a> {
     /// An allocator over the whole words of a pool.
     pub(crate) fn over(pool: &'a mut [u8]) -> Self {
-        let whole = pool.len() / size_of::<u32>() * size_of::<u32>();
-        let words = pool.get_mut(..whole).and_then(|pool| bytemuck::try_cast_slice_mut(pool).ok());
-        Self { free: words.unwrap_or_default(), asked: 0, is_exhausted: false }
+        Self { free: whole(pool), asked: 0, is_exhausted: false }
     }
 
     /// The next `count` words, or `None` if they are not there. From then on there are none.
@@ -77,12 +75,14 @@ pub(crate) fn finish(index: &mut [u8], header: Header) -> Result<&[u8], Error> {
 
 #[cfg(test)]
 mod tests {
+    use zerocopy::IntoBytes;
+
     use super::*;
 
     #[test]
     fn it_gives_what_it_has_and_counts_what_it_has_not() {
         let mut words = [7; 10];
-        let mut bump = Bump::over(bytemuck::cast_slice_mut(&mut words));
+        let mut bump = Bump::over(words.as_mut_bytes());
         bump.take(4).unwrap().fill(1);
         bump.take(3).unwrap().fill(2);
         assert!(bump.take(4).is_none() && bump.take(1).is_none() && bump.take(0).is_none());

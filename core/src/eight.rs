@@ -17,6 +17,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};
+use zerocopy::{transmute, transmute_ref};
 
 use crate::filter::RayFilter;
 use crate::mesh::{Near, TriangleMesh};
@@ -143,7 +144,7 @@ fn read<'m>(
         }
         let Some(triangle) = mesh.triangle(id) else { continue };
         for (row, [x, y, z]) in [a, b, c].into_iter().zip(triangle) {
-            *row = bytemuck::cast([x, y, z, 0.0]);
+            *row = transmute!([x, y, z, 0.0_f32]);
         }
         used |= 1 << lane;
     }
@@ -190,7 +191,7 @@ pub(crate) fn columns<S: Simd>(
 /// A ray as two rows.
 #[inline(always)]
 fn halves(ray: &Ray) -> &[Row; 2] {
-    bytemuck::cast_ref(ray)
+    transmute_ref!(ray)
 }
 
 /// One half of four rays.
@@ -209,6 +210,7 @@ pub(crate) fn load<S: Simd>(simd: S, row: &Row) -> f32x4<S> {
 #[cfg(test)]
 mod tests {
     use glam::Vec3A;
+    use zerocopy::IntoBytes;
 
     use super::*;
     use crate::aabb::Aabb;
@@ -379,7 +381,7 @@ mod tests {
             let mut vertices = Vec::new();
             for position in &positions {
                 vertices.resize(vertices.len().next_multiple_of(position_stride), 0xff);
-                vertices.extend_from_slice(bytemuck::bytes_of(position));
+                vertices.extend_from_slice(position.as_bytes());
             }
             for (index_type, size) in [(IndexType::U32, 12), (IndexType::U16, 6)] {
                 let far = if cfg!(miri) { 100 } else { 65_536 };

@@ -17,8 +17,7 @@ use alloc::vec::Vec;
 use core::fmt;
 use core::marker::PhantomData;
 
-use bytemuck::NoUninit;
-use bytemuck::allocation::try_zeroed_vec;
+use zerocopy::{FromZeros, Immutable, IntoBytes};
 
 use crate::config::Config;
 use crate::control::Control;
@@ -38,9 +37,9 @@ trait Bytes: Send + Sync {
 /// A container of the caller's.
 struct Container<C, T>(C, PhantomData<fn() -> T>);
 
-impl<C: AsRef<[T]> + Send + Sync, T: NoUninit> Bytes for Container<C, T> {
+impl<C: AsRef<[T]> + Send + Sync, T: Immutable + IntoBytes> Bytes for Container<C, T> {
     fn bytes(&self) -> &[u8] {
-        bytemuck::cast_slice(self.0.as_ref())
+        self.0.as_ref().as_bytes()
     }
 }
 
@@ -69,8 +68,10 @@ pub struct OwnedStrided {
 
 impl OwnedStrided {
     /// The elements of a container: of a `Vec`, an `Arc` of a slice, a static array, a mapped file of
-    /// yours. It is kept as it is; nothing is copied.
-    pub fn new<T: NoUninit>(elements: impl AsRef<[T]> + Send + Sync + 'static) -> Self {
+    /// yours. It is kept as it is; nothing is copied. The elements are of a type that [`Strided::new`] takes.
+    pub fn new<T: Immutable + IntoBytes + 'static>(
+        elements: impl AsRef<[T]> + Send + Sync + 'static,
+    ) -> Self {
         let container = Arc::new(Container(elements, PhantomData::<fn() -> T>));
         Self { container, offset: 0, stride: size_of::<T>() }
     }
@@ -191,7 +192,7 @@ impl Memory {
         let missing =
             Error::OutOfMemory { region, needed_bytes: length as u64, available_bytes: 0 };
         let room = length.checked_add(ALIGNMENT - 1).ok_or(missing)?;
-        Ok(Self { bytes: try_zeroed_vec(room).map_err(|()| missing)?, length })
+        Ok(Self { bytes: u8::new_vec_zeroed(room).map_err(|_| missing)?, length })
     }
 
     /// Bytes before the first multiple of [`ALIGNMENT`].

@@ -1,7 +1,7 @@
 //! Rays and hits: the two structs that cross every boundary, laid out as C sees them.
 
-use bytemuck::{Pod, Zeroable};
 use glam::Vec3A;
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// The id that no primitive has.
 pub const INVALID_ID: u32 = u32::MAX;
@@ -12,7 +12,7 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// `t_min <= t <= t_max`, closed at both ends, and decided exactly: see [`Hit`]. A ray with a NaN anywhere, an infinite origin or
 /// direction, a zero direction or `t_min > t_max` hits nothing.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Ray {
     /// Where `t` is 0, in scene units.
     pub origin: [f32; 3],
@@ -54,7 +54,7 @@ impl Ray {
 /// Direction and range are those of a [`Ray`], and so is what makes a ray miss everything; an origin that f32
 /// cannot hold misses, too.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct RayF64 {
     /// Where `t` is 0, in scene units.
     pub origin: [f64; 3],
@@ -108,7 +108,7 @@ impl RayF64 {
 /// leave out the hit that it was reported for. An origin more than 2^50 times as far away as a triangle
 /// is large may not tell its vertices apart, and miss it. The proof is the head of `triangle.rs`.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Hit {
     /// Distance in multiples of the ray's direction.
     pub t: f32,

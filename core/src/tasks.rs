@@ -78,7 +78,7 @@ mod with_atomics {
     use core::sync::atomic::{AtomicU32, Ordering};
 
     use try_lock::TryLock;
-    use zerocopy::{FromBytes as _, IntoBytes as _};
+    use zerocopy::{FromBytes, IntoBytes};
 
     use super::Control;
 

@@ -25,13 +25,12 @@ fn strides_types_and_alignment_do_not_matter() {
     let expected = Owned::build(&tight, &config).unwrap();
 
     let positions: Vec<[u8; 12]> =
-        mesh.positions.iter().map(|p| bytemuck_bytes(p.map(f32::to_ne_bytes))).collect();
-    let wide: Vec<[u8; 12]> =
-        mesh.indices.iter().map(|t| bytemuck_bytes(t.map(u32::to_ne_bytes))).collect();
+        mesh.positions.iter().map(|p| flat(p.map(f32::to_ne_bytes))).collect();
+    let wide: Vec<[u8; 12]> = mesh.indices.iter().map(|t| flat(t.map(u32::to_ne_bytes))).collect();
     let narrow: Vec<[u8; 6]> = mesh
         .indices
         .iter()
-        .map(|t| bytemuck_bytes(t.map(|i| u16::try_from(i).unwrap().to_ne_bytes())))
+        .map(|t| flat(t.map(|i| u16::try_from(i).unwrap().to_ne_bytes())))
         .collect();
 
     for position_stride in [12, 13, 16, 32] {
@@ -66,7 +65,7 @@ fn strides_types_and_alignment_do_not_matter() {
     }
 }
 
-fn bytemuck_bytes<const N: usize, const W: usize>(words: [[u8; W]; 3]) -> [u8; N] {
+fn flat<const N: usize, const W: usize>(words: [[u8; W]; 3]) -> [u8; N] {
     words.concat().try_into().expect("three words")
 }
 

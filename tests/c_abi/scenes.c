@@ -451,17 +451,17 @@ static void what_scenes_refuse(void)
            hgrid_refit_scene(instances, INSTANCES - 1, objects, 2, copy, inner_bytes, &empty, NULL));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_refit_scene((const hgrid_instance *)copy, INSTANCES, objects, 2, copy,
                                                   inner_bytes, &empty, NULL));
-    hgrid_refit_report report = HGRID_REFIT_REPORT_INIT;
+    hgrid_refit_report refit = HGRID_REFIT_REPORT_INIT;
     instances[3].object = 9;
     EXPECT(HGRID_ERROR_INSTANCE_OBJECT,
-           hgrid_refit_scene(instances, INSTANCES, objects, 2, copy, inner_bytes, &empty, &report));
-    CHECK(report.triangle == 3);
-    report.triangle = 0;
+           hgrid_refit_scene(instances, INSTANCES, objects, 2, copy, inner_bytes, &empty, &refit));
+    CHECK(refit.triangle == 3);
+    refit.triangle = 0;
     instances[3].object = 1, instances[3].linear[0][0] = 0;
     copy = guarded_copy(inner_blob, inner_bytes);
     EXPECT(HGRID_ERROR_INSTANCE_MATRIX,
-           hgrid_refit_scene(instances, INSTANCES, objects, 2, copy, inner_bytes, &empty, &report));
-    CHECK(report.triangle == 3);
+           hgrid_refit_scene(instances, INSTANCES, objects, 2, copy, inner_bytes, &empty, &refit));
+    CHECK(refit.triangle == 3);
     instances[3].linear[0][0] = 1;
 
     /* Boxes that are not those of the instances. */

@@ -205,7 +205,7 @@ fn it_fits_into_a_struct_and_moves_with_it() {
 }
 
 #[repr(C)]
-#[derive(Debug, Clone, Copy, bytemuck::Zeroable, bytemuck::Pod)]
+#[derive(Debug, Clone, Copy, zerocopy::Immutable, zerocopy::IntoBytes)]
 struct Vertex {
     color: u32,
     position: [f32; 3],

@@ -3,6 +3,7 @@
 use core::marker::PhantomData;
 
 use super::{Answer, Batch, Coherence, alone};
+use crate::arena::whole;
 use crate::bvh::{Bvh, Entry, Groups, Scope, Together};
 use crate::grid::Grid;
 use crate::options::QueryOptions;
@@ -97,7 +98,8 @@ impl<A: Answer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
     #[inline(always)]
     fn sorted<const ANY: bool>(&mut self) {
         let lent = core::mem::take(&mut self.options.scratch);
-        let (_, memory, _) = bytemuck::pod_align_to_mut(lent);
+        let start = lent.as_ptr().align_offset(align_of::<Entry>());
+        let memory = whole::<Entry>(lent.get_mut(start..).unwrap_or_default());
         if memory.len() < 2 * FEW {
             self.sorted_on_the_stack::<ANY>();
         } else {

@@ -20,7 +20,7 @@ mod groups;
 
 use core::fmt;
 
-use bytemuck::{Pod, bytes_of};
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::error::{BatchField, Error};
 use crate::grid::Grid;
@@ -75,9 +75,9 @@ impl<'a> StridedMut<'a> {
     /// let hits = StridedMut::new(&mut hits);
     /// assert_eq!((hits.stride, hits.count), (16, 3));
     /// ```
-    pub fn new<T: Pod>(elements: &'a mut [T]) -> Self {
+    pub fn new<T: FromBytes + IntoBytes>(elements: &'a mut [T]) -> Self {
         let count = elements.len();
-        Self { bytes: bytemuck::cast_slice_mut(elements), stride: size_of::<T>(), count }
+        Self { bytes: elements.as_mut_bytes(), stride: size_of::<T>(), count }
     }
 
     /// Returns true if all elements of `size` bytes lie inside `bytes` and do not overlap.
@@ -89,11 +89,11 @@ impl<'a> StridedMut<'a> {
 
     /// Writes element `index`; the bytes between the elements stay as they are.
     #[inline(always)]
-    pub(crate) fn write<T: Pod>(&mut self, index: usize, value: &T) {
+    pub(crate) fn write<T: Immutable + IntoBytes>(&mut self, index: usize, value: &T) {
         let start = index.saturating_mul(self.stride);
         let slot = self.bytes.get_mut(start..).and_then(|rest| rest.get_mut(..size_of::<T>()));
         if let Some(slot) = slot {
-            slot.copy_from_slice(bytes_of(value));
+            slot.copy_from_slice(value.as_bytes());
         }
     }
 }
@@ -393,7 +393,7 @@ trait Answer: Sized {
     const IS_RARE: bool = false;
 
     /// The type of an element in an array of answers.
-    type Stored: Pod;
+    type Stored: Immutable + IntoBytes;
 
     fn stored(self) -> Self::Stored;
 

@@ -26,8 +26,8 @@
 
 use core::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
 use fearless_simd::Simd;
+use zerocopy::{FromZeros, IntoBytes};
 
 use super::census::{Census, count, share, take};
 use super::high;
@@ -42,8 +42,7 @@ use super::subtree::Subtree;
 use super::top::{self, ITEM, Item, Top};
 use super::units::{SEAM, Units, is_seam, starts};
 use crate::aabb::Aabb;
-use crate::arena::Sizes;
-use crate::arena::{section_bytes, split_mut};
+use crate::arena::{Sizes, section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
 use crate::config::Config;
@@ -208,7 +207,7 @@ fn build_in<const N: usize>(
         keys
     } else {
         // There are fewer ids than keys if triangles are skipped.
-        let keys = bytemuck::cast_slice_mut(bench).get_mut(..triangles as usize);
+        let keys = bench.as_flattened_mut().get_mut(..triangles as usize);
         keys.filter(|_| has_whole_bench).ok_or(index_error(fast_bound(triangles, 1).0))?
     };
 
@@ -273,13 +272,6 @@ pub(super) const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_57
 /// The smallest box of a scene that steps are made for.
 pub(crate) fn least_node(scene: &Aabb) -> f32 {
     scene.size().max_element() * LEAST_NODE
-}
-
-/// The whole elements of some bytes.
-pub(super) fn whole<T: Pod>(bytes: &mut [u8]) -> &mut [T] {
-    let used = bytes.len() / size_of::<T>() * size_of::<T>();
-    let bytes = bytes.get_mut(..used).unwrap_or_default();
-    bytemuck::try_cast_slice_mut(bytes).unwrap_or_default()
 }
 
 /// Finds the key of every triangle, and counts the triangles of each bin.
@@ -351,7 +343,7 @@ fn scatter<const N: usize>(
         }
         return Ok(());
     }
-    let entries = Shared::new(bytemuck::cast_slice_mut(entries));
+    let entries = Shared::new(entries.as_flattened_mut());
     let parts = counts.iter_mut().flatten().enumerate().map(|(task, heads)| {
         let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
         (range.start as u32, keys.get(range).unwrap_or_default(), heads)
@@ -457,7 +449,7 @@ impl Work<'_> {
         let made = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
 
         // Move nodes and records together.
-        let mut all = All { nodes: 1, roots: 0, last: Record::zeroed() };
+        let mut all = All { nodes: 1, roots: 0, last: Record::new_zeroed() };
         for (made, last) in made.into_iter().flatten() {
             let moved = made.child - all.nodes;
             let from = made.child as usize..(made.child + made.nodes) as usize;
@@ -478,7 +470,7 @@ impl Work<'_> {
                 all.last.node.child -= moved;
                 all.last.write(entries.get_mut(to..));
             } else if let Some(of_task) = entries.get_mut(records.clone()) {
-                for record in whole::<Record>(bytemuck::cast_slice_mut(of_task)) {
+                for record in whole::<Record>(of_task.as_mut_bytes()) {
                     record.node.child -= moved;
                 }
                 move_down(entries, records, to);
@@ -520,8 +512,8 @@ impl Work<'_> {
         }
         let roots = all.roots as usize;
         let (records, rest) = entries.split_at_mut_checked(roots * RECORD)?;
-        let records = &*whole::<Record>(bytemuck::cast_slice_mut(records));
-        let items = whole::<Item>(bytemuck::cast_slice_mut(rest.get_mut(..roots * ITEM)?));
+        let records = &*whole::<Record>(records.as_mut_bytes());
+        let items = whole::<Item>(rest.get_mut(..roots * ITEM)?.as_mut_bytes());
         let record =
             |at: u32| records.get(at as usize).map_or((Node::EMPTY, 0), |r| (r.node, r.levels));
         let mut build = |nodes: &mut [Node]| {
@@ -532,8 +524,7 @@ impl Work<'_> {
             top::build(items, record, nodes, all.nodes, self.least)
         };
         let behind = nodes.get_mut(all.nodes as usize..).and_then(&mut build);
-        let Top { root, count, levels } =
-            behind.or_else(|| build(whole(bytemuck::cast_slice_mut(bench))))?;
+        let Top { root, count, levels } = behind.or_else(|| build(whole(bench.as_mut_bytes())))?;
         if let Some(slot) = nodes.first_mut() {
             *slot = root;
         }

@@ -15,10 +15,10 @@
 //! starts far away, the error is relative, and the far side of a slab test has a margin for it
 //! ([`slab`](super::slab)).
 
-use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u32x4, u32x8};
 use glam::Vec3A;
+use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
 
@@ -34,7 +34,7 @@ pub(crate) type Sides = [f32; 8];
 
 /// Up to eight children and their boxes.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromBytes, Immutable, IntoBytes)]
 pub(crate) struct Node {
     /// The bits of three f32: where bound 0 lies.
     pub(crate) origin: [u32; 3],
@@ -109,9 +109,8 @@ impl Node {
     /// bring the word to vectors by way of a plain register.
     #[inline(always)]
     fn inner_and_child(&self) -> (u32, u32) {
-        let bytes = bytemuck::bytes_of(self);
-        let pair = bytes.get(12..20).and_then(|bytes| bytes.first_chunk()).copied();
-        let pair: [u32; 2] = bytemuck::cast(u64::from_ne_bytes(pair.unwrap_or_default()));
+        let pair = self.as_bytes().get(12..20).and_then(|bytes| bytes.first_chunk()).copied();
+        let pair: [u32; 2] = transmute!(u64::from_ne_bytes(pair.unwrap_or_default()));
         (pair[0] >> 24, pair[1])
     }
 

@@ -2,6 +2,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};
+use zerocopy::{transmute_mut, transmute_ref};
 
 use super::boxes::{Beam, Slabs, bits, splat};
 use super::slab::{EARLIER, STEEP, TINY, WIDER};
@@ -436,17 +437,19 @@ fn octet_of<S: Simd>(simd: S, rows: &[Row; 3], octet: usize) -> [f32x8<S>; 3] {
 /// Sixteen rays of a row.
 #[inline(always)]
 fn sixteen<S: Simd>(simd: S, row: &Row, which: usize) -> f32x16<S> {
-    let rows: &[[f32; 16]; OCTETS / 2] = bytemuck::cast_ref(row);
+    let rows: &[[f32; 16]; OCTETS / 2] = transmute_ref!(row);
     f32x16::simd_from(simd, rows[which % (OCTETS / 2)])
 }
 
 #[inline(always)]
 fn put(row: &mut Row, ray: usize, number: f32) {
-    bytemuck::cast_mut::<Row, [f32; GROUP]>(row)[ray % GROUP] = number;
+    let row: &mut [f32; GROUP] = transmute_mut!(row);
+    row[ray % GROUP] = number;
 }
 
 #[inline(always)]
 fn get(row: &Row, ray: u32) -> f32 {
     // Flat, so that its place is one index from where the row lies.
-    bytemuck::cast_ref::<Row, [f32; GROUP]>(row)[ray as usize % GROUP]
+    let row: &[f32; GROUP] = transmute_ref!(row);
+    row[ray as usize % GROUP]
 }

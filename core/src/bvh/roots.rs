@@ -18,7 +18,7 @@
 
 use core::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
+use zerocopy::{FromBytes, FromZeros, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
 use crate::mesh::TriangleMesh;
@@ -33,7 +33,7 @@ use super::units::{Savings, starts};
 
 /// The record of a root: its node, its box and its counts.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, FromBytes, Immutable, IntoBytes)]
 pub(crate) struct Record {
     pub(crate) node: Node,
     pub(crate) min: [f32; 3],
@@ -53,7 +53,7 @@ impl Record {
     /// Writes it to the start of some entries, if it has room there.
     pub(crate) fn write(&self, entries: Option<&mut [Entry]>) {
         if let Some(slot) = entries.and_then(|entries| entries.first_chunk_mut::<RECORD>()) {
-            *slot = bytemuck::cast(*self);
+            *slot = transmute!(*self);
         }
     }
 }
@@ -114,7 +114,7 @@ impl<'w> Roots<'w> {
         counts: &'w mut [u32],
         subtree: &'w mut Subtree,
     ) -> Self {
-        let last = Record::zeroed();
+        let last = Record::new_zeroed();
         let (node_count, root_count) = (0, 0);
         Self {
             mesh,

@@ -15,9 +15,9 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "no more than MOST_ROOT triangles")]
 
-use bytemuck::Zeroable;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x64};
+use zerocopy::{FromZeros, transmute};
 
 use crate::aabb::Aabb;
 use crate::eight::load;
@@ -123,7 +123,7 @@ impl Subtree {
     /// Returns all zeros, which the compiler writes in place; any other value would be made elsewhere and copied.
     pub(crate) fn new() -> Self {
         Self {
-            nodes: [Node::zeroed(); MOST_NODES],
+            nodes: [Node::new_zeroed(); MOST_NODES],
             children: [[Part::NONE; WIDTH]; MOST_NODES],
             ranges: [Part::NONE; MOST_NODES],
             above: [0; MOST_NODES],
@@ -195,7 +195,7 @@ impl Subtree {
         if by == Cut::Halves {
             self.changes = [0; MOST_ROOT];
         }
-        let [low, high] = bytemuck::cast::<_, [[u8; 64]; 2]>(self.changes);
+        let [low, high]: [[u8; 64]; 2] = transmute!(self.changes);
         let [low, high] = [u8x64::simd_from(simd, low), u8x64::simd_from(simd, high)];
         let changes = |level: u8| {
             let level = u8x64::splat(simd, level);

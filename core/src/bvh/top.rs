@@ -9,8 +9,8 @@
 //!
 //! At [`DEEP`] levels parts are halved instead, so that the number of levels is bounded.
 
-use bytemuck::{Pod, Zeroable};
 use glam::Vec3A;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::aabb::Aabb;
 
@@ -19,7 +19,7 @@ use super::node::{Node, WIDTH};
 
 /// A root, as the tree above sees it.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, FromBytes, Immutable, IntoBytes)]
 pub(crate) struct Item {
     pub(crate) min: [f32; 3],
     pub(crate) max: [f32; 3],

@@ -10,6 +10,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
+use zerocopy::transmute;
 
 use super::Bvh;
 use super::boxes::bits;
@@ -213,7 +214,7 @@ fn row(node: &Node, axis: usize, flip: usize) -> [u8; WIDTH] {
 /// Twice eight bytes as numbers.
 #[inline(always)]
 pub(crate) fn bytes<S: Simd>(simd: S, low: [u8; 8], high: [u8; 8]) -> (f32x8<S>, f32x8<S>) {
-    let both: [u8; 16] = bytemuck::cast([low, high]);
+    let both: [u8; 16] = transmute!([low, high]);
     let (low, high) = u8x16::simd_from(simd, both).widen();
     (numbers(low), numbers(high))
 }

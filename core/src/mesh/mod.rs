@@ -13,8 +13,8 @@ mod parts;
 use core::fmt;
 use core::ops::Range;
 
-use bytemuck::{Pod, pod_read_unaligned};
 use glam::{Vec3A, Vec4};
+use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
 use crate::error::{Error, MeshField};
@@ -85,25 +85,37 @@ impl fmt::Debug for Strided<'_> {
 }
 
 impl<'a> Strided<'a> {
-    /// Elements that lie side by side.
+    /// Elements that lie side by side: numbers, arrays of them, and structs that derive these traits.
     ///
     /// ```
-    /// use hgrid_core::{Ray, Strided};
-    /// let rays = [Ray::new([0.0; 3], [0.0, 0.0, 1.0]); 3];
-    /// assert_eq!((Strided::new(&rays).stride, Strided::new(&rays).count), (32, 3));
+    /// use hgrid_core::Strided;
+    /// use zerocopy::{Immutable, IntoBytes};
+    ///
+    /// #[derive(Clone, Copy, Immutable, IntoBytes)]
+    /// #[repr(C)]
+    /// struct Vertex {
+    ///     position: [f32; 3],
+    ///     color: u32,
+    /// }
+    ///
+    /// let vertices = [Vertex { position: [0.0; 3], color: 7 }; 3];
+    /// let view = Strided::new(&vertices);
+    /// assert_eq!((view.stride, view.count), (16, 3));
     /// ```
+    ///
+    /// The fields take bytes from anywhere else, such as `bytemuck::cast_slice(&vertices)`.
     #[must_use]
-    pub fn new<T: Pod>(elements: &'a [T]) -> Self {
+    pub fn new<T: Immutable + IntoBytes>(elements: &'a [T]) -> Self {
         let count = elements.len();
-        Self { bytes: bytemuck::cast_slice(elements), stride: size_of::<T>(), count }
+        Self { bytes: elements.as_bytes(), stride: size_of::<T>(), count }
     }
 
     /// Element `index`, or zeros if there is none.
     #[inline(always)]
-    pub(crate) fn read<T: Pod>(&self, index: usize) -> T {
+    pub(crate) fn read<T: FromBytes>(&self, index: usize) -> T {
         let start = index.saturating_mul(self.stride);
-        let bytes = self.bytes.get(start..).and_then(|rest| rest.get(..size_of::<T>()));
-        bytes.map_or_else(T::zeroed, pod_read_unaligned)
+        let element = self.bytes.get(start..).and_then(|rest| T::read_from_prefix(rest).ok());
+        element.map_or_else(T::new_zeroed, |(element, _)| element)
     }
 
     /// No elements.
@@ -192,12 +204,12 @@ impl<'a> TriangleMesh<'a> {
     /// ```
     pub fn new(positions: &'a [[f32; 3]], indices: &'a [[u32; 3]]) -> Result<Self, Error> {
         let positions = Strided {
-            bytes: bytemuck::cast_slice(positions),
+            bytes: positions.as_bytes(),
             stride: size_of::<[f32; 3]>(),
             count: positions.len(),
         };
         let indices = Strided {
-            bytes: bytemuck::cast_slice(indices),
+            bytes: indices.as_bytes(),
             stride: size_of::<[u32; 3]>(),
             count: indices.len(),
         };
@@ -520,7 +532,8 @@ impl<'a> TriangleMesh<'a> {
         };
         let mut first = vertices.start;
         for bytes in fours {
-            let [a, b, c] = bytemuck::cast::<_, [[f32; 4]; 3]>(*bytes).map(Vec4::from_array);
+            let rows: [[f32; 4]; 3] = transmute!(*bytes);
+            let [a, b, c] = rows.map(Vec4::from_array);
             let limit = Vec4::splat(MAX_COORDINATE);
             let is_inside = a.abs().cmple(limit) & b.abs().cmple(limit) & c.abs().cmple(limit);
             if is_inside.all() {
@@ -627,7 +640,7 @@ impl<'a> WideMesh<'a> {
     #[inline(always)]
     pub(crate) fn corners(&self, triangle: u32) -> Option<[&'a [u8; 16]; 3]> {
         let indices: &[u8; 12] = element(self.indices, self.index_stride, triangle)?;
-        self.vertices(self.position_stride, bytemuck::cast(*indices))
+        self.vertices(self.position_stride, transmute!(*indices))
     }
 
     /// Those of four triangles that follow one another, if all of them can be read this way.
@@ -636,7 +649,7 @@ impl<'a> WideMesh<'a> {
         // What most meshes have: one load of indices, and products that the compiler knows.
         if (self.index_stride, self.position_stride) == (12, 12) {
             let indices: &[u8; 48] = element(self.indices, 12, first)?;
-            let [a, b, c, d]: [[u32; 3]; 4] = bytemuck::cast(*indices);
+            let [a, b, c, d]: [[u32; 3]; 4] = transmute!(*indices);
             let corners = |vertices| self.vertices(12, vertices);
             return Some([corners(a)?, corners(b)?, corners(c)?, corners(d)?]);
         }
@@ -655,7 +668,7 @@ impl<'a> WideMesh<'a> {
 /// A corner from its bytes and those behind it.
 #[inline(always)]
 fn vector(bytes: &[u8; 16]) -> Vec3A {
-    let row: [f32; 4] = bytemuck::cast(*bytes);
+    let row: [f32; 4] = transmute!(*bytes);
     Vec3A::from_vec4(Vec4::from_array(row))
 }
 
@@ -697,7 +710,7 @@ mod tests {
                     let mut bytes = Vec::new();
                     for (at, position) in positions.iter().enumerate() {
                         bytes.resize(at * stride, 0xff);
-                        bytes.extend_from_slice(bytemuck::bytes_of(position));
+                        bytes.extend_from_slice(position.as_bytes());
                     }
                     let vertices = Strided { bytes: &bytes, stride, count: positions.len() };
                     let none = Strided { bytes: &[], stride: 12, count: 0 };

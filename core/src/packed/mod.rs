@@ -17,6 +17,8 @@ mod scene;
 
 use core::mem::offset_of;
 
+use zerocopy::IntoBytes;
+
 use crate::arena::{align_up, check_alignment, section_bytes};
 use crate::blob::{BLOB_VERSION, HEADER_BYTES, HasMesh, Header, corrupt};
 use crate::error::{Error, Region};
@@ -181,7 +183,7 @@ impl<'a> Grid<'a> {
         out.pad();
         mesh.each_vertex(|vertex| out.put(vertex));
         out.pad();
-        mesh.each_indices(|vertices| out.put(bytemuck::bytes_of(&vertices)));
+        mesh.each_indices(|vertices| out.put(vertices.as_bytes()));
         out.pad();
         if mesh.has_masks() {
             (0..mesh.triangle_count()).for_each(|id| out.put(&mesh.mask(id).to_ne_bytes()));

@@ -18,7 +18,7 @@
 //! The `t` of a ray in a scene inside another is that of the outermost scene. The object's ray is a function of
 //! that ray, the instances on the path and the object's box alone, so every query asks the object the same.
 
-use bytemuck::{Pod, Zeroable};
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use crate::aabb::{greater, lesser};
 use crate::approach::LineF64;
@@ -27,7 +27,7 @@ use crate::ray::{Ray, RayF64, round};
 
 /// An object at a place in a scene: 72 bytes.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Instance {
     /// Rows of the matrix that takes the object's directions to the scene's. Mirrors, shears and scales of any
     /// kind are allowed, as long as the matrix has an inverse.
@@ -77,7 +77,7 @@ impl Instance {
 
 /// An instance as a blob has it: `linear` is the inverse.
 #[repr(transparent)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes)]
 pub(super) struct Placed(Instance);
 
 /// How far the product of a matrix and its rounded inverse may be from one.

@@ -16,7 +16,7 @@ mod store;
 
 use core::fmt;
 
-use bytemuck::{Pod, Zeroable};
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::grid::Grid;
 use crate::limits::MAX_NESTING;
@@ -141,7 +141,7 @@ impl fmt::Debug for Scene<'_> {
 
 /// What the blob of a scene says beyond its tree.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, FromBytes, Immutable, IntoBytes)]
 struct Table {
     /// One more than the largest number of an object that an instance has.
     object_count: u32,

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use bytemuck::{Pod, Zeroable};
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use super::instance::Seen;
 use super::{Object, Scene};
@@ -15,7 +15,7 @@ use crate::search::{Outcome, Search};
 
 /// Where a ray meets a scene: 32 bytes.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct SceneHit {
     /// Distance in multiples of the ray's direction.
     pub t: f32,

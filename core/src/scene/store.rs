@@ -2,6 +2,8 @@
 
 use core::mem::offset_of;
 
+use zerocopy::IntoBytes;
+
 use super::instance::{Instance, Placed};
 use super::{Object, Scene, Table};
 use crate::arena::{Sizes, align_up, check_alignment, section_bytes, split, split_mut};
@@ -40,9 +42,9 @@ const fn check(config: &Config) -> Result<(), Error> {
 
 /// The boxes of instances as the tree sees them.
 fn boxes_of<'a>(sides: &'a [Sides], placed: &'a [Placed]) -> Result<TriangleMesh<'a>, Error> {
-    let bytes = bytemuck::cast_slice(sides);
+    let bytes = sides.as_bytes();
     let boxes = Strided { bytes, stride: BOX_BYTES, count: sides.len() };
-    let bytes = bytemuck::cast_slice(placed).get(offset_of!(Instance, mask)..).unwrap_or_default();
+    let bytes = placed.as_bytes().get(offset_of!(Instance, mask)..).unwrap_or_default();
     let masks = Strided { bytes, stride: size_of::<Placed>(), count: placed.len() };
     TriangleMesh::of_boxes(boxes, Content::Instances)?.with_masks(masks)
 }
@@ -264,14 +266,14 @@ impl<'a> Scene<'a> {
             let bounds = placed.bounds(&object.bounds()).ok_or(at(instance_at))?;
             object_count = object_count.max(placed.object().saturating_add(1));
             let stored = self.tree.mesh().box_bytes(number);
-            if stored.is_none_or(|stored| *stored != bytemuck::cast::<_, [u8; BOX_BYTES]>(bounds)) {
+            if stored.is_none_or(|stored| stored != bounds.as_bytes()) {
                 return Err(at(start + table_bytes + u64::from(number) * BOX_BYTES as u64));
             }
         }
         let table = Table { object_count, unused: [0; 15] };
         let start = usize::try_from(start).unwrap_or(usize::MAX);
         let stored = self.blob.get(start..).and_then(|bytes| bytes.first_chunk::<64>());
-        if stored.is_none_or(|stored| *stored != bytemuck::cast::<_, [u8; 64]>(table)) {
+        if stored.is_none_or(|stored| stored != table.as_bytes()) {
             return Err(corrupt(start));
         }
         Ok(())

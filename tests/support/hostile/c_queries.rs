@@ -4,9 +4,9 @@
 use std::ptr::{from_mut, from_ref, null, null_mut};
 
 use arbitrary::{Arbitrary, Result, Unstructured};
-use bytemuck::bytes_of;
 use hgrid_capi::*;
 use hgrid_core::{ClosestPoint, Grid, Hit, IndexType, Ray, Strided, TriangleMesh};
+use zerocopy::{FromBytes, IntoBytes};
 
 use super::ask::{agrees, ends};
 use super::c_abi::{Caller, known};
@@ -197,12 +197,12 @@ impl Caller<'_> {
         let mut memory = Memory::new(bytes);
         for (i, ray) in rays.iter().enumerate() {
             let start = rays_at + i * if ray_stride == 0 { 32 } else { ray_stride };
-            memory.bytes_mut()[start..start + 32].copy_from_slice(bytes_of(ray));
+            memory.bytes_mut()[start..start + 32].copy_from_slice(ray.as_bytes());
         }
         // Where rays overlap, what lies there counts.
         let read = |memory: &Memory, i: usize| -> Ray {
             let start = rays_at + i * if ray_stride == 0 { 32 } else { ray_stride };
-            bytemuck::pod_read_unaligned(&memory.bytes()[start..start + 32])
+            Ray::read_from_bytes(&memory.bytes()[start..start + 32]).unwrap()
         };
         let rays: Vec<Ray> = (0..rays.len()).map(|i| read(&memory, i)).collect();
         let before = memory.bytes().to_vec();
@@ -230,7 +230,7 @@ impl Caller<'_> {
                 is_blocked[i] = found;
             } else {
                 let found = options.ask(&mut told, i, |options| core.intersect_with(ray, options));
-                answer.copy_from_slice(bytes_of(&found.unwrap_or(Hit::MISS)));
+                answer.copy_from_slice(found.unwrap_or(Hit::MISS).as_bytes());
             }
         }
         // SAFETY: all pointers are NULL or good for so many elements, or nothing is.

@@ -1,9 +1,9 @@
 //! Grows the nodes over a range of triangles from the root down, each with eight children.
 
-use bytemuck::Zeroable;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8};
 use glam::Vec3A;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use super::cut::{Bins, Extent, ID, Item, Sides, area};
 use crate::aabb::Aabb;
@@ -302,7 +302,7 @@ impl Cursor {
 
 /// The result of a task for one range, written over the first items of the range.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, bytemuck::Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, FromBytes, Immutable, IntoBytes)]
 pub(super) struct Record {
     pub(super) root: Node,
     /// Nodes below the root.

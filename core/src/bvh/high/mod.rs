@@ -29,12 +29,13 @@ mod grow;
 
 use fearless_simd::Simd;
 use glam::Vec3A;
+use zerocopy::transmute;
 
 use super::census::{share, take};
 use super::layout::index_bytes;
 use super::node::Node;
 use crate::aabb::Aabb;
-use crate::arena::{section_bytes, split_mut};
+use crate::arena::{section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
 use crate::config::{BuildFlags, Config};
@@ -119,7 +120,7 @@ pub(super) fn build_in<const N: usize>(
     let parts = behind.and_then(|behind| behind.split_at_mut_checked(ids_bytes));
     let (ids, nodes) = parts.unwrap_or_default();
     let (ids, _) = split_mut::<u32>(ids, finite as u64).unwrap_or_default();
-    let nodes = super::build::whole::<Node>(nodes);
+    let nodes = whole::<Node>(nodes);
 
     // Make the nodes.
     watch.at(TOP)?;
@@ -322,7 +323,7 @@ impl Part<'_> {
             node_count += nodes;
             id_count += ids;
             if let Some(place) = items.first_chunk_mut::<RECORD>() {
-                *place = bytemuck::cast(Record { root, nodes, levels, unused: [0; 2] });
+                *place = transmute!(Record { root, nodes, levels, unused: [0; 2] });
             }
         }
         node_count
@@ -421,8 +422,7 @@ impl Work {
                 let Some(waiter) = cursor.next(top) else { break };
                 let behind = items.get(waiter.start as usize..).unwrap_or_default();
                 let Some(record) = behind.first_chunk::<RECORD>() else { break };
-                let Record { mut root, nodes: below, levels: levels_of, .. } =
-                    bytemuck::cast(*record);
+                let Record { mut root, nodes: below, levels: levels_of, .. } = transmute!(*record);
                 let moved = child - count;
                 if moved > 0 {
                     let from = child as usize..(child + below) as usize;
