@@ -29,7 +29,9 @@ Examples:
   hgrid render bunny.ply --shading heat --counter primitive-tests --heat-top 50
   hgrid render bunny.ply --json              the numbers, for programs
 
-Without a view, the camera stands in front of things, above flat scenes and within rooms.";
+Without a view, the camera stands in front of things, above flat scenes and within rooms.
+Meshes of a glTF file that stand more than once are instances in a scene of grids; for --shading heat and
+normals, for other methods than bvh and where one is made flat they become triangles.";
 
 pub(super) const INFO_EXAMPLES: &str = "\
 Examples:
