@@ -192,6 +192,10 @@ pub struct CompareArgs {
     /// What is asked of them, between commas [default: all]
     #[arg(long, value_name = "WORKLOADS", value_delimiter = ',', value_enum)]
     pub workloads: Vec<Workload>,
+    /// Compare on a field of so many instances of the mesh, for `bvh` and Embree: scenes over one structure
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, conflicts_with = "output",
+          value_parser = clap::value_parser!(u32).range(..=10_000_000))]
+    pub instances: u32,
     /// Build and trace so many times, taking turns, and report the medians
     #[arg(long, value_name = "TIMES", default_value_t = 5,
           value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -228,6 +232,9 @@ pub struct FirstBuildArgs {
     pub scene: String,
     /// A method or a peer
     pub system: String,
+    /// Build a scene of so many instances over it, too
+    #[arg(long, default_value_t = 0)]
+    pub instances: u32,
 }
 
 /// Which methods compete, and how often.

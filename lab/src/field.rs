@@ -1,4 +1,4 @@
-//! Many instances of a mesh on a square field: what `animate` moves.
+//! Many instances of a mesh on a square field: what `animate` moves and `compare` traces.
 //!
 //! Each instance turns about its own axis on a small circle, is larger or smaller than the mesh, and is back where it was
 //! after a time of 1. Nothing depends on a clock.
@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result};
 use hgrid_core::{Block, Config, Control, Hit, Instance, Object, Ray, RayF64, Scene, TriangleMesh};
 
 use crate::camera::{Camera, Up};
-use crate::scene::Bounds;
+use crate::scene::{Bounds, Scene as Model};
 use crate::shade::{Rgb, Shader};
 use crate::tiles::TILE_RAYS;
 use crate::vector::{Vector, offset, round};
@@ -37,6 +37,18 @@ impl Field {
         let (middle, size) = (along(|a, b| 0.5 * (a + b)), along(|a, b| b - a));
         let extent = size.into_iter().fold(0.0, f64::max);
         Self { count, up, middle, extent: if extent > 0.0 { extent } else { 1.0 } }
+    }
+
+    /// A field of so many instances of a scene, along its own ground; none for 0.
+    #[must_use]
+    pub fn over(scene: &Model, count: u32) -> Option<Self> {
+        (count > 0).then(|| Self::new(scene.framed_bounds(), count, Up::of(scene)))
+    }
+
+    /// Has pictures of the scene show the field.
+    pub fn frame(&self, scene: &mut Model) {
+        scene.is_z_up = Some(self.up == Up::Z);
+        scene.focus = Some(self.bounds());
     }
 
     /// How many there are.

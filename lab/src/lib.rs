@@ -44,3 +44,4 @@ pub mod threads;
 pub mod tiles;
 pub mod validate;
 mod vector;
+pub mod world;

@@ -1,17 +1,18 @@
 //! What is in the way of light: shadows of the lamp, and ambient occlusion.
 //!
 //! ```text
-//! spots of a tile -> rays toward the lamp                    -> one call of occluded_n -> lit
-//!                 -> some rays of each toward sky and ground -> one call of occluded_n -> open
+//! spots of a tile -> rays toward the lamp                    -> one call for any hit -> lit
+//!                 -> some rays of each toward sky and ground -> one call for any hit -> open
 //! ```
 //!
 //! The rays of a call are in the order of the tile's pixels, those of a pixel side by side: rays that
 //! follow one another start near each other, so that a tree takes them in groups, wherever they go.
 
-use hgrid_core::{Coherence, Grid, Ray, Strided, StridedMut};
+use hgrid_core::Ray;
 
 use crate::tiles::TILE_RAYS;
 use crate::vector::{Vector, cross, dot, offset, round, unit};
+use crate::world::World;
 
 /// The lights that something may be in the way of.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -72,7 +73,7 @@ impl Lights {
     /// Asks what reaches the spots of a tile.
     pub(crate) fn reach(
         self,
-        grid: &Grid<'_>,
+        world: World<'_>,
         around: &Around,
         sample: Sample,
         spots: &[Spot],
@@ -83,7 +84,7 @@ impl Lights {
             let is_lit = |spot: &&Spot| dot(wide(spot.normal), lamp) > 0.0;
             let probes = spots.iter().filter(is_lit);
             let probes = probes.map(|spot| (spot.at, Ray::new(spot.start, around.lamp)));
-            reached.rays += send(grid, probes, |at| reached.lit[at] = 0.0);
+            reached.rays += send(world, probes, |at| reached.lit[at] = 0.0);
         }
         if self.sky_rays > 0 {
             let t_max = around.reach;
@@ -97,7 +98,7 @@ impl Lights {
                 })
             });
             let part = 1.0 / f32::from(self.sky_rays);
-            reached.rays += send(grid, probes, |at| reached.open[at] -= part);
+            reached.rays += send(world, probes, |at| reached.open[at] -= part);
         }
         reached
     }
@@ -105,15 +106,13 @@ impl Lights {
 
 /// Traces all rays with one call and shows `hidden` the pixels of those that do not get through.
 fn send(
-    grid: &Grid<'_>,
+    world: World<'_>,
     probes: impl Iterator<Item = (usize, Ray)>,
     mut hidden: impl FnMut(usize),
 ) -> u64 {
     let (pixels, rays): (Vec<_>, Vec<_>) = probes.unzip();
     let mut occluded = vec![0_u8; rays.len()];
-    let answers = &mut StridedMut::new(&mut occluded);
-    let answered = grid.occluded_n(&Strided::new(&rays), answers, Coherence::Coherent);
-    debug_assert_eq!(answered, Ok(()));
+    world.occluded_all(&rays, &mut occluded);
     for (at, _) in pixels.into_iter().zip(occluded).filter(|(_, occluded)| *occluded != 0) {
         hidden(at);
     }
@@ -152,7 +151,7 @@ fn scatter(normal: Vector, [turn, part]: [f64; 2], number: u32, count: u32) -> V
 
 #[cfg(test)]
 mod tests {
-    use hgrid_core::{Config, Hit, Method, TriangleMesh};
+    use hgrid_core::{Config, Grid, Hit, Method, TriangleMesh};
 
     use super::*;
     use crate::regions::Regions;
@@ -182,7 +181,8 @@ mod tests {
                 })
                 .collect();
             let around = Around { lamp: [0.0, 0.0, 1.0], reach: 3.0 };
-            let reached = lights.reach(&grid, &around, Sample { number: 1, count: 2 }, &spots);
+            let reached =
+                lights.reach(World::Mesh(&grid), &around, Sample { number: 1, count: 2 }, &spots);
             assert_eq!((spots.len(), reached.rays), (2, 2 * (1 + 64)));
             assert_eq!(reached.lit[..3], [1.0, 0.0, 1.0]);
             assert!(reached.open[0] > 0.9 && reached.open[1] < 0.1, "{:?}", &reached.open[..3]);

@@ -30,6 +30,7 @@ use serde::{Deserialize, Serialize};
 use crate::progress::Progress;
 use crate::regions::{Regions, peak_bytes};
 use crate::scene::Scene;
+use crate::scene::model::Model;
 use crate::shade::{Rgb, Shade, Shader};
 use crate::threads::Threads;
 use crate::tiles::{TILE_RAYS, Tiles, intersect};
@@ -57,6 +58,21 @@ impl SceneFacts {
             vertices: scene.positions.len(),
             scene_bytes: size_of_val(&*scene.indices) + size_of_val(&*scene.positions),
         }
+    }
+
+    /// The facts of meshes that instances show: triangles and vertices are those that are shown, bytes those
+    /// of the meshes, each once.
+    #[must_use]
+    pub fn of_model(name: &str, model: &Model) -> Self {
+        let (mut triangles, mut vertices, mut scene_bytes) = (0, 0, 0);
+        for mesh in &model.meshes {
+            scene_bytes += size_of_val(&*mesh.indices) + size_of_val(&*mesh.positions);
+        }
+        for mesh in model.instances.iter().filter_map(|&(mesh, _)| model.meshes.get(mesh)) {
+            triangles += mesh.indices.len();
+            vertices += mesh.positions.len();
+        }
+        Self { scene: name.to_owned(), triangles, vertices, scene_bytes }
     }
 }
 

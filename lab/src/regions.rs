@@ -48,9 +48,33 @@ impl Regions {
             Some(bound) => bound,
             None => sizes_with(&mesh, config, &mut [], parallel)?,
         };
-        let (mut index, mut scratch) = (pages(sizes.index_bytes)?, pages(sizes.scratch_bytes)?);
-        Grid::build_with(mesh, config, &mut index, &mut scratch, parallel)?;
-        Ok(Self { index, scratch })
+        let mut regions = Self::mapped(sizes, pages)?;
+        Grid::build_with(mesh, config, &mut regions.index, &mut regions.scratch, parallel)?;
+        Ok(regions)
+    }
+
+    fn mapped(sizes: Sizes, pages: fn(usize) -> Result<MmapMut>) -> Result<Self> {
+        Ok(Self { index: pages(sizes.index_bytes)?, scratch: pages(sizes.scratch_bytes)? })
+    }
+
+    /// Maps as many bytes as these.
+    pub(crate) fn of(sizes: Sizes) -> Result<Self> {
+        Self::mapped(sizes, memory)
+    }
+
+    /// The same in small pages, of which [`written_bytes`](Self::written_bytes) tells how many a build writes.
+    pub(crate) fn counted(sizes: Sizes) -> Result<Self> {
+        Self::mapped(sizes, small_pages)
+    }
+
+    /// Bytes that were written, in whole pages; where the system does not tell, those of the index that
+    /// are used and all of the scratch.
+    pub(crate) fn written_bytes(&self, index_bytes: usize) -> usize {
+        let Self { index, scratch } = self;
+        match resident_bytes(index).zip(resident_bytes(scratch)) {
+            Some((index, scratch)) => index + scratch,
+            None => index_bytes + scratch.len(),
+        }
     }
 
     /// Maps as much as the mesh needs as it is now.
@@ -59,8 +83,7 @@ impl Regions {
         config: &Config,
         parallel: &Control<'_>,
     ) -> Result<Self> {
-        let sizes = sizes_with(mesh, config, &mut [], parallel)?;
-        Ok(Self { index: memory(sizes.index_bytes)?, scratch: memory(sizes.scratch_bytes)? })
+        Self::of(sizes_with(mesh, config, &mut [], parallel)?)
     }
 
     /// Builds in these regions, in larger ones if the mesh needs it; returns how often they grew.
@@ -93,11 +116,9 @@ pub(crate) fn peak_bytes(
     config: &Config,
     parallel: &Control<'_>,
 ) -> Result<usize> {
-    let Regions { index, scratch } = Regions::built(mesh, config, parallel, small_pages)?;
-    match resident_bytes(&index).zip(resident_bytes(&scratch)) {
-        Some((index, scratch)) => Ok(index + scratch),
-        None => Ok(Grid::open(&index, mesh)?.blob_bytes() + scratch.len()),
-    }
+    let regions = Regions::built(mesh, config, parallel, small_pages)?;
+    let index_bytes = Grid::open(&regions.index, mesh)?.blob_bytes();
+    Ok(regions.written_bytes(index_bytes))
 }
 
 /// From here on large pages are asked for: eight of 2 MiB.

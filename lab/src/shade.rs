@@ -49,18 +49,7 @@ impl<'a> Shader<'a> {
     /// A shader for the hits that the camera's rays have on a mesh.
     #[must_use]
     pub fn new(mesh: TriangleMesh<'a>, camera: &Camera) -> Self {
-        let axes = camera.axes();
-        let [right, up, toward] = axes;
-        let along = |c: usize| right[c] * LIGHT[0] + up[c] * LIGHT[1] + toward[c] * LIGHT[2];
-        let light = [0, 1, 2].map(along);
-        let length = dot(light, light).sqrt();
-        Self { mesh, axes, light: light.map(|c| c / length) }
-    }
-
-    /// The direction toward the lamp, a unit vector.
-    #[must_use]
-    pub const fn lamp(&self) -> [f32; 3] {
-        self.light
+        Self { mesh, axes: camera.axes(), light: lamp(camera) }
     }
 
     /// A grey solid in a lit room: the colours of rays with these hits, [`Hit::MISS`] for none. All
@@ -124,6 +113,16 @@ impl<'a> Shader<'a> {
     fn background(&self, direction: [f32; 3]) -> [f32; 3] {
         background(self.axes[1], direction)
     }
+}
+
+/// The direction toward the lamp of a camera, a unit vector.
+#[must_use]
+pub fn lamp(camera: &Camera) -> [f32; 3] {
+    let [right, up, toward] = camera.axes();
+    let along = |c: usize| right[c] * LIGHT[0] + up[c] * LIGHT[1] + toward[c] * LIGHT[2];
+    let light = [0, 1, 2].map(along);
+    let length = dot(light, light).sqrt();
+    light.map(|c| c / length)
 }
 
 /// The light from where there is nothing, in a picture with this direction upward.

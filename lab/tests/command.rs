@@ -129,3 +129,40 @@ fn a_blob_can_be_an_array_of_c() {
         assert!(message.contains(expected), "{message}");
     }
 }
+
+#[test]
+fn meshes_that_stand_more_than_once_are_instances() {
+    let folder = Folder::new("gltf").unwrap();
+    let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let bytes: Vec<_> = corners.as_flattened().iter().flat_map(|c| c.to_le_bytes()).collect();
+    fs::write(folder.0.join("a.bin"), bytes).unwrap();
+    let scene = |second: &str| {
+        format!(
+            r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0, 1]}}],
+            "nodes": [{{"mesh": 0}}, {{"mesh": 0, {second}}}],
+            "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
+            "buffers": [{{"byteLength": 36, "uri": "a.bin"}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
+            "accessors": [{{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3,
+                "min": [0, 0, 0], "max": [1, 1, 0]}}]}}"#
+        )
+    };
+    let is = |file: &str, words: &str| {
+        let json = folder.says(&format!("render {file} --size 32 --json {words}")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let number = |name: &str| json[name].as_u64().unwrap();
+        (number("triangles"), number("instances"), number("hits"))
+    };
+    fs::write(folder.0.join("two.gltf"), scene(r#""translation": [1, 0.5, 0]"#)).unwrap();
+    let (triangles, instances, hits) = is("two.gltf", "--view front");
+    assert!((triangles, instances) == (2, 2) && hits > 100, "{hits}");
+    // A grid has no instances, and sees the same.
+    let as_mesh = is("two.gltf", "--view front --method fixed --samples 4");
+    assert_eq!(as_mesh, (2, 0, hits));
+    assert_eq!(is("two.gltf", "--view front --shading heat").1, 0);
+    let text = folder.says("two.gltf --size 16").unwrap();
+    assert!(text.contains("2 triangles, 6 vertices in 2 instances"), "{text}");
+    // What is made flat has no inverse: it becomes triangles.
+    fs::write(folder.0.join("flat.gltf"), scene(r#""scale": [1, 1, 0]"#)).unwrap();
+    assert_eq!(is("flat.gltf", "--view front").1, 0);
+}

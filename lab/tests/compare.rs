@@ -38,3 +38,36 @@ fn first_builds_have_processes_of_their_own() {
         assert_eq!(system["rebuild"]["samples"].as_array().unwrap().len(), 1, "{system}");
     }
 }
+
+#[cfg(feature = "peers")]
+#[test]
+fn instances_are_for_trees_and_embree() {
+    let file = std::env::temp_dir().join(format!("hgrid-instances-{}.json", std::process::id()));
+    let words = format!(
+        "compare procedural:knot:500 --instances 30 --size 32 --repeat 1 --methods one-level,bvh \
+         --peers parry-ploc,embree-medium --workloads primary,ao,near --json {}",
+        file.display()
+    );
+    let output = hgrid(&words).unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    assert!(
+        error.contains("left out, because they have no instances: near, one-level, parry-ploc")
+    );
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("knot:500: 30 instances of 500 triangles"), "{text}");
+    assert!(text.contains("index bytes per instance / best peer"), "{text}");
+
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    std::fs::remove_file(&file).unwrap();
+    let scene = &json["scenes"][0];
+    let systems = scene["systems"].as_array().unwrap();
+    let names: Vec<_> = systems.iter().filter_map(|system| system["system"].as_str()).collect();
+    assert_eq!((&scene["instances"], &*names), (&30.into(), &["bvh", "embree-medium"][..]));
+
+    let output =
+        hgrid("compare procedural:knot:500 --instances 3 --methods fixed --peers bvh-crate")
+            .unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && error.contains("nobody answers primary"), "{error}");
+}

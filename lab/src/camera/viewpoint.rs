@@ -10,12 +10,13 @@
 //! A room shows the fronts of its triangles to whoever stands in the middle of it; a solid shows
 //! backs there. Rays from the middle tell which of the two a scene is.
 
-use hgrid_core::{Grid, Hit, Ray};
+use hgrid_core::{Ray, SceneHit};
 
 use super::view::{half_extent, is_flat};
 use super::{Camera, Lens, Point, Up, View};
 use crate::scene::Bounds;
 use crate::vector::{Vector, offset, round};
+use crate::world::World;
 
 /// Rays from a point in all directions.
 const AROUND: u16 = 256;
@@ -48,29 +49,29 @@ const AZIMUTHS: u16 = 16;
 /// Rays on each side of a coarse picture from a place.
 const COARSE: u16 = 8;
 
-/// Returns the camera that shows a part of a scene, of a grid over all of it.
+/// Returns the camera that shows a part of a scene.
 #[must_use]
-pub fn choose(grid: &Grid<'_>, part: Bounds, is_all: bool, up: Up, lens: Option<Lens>) -> Camera {
+pub fn choose(world: World<'_>, part: Bounds, is_all: bool, up: Up, lens: Option<Lens>) -> Camera {
     let outside = |view| Camera::framing_through(lens.unwrap_or_default(), part, view, up);
     if is_flat(part, up) {
         return outside(MAP);
     }
     let Point(middle) = Point::centre_of(part);
-    if !is_all || !is_in_room(grid, middle) {
+    if !is_all || !is_in_room(world, middle) {
         return outside(THING);
     }
-    match open_side(grid, middle, up) {
+    match open_side(world, middle, up) {
         Some(azimuth) => outside(View::Angles { azimuth, elevation: 0.0 }),
-        None => within(grid, part, up, lens).unwrap_or_else(|| outside(THING)),
+        None => within(world, part, up, lens).unwrap_or_else(|| outside(THING)),
     }
 }
 
 /// Returns true if the fronts of triangles are around a point in nearly all directions.
-fn is_in_room(grid: &Grid<'_>, point: Vector) -> bool {
+fn is_in_room(world: World<'_>, point: Vector) -> bool {
     let (mut fronts, mut backs) = (0, 0);
     for number in 0..AROUND {
         let ray = Ray::new(round(point), round(spread(number)));
-        let hit = grid.intersect(&ray).and_then(|hit| grid.mesh().surface(&ray, &hit));
+        let hit = world.closest(&ray).and_then(|hit| world.surface(&ray, &hit));
         match hit {
             Some(surface) if surface.is_front == 1 => fronts += 1,
             Some(_) => backs += 1,
@@ -90,12 +91,12 @@ fn spread(number: u16) -> Vector {
 }
 
 /// Returns the middle of the widest run of level directions in which nothing is, in degrees.
-fn open_side(grid: &Grid<'_>, middle: Vector, up: Up) -> Option<f64> {
+fn open_side(world: World<'_>, middle: Vector, up: Up) -> Option<f64> {
     let degrees = |at: u16| 360.0 * f64::from(at) / f64::from(LEVEL);
     let is_open: Vec<bool> = (0..LEVEL)
         .map(|at| {
             let toward = View::Angles { azimuth: degrees(at), elevation: 0.0 }.toward_eye();
-            !grid.occluded(&Ray::new(round(middle), round(up.turned_back(toward))))
+            !world.occluded(&Ray::new(round(middle), round(up.turned_back(toward))))
         })
         .collect();
     let length = |start: u16| {
@@ -111,7 +112,7 @@ fn open_side(grid: &Grid<'_>, middle: Vector, up: Up) -> Option<f64> {
 
 /// Returns the camera in a room that sees farthest: with the largest harmonic mean of distances,
 /// which one close wall makes small.
-fn within(grid: &Grid<'_>, part: Bounds, up: Up, lens: Option<Lens>) -> Option<Camera> {
+fn within(world: World<'_>, part: Bounds, up: Up, lens: Option<Lens>) -> Option<Camera> {
     let lens = lens.or_else(|| ROOM_DEGREES.parse().ok())?;
     let (Point(middle), half) = (Point::centre_of(part), up.turned(half_extent(part)));
     let mut best: Option<(f64, Camera)> = None;
@@ -122,7 +123,7 @@ fn within(grid: &Grid<'_>, part: Bounds, up: Up, lens: Option<Lens>) -> Option<C
     {
         let at = [0, 1, 2].map(|axis| (2.0 * [x, y, z][axis] - 1.0) * half[axis].abs());
         let eye = offset(middle, 1.0, up.turned_back(at));
-        if !is_in_room(grid, eye) {
+        if !is_in_room(world, eye) {
             continue;
         }
         for at in 0..AZIMUTHS {
@@ -130,7 +131,7 @@ fn within(grid: &Grid<'_>, part: Bounds, up: Up, lens: Option<Lens>) -> Option<C
             let away = View::Angles { azimuth, elevation: 0.0 }.toward_eye();
             let target = offset(eye, -1.0, up.turned_back(away));
             let camera = Camera::between(Point(eye), Point(target), up, lens);
-            let score = openness(grid, &camera);
+            let score = openness(world, &camera);
             if best.as_ref().is_none_or(|&(most, _)| score > most) {
                 best = Some((score, camera));
             }
@@ -140,11 +141,11 @@ fn within(grid: &Grid<'_>, part: Bounds, up: Up, lens: Option<Lens>) -> Option<C
 }
 
 /// Returns the harmonic mean of the distances that a camera sees.
-fn openness(grid: &Grid<'_>, camera: &Camera) -> f64 {
+fn openness(world: World<'_>, camera: &Camera) -> f64 {
     let pixels = (0..COARSE).flat_map(|row| (0..COARSE).map(move |column| (column, row)));
     let nearness = pixels.map(|(column, row)| {
         let ray = camera.ray(column, row, COARSE);
-        let Some(Hit { t, .. }) = grid.intersect(&ray) else { return 0.0 };
+        let Some(SceneHit { t, .. }) = world.closest(&ray) else { return 0.0 };
         1.0 / f64::from(t)
     });
     f64::from(COARSE * COARSE) / nearness.sum::<f64>().max(f64::MIN_POSITIVE)
@@ -162,7 +163,7 @@ fn ahead(camera: &Camera) -> (Vector, Vector) {
 
 #[cfg(test)]
 mod tests {
-    use hgrid_core::{Config, TriangleMesh};
+    use hgrid_core::{Config, Grid, TriangleMesh};
 
     use super::*;
     use crate::regions::Regions;
@@ -187,7 +188,7 @@ mod tests {
         let mesh = TriangleMesh::new(&scene.positions, &scene.indices).unwrap();
         let regions = Regions::build(mesh, &Config::default()).unwrap();
         let grid = Grid::open(&regions.index, mesh).unwrap();
-        ahead(&choose(&grid, scene.framed_bounds(), true, Up::Y, None))
+        ahead(&choose(World::Mesh(&grid), scene.framed_bounds(), true, Up::Y, None))
     }
 
     #[test]

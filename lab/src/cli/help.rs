@@ -29,7 +29,9 @@ Examples:
   hgrid render bunny.ply --shading heat --counter primitive-tests --heat-top 50
   hgrid render bunny.ply --json              the numbers, for programs
 
-Without a view, the camera stands in front of things, above flat scenes and within rooms.";
+Without a view, the camera stands in front of things, above flat scenes and within rooms.
+Meshes of a glTF file that stand more than once are instances in a scene of grids; for --shading heat and
+normals, for other methods than bvh and where one is made flat they become triangles.";
 
 pub(super) const INFO_EXAMPLES: &str = "\
 Examples:
@@ -81,6 +83,7 @@ Examples:
   hgrid compare bunny.ply dragon.ply buddha.ply
   hgrid compare dragon.ply --peers embree-low,embree-medium --workloads primary,ao,bounce
   hgrid compare sponza.ply --view inside
+  hgrid compare bunny.ply --instances 10000  scenes over a field of instances
   hgrid compare bunny.ply dragon.ply --markdown --json compare.json -o pictures
 
 This needs a program with the peers in it; docs/performance.md tells how they are set up and measured:

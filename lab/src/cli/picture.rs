@@ -2,11 +2,11 @@
 
 use anyhow::{Result, ensure};
 use clap::Args;
-use hgrid_core::Grid;
 
 use crate::camera::{Aim, Camera, Lens, Point, Up, View, viewpoint};
 use crate::scene::Scene;
 use crate::tiles::Tiles;
+use crate::world::World;
 
 /// How large a picture is and from where it is taken.
 #[derive(Debug, Clone, Copy, Args)]
@@ -49,9 +49,9 @@ impl Picture {
     ///
     /// # Errors
     /// Those of [`tiles`](Self::tiles).
-    pub fn shot(&self, scene: &Scene, grid: &Grid<'_>) -> Result<Tiles> {
+    pub fn shot(&self, scene: &Scene, world: World<'_>) -> Result<Tiles> {
         let (part, is_all) = (scene.framed_bounds(), scene.focus.is_none());
-        let best = || viewpoint::choose(grid, part, is_all, self.up(scene), self.fov);
+        let best = || viewpoint::choose(world, part, is_all, self.up(scene), self.fov);
         let camera = self.asked(scene)?.unwrap_or_else(best);
         Ok(Tiles { camera, size: self.size })
     }

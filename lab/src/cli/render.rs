@@ -100,6 +100,13 @@ impl RenderArgs {
         Ok(())
     }
 
+    /// Whether meshes that stand more than once stay instances: for the picture that a tree makes. For all
+    /// others they become triangles.
+    #[must_use]
+    pub fn takes_instances(&self) -> bool {
+        self.method == Method::Bvh && self.shading == Shading::Diffuse
+    }
+
     /// Rays through each pixel.
     #[must_use]
     pub fn samples(&self) -> u16 {

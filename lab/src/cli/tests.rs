@@ -27,6 +27,8 @@ fn bad_values_are_refused() {
         "table a.ply --json --markdown",
         "compare",
         "compare a.ply --peers optix",
+        "compare a.ply --instances 9 -o charts",
+        "compare a.ply --instances many",
         "render --samples 0",
         "pack a.ply",
         "validate",

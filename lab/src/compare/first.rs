@@ -16,6 +16,7 @@ use super::samples::Watch;
 use super::system::System;
 use super::system_named;
 use crate::cli::FirstBuildArgs;
+use crate::field::Field;
 use crate::scene::Scene;
 
 /// The name of the command that builds once.
@@ -39,16 +40,19 @@ pub type FirstBuilds<'a> = dyn Fn(&dyn System) -> Result<FirstBuild> + 'a;
 /// If there is no such scene or system, or it cannot be built.
 pub fn run(args: &FirstBuildArgs) -> Result<()> {
     let system = system_named(&args.system)?;
-    let first = in_this_process(&args.scene, system.as_ref())?;
+    let first = in_this_process(&args.scene, args.instances, system.as_ref())?;
     Ok(writeln!(io::stdout(), "{}", serde_json::to_string(&first)?)?)
 }
 
-/// Loads a scene and builds once, whatever this process has done before.
+/// Loads a scene, puts so many instances of it into a field, and builds once, whatever this process
+/// has done before.
 ///
 /// # Errors
 /// If the scene cannot be loaded, or the structure not be built.
-pub fn in_this_process(scene: &str, system: &dyn System) -> Result<FirstBuild> {
-    let input = Input::new(Scene::load(scene)?);
+pub fn in_this_process(scene: &str, instances: u32, system: &dyn System) -> Result<FirstBuild> {
+    let scene = Scene::load(scene)?;
+    let field = Field::over(&scene, instances);
+    let input = Input::of_field(scene, field.as_ref());
     // What loading has left behind is nobody's.
     give_back_heap();
     let watch = Watch::start();
@@ -65,10 +69,11 @@ pub fn in_this_process(scene: &str, system: &dyn System) -> Result<FirstBuild> {
 ///
 /// # Errors
 /// If that process fails.
-pub fn in_new_process(scene: &str, system: &dyn System) -> Result<FirstBuild> {
+pub fn in_new_process(scene: &str, instances: u32, system: &dyn System) -> Result<FirstBuild> {
     let program = env::current_exe().context("this program has no file")?;
     let mut command = Command::new(program);
-    command.args([COMMAND, scene, &system.name()]).stderr(Stdio::inherit());
+    command.args([COMMAND, scene, &system.name()]);
+    command.args(["--instances", &instances.to_string()]).stderr(Stdio::inherit());
     let output = command.output().context("cannot start a process for a first build")?;
     ensure!(output.status.success(), "the process for a first build failed");
     serde_json::from_slice(&output.stdout).context("a first build printed no time")
@@ -81,11 +86,14 @@ mod tests {
     #[test]
     fn a_first_build_takes_time_and_names_what_is_missing() {
         let system = system_named("one-level").unwrap();
-        let first = in_this_process("procedural:knot:500", system.as_ref()).unwrap();
+        let first = in_this_process("procedural:knot:500", 0, system.as_ref()).unwrap();
         assert!(first.seconds > 0.0);
+        let system = system_named("bvh").unwrap();
+        let field = in_this_process("procedural:knot:500", 9, system.as_ref()).unwrap();
+        assert!(field.seconds > 0.0);
         let json = serde_json::to_string(&first).unwrap();
         assert_eq!(serde_json::from_str::<FirstBuild>(&json).unwrap(), first);
-        assert!(in_this_process("no/such.ply", system.as_ref()).is_err());
+        assert!(in_this_process("no/such.ply", 0, system.as_ref()).is_err());
         let error = system_named("nothing").map(drop).unwrap_err();
         assert!(error.to_string().contains("nothing"), "{error}");
     }

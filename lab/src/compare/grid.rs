@@ -8,6 +8,7 @@ use hgrid_core::{
 };
 
 use super::input::Input;
+use super::instanced;
 use super::mode::Mode;
 use super::points::distance;
 use super::system::{Bytes, System, Tracer, Use, each, one_by_one};
@@ -45,9 +46,12 @@ impl System for GridSystem {
         false
     }
 
-    fn modes(&self, workload: Workload) -> &'static [Mode] {
+    fn modes(&self, workload: Workload, of_instances: bool) -> &'static [Mode] {
         let method = self.config.method;
         match workload {
+            // Scenes are trees, and are asked ray by ray.
+            _ if of_instances && method == Method::Bvh => one_by_one(workload),
+            _ if of_instances => &[],
             // Far from the mesh, a point can take another method as long as a picture.
             Workload::Near | Workload::Far if method == Method::default() => &[Mode::Single],
             Workload::Near | Workload::Far => &[],
@@ -59,6 +63,9 @@ impl System for GridSystem {
     }
 
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
+        if !input.instances().is_empty() {
+            return instanced::build(input, &self.config, None, then);
+        }
         let mesh = input.mesh()?;
         let regions = Regions::build(mesh, &self.config)?;
         let (grid, memory) = (Grid::open(&regions.index, mesh)?, RefCell::default());
@@ -66,6 +73,9 @@ impl System for GridSystem {
     }
 
     fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
+        if !input.instances().is_empty() {
+            return instanced::build(input, &self.config, Some(start), then);
+        }
         let mesh = input.mesh()?;
         let mut regions = Regions::build(mesh, &self.config)?;
         start();

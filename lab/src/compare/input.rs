@@ -1,9 +1,11 @@
-//! The mesh as every system gets it.
+//! The mesh, and its instances if there are any, as every system gets them.
 
 use anyhow::Result;
-use hgrid_core::TriangleMesh;
+use hgrid_core::{Instance, TriangleMesh};
 
+use crate::field::Field;
 use crate::scene::Scene;
+use crate::vector::round;
 
 /// A triangle mesh in two plain arrays, with one more position behind the last one.
 ///
@@ -13,6 +15,7 @@ use crate::scene::Scene;
 pub struct Input {
     padded: Vec<[f32; 3]>,
     indices: Vec<[u32; 3]>,
+    instances: Vec<Instance>,
 }
 
 impl Input {
@@ -21,7 +24,24 @@ impl Input {
     pub fn new(scene: Scene) -> Self {
         let Scene { positions: mut padded, indices, .. } = scene;
         padded.push([0.0; 3]);
-        Self { padded, indices }
+        Self { padded, indices, instances: Vec::new() }
+    }
+
+    /// Takes the arrays of a scene that a field shows many times, or once and as it is without a field.
+    #[must_use]
+    pub fn of_field(scene: Scene, field: Option<&Field>) -> Self {
+        let mut instances = field.map_or_else(Vec::new, |field| field.instances(0.0));
+        for instance in &mut instances {
+            // Embree takes places in f32: all systems get the same.
+            instance.translation = round(instance.translation).map(f64::from);
+        }
+        Self { instances, ..Self::new(scene) }
+    }
+
+    /// Where the mesh stands how often; nothing if it stands where it is.
+    #[must_use]
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
     }
 
     /// The vertices. Four bytes behind the last one may be read.

@@ -19,6 +19,7 @@ mod grid;
 #[cfg(feature = "peers")]
 mod heap;
 pub mod input;
+mod instanced;
 pub mod mode;
 pub mod numbers;
 pub mod peers;
@@ -36,7 +37,7 @@ pub mod workloads;
 use std::fs;
 use std::io::{self, Write as _};
 
-use anyhow::{Context as _, Error, Result};
+use anyhow::{Context as _, Error, Result, ensure};
 use clap::ValueEnum as _;
 use hgrid_core::{Config, Method, Quality};
 
@@ -66,9 +67,13 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let first = first::in_new_process;
     let asked =
         |workload: &Workload| args.workloads.is_empty() || args.workloads.contains(workload);
-    let workloads: Vec<_> = Workload::ALL.into_iter().filter(asked).collect();
+    let mut workloads: Vec<_> = Workload::ALL.into_iter().filter(asked).collect();
+    if args.instances > 0 {
+        leave_out(&mut systems, &mut workloads)?;
+    }
     let amount = Amount::of(&workloads);
-    let plan = Plan { repeat: args.repeat, workloads, amount, first };
+    let (repeat, instances) = (args.repeat, args.instances);
+    let plan = Plan { repeat, workloads, amount, instances, first };
     let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, &plan)?;
     let text = if args.markdown { comparison.markdown() } else { comparison.text() };
     writeln!(io::stdout(), "{text}")?;
@@ -78,6 +83,32 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     if let Some(folder) = &args.output {
         comparison.draw(folder)?;
+    }
+    Ok(())
+}
+
+/// Leaves out systems and workloads that know no instances, and says which.
+fn leave_out(systems: &mut Vec<Box<dyn System>>, workloads: &mut Vec<Workload>) -> Result<()> {
+    let answers = |system: &dyn System, workload| !system.modes(workload, true).is_empty();
+    let mut names = Vec::new();
+    workloads.retain(|&workload| {
+        let is_kept = systems.iter().any(|system| answers(system.as_ref(), workload));
+        if !is_kept {
+            names.push(workload.name().to_owned());
+        }
+        is_kept
+    });
+    systems.retain(|system| {
+        let is_kept = workloads.iter().any(|&workload| answers(system.as_ref(), workload));
+        if !is_kept {
+            names.push(system.name());
+        }
+        is_kept
+    });
+    let names = names.join(", ");
+    ensure!(!systems.is_empty(), "nothing to measure: of instances nobody answers {names}");
+    if !names.is_empty() {
+        writeln!(io::stderr(), "left out, because they have no instances: {names}")?;
     }
     Ok(())
 }
@@ -116,6 +147,7 @@ pub fn system_named(name: &str) -> Result<Box<dyn System>> {
 mod tests {
     use clap::Parser as _;
 
+    use super::numbers::Kind;
     use super::*;
 
     /// A comparison of all that there is on small scenes.
@@ -124,6 +156,14 @@ mod tests {
     }
 
     fn compare_on(workloads: &[Workload], systems: &[Box<dyn System>]) -> Comparison {
+        compare_of(0, workloads, systems)
+    }
+
+    fn compare_of(
+        instances: u32,
+        workloads: &[Workload],
+        systems: &[Box<dyn System>],
+    ) -> Comparison {
         let words = ["hgrid", "procedural:knot:2000", "procedural:soup:500", "--size", "48"];
         let args = CompareArgs::parse_from(words);
         let amount = Amount { random_rays: 2000, near_points: 500, far_points: 50 };
@@ -131,6 +171,7 @@ mod tests {
             repeat: 2,
             workloads: workloads.to_vec(),
             amount,
+            instances,
             first: first::in_this_process,
         };
         Comparison::measure(&args.scenes, systems, &args.picture, &plan).unwrap()
@@ -184,6 +225,67 @@ mod tests {
         assert_eq!(system["rebuild"]["samples"].as_array().unwrap().len(), 2);
         assert_eq!(system["runs"][1]["workload"], "ao");
         assert!(json["machine"]["rustc"].is_string() && json["target"].is_string());
+    }
+
+    #[test]
+    fn what_has_no_instances_is_left_out() {
+        let [mut systems, mut others] = [methods(&[]), methods(&[Method::Fixed])];
+        let mut workloads = Workload::ALL.to_vec();
+        leave_out(&mut systems, &mut workloads).unwrap();
+        let names: Vec<_> = systems.iter().map(|system| system.name()).collect();
+        assert_eq!(names, [Method::Bvh.name()]);
+        assert_eq!(workloads, Workload::ALL[..4]);
+        let error = leave_out(&mut others, &mut workloads).unwrap_err().to_string();
+        assert!(error.contains("fixed") && error.contains("random"), "{error}");
+    }
+
+    /// Checks a comparison on fields of instances, all of whose systems have some.
+    fn check_instances(systems: &[Box<dyn System>], ratios: usize) {
+        const COUNT: u32 = 40;
+        let workloads = &Workload::ALL[..4];
+        let comparison = compare_of(COUNT, workloads, systems);
+        for scene in &comparison.scenes {
+            assert_eq!((scene.instances, scene.systems.len()), (COUNT, systems.len()));
+            for system in &scene.systems {
+                let name = &system.system;
+                assert_eq!(system.items(), u64::from(COUNT));
+                // Matrix, place and box of an instance; less than the structure of the mesh.
+                let each = system.index_bytes_per_item();
+                assert!((96.0..4000.0).contains(&each), "{name}: {each}");
+                assert!(system.peak_bytes >= system.index_bytes, "{name}");
+                assert!(system.first_build.seconds > 0.0 && system.rebuild.seconds > 0.0);
+                assert!(system.time_to_image(Kind::Rebuild).is_none());
+                for workload in workloads {
+                    assert!(system.best(*workload).is_some(), "{name}: {workload:?}");
+                }
+                for run in &system.runs {
+                    assert!(
+                        run.hits > 0 && run.hits < run.rays && !run.is_off(),
+                        "{name}: {run:?}"
+                    );
+                }
+            }
+            assert_eq!(scene.ratios.len(), ratios, "{:#?}", scene.ratios);
+        }
+        let text = comparison.text();
+        assert!(text.contains("knot:2000: 40 instances of 2.00K triangles, hits: "), "{text}");
+        assert!(text.contains("rebuild (ns/inst)") && text.contains("index (B/inst)"), "{text}");
+        assert!(text.contains("rebuilds of the scene alone"), "{text}");
+    }
+
+    #[test]
+    fn instances_are_compared_in_scenes() {
+        check_instances(&methods(&[Method::Bvh]), 0);
+    }
+
+    #[cfg(feature = "peers")]
+    #[test]
+    fn embree_agrees_with_hgrid_on_instances() {
+        let mut systems = methods(&[Method::Bvh]);
+        let embree = [Peer::EmbreeLow, Peer::EmbreeDynamic, Peer::EmbreeMedium];
+        systems.extend(peers::systems(&embree).unwrap());
+        // Two builds, bytes kept and at most; single primary rays, ao, bounces and random rays.
+        check_instances(&systems, 8);
     }
 
     #[cfg(not(feature = "peers"))]

@@ -15,6 +15,7 @@ use super::system::System;
 use super::workloads::{Rays, Workload};
 use super::{charts, tables};
 use crate::cli::Picture;
+use crate::field::Field;
 use crate::machine::Machine;
 use crate::measure::{SceneFacts, ratio};
 use crate::progress::Progress;
@@ -42,6 +43,8 @@ pub struct SceneNumbers {
     /// The scene.
     #[serde(flatten)]
     pub facts: SceneFacts,
+    /// Instances of it that the systems built a scene over; 0 if they built the mesh alone.
+    pub instances: u32,
     /// The methods of hgrid, then the peers.
     pub systems: Vec<SystemNumbers>,
     /// hgrid divided by a peer.
@@ -61,11 +64,13 @@ pub struct SystemNumbers {
     pub first_build: Build,
     /// The build in memory that was kept from a build before.
     pub rebuild: Build,
-    /// Triangles of the scene.
+    /// Triangles of the mesh.
     pub triangles: u64,
-    /// Bytes that are kept for queries, without the mesh.
+    /// Instances of it, if there are any.
+    pub instances: u64,
+    /// Bytes that are kept for queries, without the mesh; of instances without its structure, too.
     pub index_bytes: u64,
-    /// The most bytes that there were during the build.
+    /// The most bytes that there were during the build, likewise.
     pub peak_bytes: u64,
     /// Every workload in every mode that makes sense.
     pub runs: Vec<Run>,
@@ -143,22 +148,29 @@ impl SystemNumbers {
         }
     }
 
-    /// Build and primary rays: from a mesh in memory to a picture.
+    /// Build and primary rays: from a mesh in memory to a picture. Instances get no colours, so none.
     #[must_use]
     pub fn time_to_image(&self, kind: Kind) -> Option<f64> {
-        self.best(Workload::Primary).map(|run| self.build(kind).seconds + run.seconds)
+        let run = self.best(Workload::Primary).filter(|_| self.instances == 0)?;
+        Some(self.build(kind).seconds + run.seconds)
     }
 
-    /// Bytes kept for each triangle.
+    /// What the tree is built over: triangles or instances.
     #[must_use]
-    pub fn index_bytes_per_triangle(&self) -> f64 {
-        ratio(self.index_bytes, self.triangles)
+    pub const fn items(&self) -> u64 {
+        if self.instances > 0 { self.instances } else { self.triangles }
     }
 
-    /// The most bytes during the build, for each triangle.
+    /// Bytes kept for each triangle or instance.
     #[must_use]
-    pub fn peak_bytes_per_triangle(&self) -> f64 {
-        ratio(self.peak_bytes, self.triangles)
+    pub fn index_bytes_per_item(&self) -> f64 {
+        ratio(self.index_bytes, self.items())
+    }
+
+    /// The most bytes during the build, likewise.
+    #[must_use]
+    pub fn peak_bytes_per_item(&self) -> f64 {
+        ratio(self.peak_bytes, self.items())
     }
 }
 
@@ -215,16 +227,22 @@ impl SceneNumbers {
         plan: &Plan,
         progress: &mut Progress,
     ) -> Result<Self> {
-        let scene = Scene::load(spec)?;
+        let mut scene = Scene::load(spec)?;
         ensure!(!scene.indices.is_empty(), "no triangles: nothing to measure");
         let bounds = scene.bounds().context("no vertex with finite coordinates")?;
         let facts = SceneFacts::of(&scene);
+        let instances = plan.instances;
+        let field = Field::over(&scene, instances);
+        if let Some(field) = &field {
+            field.frame(&mut scene);
+        }
+        let bounds = field.as_ref().map_or(bounds, Field::bounds);
         let tiles = picture.tiles(&scene)?;
-        let input = Input::new(scene);
+        let input = Input::of_field(scene, field.as_ref());
         let rays = Rays::new(&input, bounds, tiles, plan.amount)?;
-        let first = |system: &dyn System| (plan.first)(spec, system);
+        let first = |system: &dyn System| (plan.first)(spec, instances, system);
         let systems = race(&input, &rays, systems, plan, &first, progress)?;
         let ratios = Ratio::all(&systems);
-        Ok(Self { facts, systems, ratios })
+        Ok(Self { facts, instances, systems, ratios })
     }
 }

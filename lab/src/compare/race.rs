@@ -35,8 +35,10 @@ pub struct Plan {
     pub workloads: Vec<Workload>,
     /// Questions of each workload.
     pub amount: Amount,
-    /// Builds a scene for the first time.
-    pub first: fn(&str, &dyn System) -> Result<FirstBuild>,
+    /// Instances of each mesh, in a field; 0 for the mesh as it is.
+    pub instances: u32,
+    /// Builds a scene for the first time, with so many instances.
+    pub first: fn(&str, u32, &dyn System) -> Result<FirstBuild>,
 }
 
 /// Builds and traces with every system.
@@ -53,7 +55,9 @@ pub fn race(
 ) -> Result<Vec<SystemNumbers>> {
     let Plan { repeat, ref workloads, .. } = *plan;
     let mut stage = Stage::new(input, rays)?;
-    let records = systems.iter().map(|system| Record::new(system.as_ref(), workloads));
+    let of_instances = !input.instances().is_empty();
+    let records =
+        systems.iter().map(|system| Record::new(system.as_ref(), workloads, of_instances));
     let mut records: Vec<_> = records.collect();
     for repetition in 1..=repeat {
         for (system, record) in systems.iter().zip(&mut records) {
@@ -72,8 +76,7 @@ pub fn race(
             progress.advance(1);
         }
     }
-    let triangles = input.indices().len();
-    Ok(records.into_iter().map(|record| record.numbers(rays, triangles)).collect())
+    Ok(records.into_iter().map(|record| record.numbers(rays, input)).collect())
 }
 
 /// One rebuild and one run of each kind.
@@ -151,9 +154,10 @@ mod tests {
             repeat,
             workloads: Workload::ALL.to_vec(),
             amount,
-            first: |_, _| Ok(FirstBuild { seconds: 1.0, page_faults: None }),
+            instances: 0,
+            first: |_, _, _| Ok(FirstBuild { seconds: 1.0, page_faults: None }),
         };
-        let first = |system: &dyn System| (plan.first)("", system);
+        let first = |system: &dyn System| (plan.first)("", 0, system);
         race(&input, &rays, systems, &plan, &first, &mut Progress::new("", 0))
     }
 

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use super::input::Input;
 use super::mode::Mode;
 use super::numbers::{Build, Run, SystemNumbers};
 use super::process::page_faults;
@@ -76,9 +77,9 @@ impl Watch {
 
 impl Record {
     /// Nothing yet, for the workloads in every mode of the system.
-    pub(super) fn new(system: &dyn System, workloads: &[Workload]) -> Self {
+    pub(super) fn new(system: &dyn System, workloads: &[Workload], of_instances: bool) -> Self {
         let runs = workloads.iter().flat_map(|&workload| {
-            system.modes(workload).iter().map(move |&mode| RunRecord {
+            system.modes(workload, of_instances).iter().map(move |&mode| RunRecord {
                 workload,
                 mode,
                 samples: Samples::default(),
@@ -98,7 +99,7 @@ impl Record {
     }
 
     /// Medians and samples.
-    pub(super) fn numbers(self, rays: &Rays, triangles: usize) -> SystemNumbers {
+    pub(super) fn numbers(self, rays: &Rays, input: &Input) -> SystemNumbers {
         let runs = self.runs.into_iter().map(|run| Run {
             workload: run.workload,
             mode: run.mode,
@@ -115,7 +116,8 @@ impl Record {
             is_peer: self.is_peer,
             first_build: self.first_build.build(),
             rebuild: self.rebuild.build(),
-            triangles: triangles as u64,
+            triangles: input.indices().len() as u64,
+            instances: input.instances().len() as u64,
             index_bytes: self.bytes.index as u64,
             peak_bytes: self.bytes.peak as u64,
             runs: runs.collect(),

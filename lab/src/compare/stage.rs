@@ -18,7 +18,8 @@ use crate::tiles::TILE_RAYS;
 /// What all systems share: questions, and room for answers.
 pub(super) struct Stage<'a> {
     rays: &'a Rays,
-    shader: Shader<'a>,
+    /// What surfaces look like; instances turn them, which no shader is told, so they get no colour.
+    shader: Option<Shader<'a>>,
     pixels: Vec<Rgb>,
     hits: Vec<Hit>,
     occluded: Vec<u8>,
@@ -28,9 +29,11 @@ pub(super) struct Stage<'a> {
 impl<'a> Stage<'a> {
     pub(super) fn new(input: &'a Input, rays: &'a Rays) -> Result<Self> {
         let pixels = rays.primary_hits.len();
+        let shader = Shader::new(input.mesh()?, &rays.tiles.camera);
+        let shader = input.instances().is_empty().then_some(shader);
         Ok(Self {
             rays,
-            shader: Shader::new(input.mesh()?, &rays.tiles.camera),
+            shader,
             // Not zero: zeros may come as pages that nobody has touched.
             pixels: vec![[1; 3]; pixels],
             hits: vec![Hit::MISS; pixels.max(rays.random.questions.len())],
@@ -49,13 +52,17 @@ impl<'a> Stage<'a> {
         let watch = Watch::start();
         match run.workload {
             Workload::Primary => {
-                let mut hits = [Hit::MISS; TILE_RAYS];
-                rays.tiles.fill(pixels, |rays, colors| {
-                    let hits = &mut hits[..rays.len()];
-                    tracer.intersect(mode, rays, hits);
-                    shader.diffuse(rays, hits, colors);
-                });
-                black_box(&*pixels);
+                if let Some(shader) = shader {
+                    let mut hits = [Hit::MISS; TILE_RAYS];
+                    rays.tiles.fill(pixels, |rays, colors| {
+                        let hits = &mut hits[..rays.len()];
+                        tracer.intersect(mode, rays, hits);
+                        shader.diffuse(rays, hits, colors);
+                    });
+                    black_box(&*pixels);
+                } else {
+                    primary_hits(tracer, mode, rays, hits);
+                }
             }
             Workload::Ao => tracer.occluded(mode, &rays.ao.questions, occluded),
             Workload::Bounce => closest_hits(tracer, mode, &rays.bounce.questions, hits),
@@ -73,8 +80,7 @@ impl<'a> Stage<'a> {
         match run.workload {
             Workload::Primary => {
                 // Only their colours were kept.
-                let found = &mut self.hits[..rays.primary_hits.len()];
-                rays.tiles.fill(found, |rays, hits| tracer.intersect(run.mode, rays, hits));
+                primary_hits(tracer, run.mode, rays, &mut self.hits);
                 self.check_hits(&rays.primary_hits, run, is_peer);
             }
             Workload::Ao => {
@@ -108,6 +114,12 @@ impl<'a> Stage<'a> {
             unequal(expected, found)
         };
     }
+}
+
+/// The closest hits of the primary rays, row by row in the first places.
+fn primary_hits(tracer: &dyn Tracer, mode: Mode, rays: &Rays, hits: &mut [Hit]) {
+    let hits = &mut hits[..rays.primary_hits.len()];
+    rays.tiles.fill(hits, |rays, hits| tracer.intersect(mode, rays, hits));
 }
 
 /// The closest hits of rays, in the first places.

@@ -44,9 +44,10 @@ pub trait System {
         None
     }
 
-    /// The ways to ask for a workload that make sense; none if the system does not answer it.
-    fn modes(&self, workload: Workload) -> &'static [Mode] {
-        one_by_one(workload)
+    /// The ways to ask for a workload that make sense, on a mesh or on instances of it; none if the
+    /// system does not answer it.
+    fn modes(&self, workload: Workload, of_instances: bool) -> &'static [Mode] {
+        if of_instances { &[] } else { one_by_one(workload) }
     }
 
     /// Builds and calls `then` with the structure. What happens before that call is the build.
@@ -56,7 +57,8 @@ pub trait System {
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()>;
 
     /// Builds until that takes no new memory, calls `start`, and builds once more in the memory
-    /// that was kept; then calls `then`. What happens between the two calls is the rebuild.
+    /// that was kept; then calls `then`. What happens between the two calls is the rebuild. Of
+    /// instances it is that of the scene alone: the mesh's structure is there before `start`.
     ///
     /// # Errors
     /// As [`build`](Self::build).

@@ -6,6 +6,7 @@ use super::mode::Mode;
 use super::numbers::{Comparison, Kind, Run, SceneNumbers, SystemNumbers};
 use super::ratios::Ratio;
 use super::workloads::{AO_REACH, Workload};
+use crate::measure::ratio;
 use crate::table::{count, display_name, markdown as as_markdown, seconds, times};
 
 /// Behind a time whose rays have too many answers that differ.
@@ -69,6 +70,13 @@ impl Comparison {
              beside it."
                 .to_owned(),
         ];
+        if self.scenes.iter().any(|scene| scene.instances > 0) {
+            notes.push(format!(
+                "Instances: first builds are of the mesh's structure and the scene over it, rebuilds of the \
+                 scene alone; bytes are those of the scene alone. Primary rays are not shaded, and ao is \
+                 {AO_REACH} of the mesh's diagonal long."
+            ));
+        }
         notes.extend(self.versions());
         notes
     }
@@ -95,8 +103,12 @@ impl SceneNumbers {
             Some(format!("{} {} of {}", workload.name(), run.hits, run.rays))
         };
         let hits: Vec<_> = Workload::ALL.into_iter().filter_map(hits).collect();
-        let (name, count) = (display_name(&self.facts.scene), count(self.facts.triangles));
-        format!("{name}: {count} triangles, hits: {}", hits.join(", "))
+        let (name, triangles) = (display_name(&self.facts.scene), count(self.facts.triangles));
+        let instances = match self.instances {
+            0 => String::new(),
+            instances => format!("{} instances of ", count(instances as usize)),
+        };
+        format!("{name}: {instances}{triangles} triangles, hits: {}", hits.join(", "))
     }
 
     fn tables(&self) -> impl Iterator<Item = Table> + '_ {
@@ -107,37 +119,42 @@ impl SceneNumbers {
         core::iter::once(self.builds()).chain(queries).chain(ratios)
     }
 
-    /// Builds, first images and memory.
+    /// Builds, first images and memory; of instances no images, but the time of each.
     fn builds(&self) -> Table {
-        let mut table = table([
-            "structure",
-            "primary rays",
-            "first build (s)",
-            "rebuild (s)",
-            "first image (s)",
-            "image, rebuilt (s)",
-            "index (B/tri)",
-            "peak (B/tri)",
-            "first faults",
-            "rebuild faults",
-        ]);
+        let of_instances = self.instances > 0;
+        let item = if of_instances { "inst" } else { "tri" };
+        let images = ["first image (s)", "image, rebuilt (s)"].map(str::to_owned).to_vec();
+        let header = ["structure", "primary rays", "first build (s)", "rebuild (s)"];
+        let header = header.map(str::to_owned).into_iter();
+        let header = header
+            .chain(if of_instances { vec![format!("rebuild (ns/{item})")] } else { images })
+            .chain([format!("index (B/{item})"), format!("peak (B/{item})")])
+            .chain(["first faults", "rebuild faults"].map(str::to_owned));
+        let mut table = table(header);
         let told = |faults: Option<u64>| faults.map_or_else(|| "-".to_owned(), |f| f.to_string());
         for system in &self.systems {
             let image = |kind| system.time_to_image(kind).map(seconds).unwrap_or_default();
+            let each = 1e9 * system.rebuild.seconds / ratio(system.items(), 1);
+            let times = if of_instances {
+                vec![format!("{each:.1}")]
+            } else {
+                vec![image(Kind::First), image(Kind::Rebuild)]
+            };
             let mode = system.best(Workload::Primary).map(|run| run.mode.name());
             let SystemNumbers { first_build, rebuild, .. } = system;
-            table.add_row([
+            let builds = [
                 system.system.clone(),
                 mode.unwrap_or_default().to_owned(),
                 seconds(first_build.seconds),
                 seconds(rebuild.seconds),
-                image(Kind::First),
-                image(Kind::Rebuild),
-                format!("{:.1}", system.index_bytes_per_triangle()),
-                format!("{:.1}", system.peak_bytes_per_triangle()),
+            ];
+            let memory = [
+                format!("{:.1}", system.index_bytes_per_item()),
+                format!("{:.1}", system.peak_bytes_per_item()),
                 told(first_build.page_faults),
                 told(rebuild.page_faults),
-            ]);
+            ];
+            table.add_row(builds.into_iter().chain(times).chain(memory));
         }
         table
     }

@@ -6,20 +6,22 @@
 
 use anyhow::{Context as _, Result};
 use clap::ValueEnum;
-use hgrid_core::{Config, Grid, Hit, Ray, TriangleMesh};
+use hgrid_core::{Config, Control, Grid, Hit, Object, Ray, Scene};
 use serde::Serialize;
 
 use super::input::Input;
+use super::instanced::hit_of_mesh;
 use super::points::Points;
 use super::random::Random;
-use super::system::is_hit;
+use crate::field::Memory;
 use crate::regions::Regions;
 use crate::scene::Bounds;
 use crate::shade::normal_of;
 use crate::tiles::Tiles;
-use crate::vector::{cross, dot, length, offset, round, unit};
+use crate::vector::{Vector, cross, dot, length, offset, round, unit};
 
-/// The length of an ambient occlusion ray, as a part of the diagonal of the scene's box.
+/// The length of an ambient occlusion ray, as a part of the diagonal of the scene's box, or of the mesh's
+/// where the scene is a field of its instances.
 pub const AO_REACH: f64 = 0.1;
 
 /// How far from its surface such a ray starts, likewise: far above rounding, far below triangles.
@@ -143,28 +145,36 @@ impl Rays {
         let regions =
             Regions::build(mesh, &Config::default()).context("no structure for the rays")?;
         let grid = Grid::open(&regions.index, mesh)?;
-        let closest = |ray: &Ray| grid.intersect(ray).unwrap_or(Hit::MISS);
+        let objects = [Object::Grid(&grid)];
+        let count = u32::try_from(input.instances().len())?;
+        let (config, control) = (Config::default(), Control::default());
+        let mut memory = Memory::new(count, &config, 1)?;
+        let asked = match input.instances() {
+            [] => Asks::Mesh(grid),
+            instances => Asks::Field(memory.build(instances, &objects, &config, &control)?),
+        };
+        let closest = |ray: &Ray| asked.closest(ray).0;
 
-        let (min, max) = bounds;
-        let extent = [0, 1, 2].map(|axis| f64::from(max[axis]) - f64::from(min[axis]));
-        let diagonal = length(extent);
+        let diagonal = diagonal_of(bounds);
         let mut primary_hits = vec![Hit::MISS; tiles.pixels()];
         let mut bounce = Vec::new();
         tiles.each(|rays, pixels| {
             for (ray, &pixel) in rays.iter().zip(pixels) {
-                let hit = closest(ray);
+                let (hit, normal) = asked.closest(ray);
                 primary_hits[pixel] = hit;
-                let bounced =
-                    is_hit(&hit).then(|| bounce_ray(mesh, ray, &hit, pixel, diagonal)).flatten();
-                bounce.extend(bounced);
+                bounce.extend(
+                    normal.and_then(|normal| bounce_ray(normal, ray, &hit, pixel, diagonal)),
+                );
             }
         });
-        let t_max = narrow(AO_REACH * diagonal);
+        // What is near to an instance, however large the field is.
+        let of_mesh = if count > 0 { diagonal_of(grid.bounds()) } else { diagonal };
+        let t_max = narrow(AO_REACH * of_mesh);
         let ao = bounce.iter().map(|&ray| Ray { t_max, ..ray }).collect();
         Ok(Self {
             tiles,
             primary_hits,
-            ao: Asked::new(ao, |ray| grid.occluded(ray).into()),
+            ao: Asked::new(ao, |ray| asked.occluded(ray).into()),
             bounce: Asked::new(bounce, closest),
             random: Asked::new(random_rays(bounds, amount.random_rays), closest),
             near: Points::near(&grid, diagonal, amount.near_points),
@@ -187,16 +197,45 @@ impl Rays {
     }
 }
 
+/// Who gives the answers: the default method on the mesh, or a scene of its instances.
+enum Asks<'a> {
+    Mesh(Grid<'a>),
+    Field(Scene<'a>),
+}
+
+impl Asks<'_> {
+    /// The closest hit, and the normal of the triangle if there is one with an area.
+    fn closest(&self, ray: &Ray) -> (Hit, Option<Vector>) {
+        match self {
+            Self::Mesh(grid) => {
+                let hit = grid.intersect(ray).unwrap_or(Hit::MISS);
+                let triangle = grid.mesh().triangle(hit.primitive);
+                (hit, triangle.and_then(|triangle| normal_of(&triangle)))
+            }
+            Self::Field(scene) => {
+                let found = scene.intersect(&ray.into());
+                let normal = found.and_then(|hit| scene.triangle_normal(&hit));
+                (found.map_or(Hit::MISS, hit_of_mesh), normal.map(|normal| normal.map(f64::from)))
+            }
+        }
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        match self {
+            Self::Mesh(grid) => grid.occluded(ray),
+            Self::Field(scene) => scene.occluded(&ray.into()),
+        }
+    }
+}
+
+/// From the smallest to the largest coordinates.
+fn diagonal_of((min, max): Bounds) -> f64 {
+    length([0, 1, 2].map(|axis| f64::from(max[axis]) - f64::from(min[axis])))
+}
+
 /// A ray from a hit into the half space above its surface, by the cosine of the angle.
-fn bounce_ray(
-    mesh: TriangleMesh<'_>,
-    ray: &Ray,
-    hit: &Hit,
-    pixel: usize,
-    diagonal: f64,
-) -> Option<Ray> {
+fn bounce_ray(normal: Vector, ray: &Ray, hit: &Hit, pixel: usize, diagonal: f64) -> Option<Ray> {
     let direction = ray.direction.map(f64::from);
-    let normal = normal_of(&mesh.triangle(hit.primitive)?)?;
     let normal = if dot(normal, direction) > 0.0 { normal.map(|c| -c) } else { normal };
 
     // A point of the unit disk, lifted onto the hemisphere.
@@ -234,6 +273,7 @@ pub(super) fn narrow(length: f64) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::system::is_hit;
     use super::*;
     use crate::camera::{Camera, Up, View};
     use crate::scene::Scene;

@@ -19,6 +19,9 @@ pub(super) struct Comparison {
 struct Scene {
     scene: String,
     triangles: usize,
+    /// Results from before there were instances have none.
+    #[serde(default)]
+    instances: usize,
     systems: Vec<System>,
     ratios: Vec<Ratio>,
 }
@@ -77,9 +80,19 @@ fn scenes(files: &[Comparison]) -> impl Iterator<Item = (String, &Scene)> {
     })
 }
 
+impl Scene {
+    /// What was built over, counted: triangles, or instances of so many.
+    fn size(&self) -> String {
+        match self.instances {
+            0 => count(self.triangles),
+            instances => format!("{} instances of {}", count(instances), count(self.triangles)),
+        }
+    }
+}
+
 /// A row for each ratio, a column for each scene: the medians.
 pub(super) fn ratios(files: &[Comparison]) -> String {
-    let columns = scenes(files).map(|(name, scene)| format!("{name} {}", count(scene.triangles)));
+    let columns = scenes(files).map(|(name, scene)| format!("{name} {}", scene.size()));
     let mut table = table("hgrid's default / peer", columns);
     let rows = scenes(files).next().map(|(_, scene)| &*scene.ratios).unwrap_or_default();
     for row in rows {
@@ -96,7 +109,7 @@ pub(super) fn ratios(files: &[Comparison]) -> String {
 pub(super) fn ratios_in_full(files: &[Comparison]) -> String {
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["ratio", "least to most", "hgrid", "peer", "modes"].map(str::to_owned);
-        let mut table = table(&format!("{name}, {}", count(scene.triangles)), columns);
+        let mut table = table(&format!("{name}, {}", scene.size()), columns);
         for Ratio { what, hgrid, value, peer, peer_value, ratio, least, most } in &scene.ratios {
             let is_exact = what.contains("bytes");
             let number = |value: f64| {
@@ -121,13 +134,13 @@ pub(super) fn systems(files: &[Comparison]) -> String {
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["first build", "rebuild", "index", "peak"];
         let columns = columns.into_iter().chain(WORKLOADS).map(str::to_owned);
-        let mut table = table(&format!("{name}, {}", count(scene.triangles)), columns);
+        let mut table = table(&format!("{name}, {}", scene.size()), columns);
+        let items = if scene.instances > 0 { scene.instances } else { scene.triangles } as u64;
         for system in &scene.systems {
-            let triangles = scene.triangles as u64;
             let times = [&system.first_build, &system.rebuild];
-            let times = times.map(|build| nanoseconds(build.seconds, triangles));
+            let times = times.map(|build| nanoseconds(build.seconds, items));
             let bytes = [system.index_bytes, system.peak_bytes];
-            let bytes = bytes.map(|bytes| format!("{:.1}", ratio(bytes, triangles)));
+            let bytes = bytes.map(|bytes| format!("{:.1}", ratio(bytes, items)));
             let cells = WORKLOADS.into_iter().map(|workload| system.fastest(workload));
             let name = &system.system;
             let name = if system.is_peer { name.clone() } else { format!("hgrid {name}") };

@@ -1,10 +1,11 @@
 //! From a scene to a picture: the `render` command.
 //!
 //! ```text
-//! scene -> grid -> camera (as asked for, or viewpoint) -> studio (lamp, sky, floor) -> paint -> PNG
+//! scene -> build: a world -> camera (as asked for, or viewpoint) -> studio (lamp, sky, floor) -> paint -> PNG
 //!                                                      '> heat: the work of each ray
 //! ```
 
+mod build;
 mod paint;
 mod studio;
 mod summary;
@@ -14,8 +15,9 @@ use std::io::{self, Write as _};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{Counters, Grid, TriangleMesh};
+use hgrid_core::{Counters, Grid};
 
+use self::build::{Built, build};
 use self::paint::{Seen, paint};
 use self::studio::Studio;
 pub(crate) use self::summary::seconds;
@@ -26,11 +28,11 @@ use crate::image;
 use crate::light::Lights;
 use crate::measure::{self, SceneFacts, ratio};
 use crate::progress::Progress;
-use crate::regions::Regions;
 use crate::scene::Scene;
 use crate::shade::{Rgb, Shader};
 use crate::threads::Threads;
 use crate::tiles::Tiles;
+use crate::world::{World, on_mesh};
 
 /// Renders, writes the picture and prints the numbers.
 ///
@@ -41,27 +43,27 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     image::check_picture(&args.output)?;
 
     let start = Instant::now();
-    let scene = Scene::load(&args.scene)?;
+    let (scene, model) = Scene::open(&args.scene, args.takes_instances())?;
     let load_seconds = start.elapsed().as_secs_f64();
+    let facts = match &model {
+        None => SceneFacts::of(&scene),
+        Some(model) => SceneFacts::of_model(&scene.name, model),
+    };
     let none = || format!("no picture of `{}`", args.scene);
-    ensure!(!scene.indices.is_empty(), "{}: it has no triangles", none());
+    ensure!(facts.triangles > 0, "{}: it has no triangles", none());
     ensure!(scene.bounds().is_some(), "{}: no vertex has finite coordinates", none());
 
-    let mesh = TriangleMesh::new(&scene.positions, &scene.indices).with_context(none)?;
     let threads = Threads::new(args.threads())?;
     threads.wake();
-    let start = Instant::now();
-    let built = threads.parallel(|parallel| Regions::fresh(mesh, &args.config(), parallel));
-    let Regions { index, scratch } = built.with_context(none)?;
-    let build_seconds = start.elapsed().as_secs_f64();
-    drop(scratch);
-    let grid = Grid::open(&index, mesh)?;
-
-    let tiles = args.picture.shot(&scene, &grid)?;
     let lights = args.lights();
-    let start = Instant::now();
-    let outcome = draw(args, &scene, &grid, tiles, lights, &threads)?;
-    let render_seconds = start.elapsed().as_secs_f64();
+    let render = |world: World<'_>, built: Built| {
+        let tiles = args.picture.shot(&scene, world)?;
+        let start = Instant::now();
+        let outcome = draw(args, &scene, world, tiles, lights, &threads)?;
+        Ok((built, outcome, start.elapsed().as_secs_f64()))
+    };
+    let rendered = build(&scene, model.as_ref(), &args.config(), &threads, render);
+    let (built, outcome, render_seconds) = rendered.with_context(none)?;
     ensure!(
         outcome.hits > 0,
         "{}: no ray hits anything; look from elsewhere, by --view, or by --eye and --target",
@@ -71,14 +73,15 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     image::write_png(&args.output, size, &pixels)?;
 
     let summary = Summary {
-        scene: SceneFacts::of(&scene),
+        scene: facts,
+        instances: built.instances,
         load_seconds,
-        method: grid.method().name(),
+        method: args.method.name(),
         threads: outcome.threads,
-        build_seconds,
-        index_bytes: grid.blob_bytes(),
-        skipped_triangles: grid.skipped_count(),
-        size: tiles.size,
+        build_seconds: built.seconds,
+        index_bytes: built.index_bytes,
+        skipped_triangles: built.skipped_triangles,
+        size: args.picture.size,
         samples: args.samples(),
         shadows: lights.has_shadows,
         ao: lights.sky_rays,
@@ -111,30 +114,32 @@ struct Outcome {
 fn draw(
     args: &RenderArgs,
     scene: &Scene,
-    grid: &Grid<'_>,
+    world: World<'_>,
     tiles: Tiles,
     lights: Lights,
     threads: &Threads,
 ) -> Result<Outcome> {
     let square =
         |pixels: Vec<Rgb>| Picture { size: (tiles.size.into(), tiles.size.into()), pixels };
-    let (pixels, tally) = match args.shading {
-        Shading::Heat => return heat(args, grid, &tiles),
-        Shading::Diffuse => {
-            let part = (scene.framed_bounds(), scene.focus.is_none());
-            let studio = Studio::new(grid, tiles, lights, part, args.picture.up(scene));
-            paint(grid, &tiles, args.samples(), threads, |seen, light| studio.shade(seen, light))
-        }
-        Shading::Normals => {
+    let (pixels, tally) = match (args.shading, world) {
+        (Shading::Heat, World::Mesh(grid)) => return heat(args, grid, &tiles),
+        (Shading::Normals, World::Mesh(grid)) => {
             let shader = Shader::new(*grid.mesh(), &tiles.camera);
-            paint(grid, &tiles, args.samples(), threads, |seen: &Seen<'_>, light| {
+            paint(world, &tiles, args.samples(), threads, |seen: &Seen<'_>, light| {
                 let mut colors = vec![[0; 3]; seen.rays.len()];
-                shader.normals(seen.rays, seen.hits, &mut colors);
+                let hits: Vec<_> = seen.hits.iter().map(on_mesh).collect();
+                shader.normals(seen.rays, &hits, &mut colors);
                 for (light, color) in light.iter_mut().zip(colors) {
                     *light = color.map(|c| (f32::from(c) / 255.0).powi(2));
                 }
                 0
             })
+        }
+        // Instances are loaded for this one alone.
+        (Shading::Diffuse, _) | (_, World::Instances(_)) => {
+            let part = (scene.framed_bounds(), scene.focus.is_none());
+            let studio = Studio::new(world, tiles, lights, part, args.picture.up(scene));
+            paint(world, &tiles, args.samples(), threads, |seen, light| studio.shade(seen, light))
         }
     };
     let [rays, hits] = [tally.rays, tally.hits].map(|count| count.load(Ordering::Relaxed));

@@ -14,18 +14,19 @@
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::sync::Mutex;
 
-use hgrid_core::{Grid, Hit, INVALID_ID, Ray};
+use hgrid_core::{INVALID_ID, Ray, SceneHit};
 
 use crate::light::Sample;
 use crate::progress::Progress;
 use crate::shade::Rgb;
 use crate::threads::Threads;
-use crate::tiles::{TILE_RAYS, Tiles, intersect};
+use crate::tiles::{TILE_RAYS, Tiles};
+use crate::world::World;
 
 /// The rays of a tile with their hits, and which sample of their pixels they are.
 pub(super) struct Seen<'a> {
     pub(super) rays: &'a [Ray],
-    pub(super) hits: &'a [Hit],
+    pub(super) hits: &'a [SceneHit],
     /// The rays through the middle of the pixels.
     pub(super) middles: &'a [Ray],
     pub(super) sample: Sample,
@@ -44,7 +45,7 @@ pub(super) struct Tally {
 /// returns how many more rays it sent.
 #[expect(clippy::cast_possible_truncation, reason = "fewer bands than pixels of a side")]
 pub(super) fn paint(
-    grid: &Grid<'_>,
+    world: World<'_>,
     tiles: &Tiles,
     samples: u16,
     threads: &Threads,
@@ -56,7 +57,7 @@ pub(super) fn paint(
     let bands: Vec<_> = tiles.bands(&mut pixels).map(Mutex::new).collect();
     threads.each(bands.len() as u32, |at| {
         let Some(Ok(mut band)) = bands.get(at as usize).map(|band| band.lock()) else { return };
-        band.fill(|middles, colors| tile(grid, tiles, samples, middles, colors, &shade, &tally));
+        band.fill(|middles, colors| tile(world, tiles, samples, middles, colors, &shade, &tally));
         if let Ok(mut progress) = progress.lock() {
             progress.advance(band.height().into());
         }
@@ -67,7 +68,7 @@ pub(super) fn paint(
 
 /// Paints the pixels of a tile.
 fn tile(
-    grid: &Grid<'_>,
+    world: World<'_>,
     tiles: &Tiles,
     samples: u16,
     middles: &[Ray],
@@ -75,7 +76,7 @@ fn tile(
     shade: impl Fn(&Seen<'_>, &mut [[f32; 3]]) -> u64,
     tally: &Tally,
 ) {
-    let mut hits = [Hit::MISS; TILE_RAYS];
+    let mut hits = [SceneHit::MISS; TILE_RAYS];
     let hits = &mut hits[..middles.len()];
     let mut light = [[0.0; 3]; TILE_RAYS];
     let light = &mut light[..middles.len()];
@@ -89,7 +90,7 @@ fn tile(
                 Ray::new(ray.origin, [0, 1, 2].map(|axis| ray.direction[axis] + shift[axis]))
             })
             .collect();
-        intersect(grid, &rays, hits);
+        world.intersect(&rays, hits);
         let sample = Sample { number, count: samples };
         traced += rays.len() as u64 + shade(&Seen { rays: &rays, hits, middles, sample }, light);
         struck += hits.iter().filter(|hit| hit.primitive != INVALID_ID).count() as u64;

@@ -8,15 +8,16 @@
 //!  -------floor-----
 //! ```
 
-use hgrid_core::{Grid, Hit, INVALID_ID, Ray};
+use hgrid_core::{INVALID_ID, Ray, SceneHit};
 
 use super::paint::Seen;
 use crate::camera::{Camera, Up, View};
 use crate::light::{Around, Lights, Sample, Spot, noise};
 use crate::scene::Bounds;
-use crate::shade::{Shader, background};
-use crate::tiles::{Tiles, intersect};
+use crate::shade::{background, lamp};
+use crate::tiles::Tiles;
 use crate::vector::{dot, length, offset, round};
+use crate::world::World;
 
 /// The three lights on a surface, as linear red, green and blue.
 const KEY: [f32; 3] = [0.92, 0.86, 0.76];
@@ -49,7 +50,7 @@ const COARSE: u16 = 48;
 /// What lights the surfaces of a scene, as a camera sees them.
 #[derive(Debug)]
 pub(super) struct Studio<'a> {
-    grid: &'a Grid<'a>,
+    world: World<'a>,
     tiles: Tiles,
     lights: Lights,
     around: Around,
@@ -70,13 +71,13 @@ struct Floor {
 impl<'a> Studio<'a> {
     /// Lights a part of a scene for a camera.
     pub(super) fn new(
-        grid: &'a Grid<'a>,
+        world: World<'a>,
         tiles: Tiles,
         lights: Lights,
         (part, is_all): (Bounds, bool),
         up: Up,
     ) -> Self {
-        let lamp = Shader::new(*grid.mesh(), &tiles.camera).lamp();
+        let lamp = lamp(&tiles.camera);
         let (min, max) = (part.0.map(f64::from), part.1.map(f64::from));
         let diagonal = offset(max, -1.0, min);
         let radius = 0.5 * length(diagonal);
@@ -88,7 +89,7 @@ impl<'a> Studio<'a> {
         let is_above = dot(offset(eye, -1.0, floor.middle), upward) > 0.0;
         let [reach, ..] = round([REACH * radius, 0.0, 0.0]);
         let mut studio = Self {
-            grid,
+            world,
             tiles,
             lights,
             around: Around { lamp, reach },
@@ -110,15 +111,12 @@ impl<'a> Studio<'a> {
         let (mut rays, mut hits) = (Vec::new(), Vec::new());
         coarse.each(|tile, _| {
             let from = hits.len();
-            hits.resize(from + tile.len(), Hit::MISS);
-            intersect(self.grid, tile, &mut hits[from..]);
+            hits.resize(from + tile.len(), SceneHit::MISS);
+            self.world.intersect(tile, &mut hits[from..]);
             rays.extend_from_slice(tile);
         });
-        let surfaces: Vec<_> = rays
-            .iter()
-            .zip(&hits)
-            .filter_map(|(ray, hit)| self.grid.mesh().surface(ray, hit))
-            .collect();
+        let surfaces: Vec<_> =
+            rays.iter().zip(&hits).filter_map(|(ray, hit)| self.world.surface(ray, hit)).collect();
         if surfaces.is_empty() {
             return;
         }
@@ -132,7 +130,7 @@ impl<'a> Studio<'a> {
                 let lit = surfaces.iter().map(|surface| {
                     let toward = crate::shade::dot(surface.normal, lamp).max(0.0);
                     let is_dark =
-                        toward <= 0.0 || self.grid.occluded(&Ray::new(surface.above, lamp));
+                        toward <= 0.0 || self.world.occluded(&Ray::new(surface.above, lamp));
                     if is_dark { 0.0 } else { toward.min(GRAZING) }
                 });
                 lit.sum()
@@ -147,8 +145,8 @@ impl<'a> Studio<'a> {
 
         let (mut sum, mut pixels) = (0.0, 0.0);
         coarse.each(|tile, _| {
-            let mut hits = vec![Hit::MISS; tile.len()];
-            intersect(self.grid, tile, &mut hits);
+            let mut hits = vec![SceneHit::MISS; tile.len()];
+            self.world.intersect(tile, &mut hits);
             let mut light = vec![[0.0; 3]; tile.len()];
             let sample = Sample { number: 0, count: 1 };
             self.shade(&Seen { rays: tile, hits: &hits, middles: tile, sample }, &mut light);
@@ -171,20 +169,19 @@ impl<'a> Studio<'a> {
 
     /// Gives rays their light, and returns how many more it took.
     pub(super) fn shade(&self, seen: &Seen<'_>, light: &mut [[f32; 3]]) -> u64 {
-        let mesh = self.grid.mesh();
         let size = self.tiles.size;
         let mut spots = Vec::with_capacity(seen.rays.len());
         for (at, ((ray, hit), middle)) in
             (0..).zip(seen.rays.iter().zip(seen.hits).zip(seen.middles))
         {
             let noise = noise(self.camera().pixel(middle, size));
-            if let Some(surface) = mesh.surface(ray, hit) {
+            if let Some(surface) = self.world.surface(ray, hit) {
                 spots.push(Spot { at, normal: surface.normal, start: surface.above, noise });
             } else if let Some((start, _)) = self.on_floor(ray) {
                 spots.push(Spot { at, normal: self.up, start, noise });
             }
         }
-        let reached = self.lights.reach(self.grid, &self.around, seen.sample, &spots);
+        let reached = self.lights.reach(self.world, &self.around, seen.sample, &spots);
         let [_, picture_up, _] = self.camera().axes();
         for (light, ray) in light.iter_mut().zip(seen.rays) {
             *light = background(picture_up, ray.direction);

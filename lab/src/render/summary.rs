@@ -13,6 +13,8 @@ pub struct Summary {
     /// The scene.
     #[serde(flatten)]
     pub scene: SceneFacts,
+    /// Instances by which its meshes are shown; 0 for one mesh where it is.
+    pub instances: usize,
     /// Reading or generating it.
     pub load_seconds: f64,
     /// The structure.
@@ -21,7 +23,7 @@ pub struct Summary {
     pub threads: u32,
     /// Asking for sizes, getting memory and building.
     pub build_seconds: f64,
-    /// Bytes of the grid, without the mesh.
+    /// Bytes of the grid, or of the grids and the scene of instances, without meshes.
     pub index_bytes: usize,
     /// Triangles without finite coordinates, which the grid leaves out.
     pub skipped_triangles: u32,
@@ -63,11 +65,12 @@ impl fmt::Display for Summary {
         let (triangles, vertices) =
             (HumanCount(scene.triangles as u64), HumanCount(scene.vertices as u64));
         let loaded = seconds(self.load_seconds);
-        writeln!(
-            f,
-            "{}: {triangles} triangles, {vertices} vertices, loaded in {loaded}",
-            scene.scene
-        )?;
+        write!(f, "{}: {triangles} triangles, {vertices} vertices", scene.scene)?;
+        match self.instances {
+            0 => {}
+            instances => write!(f, " in {} instances", HumanCount(instances as u64))?,
+        }
+        writeln!(f, ", loaded in {loaded}")?;
 
         let s = if *threads == 1 { "" } else { "s" };
         let bytes = HumanCount(self.index_bytes as u64);

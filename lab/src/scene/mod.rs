@@ -54,12 +54,23 @@ impl Scene {
     /// # Ok::<(), anyhow::Error>(())
     /// ```
     pub fn load(spec: &str) -> Result<Self> {
+        Self::open(spec, false).map(|(scene, _)| scene)
+    }
+
+    /// Loads a scene. If the caller takes instances and it is a file in which a mesh stands more than once, they
+    /// stay instances: their meshes come beside the scene, which then has no triangles, and the two
+    /// corners of its box for vertices.
+    ///
+    /// # Errors
+    /// Those of [`load`](Self::load).
+    pub fn open(spec: &str, takes_instances: bool) -> Result<(Self, Option<Model>)> {
         let path = Path::new(spec);
         if let Some((inner, outer)) = spec.split_once('+').filter(|_| !path.exists()) {
-            return Ok(Self::load(inner)?.within(Self::load(outer)?));
+            return Ok((Self::load(inner)?.within(Self::load(outer)?), None));
         }
         if let Some(words) = spec.strip_prefix("procedural:") {
-            return procedural::make(words).with_context(|| format!("no scene `{spec}`"));
+            let scene = procedural::make(words).with_context(|| format!("no scene `{spec}`"))?;
+            return Ok((scene, None));
         }
         if !path.exists() && Format::named(path).is_none() {
             bail!(
@@ -69,11 +80,16 @@ impl Scene {
             );
         }
         let (format, model) = read_model(path).with_context(|| format!("cannot load `{spec}`"))?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let scene = Self { name, is_z_up: format.is_z_up(), ..Self::default() };
+        if takes_instances && model.is_shared() {
+            let positions = model.bounds().map_or_else(Vec::new, |(min, max)| vec![min, max]);
+            return Ok((Self { positions, ..scene }, Some(model)));
+        }
         let mesh = model.flatten();
         let Mesh { positions, indices } =
             mesh.with_context(|| format!("`{spec}` has more than 2^32 vertices"))?;
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { name, positions, indices, focus: None, is_z_up: format.is_z_up() })
+        Ok((Self { positions, indices, ..scene }, None))
     }
 
     /// This scene in the middle of another, as large as both are; pictures are of what this one is.
@@ -100,7 +116,7 @@ impl Scene {
     /// The box around all finite vertices, or `None` if there are none.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
-        model::bounds(&self.positions)
+        model::bounds(self.positions.iter().copied())
     }
 
     /// The box that a picture shows: the focus, or all of the scene, or the origin if it is empty.

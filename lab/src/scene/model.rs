@@ -7,6 +7,8 @@
 //!
 //! A file without transforms is one mesh and one instance that leaves it where it is.
 
+use hgrid_core::Instance;
+
 use super::Bounds;
 use crate::vector::{Vector, dot, round};
 
@@ -41,6 +43,30 @@ impl From<Mesh> for Model {
 }
 
 impl Model {
+    /// Returns true if a mesh with triangles stands more than once, and all stand where instances of a scene can:
+    /// none is made flat.
+    #[must_use]
+    pub fn is_shared(&self) -> bool {
+        let mut is_seen = vec![false; self.meshes.len()];
+        let has_triangles =
+            |mesh: usize| self.meshes.get(mesh).is_some_and(|mesh| !mesh.indices.is_empty());
+        let mut shown = self.instances.iter().filter(|(mesh, _)| has_triangles(*mesh));
+        let is_volume = |transform| determinant(transform).is_normal();
+        shown.clone().all(|(_, transform)| is_volume(transform))
+            && shown.any(|&(mesh, _)| core::mem::replace(&mut is_seen[mesh], true))
+    }
+
+    /// Returns the box around all finite vertices of all instances, or `None` if there are none.
+    #[must_use]
+    pub fn bounds(&self) -> Option<Bounds> {
+        let of = |&(mesh, transform): &(usize, Transform)| {
+            let positions = &self.meshes.get(mesh)?.positions;
+            bounds(positions.iter().map(|&position| moved(&transform, position)))
+        };
+        let corners = self.instances.iter().filter_map(of).flat_map(|(min, max)| [min, max]);
+        bounds(corners)
+    }
+
     /// Returns the triangles of all instances as one mesh; `None` if that has more than 2^32 vertices.
     ///
     /// The front of a triangle stays its front: under a mirror its corners change their order.
@@ -79,7 +105,7 @@ impl Model {
 }
 
 /// Moves a point, in `f64` until it is there.
-fn moved(transform: &Transform, point: [f32; 3]) -> [f32; 3] {
+pub(crate) fn moved(transform: &Transform, point: [f32; 3]) -> [f32; 3] {
     let point = point.map(f64::from);
     round(transform.map(|row| {
         let [x, y, z, offset] = row.map(f64::from);
@@ -87,16 +113,25 @@ fn moved(transform: &Transform, point: [f32; 3]) -> [f32; 3] {
     }))
 }
 
+/// Where an instance puts its object.
+pub(crate) fn transform_of(instance: &Instance) -> Transform {
+    let translation = round(instance.translation);
+    [0, 1, 2].map(|axis| {
+        let [x, y, z] = instance.linear[axis];
+        [x, y, z, translation[axis]]
+    })
+}
+
 /// Returns the volume that the unit cube gets, negative under a mirror.
-fn determinant(transform: &Transform) -> f64 {
+pub(crate) fn determinant(transform: &Transform) -> f64 {
     let [a, b, c] = transform.map(|[x, y, z, _]| -> Vector { [x, y, z].map(f64::from) });
     dot(a, crate::vector::cross(b, c))
 }
 
 /// Returns the box around all finite points, or `None` if there are none.
-pub(super) fn bounds(positions: &[[f32; 3]]) -> Option<Bounds> {
-    let is_finite = |position: &&[f32; 3]| position.iter().all(|c| c.is_finite());
-    positions.iter().filter(is_finite).fold(None, |bounds, &position| {
+pub(super) fn bounds(positions: impl Iterator<Item = [f32; 3]>) -> Option<Bounds> {
+    let is_finite = |position: &[f32; 3]| position.iter().all(|c| c.is_finite());
+    positions.filter(is_finite).fold(None, |bounds, position| {
         let (mut min, mut max) = bounds.unwrap_or((position, position));
         for axis in 0..3 {
             min[axis] = min[axis].min(position[axis]);
@@ -128,6 +163,35 @@ mod tests {
         };
         let expected = [[7.0, 0.0, -1.0], [5.0, 2.0, -1.0], [0.0; 3], [-1.0, 0.0, 0.0]];
         assert_eq!(bits(&all.positions[1..5]), bits(&expected));
+    }
+
+    #[test]
+    fn meshes_are_shared_that_stand_twice_where_instances_can() {
+        let mesh = Mesh {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, f32::NAN], [0.0, 1.0, 0.0]],
+            indices: vec![[0, 1, 3]],
+        };
+        let of = |instances: &[(usize, Transform)]| Model {
+            meshes: vec![mesh.clone(), mesh.clone(), Mesh::default()],
+            instances: instances.to_vec(),
+        };
+        let beside = [[1.0, 0.0, 0.0, 5.0], IDENTITY[1], [0.0, 0.0, -1.0, 2.0]];
+        let flat = [IDENTITY[0], IDENTITY[1], [0.0; 4]];
+        assert!(of(&[(0, IDENTITY), (1, IDENTITY), (0, beside)]).is_shared());
+        for alone in [
+            &[(0, IDENTITY), (1, beside)][..],
+            &[(2, IDENTITY), (2, beside), (0, beside)],
+            &[(0, IDENTITY), (0, beside), (1, flat)],
+            &[(7, IDENTITY), (7, IDENTITY)],
+            &[],
+        ] {
+            assert!(!of(alone).is_shared(), "{alone:?}");
+        }
+        let model = of(&[(0, IDENTITY), (0, beside), (7, beside)]);
+        assert_eq!(model.bounds(), Some(([0.0; 3], [6.0, 1.0, 2.0])));
+        assert_eq!(Model::default().bounds(), None);
+        let transform = transform_of(&Instance::with_transform(0, beside));
+        assert_eq!(transform, beside);
     }
 
     #[test]

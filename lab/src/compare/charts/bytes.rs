@@ -40,9 +40,10 @@ impl Drawing for Figure<'_> {
         let (_, below) = area.split_vertically(pen.px(HEADING));
 
         let systems = names(self.0);
-        let amounts = scenes.iter().flat_map(|scene| &scene.systems).flat_map(|system| {
-            [system.index_bytes_per_triangle(), system.peak_bytes_per_triangle()]
-        });
+        let amounts = scenes
+            .iter()
+            .flat_map(|scene| &scene.systems)
+            .flat_map(|system| [system.index_bytes_per_item(), system.peak_bytes_per_item()]);
         let y = Scale::fitting(amounts, 0.05);
         let floor = y.range().start;
         let place = |at: usize| u32::try_from(at).map_or(0.0, f64::from);
@@ -58,8 +59,8 @@ impl Drawing for Figure<'_> {
                 let Some(numbers) = find(scene, &system.system) else { continue };
                 let start = place(group) + 0.5 * (1.0 - PART) + place(at) * width;
                 let from_to = |from, to| [(start, from), (start + 0.9 * width, to)];
-                let kept = numbers.index_bytes_per_triangle();
-                let peak = numbers.peak_bytes_per_triangle();
+                let kept = numbers.index_bytes_per_item();
+                let peak = numbers.peak_bytes_per_item();
                 let (full, pale) = (color(at).filled(), color(at).mix(0.35).filled());
                 chart.draw_series(
                     (peak > kept).then_some(Rectangle::new(from_to(kept, peak), pale)),

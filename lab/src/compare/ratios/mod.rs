@@ -24,7 +24,7 @@ pub struct Ratio {
     pub what: String,
     /// The method and mode of hgrid.
     pub hgrid: String,
-    /// Its number: seconds, the median; or bytes for each triangle.
+    /// Its number: seconds, the median; or bytes for each triangle or instance.
     pub value: f64,
     /// The peer and its mode.
     pub peer: String,
@@ -86,7 +86,8 @@ fn builds(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>>
     let bytes = |what: &str, of: fn(&SystemNumbers) -> f64| {
         let entries = peers.iter().map(|peer| Entry::number(peer, of));
         let theirs = least(entries.filter(|entry| entry.value > 0.0))?;
-        let what = format!("{what} per triangle / best peer");
+        let item = if hgrid.instances > 0 { "instance" } else { "triangle" };
+        let what = format!("{what} per {item} / best peer");
         Ratio::new(what, &Entry::number(hgrid, of), &theirs)
     };
     vec![
@@ -94,8 +95,8 @@ fn builds(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>>
         build(Kind::First, FIRST),
         image(Kind::First, FIRST),
         image(Kind::Rebuild, REBUILD),
-        bytes("index bytes", SystemNumbers::index_bytes_per_triangle),
-        bytes("peak bytes", SystemNumbers::peak_bytes_per_triangle),
+        bytes("index bytes", SystemNumbers::index_bytes_per_item),
+        bytes("peak bytes", SystemNumbers::peak_bytes_per_item),
     ]
 }
 
@@ -118,6 +119,9 @@ fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>
         Ratio::new(what, &entry(hgrid)?, &entry(peer)?)
     };
     let coherent = || {
+        if hgrid.instances > 0 {
+            return None; // Ray by ray: the row below.
+        }
         let (what, theirs) = medium("coherent primary rays", Workload::Primary)?;
         Ratio::new(what, &Entry::in_mode(hgrid, Workload::Primary, Mode::Coherent)?, &theirs)
     };
@@ -194,6 +198,7 @@ mod tests {
             first_build: build(2.0),
             rebuild: build(1.0),
             triangles: 100,
+            instances: 0,
             index_bytes: match name {
                 "tinybvh2" => 4000,
                 _ if is_peer => 8000,

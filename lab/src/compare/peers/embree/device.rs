@@ -1,15 +1,18 @@
 //! A device and its scenes, and the bytes that Embree reports for them.
 
-use core::ffi::c_void;
+use core::ffi::{c_uint, c_void};
 use core::ptr;
 use core::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 
 use anyhow::{Result, ensure};
+use hgrid_core::Instance;
 
 use super::ffi;
 use super::query::Buffers;
+use crate::compare::heap;
 use crate::compare::input::Input;
 use crate::compare::system::Bytes;
+use crate::vector::round;
 
 /// One thread; everything else, the vector width too, is what Embree chooses.
 const CONFIG: &core::ffi::CStr = c"threads=1";
@@ -23,6 +26,22 @@ pub(in super::super) enum Quality {
     Dynamic,
     /// The default: binned SAH.
     Medium,
+}
+
+impl Quality {
+    const fn number(self) -> c_uint {
+        match self {
+            Self::Low | Self::Dynamic => ffi::BUILD_QUALITY_LOW,
+            Self::Medium => ffi::BUILD_QUALITY_MEDIUM,
+        }
+    }
+
+    const fn flags(self) -> c_uint {
+        match self {
+            Self::Low | Self::Medium => ffi::SCENE_NONE,
+            Self::Dynamic => ffi::SCENE_DYNAMIC,
+        }
+    }
 }
 
 /// Bytes that a device holds, and the most since a build began.
@@ -69,38 +88,55 @@ impl Device {
 
     /// Builds a scene of one mesh.
     pub(super) fn build<'a>(&'a self, input: &'a Input, quality: Quality) -> Result<Scene<'a>> {
-        let (quality, flags) = match quality {
-            Quality::Low => (ffi::BUILD_QUALITY_LOW, ffi::SCENE_NONE),
-            Quality::Dynamic => (ffi::BUILD_QUALITY_LOW, ffi::SCENE_DYNAMIC),
-            Quality::Medium => (ffi::BUILD_QUALITY_MEDIUM, ffi::SCENE_NONE),
-        };
-        let before = self.memory.current.load(Relaxed);
-        self.memory.peak.store(before, Relaxed);
-
-        // SAFETY: the device is a live one, here and below.
-        let handle = unsafe { ffi::rtcNewScene(self.handle) };
-        let scene = Scene { handle, device: self, before, buffers: Buffers::new(), input };
-        // SAFETY: as above.
-        let geometry = unsafe { ffi::rtcNewGeometry(self.handle, ffi::GEOMETRY_TYPE_TRIANGLE) };
-        ensure!(!handle.is_null() && !geometry.is_null(), "Embree has no memory left");
-        // SAFETY: scene and geometry are live, here and below.
-        unsafe { ffi::rtcSetSceneFlags(handle, flags) };
-        // SAFETY: as above.
-        unsafe { ffi::rtcSetSceneBuildQuality(handle, quality) };
-        // SAFETY: as above.
-        unsafe { ffi::rtcSetGeometryBuildQuality(geometry, quality) };
+        let scene = self.start(input, None, quality)?;
+        let geometry = self.geometry(ffi::GEOMETRY_TYPE_TRIANGLE)?;
+        // SAFETY: the geometry is a live one.
+        unsafe { ffi::rtcSetGeometryBuildQuality(geometry, quality.number()) };
         share(geometry, ffi::BUFFER_TYPE_VERTEX, ffi::FORMAT_FLOAT3, input.positions());
         share(geometry, ffi::BUFFER_TYPE_INDEX, ffi::FORMAT_UINT3, input.indices());
-        // SAFETY: as above.
-        unsafe { ffi::rtcCommitGeometry(geometry) };
-        // SAFETY: as above.
-        unsafe { ffi::rtcAttachGeometry(handle, geometry) };
-        // SAFETY: as above; the scene keeps a count of its own.
-        unsafe { ffi::rtcReleaseGeometry(geometry) };
-        // SAFETY: as above.
-        unsafe { ffi::rtcCommitScene(handle) };
-        self.check()?;
+        scene.attach(geometry);
+        scene.commit()?;
         Ok(scene)
+    }
+
+    /// Builds a scene of the instances of a mesh whose own scene is built.
+    pub(super) fn build_instances<'a>(
+        &'a self,
+        mesh: &Scene<'a>,
+        quality: Quality,
+    ) -> Result<Scene<'a>> {
+        let scene = self.start(mesh.input, Some(mesh.handle), quality)?;
+        scene.attach_instances(mesh.handle)?;
+        scene.commit()?;
+        Ok(scene)
+    }
+
+    /// Makes a scene without geometries.
+    fn start<'a>(
+        &'a self,
+        input: &'a Input,
+        mesh: Option<ffi::Scene>,
+        quality: Quality,
+    ) -> Result<Scene<'a>> {
+        let before = self.memory.current.load(Relaxed);
+        self.memory.peak.store(before, Relaxed);
+        // SAFETY: the device is a live one.
+        let handle = unsafe { ffi::rtcNewScene(self.handle) };
+        let scene = Scene { handle, device: self, before, buffers: Buffers::new(), input, mesh };
+        ensure!(!handle.is_null(), "Embree has no memory left");
+        // SAFETY: the scene is a live one, here and below.
+        unsafe { ffi::rtcSetSceneFlags(handle, quality.flags()) };
+        // SAFETY: as above.
+        unsafe { ffi::rtcSetSceneBuildQuality(handle, quality.number()) };
+        Ok(scene)
+    }
+
+    /// Makes a geometry.
+    fn geometry(&self, kind: c_uint) -> Result<ffi::Geometry> {
+        // SAFETY: the device is a live one.
+        let geometry = unsafe { ffi::rtcNewGeometry(self.handle, kind) };
+        ensure!(!geometry.is_null(), "Embree has no memory left");
+        Ok(geometry)
     }
 
     /// What Embree says about the calls so far.
@@ -131,6 +167,20 @@ fn share<T>(geometry: ffi::Geometry, kind: u32, format: u32, items: &[[T; 3]]) {
     };
 }
 
+/// Puts an instance where it stands.
+fn place(geometry: ffi::Geometry, instance: &Instance) {
+    let Instance { linear, translation, .. } = instance;
+    let translation = round(*translation);
+    let rows = [0, 1, 2].map(|axis| {
+        let [x, y, z] = linear[axis];
+        [x, y, z, translation[axis]]
+    });
+    // SAFETY: the geometry is a live one, and Embree reads twelve floats, which it copies.
+    unsafe {
+        ffi::rtcSetGeometryTransform(geometry, 0, ffi::FORMAT_FLOAT3X4, rows.as_ptr().cast());
+    };
+}
+
 impl Drop for Device {
     fn drop(&mut self) {
         // SAFETY: the device is a live one, and scenes borrow it: there is none left.
@@ -145,6 +195,8 @@ pub(super) struct Scene<'a> {
     before: isize,
     buffers: Buffers,
     input: &'a Input,
+    /// The scene of the mesh that the instances show, if it is a scene of them. They keep it alive.
+    mesh: Option<ffi::Scene>,
 }
 
 impl Scene<'_> {
@@ -152,17 +204,54 @@ impl Scene<'_> {
         self.handle
     }
 
-    /// Builds again, as if all vertices had moved.
-    pub(super) fn rebuild(&self) -> Result<()> {
-        // SAFETY: the scene is a live one and holds the one geometry that was attached to it.
-        let geometry = unsafe { ffi::rtcGetGeometry(self.handle, 0) };
-        // SAFETY: as above, here and below.
-        unsafe { ffi::rtcUpdateGeometryBuffer(geometry, ffi::BUFFER_TYPE_VERTEX, 0) };
-        // SAFETY: as above.
+    /// Commits a geometry and hands it to the scene.
+    fn attach(&self, geometry: ffi::Geometry) {
+        // SAFETY: the geometry is a live one, here and below.
         unsafe { ffi::rtcCommitGeometry(geometry) };
-        // SAFETY: as above.
+        // SAFETY: the scene is a live one, too.
+        unsafe { ffi::rtcAttachGeometry(self.handle, geometry) };
+        // SAFETY: as above; the scene keeps a count of its own.
+        unsafe { ffi::rtcReleaseGeometry(geometry) };
+    }
+
+    /// Attaches a geometry for each instance of a mesh.
+    fn attach_instances(&self, mesh: ffi::Scene) -> Result<()> {
+        for instance in self.input.instances() {
+            let geometry = self.device.geometry(ffi::GEOMETRY_TYPE_INSTANCE)?;
+            // SAFETY: geometry and scene are live; the geometry keeps a count of the scene.
+            unsafe { ffi::rtcSetGeometryInstancedScene(geometry, mesh) };
+            place(geometry, instance);
+            self.attach(geometry);
+        }
+        Ok(())
+    }
+
+    fn commit(&self) -> Result<()> {
+        // SAFETY: the scene is a live one.
         unsafe { ffi::rtcCommitScene(self.handle) };
         self.device.check()
+    }
+
+    /// Builds again, as if all vertices, or all instances, had moved.
+    pub(super) fn rebuild(&self) -> Result<()> {
+        // SAFETY: the scene is a live one and holds the geometries that were attached to it, numbered
+        // from 0 on.
+        let geometry = |number| unsafe { ffi::rtcGetGeometry(self.handle, number) };
+        if self.mesh.is_some() {
+            for (number, instance) in (0..).zip(self.input.instances()) {
+                let geometry = geometry(number);
+                place(geometry, instance);
+                // SAFETY: as above.
+                unsafe { ffi::rtcCommitGeometry(geometry) };
+            }
+        } else {
+            let geometry = geometry(0);
+            // SAFETY: as above.
+            unsafe { ffi::rtcUpdateGeometryBuffer(geometry, ffi::BUFFER_TYPE_VERTEX, 0) };
+            // SAFETY: as above.
+            unsafe { ffi::rtcCommitGeometry(geometry) };
+        }
+        self.commit()
     }
 
     /// The mesh.
@@ -175,11 +264,25 @@ impl Scene<'_> {
     }
 
     /// Bytes since the build began.
-    pub(super) fn memory(&self) -> Bytes {
+    pub(super) fn memory(&self) -> Result<Bytes> {
         let Memory { current, peak } = &*self.device.memory;
         let since =
             |bytes: &AtomicIsize| usize::try_from(bytes.load(Relaxed) - self.before).unwrap_or(0);
-        Bytes { index: since(current), peak: since(peak) }
+        let (index, peak) = (since(current), since(peak));
+        let untold = self.untold()?;
+        Ok(Bytes { index: index + untold, peak: peak + untold })
+    }
+
+    /// Bytes of the geometries of instances, which Embree's monitor is not told of: what the heap of C grows by,
+    /// beyond what the monitor is told, while they are attached to another scene.
+    fn untold(&self) -> Result<usize> {
+        let Some(mesh) = self.mesh else { return Ok(0) };
+        let told = || self.device.memory.current.load(Relaxed);
+        let other = self.device.start(self.input, self.mesh, Quality::Low)?;
+        let (heap, told_before) = (heap::in_use(), told());
+        other.attach_instances(mesh)?;
+        let grown = heap::in_use().saturating_sub(heap);
+        Ok(grown.saturating_sub(usize::try_from(told() - told_before).unwrap_or(0)))
     }
 }
 

@@ -12,8 +12,13 @@ pub(super) const INVALID_ID: u32 = u32::MAX;
 pub(super) const FORMAT_UINT3: c_uint = 0x5003;
 pub(super) const FORMAT_FLOAT3: c_uint = 0x9003;
 
-/// `RTC_GEOMETRY_TYPE_TRIANGLE`, `RTC_BUFFER_TYPE_INDEX` and `RTC_BUFFER_TYPE_VERTEX`.
+/// `RTC_FORMAT_FLOAT3X4_ROW_MAJOR`.
+pub(super) const FORMAT_FLOAT3X4: c_uint = 0x9134;
+
+/// `RTC_GEOMETRY_TYPE_TRIANGLE`, `RTC_GEOMETRY_TYPE_INSTANCE`, `RTC_BUFFER_TYPE_INDEX` and
+/// `RTC_BUFFER_TYPE_VERTEX`.
 pub(super) const GEOMETRY_TYPE_TRIANGLE: c_uint = 0;
+pub(super) const GEOMETRY_TYPE_INSTANCE: c_uint = 121;
 pub(super) const BUFFER_TYPE_INDEX: c_uint = 0;
 pub(super) const BUFFER_TYPE_VERTEX: c_uint = 1;
 
@@ -190,6 +195,13 @@ unsafe extern "C" {
         byte_offset: usize,
         byte_stride: usize,
         item_count: usize,
+    );
+    pub(super) fn rtcSetGeometryInstancedScene(geometry: Geometry, scene: Scene);
+    pub(super) fn rtcSetGeometryTransform(
+        geometry: Geometry,
+        time_step: c_uint,
+        format: c_uint,
+        transform: *const c_void,
     );
     pub(super) fn rtcUpdateGeometryBuffer(geometry: Geometry, kind: c_uint, slot: c_uint);
     pub(super) fn rtcCommitGeometry(geometry: Geometry);

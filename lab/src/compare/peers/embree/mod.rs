@@ -1,4 +1,5 @@
-//! Embree 3: a device with one thread, the mesh's own arrays as shared buffers.
+//! Embree 3: a device with one thread, the mesh's own arrays as shared buffers, and a geometry for each
+//! instance of it.
 //!
 //! ```text
 //! mod     System and Tracer: which query for which mode
@@ -19,7 +20,7 @@ use hgrid_core::{Hit, Ray};
 use super::Peer;
 use crate::compare::input::Input;
 use crate::compare::mode::{Hint, Lanes, Mode};
-use crate::compare::system::{Bytes, System, Tracer, Use, rebuild_anew, warm_up};
+use crate::compare::system::{Bytes, System, Tracer, Use, one_by_one, warm_up};
 use crate::compare::workloads::Workload;
 pub(super) use device::Quality;
 use device::{Device, Scene};
@@ -60,23 +61,41 @@ impl System for Embree {
         Some(format!("Embree {}", self.device.version()))
     }
 
-    fn modes(&self, workload: Workload) -> &'static [Mode] {
-        if workload.asks_points() { &[Mode::Single] } else { MODES }
+    fn modes(&self, workload: Workload, of_instances: bool) -> &'static [Mode] {
+        match (workload.asks_points(), of_instances) {
+            (true, false) => &[Mode::Single],
+            // Version 3.13.5 does not come back from some packets of rays at instances.
+            (_, true) => one_by_one(workload),
+            (false, false) => MODES,
+        }
     }
 
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
-        then(&self.device.build(input, self.quality)?)
+        let mesh = self.device.build(input, self.quality)?;
+        if input.instances().is_empty() {
+            return then(&mesh);
+        }
+        then(&self.device.build_instances(&mesh, self.quality)?)
     }
 
     fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
-        if !matches!(self.quality, Quality::Dynamic) {
-            return rebuild_anew(self, input, start, then);
+        let Self { device, quality, .. } = self;
+        let of_instances = !input.instances().is_empty();
+        let mesh = of_instances.then(|| device.build(input, *quality)).transpose()?;
+        let build = || match &mesh {
+            Some(mesh) => device.build_instances(mesh, *quality),
+            None => device.build(input, *quality),
+        };
+        if matches!(quality, Quality::Dynamic) {
+            let scene = build()?;
+            warm_up(|| scene.rebuild())?;
+            start();
+            scene.rebuild()?;
+            return then(&scene);
         }
-        let scene = self.device.build(input, self.quality)?;
-        warm_up(|| scene.rebuild())?;
+        warm_up(|| build().map(drop))?;
         start();
-        scene.rebuild()?;
-        then(&scene)
+        then(&build()?)
     }
 }
 
@@ -102,6 +121,6 @@ impl Tracer for Scene<'_> {
     }
 
     fn bytes(&self) -> Result<Option<Bytes>> {
-        Ok(Some(self.memory()))
+        self.memory().map(Some)
     }
 }

@@ -1,0 +1,67 @@
+//! Instances of a mesh by hgrid: a scene over the tree of the mesh, which is built once.
+
+use anyhow::{Context as _, Result};
+use hgrid_core::{Config, Grid, Hit, Instance, Object, Ray, Scene, SceneHit, Sizes};
+
+use super::input::Input;
+use super::mode::Mode;
+use super::system::{Bytes, Tracer, Use, each};
+use crate::regions::Regions;
+
+/// Builds the mesh's tree and the scene, and calls `then` with the scene. With `start` it builds the scene
+/// before, calls `start`, and builds the scene alone in the memory that it has just written.
+pub(super) fn build(
+    input: &Input,
+    config: &Config,
+    start: Option<&mut dyn FnMut()>,
+    then: &mut Use<'_>,
+) -> Result<()> {
+    let (mesh, instances) = (input.mesh()?, input.instances());
+    let regions = Regions::build(mesh, config)?;
+    let grid = Grid::open(&regions.index, mesh)?;
+    let objects = [Object::Grid(&grid)];
+    let Regions { index, scratch } = &mut Regions::of(bound(instances, config)?)?;
+    if let Some(start) = start {
+        Scene::build(instances, &objects, config, index, scratch)?;
+        start();
+    }
+    let scene = Scene::build(instances, &objects, config, index, scratch)?;
+    then(&SceneTracer { scene, instances, config })
+}
+
+/// What a scene of the instances needs at most.
+fn bound(instances: &[Instance], config: &Config) -> Result<Sizes> {
+    let count = u32::try_from(instances.len())?;
+    Scene::bound(count, config).context("scenes are built with bvh, and of fewer instances")
+}
+
+/// A hit as one of the mesh: which instance was hit is left out.
+pub(super) const fn hit_of_mesh(hit: SceneHit) -> Hit {
+    let SceneHit { t, u, v, primitive, .. } = hit;
+    Hit { t, u, v, primitive }
+}
+
+struct SceneTracer<'a> {
+    scene: Scene<'a>,
+    instances: &'a [Instance],
+    config: &'a Config,
+}
+
+impl Tracer for SceneTracer<'_> {
+    fn intersect(&self, _: Mode, rays: &[Ray], hits: &mut [Hit]) {
+        each(rays, hits, |ray| self.scene.intersect(&ray.into()).map_or(Hit::MISS, hit_of_mesh));
+    }
+
+    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [u8]) {
+        each(rays, occluded, |ray| self.scene.occluded(&ray.into()).into());
+    }
+
+    fn bytes(&self) -> Result<Option<Bytes>> {
+        let Self { scene, instances, config } = self;
+        let index_bytes = scene.blob().len();
+        let mut regions = Regions::counted(bound(instances, config)?)?;
+        let Regions { index, scratch } = &mut regions;
+        Scene::build(instances, scene.objects(), config, index, scratch)?;
+        Ok(Some(Bytes { index: index_bytes, peak: regions.written_bytes(index_bytes) }))
+    }
+}

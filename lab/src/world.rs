@@ -1,0 +1,221 @@
+//! What rays are asked of: a grid of a mesh, or a scene of instances of several.
+//!
+//! ```text
+//! World      closest hits       any hit               surface
+//! mesh       a tile together    all rays together     the mesh's
+//! instances  one by one         one by one            that of the triangle where its instance puts it, with starts
+//!                                                     as far off as rays of instances need
+//! ```
+
+use hgrid_core::{
+    Coherence, Grid, Hit, INVALID_ID, Instance, MAX_NESTING, Object, Ray, Scene, SceneHit, Strided,
+    StridedMut, Surface, TriangleMesh,
+};
+
+use crate::scene::Bounds;
+use crate::scene::model::{determinant, moved, transform_of};
+use crate::tiles::{TILE_RAYS, intersect};
+
+/// What is built, as a picture asks it.
+#[derive(Debug, Clone, Copy)]
+pub enum World<'a> {
+    /// A mesh where it is.
+    Mesh(&'a Grid<'a>),
+    /// Meshes where instances put them.
+    Instances(&'a Scene<'a>),
+}
+
+/// What a start is lifted by beyond the lift of a mesh, in parts of an object's extent and of its
+/// coordinates: docs/renderers.md asks for half as much.
+const LIFT: f32 = 32.0 * f32::EPSILON; // 2^-18
+
+/// The same for the rounding of corners that are moved, in parts of their coordinates in the scene.
+const CORNERS: f32 = 2.0 * f32::EPSILON; // 2^-22
+
+impl World<'_> {
+    /// The closest hits of rays, as many as there are rays.
+    pub fn intersect(&self, rays: &[Ray], hits: &mut [SceneHit]) {
+        match self {
+            Self::Mesh(grid) => {
+                let mut found = [Hit::MISS; TILE_RAYS];
+                for (rays, hits) in rays.chunks(TILE_RAYS).zip(hits.chunks_mut(TILE_RAYS)) {
+                    let found = &mut found[..rays.len()];
+                    intersect(grid, rays, found);
+                    for (hit, found) in hits.iter_mut().zip(found) {
+                        *hit = of_mesh(found);
+                    }
+                }
+            }
+            Self::Instances(scene) => {
+                for (ray, hit) in rays.iter().zip(hits) {
+                    *hit = scene.intersect(&ray.into()).unwrap_or(SceneHit::MISS);
+                }
+            }
+        }
+    }
+
+    /// The closest hit of a ray.
+    #[must_use]
+    pub fn closest(&self, ray: &Ray) -> Option<SceneHit> {
+        match self {
+            Self::Mesh(grid) => grid.intersect(ray).map(|hit| of_mesh(&hit)),
+            Self::Instances(scene) => scene.intersect(&ray.into()),
+        }
+    }
+
+    /// Returns true if a ray hits anything.
+    #[must_use]
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        match self {
+            Self::Mesh(grid) => grid.occluded(ray),
+            Self::Instances(scene) => scene.occluded(&ray.into()),
+        }
+    }
+
+    /// The same for many rays: 1 for each that hits anything, 0 for the others.
+    pub fn occluded_all(&self, rays: &[Ray], occluded: &mut [u8]) {
+        match self {
+            Self::Mesh(grid) => {
+                let answers = &mut StridedMut::new(occluded);
+                let answered = grid.occluded_n(&Strided::new(rays), answers, Coherence::Coherent);
+                debug_assert_eq!(answered, Ok(()));
+            }
+            Self::Instances(scene) => {
+                for (ray, occluded) in rays.iter().zip(occluded) {
+                    *occluded = scene.occluded(&ray.into()).into();
+                }
+            }
+        }
+    }
+
+    /// The point where a ray met a triangle, with starts for rays that leave it.
+    #[must_use]
+    pub fn surface(&self, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
+        match self {
+            Self::Mesh(grid) => grid.mesh().surface(ray, &on_mesh(hit)),
+            Self::Instances(scene) => surface(scene, ray, hit),
+        }
+    }
+}
+
+/// A hit of a mesh that no instance shows.
+fn of_mesh(&Hit { t, u, v, primitive }: &Hit) -> SceneHit {
+    SceneHit { t, u, v, primitive, path: [INVALID_ID; MAX_NESTING] }
+}
+
+/// A hit without its instance.
+pub(crate) fn on_mesh(&SceneHit { t, u, v, primitive, .. }: &SceneHit) -> Hit {
+    Hit { t, u, v, primitive }
+}
+
+fn surface(scene: &Scene<'_>, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
+    let Object::Grid(grid) = scene.object_of(hit)? else { return None };
+    let instance = scene.instance_of(hit)?;
+    let transform = transform_of(&instance);
+    let [a, b, c] = grid.mesh().triangle(hit.primitive)?.map(|corner| moved(&transform, corner));
+    let Hit { u, v, .. } = on_mesh(hit);
+    // The front stays the front, as where instances are triangles.
+    let (corners, [u, v]) =
+        if determinant(&transform) < 0.0 { ([a, c, b], [v, u]) } else { ([a, b, c], [u, v]) };
+    let mesh = TriangleMesh::new(&corners, &[[0, 1, 2]]).ok()?;
+    let surface = mesh.surface(ray, &Hit { t: hit.t, u, v, primitive: 0 })?;
+
+    let far = surface.position.iter().fold(0.0, |far: f32, c| far.max(c.abs()));
+    let lift = LIFT * size(&instance, grid.bounds()) + CORNERS * far;
+    let lifted = |start: [f32; 3], by: f32| {
+        core::array::from_fn(|axis| start[axis] + by * surface.normal[axis])
+    };
+    let (above, below) = (lifted(surface.above, lift), lifted(surface.below, -lift));
+    Some(Surface { above, below, ..surface })
+}
+
+/// How large an object is and how far its own origin is away from it, added, as its instance scales it.
+fn size(instance: &Instance, (min, max): Bounds) -> f32 {
+    let along = |axis: usize| max[axis] - min[axis] + min[axis].abs().max(max[axis].abs());
+    let scale = instance.linear.as_flattened().iter().map(|c| c * c).sum::<f32>().sqrt();
+    scale * (0..3).map(along).fold(0.0, f32::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use hgrid_core::{Block, Config, Sizes};
+
+    use super::*;
+    use crate::camera::{Camera, Up, View};
+    use crate::regions::Regions;
+    use crate::scene::Scene as Shown;
+    use crate::scene::model::{IDENTITY, Mesh, Model, Transform};
+    use crate::shade::dot;
+    use crate::tiles::Tiles;
+
+    /// Turned by a quarter, larger and elsewhere; and mirrored, far from its own origin and the scene's.
+    const PLACES: [Transform; 3] = [
+        IDENTITY,
+        [[0.0, -2.0, 0.0, 7.0], [2.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0, -3.0]],
+        [[-1.0, 0.0, 0.0, 90.0], [0.0, 1.0, 0.0, 0.5], [0.0, 0.25, 1.0, 80.0]],
+    ];
+
+    #[test]
+    fn instances_look_like_their_triangles() {
+        let knot = Shown::load("procedural:knot:800").unwrap();
+        let mesh = Mesh { positions: knot.positions, indices: knot.indices };
+        let instances = PLACES.map(|place| (0, place)).to_vec();
+        let model = Model { meshes: vec![mesh], instances };
+        assert!(model.is_shared());
+        let bounds = model.bounds().unwrap();
+        let flat = model.clone().flatten().unwrap();
+
+        let config = Config::default();
+        let triangles = TriangleMesh::new(&flat.positions, &flat.indices).unwrap();
+        let regions = Regions::build(triangles, &config).unwrap();
+        let flat = Grid::open(&regions.index, triangles).unwrap();
+        let mesh = &model.meshes[0];
+        let mesh = TriangleMesh::new(&mesh.positions, &mesh.indices).unwrap();
+        let regions = Regions::build(mesh, &config).unwrap();
+        let grid = Grid::open(&regions.index, mesh).unwrap();
+        let objects = [Object::Grid(&grid)];
+        let placed = PLACES.map(|place| Instance::with_transform(0, place));
+        let Sizes { index_bytes, scratch_bytes, .. } = Scene::bound(3, &config).unwrap();
+        let [mut index, mut scratch] =
+            [index_bytes, scratch_bytes].map(|bytes| vec![Block::ZERO; Block::count_for(bytes)]);
+        let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+        let scene = Scene::build(&placed, &objects, &config, index, scratch).unwrap();
+
+        let worlds = [World::Mesh(&flat), World::Instances(&scene)];
+        let (mut rays_with_hits, mut other) = (0, 0);
+        let alone = |&place: &Transform| {
+            Model { instances: vec![(0, place)], ..model.clone() }.bounds().unwrap()
+        };
+        for part in PLACES.iter().map(alone).chain([bounds]) {
+            let camera = Camera::framing(part, View::ThreeQuarter, Up::Y);
+            Tiles { camera, size: 40 }.each(|rays, _| {
+                let hits = worlds.map(|world| {
+                    let mut hits = vec![SceneHit::MISS; rays.len()];
+                    world.intersect(rays, &mut hits);
+                    hits
+                });
+                for (ray, (a, b)) in rays.iter().zip(hits[0].iter().zip(&hits[1])) {
+                    let [a, b] = [worlds[0].surface(ray, a), worlds[1].surface(ray, b)];
+                    let (Some(a), Some(b)) = (a, b) else {
+                        other += u32::from(a.is_some() != b.is_some());
+                        continue;
+                    };
+                    rays_with_hits += 1;
+                    let is_same = (0..3)
+                        .all(|axis| (a.position[axis] - b.position[axis]).abs() < 1e-3)
+                        && dot(a.normal, b.normal) > 0.999
+                        && a.is_front == b.is_front;
+                    other += u32::from(!is_same);
+                    // On a closed surface nothing is just above the outside.
+                    let t_max = 1e-4;
+                    let up = Ray { t_max, ..Ray::new(b.above, b.normal) };
+                    let down = Ray { t_max, ..Ray::new(b.above, b.normal.map(|c| -c)) };
+                    let mut occluded = [0; 2];
+                    worlds[1].occluded_all(&[up, Ray { t_max: 1.0, ..down }], &mut occluded);
+                    assert_eq!((occluded, worlds[1].occluded(&up)), ([0, 1], false), "{b:?}");
+                }
+            });
+        }
+        assert!(rays_with_hits > 500 && other <= 3, "{other} of {rays_with_hits}");
+    }
+}
