@@ -214,7 +214,7 @@ pub unsafe extern "C" fn hgrid_fit(
         // SAFETY: the caller's promise.
         let mut config = unsafe { raw::settings(config) }?;
         config.struct_size = struct_size;
-        config.density = found.density;
+        config.density = found.parameters.density().unwrap_or(config.density);
         // SAFETY: the caller's promise.
         unsafe { raw::write(to, config) };
         Ok(())

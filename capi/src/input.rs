@@ -62,7 +62,7 @@ impl Input {
                         report.note_sizes(&enough);
                     }
                     // Without room for bins or ids, trees name a bound.
-                    let is_bound = config.method == Method::Bvh;
+                    let is_bound = config.method() == Method::Bvh;
                     let is_exact = region == Region::Index && !is_bound;
                     report.is_exact = is_exact.into();
                 }

@@ -9,7 +9,7 @@ use core::ptr::{null, null_mut};
 
 use hgrid_core::{
     BuildFlags, Config, Control, Error, Grid, INVALID_ID, IndexType, MAX_TRIANGLES, Method,
-    Quality, Region, Scene, Sizes, Strided, TriangleMesh, sizes,
+    Parameters, Quality, Region, Scene, Sizes, Strided, TriangleMesh, sizes,
 };
 
 use crate::raw::parts_of;
@@ -320,25 +320,20 @@ impl hgrid_grid {
 impl hgrid_config {
     /// What NULL means.
     #[expect(clippy::cast_possible_truncation, reason = "64 bytes")]
-    pub(crate) const DEFAULT: Self = {
-        let Config { method, density, macrocell_factor, subdivide_above, depth, .. } =
-            Config::new(Method::Bvh);
-        let (struct_size, method) = (size_of::<Self>() as u32, method as u32);
-        Self {
-            struct_size,
-            method,
-            density,
-            macrocell_factor,
-            subdivide_above,
-            depth,
-            reserved: 0,
-            flags: 0,
-            tasks: 1,
-            quality: HGRID_QUALITY_FAST,
-            context: null_mut(),
-            run: None,
-            progress: None,
-        }
+    pub(crate) const DEFAULT: Self = Self {
+        struct_size: size_of::<Self>() as u32,
+        method: HGRID_METHOD_BVH,
+        density: 4.0,
+        macrocell_factor: 6,
+        subdivide_above: 16,
+        depth: 3,
+        reserved: 0,
+        flags: 0,
+        tasks: 1,
+        quality: HGRID_QUALITY_FAST,
+        context: null_mut(),
+        run: None,
+        progress: None,
     };
 
     /// Notes how much memory is enough for so many triangles.
@@ -364,7 +359,7 @@ impl hgrid_config {
         report: &mut hgrid_report,
     ) -> Result<(), hgrid_status> {
         let (config, tasks) = (self.to_core()?, self.task_count()?);
-        if config.method != Method::Bvh {
+        if config.method() != Method::Bvh {
             return Err(HGRID_ERROR_INVALID_METHOD);
         }
         self.bound(instance_count, report)?;
@@ -390,13 +385,18 @@ impl hgrid_config {
         if self.reserved != 0 {
             return Err(HGRID_ERROR_STRUCT_SIZE);
         }
-        let method = Method::from_u32(self.method).ok_or(HGRID_ERROR_INVALID_METHOD)?;
-        let flags = BuildFlags::from_bits(self.flags).ok_or(HGRID_ERROR_INVALID_FLAGS)?;
-        let quality = match method {
-            Method::Bvh => Quality::from_u32(self.quality).ok_or(HGRID_ERROR_INVALID_QUALITY)?,
-            _ => Quality::Fast,
+        // Told only if method and flags are right.
+        let quality = Quality::from_u32(self.quality).ok_or(HGRID_ERROR_INVALID_QUALITY);
+        let parameters = match self.method {
+            HGRID_METHOD_ONE_LEVEL => Ok(Parameters::OneLevel { density }),
+            HGRID_METHOD_FIXED => Ok(Parameters::Fixed { density, macrocell_factor }),
+            HGRID_METHOD_VARIABLE => Ok(Parameters::Variable { density, subdivide_above }),
+            HGRID_METHOD_RECURSIVE => Ok(Parameters::Recursive { density, depth }),
+            HGRID_METHOD_BVH => quality.map(|quality| Parameters::Bvh { quality }),
+            _ => return Err(HGRID_ERROR_INVALID_METHOD),
         };
-        Ok(Config { method, density, macrocell_factor, subdivide_above, depth, quality, flags })
+        let flags = BuildFlags::from_bits(self.flags).ok_or(HGRID_ERROR_INVALID_FLAGS)?;
+        Ok(Config { parameters: parameters?, flags })
     }
 }
 
@@ -431,7 +431,7 @@ impl hgrid_report {
         self.scratch_bytes = grid.scratch_bytes();
         self.skipped_count = grid.skipped_count();
         self.reference_count = grid.reference_count();
-        self.density = if grid.method().has_density() { grid.density() } else { 0.0 };
+        self.density = grid.config().parameters.density().unwrap_or(0.0);
         self.resolution = grid.resolution();
     }
 

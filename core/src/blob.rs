@@ -18,7 +18,7 @@ use crate::aabb::Aabb;
 use crate::arena;
 use crate::bits::halves;
 use crate::cell::Lattice;
-use crate::config::{BuildFlags, Config};
+use crate::config::{BuildFlags, Parameters, density_is_valid};
 use crate::control::Watch;
 use crate::error::{Error, Region};
 use crate::hash::Hash;
@@ -100,20 +100,13 @@ const _: () = assert!(HEADER_BYTES == 128 && HEADER_BYTES.is_multiple_of(ALIGNME
 
 impl Header {
     /// A header for a mesh; the counts that the build finds are the caller's to fill in.
-    pub(crate) fn new(config: &Config, mesh: &TriangleMesh<'_>, lattice: &Lattice) -> Self {
-        Self {
+    pub(crate) fn new(parameters: Parameters, mesh: &TriangleMesh<'_>, lattice: &Lattice) -> Self {
+        let mut header = Self {
             magic: MAGIC,
             byte_order: BYTE_ORDER,
             version: BLOB_VERSION,
-            method: config.method as u32,
-            macrocell_factor: if config.method.has_macrocells() {
-                config.macrocell_factor
-            } else {
-                0
-            },
-            subdivide_above: if config.method.has_subgrids() { config.subdivide_above } else { 0 },
-            depth: if config.method.has_depth() { config.depth } else { 0 },
-            quality: if config.method.has_nodes() { config.quality as u32 } else { 0 },
+            method: parameters.method() as u32,
+            density: parameters.density().unwrap_or(0.0),
             triangle_count: mesh.triangle_count(),
             vertex_count: mesh.vertex_count() as u64,
             content: mesh.content() as u32,
@@ -121,7 +114,32 @@ impl Header {
             bounds_max: lattice.max,
             resolution: lattice.resolution,
             ..Self::new_zeroed()
+        };
+        match parameters {
+            Parameters::OneLevel { .. } => {}
+            Parameters::Fixed { macrocell_factor: factor, .. } => header.macrocell_factor = factor,
+            Parameters::Variable { subdivide_above: most, .. } => header.subdivide_above = most,
+            Parameters::Recursive { depth, .. } => header.depth = depth,
+            Parameters::Bvh { quality } => header.quality = quality as u32,
         }
+        header
+    }
+
+    /// The parameters that the grid was built with.
+    pub(crate) fn parameters(&self, method: Method) -> Parameters {
+        let Self { density, macrocell_factor, subdivide_above, depth, .. } = *self;
+        match method {
+            Method::OneLevel => Parameters::OneLevel { density },
+            Method::Fixed => Parameters::Fixed { density, macrocell_factor },
+            Method::Variable => Parameters::Variable { density, subdivide_above },
+            Method::Recursive => Parameters::Recursive { density, depth },
+            Method::Bvh => Parameters::Bvh { quality: self.quality() },
+        }
+    }
+
+    /// The quality of a tree.
+    pub(crate) fn quality(&self) -> Quality {
+        Quality::from_u32(self.quality).unwrap_or_default()
     }
 
     /// The header as the first bytes of a blob.
@@ -250,27 +268,6 @@ impl Header {
         Ok(Lattice::new(bounds, self.resolution))
     }
 
-    /// The configuration that the grid was built with, where the method has such parameters.
-    pub(crate) fn config(&self, default: Config) -> Config {
-        let mut config = default;
-        if config.method.has_density() {
-            config.density = self.density;
-        }
-        if config.method.has_macrocells() {
-            config.macrocell_factor = self.macrocell_factor;
-        }
-        if config.method.has_subgrids() {
-            config.subdivide_above = self.subdivide_above;
-        }
-        if config.method.has_depth() {
-            config.depth = self.depth;
-        }
-        if config.method.has_nodes() {
-            config.quality = Quality::from_u32(self.quality).unwrap_or_default();
-        }
-        config
-    }
-
     /// Whether the header says what the mesh says: what was skipped, its box, and the resolution
     /// that `rule` has for the box's size and so many triangles.
     pub(crate) fn check(
@@ -280,8 +277,7 @@ impl Header {
         rule: impl FnOnce(Vec3A, u32) -> Option<[u32; 3]>,
     ) -> Result<(), Error> {
         let survey = self.survey(lattice, mesh)?;
-        let asked = Config { density: self.density, ..Config::default() };
-        if !asked.density_is_valid() {
+        if !density_is_valid(self.density) {
             return Err(corrupt(core::mem::offset_of!(Self, density)));
         }
         if rule(lattice.bounds().size(), survey.finite_count) != Some(lattice.resolution) {
@@ -308,12 +304,12 @@ impl Header {
 
     /// Whether the fields that mean nothing to the method are zero, as a build leaves them.
     pub(crate) fn unused_is_zero(&self, method: Method) -> bool {
-        (method.has_macrocells() || self.macrocell_factor == 0)
-            && (method.has_subgrids() || self.subdivide_above == 0)
-            && (method.has_depth() || self.depth == 0)
-            && (method.has_density() || self.density.to_bits() == 0)
-            && (method.has_nodes() || (self.node_count, self.levels) == (0, 0))
-            && (method.has_nodes() || self.quality == 0)
+        let is_tree = method == Method::Bvh;
+        (method == Method::Fixed || self.macrocell_factor == 0)
+            && (method == Method::Variable || self.subdivide_above == 0)
+            && (method == Method::Recursive || self.depth == 0)
+            && (!is_tree || self.density.to_bits() == 0)
+            && (is_tree || (self.node_count, self.levels, self.quality) == (0, 0, 0))
     }
 }
 

@@ -452,8 +452,7 @@ impl<'a> Grid<'a> {
     /// where a bump allocator gave it.
     #[must_use]
     pub fn scratch_bytes(&self) -> u64 {
-        let triangles = self.mesh.triangle_count();
-        self.structure.scratch_bytes(triangles, &self.config(), self.lattice.resolution)
+        self.header().map_or(0, |header| self.structure.scratch_bytes(&header))
     }
 
     /// The least and the greatest corner of the grid's box, in scene units: the mesh's box and a
@@ -475,19 +474,13 @@ impl<'a> Grid<'a> {
         self.structure.method()
     }
 
-    /// The density that the grid has: the configured one, or a half, a quarter, ... of it where the
-    /// mesh would have needed more than 16 references a triangle. It
-    /// means nothing for a tree.
-    #[must_use]
-    pub fn density(&self) -> f32 {
-        self.config().density
-    }
-
-    /// A configuration that builds this grid of this mesh again.
+    /// A configuration that builds this grid of this mesh again. Its density is the one that the grid has: the
+    /// configured one, or a half, a quarter, ... of it where the mesh would have needed more than 16 references
+    /// a triangle.
     #[must_use]
     pub fn config(&self) -> Config {
-        let config = Config::new(self.method());
-        self.header().map_or(config, |header| header.config(config))
+        let method = self.method();
+        self.header().map_or(Config::new(method), |header| header.parameters(method).into())
     }
 
     /// Triangles left out because a coordinate is not finite.

@@ -140,7 +140,7 @@ pub use arena::{Block, Sizes};
 pub use batch::{Batch, Coherence, StridedMut};
 pub use blob::BLOB_VERSION;
 pub use closest::ClosestPoint;
-pub use config::{BuildFlags, Config};
+pub use config::{BuildFlags, Config, Parameters};
 pub use control::{Control, Task};
 pub use counters::Counters;
 pub use error::{BatchField, ConfigField, Error, MeshField, Region};

@@ -73,42 +73,6 @@ impl Method {
             Self::Bvh => cfg!(feature = "bvh"),
         }
     }
-
-    /// Whether [`Config::macrocell_factor`] means something to it.
-    pub(crate) const fn has_macrocells(self) -> bool {
-        matches!(self, Self::Fixed)
-    }
-
-    /// Whether [`Config::subdivide_above`] means something to it.
-    pub(crate) const fn has_subgrids(self) -> bool {
-        matches!(self, Self::Variable)
-    }
-
-    /// Whether [`Config::depth`] means something to it.
-    pub(crate) const fn has_depth(self) -> bool {
-        matches!(self, Self::Recursive)
-    }
-
-    /// Whether [`Config::density`](crate::Config::density) means something to it.
-    #[must_use]
-    pub const fn has_density(self) -> bool {
-        !self.has_nodes()
-    }
-
-    /// Whether its index has nodes, not cells.
-    pub(crate) const fn has_nodes(self) -> bool {
-        matches!(self, Self::Bvh)
-    }
-
-    /// The density that the paper uses with this method.
-    #[must_use]
-    pub const fn default_density(self) -> f32 {
-        match self {
-            Self::OneLevel | Self::Variable | Self::Bvh => 4.0,
-            Self::Fixed => 32.0,
-            Self::Recursive => 8.0,
-        }
-    }
 }
 
 /// How much time a build of [`Method::Bvh`] takes for rays that are faster.

@@ -271,7 +271,7 @@ impl OwnedGrid {
         let mut scratch = Memory::new(sizes.scratch_bytes, Region::Scratch)?;
         // A tree's bound is at most twice what it takes, and only what it takes is touched. Those of the
         // other methods may be more than there is: find out.
-        if config.method != Method::Bvh {
+        if config.method() != Method::Bvh {
             sizes = sizes_with(&view, config, scratch.bytes_mut(), control)?;
         }
         let mut index = Memory::new(sizes.index_bytes, Region::Index)?;

@@ -15,10 +15,10 @@ use crate::arena::Sizes;
 use crate::config::Config;
 use crate::control::Control;
 use crate::counters::Counters;
-use crate::error::{ConfigField, Error};
+use crate::error::Error;
 use crate::grid::Grid;
 use crate::mesh::{Strided, TriangleMesh};
-use crate::method::{Content, Method};
+use crate::method::Content;
 use crate::options::{Cull, QueryOptions, Selection};
 use crate::ray::{Hit, Ray};
 use crate::refit::{Refit, refit_content};
@@ -136,14 +136,6 @@ impl fmt::Debug for Shapes<'_> {
     }
 }
 
-/// Refuses all methods but the tree.
-fn check(config: &Config) -> Result<(), Error> {
-    match config.method {
-        Method::Bvh => Ok(()),
-        _ => Err(Error::InvalidConfig(ConfigField::Method)),
-    }
-}
-
 impl<'a> Shapes<'a> {
     /// The memory that a build over these boxes takes: [`sizes`](crate::sizes) for shapes.
     ///
@@ -151,7 +143,7 @@ impl<'a> Shapes<'a> {
     /// Those of [`sizes`](crate::sizes); [`Error::InvalidConfig`] if the method is not
     /// [`Method::Bvh`], here and in all builds.
     pub fn sizes(boxes: &Boxes<'_>, config: &Config, scratch: &mut [u8]) -> Result<Sizes, Error> {
-        check(config)?;
+        config.check_tree()?;
         sizes_with(&boxes.0, config, scratch, &Control::SERIAL)
     }
 
@@ -180,7 +172,7 @@ impl<'a> Shapes<'a> {
         scratch: &mut [u8],
         control: &Control<'_>,
     ) -> Result<Self, Error> {
-        check(config)?;
+        config.check_tree()?;
         Ok(Self { grid: Grid::build_with(boxes.0, config, index, scratch, control)? })
     }
 

@@ -145,7 +145,7 @@ pub fn fit(
 ) -> Result<(Config, Sizes), Error> {
     config.check()?;
     // A tree is neither fine nor coarse.
-    let most_steps = if config.method.has_density() { MOST_STEPS } else { 0 };
+    let most_steps = if config.parameters.density().is_some() { MOST_STEPS } else { 0 };
     let mut try_with = |steps: u32| fits(mesh, &coarsened(config, steps), index_bytes, scratch);
     // The first number of steps of 0, 1, 2, 4, ... that fits, then the smallest one below it.
     let (mut low, mut high) = (0, 0);
@@ -171,13 +171,14 @@ const MOST_STEPS: u32 = 1024;
 
 /// A configuration that asks for so many steps fewer cells.
 fn coarsened(config: &Config, steps: u32) -> Config {
-    let fewer = |factor: f64| (0..steps).fold(1.0, |all, _| all * factor);
-    let mut coarser = *config;
-    if config.method.has_density() {
-        let density = f64::from(config.density) * fewer(core::f64::consts::FRAC_1_SQRT_2);
-        coarser.density = round(density).max(f32::MIN_POSITIVE);
+    match config.parameters.density() {
+        Some(density) if steps > 0 => {
+            let fewer = (0..steps).fold(1.0, |all, _| all * core::f64::consts::FRAC_1_SQRT_2);
+            let density = round(f64::from(density) * fewer).max(f32::MIN_POSITIVE);
+            Config { parameters: config.parameters.with_density(density), ..*config }
+        }
+        _ => *config,
     }
-    if steps == 0 { *config } else { coarser }
 }
 
 /// What a grid needs, if it fits into so much memory.
@@ -194,7 +195,7 @@ fn fits(
         available_bytes: available as u64,
     };
     // Their bounds say nothing of what a mesh takes.
-    let has_pool = !matches!(config.method, Method::OneLevel | Method::Fixed);
+    let has_pool = !matches!(config.method(), Method::OneLevel | Method::Fixed);
     if has_pool && !needed.is_exact {
         return Err(missing(Region::Scratch, needed.scratch_bytes, scratch.len()));
     }

@@ -1,15 +1,15 @@
 //! The methods of the library: the one place that lists what is done by method.
 //!
 //! A method is a folder with a cargo feature of its name. Without the feature the folder is not compiled, and calls
-//! with the method return [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes` and `build` and a
-//! type that reads what was built; [`Structure`] is an enum of these types. A new method is a line of the list at the
-//! end and a module in lib.rs.
+//! with the method return [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes` and `build`, which
+//! take the method's own parameters, and a type that reads what was built; [`Structure`] is an enum of these types. A
+//! new method is a variant of [`Parameters`], a line of the list at the end and a module in lib.rs.
 
 use crate::aabb::Aabb;
 use crate::arena::Sizes;
 use crate::blob::Header;
 use crate::cell::Lattice;
-use crate::config::Config;
+use crate::config::{Config, Parameters};
 use crate::control::{Control, Watch};
 use crate::counters::Tally;
 use crate::dda::Line;
@@ -41,8 +41,8 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
 
 macro_rules! methods {
     (
-        cells: $($feature:literal $Cells:ident $cells:ident,)*
-        trees: $($of_tree:literal $Tree:ident $tree:ident,)*
+        cells: $($feature:literal $Cells:ident $cells:ident { $($field:ident),* },)*
+        trees: $($of_tree:literal $Tree:ident $tree:ident { $($choice:ident),* },)*
     ) => {
         /// What a build wrote, as its method reads it.
         #[derive(Debug, Clone, Copy)]
@@ -53,15 +53,15 @@ macro_rules! methods {
 
         /// Enough bytes of index and scratch for any mesh of so many triangles.
         pub(crate) const fn bound(triangles: u32, config: &Config, tasks: u32) -> Option<(u64, u64)> {
-            match config.method {
+            match config.parameters {
                 $(#[cfg(feature = $feature)]
-                Method::$Cells => Some(crate::$cells::bound(triangles, config)),
+                Parameters::$Cells { $($field),* } => Some(crate::$cells::bound(triangles, $($field),*)),
                 #[cfg(not(feature = $feature))]
-                Method::$Cells => None,)*
+                Parameters::$Cells { .. } => None,)*
                 $(#[cfg(feature = $of_tree)]
-                Method::$Tree => crate::$tree::bound(triangles, config, tasks),
+                Parameters::$Tree { $($choice),* } => crate::$tree::bound(triangles, $($choice),*, tasks),
                 #[cfg(not(feature = $of_tree))]
-                Method::$Tree => None,)*
+                Parameters::$Tree { .. } => None,)*
             }
         }
 
@@ -72,15 +72,17 @@ macro_rules! methods {
             scratch: &mut [u8],
             control: &Control<'_>,
         ) -> Result<Sizes, Error> {
-            match config.method {
+            match config.parameters {
                 $(#[cfg(feature = $feature)]
-                Method::$Cells => crate::$cells::sizes(mesh, config, scratch),)*
+                Parameters::$Cells { $($field),* } => crate::$cells::sizes(mesh, $($field),*, config.flags, scratch),)*
                 $(#[cfg(feature = $of_tree)]
-                Method::$Tree => crate::$tree::sizes(mesh, config, scratch, control),)*
+                Parameters::$Tree { $($choice),* } => {
+                    crate::$tree::sizes(mesh, $($choice),*, config.flags, scratch, control)
+                })*
                 $(#[cfg(not(feature = $feature))]
-                Method::$Cells => Err(Error::MethodLeftOut(config.method)),)*
+                Parameters::$Cells { .. } => Err(Error::MethodLeftOut(Method::$Cells)),)*
                 $(#[cfg(not(feature = $of_tree))]
-                Method::$Tree => Err(Error::MethodLeftOut(config.method)),)*
+                Parameters::$Tree { .. } => Err(Error::MethodLeftOut(Method::$Tree)),)*
             }
         }
 
@@ -93,15 +95,19 @@ macro_rules! methods {
             control: &Control<'_>,
             watch: &Watch<'_>,
         ) -> Result<&'a [u8], Error> {
-            match config.method {
+            match config.parameters {
                 $(#[cfg(feature = $feature)]
-                Method::$Cells => crate::$cells::build(mesh, config, index, scratch, watch),)*
+                Parameters::$Cells { $($field),* } => {
+                    crate::$cells::build(mesh, $($field),*, config.flags, index, scratch, watch)
+                })*
                 $(#[cfg(feature = $of_tree)]
-                Method::$Tree => crate::$tree::build(mesh, config, index, scratch, control, watch),)*
+                Parameters::$Tree { $($choice),* } => crate::$tree::build(
+                    mesh, $($choice),*, config.flags, index, scratch, control, watch
+                ),)*
                 $(#[cfg(not(feature = $feature))]
-                Method::$Cells => Err(Error::MethodLeftOut(config.method)),)*
+                Parameters::$Cells { .. } => Err(Error::MethodLeftOut(Method::$Cells)),)*
                 $(#[cfg(not(feature = $of_tree))]
-                Method::$Tree => Err(Error::MethodLeftOut(config.method)),)*
+                Parameters::$Tree { .. } => Err(Error::MethodLeftOut(Method::$Tree)),)*
             }
         }
 
@@ -190,13 +196,11 @@ macro_rules! methods {
                 }
             }
 
-            /// Bytes of scratch that a build of this structure over so many triangles takes.
-            pub(crate) fn scratch_bytes(&self, triangles: u32, config: &Config, resolution: [u32; 3]) -> u64 {
+            /// Bytes of scratch that a build of this structure over its mesh takes.
+            pub(crate) fn scratch_bytes(&self, header: &Header) -> u64 {
                 match self {
-                    $(#[cfg(feature = $feature)]
-                    Self::$Cells(_) => crate::$cells::scratch_bytes(triangles, config, resolution),)*
-                    $(#[cfg(feature = $of_tree)]
-                    Self::$Tree(_) => crate::$tree::scratch_bytes(triangles, config),)*
+                    $(#[cfg(feature = $feature)] Self::$Cells(_) => crate::$cells::scratch_bytes(header),)*
+                    $(#[cfg(feature = $of_tree)] Self::$Tree(_) => crate::$tree::scratch_bytes(header),)*
                 }
             }
         }
@@ -205,10 +209,10 @@ macro_rules! methods {
 
 methods! {
     cells:
-        "one-level" OneLevel one_level,
-        "fixed" Fixed fixed,
-        "variable" Variable variable,
-        "recursive" Recursive recursive,
+        "one-level" OneLevel one_level { density },
+        "fixed" Fixed fixed { density, macrocell_factor },
+        "variable" Variable variable { density, subdivide_above },
+        "recursive" Recursive recursive { density, depth },
     trees:
-        "bvh" Bvh bvh,
+        "bvh" Bvh bvh { quality },
 }

@@ -55,7 +55,7 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     let focus = field.map(|field| field.bounds()).or(scene.focus);
     let shown = Scene { focus, is_z_up: Some(up == Up::Z), ..scene.clone() };
     let tiles = args.picture.tiles(&shown)?;
-    let config = args.tuning.config(args.method);
+    let config = args.tuning.config(args.method, None);
     let threads = Threads::new(args.threads)?;
     let mut progress = Progress::new("frames", args.frames.into());
     let write = |frame: u32, pixels: &[Rgb]| match &args.output {
@@ -185,11 +185,11 @@ fn animate(
     let mut pixels = vec![[0; 3]; plan.tiles.pixels()];
     let mut kept = None;
     let instances = plan.field.map_or(0, |field| field.count());
-    let mut memory = Memory::new(
-        instances,
-        &Config { method: Method::Bvh, ..plan.config },
-        plan.threads.count(),
-    )?;
+    let tree = match plan.config.method() {
+        Method::Bvh => plan.config,
+        _ => Config::default(),
+    };
+    let mut memory = Memory::new(instances, &tree, plan.threads.count())?;
     let (mut frames, mut index_bytes, mut grown) = (Vec::new(), 0, 0);
     for number in 0..plan.frames {
         let start = Instant::now();
@@ -244,7 +244,7 @@ fn animate(
         triangles: scene.indices.len(),
         instances,
         is_refitted: plan.is_refitted,
-        method: plan.config.method.name(),
+        method: plan.config.method().name(),
         threads: plan.threads.count(),
         size: plan.tiles.size,
         grown,

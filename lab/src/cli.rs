@@ -264,7 +264,7 @@ impl Race {
     /// # Errors
     /// The first such parameter, and the method that it is for.
     pub fn check(&self) -> anyhow::Result<()> {
-        let methods: Vec<_> = self.configs().iter().map(|config| config.method).collect();
+        let methods: Vec<_> = self.configs().iter().map(Config::method).collect();
         self.tuning.check(&methods)
     }
 
@@ -272,7 +272,7 @@ impl Race {
     #[must_use]
     pub fn configs(&self) -> Vec<Config> {
         let methods = if self.methods.is_empty() { Method::ALL } else { &self.methods };
-        methods.iter().map(|&method| self.tuning.config(method)).collect()
+        methods.iter().map(|&method| self.tuning.config(method, None)).collect()
     }
 }
 

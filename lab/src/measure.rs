@@ -204,7 +204,7 @@ pub fn measure(
     let mut hits = [Hit::MISS; TILE_RAYS];
     for repetition in 1..=repeat {
         for (config, (builds, renders)) in configs.iter().zip(&mut samples) {
-            let name = config.method.name();
+            let name = config.method().name();
             let turn = format!("{name}, {repetition} of {repeat}:");
             progress.set_message(&format!("{turn} building"));
             threads.wake();
@@ -321,12 +321,11 @@ fn numbers(
 ) -> Measurement {
     let rays = u64::from(size) * u64::from(size);
     let index_bytes = grid.blob_bytes();
-    let has_density = config.method.has_density();
     let (build_seconds, render_seconds) = (median(builds), median(renders));
     Measurement {
         method: grid.method().name().into(),
-        configured_density: has_density.then_some(config.density),
-        density: has_density.then(|| grid.density()),
+        configured_density: config.parameters.density(),
+        density: grid.config().parameters.density(),
         resolution: grid.resolution(),
         references: has_references(grid.method()).then(|| grid.reference_count()),
         skipped_triangles: grid.skipped_count(),
@@ -396,7 +395,7 @@ mod tests {
         assert!((300..900).contains(&hits), "{hits}");
         assert_eq!(measurements.len(), configs.len());
         for (m, config) in measurements.iter().zip(configs) {
-            assert_eq!((&*m.method, m.hits), (config.method.name(), hits as u64));
+            assert_eq!((&*m.method, m.hits), (config.method().name(), hits as u64));
             assert!(m.allocated_index_bytes >= m.index_bytes && m.peak_bytes >= m.index_bytes);
         }
     }

@@ -8,7 +8,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{Config, Grid, TriangleMesh};
+use hgrid_core::{Config, Grid, Parameters, TriangleMesh};
 use indicatif::HumanCount;
 
 use crate::blob::Blob;
@@ -30,7 +30,8 @@ pub fn run(args: &PackArgs) -> Result<()> {
     check_writable(&args.output)?;
     let scene = Scene::load(&args.scene)?;
     let cannot = || format!("cannot pack `{}`", args.scene);
-    let blob = pack(&scene, &config(args)).with_context(cannot)?;
+    let config = args.tuning.config(args.method, args.density);
+    let blob = pack(&scene, &config).with_context(cannot)?;
     let written = match &args.c_array {
         None => fs::write(&args.output, blob.bytes()),
         Some(name) => File::create(&args.output).and_then(|file| {
@@ -52,16 +53,11 @@ pub fn run(args: &PackArgs) -> Result<()> {
     Ok(())
 }
 
-fn config(args: &PackArgs) -> Config {
-    let config = args.tuning.config(args.method);
-    Config { density: args.density.unwrap_or(config.density), ..config }
-}
-
 /// Refuses words that would be ignored, and files that are no blob's.
 fn check(args: &PackArgs) -> Result<()> {
     let (method, output) = (args.method, args.output.display());
     ensure!(
-        args.density.is_none() || method.has_density(),
+        args.density.is_none() || Parameters::new(method).density().is_some(),
         "--density is not for {}, which has none",
         method.name()
     );

@@ -40,7 +40,7 @@ impl Regions {
     ) -> Result<Self> {
         // A tree's bound follows from the number of triangles, and
         // what is not written costs nothing.
-        let bound = match config.method {
+        let bound = match config.method() {
             Method::Bvh => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
             _ => None,
         };
@@ -189,7 +189,7 @@ mod tests {
             kept.rebuild(small, &config, &control).unwrap();
             assert!(kept.rebuild(large, &config, &control).unwrap() > 0);
             assert_eq!(kept.rebuild(large, &config, &control).unwrap(), 0);
-            assert!(blob(&kept) == blob(&expected), "{}", config.method.name());
+            assert!(blob(&kept) == blob(&expected), "{}", config.method().name());
         }
     }
 }

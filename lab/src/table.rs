@@ -272,7 +272,7 @@ pub(crate) fn seconds(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use clap::Parser as _;
-    use hgrid_core::Method;
+    use hgrid_core::{Method, Parameters};
 
     use super::*;
 
@@ -288,7 +288,8 @@ mod tests {
         let text = results.text();
         assert!(text.contains("knot:"), "{text}");
         for method in Method::ALL {
-            let title = if method.has_density() { ", density" } else { "\n" };
+            let title =
+                if Parameters::new(*method).density().is_some() { ", density" } else { "\n" };
             assert!(text.contains(&format!(" {}{title}", method.name())), "{text}");
         }
         assert_eq!(text.matches("time to image").count(), Method::ALL.len());

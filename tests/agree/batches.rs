@@ -197,13 +197,13 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
         let met = expected[LIMITED].iter().filter(|hit| **hit != Hit::MISS).count();
         assert!(limited > 100 && met > 200, "{limited} {met}");
         // Other methods have no vectors in them.
-        let levels = levels_of(config.method);
+        let levels = levels_of(config.method());
         for (level, coherence) in levels.into_iter().flat_map(|l| COHERENCES.map(|c| (l, c))) {
             let grid = grid.with_simd(level);
             for n in [0, 1, 7, 63, 64, 65, 128, 1000, rays.len() - 37] {
                 // From another ray on, so that tiles are cut at other places.
                 for from in [0, rays.len() - n] {
-                    let what = format!("{:?} {level:?} {coherence:?} {n} {from}", config.method);
+                    let what = format!("{:?} {level:?} {coherence:?} {n} {from}", config.method());
                     let rays = &rays[from..from + n];
                     let expected = &expected[from..from + n];
                     let mut hits = vec![Hit { t: 7.0, u: 7.0, v: 7.0, primitive: 7 }; n];
@@ -348,7 +348,7 @@ fn elements_may_lie_anywhere_and_what_is_between_them_stays() {
                     StridedMut { bytes: &mut hits, stride: hit_stride, count: rays.len() };
                 grid.intersect_n(&strided, &mut answers, coherence).unwrap();
                 let expected_hits = scatter(expected.iter().map(hit_bytes), hit_stride);
-                assert!(hits == expected_hits, "{:?} {coherence:?} {hit_stride}", config.method);
+                assert!(hits == expected_hits, "{:?} {coherence:?} {hit_stride}", config.method());
 
                 let mut occluded = vec![0xa5_u8; last * byte_stride + 1];
                 let mut answers =
@@ -358,7 +358,7 @@ fn elements_may_lie_anywhere_and_what_is_between_them_stays() {
                 assert!(
                     occluded == scatter(is_hit, byte_stride),
                     "{:?} {coherence:?}",
-                    config.method
+                    config.method()
                 );
             }
         }
@@ -404,10 +404,10 @@ fn masks_culling_and_a_triangle_to_skip_agree() {
                 .collect();
             different += usize::from(expected != alone(&grid, rays));
             for (level, coherence) in
-                levels_of(config.method).into_iter().flat_map(|l| COHERENCES.map(|c| (l, c)))
+                levels_of(config.method()).into_iter().flat_map(|l| COHERENCES.map(|c| (l, c)))
             {
                 let grid = grid.with_simd(level);
-                let what = format!("{:?} {level:?} {coherence:?} {mask} {cull:?}", config.method);
+                let what = format!("{:?} {level:?} {coherence:?} {mask} {cull:?}", config.method());
                 let strided = Strided::new(rays);
                 let mut hits = vec![Hit { primitive: 7, ..Hit::MISS }; rays.len()];
                 let answers = &mut StridedMut::new(&mut hits);
@@ -422,7 +422,7 @@ fn masks_culling_and_a_triangle_to_skip_agree() {
                 }
             }
         }
-        assert_eq!(different, 7, "{:?}: every option changes something", config.method);
+        assert_eq!(different, 7, "{:?}: every option changes something", config.method());
     }
 }
 
@@ -533,7 +533,7 @@ fn filters_and_counters_are_those_of_single_rays() {
             let mut hits = vec![Hit::MISS; rays.len()];
             let answers = &mut StridedMut::new(&mut hits);
             grid.intersect_n_with(&Strided::new(rays), answers, coherence, &mut options).unwrap();
-            assert!(hits == expected && shown == expected_shown, "{:?}", config.method);
+            assert!(hits == expected && shown == expected_shown, "{:?}", config.method());
             assert_eq!(work, expected_work);
 
             // Without a filter.
@@ -546,7 +546,7 @@ fn filters_and_counters_are_those_of_single_rays() {
             let answers = &mut StridedMut::new(&mut occluded);
             let options = &mut QueryOptions::counting(&mut work);
             grid.occluded_n_with(&Strided::new(rays), answers, coherence, options).unwrap();
-            assert_eq!((occluded, work), (expected, expected_work), "{:?}", config.method);
+            assert_eq!((occluded, work), (expected, expected_work), "{:?}", config.method());
         }
     }
 }

@@ -219,7 +219,7 @@ fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
     let masks = masks(mesh.view().triangle_count());
     let with_masks = mesh.view().with_masks(Strided::new(&masks)).unwrap();
     // Without masks every triangle is asked about, or none: enough to ask of trees.
-    let trees = methods::configs().filter(|config| config.method == Method::Bvh);
+    let trees = methods::configs().filter(|config| config.method() == Method::Bvh);
     let plain = trees.map(|config| (config, mesh.view()));
     for (config, view) in methods::configs().map(|config| (config, with_masks)).chain(plain) {
         let owned = Owned::build(&view, &config).unwrap();
@@ -234,7 +234,7 @@ fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
                 for (ray, hits) in rays.iter().zip(&hits).step_by(5) {
                     check_single(&grid, ray, hits, asked);
                 }
-                for level in levels_of(config.method) {
+                for level in levels_of(config.method()) {
                     let grid = grid.with_simd(level);
                     check_batches(&grid, &rays, &hits, asked, COHERENCES[0], 0);
                     for scratch in [0, 9000, 16 * rays.len()] {
@@ -271,7 +271,7 @@ fn opaque_triangles_cost_no_walk() {
             let answers = &mut StridedMut::new(&mut hits);
             grid.intersect_n_with(&Strided::new(rays), answers, Coherence::Coherent, &mut options)
                 .unwrap();
-            assert_eq!(alone, together, "{:?}", config.method);
+            assert_eq!(alone, together, "{:?}", config.method());
             alone.primitive_tests
         };
         let mut plain = Counters::default();
@@ -279,8 +279,8 @@ fn opaque_triangles_cost_no_walk() {
             let _ = grid.intersect_with(ray, &mut QueryOptions::counting(&mut plain));
         }
         // A mask that no triangle has: no more work than without a filter.
-        assert_eq!(tests(8), plain.primitive_tests, "{:?}", config.method);
-        assert!(tests(1) < tests(u32::MAX), "{:?}", config.method);
+        assert_eq!(tests(8), plain.primitive_tests, "{:?}", config.method());
+        assert!(tests(1) < tests(u32::MAX), "{:?}", config.method());
     }
 }
 
@@ -309,7 +309,7 @@ fn what_is_named_blocks_the_ray() {
                 check_occluder(&grid, hits, asked, named, "counted");
             }
             for (level, coherence) in
-                levels_of(config.method).into_iter().flat_map(|l| COHERENCES.map(|c| (l, c)))
+                levels_of(config.method()).into_iter().flat_map(|l| COHERENCES.map(|c| (l, c)))
             {
                 let mut named = vec![7; rays.len()];
                 let mut scratch = vec![0; 16 * rays.len()];

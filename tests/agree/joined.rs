@@ -167,7 +167,7 @@ fn tasks_build_the_same() {
     let mesh = TriangleMesh::join(&mut parts).unwrap();
     let run = |count: u32, task: &Task<'_>| (0..count).rev().for_each(task);
     let control = Control { tasks: 7, run: &run, progress: None };
-    for config in methods::configs().filter(|config| config.method == Method::Bvh) {
+    for config in methods::configs().filter(|config| config.method() == Method::Bvh) {
         let expected = Owned::build(&all.view(), &config).unwrap();
         let sizes = sizes_with(&mesh, &config, &mut [], &control).unwrap();
         let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];

@@ -2,7 +2,9 @@
 
 use std::collections::HashSet;
 
-use hgrid_core::{Boxes, Config, Counters, Quality, QueryOptions, Ray, ShapeHit, Shapes, Strided};
+use hgrid_core::{
+    Boxes, Config, Counters, Parameters, Quality, QueryOptions, Ray, ShapeHit, Shapes, Strided,
+};
 use hgrid_tests::random::Random;
 use hgrid_tests::scenes::Built;
 
@@ -58,7 +60,7 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
         let masks: Vec<u32> = (0..count).map(|id| 1 << (id % 3)).collect();
         let boxes = Boxes::new(&boxes).unwrap().with_masks(Strided::new(&masks)).unwrap();
         for quality in [Quality::Fast, Quality::High] {
-            let config = Config { quality, ..Config::default() };
+            let config = Config::from(Parameters::Bvh { quality });
             let built = Built::shapes(boxes, &config).unwrap();
             let shapes = Shapes::open(built.bytes(), boxes).unwrap();
             assert_eq!(shapes.count() as usize, count);

@@ -107,7 +107,7 @@ fn refused(copy: &mut Copy, mesh: &TriangleMesh<'_>, expected: Error) {
 #[test]
 fn what_cannot_be_refitted_is_left_as_it_was() {
     let mesh = soup(100, 0.2, 1);
-    for config in configs().filter(|config| config.method != Method::Bvh) {
+    for config in configs().filter(|config| config.method() != Method::Bvh) {
         let owned = Owned::build(&mesh.view(), &config).unwrap();
         refused(&mut Copy::of(owned.bytes()), &mesh.view(), Error::CannotRefit);
     }

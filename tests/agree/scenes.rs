@@ -1,8 +1,8 @@
 //! Scenes: every query agrees with a loop over all instances, and with the triangles moved in f64.
 
 use hgrid_core::{
-    BlobInfo, Block, Boxes, Config, Counters, Grid, Instance, Method, Object, Quality, Ray, RayF64,
-    Scene, SceneHit, SceneOptions, ShapeHit, Shapes, TriangleMesh, Verdict,
+    BlobInfo, Block, Boxes, Config, Counters, Grid, Instance, Method, Object, Parameters, Quality,
+    Ray, RayF64, Scene, SceneHit, SceneOptions, ShapeHit, Shapes, TriangleMesh, Verdict,
 };
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
@@ -84,7 +84,7 @@ fn a_scene_answers_as_each_of_its_instances_alone() {
             }
             let alone = Alone::new(&instances, objects);
             for quality in [Quality::Fast, Quality::High] {
-                let config = Config { quality, ..Config::default() };
+                let config = Config::from(Parameters::Bvh { quality });
                 let built = Built::scene(&instances, objects, &config).unwrap();
                 let scene = built.open(objects).unwrap();
                 let mut random = Random(5);

@@ -1,7 +1,7 @@
 //! Random small meshes whose coordinates are snapped to quarters of a cell, and rays between
 //! snapped points: most rays run along a cell border, an edge or a vertex.
 
-use hgrid_core::{Config, Method, Ray, Strided};
+use hgrid_core::{Config, Method, Parameters, Ray, Strided};
 use hgrid_tests::meshes::Mesh;
 use hgrid_tests::oracle;
 use hgrid_tests::owned::{Owned, prove};
@@ -75,12 +75,12 @@ proptest! {
         let mesh = mesh.scaled(scale);
         let masks: Vec<u32> = (0..).take(mesh.view().triangle_count() as usize).collect();
         let view = mesh.view().with_masks(Strided::new(&masks)).unwrap();
-        let config = Config {
-            density,
-            macrocell_factor: factor,
-            subdivide_above: factor,
-            ..Config::new(method)
+        let parameters = match Parameters::new(method).with_density(density) {
+            Parameters::Fixed { .. } => Parameters::Fixed { density, macrocell_factor: factor },
+            Parameters::Variable { .. } => Parameters::Variable { density, subdivide_above: factor },
+            others => others,
         };
+        let config = Config::from(parameters);
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
         prove(&grid).unwrap();

@@ -2,7 +2,8 @@
 //! and for each of them configurations, rays under options, and points.
 
 use hgrid_core::{
-    ClosestPoint, Config, Cull, Grid, Hit, INVALID_ID, Method, Ray, Strided, TriangleMesh, Verdict,
+    ClosestPoint, Config, Cull, Grid, Hit, INVALID_ID, Method, Parameters, Ray, Strided,
+    TriangleMesh, Verdict,
 };
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::methods::configs;
@@ -253,10 +254,7 @@ pub(crate) fn bytes(cases: &[Case], grid: impl Fn(&Case, &Config) -> Built) -> V
             out.words(&[primitive]);
         }
         for config in configs {
-            let Config { method, density, macrocell_factor, subdivide_above, depth, .. } = *config;
-            let density = density.to_bits();
-            out.words(&[method as u32, density, macrocell_factor, subdivide_above, depth]);
-            out.words(&[0, config.flags.bits(), config.quality as u32]);
+            out.words(&fields(config));
             let Built { blob, counters } = grid(case, config);
             out.count(blob.len());
             counters.iter().for_each(|number| out.0.extend(number.to_ne_bytes()));
@@ -264,6 +262,19 @@ pub(crate) fn bytes(cases: &[Case], grid: impl Fn(&Case, &Config) -> Built) -> V
         }
     }
     out.0
+}
+
+/// The fields of `hgrid_config` from `method` to `quality`, but for `tasks`; those of other methods are 0.
+fn fields(config: &Config) -> [u32; 8] {
+    let (method, density) = (config.method() as u32, config.parameters.density().unwrap_or(0.0));
+    let [factor, above, depth, quality] = match config.parameters {
+        Parameters::Fixed { macrocell_factor, .. } => [macrocell_factor, 0, 0, 0],
+        Parameters::Variable { subdivide_above, .. } => [0, subdivide_above, 0, 0],
+        Parameters::Recursive { depth, .. } => [0, 0, depth, 0],
+        Parameters::Bvh { quality } => [0, 0, 0, quality as u32],
+        _ => [0; 4],
+    };
+    [method, density.to_bits(), factor, above, depth, 0, config.flags.bits(), quality]
 }
 
 /// A grid's bytes, and the work of finding the closest hits and any

@@ -5,7 +5,7 @@ use std::fs;
 use std::process::Command;
 use std::sync::OnceLock;
 
-use hgrid_core::{Config, Method, Quality, Scene, Sizes};
+use hgrid_core::{Config, Method, Parameters, Quality, Scene, Sizes};
 use hgrid_tests::artefact::{Flavour, compiler, compilers, is_cpp, root, run, static_library};
 use tempfile::TempDir;
 
@@ -301,16 +301,22 @@ fn initialisers_are_the_defaults() {
     ] {
         assert_eq!(fact(name), format!("{} {fields}", fact(&format!("hgrid_{name}"))), "{name}");
     }
-    for config in Method::ALL.iter().copied().map(Config::new) {
-        let Config { method, density, macrocell_factor, subdivide_above, depth, .. } = config;
-        let (size, flags) = (fact("hgrid_config"), config.flags.bits());
-        let fields =
-            format!("{size} {density} {macrocell_factor} {subdivide_above} {depth} 0 {flags}");
+    for parameters in Method::ALL.iter().copied().map(Parameters::new) {
+        // Each macro sets what is the paper's for other methods, too.
+        let (mut factor, mut above, mut levels) = (6, 16, 3);
+        match parameters {
+            Parameters::Fixed { macrocell_factor, .. } => factor = macrocell_factor,
+            Parameters::Variable { subdivide_above, .. } => above = subdivide_above,
+            Parameters::Recursive { depth, .. } => levels = depth,
+            _ => {}
+        }
+        let (size, density) = (fact("hgrid_config"), parameters.density().unwrap_or(4.0));
         // One task, and nobody is asked on the way.
-        let fields = format!("{fields} 1 0 0 0 0");
+        let fields = format!("{size} {density} {factor} {above} {levels} 0 0 1 0 0 0 0");
+        let method = parameters.method();
         assert_eq!(fact(&format!("config_{}", method as u32)), fields, "{method:?}");
     }
-    assert_eq!(fact("HGRID_METHOD_BVH"), (Config::default().method as u32).to_string());
+    assert_eq!(fact("HGRID_METHOD_BVH"), (Config::default().method() as u32).to_string());
 }
 
 #[test]
@@ -328,11 +334,11 @@ fn bounds_are_no_less_than_those_of_core() {
             let is_close = *scene <= bound.index_bytes + bound.index_bytes / 16 + 1280;
             assert!(*scene >= bound.index_bytes && (triangles > 1_000_000 || is_close), "{line}");
         }
-        let high = Config { quality: Quality::High, ..tree };
+        let high = Config::from(Parameters::Bvh { quality: Quality::High });
         let configs = [tree, Config::new(Method::OneLevel), high];
         assert_eq!(all.len(), 2 * configs.len());
         for (config, macros) in configs.iter().zip(all.chunks(2)) {
-            let is_too_many = config.method == Method::Bvh && triangles > 1 << 31;
+            let is_too_many = config.method() == Method::Bvh && triangles > 1 << 31;
             let bound = Sizes::bound(triangles, config);
             assert_eq!(bound.is_none(), is_too_many, "{line}");
             let Some(bound) = bound else { continue };

@@ -1,6 +1,8 @@
 //! Work has bounds (docs/bounds.md): counted, not timed, on the worst meshes that are known.
 
-use hgrid_core::{Block, Config, Counters, Grid, Hit, Method, QueryOptions, Ray, Sizes, Verdict};
+use hgrid_core::{
+    Block, Config, Counters, Grid, Hit, Method, Parameters, QueryOptions, Ray, Sizes, Verdict,
+};
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
@@ -85,14 +87,14 @@ fn hold(name: &str, grid: &Grid<'_>, work: &Counters, walks: u64) {
     let steps: u64 = grid.resolution().iter().map(|&cells| u64::from(cells)).sum();
     let words = u64::from(grid.reference_count());
     let Counters { primitive_tests, cell_steps, grid_steps } = *work;
-    let bounds = match grid.method() {
-        Method::OneLevel => [16 * n + 64, steps, 0],
-        Method::Fixed => {
-            let within = 3 * u64::from(grid.config().macrocell_factor);
+    let bounds = match grid.config().parameters {
+        Parameters::OneLevel { .. } => [16 * n + 64, steps, 0],
+        Parameters::Fixed { macrocell_factor, .. } => {
+            let within = 3 * u64::from(macrocell_factor);
             [16 * n + 64, walks * steps + within * grid_steps, u64::MAX]
         }
-        Method::Variable => [words, walks * steps + 765 * grid_steps, steps],
-        Method::Recursive => [words, words, words],
+        Parameters::Variable { .. } => [words, walks * steps + 765 * grid_steps, steps],
+        Parameters::Recursive { .. } => [words, words, words],
         // Nodes, leaves and triangles are met once.
         _ => [n, n, tree_nodes(n)],
     };

@@ -3,7 +3,7 @@
 
 use hgrid_core::{
     BatchField, BuildFlags, Config, ConfigField, Error, IndexType, MAX_COORDINATE, MeshField,
-    Method, Ray, Sizes, Strided, TriangleMesh, sizes,
+    Method, Parameters, Ray, Sizes, Strided, TriangleMesh, sizes,
 };
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::owned::{Owned, prove};
@@ -80,18 +80,18 @@ fn the_largest_coordinate_is_finite() {
 fn densities_outside_the_range_are_refused() {
     let mesh = ball(4, 1.0);
     for density in [0.0, -0.0, -1.0, f32::NAN, f32::INFINITY, 1e30] {
-        let config = Config { density, ..Config::new(Method::OneLevel) };
+        let config = Config::from(Parameters::OneLevel { density });
         let error = Error::InvalidConfig(ConfigField::Density);
         assert_eq!(sizes(&mesh.view(), &config, &mut []), Err(error), "{density}");
         assert_eq!(Owned::build(&mesh.view(), &config).unwrap_err(), error, "{density}");
     }
     for density in [f32::MIN_POSITIVE, 1e-10, 1000.0] {
-        let config = Config { density, ..Config::new(Method::OneLevel) };
+        let config = Config::from(Parameters::OneLevel { density });
         assert!(Owned::build(&mesh.view(), &config).is_ok());
     }
-    // A tree has none, and does not mind.
-    let config = Config { density: f32::NAN, ..Config::new(Method::Bvh) };
-    assert!(Owned::build(&mesh.view(), &config).is_ok());
+    // A tree has none.
+    let tree = Parameters::new(Method::Bvh);
+    assert_eq!((tree.with_density(f32::NAN), tree.density()), (tree, None));
 }
 
 /// What a density asks for that no build takes is still no less than what a lower one asks for.
@@ -100,9 +100,9 @@ fn bounds_grow_with_the_density_however_high() {
     for config in methods::configs() {
         let mut least = 0;
         for density in [1.0, 1e3, 1e10, 1e18, 1e19, 1e30, f32::MAX] {
-            let bound = Sizes::bound(100, &Config { density, ..config });
+            let bound = Sizes::bound(100, &config.parameters.with_density(density).into());
             let Some(Sizes { scratch_bytes, .. }) = bound else { continue };
-            assert!(scratch_bytes >= least, "{:?} {density}", config.method);
+            assert!(scratch_bytes >= least, "{:?} {density}", config.method());
             least = scratch_bytes;
         }
         assert!(least > 0);
@@ -193,7 +193,7 @@ fn recursive_grids_of_every_density_answer_right() {
     let view = mesh.view();
     for depth in 1..=hgrid_core::MAX_DEPTH {
         for density in [1e-3, 1.0, 32.0, 200.0, 5000.0, 1e6, 1e8, 1e12] {
-            let config = Config { density, depth, ..Config::new(hgrid_core::Method::Recursive) };
+            let config = Config::from(Parameters::Recursive { density, depth });
             let answer = sizes(&view, &config, &mut []);
             let is_too_fine = Err(Error::InvalidConfig(ConfigField::Density));
             if answer == is_too_fine || answer.is_ok_and(|need| need.scratch_bytes > 1 << 30) {
@@ -212,24 +212,24 @@ fn recursive_grids_of_every_density_answer_right() {
 #[test]
 fn parameters_outside_their_range_are_refused() {
     let mesh = ball(2, 1.0);
-    for factor in [0, 1] {
-        let config = Config { macrocell_factor: factor, ..Config::new(Method::Fixed) };
+    for macrocell_factor in [0, 1] {
+        let config = Config::from(Parameters::Fixed { density: 32.0, macrocell_factor });
         let error = Error::InvalidConfig(ConfigField::MacrocellFactor);
         assert_eq!(Owned::build(&mesh.view(), &config).unwrap_err(), error);
     }
     for depth in [0, hgrid_core::MAX_DEPTH + 1, u32::MAX] {
-        let config = Config { depth, ..Config::new(Method::Recursive) };
+        let config = Config::from(Parameters::Recursive { density: 8.0, depth });
         let error = Error::InvalidConfig(ConfigField::Depth);
         assert_eq!(Owned::build(&mesh.view(), &config).unwrap_err(), error);
     }
-    for config in [
-        Config { macrocell_factor: u32::MAX, ..Config::new(Method::Fixed) },
-        Config { macrocell_factor: 5000, ..Config::new(Method::Fixed) },
-        Config { subdivide_above: 0, ..Config::new(Method::Variable) },
-        Config { subdivide_above: u32::MAX, ..Config::new(Method::Variable) },
+    for parameters in [
+        Parameters::Fixed { density: 32.0, macrocell_factor: u32::MAX },
+        Parameters::Fixed { density: 32.0, macrocell_factor: 5000 },
+        Parameters::Variable { density: 4.0, subdivide_above: 0 },
+        Parameters::Variable { density: 4.0, subdivide_above: u32::MAX },
     ] {
         let view = mesh.view();
-        let owned = Owned::build(&view, &config).unwrap();
+        let owned = Owned::build(&view, &parameters.into()).unwrap();
         let grid = owned.open(&view).unwrap();
         prove(&grid).unwrap();
         oracle::check(&grid, &Ray::new([0.1, 0.2, 3.0], [0.0, 0.0, -1.0]));

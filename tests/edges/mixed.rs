@@ -1,7 +1,7 @@
 //! Trees of meshes that mix sizes: answers as brute force gives them, bytes in proportion to the triangles,
 //! and no ray that is shown most of the mesh.
 
-use hgrid_core::{Config, Counters, Grid, Method, Quality, QueryOptions, Ray};
+use hgrid_core::{Config, Counters, Grid, Method, Parameters, Quality, QueryOptions, Ray};
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::oracle;
 use hgrid_tests::owned::{Owned, prove};
@@ -12,7 +12,7 @@ use hgrid_tests::random::Random;
 fn agrees(mesh: &Mesh, tests: u64) {
     let view = mesh.view();
     for quality in Quality::ALL.iter().copied() {
-        let owned = Owned::build(&view, &Config { quality, ..Config::new(Method::Bvh) }).unwrap();
+        let owned = Owned::build(&view, &Parameters::Bvh { quality }.into()).unwrap();
         let grid = owned.open(&view).unwrap();
         prove(&grid).unwrap();
         let bytes = owned.bytes().len();

@@ -29,7 +29,7 @@ fn everything_prints_a_line() {
     for config in methods::configs() {
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
-        let (method, bytes) = (config.method, grid.blob_bytes());
+        let (method, bytes) = (config.method(), grid.blob_bytes());
         let expected =
             format!("Grid {{ method: {method:?}, triangles: {triangles}, bytes: {bytes} }}");
         assert_eq!(line(grid), expected);

@@ -1,6 +1,6 @@
 //! Rays that are no rays miss; rays at the limits of what is one are answered as brute force does.
 
-use hgrid_core::{Coherence, Config, Cull, Grid, Hit, Ray, Strided, StridedMut};
+use hgrid_core::{Coherence, Config, Cull, Grid, Hit, Parameters, Ray, Strided, StridedMut};
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
@@ -191,19 +191,19 @@ fn origins_on_vertices_that_many_triangles_share() {
         }
         let closest = |ray: &Ray| oracle::hits_of(&view, ray, Cull::None).first().copied();
         let expected: Vec<Hit> = rays.iter().map(|ray| closest(ray).unwrap_or(Hit::MISS)).collect();
-        for config in methods::configs_with([2.0, 8.0][round % 2]) {
-            for depth in [2, 3] {
-                let owned = Owned::build(&view, &Config { depth, ..config }).unwrap();
-                let grid = owned.open(&view).unwrap();
-                let mut hits = vec![Hit::MISS; rays.len()];
-                let (from, to) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
-                grid.intersect_n(&from, to, Coherence::Coherent).unwrap();
-                for ((ray, expected), in_batch) in rays.iter().zip(&expected).zip(&hits) {
-                    let hit = grid.intersect(ray).unwrap_or(Hit::MISS);
-                    assert_eq!(in_batch, expected, "{:?} {depth} {ray:?}", config.method);
-                    assert_eq!(hit, *expected, "{:?} {depth} {ray:?}", config.method);
-                    ties += usize::from(hit.t == 0.0);
-                }
+        let density = [2.0, 8.0][round % 2];
+        let shallow = Config::from(Parameters::Recursive { density, depth: 2 });
+        for config in methods::configs_with(density).chain([shallow]) {
+            let owned = Owned::build(&view, &config).unwrap();
+            let grid = owned.open(&view).unwrap();
+            let mut hits = vec![Hit::MISS; rays.len()];
+            let (from, to) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
+            grid.intersect_n(&from, to, Coherence::Coherent).unwrap();
+            for ((ray, expected), in_batch) in rays.iter().zip(&expected).zip(&hits) {
+                let hit = grid.intersect(ray).unwrap_or(Hit::MISS);
+                assert_eq!(in_batch, expected, "{config:?} {ray:?}");
+                assert_eq!(hit, *expected, "{config:?} {ray:?}");
+                ties += usize::from(hit.t == 0.0);
             }
         }
     }

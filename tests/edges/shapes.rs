@@ -1,6 +1,6 @@
 //! Meshes of odd shapes answer as brute force does and stay within the memory they were promised.
 
-use hgrid_core::{Config, Grid, Method, Ray, Sizes};
+use hgrid_core::{Config, Grid, Parameters, Ray, Sizes};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
@@ -182,20 +182,19 @@ fn a_mesh_of_spanning_triangles_lowers_the_density() {
     let mesh = soup(300, 2.0, 23);
     let view = mesh.view();
     let depths = 1..=hgrid_core::MAX_DEPTH;
-    for (config, depth) in
-        methods::configs_with(64.0).flat_map(|c| depths.clone().map(move |d| (c, d)))
-    {
-        if depth > 1 && config.method != Method::Recursive {
-            // Others have no depth.
-            continue;
-        }
-        let owned = Owned::build(&view, &Config { depth, ..config }).unwrap();
+    let recursive = depths.map(|depth| Parameters::Recursive { density: 64.0, depth }.into());
+    for config in methods::configs_with(64.0).chain(recursive) {
+        let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
         prove(&grid).unwrap();
-        let ratio = 64.0 / grid.density();
-        assert!(ratio.log2().fract() == 0.0, "halved, again and again: {ratio}");
-        // A deep recursive grid has few cells at the root, whatever the triangles.
-        assert!(ratio > 1.0 || depth > 1, "{config:?}");
+        if let Some(density) = grid.config().parameters.density() {
+            let ratio = 64.0 / density;
+            assert!(ratio.log2().fract() == 0.0, "halved, again and again: {ratio}");
+            // A deep recursive grid has few cells at the root, whatever the triangles.
+            let is_deep =
+                matches!(config.parameters, Parameters::Recursive { depth, .. } if depth > 1);
+            assert!(ratio > 1.0 || is_deep, "{config:?}");
+        }
         let rebuilt = Owned::build(&view, &grid.config()).unwrap();
         assert_eq!(rebuilt.bytes(), owned.bytes(), "{config:?}");
         let mut random = Random(71);

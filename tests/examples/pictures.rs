@@ -68,17 +68,15 @@ fn every_method_draws_the_same_picture() {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices).expect("a sound mesh");
     let (picture, _) = expected(&scene);
     for config in Method::ALL.iter().copied().map(Config::new) {
-        let name = config.method.name();
+        let name = config.method().name();
         let mut raytracer = raytracer();
         raytracer.args(["--size", &SIZE.to_string(), "--method", name, "-o"]).arg(&path);
         let printed = String::from_utf8(run(&mut raytracer).stdout).expect("text");
         assert!(fs::read(&path).expect("the picture") == picture, "{name}");
 
         let owned = Owned::build(&mesh, &config).expect("a sound mesh");
-        let cells = match config.method {
-            Method::Bvh => String::new(),
-            _ => format!("density        {}\n", config.density),
-        };
+        let density = config.parameters.density();
+        let cells = density.map_or(String::new(), |density| format!("density        {density}\n"));
         let bytes = format!("index bytes    {}\n", owned.bytes().len());
         for line in [format!("method         {name}\n"), cells, bytes] {
             assert!(printed.contains(&line), "{line} is missing in {printed}");

@@ -9,7 +9,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use hgrid_core::{Config, Counters, Method, Quality, QueryOptions, Statistics};
+use hgrid_core::{Config, Counters, Method, Parameters, Quality, QueryOptions, Statistics};
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_lab::scene::Scene;
 use hgrid_tests::copy::hash;
@@ -43,9 +43,9 @@ fn line(name: &str, mesh: &Mesh, config: &Config) -> String {
     let Statistics { longest_list, content_hash, .. } = grid.inspect();
     let [x, y, z] = grid.resolution();
     let resolution = format!("{x}x{y}x{z}");
-    let method = match config.quality {
-        Quality::High => "bvh-high",
-        _ => config.method.name(),
+    let method = match config.parameters {
+        Parameters::Bvh { quality: Quality::High } => "bvh-high",
+        others => others.method().name(),
     };
     format!(
         "{name:8} {method:10} {resolution:>9} {:>8} {hits:>5} {primitive_tests:>7} {cell_steps:>7} {grid_steps:>6} {longest_list:>7} {content_hash:016x} {:016x}",
@@ -70,7 +70,7 @@ fn work_is_what_it_was() {
         "scene    method     resolution    bytes  hits   tests   steps  grids longest content          words\n",
     );
     for (name, mesh) in &scenes {
-        let high = Config { quality: Quality::High, ..Config::new(Method::Bvh) };
+        let high = Config::from(Parameters::Bvh { quality: Quality::High });
         for config in Method::ALL.iter().map(|&method| Config::new(method)).chain([high]) {
             writeln!(table, "{}", line(name, mesh, &config)).unwrap();
         }

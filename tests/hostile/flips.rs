@@ -57,7 +57,7 @@ fn flip_all(seed: &Seed, rays: usize, step: usize) -> Ends {
     let mut copy = Copy::of(&seed.blob);
     let mut ended = Ends::default();
     for (at, bit) in (0..8 * seed.blob.len()).step_by(step).map(|bit| (bit / 8, bit % 8)) {
-        let what = format!("{:?}: bit {bit} of byte {at}", seed.config.method);
+        let what = format!("{:?}: bit {bit} of byte {at}", seed.config.method());
         copy.set(at, &[seed.blob[at] ^ 1 << bit]);
         if at < CHECKSUM + 4 {
             let error = Grid::open(copy.bytes(), view).map(|_| ()).unwrap_err();
@@ -107,7 +107,7 @@ fn flip_all(seed: &Seed, rays: usize, step: usize) -> Ends {
 }
 
 fn flip(method: Method, step: usize) {
-    let is_one = |seed: &&Seed| seed.config.method == method && seed.blob.len() < 6500;
+    let is_one = |seed: &&Seed| seed.config.method() == method && seed.blob.len() < 6500;
     assert!(seeds().filter(is_one).count() > 1);
     for seed in seeds().filter(is_one) {
         // The smallest always in full.

@@ -16,7 +16,7 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
         assert_eq!(fit(&view, &config, whole, scratch).unwrap().0, config);
         assert_eq!(fit(&view, &config, usize::MAX, scratch).unwrap().0, config);
 
-        let has_dial = config.method.has_density();
+        let has_dial = config.parameters.density().is_some();
         let mut last = whole;
         for budget in [whole - 1, whole * 9 / 10, whole * 3 / 4] {
             let (fitted, needed) = match fit(&view, &config, budget, scratch) {
@@ -53,15 +53,15 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
         assert!(is_told, "{config:?}: {error}");
     }
     // Too fine to be built at all is too large, not wrong.
-    for config in configs().filter(|config| config.method != Method::Bvh) {
-        let finer = Config { density: 1e9, ..config };
+    for config in configs().filter(|config| config.method() != Method::Bvh) {
+        let finer = Config::from(config.parameters.with_density(1e9));
         let enough = sizes(&view, &config, &mut []).unwrap();
         let mut scratch = vec![Block::ZERO; 2 * Block::count_for(enough.scratch_bytes)];
         let scratch = Block::bytes_mut(&mut scratch);
         let budget = 12 * mesh.indices.len();
         let (fitted, needed) = fit(&view, &finer, budget, scratch).unwrap();
         assert!(needed.index_bytes <= budget, "{config:?}");
-        assert!(fitted.density < finer.density, "{fitted:?}");
+        assert!(fitted.parameters.density() < Some(1e9), "{fitted:?}");
     }
     let nothing = Mesh::default();
     for config in configs() {
@@ -70,7 +70,7 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
         let scratch = Block::bytes_mut(&mut scratch);
         assert_eq!(fit(&nothing.view(), &config, 1 << 24, scratch).unwrap().0, config);
         let without = fit(&mesh.view(), &config, usize::MAX, &mut []);
-        let needs_scratch = !matches!(config.method, Method::OneLevel | Method::Fixed);
+        let needs_scratch = !matches!(config.method(), Method::OneLevel | Method::Fixed);
         let is_asked_for =
             matches!(without, Err(Error::OutOfMemory { region: Region::Scratch, .. }));
         assert_eq!(is_asked_for, needs_scratch, "{config:?}: {without:?}");

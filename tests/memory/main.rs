@@ -6,7 +6,7 @@ mod owned;
 mod scenes;
 mod trees;
 
-use hgrid_core::{Config, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes};
+use hgrid_core::{Config, Error, Grid, Method, Parameters, Region, Sizes, TriangleMesh, sizes};
 use hgrid_tests::guarded::Guarded;
 use hgrid_tests::joined::{Parts, merged};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
@@ -20,7 +20,7 @@ fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
     let scratch_bytes = sizes(mesh, config, &mut []).unwrap().scratch_bytes;
     // Methods with a pool fill it as they go, and the variable one needs less scratch than it asks
     // for.
-    let is_planned = !matches!(config.method, Method::Variable | Method::Recursive);
+    let is_planned = !matches!(config.method(), Method::Variable | Method::Recursive);
 
     for bytes in (0..exact + 200).step_by(step).chain([exact - 1, exact, exact + 1]) {
         let (mut index, mut scratch) = (Guarded::new(bytes), Guarded::new(scratch_bytes));
@@ -51,7 +51,7 @@ fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
             assert!(bytes < scratch_bytes);
             assert!(index.is_untouched(), "written before it was known to fit");
         } else {
-            assert!(config.method == Method::Variable || bytes >= scratch_bytes);
+            assert!(config.method() == Method::Variable || bytes >= scratch_bytes);
             assert_eq!(answer.index_bytes, exact);
         }
         assert!(index.around_is_intact() && scratch.around_is_intact(), "{bytes} bytes");
@@ -61,14 +61,14 @@ fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
 #[test]
 fn every_size_from_nothing_to_enough() {
     for config in methods::configs() {
-        let every_size = match config.method {
+        let every_size = match config.method() {
             Method::Bvh => trees::every_size,
             _ => every_size,
         };
         every_size(&Mesh::default().view(), &config, 1);
         every_size(&one_triangle().view(), &config, 1);
         every_size(&ball(2, 1.0).view(), &config, 1);
-        every_size(&soup(60, 0.3, 1).view(), &Config { density: 20.0, ..config }, 1);
+        every_size(&soup(60, 0.3, 1).view(), &config.parameters.with_density(20.0).into(), 1);
         every_size(&soup(3000, 0.05, 1).view(), &config, 1003);
     }
 }
@@ -81,7 +81,7 @@ fn every_size_for_joined_meshes() {
     let mut parts = stored.parts();
     let mesh = TriangleMesh::join(&mut parts).unwrap();
     for config in methods::configs() {
-        let every_size = match config.method {
+        let every_size = match config.method() {
             Method::Bvh => trees::every_size,
             _ => every_size,
         };
@@ -130,7 +130,7 @@ fn the_bound_is_one() {
         }
     }
     for density in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert_eq!(Sizes::bound(1, &Config { density, ..Config::new(Method::OneLevel) }), None);
+        assert_eq!(Sizes::bound(1, &Parameters::OneLevel { density }.into()), None);
     }
 }
 

@@ -129,14 +129,14 @@ fn a_grid_keeps_what_it_takes_and_nothing_is_written_but_by_the_build() {
         HEAP.set(Heap { peak: before.current, written: 0, ..before });
         let grid = OwnedGrid::build(input, &config).unwrap();
         let after = HEAP.get();
-        assert_eq!(grid.grid().blob(), plain.bytes(), "{:?}", config.method);
+        assert_eq!(grid.grid().blob(), plain.bytes(), "{:?}", config.method());
         let kept = after.current.wrapping_sub(before.current);
         let exact = plain.bytes().len();
-        assert!((exact..exact + LITTLE).contains(&kept), "{:?} {kept} {exact}", config.method);
-        assert!(after.written < LITTLE, "{:?} {}", config.method, after.written);
+        assert!((exact..exact + LITTLE).contains(&kept), "{:?} {kept} {exact}", config.method());
+        assert!(after.written < LITTLE, "{:?} {}", config.method(), after.written);
         let most = after.peak.wrapping_sub(before.current);
-        let index = if config.method == Method::Bvh { bound.index_bytes } else { exact };
-        assert!(most <= index + bound.scratch_bytes + 2 * LITTLE, "{:?} {most}", config.method);
+        let index = if config.method() == Method::Bvh { bound.index_bytes } else { exact };
+        assert!(most <= index + bound.scratch_bytes + 2 * LITTLE, "{:?} {most}", config.method());
         check(&grid.grid());
         drop(grid);
         let left = HEAP.get().current.wrapping_sub(before.current).cast_signed();
@@ -162,13 +162,13 @@ fn without_memory_there_is_an_error() {
                 }
                 Err(Error::OutOfMemory { available_bytes: 0, needed_bytes, region }) => {
                     let expected = [Region::Scratch, Region::Index][refused];
-                    assert!(region == expected && needed_bytes > 1000, "{:?}", config.method);
+                    assert!(region == expected && needed_bytes > 1000, "{:?}", config.method());
                 }
                 Err(error) => panic!("{error}"),
             }
             refused += 1;
         }
-        assert_eq!(refused, 2, "{:?}", config.method);
+        assert_eq!(refused, 2, "{:?}", config.method());
     }
 }
 
@@ -187,7 +187,7 @@ fn it_fits_into_a_struct_and_moves_with_it() {
         let input = OwnedMesh::new(Arc::clone(&shared), mesh.indices.clone()).unwrap();
         assert_eq!(input.view().positions().bytes.as_ptr(), shared.as_ptr().cast(), "copied");
         let grid = OwnedGrid::build(input, &config).unwrap();
-        holders.push(Holder { grid, _name: format!("{:?}", config.method) });
+        holders.push(Holder { grid, _name: format!("{:?}", config.method()) });
     }
     assert_eq!(Arc::strong_count(&shared), 1 + holders.len());
     let holders = Arc::new(std::sync::RwLock::new(holders));

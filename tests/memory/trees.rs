@@ -3,7 +3,7 @@
 use std::thread;
 
 use hgrid_core::{
-    Config, Control, Error, Grid, Method, Quality, Region, Sizes, Task, TriangleMesh, sizes,
+    Config, Control, Error, Grid, Parameters, Quality, Region, Sizes, Task, TriangleMesh, sizes,
 };
 use hgrid_tests::copy::word;
 use hgrid_tests::guarded::Guarded;
@@ -15,7 +15,7 @@ const NODE_COUNT: usize = 112;
 const LEVELS: usize = 116;
 
 fn config(quality: Quality) -> Config {
-    Config { quality, ..Config::new(Method::Bvh) }
+    Parameters::Bvh { quality }.into()
 }
 
 /// Builds with every size of one region, from 0 to a little more than enough, the other ample.

@@ -45,7 +45,7 @@ use crate::aabb::Aabb;
 use crate::arena::{Sizes, section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
-use crate::config::Config;
+use crate::config::{BuildFlags, Parameters};
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
@@ -54,13 +54,13 @@ use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
 use crate::tasks::{Shared, run, task_count};
 
 /// The memory that any mesh with so many triangles and a build with so many tasks needs.
-pub(crate) const fn bound(triangles: u32, config: &Config, tasks: u32) -> Option<(u64, u64)> {
-    if triangles > MOST_TRIANGLES { None } else { Some(bytes(triangles, config, tasks)) }
+pub(crate) const fn bound(triangles: u32, quality: Quality, tasks: u32) -> Option<(u64, u64)> {
+    if triangles > MOST_TRIANGLES { None } else { Some(bytes(triangles, quality, tasks)) }
 }
 
 /// Bytes of index and scratch that are enough.
-pub(super) const fn bytes(triangles: u32, config: &Config, tasks: u32) -> (u64, u64) {
-    match config.quality {
+pub(super) const fn bytes(triangles: u32, quality: Quality, tasks: u32) -> (u64, u64) {
+    match quality {
         Quality::Fast => fast_bound(triangles, tasks),
         Quality::High => high::bound(triangles),
     }
@@ -75,16 +75,17 @@ const fn fast_bound(triangles: u32, tasks: u32) -> (u64, u64) {
 /// The memory that a mesh needs: exact for one task if the scratch is large enough for any mesh.
 pub(crate) fn sizes(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    quality: Quality,
+    flags: BuildFlags,
     scratch: &mut [u8],
     control: &Control<'_>,
 ) -> Result<Sizes, Error> {
     check_count(mesh)?;
     let (index, needed) =
-        bytes(mesh.triangle_count(), config, control.tasks.clamp(1, Control::MAX_TASKS));
+        bytes(mesh.triangle_count(), quality, control.tasks.clamp(1, Control::MAX_TASKS));
     if control.tasks <= 1 && scratch.len() as u64 >= needed {
         let watch = &Watch::none();
-        let header = header_of::<1>(mesh, config, None, scratch, &Control::SERIAL, watch)?;
+        let header = header_of::<1>(mesh, quality, flags, None, scratch, &Control::SERIAL, watch)?;
         return Sizes::new(header.blob_bytes, needed, true);
     }
     Sizes::new(index, needed, false)
@@ -97,7 +98,8 @@ fn check_count(mesh: &TriangleMesh<'_>) -> Result<(), Error> {
 /// Builds into `index` and returns the part of it that is the blob.
 pub(crate) fn build<'a>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    quality: Quality,
+    flags: BuildFlags,
     index: &'a mut [u8],
     scratch: &mut [u8],
     control: &Control<'_>,
@@ -107,9 +109,9 @@ pub(crate) fn build<'a>(
     // Room on the stack for as many tasks as there may be, or for one: a microcontroller has one core.
     let header = if control.tasks > 1 && !IS_SMALL {
         const MOST: usize = Control::MAX_TASKS as usize;
-        header_of::<MOST>(mesh, config, Some(&mut *index), scratch, control, watch)
+        header_of::<MOST>(mesh, quality, flags, Some(&mut *index), scratch, control, watch)
     } else {
-        header_of::<1>(mesh, config, Some(&mut *index), scratch, control, watch)
+        header_of::<1>(mesh, quality, flags, Some(&mut *index), scratch, control, watch)
     }?;
     let available_bytes = index.len() as u64;
     let needed_bytes = header.blob_bytes;
@@ -125,15 +127,16 @@ pub(crate) fn build<'a>(
 /// Builds all but the header by the method that the quality names.
 fn header_of<const N: usize>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    quality: Quality,
+    flags: BuildFlags,
     index: Option<&mut [u8]>,
     scratch: &mut [u8],
     control: &Control<'_>,
     watch: &Watch<'_>,
 ) -> Result<Header, Error> {
-    match config.quality {
-        Quality::Fast => build_in::<N>(mesh, config, index, scratch, control, watch),
-        Quality::High => high::build_in::<N>(mesh, config, index, scratch, control, watch),
+    match quality {
+        Quality::Fast => build_in::<N>(mesh, flags, index, scratch, control, watch),
+        Quality::High => high::build_in::<N>(mesh, flags, index, scratch, control, watch),
     }
 }
 
@@ -147,7 +150,7 @@ const TOP: f32 = 0.8;
 #[inline(never)]
 fn build_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    flags: BuildFlags,
     mut index: Option<&mut [u8]>,
     scratch: &mut [u8],
     control: &Control<'_>,
@@ -213,7 +216,7 @@ fn build_in<const N: usize>(
 
     // Find the box, then every triangle's key.
     watch.at(CENSUS)?;
-    let census = find_keys::<N>(mesh, config, keys, &mut counts, bits, control)?;
+    let census = find_keys::<N>(mesh, flags, keys, &mut counts, bits, control)?;
     let Census { finite, skipped, bounds } = census;
 
     // Give each bin its place, and each task its place in it.
@@ -256,7 +259,7 @@ fn build_in<const N: usize>(
         }
     }
     let lattice = Lattice::new(scene, [1; 3]);
-    let mut header = Header::new(config, mesh, &lattice);
+    let mut header = Header::new(Parameters::Bvh { quality: Quality::Fast }, mesh, &lattice);
     header.skipped_count = skipped;
     header.reference_count = finite;
     header.node_count = node_count;
@@ -277,7 +280,7 @@ pub(crate) fn least_node(scene: &Aabb) -> f32 {
 /// Finds the key of every triangle, and counts the triangles of each bin.
 fn find_keys<const N: usize>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    flags: BuildFlags,
     keys: &mut [u32],
     counts: &mut [Option<&mut [u32]>; N],
     bits: u32,
@@ -286,14 +289,14 @@ fn find_keys<const N: usize>(
     let tasks = counts.iter().flatten().count();
     let vertices = vertex_bounds::<N>(mesh, tasks, control)?;
     let rule = Keys::new(&vertices);
-    let census = count::<N>(mesh, config.flags, &rule, keys, counts, bits, control)?;
+    let census = count::<N>(mesh, flags, &rule, keys, counts, bits, control)?;
     if census.bounds == vertices || census.finite == 0 {
         return Ok(census);
     }
     // Vertices that no triangle has would coarsen the keys: take them from the box of the triangles.
     counts.iter_mut().flatten().for_each(|counts| counts.fill(0));
     let rule = Keys::new(&census.bounds);
-    count::<N>(mesh, config.flags, &rule, keys, counts, bits, control)
+    count::<N>(mesh, flags, &rule, keys, counts, bits, control)
 }
 
 /// The box of all vertices, used or not.

@@ -42,7 +42,6 @@ mod walk;
 
 use crate::arena::split;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
-use crate::config::Config;
 use crate::error::Error;
 use crate::visit::Visitor;
 pub(crate) use batch::{Groups, Together};
@@ -57,9 +56,9 @@ pub(crate) use validate::proof_bytes;
 /// seven triangles each ([`subtree`]).
 pub(crate) const LEVELS: u32 = 64;
 
-/// The scratch that a build takes.
-pub(crate) const fn scratch_bytes(triangles: u32, config: &Config) -> u64 {
-    build::bytes(triangles, config, 1).1
+/// The scratch that the build of a tree with this header takes.
+pub(crate) fn scratch_bytes(header: &Header) -> u64 {
+    build::bytes(header.triangle_count, header.quality(), 1).1
 }
 
 /// A view of a built tree.

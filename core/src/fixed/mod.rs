@@ -18,7 +18,7 @@ use crate::aabb::Aabb;
 use crate::arena::Sizes;
 use crate::blob::{Header, corrupt};
 use crate::cell::{Lattice, as_f32};
-use crate::config::Config;
+use crate::config::{BuildFlags, Parameters};
 use crate::control::Watch;
 use crate::counters::Tally;
 use crate::dda::{Line, NEVER, Step};
@@ -35,13 +35,6 @@ struct Macrocells {
     factor: u32,
 }
 
-impl Macrocells {
-    /// Those that a configuration asks for.
-    const fn of(config: &Config) -> Self {
-        Self { factor: config.macrocell_factor }
-    }
-}
-
 impl Overlay for Macrocells {
     fn words(&self, resolution: [u32; 3]) -> u64 {
         Levels::new(resolution, self.factor).words()
@@ -49,6 +42,10 @@ impl Overlay for Macrocells {
 
     fn fill(&self, resolution: [u32; 3], domain_bits: &[u64], words: &mut [u64]) {
         Levels::new(resolution, self.factor).fill(resolution, domain_bits, words);
+    }
+
+    fn parameters(&self, density: f32) -> Parameters {
+        Parameters::Fixed { density, macrocell_factor: self.factor }
     }
 }
 
@@ -58,31 +55,35 @@ impl Overlay for Macrocells {
     clippy::cast_sign_loss,
     reason = "MAX_RESOLUTION at most"
 )]
-pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
+pub(crate) const fn bound(triangles: u32, density: f32, factor: u32) -> (u64, u64) {
     // A box with the most cells on every axis has the most macrocells on every level.
-    let longest = one_level::longest(triangles, config.density) as u32 + 1;
-    let levels = Levels::new([longest; 3], config.macrocell_factor);
-    one_level::bound_under(triangles, config.density, levels.words())
+    let longest = one_level::longest(triangles, density) as u32 + 1;
+    let levels = Levels::new([longest; 3], factor);
+    one_level::bound_under(triangles, density, levels.words())
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to plan in.
 pub(crate) fn sizes(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    factor: u32,
+    flags: BuildFlags,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    one_level::sizes_under(mesh, config, &Macrocells::of(config), scratch)
+    one_level::sizes_under(mesh, density, flags, &Macrocells { factor }, scratch)
 }
 
 /// Builds in memory of which [`sizes`] tells how much there must be.
 pub(crate) fn build<'a>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    factor: u32,
+    flags: BuildFlags,
     index: &'a mut [u8],
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    one_level::build_under(mesh, config, &Macrocells::of(config), index, scratch, watch)
+    one_level::build_under(mesh, density, flags, &Macrocells { factor }, index, scratch, watch)
 }
 
 /// A view of a built fixed grid.

@@ -23,7 +23,7 @@ use super::triangles::MeshSpread;
 use crate::arena::copy;
 use crate::blob::Header;
 use crate::cell::{Lattice, woo};
-use crate::config::Config;
+use crate::config::{BuildFlags, Parameters};
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
@@ -36,6 +36,9 @@ pub(crate) trait Overlay {
 
     /// Writes the words.
     fn fill(&self, resolution: [u32; 3], domain_bits: &[u64], words: &mut [u64]);
+
+    /// The parameters that build both, with this density.
+    fn parameters(&self, density: f32) -> Parameters;
 }
 
 /// Nothing.
@@ -45,6 +48,10 @@ impl Overlay for () {
     }
 
     fn fill(&self, _: [u32; 3], _: &[u64], _: &mut [u64]) {}
+
+    fn parameters(&self, density: f32) -> Parameters {
+        Parameters::OneLevel { density }
+    }
 }
 
 /// The rows of cells, once they are marked and displaced.
@@ -71,17 +78,17 @@ impl<'s> Plan<'s> {
     /// Plans as far as the scratch allows; without any, passes over the mesh give a bound.
     pub(crate) fn new(
         mesh: &TriangleMesh<'_>,
-        config: &Config,
+        mut density: f32,
+        flags: BuildFlags,
         overlay: &impl Overlay,
         scratch: &'s mut [u8],
         watch: &Watch<'_>,
     ) -> Result<Self, Error> {
-        let survey = Survey::of(mesh, config.flags, watch)?;
+        let survey = Survey::of(mesh, flags, watch)?;
         let bounds = Lattice::pad(&survey.bounds);
         let limit = reference_limit(mesh.triangle_count());
 
         // Settle the density: mark the cells, or only count where there is no room to mark.
-        let mut density = config.density;
         let (lattice, reference_count) = loop {
             let resolution = woo(bounds.size(), f64::from(density), survey.finite_count)
                 .ok_or(Error::InvalidConfig(ConfigField::Density))?;
@@ -116,11 +123,10 @@ impl<'s> Plan<'s> {
     }
 
     /// The header of the grid, with the sizes of its layout.
-    pub(crate) fn header(&self, config: &Config, mesh: &TriangleMesh<'_>) -> Header {
-        let mut header = Header::new(config, mesh, &self.lattice);
+    pub(crate) fn header(&self, parameters: Parameters, mesh: &TriangleMesh<'_>) -> Header {
+        let mut header = Header::new(parameters, mesh, &self.lattice);
         header.blob_bytes = self.layout.index_bytes();
         header.skipped_count = self.survey.skipped_count;
-        header.density = self.density;
         header.hash_count = self.layout.hash_count;
         header.reference_count = self.layout.reference_count;
         header
@@ -135,14 +141,15 @@ impl<'s> Plan<'s> {
 /// Builds into `index` and returns the part of it that is the blob.
 pub(crate) fn build_under<'a>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    flags: BuildFlags,
     overlay: &impl Overlay,
     index: &'a mut [u8],
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
     let scratch_bytes = scratch.len() as u64;
-    let plan = Plan::new(mesh, config, overlay, scratch, watch)?;
+    let plan = Plan::new(mesh, density, flags, overlay, scratch, watch)?;
     let Some(rows) = &plan.rows else {
         return Err(Error::OutOfMemory {
             region: Region::Scratch,
@@ -164,6 +171,6 @@ pub(crate) fn build_under<'a>(
     let spread = MeshSpread::new(mesh, &plan.lattice);
     fill(&spread, sections.row_offsets, sections.hash, sections.references, watch)?;
     overlay.fill(plan.lattice.resolution, sections.domain_bits, sections.overlay);
-    *sections.header = plan.header(config, mesh).to_bytes();
+    *sections.header = plan.header(overlay.parameters(plan.density), mesh).to_bytes();
     Ok(blob)
 }

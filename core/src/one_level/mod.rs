@@ -27,7 +27,7 @@ use crate::arena::Sizes;
 use crate::bits::{each_one, is_set};
 use crate::blob::{Header, corrupt};
 use crate::cell::{Lattice, cells_between, row};
-use crate::config::Config;
+use crate::config::BuildFlags;
 use crate::control::Watch;
 use crate::counters::Tally;
 use crate::dda::{Line, NEVER, Step};
@@ -57,8 +57,8 @@ pub(crate) fn slot(row_offset: i32, x: u32) -> Option<usize> {
 }
 
 /// The most memory that a mesh with so many triangles can need.
-pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
-    bound_under(triangles, config.density, 0)
+pub(crate) const fn bound(triangles: u32, density: f32) -> (u64, u64) {
+    bound_under(triangles, density, 0)
 }
 
 /// The same with so many words of another structure on top.
@@ -67,40 +67,43 @@ pub(crate) const fn bound_under(triangles: u32, density: f32, words: u64) -> (u6
     (layout.index_bytes(), layout.scratch_bytes())
 }
 
-/// The scratch that a build with this resolution takes.
-pub(crate) const fn scratch_bytes(_: u32, _: &Config, resolution: [u32; 3]) -> u64 {
-    Layout::new(resolution, 0, 0, 0).scratch_bytes()
+/// The scratch that the build of a grid with this header takes.
+pub(crate) const fn scratch_bytes(header: &Header) -> u64 {
+    Layout::new(header.resolution, 0, 0, 0).scratch_bytes()
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to plan in.
 pub(crate) fn sizes(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    flags: BuildFlags,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    sizes_under(mesh, config, &(), scratch)
+    sizes_under(mesh, density, flags, &(), scratch)
 }
 
 /// The same with another structure on top.
 pub(crate) fn sizes_under(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    flags: BuildFlags,
     overlay: &impl Overlay,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    let plan = Plan::new(mesh, config, overlay, scratch, &Watch::none())?;
+    let plan = Plan::new(mesh, density, flags, overlay, scratch, &Watch::none())?;
     Sizes::new(plan.layout.index_bytes(), plan.layout.scratch_bytes(), plan.is_exact())
 }
 
 /// Builds in memory of which [`sizes`] tells how much there must be.
 pub(crate) fn build<'a>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    flags: BuildFlags,
     index: &'a mut [u8],
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    build_under(mesh, config, &(), index, scratch, watch)
+    build_under(mesh, density, flags, &(), index, scratch, watch)
 }
 
 impl<'a> OneLevel<'a> {

@@ -26,7 +26,7 @@ use crate::arena::{Sizes, copy, section_bytes, split_mut};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::bump::{Bump, GRID, finish};
 use crate::cell::{CellRange, Lattice, as_f32, row, whole};
-use crate::config::Config;
+use crate::config::{BuildFlags, Parameters};
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::limits::MAX_RESOLUTION_OF_RECURSIVE;
@@ -55,16 +55,14 @@ const fn scratch_words(primitives: u32, density: f32) -> u64 {
 
 /// Bytes of scratch for so many triangles, whatever they look like: their ids, and one grid on each
 /// level.
-pub(crate) const fn scratch_bytes(triangles: u32, config: &Config, _: [u32; 3]) -> u64 {
-    most_scratch(triangles, config)
+const fn most_scratch(triangles: u32, density: f32, depth: u32) -> u64 {
+    let level = scratch_words(triangles, density);
+    section_bytes::<u32>((triangles as u64).saturating_add(level.saturating_mul(depth as u64)))
 }
 
-/// The same, of which no resolution tells more.
-const fn most_scratch(triangles: u32, config: &Config) -> u64 {
-    let level = scratch_words(triangles, config.density);
-    section_bytes::<u32>(
-        (triangles as u64).saturating_add(level.saturating_mul(config.depth as u64)),
-    )
+/// The scratch that the build of a grid with this header takes.
+pub(crate) const fn scratch_bytes(header: &Header) -> u64 {
+    most_scratch(header.triangle_count, header.density, header.depth)
 }
 
 /// The most memory that a mesh with so many triangles can need, or all that a pool can address.
@@ -78,44 +76,49 @@ const fn most_scratch(triangles: u32, config: &Config) -> u64 {
     clippy::cast_precision_loss,
     reason = "a bound, rounded up; no more than 2^31"
 )]
-pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
+pub(crate) const fn bound(triangles: u32, density: f32, depth: u32) -> (u64, u64) {
     let mut references = triangles as f64 + 5.0;
     let mut words = 0.0;
-    let mut depth = 0;
-    while depth < config.depth {
-        words += (3.5 * config.density as f64 + 44.0) * references;
+    let mut level = 0;
+    while level < depth {
+        words += (3.5 * density as f64 + 44.0) * references;
         references *= 29.0;
-        depth += 1;
+        level += 1;
     }
-    let most = scratch_words(triangles, config.density).saturating_add(2 * looks(triangles));
+    let most = scratch_words(triangles, density).saturating_add(2 * looks(triangles));
     let most = if most < GRID as u64 { most } else { GRID as u64 };
     let words = if words < most as f64 { words as u64 } else { most };
-    (HEADER_BYTES as u64 + section_bytes::<u32>(words), most_scratch(triangles, config))
+    (HEADER_BYTES as u64 + section_bytes::<u32>(words), most_scratch(triangles, density, depth))
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to build in.
 pub(crate) fn sizes(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    depth: u32,
+    flags: BuildFlags,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    let (index_bytes, scratch_bytes) = bound(mesh.triangle_count(), config);
+    let (index_bytes, scratch_bytes) = bound(mesh.triangle_count(), density, depth);
     if (scratch.len() as u64) < scratch_bytes {
-        Root::of(mesh, config, &Watch::none())?;
+        Root::of(mesh, density, depth, flags, &Watch::none())?;
         return Sizes::new(index_bytes, scratch_bytes, false);
     }
-    Sizes::new(run(mesh, config, &mut [], scratch, &Watch::none())?.blob_bytes, scratch_bytes, true)
+    let header = run(mesh, density, depth, flags, &mut [], scratch, &Watch::none())?;
+    Sizes::new(header.blob_bytes, scratch_bytes, true)
 }
 
 /// Builds into `index` and returns the part of it that is the blob.
 pub(crate) fn build<'a>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    depth: u32,
+    flags: BuildFlags,
     index: &'a mut [u8],
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    let header = run(mesh, config, index, scratch, watch)?;
+    let header = run(mesh, density, depth, flags, index, scratch, watch)?;
     finish(index, header)
 }
 
@@ -129,14 +132,19 @@ struct Root {
 }
 
 impl Root {
-    fn of(mesh: &TriangleMesh<'_>, config: &Config, watch: &Watch<'_>) -> Result<Self, Error> {
-        let survey = Survey::of(mesh, config.flags, watch)?;
+    fn of(
+        mesh: &TriangleMesh<'_>,
+        mut density: f32,
+        depth: u32,
+        flags: BuildFlags,
+        watch: &Watch<'_>,
+    ) -> Result<Self, Error> {
+        let survey = Survey::of(mesh, flags, watch)?;
         let bounds = Lattice::pad(&survey.bounds);
         let size = bounds.size().to_array().map(f64::from);
         let limit = u64::from(reference_limit(mesh.triangle_count()));
-        let mut density = config.density;
         loop {
-            let rule = Rule { density: f64::from(density), depth: config.depth };
+            let rule = Rule { density: f64::from(density), depth };
             let resolution = rule.resolution(size, survey.finite_count, 0).ok_or(TOO_FINE)?;
             let lattice = Lattice::new(bounds, resolution);
             if references(mesh, &lattice, limit) <= limit {
@@ -165,14 +173,16 @@ fn references(mesh: &TriangleMesh<'_>, lattice: &Lattice, limit: u64) -> u64 {
 /// Builds as much as the index holds; the header says what all of it takes.
 fn run(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    depth: u32,
+    flags: BuildFlags,
     index: &mut [u8],
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<Header, Error> {
-    let Root { survey, lattice, density, rule } = Root::of(mesh, config, watch)?;
     let available_bytes = scratch.len() as u64;
-    let needed_bytes = most_scratch(mesh.triangle_count(), config);
+    let needed_bytes = most_scratch(mesh.triangle_count(), density, depth);
+    let Root { survey, lattice, density, rule } = Root::of(mesh, density, depth, flags, watch)?;
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
     if available_bytes < needed_bytes {
         return Err(too_small);
@@ -194,10 +204,9 @@ fn run(
     builder.grid(ids, &root, 0, &mut looks, scratch)?;
     let words = builder.pool.offset()?;
 
-    let mut header = Header::new(config, mesh, &lattice);
+    let mut header = Header::new(Parameters::Recursive { density, depth }, mesh, &lattice);
     header.blob_bytes = HEADER_BYTES as u64 + section_bytes::<u32>(words.into());
     header.skipped_count = survey.skipped_count;
-    header.density = density;
     header.reference_count = words;
     Ok(header)
 }

@@ -10,11 +10,11 @@ use crate::arena::{Sizes, align_up, check_alignment, section_bytes, split, split
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::config::Config;
 use crate::control::Control;
-use crate::error::{ConfigField, Error, Region};
+use crate::error::{Error, Region};
 use crate::grid::Grid;
 use crate::limits::{ALIGNMENT, MAX_NESTING};
 use crate::mesh::{BOX_BYTES, Strided, TriangleMesh};
-use crate::method::{Content, Method};
+use crate::method::Content;
 use crate::refit::{Refit, refit_content};
 
 type Sides = [f32; 6];
@@ -30,14 +30,6 @@ const fn behind_bytes(instances: u64) -> u64 {
 pub(crate) fn ends_of(header: &Header) -> (u64, u64) {
     let start = align_up(header.blob_bytes);
     (start, start.saturating_add(behind_bytes(header.triangle_count.into())))
-}
-
-/// Refuses all methods but the tree.
-const fn check(config: &Config) -> Result<(), Error> {
-    match config.method {
-        Method::Bvh => Ok(()),
-        _ => Err(Error::InvalidConfig(ConfigField::Method)),
-    }
 }
 
 /// The boxes of instances as the tree sees them.
@@ -89,7 +81,7 @@ impl<'a> Scene<'a> {
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "compared before")]
     pub const fn bound_parallel(instances: u32, config: &Config, tasks: u32) -> Option<Sizes> {
-        if !matches!(config.method, Method::Bvh) {
+        if config.check_tree().is_err() {
             return None;
         }
         let Some(sizes) = Sizes::bound_parallel(instances, config, tasks) else { return None };
@@ -132,7 +124,7 @@ impl<'a> Scene<'a> {
         scratch: &mut [u8],
         control: &Control<'_>,
     ) -> Result<Self, Error> {
-        check(config)?;
+        config.check_tree()?;
         check_alignment(index, Region::Index)?;
         levels_over(objects)?;
         let count = instances.len() as u64;

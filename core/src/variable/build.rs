@@ -17,7 +17,7 @@ use crate::bits::{WORD_BITS, each_one, halves};
 use crate::blob::Header;
 use crate::bump::{Bump, GRID, finish};
 use crate::cell::{CellRange, Lattice};
-use crate::config::Config;
+use crate::config::{BuildFlags, Parameters};
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::lists::pairs;
@@ -100,10 +100,11 @@ const fn scratch_bytes_of(layout: &Layout, triangles: u32, density: f32) -> u64 
         + Layout::bound(triangles, density, 0).scratch_bytes()
 }
 
-/// The same for a grid of which only the resolution is known.
-pub(crate) const fn scratch_bytes(triangles: u32, config: &Config, resolution: [u32; 3]) -> u64 {
-    let layout = Layout::new(resolution, 0, reference_limit(triangles), 0);
-    scratch_bytes_of(&layout, triangles, config.density)
+/// The same for a grid with this header.
+pub(crate) const fn scratch_bytes(header: &Header) -> u64 {
+    let Header { triangle_count, density, resolution, .. } = *header;
+    let layout = Layout::new(resolution, 0, reference_limit(triangle_count), 0);
+    scratch_bytes_of(&layout, triangle_count, density)
 }
 
 /// The most words of pool that so many references in the top can lead to.
@@ -111,33 +112,36 @@ pub(crate) const fn scratch_bytes(triangles: u32, config: &Config, resolution: [
 /// A subgrid of n primitives has at most `density * n + 1` cells, each of which takes a bit, a slot
 /// and at most a row, and [`reference_limit`] references.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bound, rounded up")]
-const fn pool_words(references: u32, config: &Config) -> u32 {
-    let per_reference = 2.1 * config.density as f64 + 16.0;
+const fn pool_words(references: u32, density: f32, subdivide_above: u32) -> u32 {
+    let per_reference = 2.1 * density as f64 + 16.0;
     let per_subgrid = 3.0 + 2.1 + 2.0 + reference_limit(0) as f64;
-    let subgrids = references as f64 / (config.subdivide_above as f64 + 1.0);
+    let subgrids = references as f64 / (subdivide_above as f64 + 1.0);
     let words = references as f64 * per_reference + subgrids * per_subgrid;
     if words < GRID as f64 { words as u32 } else { GRID }
 }
 
 /// The most memory that a mesh with so many triangles can need.
-pub(crate) const fn bound(triangles: u32, config: &Config) -> (u64, u64) {
-    let top = Layout::bound(triangles, config.density, 0);
-    let index = top.with_references(pool_words(top.reference_count, config)).index_bytes();
-    (index, scratch_bytes_of(&top, triangles, config.density))
+pub(crate) const fn bound(triangles: u32, density: f32, subdivide_above: u32) -> (u64, u64) {
+    let top = Layout::bound(triangles, density, 0);
+    let pool_words = pool_words(top.reference_count, density, subdivide_above);
+    let index_bytes = top.with_references(pool_words).index_bytes();
+    (index_bytes, scratch_bytes_of(&top, triangles, density))
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to plan in.
 pub(crate) fn sizes(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    subdivide_above: u32,
+    flags: BuildFlags,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    let plan = TopPlan::new(mesh, config, scratch, &Watch::none())?;
+    let plan = TopPlan::new(mesh, density, flags, scratch, &Watch::none())?;
     let (top, scratch_bytes) = (plan.top.layout, plan.scratch_bytes);
-    match run(mesh, config, plan, &mut [], &Watch::none()) {
+    match run(mesh, subdivide_above, plan, &mut [], &Watch::none()) {
         Ok(header) => Sizes::new(header.blob_bytes, scratch_bytes, true),
         Err(Error::OutOfMemory { region: Region::Scratch, .. }) => {
-            let pool_words = pool_words(top.reference_count, config);
+            let pool_words = pool_words(top.reference_count, density, subdivide_above);
             let index_bytes = top.with_references(pool_words).index_bytes();
             Sizes::new(index_bytes, scratch_bytes, false)
         }
@@ -148,13 +152,15 @@ pub(crate) fn sizes(
 /// Builds into `index` and returns the part of it that is the blob.
 pub(crate) fn build<'a>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    density: f32,
+    subdivide_above: u32,
+    flags: BuildFlags,
     index: &'a mut [u8],
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    let plan = TopPlan::new(mesh, config, scratch, watch)?;
-    let header = run(mesh, config, plan, index, watch)?;
+    let plan = TopPlan::new(mesh, density, flags, scratch, watch)?;
+    let header = run(mesh, subdivide_above, plan, index, watch)?;
     finish(index, header)
 }
 
@@ -169,17 +175,18 @@ struct TopPlan<'s> {
 impl<'s> TopPlan<'s> {
     fn new(
         mesh: &TriangleMesh<'_>,
-        config: &Config,
+        density: f32,
+        flags: BuildFlags,
         scratch: &'s mut [u8],
         watch: &Watch<'_>,
     ) -> Result<Self, Error> {
         let available_bytes = scratch.len() as u64;
-        let top = Plan::new(mesh, config, &(), scratch, watch)?;
+        let top = Plan::new(mesh, density, flags, &(), scratch, watch)?;
         // Slots note their cell's number in a word.
         if top.layout.cells >= u64::from(NOBODY) {
             return Err(Error::InvalidConfig(ConfigField::Density));
         }
-        let scratch_bytes = scratch_bytes_of(&top.layout, mesh.triangle_count(), config.density);
+        let scratch_bytes = scratch_bytes_of(&top.layout, mesh.triangle_count(), density);
         Ok(Self { top, scratch_bytes, available_bytes })
     }
 }
@@ -187,7 +194,7 @@ impl<'s> TopPlan<'s> {
 /// Builds as much as the index holds; the header says what all of it takes.
 fn run(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    subdivide_above: u32,
     plan: TopPlan<'_>,
     index: &mut [u8],
     watch: &Watch<'_>,
@@ -240,7 +247,7 @@ fn run(
         let start = pool.offset()?;
         let cell = cell_of(owner, plan.lattice.resolution);
         let spread = CellSpread { mesh, lattice: &plan.lattice, cell, ids, frame: Frame::WHOLE };
-        let is_crowded = ids.len() > config.subdivide_above as usize;
+        let is_crowded = ids.len() > subdivide_above as usize;
         if is_crowded && spread.subdivide(plan.density, &mut bench, &mut pool) {
             entry(slot, start | GRID);
         } else {
@@ -253,7 +260,7 @@ fn run(
     let pool_words = pool.offset()?;
     entry(owners.len(), pool_words);
     plan.layout = plan.layout.with_references(pool_words);
-    Ok(plan.header(config, mesh))
+    Ok(plan.header(Parameters::Variable { density: plan.density, subdivide_above }, mesh))
 }
 
 /// Notes the cell of every slot.

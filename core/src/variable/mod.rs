@@ -1,7 +1,7 @@
 //! The multi-level variable hashed grid (CP10 §3.1): crowded cells hold grids of their own.
 //!
 //! The top is a one-level grid at density 4. A cell with more primitives than
-//! `Config::subdivide_above` does not list them: it holds a subgrid, built by the
+//! `subdivide_above` does not list them: it holds a subgrid, built by the
 //! same algorithm from the cell's primitives, cut to the part of the cell that they
 //! reach. Two levels, as in the paper.
 //!

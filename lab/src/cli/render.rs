@@ -67,8 +67,7 @@ impl RenderArgs {
     /// The grid that the words ask for.
     #[must_use]
     pub fn config(&self) -> Config {
-        let config = self.tuning.config(self.method);
-        Config { density: self.density.unwrap_or(config.density), ..config }
+        self.tuning.config(self.method, self.density)
     }
 
     /// Refuses options that would be ignored.
@@ -77,7 +76,7 @@ impl RenderArgs {
     /// The first such option, and what it is for.
     pub fn check(&self) -> Result<()> {
         ensure!(
-            self.density.is_none() || self.method.has_density(),
+            self.density.is_none() || self.config().parameters.density().is_some(),
             "--density is not for {}, which has none",
             self.method.name()
         );

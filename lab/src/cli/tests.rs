@@ -1,5 +1,7 @@
 //! Words, and what becomes of them.
 
+use hgrid_core::Parameters;
+
 use super::*;
 
 #[test]
@@ -106,7 +108,7 @@ fn methods_have_their_names_and_all_compete_unless_some_are_named() {
     }
     let methods = |words: &[&str]| -> Vec<Method> {
         let words = ["hgrid", "a.ply"].iter().chain(words);
-        TableArgs::parse_from(words).race.configs().iter().map(|c| c.method).collect()
+        TableArgs::parse_from(words).race.configs().iter().map(Config::method).collect()
     };
     assert_eq!(methods(&[]), Method::ALL);
     assert_eq!(methods(&["--methods", "fixed,one-level"]), [Method::Fixed, Method::OneLevel]);
@@ -114,16 +116,21 @@ fn methods_have_their_names_and_all_compete_unless_some_are_named() {
 
 #[test]
 fn parameters_reach_the_configuration() {
-    let words =
-        "hgrid --macrocell-factor 4 --subdivide-above 9 --depth 2 --density 2 --quality high";
-    let config = RenderArgs::parse_from(words.split(' ')).config();
-    let expected = Config {
-        macrocell_factor: 4,
-        subdivide_above: 9,
-        depth: 2,
-        density: 2.0,
-        quality: Quality::High,
-        ..Config::default()
-    };
-    assert_eq!(config, expected);
+    let density = 2.0;
+    for (words, expected) in [
+        ("one-level --density 2", Parameters::OneLevel { density }),
+        (
+            "fixed --density 2 --macrocell-factor 4",
+            Parameters::Fixed { density, macrocell_factor: 4 },
+        ),
+        (
+            "variable --density 2 --subdivide-above 9",
+            Parameters::Variable { density, subdivide_above: 9 },
+        ),
+        ("recursive --density 2 --depth 2", Parameters::Recursive { density, depth: 2 }),
+        ("bvh --quality high", Parameters::Bvh { quality: Quality::High }),
+    ] {
+        let words = ["hgrid", "--method"].into_iter().chain(words.split(' '));
+        assert_eq!(RenderArgs::parse_from(words).config(), expected.into());
+    }
 }

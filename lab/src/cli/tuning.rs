@@ -3,7 +3,7 @@
 use anyhow::{Result, ensure};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use hgrid_core::{Config, Control, Method, Quality};
+use hgrid_core::{Config, Control, Method, Parameters, Quality};
 
 /// Parameters of single methods.
 #[derive(Debug, Clone, Copy, Args)]
@@ -23,17 +23,22 @@ pub struct Tuning {
 }
 
 impl Tuning {
-    /// The method with these parameters and the paper's where none are given.
+    /// The method with these parameters, this density, and the paper's where none are given.
     #[must_use]
-    pub fn config(&self, method: Method) -> Config {
-        let default = Config::new(method);
-        Config {
-            macrocell_factor: self.macrocell_factor.unwrap_or(default.macrocell_factor),
-            subdivide_above: self.subdivide_above.unwrap_or(default.subdivide_above),
-            depth: self.depth.unwrap_or(default.depth),
-            quality: self.quality.unwrap_or(default.quality),
-            ..default
+    pub fn config(&self, method: Method, density: Option<f32>) -> Config {
+        let mut parameters = Parameters::new(method);
+        match &mut parameters {
+            Parameters::Fixed { macrocell_factor, .. } => {
+                *macrocell_factor = self.macrocell_factor.unwrap_or(*macrocell_factor);
+            }
+            Parameters::Variable { subdivide_above, .. } => {
+                *subdivide_above = self.subdivide_above.unwrap_or(*subdivide_above);
+            }
+            Parameters::Recursive { depth, .. } => *depth = self.depth.unwrap_or(*depth),
+            Parameters::Bvh { quality } => *quality = self.quality.unwrap_or(*quality),
+            _ => {}
         }
+        density.map_or(parameters, |density| parameters.with_density(density)).into()
     }
 
     /// Refuses parameters of methods that are not built.

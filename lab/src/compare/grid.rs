@@ -4,7 +4,8 @@ use core::cell::RefCell;
 
 use anyhow::Result;
 use hgrid_core::{
-    Coherence, Config, Control, Grid, Hit, Method, Quality, QueryOptions, Ray, Strided, StridedMut,
+    Coherence, Config, Control, Grid, Hit, Method, Parameters, Quality, QueryOptions, Ray, Strided,
+    StridedMut,
 };
 
 use super::input::Input;
@@ -37,9 +38,9 @@ const fn is_of_paper(method: Method) -> bool {
 
 impl System for GridSystem {
     fn name(&self) -> String {
-        let Config { method, quality, .. } = self.config;
-        let is_high = method == Method::Bvh && quality == Quality::High;
-        method.name().to_owned() + if is_high { HIGH } else { "" }
+        let Config { parameters, .. } = self.config;
+        let is_high = parameters == Parameters::Bvh { quality: Quality::High };
+        parameters.method().name().to_owned() + if is_high { HIGH } else { "" }
     }
 
     fn is_peer(&self) -> bool {
@@ -47,7 +48,7 @@ impl System for GridSystem {
     }
 
     fn modes(&self, workload: Workload, of_instances: bool) -> &'static [Mode] {
-        let method = self.config.method;
+        let method = self.config.method();
         match workload {
             // Scenes are trees, and are asked ray by ray.
             _ if of_instances && method == Method::Bvh => one_by_one(workload),

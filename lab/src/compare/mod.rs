@@ -39,7 +39,7 @@ use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Error, Result, ensure};
 use clap::ValueEnum as _;
-use hgrid_core::{Config, Method, Quality};
+use hgrid_core::{Method, Parameters, Quality};
 
 use crate::cli::CompareArgs;
 use grid::{GridSystem, HIGH};
@@ -122,8 +122,11 @@ pub fn methods(methods: &[Method]) -> Vec<Box<dyn System>> {
 /// The same with trees of a quality.
 fn methods_of(methods: &[Method], quality: Quality) -> Vec<Box<dyn System>> {
     let methods = if methods.is_empty() { Method::ALL } else { methods };
-    let config = |method| Config { quality, ..Config::new(method) };
-    let system = |&method| Box::new(GridSystem::new(config(method))) as Box<dyn System>;
+    let parameters = |method| match method {
+        Method::Bvh => Parameters::Bvh { quality },
+        _ => Parameters::new(method),
+    };
+    let system = |&method| Box::new(GridSystem::new(parameters(method).into())) as Box<dyn System>;
     methods.iter().map(system).collect()
 }
 

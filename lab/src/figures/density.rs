@@ -3,7 +3,7 @@
 use alloc::borrow::Cow;
 
 use anyhow::{Context as _, Result, bail, ensure};
-use hgrid_core::Config;
+use hgrid_core::{Config, Parameters};
 use plotters::coord::ranged1d::Ranged as _;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
@@ -51,11 +51,12 @@ impl Curves {
         let facts = SceneFacts::of(&scene);
 
         let race = &args.race;
-        let methods: Vec<_> =
-            race.configs().into_iter().filter(|config| config.method.has_density()).collect();
-        let at_densities = |config: &Config| {
-            let config = *config;
-            args.densities.iter().map(move |&density| Config { density, ..config })
+        let configs = race.configs();
+        let with_density =
+            |config: &Config| Some((config.parameters, config.parameters.density()?));
+        let methods: Vec<_> = configs.iter().filter_map(with_density).collect();
+        let at_densities = |&(parameters, _): &(Parameters, f32)| {
+            args.densities.iter().map(move |&density| parameters.with_density(density).into())
         };
         let configs: Vec<_> = methods.iter().flat_map(at_densities).collect();
         let mut progress =
@@ -65,9 +66,9 @@ impl Curves {
             .with_context(|| format!("cannot measure `{spec}`"))?;
 
         let curves = methods.iter().zip(numbers.chunks(args.densities.len()));
-        let curves = curves.map(|(config, points)| Curve {
-            method: config.method.name().into(),
-            default_density: config.density,
+        let curves = curves.map(|(&(parameters, default_density), points)| Curve {
+            method: parameters.method().name().into(),
+            default_density,
             points: points.to_vec(),
         });
         Ok(Self {

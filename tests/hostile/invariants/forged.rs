@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hgrid_core::{Config, Error, Grid, Method, Ray};
+use hgrid_core::{Config, Error, Grid, Method, Parameters, Ray};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::{Seed, agrees, ends, fixed_rays};
 use hgrid_tests::meshes::Mesh;
@@ -176,7 +176,7 @@ fn lists_that_no_cell_names_do_not_count() {
 fn equal_lists_may_be_shared() {
     let mut mesh = Mesh::default();
     mesh.push([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-    let seed = Seed::new(mesh, Config { density: 40.0, ..Config::new(Method::OneLevel) });
+    let seed = Seed::new(mesh, Parameters::OneLevel { density: 40.0 }.into());
     let s = Hashed::of(&seed.blob);
     let rows = s.row_count();
     assert!(s.resolution[0] == 1 && rows > 8 && s.words == rows, "one cell a row, all the same");
@@ -213,8 +213,8 @@ fn equal_lists_may_be_shared() {
 /// A crowded cell with a list instead of a subgrid is slower, and nothing else.
 #[test]
 fn a_list_may_have_any_length() {
-    let config = Config { subdivide_above: 1000, ..Config::new(Method::Variable) };
-    let seed = Seed::new(sheet(), config);
+    let parameters = Parameters::Variable { density: 4.0, subdivide_above: 1000 };
+    let seed = Seed::new(sheet(), parameters.into());
     let mut copy = Copy::of(&seed.blob);
     copy.set_word(SUBDIVIDE_ABOVE, 4);
     copy.sign();

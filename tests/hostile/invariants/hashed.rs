@@ -1,6 +1,6 @@
 //! One-level and fixed grids: a table of slots, lists, and macrocells above them.
 
-use hgrid_core::{Config, Method};
+use hgrid_core::{Method, Parameters};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::Seed;
 use hgrid_tests::meshes::{Mesh, one_triangle, soup};
@@ -8,13 +8,17 @@ use hgrid_tests::meshes::{Mesh, one_triangle, soup};
 use super::sections::*;
 use super::{Case, case, refused};
 
-fn config(method: Method) -> Config {
-    Config { density: 4.0, macrocell_factor: 2, subdivide_above: 1 << 20, ..Config::new(method) }
+fn parameters(method: Method, density: f32) -> Parameters {
+    match method {
+        Method::Fixed => Parameters::Fixed { density, macrocell_factor: 2 },
+        Method::Variable => Parameters::Variable { density, subdivide_above: 1 << 20 },
+        _ => Parameters::new(method).with_density(density),
+    }
 }
 
 /// A grid with empty rows, and with empty cells in others.
 fn sparse(method: Method) -> Seed {
-    Seed::new(soup(60, 0.05, 9), config(method))
+    Seed::new(soup(60, 0.05, 9), parameters(method, 4.0).into())
 }
 
 /// What holds of every table, with its lists in the words behind it: so many at a place.
@@ -149,7 +153,7 @@ fn a_missing_triangle_is_missed() {
 #[test]
 fn slots_are_not_shared() {
     for method in [Method::OneLevel, Method::Fixed, Method::Variable] {
-        let seed = Seed::new(one_triangle(), Config { density: 40.0, ..config(method) });
+        let seed = Seed::new(one_triangle(), parameters(method, 40.0).into());
         let s = Hashed::of(&seed.blob);
         assert!(s.row_count() > 1 && s.full(&seed.blob).len() == s.cells(), "{s:?}");
         let change = move |b: &mut Copy| {
@@ -162,7 +166,7 @@ fn slots_are_not_shared() {
 
 #[test]
 fn macrocells_are_full_where_something_is_below() {
-    let seed = Seed::new(soup(300, 0.02, 3), Config { density: 32.0, ..config(Method::Fixed) });
+    let seed = Seed::new(soup(300, 0.02, 3), parameters(Method::Fixed, 32.0).into());
     let s = Hashed::of(&seed.blob);
     let [x, y, z] = s.resolution;
     assert!(x * y * z / 8 > 64 && seed.blob.len() - s.overlay >= 64, "{s:?}");

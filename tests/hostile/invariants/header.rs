@@ -9,12 +9,12 @@ use super::{Case, case, refused};
 
 fn small(method: Method) -> &'static Seed {
     // A dozen triangles.
-    seeds().find(|seed| seed.config.method == method && seed.mesh.indices.len() == 12).unwrap()
+    seeds().find(|seed| seed.config.method() == method && seed.mesh.indices.len() == 12).unwrap()
 }
 
 /// A field that means nothing to a method, and one that every method must have right.
 fn fields(seed: &Seed) -> Vec<Case<'static>> {
-    let method = seed.config.method;
+    let method = seed.config.method();
     let mut cases = vec![
         case("a triangle skipped", SKIPPED_COUNT..SKIPPED_COUNT + 4, |b| add(b, SKIPPED_COUNT, 1)),
         case("unknown method", METHOD..METHOD + 4, |b| b.set_word(METHOD, 0)),
@@ -63,14 +63,14 @@ fn fields(seed: &Seed) -> Vec<Case<'static>> {
         (SUBDIVIDE_ABOVE, method == Method::Variable),
         (DEPTH, method == Method::Recursive),
         (CELL_SIZE, false),
-        (DENSITY, method.has_density()),
+        (DENSITY, !is_tree),
     ];
     for (at, _) in of_others.into_iter().filter(|(_, is_used)| !is_used) {
         cases.push(case("a field of another method", unused.clone(), move |b| {
             b.set_word(at, 1.0_f32.to_bits());
         }));
     }
-    if method.has_density() {
+    if !is_tree {
         for density in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             cases.push(case("a density that is none", DENSITY..DENSITY + 4, move |b| {
                 b.set_word(DENSITY, density.to_bits());
@@ -111,9 +111,9 @@ fn what_fills_up_sections_is_zero() {
         // The last section ends with what fills it up, if anything
         // does; macrocells fill their words.
         let count = |at| Copy::of(&seed.blob).word(at) as usize;
-        let is_tree = seed.config.method == Method::Bvh;
+        let is_tree = seed.config.method() == Method::Bvh;
         let words = if is_tree { 20 * count(RESERVED) } else { count(REFERENCE_COUNT) };
-        let is_full = words.is_multiple_of(16) || seed.config.method == Method::Fixed;
+        let is_full = words.is_multiple_of(16) || seed.config.method() == Method::Fixed;
         for back in (1..=(16 - words % 16) * 4).take(if is_full { 0 } else { 64 }) {
             let at = seed.blob.len() - back;
             refused(seed, &[case("filled up with something", 16..24, move |b| b.set(at, &[1]))]);

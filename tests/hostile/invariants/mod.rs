@@ -38,7 +38,7 @@ fn refused(seed: &Seed, cases: &[Case<'_>]) {
             ends(&grid, &fixed_rays(grid.bounds(), 12));
             prove(&grid)
         });
-        let method = seed.config.method;
+        let method = seed.config.method();
         let is_there = matches!(result, Err(Error::Corrupt { offset })
             if usize::try_from(offset).is_ok_and(|offset| at.contains(&offset)));
         assert!(is_there, "{method:?}: {what}: {result:?}, expected at {at:?}");

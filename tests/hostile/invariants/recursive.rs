@@ -1,6 +1,6 @@
 //! Recursive grids: a pool of grids, each with a head, entries, and what its cells hold.
 
-use hgrid_core::{Config, Method};
+use hgrid_core::{Config, Method, Parameters};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::{Seed, nested};
 use hgrid_tests::meshes::soup;
@@ -123,7 +123,8 @@ fn lists_hold_the_triangles_of_their_cells() {
 #[test]
 fn nothing_is_missing_and_nothing_is_left_over() {
     // One grid and no other.
-    let seed = Seed::new(soup(12, 0.5, 51), Config { depth: 1, ..Config::new(Method::Recursive) });
+    let parameters = Parameters::Recursive { density: 8.0, depth: 1 };
+    let seed = Seed::new(soup(12, 0.5, 51), parameters.into());
     let nodes = nodes(&seed.blob);
     assert_eq!(nodes.len(), 1);
     let node = nodes[0].clone();

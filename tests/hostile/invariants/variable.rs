@@ -1,6 +1,6 @@
 //! Variable grids: cells that hold grids of their own.
 
-use hgrid_core::{Config, Method};
+use hgrid_core::Parameters;
 use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::Seed;
 use hgrid_tests::meshes::soup;
@@ -15,7 +15,7 @@ fn crowded() -> Seed {
     for (count, at) in [(30, 0.3), (20, -0.5)] {
         mesh.append(&soup(count, 0.05, 5).map(|p| p.map(|c| at + 0.1 * c)));
     }
-    Seed::new(mesh, Config { subdivide_above: 4, ..Config::new(Method::Variable) })
+    Seed::new(mesh, Parameters::Variable { density: 4.0, subdivide_above: 4 }.into())
 }
 
 /// A subgrid: where its sections start, in bytes.

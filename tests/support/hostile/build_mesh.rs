@@ -78,7 +78,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     }
     let mut scratch = Guarded::new(enough.scratch_bytes);
     // A tree's bound is told without a look at the mesh, with several tasks even where there is scratch.
-    let is_tree = config.method == Method::Bvh;
+    let is_tree = config.method() == Method::Bvh;
     if is_tree && let Err(error) = sizes(&mesh, config, scratch.region()) {
         let is_odd =
             matches!(error, Error::IndexOutOfRange { .. } | Error::NonFiniteTriangle { .. });
@@ -152,7 +152,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     let copy = crate::copy::Copy::of(&blob);
     let grid = Grid::open(copy.bytes(), mesh).expect("what was built opens");
     prove(&grid).expect("what was built is valid");
-    assert_eq!(grid.method(), config.method);
+    assert_eq!(grid.method(), config.method());
     let mut rays = rays::fixed_rays(grid.bounds(), 6);
     rays.extend(rays::chosen(u, &grid).unwrap_or_default());
     agrees(&grid, &rays);

@@ -198,7 +198,7 @@ impl Caller<'_> {
 
     pub(super) fn input(&self, u: &mut Unstructured<'_>) -> Result<Input> {
         let mesh = self.mesh(u)?;
-        let chosen = shape::config(u)?;
+        let chosen = shape::chosen(u)?;
         let patience = if rarely(u, 4)? { u8::arbitrary(u)?.into() } else { u32::MAX };
         let run = Loop::arbitrary(u)?;
         let control = Control { run, patience, done: Cell::new(0), calls: Cell::new(0) };

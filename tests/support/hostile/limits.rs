@@ -1,6 +1,6 @@
 //! How much work one ray can cost, whatever the bytes say.
 
-use hgrid_core::{Counters, Grid, Method};
+use hgrid_core::{Counters, Grid, Method, Parameters};
 
 /// The most that a query of one ray may count.
 ///
@@ -12,17 +12,19 @@ pub fn most(grid: &Grid<'_>) -> Counters {
     let sum = |cells: [u32; 3]| cells.iter().map(|&c| u64::from(c)).sum::<u64>();
     let words = grid.blob_bytes() as u64 / 4;
     let cells = sum(grid.resolution());
-    let cell_steps = match grid.method() {
+    let cell_steps = match grid.config().parameters {
         // One walk.
-        Method::OneLevel => cells,
-        Method::Fixed => macrocells(grid.resolution(), grid.config().macrocell_factor),
+        Parameters::OneLevel { .. } => cells,
+        Parameters::Fixed { macrocell_factor, .. } => {
+            macrocells(grid.resolution(), macrocell_factor)
+        }
         // In every cell a subgrid of no more than 255 cells on an axis.
-        Method::Variable => cells * (1 + 3 * 255),
+        Parameters::Variable { .. } => cells * (1 + 3 * 255),
         // One step for each entry.
-        Method::Recursive => words,
+        Parameters::Recursive { .. } => words,
         // A node for each node, and eight leaves; one more, and the budget is spent.
-        Method::Bvh => 9 * nodes(grid) + 1,
-        method => panic!("nobody has said what {method:?} may cost"),
+        Parameters::Bvh { .. } => 9 * nodes(grid) + 1,
+        others => panic!("nobody has said what {others:?} may cost"),
     };
     // Lists hold each word once, but for leaves of a tree, which have eight ids or fewer; a ray from too
     // far away for any structure is shown every triangle.

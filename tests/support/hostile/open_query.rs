@@ -12,6 +12,6 @@ pub fn run(data: &[u8]) {
     let Ok(grid) = damaged.open() else { return };
     ends(&grid, &Damaged::rays(&mut u, &grid));
     // What it says about itself is harmless, too.
-    let _ = (grid.config(), grid.density(), grid.skipped_count(), grid.reference_count());
+    let _ = (grid.config(), grid.skipped_count(), grid.reference_count());
     let _ = (grid.scratch_bytes(), grid.packed_bytes(), grid.method());
 }

@@ -3,8 +3,8 @@
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_core::{
-    BuildFlags, Config, Error, IndexType, MAX_COORDINATE, MeshPart, Method, Quality, Strided,
-    TriangleMesh,
+    BuildFlags, Config, Error, IndexType, MAX_COORDINATE, MeshPart, Method, Parameters, Quality,
+    Strided, TriangleMesh,
 };
 
 use super::memory::rarely;
@@ -256,22 +256,46 @@ impl Count {
     }
 }
 
+/// What C can choose: the fields of all methods.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Chosen {
+    pub(super) method: Method,
+    pub(super) density: f32,
+    pub(super) macrocell_factor: u32,
+    pub(super) subdivide_above: u32,
+    pub(super) depth: u32,
+    pub(super) quality: Quality,
+    pub(super) flags: BuildFlags,
+}
+
 /// The configuration that the bytes describe.
 pub(super) fn config(u: &mut Unstructured<'_>) -> Result<Config> {
+    let Chosen { method, density, macrocell_factor, subdivide_above, depth, quality, flags } =
+        chosen(u)?;
+    let parameters = match method {
+        Method::Fixed => Parameters::Fixed { density, macrocell_factor },
+        Method::Variable => Parameters::Variable { density, subdivide_above },
+        Method::Recursive => Parameters::Recursive { density, depth },
+        Method::Bvh => Parameters::Bvh { quality },
+        _ => Parameters::new(method).with_density(density),
+    };
+    Ok(Config { parameters, flags })
+}
+
+/// The choice that the bytes describe.
+pub(super) fn chosen(u: &mut Unstructured<'_>) -> Result<Chosen> {
     let which = usize::from(u8::arbitrary(u)?);
     let method = Method::ALL[which % Method::ALL.len()];
     let quality = Quality::ALL[which / Method::ALL.len() % Quality::ALL.len()];
-    let default = Config::new(method);
     let mut count = |default| Count::arbitrary(u).map(|count| count.or(default));
-    let [macrocell_factor, subdivide_above, depth] = [count(3)?, count(4)?, count(default.depth)?];
+    let [macrocell_factor, subdivide_above, depth] = [count(3)?, count(4)?, count(3)?];
     let mut setting = |default| Setting::arbitrary(u).map(|setting| setting.or(default));
-    let density = setting(default.density)?;
+    let density = setting(Parameters::new(method).density().unwrap_or(4.0))?;
     let flags = match u8::arbitrary(u)? {
         0..=199 => 0,
         200..=249 => 1,
         _ => u32::arbitrary(u)?,
     };
     let flags = BuildFlags::from_bits_retain(flags);
-    let chosen = Config { macrocell_factor, subdivide_above, depth, ..default };
-    Ok(Config { density, quality, flags, ..chosen })
+    Ok(Chosen { method, density, macrocell_factor, subdivide_above, depth, quality, flags })
 }

@@ -38,10 +38,11 @@ use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
-use crate::config::{BuildFlags, Config};
+use crate::config::{BuildFlags, Parameters};
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
+use crate::method::Quality;
 use crate::simd::{Kernel, SimdLevel, dispatch};
 use crate::tasks::{run, task_count};
 use cut::Item;
@@ -82,7 +83,7 @@ const LEAST_NODE: f32 = super::build::LEAST_NODE;
 #[inline(never)]
 pub(super) fn build_in<const N: usize>(
     mesh: &TriangleMesh<'_>,
-    config: &Config,
+    flags: BuildFlags,
     mut index: Option<&mut [u8]>,
     scratch: &mut [u8],
     control: &Control<'_>,
@@ -112,7 +113,7 @@ pub(super) fn build_in<const N: usize>(
 
     // Find the boxes.
     watch.at(BOXES)?;
-    let (finite, bounds) = boxes::<N>(mesh, config.flags, items, tasks, control)?;
+    let (finite, bounds) = boxes::<N>(mesh, flags, items, tasks, control)?;
     let items = items.get_mut(..finite).unwrap_or_default();
 
     // Cut the index.
@@ -145,7 +146,7 @@ pub(super) fn build_in<const N: usize>(
         }
     }
     let lattice = Lattice::new(scene, [1; 3]);
-    let mut header = Header::new(config, mesh, &lattice);
+    let mut header = Header::new(Parameters::Bvh { quality: Quality::High }, mesh, &lattice);
     header.skipped_count = triangles - finite as u32;
     header.reference_count = finite as u32;
     header.node_count = node_count;
