@@ -141,7 +141,7 @@ impl<'a> Shapes<'a> {
     ///
     /// # Errors
     /// Those of [`sizes`](crate::sizes); [`Error::InvalidConfig`] if the method is not
-    /// [`Method::Bvh`], here and in all builds.
+    /// [`Method::Bvh`](crate::Method::Bvh), here and in all builds.
     pub fn sizes(boxes: &Boxes<'_>, config: &Config, scratch: &mut [u8]) -> Result<Sizes, Error> {
         config.check_tree()?;
         sizes_with(&boxes.0, config, scratch, &Control::SERIAL)

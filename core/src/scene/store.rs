@@ -71,7 +71,7 @@ fn levels_over(objects: &[Object<'_>]) -> Result<usize, Error> {
 
 impl<'a> Scene<'a> {
     /// Enough memory for any scene of so many instances: O(1), usable in a constant. `None` as for
-    /// [`Sizes::bound`], and for a method that is not [`Method::Bvh`].
+    /// [`Sizes::bound`], and for a method that is not [`Method::Bvh`](crate::Method::Bvh).
     #[must_use]
     pub const fn bound(instances: u32, config: &Config) -> Option<Sizes> {
         Self::bound_parallel(instances, config, 1)
@@ -101,7 +101,7 @@ impl<'a> Scene<'a> {
     /// [`Error::InstanceWithoutObject`] and [`Error::InstanceWithoutInverse`] name the instance;
     /// [`Error::TooDeep`] for more than [`MAX_NESTING`] scenes inside one another; [`Error::OutOfMemory`],
     /// [`Error::Misaligned`], [`Error::TooManyTriangles`] for more instances than ids, and [`Error::InvalidConfig`] if the
-    /// method is not [`Method::Bvh`]. After an error the index holds nothing of use.
+    /// method is not [`Method::Bvh`](crate::Method::Bvh). After an error the index holds nothing of use.
     pub fn build(
         instances: &[Instance],
         objects: &'a [Object<'a>],
