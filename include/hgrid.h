@@ -16,12 +16,13 @@
  * hgrid_occluder_n. Every triangle along a ray: hgrid_intersect_all. The nearest point:
  * hgrid_closest_point. Masks, culling, a triangle to skip, filters and counters are options of these.
  * hgrid_bound, hgrid_sizes and hgrid_fit are about memory: enough for any mesh, for this one, and the
- * best grid for a budget. A build on threads of yours, with progress, is a matter of hgrid_config.
- * hgrid_surface_at knows the normal of a hit, and where rays start that leave it. hgrid_join takes
- * several meshes into one grid, and hgrid_locate tells which of them was hit. Trees of your own shapes
+ * best grid for a budget. hgrid_config has the fields for a build on your threads, and for its progress.
+ * hgrid_surface_at returns the normal of a hit and the origins of rays that leave it. hgrid_join joins
+ * several meshes for one grid, and hgrid_locate tells which of them was hit. Trees of your own shapes
  * begin with hgrid_build_shapes, scenes of instances with hgrid_build_scene. For grids that are
  * stored there are hgrid_open, hgrid_peek, hgrid_pack, hgrid_mesh_of and hgrid_validate, for scenes
- * with all that they show hgrid_pack_scene; hgrid_inspect looks at all of a grid. hgrid_refit moves a tree with its vertices.
+ * with all that they show hgrid_pack_scene; hgrid_inspect returns statistics of a grid. hgrid_refit
+ * fits a tree to vertices that moved.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -64,15 +65,15 @@
  * link a library with the feature std, are compiled with -DHGRID_STD (or define it before anything
  * includes this file), and have hgrid_create and hgrid_destroy as well.
  *
- * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are enough for every mesh with so many
- * triangles, with the default configuration, and fit into an array declaration; hgrid_sizes knows
- * the mesh, takes any configuration and asks for less. Where the system hands out memory page by
- * page (on Linux mmap, and large blocks of aligned_alloc), an index that is too large costs addresses
- * and no memory: pages that are not touched are never taken. So the shortest way to a grid there is
- * hgrid_bound or hgrid_sizes without scratch, a build in so much, and if you like a copy of the
- * index_bytes that its report tells. With scratch hgrid_sizes is exact, but takes half as long as the
- * build, or as long (bvh, recursive): that is for memory that has to be there, as where there are no pages, or where they
- * count when they are asked for (Windows, and Linux that may not overcommit).
+ * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are constants that are enough for every mesh with
+ * that many triangles, with the default configuration; hgrid_sizes looks at the mesh, takes any
+ * configuration and returns less. Where the system provides memory page by page (on Linux mmap, and
+ * large blocks of aligned_alloc), an index that is too large costs addresses but no memory, because
+ * pages that are never touched are never allocated. There, call hgrid_bound or hgrid_sizes without
+ * scratch, build in that much, and copy the report's index_bytes to a smaller block if you like. With
+ * scratch hgrid_sizes is exact, but takes half as long as the build, or as long (bvh, recursive). Use it
+ * where every byte is real memory: without virtual memory, or where memory is charged when it is
+ * reserved (Windows, and Linux without overcommit).
  *
  * The index is a blob: no pointer in it, so it can be copied to another region at a multiple of 64,
  * written to a file, mapped from one, sent, or put in flash, and opened there with hgrid_open. The
@@ -96,20 +97,20 @@
  *
  *   hgrid_config config = HGRID_CONFIG_INIT_VARIABLE;
  *
- * One level and fixed know the size of the index, to the byte, before they write it. The others find
- * it while they write: hgrid_sizes tells it in advance if it is given scratch, and an index that
- * turns out to be too small is lost, see HGRID_ERROR_INDEX_TOO_SMALL.
+ * With one level and fixed, a build knows the exact size of the index before it writes. With the other
+ * methods the size shows only while the index is written: hgrid_sizes with scratch returns it in
+ * advance, and after HGRID_ERROR_INDEX_TOO_SMALL the former content of the index is lost.
  *
- * A library may be built with fewer methods, to be smaller: hgrid_has_method tells which it has, and
- * what needs another one answers HGRID_ERROR_METHOD_LEFT_OUT. NULL for a configuration and
- * HGRID_CONFIG_INIT mean bvh, in a library without it, too: name a method there.
+ * A library may be built with fewer methods, to be smaller. hgrid_has_method tells which it has; calls
+ * that need another one return HGRID_ERROR_METHOD_LEFT_OUT. NULL for a configuration and
+ * HGRID_CONFIG_INIT always mean bvh: in a library without bvh, name a method.
  *
  * Hits
  * ----
  * A hit names the triangle and the place on it. The normal is cross(b - a, c - a) for its vertices a, b,
- * c, and points to the side from which they appear counter-clockwise, the front; which side was hit says
- * the sign of its product with the direction. hgrid_surface_at tells all that, and where the next ray
- * starts: a ray to a light that started at the hit itself could hit the triangle that it leaves.
+ * c, and points to the front, from which they appear counter-clockwise: a ray hits the front if the dot
+ * product of normal and direction is negative. hgrid_surface_at returns the normal, the side and origins
+ * for the next ray: a ray that starts at the hit itself could hit the triangle that it leaves.
  *
  * One grid may hold several meshes: hgrid_join makes them one, without a copy, and hgrid_locate tells whose
  * triangle was hit. Masks can leave meshes out. Several grids are asked one after the other; let each hit
@@ -160,18 +161,18 @@
  * The library waits for no lock and starts no thread (hgrid_build uses yours if you bring some), and
  * it has no global state but one byte that remembers which vector instructions the processor has. Any
  * number of threads may query one grid at once, and calls that share no memory they write never disturb
- * each other. Each function says it again for itself.
+ * each other. The text of each function has the details.
  *
  * Results
  * -------
  * Meshes and hits are in your units; t is in multiples of the ray's direction, whatever its length.
- * There is no epsilon: what hits may be off by is a part of the ray and the triangle, as hgrid_hit says,
- * and whether t lies in the range is decided exactly. So the scale of a mesh does not matter, from
- * 1e-30 to 1e30, but for time: between 1e-15 and 1e15 tests in float spare most of those in double. Only IEEE
+ * There is no epsilon: the error of a hit is relative to the ray and the triangle (hgrid_hit has the
+ * bound), and whether t lies in the range is decided exactly. So meshes of any scale from 1e-30 to 1e30
+ * work; between 1e-15 and 1e15 rays are faster, as tests in float replace most tests in double. Only IEEE
  * + - * / and square roots are used, in a fixed order: the same input gives the same bits on every
  * machine. They are rounded to nearest, as in every C program that does not call fesetround: another
- * mode loses hits. Where denormal numbers are taken for zero (FTZ and DAZ of x86), what is below 1.2e-38
- * counts as zero, in between, too: scenes of 1e-25 and less may get other hits.
+ * mode loses hits. Where denormal numbers are flushed to zero (FTZ and DAZ of x86), inputs and
+ * intermediate results below 1.2e-38 become zero: scenes of size 1e-25 and less may get other hits.
  *
  * Versions
  * --------
@@ -232,7 +233,7 @@
 #define HGRID_SCRATCH_BOUND_ONE_LEVEL(triangles) ((size_t)5 * (triangles) + 1024)
 
 /**
- * The same with `HGRID_QUALITY_HIGH`, bytes of scratch; of index `HGRID_INDEX_BOUND` is enough. With 32 bits
+ * Bytes of scratch that are enough with `HGRID_QUALITY_HIGH`; for the index use `HGRID_INDEX_BOUND`. With 32 bits
  * the result wraps beyond 134 million triangles.
  */
 #define HGRID_BVH_HIGH_SCRATCH_BOUND(triangles) ((size_t)32 * (triangles) + 64)
@@ -358,7 +359,7 @@
 #define HGRID_QUALITY_FAST 0
 
 /**
- * The quality of a tree whose every node SAH chooses, each triangle on its own.
+ * The quality of a tree that is built with SAH at every node, down to single triangles.
  *
  * Choose it for a scene that is traced for long, above all where large and small triangles mix, as in
  * architecture. Rays are answered sooner and the index is smaller; the build takes about ten times
@@ -384,7 +385,7 @@
 #define HGRID_MAX_TASKS 64
 
 /**
- * What `progress` of `hgrid_config` is told when all is done.
+ * The value that `progress` of `hgrid_config` gets when the build is done.
  */
 #define HGRID_PROGRESS_END 1000
 
@@ -450,7 +451,7 @@
 #define HGRID_VERSION (((HGRID_VERSION_MAJOR << 16) | (HGRID_VERSION_MINOR << 8)) | HGRID_VERSION_PATCH)
 
 /**
- * What a call answers: `HGRID_OK`, or below zero why not. `hgrid_status_string` has it in words.
+ * The result of a call: `HGRID_OK`, or a negative error. `hgrid_status_string` has the text of each.
  */
 typedef int32_t hgrid_status;
 
@@ -535,12 +536,12 @@ typedef struct hgrid_mesh {
 typedef void (*hgrid_task)(void *task_context, uint32_t index);
 
 /**
- * What a build may be told: which grid, and how to go about it. Initialise it with
+ * The configuration of a build: the method with its parameters, tasks and progress. Initialise it with
  * `HGRID_CONFIG_INIT`, which is also what NULL means, or with the macro of another method:
  * `HGRID_CONFIG_INIT_ONE_LEVEL`, `_FIXED`, `_VARIABLE`, `_RECURSIVE`.
  *
- * Each macro sets all fields to what the method's authors use. To change the method later, set
- * `method` and `density`: a field that belongs to another method is not looked at.
+ * Each macro sets all fields to the values that the method's authors use. To change the method later,
+ * set `method` and `density`: fields of other methods are ignored.
  */
 typedef struct hgrid_config {
     /**
@@ -581,12 +582,12 @@ typedef struct hgrid_config {
      */
     uint32_t flags;
     /**
-     * For `HGRID_METHOD_BVH`: the most tasks that are run at once, usually the
-     * number of cores; each takes scratch of its own, for which `hgrid_bound` and `hgrid_sizes` ask and
-     * `HGRID_SCRATCH_BOUND` does not: with less the build runs fewer, down to one. With 0 and 1 nothing
-     * is parallel, and what is above `HGRID_MAX_TASKS` counts as that. Above 1 `run` may not be NULL,
-     * not even for `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the
-     * thread that calls, and look at neither.
+     * For `HGRID_METHOD_BVH`: the most tasks that run at once, usually the number of cores. Each needs
+     * scratch, which `hgrid_bound` and `hgrid_sizes` include and `HGRID_SCRATCH_BOUND` does not; with
+     * less scratch the build runs fewer tasks, down to one. 0 and 1 mean a serial build; a number above
+     * `HGRID_MAX_TASKS` counts as `HGRID_MAX_TASKS`. Above 1 `run` may not be NULL, not even for
+     * `hgrid_bound` and `hgrid_fit`, which do not call it. The other methods build on the calling thread
+     * and ignore `tasks` and `run`.
      */
     uint32_t tasks;
     /**
@@ -609,30 +610,30 @@ typedef struct hgrid_config {
      *
      * A task that is called twice, even at the same time, one that is never called, and an index
      * that is not below `count` do no harm: the build ends with `HGRID_ERROR_PARALLEL_FOR`.
-     * Undefined behaviour, as nothing can detect it, is a call of `task` that is made or still
-     * running after `run` has returned, or with another `task_context`; a `run` that is left by
-     * `longjmp` or by a C++ exception; and one that changes what the build works on.
+     * The following cannot be detected and are undefined behaviour: a call of `task` that is made or still
+     * running after `run` has returned, or that gets another `task_context`; a `run` that is left by
+     * `longjmp` or by a C++ exception; a `run` that changes the mesh or the regions of the build.
      */
     void (*run)(void *context, uint32_t count, hgrid_task task, void *task_context);
     /**
-     * Told how much of a build is `done`, in thousandths from 0 to `HGRID_PROGRESS_END`, and answers
-     * whether to go on; or NULL. It is called on the thread that builds, a few times to a few hundred
-     * times; `done` grows from call to call, and in the last call of a build that succeeds it is
-     * `HGRID_PROGRESS_END`, whatever the answer. After false the build ends with
-     * `HGRID_ERROR_CANCELLED`, at the latest when a pass over the mesh is over. It may ask other grids
-     * questions and build other grids, but not touch the regions of this build nor change its mesh, and
-     * may not be left by `longjmp` or by a C++ exception.
+     * Gets how much of a build is `done`, in thousandths from 0 to `HGRID_PROGRESS_END`, and returns true
+     * to continue or false to cancel. May be NULL. It is called on the thread that builds, a few times to
+     * a few hundred times. `done` grows from call to call; the last call of a build that succeeds gets
+     * `HGRID_PROGRESS_END`, and its result is ignored. After false the build ends with
+     * `HGRID_ERROR_CANCELLED`, after the current pass over the mesh at the latest. The callback may query
+     * and build other grids. It must not touch the regions of this build, change its mesh, or be left by
+     * `longjmp` or by a C++ exception.
      */
     bool (*progress)(void *context, uint32_t done);
 } hgrid_config;
 
 /**
- * What a build, or a question for sizes, found out. Initialise it with `HGRID_REPORT_INIT`.
+ * The results of a build, or of a call that computes sizes. Initialise it with `HGRID_REPORT_INIT`.
  *
- * Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails:
- * what the call did not find out is 0, and `triangle` is `HGRID_INVALID_ID`. What takes another
- * pass over mesh and grid, `hgrid_inspect` tells: triangles with two equal corners, the first bad
- * one, the longest list, a hash of the content.
+ * Every call that takes a report sets all fields but `struct_size`, whether it succeeds or fails.
+ * Fields that the call does not compute become 0, and `triangle` becomes `HGRID_INVALID_ID`.
+ * `hgrid_inspect` has the statistics that take another pass over mesh and grid: triangles with two
+ * equal corners, the first bad triangle, the longest list, a hash of the content.
  */
 typedef struct hgrid_report {
     /**
@@ -649,9 +650,9 @@ typedef struct hgrid_report {
      */
     uint64_t index_bytes;
     /**
-     * Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it
-     * is enough, but not exact, and after a build an upper bound of that. After a build with
-     * several tasks, whether it succeeds or fails, it is that of a build with one.
+     * Bytes that the scratch region needs. For `HGRID_METHOD_VARIABLE` it is enough but not exact, before
+     * a build and after it. After a build with several tasks, whether it succeeds or fails, it is the need
+     * of a build with one task.
      */
     uint64_t scratch_bytes;
     /**
@@ -741,20 +742,19 @@ typedef uint32_t hgrid_verdict;
  * triangle's vertices `a`, `b`, `c`, up to rounding. A hit is a function of the ray and the triangle
  * alone: other triangles, the method and the box of the grid do not change a bit of it.
  *
- * There is no epsilon. Let L be the largest difference of a coordinate between the origin and a
- * vertex, Z the range of `t` between the vertices. The hit is that of a triangle whose vertices lie
- * up to 2^-50 L across the ray from where they are. Of this hit `u` and `v` are off by no more than
- * (2^-24 + 2^-38) of their value, `t` by no more than 2^-24 |t| + 2^-38 (|t| + Z); below 1.2e-38 by
- * 2^-149. Triangles that share a vertex share the place where it lies, so nothing slips between them.
+ * There is no epsilon, but an error bound. Let L be the largest coordinate of a vertex relative to the
+ * origin, Z the range of `t` between the vertices. The reported hit is the exact hit of a triangle whose
+ * vertices are moved by up to 2^-50 L across the ray, with these errors: `u` and `v` up to 2^-24 + 2^-38
+ * of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up to 2^-149. A vertex is
+ * moved alike for all triangles that share it, so no ray passes between them.
  *
  * The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the
- * ray's line meets the plane of the vertices as they are: a ray that starts above a plane and leaves
- * it does not hit it, however close it starts. Only an end that lies between vertices is
- * asked about: all points of the triangle keep the other one. The `t` that is reported lies in the
- * range, too: it is the end for a triangle that the ray grazes, whose own `t` may be up to 2^-21 Z outside. It is rounded: a range that
- * ends at it may leave out the hit that it was reported for. An origin more than 2^50 times as far away
- * as a triangle is large may not tell its vertices apart, and miss it. (The proof is the head of
- * core/src/triangle.rs.)
+ * ray's line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does
+ * not hit it, however close it starts. An end of the range needs this decision only if it lies between
+ * the vertices. The reported `t` lies in the range, too: where a ray grazes a triangle, its own `t` may
+ * be up to 2^-21 Z outside, and the end of the range is reported. The reported `t` is rounded, so a range
+ * that ends at it may exclude the same hit. A triangle that is farther from the origin than 2^50 times
+ * its size may be missed. (The head of core/src/triangle.rs has the proof.)
  */
 typedef struct hgrid_hit {
     /**
@@ -796,15 +796,14 @@ typedef struct hgrid_counters {
 } hgrid_counters;
 
 /**
- * What a query may be told. Initialise it with `HGRID_QUERY_OPTIONS_INIT`; NULL means the same.
+ * The options of a query. Initialise them with `HGRID_QUERY_OPTIONS_INIT`; NULL means these defaults.
  *
  * A query with options that are not the defaults is somewhat slower than one without. A tree
  * (`HGRID_METHOD_BVH`) traces the rays of a batch together whatever `mask`, `cull` and `skip` are, and
  * with a `filter` up to their first hits; with `counters`, and with the other methods, they are traced
  * one by one.
- * Options that break the rules for structs make
- * a query of one ray answer as for a miss: `hgrid_intersect_all` with the same options
- * returns what is wrong with them.
+ * With options that break the rules for structs, a query of one ray returns a miss;
+ * `hgrid_intersect_all` with the same options returns the error.
  */
 typedef struct hgrid_query_options {
     /**
@@ -821,10 +820,9 @@ typedef struct hgrid_query_options {
      */
     uint32_t cull;
     /**
-     * A triangle that is not hit, usually the one that the ray leaves, which then cannot
-     * hit itself, without any epsilon; or `HGRID_INVALID_ID`. A neighbour across an edge
-     * still may be hit, where the origin was rounded to just below it. It is one triangle for all
-     * rays of a batch: rays that start where `hgrid_surface_at` says need none.
+     * A triangle that is not hit, usually the one that the ray leaves, or `HGRID_INVALID_ID`. It needs no
+     * epsilon, but a neighbour across an edge may still be hit if rounding put the origin below it. All
+     * rays of a batch skip the same triangle; rays from origins of `hgrid_surface_at` need not skip any.
      */
     uint32_t skip;
     /**
@@ -832,14 +830,14 @@ typedef struct hgrid_query_options {
      */
     void *context;
     /**
-     * Says of a `hit` whether it counts; or NULL: all do. `ray` is the place of the ray in
-     * its batch, 0 for a single one.
+     * Returns whether a `hit` counts. NULL means that all hits count. `ray` is the number of the ray in
+     * its batch, 0 for a single ray.
      *
-     * Hits are offered from near to far, where `t` is equal by ascending triangle, and each
-     * triangle at most once for each ray; those of one ray of a batch before those of the next. Which
-     * triangles are offered, `filter_mask` says. It is called on the thread that asks, may ask the same
-     * grid other questions, and may not be left by `longjmp` or by a C++ exception. Here is glass,
-     * which lets shadow rays pass and weakens them:
+     * The filter gets the hits of a ray from near to far, at equal `t` by ascending triangle, and each
+     * triangle at most once. In a batch it gets all hits of one ray before those of the next.
+     * `filter_mask` selects the triangles that it is called for. It runs on the thread that called the
+     * query, may query the same grid, and must not be left by `longjmp` or by a C++ exception. Here is
+     * glass, which lets shadow rays pass and weakens them:
      *
      * ```c
      * typedef struct {
@@ -886,13 +884,13 @@ typedef struct hgrid_query_options {
      */
     size_t scratch_bytes;
     /**
-     * `filter` is asked about a triangle if its mask and this have a bit in common; the others are
-     * opaque: their hits count unasked. 0, the default, and all bits ask about every triangle, even one
-     * whose mask is 0.
+     * `filter` is called for the triangles whose mask has a bit in common with this one. The others are
+     * opaque: their hits count without a call. With 0, the default, and with all bits it is called for
+     * every triangle, even one whose mask is 0.
      *
-     * Rays that meet none of those triangles cost in a batch what they cost without a filter. Of a ray
-     * that an opaque triangle blocks, `hgrid_occluded` and the other questions of that kind may offer the
-     * filter other hits or not. Here are leaves, whose triangles have the mask 2, among walls:
+     * In a batch, rays that meet only opaque triangles cost no more than without a filter. If an opaque
+     * triangle blocks a ray, `hgrid_occluded` and its like may call the filter for other hits of the ray,
+     * or not. Here are leaves, whose triangles have the mask 2, among walls:
      *
      * ```c
      * static hgrid_status light_of_rays(const hgrid_grid *grid, const hgrid_ray *rays, size_t count,
@@ -1058,7 +1056,7 @@ typedef struct hgrid_blob_info {
 } hgrid_blob_info;
 
 /**
- * What a look at all of a grid finds. Initialise it with `HGRID_STATISTICS_INIT`.
+ * The statistics of a grid and its mesh. Initialise it with `HGRID_STATISTICS_INIT`.
  */
 typedef struct hgrid_statistics {
     /**
@@ -1095,9 +1093,9 @@ typedef struct hgrid_statistics {
      */
     uint32_t reserved;
     /**
-     * A hash of the grid's box, resolution and lists in order, not of which cell
-     * has which: the same for the same grid on every platform, whatever its byte
-     * order. No defence against forgery.
+     * A hash of the grid's box, its resolution and its lists in order, but not of the cells that they
+     * belong to. The same grid has the same hash on every platform, whatever its byte order. It does not
+     * protect against forgery.
      */
     uint64_t content_hash;
 } hgrid_statistics;
@@ -1185,7 +1183,7 @@ typedef struct hgrid_shapes {
 } hgrid_shapes;
 
 /**
- * What instances show: a grid, a tree of shapes or a scene, by the address of its view. `hgrid_object_grid`,
+ * A grid, a tree of shapes or a scene that instances show, by the address of its view. `hgrid_object_grid`,
  * `hgrid_object_shapes` and `hgrid_object_scene` make it.
  *
  * The view stays where it is, with all that it refers to, for as long as scenes that show it are queried.
@@ -1291,7 +1289,7 @@ typedef struct hgrid_scene_hit {
 } hgrid_scene_hit;
 
 /**
- * What a query of a scene may be told. Initialise it with `HGRID_SCENE_OPTIONS_INIT`.
+ * The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`.
  */
 typedef struct hgrid_scene_options {
     /**
@@ -1373,9 +1371,9 @@ typedef struct hgrid_allocator {
 
 /**
  * Rays that follow one another start near each other: camera rays of a tile, shadow rays and
- * ambient occlusion from its hits. They are taken as given, with a tree in groups of 64. Best are
- * runs of 128 rays from two tiles of 8 x 8 pixels side by side, each sixteen of them a square of
- * 4 x 4.
+ * ambient occlusion from its hits. They are traced in the order given, with a tree in groups of 64.
+ * The best order is that of tiles of 8 x 8 pixels, two adjacent ones at a time, each in four squares of
+ * 4 x 4 pixels.
  */
 #define HGRID_COHERENCE_COHERENT 1
 
@@ -1576,7 +1574,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_CANNOT_REFIT -47
 
 /**
- * An older version built the blob with a method that was removed, brick: build it again with another one.
+ * The blob was built by an older version with the method brick, which was removed: build it with another method.
  */
 #define HGRID_ERROR_METHOD_REMOVED -48
 
@@ -1586,7 +1584,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_OTHER_CONTENT -49
 
 /**
- * An instance names an object that there is not. The report's `triangle` says which instance.
+ * An instance names an object that does not exist. The report's `triangle` is the number of the instance.
  */
 #define HGRID_ERROR_INSTANCE_OBJECT -60
 
@@ -1721,9 +1719,9 @@ hgrid_status hgrid_bound(size_t triangle_count,
  * is 1. That takes about half the time of a build; with recursive and bvh, which have to build
  * the grid and keep nothing of it, all of that time. The scratch holds nothing of use afterwards.
  *
- * With `tasks` in the configuration the answer is for a build with so many at once: each takes
- * scratch, the index is filled by all of them and may be a little larger; with bvh it is what any
- * mesh takes, and `is_exact` is 0. `run` may be called for the answer, too; `progress` is not.
+ * With `tasks` above 1 in the configuration, the sizes are those of a build with so many tasks: each
+ * takes scratch, and all of them fill the index, which may be a little larger. With bvh the sizes are then
+ * bounds for any mesh, and `is_exact` is 0. The call may use `run`, too, but not `progress`.
  *
  * `mesh` and `report` may not be NULL. `config` may be NULL: the defaults. `scratch` may be NULL
  * if its size is 0; scratch that is too small is no error, and counts as none.
@@ -1759,10 +1757,10 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  * (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call takes at most a dozen times as long
  * as `hgrid_sizes`. A density that is too fine for a build counts as one that does not fit.
  *
- * Bring as much scratch as `hgrid_sizes` without scratch says. With less the grid may get coarser
- * than the index had to be: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` it must fit by
- * its bound, with the other methods there must be scratch enough to plan it; where there is not
- * for any, they answer `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
+ * Bring as much scratch as `hgrid_sizes` without scratch returns. With less, the grid may become coarser
+ * than the index requires: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the bound of a grid must
+ * fit, with the other methods the scratch must be large enough to plan a grid. If it is too small for all
+ * densities, the call returns `HGRID_ERROR_SCRATCH_TOO_SMALL`. The scratch holds nothing of use
  * afterwards.
  *
  * `mesh` and `fitted` may not be NULL. `config` may be NULL: the defaults; and it may be
@@ -1808,13 +1806,13 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  * what `hgrid_sizes` returns. The report is written in both cases: what was built; or, if a region
  * is too small, what both need; or the triangle that is to blame.
  *
- * After an error `index` is as it was, with two exceptions. After a cancelled build it may hold
- * anything. And `HGRID_METHOD_BVH` writes into it before it has read the whole mesh: after any error
- * of a build that began, a grid that lay there before is gone. So it is with `HGRID_METHOD_VARIABLE` and
- * `HGRID_METHOD_RECURSIVE` after `HGRID_ERROR_INDEX_TOO_SMALL` and `HGRID_ERROR_INVALID_DENSITY`. A view of it (`grid` itself, where a build is repeated) can be asked
- * without harm, but answers anything: set it to `HGRID_GRID_INIT`. These methods write as far as the
- * index reaches and then go on counting: the report's `index_bytes` is exact (with bvh maybe
- * only enough), and with so many the same call succeeds.
+ * After an error `index` is unchanged, except in three cases in which it may hold anything: after a cancelled
+ * build; with `HGRID_METHOD_BVH` after any error of a build that began; with `HGRID_METHOD_VARIABLE` and
+ * `HGRID_METHOD_RECURSIVE` after `HGRID_ERROR_INDEX_TOO_SMALL` and `HGRID_ERROR_INVALID_DENSITY`. Queries on a
+ * view of the grid that lay there before are safe, but their answers are wrong: set the view to
+ * `HGRID_GRID_INIT` (`grid` itself, if a build is repeated). If the index is too small, these three methods
+ * continue without writing and compute the size: the report's `index_bytes` is exact (with bvh maybe only
+ * enough), and the same call with that much succeeds.
  *
  * A build allocates nothing and needs at most 18 KiB of stack, as `hgrid_sizes`, `hgrid_fit`,
  * `hgrid_validate` and `hgrid_inspect` do; with `tasks` above 1 at most 96 KiB, and each task 13
@@ -1897,11 +1895,11 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * seen exactly edge-on, is not hit, up to rounding.
  *
  * `options` may be NULL: the defaults. With another NULL, with a view of zeros (`HGRID_GRID_INIT`),
- * or with options that break the rules for structs, nothing is hit. A view that nobody initialised,
- * and one whose blob or mesh is gone, is undefined behaviour.
+ * or with options that break the rules for structs, nothing is hit. A query of an uninitialised view, or
+ * of one whose blob or mesh is gone, is undefined behaviour.
  *
- * A query allocates nothing, needs at most 7 KiB of stack, as all queries of one ray or point do,
- * and always ends: on one level after no more steps than the three resolutions sum up to.
+ * A query allocates nothing and needs at most 7 KiB of stack, as all queries of one ray or point do. It
+ * always ends: in a grid of one level after at most as many steps as the three resolutions add up to.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -1960,17 +1958,16 @@ uint32_t hgrid_occluder(const struct hgrid_grid *grid,
 /**
  * Finds all triangles that a ray hits: by ascending `t`, where that is equal by number, each once.
  *
- * Writes as many hits as there is room for, the nearest, and to `count` how many there are, which
- * may be more. Without a filter a tree is walked once and keeps the nearest in a heap: the number of hits
- * times the logarithm of the room. With a filter, and for the other methods where there is not room for
- * more hits than there are, the ray is walked once more for each sixteen hits, from where it got to: so
- * nothing is allocated, whatever their number, but thousands of hits in one cell take long, as the
- * square of their number.
- * Options as with `hgrid_intersect`: a filter is asked about each hit, from near to far, and what
- * it accepts is written and counted.
+ * Writes the nearest hits to `hits`, up to `capacity`, and the number of all hits to `count`, which may
+ * be larger; `capacity` 0 only counts. In a tree without a filter, one traversal keeps the nearest hits in
+ * a heap, in time proportional to the number of hits times the logarithm of `capacity`. With a filter, and
+ * with the other methods if `capacity` is too small for all hits, the ray is traversed again for every
+ * sixteen hits, each time from the last of them. That takes no memory, but the time for thousands of hits
+ * in one cell grows with the square of their number. Options are as with `hgrid_intersect`: a filter gets
+ * each hit, from near to far, and those that it accepts are written and counted.
  *
- * What is left of a light at the end of a ray (`t_max`), behind panes of one triangle each. More than
- * 64 count as a wall. (Where two share an edge, a ray through it meets both.)
+ * The example computes how much light from the end of a ray (`t_max`) passes through panes of glass, one
+ * triangle each. More than 64 panes count as a wall. (A ray through an edge that two panes share meets both.)
  *
  * ```c
  * static float light_behind(const hgrid_grid *grid, const hgrid_ray *ray, const float *share)
@@ -2021,17 +2018,15 @@ hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
  * }
  * ```
  *
- * Of the options, `mask`, `skip` and `counters` mean something here: `cell_steps` counts
- * the lists or leaves that were looked at, `primitive_tests` the triangles in them, `grid_steps` the nodes
- * of a tree. `options` may be
- * NULL: the defaults. With anything that is not as it should be (another NULL, a view of
- * zeros, options that break the rules, a point that is not finite, a distance that is NaN
- * or negative) the answer is false.
+ * Of the options, `mask`, `skip` and `counters` are used: `cell_steps` counts the lists or leaves that are
+ * visited, `primitive_tests` the triangles in them, `grid_steps` the nodes of a tree. `options` may be
+ * NULL: the defaults. The call returns false for invalid arguments: another NULL, a view of zeros, options
+ * that break the rules, a point that is not finite, a distance that is NaN or negative.
  *
  * The call allocates nothing and always ends. With `HGRID_METHOD_BVH` it visits the nodes that are no
  * farther than the answer, wherever the point lies. With the other methods the time grows with the
- * triangles in a cube around the point that reaches as far as the answer: it is short near the mesh, and
- * far outside of it that of a loop over a good part of all triangles.
+ * triangles in a cube around the point that reaches as far as the answer. So they are fast near the mesh;
+ * for points far outside they test a large part of all triangles.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
  *
@@ -2074,7 +2069,8 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * A start lies above the plane by 1 / 2^20 of the distance to the triangle's farthest corner, far more
  * than a test may be off. A ray nearly along the plane may still hit the triangle, as the normal is
  * rounded. A triangle without area, or a needle thinner than 1e-9 of its length, has no normal to
- * rely on: without any it is the one that faces the ray. `is_front` is what `cull` goes by, but for triangles seen nearly edge-on.
+ * rely on; if there is none at all, `normal` faces the ray. `is_front` agrees with `cull`, except for
+ * triangles that the ray sees nearly edge-on.
  *
  * Threads: any number of calls and queries on the same grid at once.
  *
@@ -2143,9 +2139,9 @@ bool hgrid_locate(const struct hgrid_grid *grid,
  *
  * Rays and hits may lie in structs of yours, also in the same ones: with `struct {hgrid_ray ray;
  * hgrid_hit hit; int pixel;}` both strides are the size of the struct. A stride of 0 means side by
- * side. Neither array needs any alignment, and not a byte between its elements is read or written.
- * No hit may overlap a ray, its own or another; where the two arrays reach into each other, their
- * strides are the same. Nor do hits overlap anything else that the call uses.
+ * side. Neither array needs any alignment, and bytes between elements are neither read nor written.
+ * No hit may overlap a ray, nor anything else that the call uses; if the two arrays interleave, their
+ * strides must be equal.
  *
  * `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
  * the hits. For rays without any order lend memory to sort them in, and pass as many as you have in
@@ -2269,10 +2265,9 @@ hgrid_status hgrid_occluder_n(const struct hgrid_grid *grid,
  * `hgrid_pack` wrote has its mesh in it: then `mesh` may be NULL. With a mesh that one is used, its
  * masks included, and the one in the blob is not looked at.
  *
- * What O(1) cannot see is not trusted: on damaged bytes, queries may answer wrongly, but they read
- * nothing outside the blob and the mesh and they end. `hgrid_validate` makes sure. The bytes must
- * not change while the grid is in use: a file that others may write is not for mapping,
- * read it into memory of your own.
+ * The call does not check the whole blob. On damaged bytes queries may answer wrongly, but they end, and
+ * they read nothing outside the blob and the mesh. `hgrid_validate` proves a blob. The bytes must not
+ * change while the grid is in use: do not map a file that others may write, read it into your own memory.
  *
  * `blob` and `grid` may not be NULL. Returns `HGRID_OK` and writes the view to `grid`; or returns
  * what is wrong and leaves `grid` as it was:
@@ -2413,9 +2408,9 @@ hgrid_status hgrid_mesh_of(const struct hgrid_grid *grid,
  * address, overlaps neither blob nor mesh nor any argument of this call, and may be NULL if
  * `scratch_bytes` is 0. It may hold anything before and holds nothing of use afterwards.
  *
- * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`, or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if it is the mesh
- * that is damaged; `HGRID_ERROR_SCRATCH_TOO_SMALL` and `HGRID_ERROR_OVERLAP` if it is the scratch that
- * will not do; `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
+ * Returns `HGRID_OK`; `HGRID_ERROR_CORRUPT`; `HGRID_ERROR_INDEX_OUT_OF_RANGE` if the mesh is damaged;
+ * `HGRID_ERROR_SCRATCH_TOO_SMALL` or `HGRID_ERROR_OVERLAP` if the scratch is too small or overlaps;
+ * `HGRID_ERROR_NOT_A_GRID` for a view of zeros (`HGRID_GRID_INIT`);
  * `HGRID_ERROR_NULL_ARGUMENT`.
  *
  * Threads: any number of calls and queries on the same grid at once, each with scratch of its own.
@@ -2886,8 +2881,8 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
  * with, and `hgrid_build`, in one call.
  *
  * Only in libraries that were built with the feature `std`, and declared only where `HGRID_STD` is
- * defined. It takes as long as those three calls: who builds again for every frame brings
- * the memory and calls `hgrid_build`.
+ * defined. It takes as long as those three calls. To build again for every frame, keep the memory and
+ * call `hgrid_build`.
  *
  * ```c
  * static size_t count_hits(const hgrid_mesh *mesh, const hgrid_ray *rays, size_t count)
@@ -2973,8 +2968,8 @@ uint32_t hgrid_version(void);
 const char *hgrid_version_string(void);
 
 /**
- * Whether the library that is linked has a method, `HGRID_METHOD_ONE_LEVEL` and so on. False for a
- * number that is no method.
+ * Tells whether the linked library has a method, `HGRID_METHOD_ONE_LEVEL` and so on; false for a number
+ * that is no method.
  *
  * It has all of them unless it was built with fewer, to be smaller: `cargo build --release -p
  * hgrid-capi --no-default-features --features one-level`, say.
