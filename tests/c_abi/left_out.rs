@@ -49,7 +49,7 @@ fn what_is_left_out_is_refused_and_what_is_there_is_the_same() {
 }
 
 #[test]
-#[ignore = "slow: three more libraries, optimised as a whole"]
+#[ignore = "slow: three more libraries"]
 fn other_methods_may_be_left_out() {
     assert!(print(&OTHERS).contains("reached -38 hgrid_build"));
 }

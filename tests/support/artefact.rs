@@ -4,10 +4,10 @@
 //! a folder of its own below the target folder: a test program holds the lock of the outer one.
 //! Each flavour has a folder, so that one does not take the place of the other.
 
-use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
+use std::{env, fs};
 
 use cc::Tool;
 
@@ -101,14 +101,25 @@ impl Flavour {
     }
 }
 
-/// The static library with some of its methods: the names of features, between commas.
+/// The static library with some of its methods: the names of features, between commas. It is compiled in a third of
+/// the time, as only its answers count, not its size; without any LTO the core of Rust asks for a runtime.
+///
+/// # Panics
+/// If it cannot be built or copied.
 #[must_use]
 pub fn library_with(features: &str) -> PathBuf {
-    let target = target_dir().join("methods").join(features.replace(',', "_"));
-    let build = &mut cargo_in(&target, "build");
+    // All are built in one folder, so that they share what they depend on: one after the other.
+    static FOLDER: Mutex<()> = Mutex::new(());
+    let _turn = FOLDER.lock().expect("nobody panicked");
+    let target = target_dir().join("methods");
+    let mut build = cargo_in(&target, "rustc");
     build.args(["--release", "-p", "hgrid-capi", "--no-default-features", "--features", features]);
-    run(build);
-    target.join("release/libhgrid.a")
+    build.args(["--lib", "--crate-type", "staticlib"]);
+    build.env("CARGO_PROFILE_RELEASE_LTO", "thin").env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
+    run(&mut build);
+    let library = target.join(format!("{}.a", features.replace(',', "_")));
+    fs::copy(target.join("release/libhgrid.a"), &library).expect("a copy");
+    library
 }
 
 /// Where the libraries of the usual flavour lie.
