@@ -295,8 +295,8 @@
 /**
  * A hashed grid of many small cells, and above it levels of macrocells that say where anything is.
  *
- * Rays cross empty space in large steps, and the small cells hold few triangles each. Choose it
- * where many rays are shot for each build. `macrocell_factor` belongs to it.
+ * Rays cross empty space in large steps, and the small cells hold few triangles each. Among the paper's
+ * grids it has the shortest time to a first image. `macrocell_factor` belongs to it.
  *
  * Memory: one and a half to three times that of one level. The build plans every byte in the
  * scratch before it writes the index.
