@@ -192,7 +192,7 @@ pub struct CompareArgs {
     /// What is asked of them, between commas [default: all]
     #[arg(long, value_name = "WORKLOADS", value_delimiter = ',', value_enum)]
     pub workloads: Vec<Workload>,
-    /// Compare on a field of so many instances of the mesh, for `bvh` and Embree: scenes over one structure
+    /// Compare scenes of this many instances of the mesh (`bvh` and Embree only); 0 compares the mesh itself
     #[arg(long, value_name = "NUMBER", default_value_t = 0, conflicts_with = "output",
           value_parser = clap::value_parser!(u32).range(..=10_000_000))]
     pub instances: u32,

@@ -1,4 +1,4 @@
-//! What rays are asked of: a grid of a mesh, or a scene of instances of several.
+//! The structure that the rays of a picture query: a grid of one mesh, or a scene of instances of several.
 //!
 //! ```text
 //! World      closest hits       any hit               surface
@@ -16,7 +16,7 @@ use crate::scene::Bounds;
 use crate::scene::model::{determinant, moved, transform_of};
 use crate::tiles::{TILE_RAYS, intersect};
 
-/// What is built, as a picture asks it.
+/// A built structure, with the queries of a picture.
 #[derive(Debug, Clone, Copy)]
 pub enum World<'a> {
     /// A mesh where it is.
@@ -25,8 +25,8 @@ pub enum World<'a> {
     Instances(&'a Scene<'a>),
 }
 
-/// What a start is lifted by beyond the lift of a mesh, in parts of an object's extent and of its
-/// coordinates: docs/renderers.md asks for half as much.
+/// The lift of a ray's start beyond that of a mesh, relative to the extent and the coordinates of the object: twice the
+/// error that docs/renderers.md gives.
 const LIFT: f32 = 32.0 * f32::EPSILON; // 2^-18
 
 /// The same for the rounding of corners that are moved, in parts of their coordinates in the scene.
@@ -92,7 +92,7 @@ impl World<'_> {
     #[must_use]
     pub fn surface(&self, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
         match self {
-            Self::Mesh(grid) => grid.mesh().surface(ray, &on_mesh(hit)),
+            Self::Mesh(grid) => grid.mesh().surface(ray, &on_mesh(*hit)),
             Self::Instances(scene) => surface(scene, ray, hit),
         }
     }
@@ -104,7 +104,7 @@ fn of_mesh(&Hit { t, u, v, primitive }: &Hit) -> SceneHit {
 }
 
 /// A hit without its instance.
-pub(crate) fn on_mesh(&SceneHit { t, u, v, primitive, .. }: &SceneHit) -> Hit {
+pub(crate) const fn on_mesh(SceneHit { t, u, v, primitive, .. }: SceneHit) -> Hit {
     Hit { t, u, v, primitive }
 }
 
@@ -113,12 +113,12 @@ fn surface(scene: &Scene<'_>, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
     let instance = scene.instance_of(hit)?;
     let transform = transform_of(&instance);
     let [a, b, c] = grid.mesh().triangle(hit.primitive)?.map(|corner| moved(&transform, corner));
-    let Hit { u, v, .. } = on_mesh(hit);
+    let SceneHit { t, u, v, .. } = *hit;
     // The front stays the front, as where instances are triangles.
     let (corners, [u, v]) =
         if determinant(&transform) < 0.0 { ([a, c, b], [v, u]) } else { ([a, b, c], [u, v]) };
     let mesh = TriangleMesh::new(&corners, &[[0, 1, 2]]).ok()?;
-    let surface = mesh.surface(ray, &Hit { t: hit.t, u, v, primitive: 0 })?;
+    let surface = mesh.surface(ray, &Hit { t, u, v, primitive: 0 })?;
 
     let far = surface.position.iter().fold(0.0, |far: f32, c| far.max(c.abs()));
     let lift = LIFT * size(&instance, grid.bounds()) + CORNERS * far;
@@ -129,7 +129,7 @@ fn surface(scene: &Scene<'_>, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
     Some(Surface { above, below, ..surface })
 }
 
-/// How large an object is and how far its own origin is away from it, added, as its instance scales it.
+/// The extent of an object plus its largest coordinate, scaled as its instance scales it.
 fn size(instance: &Instance, (min, max): Bounds) -> f32 {
     let along = |axis: usize| max[axis] - min[axis] + min[axis].abs().max(max[axis].abs());
     let scale = instance.linear.as_flattened().iter().map(|c| c * c).sum::<f32>().sqrt();

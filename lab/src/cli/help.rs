@@ -30,8 +30,8 @@ Examples:
   hgrid render bunny.ply --json              the numbers, for programs
 
 Without a view, the camera stands in front of things, above flat scenes and within rooms.
-Meshes of a glTF file that stand more than once are instances in a scene of grids; for --shading heat and
-normals, for other methods than bvh and where one is made flat they become triangles.";
+A mesh that a glTF file shows more than once is built once and shown by instances. It becomes triangles with
+--shading heat or normals, with methods other than bvh, and if an instance flattens it.";
 
 pub(super) const INFO_EXAMPLES: &str = "\
 Examples:

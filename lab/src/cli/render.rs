@@ -99,8 +99,8 @@ impl RenderArgs {
         Ok(())
     }
 
-    /// Whether meshes that stand more than once stay instances: for the picture that a tree makes. For all
-    /// others they become triangles.
+    /// Returns true if meshes that stand more than once stay instances: only diffuse pictures with bvh show them.
+    /// Otherwise they become triangles.
     #[must_use]
     pub fn takes_instances(&self) -> bool {
         self.method == Method::Bvh && self.shading == Shading::Diffuse

@@ -1,12 +1,13 @@
 //! Instances of a mesh by hgrid: a scene over the tree of the mesh, which is built once.
 
 use anyhow::{Context as _, Result};
-use hgrid_core::{Config, Grid, Hit, Instance, Object, Ray, Scene, SceneHit, Sizes};
+use hgrid_core::{Config, Grid, Hit, Instance, Object, Ray, Scene, Sizes};
 
 use super::input::Input;
 use super::mode::Mode;
 use super::system::{Bytes, Tracer, Use, each};
 use crate::regions::Regions;
+use crate::world::on_mesh;
 
 /// Builds the mesh's tree and the scene, and calls `then` with the scene. With `start` it builds the scene
 /// before, calls `start`, and builds the scene alone in the memory that it has just written.
@@ -29,16 +30,10 @@ pub(super) fn build(
     then(&SceneTracer { scene, instances, config })
 }
 
-/// What a scene of the instances needs at most.
+/// Returns the memory that is enough for a scene of these instances.
 fn bound(instances: &[Instance], config: &Config) -> Result<Sizes> {
     let count = u32::try_from(instances.len())?;
     Scene::bound(count, config).context("scenes are built with bvh, and of fewer instances")
-}
-
-/// A hit as one of the mesh: which instance was hit is left out.
-pub(super) const fn hit_of_mesh(hit: SceneHit) -> Hit {
-    let SceneHit { t, u, v, primitive, .. } = hit;
-    Hit { t, u, v, primitive }
 }
 
 struct SceneTracer<'a> {
@@ -49,7 +44,7 @@ struct SceneTracer<'a> {
 
 impl Tracer for SceneTracer<'_> {
     fn intersect(&self, _: Mode, rays: &[Ray], hits: &mut [Hit]) {
-        each(rays, hits, |ray| self.scene.intersect(&ray.into()).map_or(Hit::MISS, hit_of_mesh));
+        each(rays, hits, |ray| self.scene.intersect(&ray.into()).map_or(Hit::MISS, on_mesh));
     }
 
     fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [u8]) {

@@ -87,7 +87,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     Ok(())
 }
 
-/// Leaves out systems and workloads that know no instances, and says which.
+/// Removes systems and workloads without instances, and prints their names.
 fn leave_out(systems: &mut Vec<Box<dyn System>>, workloads: &mut Vec<Workload>) -> Result<()> {
     let answers = |system: &dyn System, workload| !system.modes(workload, true).is_empty();
     let mut names = Vec::new();
@@ -106,7 +106,11 @@ fn leave_out(systems: &mut Vec<Box<dyn System>>, workloads: &mut Vec<Workload>) 
         is_kept
     });
     let names = names.join(", ");
-    ensure!(!systems.is_empty(), "nothing to measure: of instances nobody answers {names}");
+    ensure!(
+        !systems.is_empty(),
+        "nothing to measure: --instances is for bvh and Embree, and for the workloads primary, ao, bounce and \
+         random; left out were {names}"
+    );
     if !names.is_empty() {
         writeln!(io::stderr(), "left out, because they have no instances: {names}")?;
     }

@@ -68,7 +68,7 @@ pub struct SystemNumbers {
     pub triangles: u64,
     /// Instances of it, if there are any.
     pub instances: u64,
-    /// Bytes that are kept for queries, without the mesh; of instances without its structure, too.
+    /// Bytes that are kept for queries, without the mesh. With instances, without the structure of the mesh, too.
     pub index_bytes: u64,
     /// The most bytes that there were during the build, likewise.
     pub peak_bytes: u64,
@@ -155,7 +155,7 @@ impl SystemNumbers {
         Some(self.build(kind).seconds + run.seconds)
     }
 
-    /// What the tree is built over: triangles or instances.
+    /// The number of triangles or instances that the structure is built over.
     #[must_use]
     pub const fn items(&self) -> u64 {
         if self.instances > 0 { self.instances } else { self.triangles }

@@ -18,7 +18,7 @@ use crate::tiles::TILE_RAYS;
 /// What all systems share: questions, and room for answers.
 pub(super) struct Stage<'a> {
     rays: &'a Rays,
-    /// What surfaces look like; instances turn them, which no shader is told, so they get no colour.
+    /// The shader of the mesh; none with instances, as it does not know how they turn its surface.
     shader: Option<Shader<'a>>,
     pixels: Vec<Rgb>,
     hits: Vec<Hit>,

@@ -119,7 +119,7 @@ impl SceneNumbers {
         core::iter::once(self.builds()).chain(queries).chain(ratios)
     }
 
-    /// Builds, first images and memory; of instances no images, but the time of each.
+    /// Builds, first images and memory. With instances, the build time of each in place of images.
     fn builds(&self) -> Table {
         let of_instances = self.instances > 0;
         let item = if of_instances { "inst" } else { "tri" };

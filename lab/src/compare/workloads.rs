@@ -10,7 +10,6 @@ use hgrid_core::{Config, Control, Grid, Hit, Object, Ray, Scene};
 use serde::Serialize;
 
 use super::input::Input;
-use super::instanced::hit_of_mesh;
 use super::points::Points;
 use super::random::Random;
 use crate::field::Memory;
@@ -19,6 +18,7 @@ use crate::scene::Bounds;
 use crate::shade::normal_of;
 use crate::tiles::Tiles;
 use crate::vector::{Vector, cross, dot, length, offset, round, unit};
+use crate::world::on_mesh;
 
 /// The length of an ambient occlusion ray, as a part of the diagonal of the scene's box, or of the mesh's
 /// where the scene is a field of its instances.
@@ -167,7 +167,7 @@ impl Rays {
                 );
             }
         });
-        // What is near to an instance, however large the field is.
+        // A tenth of the mesh, not of the field: rays that are occluded nearby.
         let of_mesh = if count > 0 { diagonal_of(grid.bounds()) } else { diagonal };
         let t_max = narrow(AO_REACH * of_mesh);
         let ao = bounce.iter().map(|&ray| Ray { t_max, ..ray }).collect();
@@ -197,7 +197,7 @@ impl Rays {
     }
 }
 
-/// Who gives the answers: the default method on the mesh, or a scene of its instances.
+/// The structure that gives the answers: the default method on the mesh, or a scene of its instances.
 enum Asks<'a> {
     Mesh(Grid<'a>),
     Field(Scene<'a>),
@@ -215,7 +215,7 @@ impl Asks<'_> {
             Self::Field(scene) => {
                 let found = scene.intersect(&ray.into());
                 let normal = found.and_then(|hit| scene.triangle_normal(&hit));
-                (found.map_or(Hit::MISS, hit_of_mesh), normal.map(|normal| normal.map(f64::from)))
+                (found.map_or(Hit::MISS, on_mesh), normal.map(|normal| normal.map(f64::from)))
             }
         }
     }

@@ -81,7 +81,7 @@ fn scenes(files: &[Comparison]) -> impl Iterator<Item = (String, &Scene)> {
 }
 
 impl Scene {
-    /// What was built over, counted: triangles, or instances of so many.
+    /// The number of triangles, and that of instances if there are any.
     fn size(&self) -> String {
         match self.instances {
             0 => count(self.triangles),

@@ -11,7 +11,7 @@ use crate::scene::model::Model;
 use crate::threads::Threads;
 use crate::world::World;
 
-/// What a build took.
+/// Time and memory of a build.
 pub(super) struct Built {
     pub(super) seconds: f64,
     pub(super) index_bytes: usize,

@@ -127,7 +127,7 @@ fn draw(
             let shader = Shader::new(*grid.mesh(), &tiles.camera);
             paint(world, &tiles, args.samples(), threads, |seen: &Seen<'_>, light| {
                 let mut colors = vec![[0; 3]; seen.rays.len()];
-                let hits: Vec<_> = seen.hits.iter().map(on_mesh).collect();
+                let hits: Vec<_> = seen.hits.iter().copied().map(on_mesh).collect();
                 shader.normals(seen.rays, &hits, &mut colors);
                 for (light, color) in light.iter_mut().zip(colors) {
                     *light = color.map(|c| (f32::from(c) / 255.0).powi(2));
@@ -135,7 +135,7 @@ fn draw(
                 0
             })
         }
-        // Instances are loaded for this one alone.
+        // Only this shading loads instances.
         (Shading::Diffuse, _) | (_, World::Instances(_)) => {
             let part = (scene.framed_bounds(), scene.focus.is_none());
             let studio = Studio::new(world, tiles, lights, part, args.picture.up(scene));

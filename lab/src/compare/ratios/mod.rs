@@ -24,7 +24,7 @@ pub struct Ratio {
     pub what: String,
     /// The method and mode of hgrid.
     pub hgrid: String,
-    /// Its number: seconds, the median; or bytes for each triangle or instance.
+    /// Median seconds of hgrid, or its bytes for each triangle or instance.
     pub value: f64,
     /// The peer and its mode.
     pub peer: String,
@@ -130,7 +130,9 @@ fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>
         Ratio::new(what, &Entry::best(hgrid, workload)?, &theirs)
     };
     let random = |peer, quality| {
-        let (what, theirs) = best(peer, quality, "random rays in one call", Workload::Random)?;
+        // Instances are traced ray by ray, here and there.
+        let what = if hgrid.instances > 0 { "random rays" } else { "random rays in one call" };
+        let (what, theirs) = best(peer, quality, what, Workload::Random)?;
         Ratio::new(what, &Entry::in_mode(hgrid, Workload::Random, Mode::Batch)?, &theirs)
     };
     let points = |what: &str, workload| {
