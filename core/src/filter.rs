@@ -147,7 +147,7 @@ impl<S: Simd> Lanes for f32x8<S> {
 
 /// Lines as the filter sees them: one a lane, or the same one in all.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Filter<L> {
+pub(crate) struct LineFilter<L> {
     /// A point of the line near the triangles.
     pub(crate) origin: [L; 3],
     /// The direction, its largest component in [1, 2).
@@ -159,7 +159,7 @@ pub(crate) struct Filter<L> {
 }
 
 /// One ray.
-pub(crate) type RayFilter = Filter<f32>;
+pub(crate) type RayFilter = LineFilter<f32>;
 
 /// How far away triangles are from a point, and how large.
 #[derive(Debug, Clone, Copy)]
@@ -232,10 +232,10 @@ impl RayFilter {
 
     /// The same ray in all lanes.
     #[inline(always)]
-    pub(crate) fn splat<S: Simd>(&self, simd: S) -> Filter<f32x8<S>> {
+    pub(crate) fn splat<S: Simd>(&self, simd: S) -> LineFilter<f32x8<S>> {
         let ([x, y, z], [u, v, w]) = (self.origin, self.direction);
         let lanes = |number: f32| f32x8::splat(simd, number);
-        Filter {
+        LineFilter {
             origin: [lanes(x), lanes(y), lanes(z)],
             direction: [lanes(u), lanes(v), lanes(w)],
             slope: lanes(self.slope),
@@ -250,7 +250,7 @@ impl RayFilter {
     }
 }
 
-impl<S: Simd> Filter<f32x8<S>> {
+impl<S: Simd> LineFilter<f32x8<S>> {
     /// The filters of eight rays. Directions are scaled; no corner is farther than `distance` from its
     /// ray's origin.
     #[inline(always)]
@@ -271,7 +271,7 @@ impl<S: Simd> Filter<f32x8<S>> {
     }
 }
 
-impl<L: Lanes> Filter<L> {
+impl<L: Lanes> LineFilter<L> {
     /// The lanes whose triangles the f64 test is sure to miss.
     #[inline(always)]
     pub(crate) fn drops(&self, [a, b, c]: &[[L; 3]; 3]) -> L::Mask {
@@ -446,7 +446,7 @@ mod tests {
             let of = |number: &dyn Fn(usize) -> f32| {
                 f32x8::simd_from(simd, core::array::from_fn::<f32, 8, _>(number))
             };
-            let all = Filter {
+            let all = LineFilter {
                 origin: core::array::from_fn(|axis| of(&|lane| rays[lane].origin[axis])),
                 direction: core::array::from_fn(|axis| of(&|lane| rays[lane].direction[axis])),
                 slope: of(&|lane| rays[lane].slope),

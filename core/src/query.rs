@@ -10,7 +10,7 @@ use crate::counters::Counters;
 use crate::grid::Grid;
 use crate::options::{QueryOptions, Selection, Verdict};
 use crate::ray::{Hit, INVALID_ID, Ray};
-use crate::search::{All, Nearest};
+use crate::search::{All, NearestHits};
 
 /// The most hits that a walk collects.
 const ROOM: usize = 16;
@@ -268,7 +268,7 @@ impl Grid<'_> {
         is_any: bool,
     ) -> usize {
         let selection = Selection::new(self.mesh(), options);
-        let mut nearest = Nearest { selection: &selection, after, hits, count: 0, is_any };
+        let mut nearest = NearestHits { selection: &selection, after, hits, count: 0, is_any };
         let begin = after.map_or(ray.t_min, |after| after.t);
         let mut work = Counters::default();
         self.search(ray, begin, options.cull, &mut nearest, &mut work);

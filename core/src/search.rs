@@ -92,7 +92,7 @@ impl Search for Any {
 /// The nearest hits in order, as many as there is room for, each triangle once. Only hits behind `after`
 /// count, and only triangles of the selection.
 #[derive(Debug)]
-pub(crate) struct Nearest<'q> {
+pub(crate) struct NearestHits<'q> {
     pub(crate) selection: &'q Selection<'q>,
     pub(crate) after: Option<Hit>,
     pub(crate) hits: &'q mut [Hit],
@@ -199,7 +199,7 @@ fn sift_down(heap: &mut [Hit]) {
     }
 }
 
-impl Search for Nearest<'_> {
+impl Search for NearestHits<'_> {
     // Out of line: hits are rare, and the walk keeps its registers.
     #[inline(never)]
     fn show(&mut self, hit: Hit) -> Outcome {

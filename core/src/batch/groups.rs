@@ -4,7 +4,7 @@ use core::marker::PhantomData;
 
 use super::{Answer, Batch, Coherence, alone};
 use crate::arena::whole;
-use crate::bvh::{Bvh, Entry, Groups, Scope, Together};
+use crate::bvh::{Bvh, Groups, Scope, SortKey, Together};
 use crate::grid::Grid;
 use crate::options::QueryOptions;
 use crate::ray::{Hit, INVALID_ID, Ray};
@@ -98,8 +98,8 @@ impl<A: Answer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
     #[inline(always)]
     fn sorted<const ANY: bool>(&mut self) {
         let lent = core::mem::take(&mut self.options.scratch);
-        let start = lent.as_ptr().align_offset(align_of::<Entry>());
-        let memory = whole::<Entry>(lent.get_mut(start..).unwrap_or_default());
+        let start = lent.as_ptr().align_offset(align_of::<SortKey>());
+        let memory = whole::<SortKey>(lent.get_mut(start..).unwrap_or_default());
         if memory.len() < 2 * FEW {
             self.sorted_on_the_stack::<ANY>();
         } else {
@@ -116,7 +116,7 @@ impl<A: Answer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
 
     /// Traces rays in groups, in windows that are sorted in memory or as given.
     #[inline(never)]
-    fn groups<const ANY: bool>(&mut self, memory: &mut [Entry]) {
+    fn groups<const ANY: bool>(&mut self, memory: &mut [SortKey]) {
         let Scope { mesh, bounds, simd } = self.grid.scope();
         let (bvh, choice) = (self.tree, self.options.choice());
         if !ASKS && !A::IS_RARE {

@@ -4,7 +4,7 @@ use fearless_simd::Simd;
 
 use super::Bvh;
 use super::group::{Group, Stack};
-use super::order::{self, Entry, Sorted};
+use super::order::{self, SortKey, Sorted};
 use super::rays::{GROUP, Rays};
 use crate::aabb::Aabb;
 use crate::filter::RayFilter;
@@ -46,7 +46,7 @@ pub(crate) struct Groups<'r, C: ?Sized, const ANY: bool> {
     pub(crate) bounds: Aabb,
     pub(crate) choice: Choice,
     /// The memory to sort rays in; empty if rays keep their order.
-    pub(crate) memory: &'r mut [Entry],
+    pub(crate) memory: &'r mut [SortKey],
     pub(crate) batch: &'r mut C,
 }
 

@@ -9,7 +9,7 @@ use super::walk::bytes;
 
 /// Sides of eight boxes, or of one box in all lanes, by axis.
 #[derive(Clone, Copy)]
-pub(crate) struct Boxes<V> {
+pub(crate) struct WideBoxes<V> {
     low: [V; 3],
     high: [V; 3],
 }
@@ -46,7 +46,7 @@ pub(crate) struct BeamMet<S: Simd> {
     pub(crate) enter: f32x8<S>,
 }
 
-impl<S: Simd> Boxes<f32x8<S>> {
+impl<S: Simd> WideBoxes<f32x8<S>> {
     /// The eight boxes of a node relative to a point, grown on each side.
     #[inline(always)]
     pub(crate) fn decode(simd: S, node: &Node, center: [f32; 3], growth: f32) -> Self {
@@ -105,7 +105,7 @@ impl<S: Simd> Boxes<f32x8<S>> {
     }
 }
 
-impl<V> Boxes<V> {
+impl<V> WideBoxes<V> {
     /// One of the boxes in all lanes.
     #[inline(always)]
     pub(crate) fn one<S: Simd>(simd: S, sides: &[[f32; WIDTH]; 6], slot: usize) -> Self

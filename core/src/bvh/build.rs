@@ -8,11 +8,11 @@
 //! top       a tree over the subtrees                                            (top.rs)
 //!
 //! index   | header | ids (first the keys)    | nodes: root | subtrees of all tasks | top |
-//! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | bench |
+//! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | spare |
 //! ```
 //!
-//! The bench is the second buffer of the sort. `sizes` computes the exact size by a build without an index: it puts the
-//! keys and the top tree on the bench and only counts ids and nodes. A build also puts the keys on the bench if they do
+//! The sort buffer is the second buffer of the sort. `sizes` computes the exact size by a build without an index: it puts the
+//! keys and the top tree on the sort buffer and only counts ids and nodes. A build also puts the keys on the sort buffer if they do
 //! not fit into the index: an index of exact size has no room for keys of triangles that are skipped.
 //!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
@@ -34,7 +34,7 @@ use super::high;
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
     CROWD, Entry, MOST_TRIANGLES, bin_bits, index_bytes, most_below, most_nodes, scratch_bytes,
-    small_bench,
+    small_spare,
 };
 use super::node::Node;
 use super::roots::{RECORD, Record, Roots, Side};
@@ -165,7 +165,7 @@ fn build_in<const N: usize>(
         available_bytes: index_available,
     };
     let available_bytes = scratch.len() as u64;
-    // Report the need of a whole bench: only the census, below, shows whether bins are crowded.
+    // Report the need of a whole sort buffer: only the census, below, shows whether bins are crowded.
     let needed_bytes = scratch_bytes(all, 1, all);
     let scratch_error =
         Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
@@ -173,7 +173,7 @@ fn build_in<const N: usize>(
     // Fewer tasks where there is no memory for more.
     let mut tasks = task_count::<N>(control, triangles as usize / SEAM);
     let fits = |tasks: u32| match tasks {
-        1 => available_bytes >= scratch_bytes(all, 1, small_bench(all)),
+        1 => available_bytes >= scratch_bytes(all, 1, small_spare(all)),
         _ => {
             available_bytes >= scratch_bytes(all, tasks.into(), all)
                 && index_available >= fast_bound(triangles, tasks).0
@@ -198,9 +198,9 @@ fn build_in<const N: usize>(
         rest = behind;
     }
     let (sizes, rest) = split_mut::<u32>(rest, bins as u64).ok_or(scratch_error)?;
-    let (entries, bench) = split_mut::<Entry>(rest, all).ok_or(scratch_error)?;
-    let bench = whole::<Entry>(bench);
-    let has_whole_bench = bench.len() as u64 >= all;
+    let (entries, spare) = split_mut::<Entry>(rest, all).ok_or(scratch_error)?;
+    let spare = whole::<Entry>(spare);
+    let has_whole_spare = spare.len() as u64 >= all;
     let behind = index.as_mut().and_then(|index| {
         // Clear the header first: if the build ends early, the region must not open as a grid.
         index.first_chunk_mut::<HEADER_BYTES>()?.fill(0);
@@ -210,8 +210,8 @@ fn build_in<const N: usize>(
         keys
     } else {
         // There are fewer ids than keys if triangles are skipped.
-        let keys = bench.as_flattened_mut().get_mut(..triangles as usize);
-        keys.filter(|_| has_whole_bench).ok_or(index_error(fast_bound(triangles, 1).0))?
+        let keys = spare.as_flattened_mut().get_mut(..triangles as usize);
+        keys.filter(|_| has_whole_spare).ok_or(index_error(fast_bound(triangles, 1).0))?
     };
 
     // Find the box, then every triangle's key.
@@ -225,7 +225,7 @@ fn build_in<const N: usize>(
         *size = counts.iter().flatten().filter_map(|counts| counts.get(bin)).sum();
     }
     let is_crowded = sizes.iter().any(|&size| size as usize > CROWD);
-    if is_crowded && !has_whole_bench {
+    if is_crowded && !has_whole_spare {
         return Err(scratch_error);
     }
     place_tasks(sizes, &mut counts);
@@ -242,11 +242,11 @@ fn build_in<const N: usize>(
     let nodes = whole::<Node>(nodes);
     let scene = Lattice::pad(&bounds);
     let work = Work { mesh, least: least_node(&scene), sizes, shift: KEY_BITS - bits };
-    let made = work.roots::<N>(entries, &mut *bench, ids, nodes, &mut counts, control)?;
+    let made = work.roots::<N>(entries, &mut *spare, ids, nodes, &mut counts, control)?;
 
     // Build the tree on top of them.
     watch.at(TOP)?;
-    let made = work.top(entries, bench, nodes, &made);
+    let made = work.top(entries, spare, nodes, &made);
     let (node_count, levels) = made.ok_or(index_error(fast_bound(triangles, 1).0))?;
     let needed_bytes = index_bytes(finite.into(), node_count.into());
     if let Some(index) = index {
@@ -372,12 +372,12 @@ struct Work<'w> {
 }
 
 /// A task: its share of the units, and the memory for their subtrees.
-struct Task<'w> {
+struct UnitsTask<'w> {
     work: &'w Work<'w>,
     /// The entries of the units among all.
     range: Range<usize>,
     entries: &'w mut [Entry],
-    bench: &'w mut [Entry],
+    spare: &'w mut [Entry],
     ids: &'w mut [u32],
     nodes: &'w mut [Node],
     /// Where the nodes lie.
@@ -394,17 +394,17 @@ struct Made {
     roots: u32,
 }
 
-impl Kernel for Task<'_> {
+impl Kernel for UnitsTask<'_> {
     type Output = (Made, Record);
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> Self::Output {
-        let Self { work, range, entries, bench, ids, nodes, child, counts } = self;
+        let Self { work, range, entries, spare, ids, nodes, child, counts } = self;
         let Work { mesh, least, sizes, shift } = *work;
         let first = range.start as u32;
         let subtree = &mut Subtree::new();
         let mut roots =
-            Roots::new(mesh, least, entries, bench, ids, first, nodes, child, counts, subtree);
+            Roots::new(mesh, least, entries, spare, ids, first, nodes, child, counts, subtree);
         let units = Units::new(sizes).skip_while(|unit| unit.start < range.start);
         for unit in units.take_while(|unit| unit.start < range.end) {
             roots.unit(unit.start - range.start..unit.end - range.start, Side::Entries, shift, 0);
@@ -415,11 +415,11 @@ impl Kernel for Task<'_> {
 }
 
 impl Work<'_> {
-    /// Makes the subtrees and their records. The bench of a single task may be smaller than its entries.
+    /// Makes the subtrees and their records. The sort buffer of a single task may be smaller than its entries.
     fn roots<const N: usize>(
         &self,
         entries: &mut [Entry],
-        bench: &mut [Entry],
+        spare: &mut [Entry],
         ids: &mut [u32],
         nodes: &mut [Node],
         counts: &mut [Option<&mut [u32]>; N],
@@ -430,7 +430,7 @@ impl Work<'_> {
         self.cut(&mut ends, tasks, entries.len());
         // The root of all comes first.
         let (mut rest_of_nodes, mut child) = (nodes.get_mut(1..).unwrap_or_default(), 1);
-        let (mut rest, mut bench, mut ids) = (&mut *entries, bench, ids);
+        let (mut rest, mut spare, mut ids) = (&mut *entries, spare, ids);
         let mut start = 0;
         let parts =
             counts.iter_mut().flatten().zip(ends).enumerate().map(|(task, (counts, end))| {
@@ -440,10 +440,11 @@ impl Work<'_> {
                 let room =
                     if is_last { rest_of_nodes.len() } else { most_below(count as u64) as usize };
                 let nodes = take(&mut rest_of_nodes, room);
-                let room_to_sort = if is_last { bench.len() } else { count };
-                let bench = take(&mut bench, room_to_sort);
+                let room_to_sort = if is_last { spare.len() } else { count };
+                let spare = take(&mut spare, room_to_sort);
                 let range = start..end;
-                let part = Task { work: self, range, entries, bench, ids, nodes, child, counts };
+                let part =
+                    UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
                 start = end;
                 child += room as u32;
                 part
@@ -497,12 +498,12 @@ impl Work<'_> {
         }
     }
 
-    /// Builds the tree over the roots, behind their nodes, or on the bench if the index has no room;
+    /// Builds the tree over the roots, behind their nodes, or on the sort buffer if the index has no room;
     /// returns how many nodes and levels there are then, or `None` if nothing has room.
     fn top(
         &self,
         entries: &mut [Entry],
-        bench: &mut [Entry],
+        spare: &mut [Entry],
         nodes: &mut [Node],
         all: &All,
     ) -> Option<(u32, u32)> {
@@ -527,7 +528,7 @@ impl Work<'_> {
             top::build(items, record, nodes, all.nodes, self.least)
         };
         let behind = nodes.get_mut(all.nodes as usize..).and_then(&mut build);
-        let Top { root, count, levels } = behind.or_else(|| build(whole(bench.as_mut_bytes())))?;
+        let Top { root, count, levels } = behind.or_else(|| build(whole(spare.as_mut_bytes())))?;
         if let Some(slot) = nodes.first_mut() {
             *slot = root;
         }

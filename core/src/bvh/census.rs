@@ -29,7 +29,7 @@ pub(crate) struct Census {
 }
 
 /// A task: some triangles, room for their keys, and its counts.
-struct Part<'w> {
+struct KeysTask<'w> {
     mesh: &'w TriangleMesh<'w>,
     flags: BuildFlags,
     rule: &'w Keys,
@@ -63,7 +63,7 @@ pub(crate) fn count<const N: usize>(
         #[expect(clippy::cast_possible_truncation, reason = "numbers of triangles")]
         let first = start as u32;
         let (skipped, bounds) = (0, Aabb::EMPTY);
-        Part { mesh, flags, rule, first, keys, counts, shift: KEY_BITS - bits, skipped, bounds }
+        KeysTask { mesh, flags, rule, first, keys, counts, shift: KEY_BITS - bits, skipped, bounds }
     });
     let level = SimdLevel::detect();
     let results = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
@@ -96,7 +96,7 @@ pub(crate) fn take<'w, T>(rest: &mut &'w mut [T], count: usize) -> &'w mut [T] {
     first
 }
 
-impl Kernel for Part<'_> {
+impl Kernel for KeysTask<'_> {
     type Output = Result<(u32, Aabb), Error>;
 
     #[inline(always)]
@@ -151,7 +151,7 @@ impl Kernel for Part<'_> {
     }
 }
 
-impl Part<'_> {
+impl KeysTask<'_> {
     #[inline(always)]
     fn add(&mut self, key: u32) {
         if let Some(count) = self.counts.get_mut((key >> self.shift) as usize) {

@@ -21,7 +21,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16, u32x8};
 
 use super::Bvh;
-use super::boxes::{Boxes, bits};
+use super::boxes::{WideBoxes, bits};
 use super::node::{Child, WIDTH};
 use super::rays::{GROUP, OCTETS, Rays};
 use super::walk::STACK;
@@ -88,7 +88,7 @@ impl<const ANY: bool> Kernel for Group<'_, ANY> {
             match child {
                 Child::Inner(number) => {
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
-                    let boxes = Boxes::decode(simd, node, rays.center, rays.spread);
+                    let boxes = WideBoxes::decode(simd, node, rays.center, rays.spread);
                     let count = mask.count_ones();
                     // Mask unused slots: their boxes are inside out, but this slab test sorts near and far side
                     // itself and would meet them.
@@ -205,7 +205,7 @@ impl Met {
 
 /// Intersects few rays with all boxes of a node.
 #[inline(always)]
-fn one_by_one<S: Simd>(simd: S, boxes: &Boxes<f32x8<S>>, rays: &Rays, mask: u64) -> Met {
+fn one_by_one<S: Simd>(simd: S, boxes: &WideBoxes<f32x8<S>>, rays: &Rays, mask: u64) -> Met {
     let zero = u32x8::splat(simd, 0);
     let far_away = f32x8::splat(simd, f32::INFINITY);
     let mut least = far_away;
@@ -233,7 +233,7 @@ fn one_by_one<S: Simd>(simd: S, boxes: &Boxes<f32x8<S>>, rays: &Rays, mask: u64)
 #[inline(always)]
 fn side_by_side<S: Simd>(
     simd: S,
-    boxes: &Boxes<f32x8<S>>,
+    boxes: &WideBoxes<f32x8<S>>,
     rays: &Rays,
     mask: u64,
     met: u32,
@@ -245,7 +245,7 @@ fn side_by_side<S: Simd>(
     while rest != 0 {
         let slot = rest.trailing_zeros() as usize % WIDTH;
         rest &= rest - 1;
-        let child = Boxes::<f32x16<S>>::one(simd, &sides, slot);
+        let child = WideBoxes::<f32x16<S>>::one(simd, &sides, slot);
         let mut least = far_away;
         for which in 0..GROUP / 16 {
             let of_sixteen = mask >> (16 * which) & 0xffff;

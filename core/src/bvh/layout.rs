@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! index    | header 128 B | ids: u32 a triangle | nodes: 80 B each                        |
-//! scratch  | counts of the bins, for each task  | entries: 8 B a triangle | bench: 8 B a triangle |
+//! scratch  | counts of the bins, for each task  | entries: 8 B a triangle | spare: 8 B a triangle |
 //! ```
 //!
 //! The bounds depend on the number `n` of triangles alone:
@@ -21,7 +21,7 @@
 //!   divided lie inside one another.
 //!
 //! A bin has one count a task and one for all, and there is at most one bin for sixteen triangles. A bin is
-//! sorted on the bench; only bins of more than [`CROWD`] entries need more of it than that.
+//! sorted on the sort buffer; only bins of more than [`CROWD`] entries need more of it than that.
 
 use crate::arena::section_bytes;
 use crate::blob::HEADER_BYTES;
@@ -105,14 +105,14 @@ pub(crate) const fn count_bytes(triangles: u64, tasks: u64) -> u64 {
     (tasks + 1) * section_bytes::<u32>(1 << bin_bits(triangles))
 }
 
-/// Bytes of scratch: for counts, entries and a bench of so many entries.
-pub(crate) const fn scratch_bytes(triangles: u64, tasks: u64, bench: u64) -> u64 {
+/// Bytes of scratch: for counts, entries and a sort buffer of so many entries.
+pub(crate) const fn scratch_bytes(triangles: u64, tasks: u64, spare: u64) -> u64 {
     count_bytes(triangles, tasks)
         + section_bytes::<Entry>(triangles)
-        + section_bytes::<Entry>(bench)
+        + section_bytes::<Entry>(spare)
 }
 
-/// Entries on the bench of a single task, as long as no bin is crowded.
-pub(crate) const fn small_bench(triangles: u64) -> u64 {
+/// Entries on the sort buffer of a single task, as long as no bin is crowded.
+pub(crate) const fn small_spare(triangles: u64) -> u64 {
     if (MOST_UNIT as u64) < triangles { MOST_UNIT as u64 } else { triangles }
 }

@@ -45,7 +45,7 @@ const DOTS: f32 = 1.0 / 2_097_152.0; // 2^-21
 const SLACK: f32 = 1.0 / 1_048_576.0 / 1_048_576.0; // 2^-40
 
 /// A point, and what is looked for.
-pub(crate) struct Nearest<'r, F, T> {
+pub(crate) struct ClosestSearch<'r, F, T> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
     /// The box of the scene.
@@ -204,12 +204,12 @@ fn waiting(node: u32, slot: u32, away: f32) -> Waiting {
     u64::from(away.to_bits()) << 32 | u64::from(node << 3 | slot)
 }
 
-impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut Nearest<'_, F, T> {
+impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Nearest { bvh, mesh, bounds, point, within, test, tally, stack } = self;
+        let ClosestSearch { bvh, mesh, bounds, point, within, test, tally, stack } = self;
         let point = Point::new(*point, bounds);
         let mut reach = point.reach(*within);
         let mut top = 0;

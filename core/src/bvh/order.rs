@@ -18,7 +18,7 @@ use super::batch::Together;
 use super::rays::GROUP;
 
 /// A ray that is sorted: its key above its place in the window.
-pub(crate) type Entry = u64;
+pub(crate) type SortKey = u64;
 
 /// Bits of a cell on each axis, and cells.
 const CELL_BITS: u32 = 4;
@@ -41,19 +41,19 @@ const SAMPLE: usize = GROUP / 4 + 1;
 
 /// The rays of a window in order, and which of them wait until all others are done.
 pub(crate) struct Sorted<'m> {
-    order: &'m [Entry],
+    order: &'m [SortKey],
     /// By their places in the window.
-    waiting: &'m mut [Entry],
+    waiting: &'m mut [SortKey],
 }
 
 /// The bit of a deferred ray; the bits below it hold the triangle of its first hit, or `INVALID_ID`.
-const WAITS: Entry = 1 << 32;
+const WAITS: SortKey = 1 << 32;
 
 impl Sorted<'_> {
     /// Notes that the ray at a place of the window waits, and a triangle.
     pub(crate) fn defer(&mut self, place: usize, id: u32) {
         if let Some(slot) = self.waiting.get_mut(place) {
-            *slot = WAITS | Entry::from(id);
+            *slot = WAITS | SortKey::from(id);
         }
     }
 
@@ -75,7 +75,7 @@ impl Sorted<'_> {
 
 /// How many rays memory is enough to sort at once.
 #[inline(always)]
-pub(crate) const fn window(memory: &[Entry]) -> usize {
+pub(crate) const fn window(memory: &[SortKey]) -> usize {
     let rays = memory.len() / 2;
     if rays > i32::MAX as usize { i32::MAX as usize } else { rays }
 }
@@ -90,7 +90,7 @@ pub(crate) fn sort<'m>(
     first: usize,
     count: usize,
     bounds: &Aabb,
-    memory: &'m mut [Entry],
+    memory: &'m mut [SortKey],
 ) -> Option<Sorted<'m>> {
     if !are_scattered(batch, first, count, bounds) {
         return None;
@@ -142,7 +142,7 @@ fn are_scattered(
 }
 
 /// Moves entries to where one digit of their keys says, those of equal digits in their order.
-fn pass(from: &[Entry], to: &mut [Entry], counts: &mut [u32; DIGITS], number: u32) {
+fn pass(from: &[SortKey], to: &mut [SortKey], counts: &mut [u32; DIGITS], number: u32) {
     let mut next = 0;
     for count in counts.iter_mut() {
         next += core::mem::replace(count, next);
@@ -159,7 +159,7 @@ fn pass(from: &[Entry], to: &mut [Entry], counts: &mut [u32; DIGITS], number: u3
 /// The lower or the upper digit of a key.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "nine bits")]
-const fn digit(entry: Entry, number: u32) -> usize {
+const fn digit(entry: SortKey, number: u32) -> usize {
     (entry >> (32 + DIGIT_BITS * number)) as usize % DIGITS
 }
 

@@ -9,7 +9,7 @@ use super::slab::{EARLIER, STEEP, TINY, WIDER};
 use crate::aabb::Aabb;
 use crate::approach::FAR_EXTENTS;
 use crate::eight::columns;
-use crate::filter::{Filter, NEARBY_LONG, NEARBY_SHORT, RayFilter};
+use crate::filter::{LineFilter, NEARBY_LONG, NEARBY_SHORT, RayFilter};
 use crate::mesh::TriangleMesh;
 use crate::options::{Choice, Cull};
 use crate::pairs;
@@ -163,7 +163,7 @@ impl Rays {
 
             // Compute the error bound of the filter: filter.rs has the proof.
             let distance = (a + half[0]).max(b + half[1]).max(c + half[2]);
-            let filter = Filter::scaled(simd, origin, scaled, distance, extent);
+            let filter = LineFilter::scaled(simd, origin, scaled, distance, extent);
             self.slope[octet] = filter.slope.into();
             self.floor[octet] = filter.floor.into();
         }
@@ -256,9 +256,9 @@ impl Rays {
 
     /// The filter of one ray in all lanes.
     #[inline(always)]
-    pub(crate) fn filter<S: Simd>(&self, simd: S, ray: u32) -> Filter<f32x8<S>> {
+    pub(crate) fn filter<S: Simd>(&self, simd: S, ray: u32) -> LineFilter<f32x8<S>> {
         let [d, e, f] = &self.direction;
-        Filter {
+        LineFilter {
             origin: splat(simd, self.given[ray as usize % GROUP].origin),
             direction: splat(simd, [get(d, ray), get(e, ray), get(f, ray)]),
             slope: f32x8::splat(simd, get(&self.slope, ray)),
@@ -268,8 +268,8 @@ impl Rays {
 
     /// The filters of eight rays.
     #[inline(always)]
-    pub(crate) fn filters<S: Simd>(&self, simd: S, octet: usize) -> Filter<f32x8<S>> {
-        Filter {
+    pub(crate) fn filters<S: Simd>(&self, simd: S, octet: usize) -> LineFilter<f32x8<S>> {
+        LineFilter {
             origin: octet_of(simd, &self.anchor, octet),
             direction: octet_of(simd, &self.direction, octet),
             slope: f32x8::simd_from(simd, self.slope[octet % OCTETS]),

@@ -7,7 +7,7 @@
 //!     else:    sort by key, cut where high bits of the key change, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units      |
-//! bench   |                            | the same unit, while it is binned again |
+//! spare   |                            | the same unit, while it is binned again |
 //! ```
 //!
 //! A unit's entries lie in one of the two arrays, and binning moves them to the other. The record of
@@ -73,7 +73,7 @@ pub(crate) struct Roots<'w> {
     /// Where the entries are, and where the records go.
     pub(crate) entries: &'w mut [Entry],
     /// The second buffer of the sort: as long as `entries`, or long enough for any unit that is sorted.
-    pub(crate) bench: &'w mut [Entry],
+    pub(crate) spare: &'w mut [Entry],
     /// The ids, each at the place of its entry; empty if only the size is computed.
     pub(crate) ids: &'w mut [u32],
     /// Where the ids lie in the index.
@@ -106,7 +106,7 @@ impl<'w> Roots<'w> {
         mesh: &'w TriangleMesh<'w>,
         least: f32,
         entries: &'w mut [Entry],
-        bench: &'w mut [Entry],
+        spare: &'w mut [Entry],
         ids: &'w mut [u32],
         first: u32,
         nodes: &'w mut [Node],
@@ -120,7 +120,7 @@ impl<'w> Roots<'w> {
             mesh,
             least,
             entries,
-            bench,
+            spare,
             ids,
             first,
             nodes,
@@ -147,17 +147,17 @@ impl<'w> Roots<'w> {
             }
             return;
         }
-        let (entries, bench) = match side {
+        let (entries, spare) = match side {
             Side::Entries => {
-                (self.entries.get_mut(range.clone()), bench_for(self.bench, &range, depth))
+                (self.entries.get_mut(range.clone()), spare_for(self.spare, &range, depth))
             }
-            Side::Bench => (self.bench.get_mut(range.clone()), self.entries.get_mut(range.clone())),
+            Side::Bench => (self.spare.get_mut(range.clone()), self.entries.get_mut(range.clone())),
         };
-        if let (Some(entries), Some(bench)) = (entries, bench) {
+        if let (Some(entries), Some(spare)) = (entries, spare) {
             let differing = |[first, last]: [&Entry; 2]| 32 - (first[0] ^ last[0]).leading_zeros();
             let ends = entries.first().zip(entries.last());
             let bits = ends.map_or(0, |(first, last)| differing([first, last]));
-            sort(entries, bench, bits.max(shift));
+            sort(entries, spare, bits.max(shift));
         }
         self.cut(range, side);
     }
@@ -197,7 +197,7 @@ impl<'w> Roots<'w> {
         let child = self.child + self.node_count;
         let entries = match side {
             Side::Entries => self.entries.get(range.clone()),
-            Side::Bench => self.bench.get(range.clone()),
+            Side::Bench => self.spare.get(range.clone()),
         };
         let Some(entries) = entries else { return };
         let subtree = &mut *self.subtree;
@@ -226,11 +226,11 @@ impl<'w> Roots<'w> {
         let (from, to, other) = match side {
             Side::Entries => (
                 self.entries.get_mut(range.clone()),
-                self.bench.get_mut(range.clone()),
+                self.spare.get_mut(range.clone()),
                 Side::Bench,
             ),
             Side::Bench => (
-                self.bench.get_mut(range.clone()),
+                self.spare.get_mut(range.clone()),
                 self.entries.get_mut(range.clone()),
                 Side::Entries,
             ),
@@ -302,17 +302,17 @@ impl<'w> Roots<'w> {
     fn on(&self, side: Side) -> &[Entry] {
         match side {
             Side::Entries => self.entries,
-            Side::Bench => self.bench,
+            Side::Bench => self.spare,
         }
     }
 }
 
-/// Returns the part of the bench that a bin is sorted in: its start, which touches few pages, or, in a division, where
-/// other bins lie on the bench, the bin's own range.
-fn bench_for<'b>(
-    bench: &'b mut [Entry],
+/// Returns the part of the sort buffer that a bin is sorted in: its start, which touches few pages, or, in a division, where
+/// other bins lie on the sort buffer, the bin's own range.
+fn spare_for<'b>(
+    spare: &'b mut [Entry],
     range: &Range<usize>,
     depth: u32,
 ) -> Option<&'b mut [Entry]> {
-    if depth > 0 { bench.get_mut(range.clone()) } else { bench.get_mut(..range.len()) }
+    if depth > 0 { spare.get_mut(range.clone()) } else { spare.get_mut(..range.len()) }
 }

@@ -1,7 +1,7 @@
 //! Queries of a tree: a ray against triangles, a ray with an f64 origin against boxes, triangles near a point.
 
 use super::Bvh;
-use super::nearest::Nearest;
+use super::nearest::ClosestSearch;
 use super::slab::Slab;
 use super::walk::OneRay;
 use crate::aabb::Aabb;
@@ -130,7 +130,8 @@ impl Bvh<'_> {
             #[inline(always)]
             |stack| {
                 let bvh = self;
-                let mut nearest = Nearest { bvh, mesh, bounds, point, within, test, tally, stack };
+                let mut nearest =
+                    ClosestSearch { bvh, mesh, bounds, point, within, test, tally, stack };
                 dispatch(*simd, &mut nearest);
             },
         );

@@ -9,20 +9,20 @@ const PASS_BITS: u32 = 9;
 const COUNTS: usize = 1 << PASS_BITS;
 
 /// Sorts entries by the lowest `bits` bits of their keys; the others are the same in all. Equal keys
-/// keep their order. `bench` has room for as many entries.
-pub(crate) fn sort(entries: &mut [Entry], bench: &mut [Entry], bits: u32) {
+/// keep their order. `spare` has room for as many entries.
+pub(crate) fn sort(entries: &mut [Entry], spare: &mut [Entry], bits: u32) {
     if entries.len() <= FEW {
         insert(entries);
         return;
     }
-    let Some(bench) = bench.get_mut(..entries.len()) else { return };
+    let Some(spare) = spare.get_mut(..entries.len()) else { return };
     // Two passes bring the entries back to where they were.
     let passes = bits.div_ceil(2 * PASS_BITS) * 2;
     let mut shift = 0;
     for _ in 0..passes / 2 {
         let width = bits.div_ceil(passes).min(PASS_BITS);
-        pass(entries, bench, shift, width);
-        pass(bench, entries, shift + width, width);
+        pass(entries, spare, shift, width);
+        pass(spare, entries, shift + width, width);
         shift += 2 * width;
     }
 }
@@ -88,8 +88,8 @@ mod tests {
                     .collect();
                 let mut expected = entries.clone();
                 expected.sort_by_key(|entry| entry[0]);
-                let mut bench = entries.clone();
-                sort(&mut entries, &mut bench, bits);
+                let mut spare = entries.clone();
+                sort(&mut entries, &mut spare, bits);
                 assert_eq!(entries, expected, "{count} {bits}");
             }
         }

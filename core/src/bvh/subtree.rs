@@ -40,9 +40,9 @@ const _: () = assert!(MOST_NODES <= MOST_ROOT && LEAF <= 8);
 pub(crate) struct Subtree {
     nodes: [Node; MOST_NODES],
     /// The ranges of entries that the children of each node hold.
-    children: [[Part; WIDTH]; MOST_NODES],
+    children: [[ChildRange; WIDTH]; MOST_NODES],
     /// The range of each node.
-    ranges: [Part; MOST_NODES],
+    ranges: [ChildRange; MOST_NODES],
     /// Levels above each node.
     above: [u8; MOST_NODES],
     count: usize,
@@ -68,14 +68,14 @@ pub(crate) enum Cut {
 
 /// A range of entries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Part {
+struct ChildRange {
     start: u8,
     end: u8,
 }
 
 const _: () = assert!(MOST_ROOT <= u8::MAX as usize && MOST_ROOT == 128);
 
-impl Part {
+impl ChildRange {
     const NONE: Self = Self { start: 0, end: 0 };
 
     const fn count(self) -> usize {
@@ -124,8 +124,8 @@ impl Subtree {
     pub(crate) fn new() -> Self {
         Self {
             nodes: [Node::new_zeroed(); MOST_NODES],
-            children: [[Part::NONE; WIDTH]; MOST_NODES],
-            ranges: [Part::NONE; MOST_NODES],
+            children: [[ChildRange::NONE; WIDTH]; MOST_NODES],
+            ranges: [ChildRange::NONE; MOST_NODES],
             above: [0; MOST_NODES],
             count: 0,
             boxes: [[0.0; 8]; BOXES],
@@ -186,7 +186,7 @@ impl Subtree {
         {
             *change = (32 - (one[0] ^ next[0]).leading_zeros()) as u8;
         }
-        self.ranges[0] = Part { start: 0, end: count as u8 };
+        self.ranges[0] = ChildRange { start: 0, end: count as u8 };
     }
 
     /// Cuts all ranges of more than a leaf, breadth first.
@@ -302,19 +302,19 @@ fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
 /// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys: where
 /// keys change in the highest bits, and in the middle of what is left.
 #[inline(always)]
-fn parts(range: Part, levels: u32, changes: impl Fn(u8) -> u128) -> [Part; WIDTH] {
-    let mut parts = [Part::NONE; WIDTH];
+fn parts(range: ChildRange, levels: u32, changes: impl Fn(u8) -> u128) -> [ChildRange; WIDTH] {
+    let mut parts = [ChildRange::NONE; WIDTH];
     let mut start = range.start;
     let mut count = 0;
     let mut cuts = highest(range, levels, changes);
     while cuts != 0 && count < WIDTH - 1 {
         let end = cuts.trailing_zeros() as u8 + 1;
         cuts &= cuts - 1;
-        parts[count] = Part { start, end };
+        parts[count] = ChildRange { start, end };
         start = end;
         count += 1;
     }
-    parts[count] = Part { start, end: range.end };
+    parts[count] = ChildRange { start, end: range.end };
     for count in count + 1..WIDTH {
         let mut largest = 0;
         for (at, part) in parts.iter().enumerate().take(count) {
@@ -322,7 +322,7 @@ fn parts(range: Part, levels: u32, changes: impl Fn(u8) -> u128) -> [Part; WIDTH
                 largest = at;
             }
         }
-        let Part { start, end } = parts[largest];
+        let ChildRange { start, end } = parts[largest];
         if end < start + 2 {
             break;
         }
@@ -331,7 +331,7 @@ fn parts(range: Part, levels: u32, changes: impl Fn(u8) -> u128) -> [Part; WIDTH
         let half = if count > LEAF { count.div_ceil(2).next_multiple_of(LEAF) } else { count / 2 };
         let middle = start + half as u8;
         parts[largest].end = middle;
-        let mut next = Part { start: middle, end };
+        let mut next = ChildRange { start: middle, end };
         for slot in parts.iter_mut().skip(largest + 1) {
             next = core::mem::replace(slot, next);
         }
@@ -341,7 +341,7 @@ fn parts(range: Part, levels: u32, changes: impl Fn(u8) -> u128) -> [Part; WIDTH
 
 /// The seven changes in the highest bits inside a range, as bits; all of them if there are fewer.
 #[inline(always)]
-fn highest(range: Part, levels: u32, changes: impl Fn(u8) -> u128) -> u128 {
+fn highest(range: ChildRange, levels: u32, changes: impl Fn(u8) -> u128) -> u128 {
     // A range of one entry or none has no inside.
     let Some(last) = range.end.checked_sub(1).filter(|&last| last > range.start) else { return 0 };
     let inside = (1_u128 << last) - (1 << range.start);

@@ -69,7 +69,7 @@ fn surface(bounds: &Aabb) -> f32 {
 
 /// A range of items that becomes a child.
 #[derive(Clone, Copy)]
-struct Part {
+struct ChildRange {
     start: u32,
     end: u32,
     bounds: Aabb,
@@ -77,7 +77,7 @@ struct Part {
     priority: f32,
 }
 
-impl Part {
+impl ChildRange {
     const NONE: Self = Self { start: 0, end: 0, bounds: Aabb::EMPTY, priority: -1.0 };
 
     #[expect(clippy::cast_precision_loss, reason = "a priority")]
@@ -131,7 +131,7 @@ pub(crate) fn build(
         }
         let (start, end, level) = (node.child, node.first, u32::from(node.counts[0]));
         let bounds = bounds_of(items, start, end);
-        let parts = parts(items, Part::new(start, end, bounds, level >= DEEP), level >= DEEP);
+        let parts = parts(items, ChildRange::new(start, end, bounds, level >= DEEP), level >= DEEP);
         let mut node = Node { child: child + count, ..Node::EMPTY };
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let parts = parts.iter().zip(&mut boxes).enumerate();
@@ -179,8 +179,8 @@ fn bounds_of(items: &[Item], start: u32, end: u32) -> Aabb {
 }
 
 /// Cuts a range of items into eight parts, or into single items.
-fn parts(items: &mut [Item], all: Part, halve: bool) -> [Part; WIDTH] {
-    let mut parts = [Part::NONE; WIDTH];
+fn parts(items: &mut [Item], all: ChildRange, halve: bool) -> [ChildRange; WIDTH] {
+    let mut parts = [ChildRange::NONE; WIDTH];
     parts[0] = all;
     for count in 1..WIDTH {
         let mut widest = 0;
@@ -198,8 +198,9 @@ fn parts(items: &mut [Item], all: Part, halve: bool) -> [Part; WIDTH] {
         let middle = cut(items_of, halve);
         #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
         let middle = part.start + middle as u32;
-        parts[widest] = Part::new(part.start, middle, bounds_of(items, part.start, middle), halve);
-        parts[count] = Part::new(middle, part.end, bounds_of(items, middle, part.end), halve);
+        parts[widest] =
+            ChildRange::new(part.start, middle, bounds_of(items, part.start, middle), halve);
+        parts[count] = ChildRange::new(middle, part.end, bounds_of(items, middle, part.end), halve);
     }
     parts
 }

@@ -28,7 +28,7 @@ const MARGIN: f64 = 1.0 / 128.0;
 
 /// A node on the way down.
 #[derive(Clone, Copy)]
-struct Level {
+struct OpenNode {
     node: u32,
     /// Children that are still to be looked at.
     rest: u32,
@@ -76,11 +76,11 @@ impl Bvh<'_> {
         let bounds = lattice.bounds();
         let least = f64::from(bounds.size().max_element()) * LEAST_STEP;
         let mut levels =
-            [Level { node: 0, rest: 0, min: DVec3::ZERO, max: DVec3::ZERO }; LEVELS as usize];
+            [OpenNode { node: 0, rest: 0, min: DVec3::ZERO, max: DVec3::ZERO }; LEVELS as usize];
         let (mut depth, mut deepest) = (0, 1);
         let mut budget = self.nodes.len();
         let mut ids = 0;
-        let start = |node: u32, min, max| Level { node, rest: 0xff, min, max };
+        let start = |node: u32, min, max| OpenNode { node, rest: 0xff, min, max };
         let everywhere = DVec3::INFINITY;
         if self.nodes.is_empty() {
             return Err(corrupt(core::mem::offset_of!(Header, node_count)));

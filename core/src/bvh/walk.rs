@@ -14,13 +14,13 @@ use zerocopy::transmute;
 
 use super::Bvh;
 use super::boxes::bits;
-use super::leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
 use super::node::{Child, Node, WIDTH};
+use super::shape_leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
 use super::slab::Slab;
 use crate::aabb::{Aabb, greater, lesser};
 use crate::counters::Tally;
 use crate::eight::{Eight, first_eight};
-use crate::filter::{Filter, RayFilter};
+use crate::filter::{LineFilter, RayFilter};
 use crate::mesh::TriangleMesh;
 use crate::options::Cull;
 use crate::ray::Ray;
@@ -65,7 +65,7 @@ struct Wide<S: Simd> {
     inverse_near: [f32x8<S>; 3],
     inverse_far: [f32x8<S>; 3],
     start: f32x8<S>,
-    filter: Filter<f32x8<S>>,
+    filter: LineFilter<f32x8<S>>,
 }
 
 /// Which side is the near one on each axis: 0 for the low side, [`FLIP`] for the high side.

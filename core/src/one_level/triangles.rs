@@ -58,7 +58,7 @@ impl Spread for MeshSpread<'_> {
             self.mesh.near(first).own(first)
         };
         if HAS_VECTORS && !wide.is_empty() {
-            dispatch(SimdLevel::detect(), Place { spread: self, wide, first, batch });
+            dispatch(SimdLevel::detect(), PlaceBatch { spread: self, wide, first, batch });
         } else {
             batch.place_each(self, places);
         }
@@ -66,7 +66,7 @@ impl Spread for MeshSpread<'_> {
 }
 
 /// Placing a batch of triangles, eight at a time.
-struct Place<'f, 'm> {
+struct PlaceBatch<'f, 'm> {
     spread: &'f MeshSpread<'m>,
     wide: WideMesh<'m>,
     /// The first triangle, as `wide` calls it.
@@ -74,7 +74,7 @@ struct Place<'f, 'm> {
     batch: &'f mut Batch,
 }
 
-impl Kernel for Place<'_, '_> {
+impl Kernel for PlaceBatch<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -172,12 +172,17 @@ mod tests {
                     for level in SimdLevel::available() {
                         dispatch(
                             level,
-                            Place { spread: &spread, wide: spread.wide, first, batch: &mut batch },
+                            PlaceBatch {
+                                spread: &spread,
+                                wide: spread.wide,
+                                first,
+                                batch: &mut batch,
+                            },
                         );
                         assert_eq!(rows(&batch, &spread, places.clone()), expected, "{level:?}");
                     }
                     let place =
-                        Place { spread: &spread, wide: spread.wide, first, batch: &mut batch };
+                        PlaceBatch { spread: &spread, wide: spread.wide, first, batch: &mut batch };
                     place.run(Fallback::new());
                     assert_eq!(rows(&batch, &spread, places.clone()), expected);
                     let placed = batch.is_placed.count_ones();

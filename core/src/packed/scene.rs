@@ -53,7 +53,7 @@ impl<'a> Member<'a> {
 }
 
 /// The counts and bytes of a packed scene.
-struct Plan {
+struct PackedSizes {
     members: u32,
     references: u64,
     /// Where the members start.
@@ -123,7 +123,7 @@ impl<'a> Scene<'a> {
         result
     }
 
-    fn plan(&self) -> Result<Plan, Error> {
+    fn plan(&self) -> Result<PackedSizes, Error> {
         let (mut members, mut references) = (0_u32, u64::from(self.object_count));
         let mut bytes = self.blob().len() as u64;
         self.each_member(&mut |object| {
@@ -139,7 +139,7 @@ impl<'a> Scene<'a> {
             Ok(())
         })?;
         let start = (HEADER_BYTES as u64).saturating_add(section_bytes::<u32>(references));
-        Ok(Plan { members, references, start, end: start.saturating_add(bytes) })
+        Ok(PackedSizes { members, references, start, end: start.saturating_add(bytes) })
     }
 
     /// Bytes that [`pack`](Self::pack) writes; 0 if it cannot. O(n^2) in the objects of all scenes.
@@ -185,7 +185,7 @@ impl<'a> Scene<'a> {
     /// ```
     pub fn pack<'t>(&self, to: &'t mut [u8]) -> Result<&'t mut [u8], Error> {
         check_alignment(to, Region::Index)?;
-        let Plan { members, references, start, end } = self.plan()?;
+        let PackedSizes { members, references, start, end } = self.plan()?;
         let (needed_bytes, available_bytes) = (end, to.len() as u64);
         let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
         let to = usize::try_from(end).ok().and_then(|end| to.get_mut(..end)).ok_or(too_small)?;

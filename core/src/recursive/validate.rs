@@ -22,7 +22,7 @@ use crate::mesh::TriangleMesh;
 use crate::survey::reference_limit;
 
 /// A cell and the grid that it is a cell of.
-type Place = (Node, [u32; 3]);
+type CellOfGrid = (Node, [u32; 3]);
 
 const LEVELS: usize = MAX_DEPTH as usize;
 
@@ -35,7 +35,7 @@ struct Check<'a> {
     /// Where the pool goes on.
     cursor: usize,
     /// The cells around the list that is read, from the root on.
-    places: [Option<Place>; LEVELS],
+    places: [Option<CellOfGrid>; LEVELS],
     /// For each of them the triangles in its grid, and what they reach.
     contents: [Contents; LEVELS],
     /// Ids in all lists.
@@ -225,7 +225,7 @@ impl Check<'_> {
     fn each_in(
         &self,
         node: &Node,
-        around: &mut [Option<Place>; LEVELS],
+        around: &mut [Option<CellOfGrid>; LEVELS],
         depth: usize,
         visit: &mut impl FnMut(&Placed),
     ) {
@@ -267,7 +267,7 @@ impl Check<'_> {
 }
 
 /// Whether these cells are the first of their grids that a triangle overlaps.
-fn is_first(placed: &Placed, places: &[Option<Place>]) -> bool {
+fn is_first(placed: &Placed, places: &[Option<CellOfGrid>]) -> bool {
     places.iter().flatten().all(|(node, cell)| {
         let mut first = None;
         placed.each_cell(node, |_, cell| {

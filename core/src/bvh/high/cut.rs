@@ -142,7 +142,7 @@ const fn bin(place: f32) -> usize {
 
 /// Where a range is cut: bins of an axis from this one on are the second part.
 #[derive(Clone, Copy)]
-struct Place {
+struct Split {
     axis: usize,
     bin: usize,
     cost: f32,
@@ -201,8 +201,8 @@ impl Bins {
 
     /// Sweeps over each axis from both ends, for the cut of least cost.
     #[inline(always)]
-    fn best<S: Simd>(&self, simd: S, rule: &Rule, unit: f32) -> Option<Place> {
-        let mut best = Place { axis: 0, bin: 0, cost: f32::INFINITY };
+    fn best<S: Simd>(&self, simd: S, rule: &Rule, unit: f32) -> Option<Split> {
+        let mut best = Split { axis: 0, bin: 0, cost: f32::INFINITY };
         for (axis, (boxes, counts)) in self.boxes.iter().zip(&self.counts).enumerate() {
             if rule.scale[axis % 3] >= f32::MAX {
                 continue;
@@ -227,7 +227,7 @@ impl Bins {
                 sum += counted;
                 let cost = before + area(simd, all, unit) * as_cost(sum);
                 if sum > 0 && cost < best.cost {
-                    best = Place { axis, bin, cost };
+                    best = Split { axis, bin, cost };
                 }
             }
         }
@@ -241,7 +241,7 @@ fn partition<S: Simd>(
     simd: S,
     items: &mut [Item],
     rule: &Rule,
-    cut: &Place,
+    cut: &Split,
 ) -> (usize, [f32x8<S>; 2]) {
     let nothing = f32x8::splat(simd, f32::INFINITY);
     let (mut first, mut second, mut middle) = (nothing, nothing, 0);

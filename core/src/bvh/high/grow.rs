@@ -69,14 +69,14 @@ const STACK: usize = (WIDTH - 1) * MOST_LEVELS as usize + 1;
 
 /// A part of a range, which becomes a child.
 #[derive(Clone, Copy)]
-struct Part {
+struct ChildRange {
     start: u32,
     end: u32,
     extent: Extent,
     area: f32,
 }
 
-impl Part {
+impl ChildRange {
     const NONE: Self = Self { start: 0, end: 0, extent: Extent::NOTHING, area: 0.0 };
 
     const fn count(&self) -> u32 {
@@ -185,11 +185,11 @@ impl Kernel for Grow<'_> {
 impl Grow<'_> {
     /// Cuts a range into eight parts in the order of its items, or into single triangles if there are fewer.
     #[inline(always)]
-    fn parts<S: Simd>(&mut self, simd: S, bins: &mut Bins, job: &Job) -> [Part; WIDTH] {
-        let mut parts = [Part::NONE; WIDTH];
+    fn parts<S: Simd>(&mut self, simd: S, bins: &mut Bins, job: &Job) -> [ChildRange; WIDTH] {
+        let mut parts = [ChildRange::NONE; WIDTH];
         let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
         let extent = Extent::of(simd, all);
-        parts[0] = Part { start: job.start, end: job.end, extent, area: 0.0 };
+        parts[0] = ChildRange { start: job.start, end: job.end, extent, area: 0.0 };
         let halve = job.level >= DEEP;
         for count in 1..WIDTH {
             let Some(at) = choose(&parts, halve) else { break };
@@ -211,8 +211,9 @@ impl Grow<'_> {
                 |extent: &Extent| area(simd, f32x8::simd_from(simd, extent.bounds), self.unit);
             // The parts behind it make room for its second half.
             let mut next =
-                Part { start: middle, end: part.end, extent: second, area: area(&second) };
-            parts[at] = Part { start: part.start, end: middle, extent: first, area: area(&first) };
+                ChildRange { start: middle, end: part.end, extent: second, area: area(&second) };
+            parts[at] =
+                ChildRange { start: part.start, end: middle, extent: first, area: area(&first) };
             for slot in parts.iter_mut().take(count + 1).skip(at + 1) {
                 core::mem::swap(slot, &mut next);
             }
@@ -231,7 +232,7 @@ fn halves<S: Simd>(simd: S, items: &[Item]) -> (usize, [Extent; 2]) {
 
 /// Which part to cut next.
 #[inline(always)]
-fn choose(parts: &[Part; WIDTH], halve: bool) -> Option<usize> {
+fn choose(parts: &[ChildRange; WIDTH], halve: bool) -> Option<usize> {
     let mut best = None;
     let mut most = (false, -1.0, 0);
     for (at, part) in parts.iter().enumerate() {

@@ -163,7 +163,7 @@ const fn inverse_power(length: f32) -> f32 {
 }
 
 /// A task of the first pass: some triangles, and room for their items.
-struct Boxes<'w> {
+struct ItemsTask<'w> {
     mesh: &'w TriangleMesh<'w>,
     flags: BuildFlags,
     first: u32,
@@ -182,7 +182,7 @@ fn boxes<const N: usize>(
     let mut rest = &mut *items;
     let parts = (0..tasks).map(|task| {
         let (first, end) = (share(all, task, tasks), share(all, task + 1, tasks));
-        Boxes { mesh, flags, first: first as u32, items: take(&mut rest, end - first) }
+        ItemsTask { mesh, flags, first: first as u32, items: take(&mut rest, end - first) }
     });
     let level = SimdLevel::detect();
     let results = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
@@ -201,7 +201,7 @@ fn boxes<const N: usize>(
     Ok((finite, bounds))
 }
 
-impl Kernel for Boxes<'_> {
+impl Kernel for ItemsTask<'_> {
     type Output = Result<(usize, Aabb), Error>;
 
     #[inline(always)]
@@ -253,7 +253,7 @@ struct Work {
 }
 
 /// The work of a task: ranges that wait.
-struct Part<'w> {
+struct RangesTask<'w> {
     work: &'w Work,
     /// Before the first of its ranges.
     cursor: Cursor,
@@ -298,7 +298,7 @@ impl Ranges {
     }
 }
 
-impl Part<'_> {
+impl RangesTask<'_> {
     /// Makes the nodes over its ranges into `nodes`, which lie in the index from `child` on, and leaves a record
     /// in the place of each range; returns how many nodes are below their roots.
     fn make(self, nodes: &mut [Node], child: u32) -> u32 {
@@ -370,14 +370,14 @@ impl Work {
         // Make the nodes over each range.
         let (top, mut rest) = nodes.split_at_mut((top_count as usize).min(nodes.len()));
         let mut ids = ids.get_mut(top_ids as usize..).unwrap_or_default();
-        let mut plans = [Plan::default(); N];
+        let mut plans = [TaskRanges::default(); N];
         let (mut first, mut start, mut cursor, mut items_left) =
             (top_ids, 0, Cursor::new(), &mut *items);
         let mut next = |goal: u32| {
             let before = cursor;
             let ranges = Ranges::until(goal, &mut cursor, top);
             let end = ranges.end.max(start);
-            let part = Part {
+            let part = RangesTask {
                 work: self,
                 cursor: before,
                 top,
@@ -407,7 +407,7 @@ impl Work {
             let parts = plans.iter_mut().take(tasks).enumerate().map(|(task, plan)| {
                 let (part, ranges) = next(share(all as usize, task + 1, tasks) as u32);
                 let nodes = take(&mut rest, ranges.nodes as usize);
-                *plan = Plan { ranges: ranges.count, child };
+                *plan = TaskRanges { ranges: ranges.count, child };
                 child += ranges.nodes;
                 (part, nodes, plan.child)
             });
@@ -417,7 +417,7 @@ impl Work {
         // Move them together, and the root of each range to where it waits.
         let mut cursor = Cursor::new();
         let mut count = top_count;
-        for Plan { ranges, mut child } in plans {
+        for TaskRanges { ranges, mut child } in plans {
             for _ in 0..ranges {
                 let top = nodes.get(..(top_count as usize).min(nodes.len())).unwrap_or_default();
                 let Some(waiter) = cursor.next(top) else { break };
@@ -450,7 +450,7 @@ const STEPS: usize = 64;
 
 /// The ranges of a task, and where their nodes lie.
 #[derive(Debug, Clone, Copy, Default)]
-struct Plan {
+struct TaskRanges {
     ranges: u32,
     child: u32,
 }
