@@ -63,6 +63,11 @@ pub use crate::stored::*;
 pub use crate::types::*;
 pub use crate::version::*;
 
+#[cfg(all(not(feature = "rlib"), panic = "unwind"))]
+compile_error!(
+    "the library cannot unwind: build it with --release, or in the folder capi, whose profiles abort"
+);
+
 /// Nothing in this library or in core panics, so link-time optimisation drops this again.
 #[cfg(not(feature = "rlib"))]
 #[panic_handler]
