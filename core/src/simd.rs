@@ -7,7 +7,7 @@
 //!
 //! ```text
 //! target          at build time                     at run time
-//! x86-64, i686    Sse2                              Avx2, Avx512 (an Ice Lake's, Zen 4 on)
+//! x86-64, i686    Sse2                              Avx2; for groups of rays Avx512 (an Ice Lake's, Zen 4 on)
 //! AArch64         Neon
 //! wasm32          Simd128, if built with +simd128
 //! all others      Scalar
@@ -42,7 +42,7 @@ pub enum SimdLevel {
     Sse2,
     /// Eight lanes on x86 (the level x86-64-v3).
     Avx2,
-    /// Eight lanes, twice the registers and masks on x86 (the AVX-512 of Ice Lake and Zen 4).
+    /// Sixteen lanes for groups of rays, else those of AVX2, on x86 (the AVX-512 of Ice Lake and Zen 4).
     Avx512,
 }
 
@@ -113,6 +113,10 @@ pub(crate) const HAS_VECTORS: bool = cfg!(any(
 pub(crate) trait Kernel {
     type Output;
 
+    /// Whether the kernel uses sixteen lanes, so that it is compiled for AVX-512, too. With eight lanes AVX2 was as
+    /// fast for rays on a Rocket Lake, and a third copy of each kernel is a seventh of the library.
+    const IS_WIDE: bool = false;
+
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
@@ -167,7 +171,7 @@ mod machine {
     #[expect(unsafe_code, reason = "a token is a promise about the machine, kept by `detect`")]
     pub(super) fn dispatch<K: Kernel>(level: SimdLevel, kernel: K) -> K::Output {
         match level.min(detect()) {
-            SimdLevel::Avx512 => {
+            SimdLevel::Avx512 if K::IS_WIDE => {
                 // SAFETY: `detect` found every instruction set that `avx512` names.
                 let simd = unsafe { avx512() };
                 simd.vectorize(
@@ -175,7 +179,7 @@ mod machine {
                     || kernel.run(simd),
                 )
             }
-            SimdLevel::Avx2 => {
+            SimdLevel::Avx512 | SimdLevel::Avx2 => {
                 // SAFETY: `detect` found every instruction set that `avx2` names.
                 let simd = unsafe { avx2() };
                 simd.vectorize(
@@ -345,6 +349,7 @@ mod tests {
 
     impl Kernel for Name {
         type Output = alloc::string::String;
+        const IS_WIDE: bool = true;
 
         fn run<S: Simd>(self, _: S) -> Self::Output {
             core::any::type_name::<S>().rsplit(':').next().unwrap_or_default().to_lowercase()

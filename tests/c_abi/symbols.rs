@@ -133,7 +133,8 @@ fn neither_flavour_asks_for_a_library() {
     for flavour in Flavour::ALL {
         let mut rustc = cargo_in(&target, "rustc");
         rustc.args(["-p", "hgrid-capi", "--crate-type", "staticlib"]).args(flavour.features());
-        rustc.args(["--config", "profile.dev.opt-level=0", "--", "--print", "native-static-libs"]);
+        rustc.args(["--config", "profile.dev.opt-level=0", "--config"]);
+        rustc.args(["profile.dev.panic='abort'", "--", "--print", "native-static-libs"]);
         let told = String::from_utf8(run(&mut rustc).stderr).expect("text");
         let libraries: Vec<_> =
             told.lines().filter_map(|line| line.split_once("native-static-libs:")).collect();

@@ -109,17 +109,18 @@ fn packages_name_no_file_outside_of_them() {
     }
 }
 
-/// Alone, the C library is built with the profiles that the workspace gives it.
+/// Alone, the C library is built with the profiles that the workspace gives it, but that debug builds abort.
 #[test]
 fn the_c_library_has_its_profiles_in_its_package() {
     let [workspace, package] = ["Cargo.toml", "capi/.cargo/config.toml"]
         .map(|name| fs::read_to_string(root().join(name)).expect("a file"));
-    for profile in ["[profile.release]\n", "[profile.dev]\n"] {
+    for (profile, more) in [("[profile.release]\n", ""), ("[profile.dev]\n", "panic = \"abort\"\n")]
+    {
         let [workspace, package] = [&workspace, &package].map(|text| {
             let behind = text.split_once(profile).expect(profile).1;
             behind.split("\n\n").next().expect("settings").trim_end().to_owned()
         });
-        assert_eq!(workspace, package, "{profile}");
+        assert_eq!(more.to_owned() + &workspace, package, "{profile}");
     }
     assert!(listed("hgrid-capi").iter().any(|file| file == ".cargo/config.toml"));
 }

@@ -52,6 +52,7 @@ pub(crate) struct Groups<'r, C: ?Sized, const ANY: bool> {
 
 impl<C: Together + ?Sized, const ANY: bool> Kernel for Groups<'_, C, ANY> {
     type Output = ();
+    const IS_WIDE: bool = true;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
