@@ -63,9 +63,10 @@ pub use crate::stored::*;
 pub use crate::types::*;
 pub use crate::version::*;
 
-#[cfg(all(not(feature = "rlib"), panic = "unwind"))]
+#[cfg(all(not(feature = "rlib"), not(doc), panic = "unwind"))]
 compile_error!(
-    "the library cannot unwind: build it with --release, or in the folder capi, whose profiles abort"
+    "the library cannot unwind: build it in its own folder, whose .cargo/config.toml says abort, or in the \
+     workspace with --release"
 );
 
 /// Nothing in this library or in core panics, so link-time optimisation drops this again.

@@ -1,13 +1,13 @@
 //! Chooses the vector instructions of queries: detects them once, and never uses more than the machine has.
 //!
 //! A [`Kernel`] is code generic over the vectors of `fearless_simd`; [`dispatch`] compiles it once
-//! for each level that the target may meet and runs the one that was asked for. Every level gives
-//! the same bits: the kernels use nothing that rounds differently, and fused multiply-adds only where
-//! the product is exact.
+//! for each level that the target may meet (for AVX-512 only if it [is wide](Kernel::IS_WIDE)) and runs the
+//! one that was asked for, or the nearest below. Every level gives the same bits: the kernels use nothing that
+//! rounds differently, and fused multiply-adds only where the product is exact.
 //!
 //! ```text
 //! target          at build time                     at run time
-//! x86-64, i686    Sse2                              Avx2; for groups of rays Avx512 (an Ice Lake's, Zen 4 on)
+//! x86-64, i686    Sse2                              Avx2; Avx512 for groups of rays (Ice Lake, Zen 4 on)
 //! AArch64         Neon
 //! wasm32          Simd128, if built with +simd128
 //! all others      Scalar
@@ -42,7 +42,7 @@ pub enum SimdLevel {
     Sse2,
     /// Eight lanes on x86 (the level x86-64-v3).
     Avx2,
-    /// Sixteen lanes for groups of rays, else those of AVX2, on x86 (the AVX-512 of Ice Lake and Zen 4).
+    /// Sixteen lanes for groups of rays, the eight of AVX2 for all else, on x86 (the AVX-512 of Ice Lake and Zen 4).
     Avx512,
 }
 
@@ -114,13 +114,13 @@ pub(crate) trait Kernel {
     type Output;
 
     /// Whether the kernel uses sixteen lanes, so that it is compiled for AVX-512, too. With eight lanes AVX2 was as
-    /// fast for rays on a Rocket Lake, and a third copy of each kernel is a seventh of the library.
+    /// fast for rays on a Rocket Lake, and a third copy of each kernel would make the library an eighth larger.
     const IS_WIDE: bool = false;
 
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// Runs a kernel at a level, or at the nearest one below that the machine has.
+/// Runs a kernel at a level, or at the nearest one below that the machine has and the kernel is compiled for.
 #[inline(always)]
 pub(crate) fn dispatch<K: Kernel>(level: SimdLevel, kernel: K) -> K::Output {
     machine::dispatch(level, kernel)

@@ -11,8 +11,8 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | spare |
 //! ```
 //!
-//! The sort buffer is the second buffer of the sort. `sizes` computes the exact size by a build without an index: it puts the
-//! keys and the top tree on the sort buffer and only counts ids and nodes. A build also puts the keys on the sort buffer if they do
+//! `spare` is the second buffer of the sort. `sizes` computes the exact size by a build without an index: it puts
+//! the keys and the top tree into `spare` and only counts ids and nodes. A build also puts the keys there if they do
 //! not fit into the index: an index of exact size has no room for keys of triangles that are skipped.
 //!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
@@ -165,7 +165,7 @@ fn build_in<const N: usize>(
         available_bytes: index_available,
     };
     let available_bytes = scratch.len() as u64;
-    // Report the need of a whole sort buffer: only the census, below, shows whether bins are crowded.
+    // Report the need of a whole `spare`: only the census, below, shows whether bins are crowded.
     let needed_bytes = scratch_bytes(all, 1, all);
     let scratch_error =
         Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
@@ -415,7 +415,7 @@ impl Kernel for UnitsTask<'_> {
 }
 
 impl Work<'_> {
-    /// Makes the subtrees and their records. The sort buffer of a single task may be smaller than its entries.
+    /// Makes the subtrees and their records. The `spare` of a single task may be shorter than its entries.
     fn roots<const N: usize>(
         &self,
         entries: &mut [Entry],
@@ -498,7 +498,7 @@ impl Work<'_> {
         }
     }
 
-    /// Builds the tree over the roots, behind their nodes, or on the sort buffer if the index has no room;
+    /// Builds the tree over the roots, behind their nodes, or in `spare` if the index has no room;
     /// returns how many nodes and levels there are then, or `None` if nothing has room.
     fn top(
         &self,

@@ -21,7 +21,7 @@
 //!   divided lie inside one another.
 //!
 //! A bin has one count a task and one for all, and there is at most one bin for sixteen triangles. A bin is
-//! sorted on the sort buffer; only bins of more than [`CROWD`] entries need more of it than that.
+//! sorted with `spare` as the second buffer; only bins of more than [`CROWD`] entries need more of it than that.
 
 use crate::arena::section_bytes;
 use crate::blob::HEADER_BYTES;
@@ -105,14 +105,14 @@ pub(crate) const fn count_bytes(triangles: u64, tasks: u64) -> u64 {
     (tasks + 1) * section_bytes::<u32>(1 << bin_bits(triangles))
 }
 
-/// Bytes of scratch: for counts, entries and a sort buffer of so many entries.
+/// Bytes of scratch: for counts, entries and a `spare` of so many entries.
 pub(crate) const fn scratch_bytes(triangles: u64, tasks: u64, spare: u64) -> u64 {
     count_bytes(triangles, tasks)
         + section_bytes::<Entry>(triangles)
         + section_bytes::<Entry>(spare)
 }
 
-/// Entries on the sort buffer of a single task, as long as no bin is crowded.
+/// Entries of the `spare` of a single task, as long as no bin is crowded.
 pub(crate) const fn small_spare(triangles: u64) -> u64 {
     if (MOST_UNIT as u64) < triangles { MOST_UNIT as u64 } else { triangles }
 }

@@ -141,16 +141,16 @@ fn are_scattered(
     4 * scattered > groups
 }
 
-/// Moves entries to where one digit of their keys says, those of equal digits in their order.
+/// Moves rays to where one digit of their keys says, those of equal digits in their order.
 fn pass(from: &[SortKey], to: &mut [SortKey], counts: &mut [u32; DIGITS], number: u32) {
     let mut next = 0;
     for count in counts.iter_mut() {
         next += core::mem::replace(count, next);
     }
-    for &entry in from {
-        let next = &mut counts[digit(entry, number)];
+    for &key in from {
+        let next = &mut counts[digit(key, number)];
         if let Some(slot) = to.get_mut(*next as usize) {
-            *slot = entry;
+            *slot = key;
         }
         *next += 1;
     }
@@ -159,8 +159,8 @@ fn pass(from: &[SortKey], to: &mut [SortKey], counts: &mut [u32; DIGITS], number
 /// The lower or the upper digit of a key.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "nine bits")]
-const fn digit(entry: SortKey, number: u32) -> usize {
-    (entry >> (32 + DIGIT_BITS * number)) as usize % DIGITS
+const fn digit(key: SortKey, number: u32) -> usize {
+    (key >> (32 + DIGIT_BITS * number)) as usize % DIGITS
 }
 
 /// The cells of a box.

@@ -97,7 +97,7 @@ pub(crate) struct Roots<'w> {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
     Entries,
-    Bench,
+    Spare,
 }
 
 impl<'w> Roots<'w> {
@@ -151,7 +151,7 @@ impl<'w> Roots<'w> {
             Side::Entries => {
                 (self.entries.get_mut(range.clone()), spare_for(self.spare, &range, depth))
             }
-            Side::Bench => (self.spare.get_mut(range.clone()), self.entries.get_mut(range.clone())),
+            Side::Spare => (self.spare.get_mut(range.clone()), self.entries.get_mut(range.clone())),
         };
         if let (Some(entries), Some(spare)) = (entries, spare) {
             let differing = |[first, last]: [&Entry; 2]| 32 - (first[0] ^ last[0]).leading_zeros();
@@ -197,7 +197,7 @@ impl<'w> Roots<'w> {
         let child = self.child + self.node_count;
         let entries = match side {
             Side::Entries => self.entries.get(range.clone()),
-            Side::Bench => self.spare.get(range.clone()),
+            Side::Spare => self.spare.get(range.clone()),
         };
         let Some(entries) = entries else { return };
         let subtree = &mut *self.subtree;
@@ -227,9 +227,9 @@ impl<'w> Roots<'w> {
             Side::Entries => (
                 self.entries.get_mut(range.clone()),
                 self.spare.get_mut(range.clone()),
-                Side::Bench,
+                Side::Spare,
             ),
-            Side::Bench => (
+            Side::Spare => (
                 self.spare.get_mut(range.clone()),
                 self.entries.get_mut(range.clone()),
                 Side::Entries,
@@ -302,13 +302,13 @@ impl<'w> Roots<'w> {
     fn on(&self, side: Side) -> &[Entry] {
         match side {
             Side::Entries => self.entries,
-            Side::Bench => self.spare,
+            Side::Spare => self.spare,
         }
     }
 }
 
-/// Returns the part of the sort buffer that a bin is sorted in: its start, which touches few pages, or, in a division, where
-/// other bins lie on the sort buffer, the bin's own range.
+/// Returns the part of `spare` that a bin is sorted with: its start, which touches few pages, or, in a division,
+/// where other bins lie in `spare`, the bin's own range.
 fn spare_for<'b>(
     spare: &'b mut [Entry],
     range: &Range<usize>,

@@ -130,7 +130,7 @@ fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>
         Ratio::new(what, &Entry::best(hgrid, workload)?, &theirs)
     };
     let random = |peer, quality| {
-        // Instances are traced ray by ray, here and there.
+        // Instances are traced ray by ray by hgrid and by the peer.
         let what = if hgrid.instances > 0 { "random rays" } else { "random rays in one call" };
         let (what, theirs) = best(peer, quality, what, Workload::Random)?;
         Ratio::new(what, &Entry::in_mode(hgrid, Workload::Random, Mode::Batch)?, &theirs)
