@@ -115,6 +115,7 @@ pub(crate) trait Kernel {
 
     /// Whether the kernel uses sixteen lanes, so that it is compiled for AVX-512, too. With eight lanes AVX2 was as
     /// fast for rays on a Rocket Lake, and a third copy of each kernel would make the library an eighth larger.
+    #[allow(dead_code, reason = "only x86 has levels of several widths")]
     const IS_WIDE: bool = false;
 
     fn run<S: Simd>(self, simd: S) -> Self::Output;
