@@ -113,8 +113,8 @@ pub(crate) const HAS_VECTORS: bool = cfg!(any(
 pub(crate) trait Kernel {
     type Output;
 
-    /// Whether the kernel uses sixteen lanes, so that it is compiled for AVX-512, too. With eight lanes AVX2 was as
-    /// fast for rays on a Rocket Lake, and a third copy of each kernel would make the library an eighth larger.
+    /// True if the kernel uses sixteen lanes. [`dispatch`] compiles only such kernels for AVX-512: with eight lanes
+    /// AVX2 was as fast on the one processor where both were measured, and a third copy of each kernel costs size.
     #[allow(dead_code, reason = "only x86 has levels of several widths")]
     const IS_WIDE: bool = false;
 

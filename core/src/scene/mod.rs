@@ -91,8 +91,8 @@ impl Object<'_> {
 /// A built scene and the objects that it was opened with, ready for queries.
 ///
 /// The view is small and can be copied; it borrows the blob and the objects, and any number of threads may
-/// query it at once. A query takes 8 KiB of stack for the scene and for each
-/// scene inside it, and what the object's own takes.
+/// query it at once. A query takes 8 KiB of stack for the scene and for each scene inside it,
+/// and what the query of the object takes.
 ///
 /// ```
 /// use hgrid_core::{Block, Config, Grid, Instance, Object, RayF64, Scene, TriangleMesh, sizes};
