@@ -36,8 +36,25 @@ impl Decided {
 }
 
 /// Decides the first `count` of eight pairs; the others are read, too.
+///
+/// `vectorize` makes the test a function of its own, compiled for the same instructions. A group decides in three
+/// places, so the compiler calls it there instead of writing it out three times.
 #[inline(always)]
 pub(crate) fn decide<S: Simd>(
+    simd: S,
+    mesh: &TriangleMesh<'_>,
+    rays: [&Ray; LANES],
+    ids: [u32; LANES],
+    count: usize,
+) -> Decided {
+    simd.vectorize(
+        #[inline(always)]
+        || decide_in_line(simd, mesh, rays, ids, count),
+    )
+}
+
+#[inline(always)]
+fn decide_in_line<S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'_>,
     rays: [&Ray; LANES],

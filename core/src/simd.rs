@@ -109,7 +109,7 @@ pub(crate) const HAS_VECTORS: bool = cfg!(any(
 /// Code for any vector instructions.
 ///
 /// What `run` calls on vectors must be `#[inline(always)]` down to the last function: only what
-/// ends up inside [`dispatch`] is compiled for the level.
+/// ends up inside [`dispatch`], or in a `Simd::vectorize` of its own (`pairs.rs`), is compiled for the level.
 pub(crate) trait Kernel {
     type Output;
 

@@ -8,7 +8,6 @@ use crate::bvh::{Bvh, Groups, Scope, SortKey, Together};
 use crate::grid::Grid;
 use crate::options::QueryOptions;
 use crate::ray::{Hit, INVALID_ID, Ray};
-use crate::simd::dispatch;
 
 /// A batch with its grid and its options; `ASKS` is true if the options have a filter.
 struct Asked<'r, 'm, 'q, B, A, const ASKS: bool> {
@@ -119,16 +118,8 @@ impl<A: Answer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
     fn groups<const ANY: bool>(&mut self, memory: &mut [SortKey]) {
         let Scope { mesh, bounds, simd } = self.grid.scope();
         let (bvh, choice) = (self.tree, self.options.choice());
-        if !ASKS && !A::IS_RARE {
-            let batch = self;
-            return dispatch(simd, Groups::<_, ANY> { bvh, mesh, bounds, choice, memory, batch });
-        }
-        let batch: &mut dyn Together = self;
         // If no hit can end a ray unasked, the first one is sooner found as the closest.
-        if ANY && !choice.asks_all(mesh) {
-            dispatch(simd, Groups::<_, true> { bvh, mesh, bounds, choice, memory, batch });
-        } else {
-            dispatch(simd, Groups::<_, false> { bvh, mesh, bounds, choice, memory, batch });
-        }
+        let is_any = ANY && !(ASKS && choice.asks_all(mesh));
+        Groups { bvh, mesh, bounds, choice, memory, batch: self }.trace(simd, is_any);
     }
 }

@@ -388,10 +388,6 @@ impl Grid<'_> {
 
 /// The answer to one ray of a batch: a hit, a flag, or the id of a triangle.
 trait Answer: Sized {
-    /// True if batches of this kind share a kernel with others, which saves code and costs a call for each ray and
-    /// each answer.
-    const IS_RARE: bool = false;
-
     /// The type of an element in an array of answers.
     type Stored: Immutable + IntoBytes;
 
@@ -452,8 +448,6 @@ impl Answer for bool {
 }
 
 impl Answer for u32 {
-    const IS_RARE: bool = true;
-
     type Stored = Self;
 
     #[inline(always)]

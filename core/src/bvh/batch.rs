@@ -1,7 +1,5 @@
 //! A batch of rays, group by group.
 
-use fearless_simd::Simd;
-
 use super::Bvh;
 use super::group::{Group, Stack};
 use super::order::{self, SortKey, Sorted};
@@ -11,10 +9,10 @@ use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
 use crate::options::{Choice, Cull};
 use crate::ray::{Hit, INVALID_ID, Ray};
-use crate::simd::Kernel;
+use crate::simd::SimdLevel;
 use crate::triangle::TriangleTest;
 
-/// A batch as a kernel sees it.
+/// A batch as the loop over its groups sees it.
 pub(crate) trait Together {
     /// Number of rays.
     fn count(&self) -> usize;
@@ -40,7 +38,7 @@ pub(crate) trait Together {
 }
 
 /// The rays of a batch, which go in groups.
-pub(crate) struct Groups<'r, C: ?Sized, const ANY: bool> {
+pub(crate) struct Groups<'r, C> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
     pub(crate) bounds: Aabb,
@@ -50,14 +48,14 @@ pub(crate) struct Groups<'r, C: ?Sized, const ANY: bool> {
     pub(crate) batch: &'r mut C,
 }
 
-impl<C: Together + ?Sized, const ANY: bool> Kernel for Groups<'_, C, ANY> {
-    type Output = ();
-    const IS_WIDE: bool = true;
-
+impl<C: Together> Groups<'_, C> {
+    /// Answers all rays; with `is_any` the first hit of a ray ends it.
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
+    pub(crate) fn trace(self, level: SimdLevel, is_any: bool) {
         let Self { bvh, mesh, bounds, choice, memory, batch } = self;
-        let (rays, stack) = (&mut Rays::new(choice), &mut Stack::new());
+        let (mut rays, mut stack) = (Rays::new(choice), Stack::new());
+        let mut group =
+            Group { bvh, mesh, bounds: &bounds, rays: &mut rays, stack: &mut stack, count: 0 };
         let mut places = [0; GROUP];
         let window = order::window(memory);
         let all = batch.count();
@@ -71,20 +69,15 @@ impl<C: Together + ?Sized, const ANY: bool> Kernel for Groups<'_, C, ANY> {
                 None
             };
             for start in (0..of_window).step_by(GROUP) {
-                let count = (of_window - start).min(GROUP);
-                let slots = (start..).zip(places.iter_mut().zip(rays.slots())).take(count);
-                for (at, (place, ray)) in slots {
+                group.count = (of_window - start).min(GROUP);
+                let slots = (start..).zip(places.iter_mut().zip(group.rays.slots()));
+                for (at, (place, ray)) in slots.take(group.count) {
                     *place = first + order.as_ref().map_or(at, |order| order.place(at));
                     *ray = batch.ray(*place);
                 }
-                let mut alone = rays.prepare(simd, count, &bounds);
-                if rays.are_scattered(&bounds) {
-                    alone |= rays.alive;
-                } else {
-                    Group::<ANY> { bvh, mesh, rays, stack }.run(simd);
-                }
-                for (lane, &place) in places.iter().enumerate().take(count) {
-                    let (is_alone, hit) = (alone >> lane & 1 != 0, &rays.hits[lane % GROUP]);
+                let alone = group.trace(level, is_any);
+                for (lane, &place) in places.iter().enumerate().take(group.count) {
+                    let (is_alone, hit) = (alone >> lane & 1 != 0, &group.rays.hits[lane % GROUP]);
                     if !is_alone && !batch.asks(hit) {
                         batch.found(place, hit);
                     } else if batch.keeps_order()
@@ -113,8 +106,8 @@ impl<C: Together + ?Sized, const ANY: bool> Kernel for Groups<'_, C, ANY> {
 
 /// Finishes the rays of a sorted window that wait for the filter, in the caller's order.
 #[inline(never)]
-fn take_turns<C: Together + ?Sized>(
-    batch: &mut C,
+fn take_turns(
+    batch: &mut impl Together,
     mesh: &TriangleMesh<'_>,
     cull: Cull,
     order: &Sorted<'_>,

@@ -4,6 +4,7 @@
 //! a leaf's triangles are fetched once for all of them, and no ray waits for another.
 //!
 //! ```text
+//! prepare the rays; if they start far apart, all are to be traced alone
 //! stack = [(root, all rays)]
 //! pop a child and its rays, without those that are done or end before it begins
 //! node: decode the eight boxes
@@ -25,9 +26,10 @@ use super::boxes::{WideBoxes, bits};
 use super::node::{Child, WIDTH};
 use super::rays::{GROUP, OCTETS, Rays};
 use super::walk::STACK;
+use crate::aabb::Aabb;
 use crate::eight::{Eight, first_eight};
 use crate::mesh::TriangleMesh;
-use crate::simd::Kernel;
+use crate::simd::{Kernel, SimdLevel, dispatch};
 
 /// With more rays than this, the beam of all rays is tested before the rays.
 const FEW_RAYS: u32 = 8;
@@ -63,20 +65,57 @@ impl Stack {
     }
 }
 
-/// A group of rays on its way; `ANY` if the first hit of a ray ends it.
-pub(crate) struct Group<'r, const ANY: bool> {
+/// A group of rays, and the tree that they go through.
+pub(crate) struct Group<'r> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
+    /// The box of the tree.
+    pub(crate) bounds: &'r Aabb,
     pub(crate) rays: &'r mut Rays,
     pub(crate) stack: &'r mut Stack,
+    /// Number of rays in the first slots.
+    pub(crate) count: usize,
 }
 
-impl<const ANY: bool> Kernel for Group<'_, ANY> {
-    type Output = ();
+impl Group<'_> {
+    /// Finds a hit of each ray; with `is_any` the first one ends it. Returns a mask of the rays that must be traced
+    /// alone instead.
+    ///
+    /// Not generic over the batch: kernels are the largest functions of the library, and all batches of a program
+    /// share them.
+    #[inline(never)]
+    pub(super) fn trace(&mut self, level: SimdLevel, is_any: bool) -> u64 {
+        if is_any {
+            dispatch(level, Descent::<true>(self))
+        } else {
+            dispatch(level, Descent::<false>(self))
+        }
+    }
+}
+
+/// The kernel over a group; with `ANY` the first hit of a ray ends it.
+struct Descent<'r, 'g, const ANY: bool>(&'r mut Group<'g>);
+
+impl<const ANY: bool> Kernel for Descent<'_, '_, ANY> {
+    type Output = u64;
+    const IS_WIDE: bool = true;
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        let Self { bvh, mesh, rays, stack } = self;
+    fn run<S: Simd>(self, simd: S) -> u64 {
+        let Group { bounds, rays, count, .. } = self.0;
+        let alone = rays.prepare(simd, *count, bounds);
+        if rays.are_scattered(bounds) {
+            return alone | rays.alive;
+        }
+        self.descend(simd);
+        alone
+    }
+}
+
+impl<const ANY: bool> Descent<'_, '_, ANY> {
+    #[inline(always)]
+    fn descend<S: Simd>(self, simd: S) {
+        let Group { bvh, mesh, rays, stack, .. } = self.0;
         let stack = &mut stack.0;
         let mut budget = bvh.budget();
         let mut top = 0;

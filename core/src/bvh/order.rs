@@ -83,10 +83,10 @@ pub(crate) const fn window(memory: &[SortKey]) -> usize {
 /// Sorts `count` rays of a batch from `first` on, no more than a [`window`]; `None` if they are better
 /// taken as given.
 ///
-/// Out of line: it needs no vectors, and its counts no stack while rays are traced.
+/// Out of line: its counts take stack only while rays are sorted.
 #[inline(never)]
 pub(crate) fn sort<'m>(
-    batch: &(impl Together + ?Sized),
+    batch: &impl Together,
     first: usize,
     count: usize,
     bounds: &Aabb,
@@ -120,12 +120,7 @@ pub(crate) fn sort<'m>(
 }
 
 /// Returns true if rays that follow one another start far from each other, in more than a few groups.
-fn are_scattered(
-    batch: &(impl Together + ?Sized),
-    first: usize,
-    count: usize,
-    bounds: &Aabb,
-) -> bool {
+fn are_scattered(batch: &impl Together, first: usize, count: usize, bounds: &Aabb) -> bool {
     let far = bounds.size().max_element() / 4.0;
     let (mut groups, mut scattered) = (0, 0);
     for start in (0..count).step_by(GROUP) {
