@@ -10,31 +10,54 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::control::Control;
 use crate::error::Error;
+use crate::simd::IS_SMALL;
 
 /// What is in the slot of a task.
 enum State<T, R> {
-    /// There is no such task, or it is being run.
+    /// There is no such task, it is being run, or its result was taken.
     Nothing,
     Task(T),
     Result(R),
 }
 
+/// Tasks that work is cut into, at most. A microcontroller has one core.
+pub(crate) const MOST: usize = if IS_SMALL { 1 } else { Control::MAX_TASKS as usize };
+
 /// The number of tasks that work is cut into. More than `most` would be too small to pay for a thread.
-#[expect(clippy::cast_possible_truncation, reason = "N is MAX_TASKS at most")]
-pub(crate) fn task_count<const N: usize>(parallel: &Control<'_>, most: usize) -> u32 {
+#[expect(clippy::cast_possible_truncation, reason = "MAX_TASKS at most")]
+pub(crate) fn task_count(parallel: &Control<'_>, most: usize) -> u32 {
     let most = u32::try_from(most).unwrap_or(u32::MAX);
-    parallel.tasks.min(most).clamp(1, N as u32)
+    parallel.tasks.min(most).clamp(1, MOST as u32)
 }
 
-/// Runs tasks and returns what each of them returns, in their order. An error if the caller's loop
-/// did not run each of them once; a single one needs no loop, and is not handed to it.
-pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
+/// Runs tasks and hands their results to `take`, in the order of the tasks. After an error of `take` it gets no more of
+/// them, and that error is returned.
+///
+/// If the caller's loop does not run every task once, `take` gets the results that there are, and the error is
+/// [`Error::InvalidParallelFor`]. A single task is not handed to the loop.
+#[inline(always)]
+pub(crate) fn run<T: Portable, R: Portable>(
+    parallel: &Control<'_>,
+    mut tasks: impl ExactSizeIterator<Item = T>,
+    work: impl Fn(T) -> R + Lendable,
+    mut take: impl FnMut(R) -> Result<(), Error>,
+) -> Result<(), Error> {
+    if IS_SMALL || tasks.len() < 2 {
+        return tasks.next().map_or(Ok(()), |task| take(work(task)));
+    }
+    run_several(parallel, tasks, work, take)
+}
+
+/// The same for several tasks. Out of line: the slots take stack only where it is called.
+#[inline(never)]
+pub(crate) fn run_several<T: Portable, R: Portable>(
     parallel: &Control<'_>,
     tasks: impl Iterator<Item = T>,
     work: impl Fn(T) -> R + Lendable,
-) -> Result<[Option<R>; N], Error> {
-    // Loops, not functions of arrays: these do everything once for each of many slots in a row.
-    let mut slots = [const { Slot::new(State::Nothing) }; N];
+    mut take: impl FnMut(R) -> Result<(), Error>,
+) -> Result<(), Error> {
+    // A loop: array functions write the code of a slot out for each of them.
+    let mut slots = [const { Slot::new(State::Nothing) }; MOST];
     let mut count = 0;
     for (slot, task) in slots.iter_mut().zip(tasks) {
         *slot = Slot::new(State::Task(task));
@@ -55,22 +78,15 @@ pub(crate) fn run<const N: usize, T: Portable, R: Portable>(
             _ => is_broken.store(true, Ordering::Relaxed),
         }
     };
-    match count {
-        0 => {}
-        1 => step(0),
-        _ => each(parallel, count, &step),
-    }
-    let (mut results, mut done) = ([const { None }; N], 0);
-    for (result, slot) in results.iter_mut().zip(slots) {
-        if let State::Result(returned) = slot.into_inner() {
-            *result = Some(returned);
-            done += 1;
+    run_each(parallel, count, &step);
+    let mut outcome = Ok(());
+    for slot in slots.iter().take(count as usize) {
+        match slot.replace(State::Nothing) {
+            Some(State::Result(result)) => outcome = outcome.and_then(|()| take(result)),
+            _ => is_broken.store(true, Ordering::Relaxed),
         }
     }
-    if is_broken.into_inner() || done != count {
-        return Err(Error::InvalidParallelFor);
-    }
-    Ok(results)
+    if is_broken.into_inner() { Err(Error::InvalidParallelFor) } else { outcome }
 }
 
 #[cfg(target_has_atomic = "32")]
@@ -99,13 +115,9 @@ mod with_atomics {
         pub(super) fn replace(&self, value: T) -> Option<T> {
             Some(core::mem::replace(&mut *self.0.try_lock()?, value))
         }
-
-        pub(super) fn into_inner(self) -> T {
-            self.0.into_inner()
-        }
     }
 
-    pub(super) fn each(parallel: &Control<'_>, count: u32, step: &(dyn Fn(u32) + Sync)) {
+    pub(super) fn run_each(parallel: &Control<'_>, count: u32, step: &(dyn Fn(u32) + Sync)) {
         (parallel.run)(count, step);
     }
 
@@ -134,7 +146,7 @@ mod with_atomics {
 #[cfg(target_has_atomic = "32")]
 pub(crate) use with_atomics::Shared;
 #[cfg(target_has_atomic = "32")]
-use with_atomics::{Lendable, Portable, Slot, each};
+use with_atomics::{Lendable, Portable, Slot, run_each};
 
 #[cfg(not(target_has_atomic = "32"))]
 mod without_atomics {
@@ -164,13 +176,9 @@ mod without_atomics {
         pub(super) fn replace(&self, value: T) -> Option<T> {
             Some(core::mem::replace(&mut *self.0.try_borrow_mut().ok()?, value))
         }
-
-        pub(super) fn into_inner(self) -> T {
-            self.0.into_inner()
-        }
     }
 
-    pub(super) fn each(_: &Control<'_>, count: u32, step: &dyn Fn(u32)) {
+    pub(super) fn run_each(_: &Control<'_>, count: u32, step: &dyn Fn(u32)) {
         for index in 0..count {
             step(index);
         }
@@ -200,4 +208,4 @@ mod without_atomics {
 #[cfg(not(target_has_atomic = "32"))]
 pub(crate) use without_atomics::Shared;
 #[cfg(not(target_has_atomic = "32"))]
-use without_atomics::{Lendable, Portable, Slot, each};
+use without_atomics::{Lendable, Portable, Slot, run_each};

@@ -51,7 +51,7 @@ use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
-use crate::tasks::{Shared, run, task_count};
+use crate::tasks::{self, Shared, run, run_several, task_count};
 
 /// The memory that any mesh with so many triangles and a build with so many tasks needs.
 pub(crate) const fn bound(triangles: u32, quality: Quality, tasks: u32) -> Option<(u64, u64)> {
@@ -85,7 +85,7 @@ pub(crate) fn sizes(
         bytes(mesh.triangle_count(), quality, control.tasks.clamp(1, Control::MAX_TASKS));
     if control.tasks <= 1 && scratch.len() as u64 >= needed {
         let watch = &Watch::none();
-        let header = header_of::<1>(mesh, quality, flags, None, scratch, &Control::SERIAL, watch)?;
+        let header = header_of(mesh, quality, flags, None, scratch, &Control::SERIAL, watch)?;
         return Sizes::new(header.blob_bytes, needed, true);
     }
     Sizes::new(index, needed, false)
@@ -106,13 +106,7 @@ pub(crate) fn build<'a>(
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
     check_count(mesh)?;
-    // Room on the stack for as many tasks as there may be, or for one: a microcontroller has one core.
-    let header = if control.tasks > 1 && !IS_SMALL {
-        const MOST: usize = Control::MAX_TASKS as usize;
-        header_of::<MOST>(mesh, quality, flags, Some(&mut *index), scratch, control, watch)
-    } else {
-        header_of::<1>(mesh, quality, flags, Some(&mut *index), scratch, control, watch)
-    }?;
+    let header = header_of(mesh, quality, flags, Some(&mut *index), scratch, control, watch)?;
     let available_bytes = index.len() as u64;
     let needed_bytes = header.blob_bytes;
     let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
@@ -125,7 +119,7 @@ pub(crate) fn build<'a>(
 }
 
 /// Builds all but the header by the method that the quality names.
-fn header_of<const N: usize>(
+fn header_of(
     mesh: &TriangleMesh<'_>,
     quality: Quality,
     flags: BuildFlags,
@@ -135,8 +129,8 @@ fn header_of<const N: usize>(
     watch: &Watch<'_>,
 ) -> Result<Header, Error> {
     match quality {
-        Quality::Fast => build_in::<N>(mesh, flags, index, scratch, control, watch),
-        Quality::High => high::build_in::<N>(mesh, flags, index, scratch, control, watch),
+        Quality::Fast => build_in(mesh, flags, index, scratch, control, watch),
+        Quality::High => high::build_in(mesh, flags, index, scratch, control, watch),
     }
 }
 
@@ -148,7 +142,7 @@ const TOP: f32 = 0.8;
 
 /// Builds everything but the header, which it returns. Without an index it only computes the size.
 #[inline(never)]
-fn build_in<const N: usize>(
+fn build_in(
     mesh: &TriangleMesh<'_>,
     flags: BuildFlags,
     mut index: Option<&mut [u8]>,
@@ -171,7 +165,7 @@ fn build_in<const N: usize>(
         Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
 
     // Fewer tasks where there is no memory for more.
-    let mut tasks = task_count::<N>(control, triangles as usize / SEAM);
+    let mut tasks = task_count(control, triangles as usize / SEAM);
     let fits = |tasks: u32| match tasks {
         1 => available_bytes >= scratch_bytes(all, 1, small_spare(all)),
         _ => {
@@ -189,14 +183,9 @@ fn build_in<const N: usize>(
     // Cut the scratch, and the ids out of the index.
     let bits = bin_bits(all);
     let bins = 1_usize << bits;
-    let mut rest = scratch;
-    let mut counts = [const { None }; N];
-    for slot in counts.iter_mut().take(tasks as usize) {
-        let (section, behind) = split_mut::<u32>(rest, bins as u64).ok_or(scratch_error)?;
-        section.fill(0);
-        *slot = Some(section);
-        rest = behind;
-    }
+    let (counts, rest) =
+        split_mut::<u32>(scratch, u64::from(tasks) << bits).ok_or(scratch_error)?;
+    counts.fill(0);
     let (sizes, rest) = split_mut::<u32>(rest, bins as u64).ok_or(scratch_error)?;
     let (entries, spare) = split_mut::<Entry>(rest, all).ok_or(scratch_error)?;
     let spare = whole::<Entry>(spare);
@@ -216,21 +205,21 @@ fn build_in<const N: usize>(
 
     // Find the box, then every triangle's key.
     watch.at(CENSUS)?;
-    let census = find_keys::<N>(mesh, flags, keys, &mut counts, bits, control)?;
+    let census = find_keys(mesh, flags, keys, counts, bits, control)?;
     let Census { finite, skipped, bounds } = census;
 
     // Give each bin its place, and each task its place in it.
     watch.at(SCATTER)?;
     for (bin, size) in sizes.iter_mut().enumerate() {
-        *size = counts.iter().flatten().filter_map(|counts| counts.get(bin)).sum();
+        *size = (0..tasks as usize).filter_map(|task| counts.get(task << bits | bin)).sum();
     }
     let is_crowded = sizes.iter().any(|&size| size as usize > CROWD);
     if is_crowded && !has_whole_spare {
         return Err(scratch_error);
     }
-    place_tasks(sizes, &mut counts);
+    place_tasks(sizes, counts, bits);
     let entries = entries.get_mut(..finite as usize).unwrap_or_default();
-    scatter::<N>(keys, entries, &mut counts, bits, control)?;
+    scatter(keys, entries, counts, bits, control)?;
 
     // Cut bins into subtrees.
     watch.at(ROOTS)?;
@@ -242,7 +231,7 @@ fn build_in<const N: usize>(
     let nodes = whole::<Node>(nodes);
     let scene = Lattice::pad(&bounds);
     let work = Work { mesh, least: least_node(&scene), sizes, shift: KEY_BITS - bits };
-    let made = work.roots::<N>(entries, &mut *spare, ids, nodes, &mut counts, control)?;
+    let made = work.roots(entries, &mut *spare, ids, nodes, counts, control)?;
 
     // Build the tree on top of them.
     watch.at(TOP)?;
@@ -277,30 +266,29 @@ pub(crate) fn least_node(scene: &Aabb) -> f32 {
     scene.size().max_element() * LEAST_NODE
 }
 
-/// Finds the key of every triangle, and counts the triangles of each bin.
-fn find_keys<const N: usize>(
+/// Finds the key of every triangle. Each task counts its triangles of each bin.
+fn find_keys(
     mesh: &TriangleMesh<'_>,
     flags: BuildFlags,
     keys: &mut [u32],
-    counts: &mut [Option<&mut [u32]>; N],
+    counts: &mut [u32],
     bits: u32,
     control: &Control<'_>,
 ) -> Result<Census, Error> {
-    let tasks = counts.iter().flatten().count();
-    let vertices = vertex_bounds::<N>(mesh, tasks, control)?;
+    let vertices = vertex_bounds(mesh, counts.len() >> bits, control)?;
     let rule = Keys::new(&vertices);
-    let census = count::<N>(mesh, flags, &rule, keys, counts, bits, control)?;
+    let census = count(mesh, flags, &rule, keys, counts, bits, control)?;
     if census.bounds == vertices || census.finite == 0 {
         return Ok(census);
     }
     // Vertices that no triangle has would coarsen the keys: take them from the box of the triangles.
-    counts.iter_mut().flatten().for_each(|counts| counts.fill(0));
+    counts.fill(0);
     let rule = Keys::new(&census.bounds);
-    count::<N>(mesh, flags, &rule, keys, counts, bits, control)
+    count(mesh, flags, &rule, keys, counts, bits, control)
 }
 
 /// The box of all vertices, used or not.
-fn vertex_bounds<const N: usize>(
+fn vertex_bounds(
     mesh: &TriangleMesh<'_>,
     tasks: usize,
     control: &Control<'_>,
@@ -308,37 +296,45 @@ fn vertex_bounds<const N: usize>(
     let vertices = mesh.vertex_count();
     let parts =
         (0..tasks).map(|task| share(vertices, task, tasks)..share(vertices, task + 1, tasks));
-    let boxes = run::<N, _, _>(control, parts, |part| mesh.vertex_bounds(part))?;
-    Ok(boxes.into_iter().flatten().fold(Aabb::EMPTY, |all, part| all.union(&part)))
+    let mut bounds = Aabb::EMPTY;
+    run(
+        control,
+        parts,
+        |part| mesh.vertex_bounds(part),
+        |part| {
+            bounds = bounds.union(&part);
+            Ok(())
+        },
+    )?;
+    Ok(bounds)
 }
 
 /// Turns the bin counts of all tasks into write positions: within a bin, entries are in the order of the tasks.
-fn place_tasks<const N: usize>(sizes: &mut [u32], counts: &mut [Option<&mut [u32]>; N]) {
+fn place_tasks(sizes: &mut [u32], counts: &mut [u32], bits: u32) {
     let mut next = starts(sizes);
     for (bin, &size) in sizes.iter().enumerate() {
         let next = &mut next[usize::from(size as usize <= CROWD)];
-        for count in counts.iter_mut().flatten().filter_map(|counts| counts.get_mut(bin)) {
+        for task in 0..counts.len() >> bits {
+            let Some(count) = counts.get_mut(task << bits | bin) else { continue };
             *next += core::mem::replace(count, *next);
         }
     }
 }
 
 /// Moves every triangle's entry to its bin.
-fn scatter<const N: usize>(
+fn scatter(
     keys: &[u32],
     entries: &mut [Entry],
-    counts: &mut [Option<&mut [u32]>; N],
+    counts: &mut [u32],
     bits: u32,
     control: &Control<'_>,
 ) -> Result<(), Error> {
-    let tasks = counts.iter().flatten().count();
+    let tasks = counts.len() >> bits;
     let shift = KEY_BITS - bits;
-    if tasks == 1
-        && let Some(Some(heads)) = counts.first_mut()
-    {
+    if IS_SMALL || tasks == 1 {
         for (id, &key) in (0..).zip(keys) {
             // A triangle that is left out has a key behind that of all bins.
-            let Some(head) = heads.get_mut((key >> shift) as usize) else { continue };
+            let Some(head) = counts.get_mut((key >> shift) as usize) else { continue };
             if let Some(entry) = entries.get_mut(*head as usize) {
                 *entry = [key, id];
             }
@@ -347,18 +343,20 @@ fn scatter<const N: usize>(
         return Ok(());
     }
     let entries = Shared::new(entries.as_flattened_mut());
-    let parts = counts.iter_mut().flatten().enumerate().map(|(task, heads)| {
+    let mut counts = counts;
+    let parts = (0..tasks).map(|task| {
+        let heads = take(&mut counts, 1 << bits);
         let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
         (range.start as u32, keys.get(range).unwrap_or_default(), heads)
     });
-    run::<N, _, _>(control, parts, |(first, keys, heads)| {
+    let move_all = |(first, keys, heads): (u32, &[u32], &mut [u32])| {
         for (id, &key) in (first..).zip(keys) {
             let Some(head) = heads.get_mut((key >> shift) as usize) else { continue };
             entries.set(2 * *head as usize, [key, id]);
             *head += 1;
         }
-    })?;
-    Ok(())
+    };
+    run(control, parts, move_all, |()| Ok(()))
 }
 
 /// The inputs that the steps after binning share.
@@ -416,41 +414,77 @@ impl Kernel for UnitsTask<'_> {
 
 impl Work<'_> {
     /// Makes the subtrees and their records. The `spare` of a single task may be shorter than its entries.
-    fn roots<const N: usize>(
+    fn roots(
         &self,
         entries: &mut [Entry],
         spare: &mut [Entry],
         ids: &mut [u32],
         nodes: &mut [Node],
-        counts: &mut [Option<&mut [u32]>; N],
+        counts: &mut [u32],
         control: &Control<'_>,
     ) -> Result<All, Error> {
-        let tasks = counts.iter().flatten().count();
-        let mut ends = [0; N];
+        if !IS_SMALL && counts.len() > self.sizes.len() {
+            return self.roots_of_tasks(entries, spare, ids, nodes, counts, control);
+        }
+        // The root of all comes first.
+        let (range, child) = (0..entries.len(), 1);
+        let nodes = nodes.get_mut(1..).unwrap_or_default();
+        let all = UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
+        let (made, last) = dispatch(SimdLevel::detect(), all);
+        Ok(All { nodes: 1 + made.nodes, roots: made.roots, last })
+    }
+
+    /// The same by several tasks. Out of line: what they return takes stack.
+    #[inline(never)]
+    fn roots_of_tasks(
+        &self,
+        entries: &mut [Entry],
+        spare: &mut [Entry],
+        ids: &mut [u32],
+        nodes: &mut [Node],
+        counts: &mut [u32],
+        control: &Control<'_>,
+    ) -> Result<All, Error> {
+        let bits = KEY_BITS - self.shift;
+        let tasks = counts.len() >> bits;
+        let mut ends = [0; tasks::MOST];
         self.cut(&mut ends, tasks, entries.len());
         // The root of all comes first.
         let (mut rest_of_nodes, mut child) = (nodes.get_mut(1..).unwrap_or_default(), 1);
         let (mut rest, mut spare, mut ids) = (&mut *entries, spare, ids);
         let mut start = 0;
-        let parts =
-            counts.iter_mut().flatten().zip(ends).enumerate().map(|(task, (counts, end))| {
-                let (count, is_last) = (end - start, task + 1 == tasks);
-                let entries = take(&mut rest, count);
-                let ids = take(&mut ids, count);
-                let room =
-                    if is_last { rest_of_nodes.len() } else { most_below(count as u64) as usize };
-                let nodes = take(&mut rest_of_nodes, room);
-                let room_to_sort = if is_last { spare.len() } else { count };
-                let spare = take(&mut spare, room_to_sort);
-                let range = start..end;
-                let part =
-                    UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
-                start = end;
-                child += room as u32;
-                part
-            });
+        let mut all_counts = counts;
+        let parts = (0..tasks).map(|task| {
+            let counts = take(&mut all_counts, 1 << bits);
+            let end = ends.get(task).copied().unwrap_or(start);
+            let (count, is_last) = (end - start, task + 1 == tasks);
+            let entries = take(&mut rest, count);
+            let ids = take(&mut ids, count);
+            let room =
+                if is_last { rest_of_nodes.len() } else { most_below(count as u64) as usize };
+            let nodes = take(&mut rest_of_nodes, room);
+            let room_to_sort = if is_last { spare.len() } else { count };
+            let spare = take(&mut spare, room_to_sort);
+            let range = start..end;
+            let part = UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
+            start = end;
+            child += room as u32;
+            part
+        });
         let level = SimdLevel::detect();
-        let made = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
+        let mut made = [const { None }; tasks::MOST];
+        let mut slots = made.iter_mut();
+        run_several(
+            control,
+            parts,
+            |part| dispatch(level, part),
+            |result| {
+                if let Some(slot) = slots.next() {
+                    *slot = Some(result);
+                }
+                Ok(())
+            },
+        )?;
 
         // Move nodes and records together.
         let mut all = All { nodes: 1, roots: 0, last: Record::new_zeroed() };
@@ -484,7 +518,7 @@ impl Work<'_> {
     }
 
     /// Where the units of each task end, at seams: about as many entries for each.
-    fn cut<const N: usize>(&self, ends: &mut [usize; N], tasks: usize, entries: usize) {
+    fn cut(&self, ends: &mut [usize], tasks: usize, entries: usize) {
         let mut units = Units::new(self.sizes);
         let mut end = 0;
         for (task, slot) in ends.iter_mut().enumerate().take(tasks) {

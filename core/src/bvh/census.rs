@@ -41,21 +41,24 @@ struct KeysTask<'w> {
     bounds: Aabb,
 }
 
-/// Fills in the keys of all triangles, and the counts of each task.
-pub(crate) fn count<const N: usize>(
+/// Fills in the keys of all triangles. Counts the triangles of each bin, for each task by itself: the counts of one
+/// task follow those of another.
+pub(crate) fn count(
     mesh: &TriangleMesh<'_>,
     flags: BuildFlags,
     rule: &Keys,
     keys: &mut [u32],
-    counts: &mut [Option<&mut [u32]>; N],
+    counts: &mut [u32],
     bits: u32,
     control: &Control<'_>,
 ) -> Result<Census, Error> {
-    let tasks = counts.iter().flatten().count();
+    let tasks = counts.len() >> bits;
     let triangles = keys.len();
     let mut rest = keys;
     let mut first = 0;
-    let parts = counts.iter_mut().flatten().enumerate().map(|(task, counts)| {
+    let mut all_counts = counts;
+    let parts = (0..tasks).map(|task| {
+        let counts = take(&mut all_counts, 1 << bits);
         let end = share(triangles, task + 1, tasks);
         let keys = take(&mut rest, end.saturating_sub(first));
         let start = first;
@@ -66,13 +69,18 @@ pub(crate) fn count<const N: usize>(
         KeysTask { mesh, flags, rule, first, keys, counts, shift: KEY_BITS - bits, skipped, bounds }
     });
     let level = SimdLevel::detect();
-    let results = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
     let mut census = Census { finite: 0, skipped: 0, bounds: Aabb::EMPTY };
-    for result in results.into_iter().flatten() {
-        let (skipped, bounds) = result?;
-        census.skipped += skipped;
-        census.bounds = census.bounds.union(&bounds);
-    }
+    run(
+        control,
+        parts,
+        |part| dispatch(level, part),
+        |result| {
+            let (skipped, bounds) = result?;
+            census.skipped += skipped;
+            census.bounds = census.bounds.union(&bounds);
+            Ok(())
+        },
+    )?;
     census.finite = mesh.triangle_count() - census.skipped;
     Ok(census)
 }

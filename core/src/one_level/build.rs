@@ -80,7 +80,7 @@ impl<'s> Plan<'s> {
         mesh: &TriangleMesh<'_>,
         mut density: f32,
         flags: BuildFlags,
-        overlay: &impl Overlay,
+        overlay: &dyn Overlay,
         scratch: &'s mut [u8],
         watch: &Watch<'_>,
     ) -> Result<Self, Error> {
@@ -143,7 +143,7 @@ pub(crate) fn build_under<'a>(
     mesh: &TriangleMesh<'_>,
     density: f32,
     flags: BuildFlags,
-    overlay: &impl Overlay,
+    overlay: &dyn Overlay,
     index: &'a mut [u8],
     scratch: &mut [u8],
     watch: &Watch<'_>,

@@ -38,6 +38,7 @@ pub(crate) use build::{Overlay, Plan, Rows, build_under};
 pub(crate) use displacement::displace;
 use layout::Sections;
 pub(crate) use layout::{Layout, longest};
+pub(crate) use placed::Batch;
 pub(crate) use spread::{Spread, fill, mark};
 pub(crate) use triangles::MeshSpread;
 pub(crate) use validate::{check_header, slots_are_sound};
@@ -87,7 +88,7 @@ pub(crate) fn sizes_under(
     mesh: &TriangleMesh<'_>,
     density: f32,
     flags: BuildFlags,
-    overlay: &impl Overlay,
+    overlay: &dyn Overlay,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
     let plan = Plan::new(mesh, density, flags, overlay, scratch, &Watch::none())?;
@@ -119,7 +120,7 @@ impl<'a> OneLevel<'a> {
     pub(crate) fn open_under(
         header: &Header,
         lattice: &Lattice,
-        overlay: &impl Overlay,
+        overlay: &dyn Overlay,
         blob: &'a [u8],
     ) -> Result<Self, Error> {
         let Header { resolution, hash_count, reference_count, .. } = *header;

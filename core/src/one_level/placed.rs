@@ -81,7 +81,7 @@ impl Batch {
     /// enough, and tells whether it had.
     #[inline(always)]
     pub(super) fn each<const REVERSE: bool>(
-        spread: &impl Spread,
+        spread: &dyn Spread,
         watch: &Watch<'_>,
         share: [f32; 2],
         mut visit: impl FnMut(&Self, Range<u32>) -> bool,
@@ -102,7 +102,7 @@ impl Batch {
 
     /// The number of cells that primitives are in.
     #[inline(always)]
-    pub(super) fn references(&self, spread: &impl Spread, places: Range<u32>) -> u64 {
+    pub(super) fn references(&self, spread: &dyn Spread, places: Range<u32>) -> u64 {
         let cells = |(lane, place)| match self.get(lane) {
             Some(placed) => placed.count(),
             None => spread.range(place).map_or(0, |range| range.count()),
@@ -115,7 +115,7 @@ impl Batch {
     #[inline(always)]
     pub(super) fn each_row<const REVERSE: bool>(
         &self,
-        spread: &impl Spread,
+        spread: &dyn Spread,
         places: Range<u32>,
         mut visit: impl FnMut(u32, usize, u32, u32),
     ) {
@@ -171,7 +171,7 @@ impl Batch {
 
     /// Places one primitive after the other.
     #[inline(always)]
-    pub(super) fn place_each(&mut self, spread: &impl Spread, places: Range<u32>) {
+    pub(crate) fn place_each(&mut self, spread: &impl Spread, places: Range<u32>) {
         let [_, height, _] = spread.resolution();
         self.is_placed = 0;
         let xs_and_more = self.xs.as_flattened_mut().iter_mut().zip(self.more.as_flattened_mut());

@@ -1,7 +1,7 @@
 //! Spreading primitives over cells: mark, count, and sort them into lists.
 //!
 //! Two passes of a compact grid (LD08) over a hash table: count the references of every slot, sum
-//! up, and fill in reverse, so that every list ascends by id. What is spread comes from a
+//! up, and fill in reverse, so that every list ascends. What is spread comes from a
 //! [`Spread`]: the triangles of a mesh over a lattice, or the triangles of one cell over a subgrid;
 //! batch after batch of them is placed (`placed.rs`) and then spread.
 
@@ -14,31 +14,28 @@ use crate::cell::CellRange;
 use crate::control::Watch;
 use crate::error::Error;
 
-/// Primitives with the cells that each belongs into.
-pub(crate) trait Spread: Sized {
+/// Primitives with the cells that each belongs into. The lists hold the places of primitives.
+///
+/// The passes take a trait object, so that their code is compiled once for all that is spread. They call `place` once
+/// a batch, and `range` only for primitives that it did not place.
+pub(crate) trait Spread {
     /// Cells per axis.
     fn resolution(&self) -> [u32; 3];
 
     /// Number of places where a primitive may be.
     fn count(&self) -> u32;
 
-    /// The id of the primitive at a place. Ids ascend.
-    fn id(&self, place: u32) -> u32;
-
     /// The cells of the primitive at a place, if it has any. Every call answers the same.
     fn range(&self, place: u32) -> Option<CellRange>;
 
     /// Places the primitives at some places, as many as a batch has or fewer: those that it can, at
     /// the cells that [`range`](Self::range) says.
-    #[inline(always)]
-    fn place(&self, places: Range<u32>, batch: &mut Batch) {
-        batch.place_each(self, places);
-    }
+    fn place(&self, places: Range<u32>, batch: &mut Batch);
 }
 
 /// Marks the cells that primitives overlap and counts the references, up to a limit.
 pub(crate) fn mark(
-    spread: &impl Spread,
+    spread: &dyn Spread,
     domain_bits: &mut [u64],
     limit: u32,
     watch: &Watch<'_>,
@@ -56,7 +53,7 @@ pub(crate) fn mark(
 /// `limit`.
 #[inline(always)]
 pub(crate) fn count_references(
-    spread: &impl Spread,
+    spread: &dyn Spread,
     limit: u32,
     watch: &Watch<'_>,
     mut visit: impl FnMut(&Batch, Range<u32>),
@@ -75,7 +72,7 @@ pub(crate) fn count_references(
 
 /// Sorts the primitives into the cells' lists: count, sum up, fill in reverse.
 pub(crate) fn fill(
-    spread: &impl Spread,
+    spread: &dyn Spread,
     row_offsets: &[i32],
     hash: &mut [u32],
     references: &mut [u32],
@@ -99,13 +96,13 @@ pub(crate) fn fill(
         *slot = end;
     }
 
-    // Put every primitive before the end of its lists, the last one first: lists ascend by id.
+    // Put every primitive before the end of its lists, the last one first: lists ascend.
     Batch::each::<true>(spread, watch, [0.7, 1.0], |batch, places| {
         batch.each_row::<true>(spread, places, |place, row, x, length| {
             for end in slots(row_offsets, hash, row, x, length) {
                 *end = end.wrapping_sub(1);
                 if let Some(reference) = references.get_mut(*end as usize) {
-                    *reference = spread.id(place);
+                    *reference = place;
                 }
             }
         });
@@ -153,12 +150,12 @@ mod tests {
             u32::try_from(self.ranges.len()).unwrap()
         }
 
-        fn id(&self, place: u32) -> u32 {
-            3 * place + 1
-        }
-
         fn range(&self, place: u32) -> Option<CellRange> {
             self.ranges[place as usize]
+        }
+
+        fn place(&self, places: Range<u32>, batch: &mut Batch) {
+            batch.place_each(self, places);
         }
     }
 
@@ -197,7 +194,7 @@ mod tests {
                 for (place, range) in (0..).zip(&spread.ranges) {
                     for [x, y, z] in range.iter().flat_map(|range| range.cells()) {
                         let cell = row(resolution[1], y, z) * width + x as usize;
-                        expected[cell].push(spread.id(place));
+                        expected[cell].push(place);
                     }
                 }
                 let sum: usize = expected.iter().map(Vec::len).sum();

@@ -38,17 +38,11 @@ impl Spread for MeshSpread<'_> {
     }
 
     #[inline(always)]
-    fn id(&self, place: u32) -> u32 {
-        place
-    }
-
-    #[inline(always)]
     fn range(&self, place: u32) -> Option<CellRange> {
         let bounds = self.mesh.corners(place).and_then(Aabb::of)?;
         Some(self.lattice.range(&bounds))
     }
 
-    #[inline(always)]
     fn place(&self, places: Range<u32>, batch: &mut Batch) {
         let (wide, first) = (self.wide, places.start);
         // Of joined meshes the part of the first triangle: others are placed one by one.

@@ -10,6 +10,8 @@
 //! nothing is moved. When the pool runs out the build goes on planning subgrids and counting words:
 //! at the end it knows, exactly, what index it would have needed. That is also how `sizes` answers.
 
+use core::ops::Range;
+
 use super::subgrid::{Frame, SubLayout};
 use crate::aabb::Aabb;
 use crate::arena::{Sizes, copy, section_bytes, split_mut};
@@ -22,7 +24,7 @@ use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
 use crate::lists::pairs;
 use crate::mesh::TriangleMesh;
-use crate::one_level::{Layout, MeshSpread, Plan, Rows, Spread, displace, fill, mark, slot};
+use crate::one_level::{Batch, Layout, MeshSpread, Plan, Rows, Spread, displace, fill, mark, slot};
 use crate::survey::reference_limit;
 
 /// The primitives of one cell over its subgrid.
@@ -52,14 +54,13 @@ impl Spread for CellSpread<'_> {
     }
 
     #[inline(always)]
-    fn id(&self, place: u32) -> u32 {
-        self.ids.get(place as usize).copied().unwrap_or(u32::MAX)
-    }
-
-    #[inline(always)]
     fn range(&self, place: u32) -> Option<CellRange> {
         let id = *self.ids.get(place as usize)?;
         Some(self.frame.range(self.cell, &self.reach(id)?))
+    }
+
+    fn place(&self, places: Range<u32>, batch: &mut Batch) {
+        batch.place_each(self, places);
     }
 }
 
@@ -307,7 +308,14 @@ impl CellSpread<'_> {
         for (to, from) in sections.domain_bits.iter_mut().zip(halves) {
             *to = from;
         }
-        fill(&self, rows, sections.hash, sections.references, &Watch::none()).is_ok()
+        if fill(&self, rows, sections.hash, sections.references, &Watch::none()).is_err() {
+            return false;
+        }
+        // The lists hold places in the cell's list: replace them by its ids, which ascend as well.
+        for reference in sections.references {
+            *reference = self.ids.get(*reference as usize).copied().unwrap_or(u32::MAX);
+        }
+        true
     }
 
     /// Plans a subgrid: its frame, and its rows on the bench.

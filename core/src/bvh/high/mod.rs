@@ -43,8 +43,8 @@ use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::method::Quality;
-use crate::simd::{Kernel, SimdLevel, dispatch};
-use crate::tasks::{run, task_count};
+use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
+use crate::tasks::{self, run, task_count};
 use cut::Item;
 use grow::{Cursor, Grow, Grown, RECORD, Record};
 
@@ -81,7 +81,7 @@ const LEAST_NODE: f32 = super::build::LEAST_NODE;
 
 /// Builds everything but the header, which it returns. Without an index it only computes the size.
 #[inline(never)]
-pub(super) fn build_in<const N: usize>(
+pub(super) fn build_in(
     mesh: &TriangleMesh<'_>,
     flags: BuildFlags,
     mut index: Option<&mut [u8]>,
@@ -101,7 +101,7 @@ pub(super) fn build_in<const N: usize>(
         None => &mut [],
     };
     // Tasks fill their parts of the index side by side, which takes the bound. With less room, run one task.
-    let mut tasks = task_count::<N>(control, triangles as usize / LEAST_TASK);
+    let mut tasks = task_count(control, triangles as usize / LEAST_TASK);
     if index_available < index_bound {
         tasks = 1;
     }
@@ -113,7 +113,7 @@ pub(super) fn build_in<const N: usize>(
 
     // Find the boxes.
     watch.at(BOXES)?;
-    let (finite, bounds) = boxes::<N>(mesh, flags, items, tasks, control)?;
+    let (finite, bounds) = boxes(mesh, flags, items, tasks, control)?;
     let items = items.get_mut(..finite).unwrap_or_default();
 
     // Cut the index.
@@ -128,7 +128,7 @@ pub(super) fn build_in<const N: usize>(
     let scene = Lattice::pad(&bounds);
     let extent = scene.size().max_element();
     let work = Work { least: extent * LEAST_NODE, unit: inverse_power(extent), tasks };
-    let (node_count, levels) = work.make::<N>(items, ids, nodes, control, watch)?;
+    let (node_count, levels) = work.make(items, ids, nodes, control, watch)?;
 
     watch.at(DONE)?;
     let needed_bytes = index_bytes(finite as u64, node_count.into());
@@ -171,7 +171,7 @@ struct ItemsTask<'w> {
 }
 
 /// Writes the items of all triangles that are finite, and returns how many there are and the box around them.
-fn boxes<const N: usize>(
+fn boxes(
     mesh: &TriangleMesh<'_>,
     flags: BuildFlags,
     items: &mut [Item],
@@ -185,18 +185,30 @@ fn boxes<const N: usize>(
         ItemsTask { mesh, flags, first: first as u32, items: take(&mut rest, end - first) }
     });
     let level = SimdLevel::detect();
-    let results = run::<N, _, _>(control, parts, |part| dispatch(level, part))?;
     let mut bounds = Aabb::EMPTY;
+    let mut counts = [0; tasks::MOST];
+    let mut slots = counts.iter_mut();
+    run(
+        control,
+        parts,
+        |part| dispatch(level, part),
+        |result| {
+            let (count, bounds_of) = result?;
+            bounds = bounds.union(&bounds_of);
+            if let Some(slot) = slots.next() {
+                *slot = count;
+            }
+            Ok(())
+        },
+    )?;
     let mut finite = 0;
-    for (task, result) in results.into_iter().flatten().enumerate() {
-        let (count, bounds_of) = result?;
+    for (task, count) in counts.into_iter().enumerate().take(tasks) {
         let first = share(all, task, tasks);
         // Those of a task stand behind those that others left out.
         if finite < first {
             move_down(items, first, count, finite);
         }
         finite += count;
-        bounds = bounds.union(&bounds_of);
     }
     Ok((finite, bounds))
 }
@@ -333,7 +345,7 @@ impl RangesTask<'_> {
 
 impl Work {
     /// Makes all nodes and ids; returns how many nodes and levels there are.
-    fn make<const N: usize>(
+    fn make(
         &self,
         items: &mut [Item],
         ids: &mut [u32],
@@ -370,7 +382,7 @@ impl Work {
         // Make the nodes over each range.
         let (top, mut rest) = nodes.split_at_mut((top_count as usize).min(nodes.len()));
         let mut ids = ids.get_mut(top_ids as usize..).unwrap_or_default();
-        let mut plans = [TaskRanges::default(); N];
+        let mut plans = [TaskRanges::default(); tasks::MOST];
         let (mut first, mut start, mut cursor, mut items_left) =
             (top_ids, 0, Cursor::new(), &mut *items);
         let mut next = |goal: u32| {
@@ -391,7 +403,7 @@ impl Work {
             start = end;
             (part, ranges)
         };
-        if self.tasks == 1 {
+        if IS_SMALL || self.tasks == 1 {
             let mut made = 0;
             plans[0].child = top_count;
             for step in 1..=STEPS {
@@ -411,7 +423,8 @@ impl Work {
                 child += ranges.nodes;
                 (part, nodes, plan.child)
             });
-            run::<N, _, _>(control, parts, |(part, nodes, child)| part.make(nodes, child))?;
+            let make = |(part, nodes, child): (RangesTask<'_>, _, _)| part.make(nodes, child);
+            run(control, parts, make, |_| Ok(()))?;
         }
 
         // Move them together, and the root of each range to where it waits.
