@@ -45,22 +45,21 @@ impl Asked {
     }
 }
 
-/// What is true of rays: of each all hits, for each way to cull.
-struct Truth([Vec<Vec<Hit>>; 3]);
+/// What is true of rays: all hits of each, for each way to cull.
+struct Truth(Vec<[Vec<Hit>; 3]>);
 
 impl Truth {
     fn of(grid: &Grid<'_>, rays: &[Ray]) -> Self {
-        let hits = |cull| rays.iter().map(|ray| oracle::all_hits(grid, ray, cull)).collect();
-        Self([Cull::None, Cull::Back, Cull::Front].map(hits))
+        Self(rays.iter().map(|ray| oracle::hits_by_cull(grid.mesh(), ray)).collect())
     }
 
-    fn culling(&self, cull: Cull) -> &[Vec<Hit>] {
-        let [none, back, front] = &self.0;
-        match cull {
+    fn culling(&self, cull: Cull) -> Vec<&Vec<Hit>> {
+        let hits = self.0.iter().map(|[none, back, front]| match cull {
             Cull::None => none,
             Cull::Back => back,
             Cull::Front => front,
-        }
+        });
+        hits.collect()
     }
 
     /// Of each ray the hits that are there, whatever the filter says.
@@ -68,7 +67,7 @@ impl Truth {
         let is_seen = |id| asked.mask == u32::MAX || mesh.mask(id) & asked.mask != 0;
         let is_there = |hit: &&Hit| hit.primitive != asked.skip && is_seen(hit.primitive);
         let there = |hits: &Vec<Hit>| hits.iter().filter(is_there).copied().collect();
-        self.culling(asked.cull).iter().map(there).collect()
+        self.culling(asked.cull).into_iter().map(there).collect()
     }
 }
 
@@ -228,7 +227,7 @@ fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
         let tiles = rays(grid.bounds())[CLOSE - 64..].to_vec();
         for rays in [tiles, scattered(1200, 2)] {
             let truth = Truth::of(&grid, &rays);
-            let first = truth.culling(Cull::None).iter().flatten().next().expect("some hit");
+            let first = truth.culling(Cull::None).into_iter().flatten().next().expect("some hit");
             for asked in choices(first.primitive) {
                 let hits = truth.there(&view, asked);
                 for (ray, hits) in rays.iter().zip(&hits).step_by(5) {
@@ -300,7 +299,7 @@ fn what_is_named_blocks_the_ray() {
             ..choices(INVALID_ID)[0]
         }) {
             let hits = truth.culling(asked.cull);
-            for (ray, hits) in rays.iter().zip(hits) {
+            for (ray, hits) in rays.iter().zip(&hits) {
                 let named = grid.occluder(ray, &mut asked.options()).unwrap_or(INVALID_ID);
                 check_occluder(&grid, hits, asked, named, "alone");
                 let mut counters = Counters::default();

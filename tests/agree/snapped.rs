@@ -3,8 +3,8 @@
 
 use hgrid_core::{Config, Method, Parameters, Ray, Strided};
 use hgrid_tests::meshes::Mesh;
-use hgrid_tests::oracle;
 use hgrid_tests::owned::{Owned, prove};
+use hgrid_tests::{oracle, rounds, setting};
 use proptest::prelude::*;
 
 /// The scene is 4 units wide; at the densities below a cell is 1 unit, half of one, or two.
@@ -55,7 +55,7 @@ fn rays() -> impl Strategy<Value = Vec<Ray>> {
 
 /// As many cases as `PROPTEST_CASES` says, or what takes some seconds.
 fn cases() -> u32 {
-    std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(6000)
+    setting("PROPTEST_CASES", rounds(1500) as u64).try_into().expect("not that many")
 }
 
 proptest! {

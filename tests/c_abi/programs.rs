@@ -257,9 +257,20 @@ fn no_thread_gets_in_the_way_of_another() {
 /// 13 KiB for a task; for a ray in scenes 8 KiB for each of them and 7 KiB for a grid.
 #[test]
 fn queries_and_builds_take_little_stack() {
+    takes_little_stack(&[]);
+}
+
+#[test]
+#[ignore = "slow: grids over a crowd in a crowd"]
+fn queries_and_builds_of_grids_over_crowds_take_little_stack() {
+    takes_little_stack(&["all"]);
+}
+
+fn takes_little_stack(arguments: &[&str]) {
     let dir = TempDir::new().expect("a folder");
     let program = compile("stack", compiler("c99"), &[], &static_library(), dir.path());
-    let printed = String::from_utf8(run(&mut Command::new(program)).stdout).expect("text");
+    let printed = run(Command::new(program).args(arguments)).stdout;
+    let printed = String::from_utf8(printed).expect("text");
     let most = |name: &str| {
         let line = printed.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
         line.and_then(|bytes| bytes.parse::<usize>().ok()).expect("a number")

@@ -133,8 +133,12 @@ fn neither_flavour_asks_for_a_library() {
     for flavour in Flavour::ALL {
         let mut rustc = cargo_in(&target, "rustc");
         rustc.args(["-p", "hgrid-capi", "--crate-type", "staticlib"]).args(flavour.features());
-        rustc.args(["--config", "profile.dev.opt-level=0", "--config"]);
-        rustc.args(["profile.dev.panic='abort'", "--", "--print", "native-static-libs"]);
+        let others = ["package.glam.opt-level=0", "package.libm.opt-level=0"];
+        let settings = ["opt-level=0", "panic='abort'"].into_iter().chain(others);
+        for setting in settings.map(|setting| format!("profile.dev.{setting}")) {
+            rustc.args(["--config", &setting]);
+        }
+        rustc.args(["--", "--print", "native-static-libs"]);
         let told = String::from_utf8(run(&mut rustc).stderr).expect("text");
         let libraries: Vec<_> =
             told.lines().filter_map(|line| line.split_once("native-static-libs:")).collect();

@@ -4,7 +4,7 @@ use hgrid_core::{Coherence, Config, Cull, Grid, Hit, Parameters, Ray, Strided, S
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
-use hgrid_tests::{methods, oracle};
+use hgrid_tests::{methods, oracle, rounds};
 
 fn ask(mesh: &Mesh, rays: impl IntoIterator<Item = Ray>) -> usize {
     let view = mesh.view();
@@ -94,7 +94,7 @@ fn origins_far_away() {
     let near = [5.0, 100.0, 1e4, 1e8, 3e8, 1e9, 1.1e9, 2e9, 1e10];
     let far = [1e20, 1e30, 1e31, 1e32, 1e35, 2e38];
     for distance in near.into_iter().chain(far) {
-        for i in 0..100 {
+        for i in 0..rounds(25) {
             let (target, towards) = (random.point().map(|c| c * 0.5), random.point());
             let origin = std::array::from_fn(|k| target[k] - towards[k] * distance);
             rays.push(Ray::new(origin, towards));
@@ -110,7 +110,8 @@ fn origins_far_away() {
             rays.push(Ray::new(origin, along));
         }
     }
-    assert!(ask(&mesh, rays) > 1000);
+    let count = rays.len();
+    assert!(ask(&mesh, rays) > count / 8);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use hgrid_core::{Config, Grid, Parameters, Ray, Sizes};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
-use hgrid_tests::{methods, oracle};
+use hgrid_tests::{methods, oracle, rounds};
 
 /// Rays through and around the mesh, from inside and outside its box, at its vertices and beside.
 fn agrees(mesh: &Mesh) {
@@ -21,7 +21,7 @@ fn agrees(mesh: &Mesh) {
     let grids: Vec<Grid<'_>> = owned.iter().map(|owned| owned.open(&view).unwrap()).collect();
     let (min, max) = grids[0].bounds();
     let mut random = Random(43);
-    for i in 0..200 {
+    for i in 0..rounds(50) {
         let mut point = |reach: f32| -> [f32; 3] {
             std::array::from_fn(|k| {
                 let half = max[k] / 2.0 - min[k] / 2.0;

@@ -3,10 +3,11 @@
 
 use hgrid_tests::hostile::{build_mesh, c_abi};
 use hgrid_tests::random::Random;
+use hgrid_tests::rounds;
 
 /// Runs a target on so many strings of bytes.
-fn run(target: fn(&[u8]), rounds: u64, bytes: usize) {
-    for round in 0..rounds {
+fn run(target: fn(&[u8]), rounds: usize, bytes: usize) {
+    for round in 0..rounds as u64 {
         let mut random = Random(round);
         let bytes: Vec<_> = (0..bytes / 8).flat_map(|_| random.bits().to_le_bytes()).collect();
         // Shown if the test fails.
@@ -17,7 +18,7 @@ fn run(target: fn(&[u8]), rounds: u64, bytes: usize) {
 
 #[test]
 fn calls_from_c() {
-    run(c_abi, if cfg!(miri) { 60 } else { 3000 }, 600);
+    run(c_abi, if cfg!(miri) { 60 } else { rounds(1000) }, 600);
 }
 
 /// Few enough for each run of Miri.
@@ -28,5 +29,5 @@ fn a_few_calls_from_c() {
 
 #[test]
 fn meshes() {
-    run(build_mesh, if cfg!(miri) { 2 } else { 500 }, 400);
+    run(build_mesh, if cfg!(miri) { 2 } else { rounds(500) }, 400);
 }

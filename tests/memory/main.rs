@@ -13,8 +13,16 @@ use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::methods;
 use hgrid_tests::owned::Owned;
 
-/// Builds with every size of one region, from 0 to a little more than enough, the other ample.
+/// Builds with every `step`th size of one region, from 0 to a little more than enough, and with those next to enough;
+/// the other region is ample.
 fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
+    match config.method() {
+        Method::Bvh => trees::every_size(mesh, config, step),
+        _ => every_size_of_grid(mesh, config, step),
+    }
+}
+
+fn every_size_of_grid(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
     let expected = Owned::build(mesh, config).unwrap();
     let exact = expected.bytes().len();
     let scratch_bytes = sizes(mesh, config, &mut []).unwrap().scratch_bytes;
@@ -61,15 +69,20 @@ fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
 #[test]
 fn every_size_from_nothing_to_enough() {
     for config in methods::configs() {
-        let every_size = match config.method() {
-            Method::Bvh => trees::every_size,
-            _ => every_size,
-        };
         every_size(&Mesh::default().view(), &config, 1);
         every_size(&one_triangle().view(), &config, 1);
+        every_size(&ball(2, 1.0).view(), &config, 7);
+        every_size(&soup(60, 0.3, 1).view(), &config.parameters.with_density(20.0).into(), 5);
+        every_size(&soup(3000, 0.05, 1).view(), &config, 1003);
+    }
+}
+
+#[test]
+#[ignore = "slow: tens of thousands of builds"]
+fn every_size_byte_by_byte() {
+    for config in methods::configs() {
         every_size(&ball(2, 1.0).view(), &config, 1);
         every_size(&soup(60, 0.3, 1).view(), &config.parameters.with_density(20.0).into(), 1);
-        every_size(&soup(3000, 0.05, 1).view(), &config, 1003);
     }
 }
 
@@ -81,10 +94,6 @@ fn every_size_for_joined_meshes() {
     let mut parts = stored.parts();
     let mesh = TriangleMesh::join(&mut parts).unwrap();
     for config in methods::configs() {
-        let every_size = match config.method() {
-            Method::Bvh => trees::every_size,
-            _ => every_size,
-        };
         every_size(&mesh, &config, 7);
         assert_eq!(
             sizes(&mesh, &config, &mut []),

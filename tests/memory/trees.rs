@@ -18,7 +18,7 @@ fn config(quality: Quality) -> Config {
     Parameters::Bvh { quality }.into()
 }
 
-/// Builds with every size of one region, from 0 to a little more than enough, the other ample.
+/// `every_size` for trees.
 ///
 /// Ids lie in the index before it is known how many nodes there are, so what an error asks for may be
 /// more than would do. A build without crowded bins takes less scratch than it may ask for.

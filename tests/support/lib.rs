@@ -28,6 +28,15 @@ pub mod symbols;
 #[cfg(feature = "full")]
 pub mod tools;
 
+/// Returns `count` times the number in `HGRID_ROUNDS`, 1 unless set; `.ci/slow` sets 4.
+///
+/// # Panics
+/// If it is no number.
+#[must_use]
+pub fn rounds(count: usize) -> usize {
+    count * usize::try_from(setting("HGRID_ROUNDS", 1)).expect("not that many")
+}
+
 /// The number in an environment variable, or another one if it is not set.
 ///
 /// # Panics

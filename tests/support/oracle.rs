@@ -69,7 +69,13 @@ pub fn hits_of(mesh: &TriangleMesh<'_>, ray: &Ray, cull: Cull) -> Vec<Hit> {
     hits_among(&passed(mesh, ray), ray, cull)
 }
 
-/// The same for the mesh of a grid.
+/// The same for each way to cull: none, back and front.
+pub fn hits_by_cull(mesh: &TriangleMesh<'_>, ray: &Ray) -> [Vec<Hit>; 3] {
+    let passed = passed(mesh, ray);
+    [Cull::None, Cull::Back, Cull::Front].map(|cull| hits_among(&passed, ray, cull))
+}
+
+/// All hits of a ray with the mesh of a grid, the nearest first.
 pub fn all_hits(grid: &Grid<'_>, ray: &Ray, cull: Cull) -> Vec<Hit> {
     hits_of(grid.mesh(), ray, cull)
 }

@@ -69,8 +69,10 @@ impl Line {
     }
 
     /// A corner with the ray's axis as the last.
+    // Written out, as `places` is: with closures, brute force is most of the time of many tests.
     fn turned(&self, corner: [f32; 3]) -> [f64; 3] {
-        self.axes.map(|axis| f64::from(corner[axis]))
+        let [x, y, z] = self.axes;
+        [corner[x].into(), corner[y].into(), corner[z].into()]
     }
 
     fn place(&self, corner: [f32; 3]) -> Place {
@@ -80,8 +82,8 @@ impl Line {
         [across(0), across(1), z]
     }
 
-    fn places(&self, corners: &Corners) -> [Place; 3] {
-        corners.map(|corner| self.place(corner))
+    fn places(&self, &[a, b, c]: &Corners) -> [Place; 3] {
+        [self.place(a), self.place(b), self.place(c)]
     }
 
     /// What the rule says of a triangle.
@@ -100,14 +102,19 @@ impl Line {
     #[must_use]
     pub fn passes(&self, corners: &Corners) -> bool {
         // A NaN is not small enough.
-        if !corners.iter().flatten().all(|c| c.abs() <= MAX_COORDINATE) {
+        let is_small = |[x, y, z]: [f32; 3]| {
+            x.abs() <= MAX_COORDINATE && y.abs() <= MAX_COORDINATE && z.abs() <= MAX_COORDINATE
+        };
+        let [a, b, c] = *corners;
+        if !(is_small(a) && is_small(b) && is_small(c)) {
             return false;
         }
         let places = self.places(corners);
         // Nothing that lies on one side of the line surrounds it: then two edge functions have opposite signs,
         // or all are 0.
+        let [a, b, c] = &places;
         let is_beside = |k: usize| {
-            places.iter().all(|place| place[k] < 0.0) || places.iter().all(|place| place[k] > 0.0)
+            (a[k] < 0.0 && b[k] < 0.0 && c[k] < 0.0) || (a[k] > 0.0 && b[k] > 0.0 && c[k] > 0.0)
         };
         if is_beside(0) || is_beside(1) {
             return false;
