@@ -45,7 +45,7 @@ impl Asked {
     }
 }
 
-/// What is true of rays: all hits of each, for each way to cull.
+/// Brute force gives all hits of each ray, for each way to cull.
 struct Truth(Vec<[Vec<Hit>; 3]>);
 
 impl Truth {

@@ -149,8 +149,8 @@ fn all_answer<const N: usize>(askers: [Asker<'_>; N]) {
         .into_iter()
         .filter_map(|(compiler, source, flags)| Some(ask(compiler?, source, flags, &table)));
     let counts: Vec<_> = askers.collect();
-    // All of them asked everything.
-    // None where no other compiler is installed.
+    // There are no counts where no other compiler is installed.
     let Some(&all) = counts.first() else { return };
+    // Every program asked everything.
     assert!(all > 500_000 && counts.iter().all(|&count| count == all), "{counts:?}");
 }

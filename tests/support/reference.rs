@@ -69,7 +69,7 @@ impl Line {
     }
 
     /// A corner with the ray's axis as the last.
-    // Written out, as `places` is: with closures, brute force is most of the time of many tests.
+    // `turned`, `places` and `passes` use no closures over arrays: brute force is most of the time of many tests.
     fn turned(&self, corner: [f32; 3]) -> [f64; 3] {
         let [x, y, z] = self.axes;
         [corner[x].into(), corner[y].into(), corner[z].into()]

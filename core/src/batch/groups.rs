@@ -119,7 +119,7 @@ impl<A: Answer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
         let Scope { mesh, bounds, simd } = self.grid.scope();
         let (bvh, choice) = (self.tree, self.options.choice());
         // If no hit can end a ray unasked, the first one is sooner found as the closest.
-        let is_any = ANY && !(ASKS && choice.asks_all(mesh));
+        let is_any = ANY && !choice.asks_all(mesh);
         Groups { bvh, mesh, bounds, choice, memory, batch: self }.trace(simd, is_any);
     }
 }
