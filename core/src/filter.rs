@@ -57,6 +57,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8};
 
 use crate::aabb::{Aabb, greater, lesser};
+use crate::extremes::Extremes;
 use crate::mesh::Triangle;
 use crate::ray::round;
 
@@ -132,7 +133,7 @@ impl<S: Simd> Lanes for f32x8<S> {
 
     #[inline(always)]
     fn or_greater(self, other: Self) -> Self {
-        self.max(other)
+        self.greater(other)
     }
 
     #[inline(always)]
@@ -265,7 +266,7 @@ impl<S: Simd> LineFilter<f32x8<S>> {
         let slope = sum * (distance * 29.0 + 19.0 * extent) * NEARBY_UNIT;
         let is_in_range = distance.simd_le(NEARBY_REACH);
         let slope = is_in_range.select(slope, f32x8::splat(simd, f32::INFINITY));
-        let distance = distance.max(f32x8::splat(simd, NEARBY_LEAST));
+        let distance = distance.greater(f32x8::splat(simd, NEARBY_LEAST));
         let floor = distance * (distance * NEARBY_FLOOR + f32::MIN_POSITIVE) + f32::MIN_POSITIVE;
         Self { origin, direction, slope, floor }
     }

@@ -99,6 +99,7 @@ mod dda;
 mod eight;
 mod error;
 mod exact;
+mod extremes;
 mod filter;
 #[cfg(feature = "fixed")]
 mod fixed;

@@ -10,6 +10,7 @@ use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
 use crate::eight::{Row, corner, corners_of, join, load};
+use crate::extremes::Extremes;
 use crate::limits::MAX_COORDINATE;
 use crate::mesh::WideMesh;
 
@@ -113,7 +114,7 @@ impl<S: Simd> Axis<S> {
 
     #[inline(always)]
     fn span(&self, simd: S, a: f32x8<S>, b: f32x8<S>, c: f32x8<S>) -> Span<S> {
-        let (min, max) = (a.min(b).min(c), a.max(b).max(c));
+        let (min, max) = (a.lesser(b).lesser(c), a.greater(b).greater(c));
         let min = (min - self.origin) * self.cells_per_unit - self.margin;
         let max = (max - self.origin) * self.cells_per_unit + self.margin;
         Span { first: self.whole(simd, min), last: self.whole(simd, max) }
@@ -121,7 +122,7 @@ impl<S: Simd> Axis<S> {
 
     #[inline(always)]
     fn whole(&self, simd: S, position: f32x8<S>) -> u32x8<S> {
-        let clamped = position.max(f32x8::splat(simd, 0.0)).min(self.end);
+        let clamped = position.greater(f32x8::splat(simd, 0.0)).lesser(self.end);
         (clamped - 0.5 + WHOLE_SHIFT).bitcast::<u32x8<S>>() & WHOLE_BITS
     }
 }

@@ -6,6 +6,7 @@ use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
 use super::node::{Node, WIDTH};
 use super::slab::WIDER;
 use super::walk::bytes;
+use crate::extremes::Extremes;
 
 /// Sides of eight boxes, or of one box in all lanes, by axis.
 #[derive(Clone, Copy)]
@@ -93,14 +94,14 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
             // The distance to a side is extreme where origin and direction are.
             let (a, b) = ((near - first) * least, (near - first) * most);
             let (c, d) = ((near - last) * least, (near - last) * most);
-            enter = enter.max(a.min(b).min(c.min(d)));
-            all_in = all_in.max(a.max(b).max(c.max(d)));
+            enter = enter.greater(a.lesser(b).lesser(c.lesser(d)));
+            all_in = all_in.greater(a.greater(b).greater(c.greater(d)));
             let (a, b) = ((far - first) * least, (far - first) * most);
             let (c, d) = ((far - last) * least, (far - last) * most);
-            leave = leave.min(a.max(b).max(c.max(d)));
-            first_out = first_out.min(a.min(b).min(c.min(d)));
+            leave = leave.lesser(a.greater(b).greater(c.greater(d)));
+            first_out = first_out.lesser(a.lesser(b).lesser(c.lesser(d)));
         }
-        let leave = (leave * f32x8::splat(simd, WIDER)).min(beam.end);
+        let leave = (leave * f32x8::splat(simd, WIDER)).lesser(beam.end);
         BeamMet { some: bits(!enter.simd_gt(leave)), all: bits(all_in.simd_lt(first_out)), enter }
     }
 }
@@ -124,12 +125,12 @@ impl<V> WideBoxes<V> {
     #[inline(always)]
     pub(crate) fn meet<S: Simd>(&self, simd: S, rays: &Slabs<V>) -> (V, V::Mask)
     where
-        V: SimdFloat<S, Element = f32>,
+        V: SimdFloat<S, Element = f32> + Extremes,
     {
         let (x, y, z) = (self.cross(rays, 0), self.cross(rays, 1), self.cross(rays, 2));
-        let near = x.0.max(y.0).max(z.0.max(rays.start));
-        let far = x.1.min(y.1).min(z.1) * V::splat(simd, WIDER);
-        let far = far.min(rays.end);
+        let near = x.0.greater(y.0).greater(z.0.greater(rays.start));
+        let far = x.1.lesser(y.1).lesser(z.1) * V::splat(simd, WIDER);
+        let far = far.lesser(rays.end);
         (near, !near.simd_gt(far))
     }
 
@@ -137,11 +138,11 @@ impl<V> WideBoxes<V> {
     #[inline(always)]
     fn cross<S: Simd>(&self, rays: &Slabs<V>, axis: usize) -> (V, V)
     where
-        V: SimdFloat<S, Element = f32>,
+        V: SimdFloat<S, Element = f32> + Extremes,
     {
         let low = (self.low[axis] - rays.origin[axis]) * rays.inverse[axis];
         let high = (self.high[axis] - rays.origin[axis]) * rays.inverse[axis];
-        (low.min(high), low.max(high))
+        (low.lesser(high), low.greater(high))
     }
 }
 

@@ -8,6 +8,7 @@ use crate::aabb::Aabb;
 use crate::config::BuildFlags;
 use crate::control::Control;
 use crate::error::Error;
+use crate::extremes::Extremes;
 use crate::limits::MAX_COORDINATE;
 use crate::mesh::Piece;
 use crate::mesh::TriangleMesh;
@@ -130,12 +131,22 @@ impl Kernel for KeysTask<'_> {
                     let c = Corners::join(head[2], tail[2]);
                     let largest = a.largest().max(b.largest()).max(c.largest());
                     if largest.simd_le(limit).all_true() {
-                        let min =
-                            [a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y), a.z.min(b.z).min(c.z)];
-                        let max =
-                            [a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y), a.z.max(b.z).max(c.z)];
-                        low = [low[0].min(min[0]), low[1].min(min[1]), low[2].min(min[2])];
-                        high = [high[0].max(max[0]), high[1].max(max[1]), high[2].max(max[2])];
+                        let min = [
+                            a.x.lesser(b.x).lesser(c.x),
+                            a.y.lesser(b.y).lesser(c.y),
+                            a.z.lesser(b.z).lesser(c.z),
+                        ];
+                        let max = [
+                            a.x.greater(b.x).greater(c.x),
+                            a.y.greater(b.y).greater(c.y),
+                            a.z.greater(b.z).greater(c.z),
+                        ];
+                        low = [low[0].lesser(min[0]), low[1].lesser(min[1]), low[2].lesser(min[2])];
+                        high = [
+                            high[0].greater(max[0]),
+                            high[1].greater(max[1]),
+                            high[2].greater(max[2]),
+                        ];
                         *keys = self.rule.of_eight(simd, min, max).into();
                         for key in &*keys {
                             self.add(*key);

@@ -28,6 +28,7 @@ use super::rays::{GROUP, OCTETS, Rays};
 use super::walk::STACK;
 use crate::aabb::Aabb;
 use crate::eight::{Eight, first_eight};
+use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
 use crate::simd::{Kernel, SimdLevel, dispatch};
 
@@ -256,7 +257,7 @@ fn one_by_one<S: Simd>(simd: S, boxes: &WideBoxes<f32x8<S>>, rays: &Rays, mask: 
             rest &= rest - 1;
             let (near, met) = boxes.meet(simd, &rays.slab(simd, first + bit));
             *met_by |= met.select(u32x8::splat(simd, 1 << bit), zero);
-            least = least.min(met.select(near, far_away));
+            least = least.lesser(met.select(near, far_away));
         }
     }
     let slots = !(halves[0] | halves[1]).simd_eq(zero);
@@ -295,7 +296,7 @@ fn side_by_side<S: Simd>(
             // An invalid ray may have a NaN distance.
             let met = met & mask32x16::from_bitmask(simd, of_sixteen);
             masks[slot] |= met.to_bitmask() << (16 * which);
-            least = least.min(met.select(near, far_away));
+            least = least.lesser(met.select(near, far_away));
         }
         nearest[slot] = least.reduce_min();
         slots |= u32::from(masks[slot] != 0) << slot;

@@ -9,6 +9,7 @@ use fearless_simd::{Simd, f32x8, u32x8};
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
+use crate::extremes::Extremes;
 
 /// Bits of a key.
 pub(crate) const KEY_BITS: u32 = 30;
@@ -71,7 +72,7 @@ impl Keys {
     fn axis<S: Simd>(&self, simd: S, axis: usize, min: f32x8<S>, max: f32x8<S>) -> u32x8<S> {
         let origin = f32x8::splat(simd, self.origin[axis]);
         let cell = ((min + max) - origin) * f32x8::splat(simd, self.scale);
-        let cell = cell.max(f32x8::splat(simd, 0.0)).min(f32x8::splat(simd, END));
+        let cell = cell.greater(f32x8::splat(simd, 0.0)).lesser(f32x8::splat(simd, END));
         let mut bits = ((cell - 0.5) + SHIFT).bitcast::<u32x8<S>>() & CELL_BITS;
         bits = (bits | bits << 16) & 0x0300_00ff;
         bits = (bits | bits << 8) & 0x0300_f00f;

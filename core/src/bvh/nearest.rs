@@ -32,6 +32,7 @@ use super::walk::{Waiting, bytes};
 use crate::aabb::{Aabb, greater};
 use crate::counters::Tally;
 use crate::eight::{Eight, first_eight};
+use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
 use crate::simd::Kernel;
 
@@ -135,16 +136,16 @@ fn triangles<S: Simd>(simd: S, corners: &[Vectors<S>; 3], point: &Point) -> f32x
         ab[2] * ac[0] - ab[0] * ac[2],
         ab[0] * ac[1] - ab[1] * ac[0],
     ];
-    let far = sum(a).max(sum(b)).max(sum(c)) * f32x8::splat(simd, DOTS);
+    let far = sum(a).greater(sum(b)).greater(sum(c)) * f32x8::splat(simd, DOTS);
     let corners = [a, b, c];
-    across(simd, edge, &corners, far).max(across(simd, normal, &corners, far))
+    across(simd, edge, &corners, far).greater(across(simd, normal, &corners, far))
 }
 
 /// The point of an edge that is closest to zero, about.
 #[inline(always)]
 fn on_edge<S: Simd>(simd: S, from: Vectors<S>, along: Vectors<S>) -> Vectors<S> {
     let share = -dot(from, along) / dot(along, along);
-    let share = share.max(f32x8::splat(simd, 0.0)).min(f32x8::splat(simd, 1.0));
+    let share = share.greater(f32x8::splat(simd, 0.0)).lesser(f32x8::splat(simd, 1.0));
     let [x, y, z] = along;
     [from[0] + share * x, from[1] + share * y, from[2] + share * z]
 }
@@ -170,9 +171,9 @@ fn across<S: Simd>(
     far: f32x8<S>,
 ) -> f32x8<S> {
     let (a, b, c) = (dot(direction, *a), dot(direction, *b), dot(direction, *c));
-    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-    let gap = low.max(-high) - sum(direction) * far;
-    let gap = gap.max(f32x8::splat(simd, 0.0));
+    let (low, high) = (a.lesser(b).lesser(c), a.greater(b).greater(c));
+    let gap = low.greater(-high) - sum(direction) * far;
+    let gap = gap.greater(f32x8::splat(simd, 0.0));
     (gap * gap - f32x8::splat(simd, 64.0 * TINY)) / dot(direction, direction)
 }
 
@@ -195,7 +196,7 @@ fn sum<S: Simd>([x, y, z]: Vectors<S>) -> f32x8<S> {
 /// How far zero lies outside of intervals.
 #[inline(always)]
 fn outside<S: Simd>(simd: S, low: f32x8<S>, high: f32x8<S>) -> f32x8<S> {
-    low.max(-high).max(f32x8::splat(simd, 0.0))
+    low.greater(-high).greater(f32x8::splat(simd, 0.0))
 }
 
 /// A child to come back to.

@@ -21,6 +21,7 @@ use glam::Vec3A;
 use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
+use crate::extremes::Extremes;
 
 /// Children of a node.
 pub(crate) const WIDTH: usize = 8;
@@ -169,10 +170,10 @@ impl Node {
     ) {
         // The frame of three axes at once.
         let (low, high) = bounds.split();
-        let magnitude = low.abs().max(high.abs());
+        let magnitude = low.abs().greater(high.abs());
         let extent = (f32x4::splat(simd, 0.0) - (low + high))
-            .max(magnitude * LEAST_STEPS)
-            .max(f32x4::splat(simd, least));
+            .greater(magnitude * LEAST_STEPS)
+            .greater(f32x4::splat(simd, least));
         let bits = (extent * f32x4::splat(simd, 1.0 / 254.0)).bitcast::<u32x4<S>>();
         let exponent = ((bits >> 23) & 0xff) + 1;
         let exponent = exponent.max(u32x4::splat(simd, 1)).min(u32x4::splat(simd, 253));
@@ -261,7 +262,7 @@ impl<S: Simd> Rule<S> {
     #[inline(always)]
     fn one(&self, children: &[f32x8<S>; WIDTH], slot: usize, count: usize) -> u32x8<S> {
         let at = (children[slot % WIDTH] - self.origin) * self.inverse - (0.5 + MARGIN);
-        let bits = (at.max(self.end) * self.sign + SHIFT).bitcast::<u32x8<S>>() & 0xff;
+        let bits = (at.greater(self.end) * self.sign + SHIFT).bitcast::<u32x8<S>>() & 0xff;
         if slot < count { bits } else { self.unused }
     }
 }

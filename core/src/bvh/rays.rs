@@ -9,6 +9,7 @@ use super::slab::{EARLIER, STEEP, TINY, WIDER};
 use crate::aabb::Aabb;
 use crate::approach::FAR_EXTENTS;
 use crate::eight::columns;
+use crate::extremes::Extremes;
 use crate::filter::{LineFilter, NEARBY_LONG, NEARBY_SHORT, RayFilter};
 use crate::mesh::TriangleMesh;
 use crate::options::{Choice, Cull};
@@ -114,7 +115,7 @@ impl Rays {
             let rays = self.given.as_chunks::<8>().0[octet];
             let (origin, t_min, direction, t_max) = columns(simd, rays.each_ref());
             let [x, y, z] = direction;
-            let longest = x.abs().max(y.abs()).max(z.abs());
+            let longest = x.abs().greater(y.abs()).greater(z.abs());
 
             // Find the rays that can hit anything, and those that are not for vectors.
             let [a, b, c] = origin;
@@ -128,7 +129,7 @@ impl Rays {
             let is_valid = is_finite & longest.simd_gt(zero) & t_min.simd_le(t_max);
             let [a, b, c] = [(a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs()];
             // Boxes behind the start have margins that groups do not: see `Slab`.
-            let is_near = a.max(b).max(c).simd_le(near)
+            let is_near = a.greater(b).greater(c).simd_le(near)
                 & t_min.simd_ge(zero)
                 & longest.simd_gt(f32x8::splat(simd, NEARBY_SHORT))
                 & longest.simd_lt(f32x8::splat(simd, NEARBY_LONG));
@@ -155,14 +156,14 @@ impl Rays {
                 self.anchor[axis][octet] = origin[axis].into();
             }
             let most = f32x8::splat(simd, f32::MAX);
-            let (start, end) = ((t_min * scale).min(most), t_max * scale);
-            let tiny = scale.max(f32x8::splat(simd, 1.0)) * TINY;
+            let (start, end) = ((t_min * scale).lesser(most), t_max * scale);
+            let tiny = scale.greater(f32x8::splat(simd, 1.0)) * TINY;
             self.start[octet] = (start - (start.abs() * EARLIER + tiny)).into();
             self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + tiny)).into();
             self.scale[octet] = scale.into();
 
             // Compute the error bound of the filter: filter.rs has the proof.
-            let distance = (a + half[0]).max(b + half[1]).max(c + half[2]);
+            let distance = (a + half[0]).greater(b + half[1]).greater(c + half[2]);
             let filter = LineFilter::scaled(simd, origin, scaled, distance, extent);
             self.slope[octet] = filter.slope.into();
             self.floor[octet] = filter.floor.into();
@@ -192,7 +193,7 @@ impl Rays {
                 let origin = f32x8::simd_from(simd, self.origin[axis][octet]) - center;
                 let origin = is_alive.select(origin, f32x8::splat(simd, 0.0));
                 let inverse = f32x8::simd_from(simd, self.inverse[axis][octet]);
-                farthest = farthest.max(origin.abs());
+                farthest = farthest.greater(origin.abs());
                 self.origin[axis][octet] = origin.into();
                 self.inverse[axis][octet] = is_alive.select(inverse, inverse_of_first).into();
             }
@@ -213,8 +214,8 @@ impl Rays {
             let is_alive = mask32x8::from_bitmask(simd, self.alive >> (8 * octet));
             let from = f32x8::simd_from(simd, self.start[octet]);
             let to = f32x8::simd_from(simd, self.end[octet]);
-            start = start.min(is_alive.select(from, first));
-            end = end.max(is_alive.select(to, first));
+            start = start.lesser(is_alive.select(from, first));
+            end = end.greater(is_alive.select(to, first));
         }
         Beam {
             origin: [
@@ -412,7 +413,7 @@ fn interval<S: Simd>(simd: S, row: &Row) -> [f32; 2] {
     let (mut low, mut high) = (first, first);
     for octet in row.iter().skip(1) {
         let numbers = f32x8::simd_from(simd, *octet);
-        (low, high) = (low.min(numbers), high.max(numbers));
+        (low, high) = (low.lesser(numbers), high.greater(numbers));
     }
     [low.reduce_min(), high.reduce_max()]
 }

@@ -6,7 +6,6 @@
 //! ([`slab`](super::slab)). A direction that is zero has an inverse that is a number, so a side that the ray
 //! runs along would be met at 0: [`pad_of`] moves it behind the end of the scene.
 
-use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8};
 
 use super::node::WIDTH;
@@ -14,6 +13,7 @@ use super::slab::Slab;
 use super::walk::flips_of;
 use crate::aabb::{Aabb, greater, lesser};
 use crate::eight::{Row, first_eight, join, load, transpose};
+use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
 
 /// The least and the greatest corners of the boxes of a leaf; the last box again where there are fewer than
@@ -29,7 +29,7 @@ pub(super) fn boxes_of_leaf<S: Simd>(
     let (one_behind, other_behind) = four(simd, mesh, [e, f, g, h]);
     let ([a, b, c], [d, e, f]) = (join(one, one_behind), join(other, other_behind));
     // Corners may come in any order.
-    ([a.min(d), b.min(e), c.min(f)], [a.max(d), b.max(e), c.max(f)])
+    ([a.lesser(d), b.lesser(e), c.lesser(f)], [a.greater(d), b.greater(e), c.greater(f)])
 }
 
 /// The two corners of four boxes.

@@ -21,6 +21,7 @@ use zerocopy::{FromZeros, transmute};
 
 use crate::aabb::Aabb;
 use crate::eight::load;
+use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
 use crate::simd::Kernel;
 
@@ -174,8 +175,8 @@ impl Subtree {
                 continue;
             };
             let (a, b, c) = (load(simd, a), load(simd, b), load(simd, c));
-            let low: f32x4<S> = a.min(b).min(c);
-            let high: f32x4<S> = a.max(b).max(c);
+            let low: f32x4<S> = a.lesser(b).lesser(c);
+            let high: f32x4<S> = a.greater(b).greater(c);
             // Store all eight numbers at once: a load that spans two stores would wait for both.
             low.combine(f32x4::splat(simd, 0.0) - high).store_slice(sides);
         }
@@ -276,9 +277,9 @@ impl Subtree {
             child += usize::from(is_node);
             for place in 0..LEAF {
                 let of_one = self.boxes.get(first + place.min(last)).copied();
-                *sides = sides.min(f32x8::simd_from(simd, of_one.unwrap_or([f32::INFINITY; 8])));
+                *sides = sides.lesser(f32x8::simd_from(simd, of_one.unwrap_or([f32::INFINITY; 8])));
             }
-            bounds = bounds.min(*sides);
+            bounds = bounds.lesser(*sides);
             used += 1;
         }
         node.set_sides(simd, bounds, &boxes, used, least);

@@ -20,6 +20,7 @@ use super::slab::Slab;
 use crate::aabb::{Aabb, greater, lesser};
 use crate::counters::Tally;
 use crate::eight::{Eight, first_eight};
+use crate::extremes::Extremes;
 use crate::filter::{LineFilter, RayFilter};
 use crate::mesh::TriangleMesh;
 use crate::options::Cull;
@@ -132,8 +133,8 @@ impl<S: Simd> Wide<S> {
             distances[axis] = (near * self.inverse_near[axis], far * self.inverse_far[axis]);
         }
         let [x, y, z] = distances;
-        let near = x.0.max(y.0).max(z.0.max(self.start));
-        let far = x.1.min(y.1).min(z.1.min(f32x8::splat(simd, end)));
+        let near = x.0.greater(y.0).greater(z.0.greater(self.start));
+        let far = x.1.lesser(y.1).lesser(z.1.lesser(f32x8::splat(simd, end)));
         (bits(near.simd_gt(far)), near)
     }
 }
@@ -162,8 +163,8 @@ impl<S: Simd> Wide<S> {
             distances[axis] = (near, far);
         }
         let [x, y, z] = distances;
-        let near = x.0.max(y.0).max(z.0.max(self.start));
-        let far = x.1.min(y.1).min(z.1.min(f32x8::splat(simd, end)));
+        let near = x.0.greater(y.0).greater(z.0.greater(self.start));
+        let far = x.1.lesser(y.1).lesser(z.1.lesser(f32x8::splat(simd, end)));
         let used = (1_u32 << ids.len().min(WIDTH)) - 1;
         (bits(!near.simd_gt(far)) & used, near.into())
     }

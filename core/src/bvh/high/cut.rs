@@ -12,6 +12,8 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 
+use crate::extremes::Extremes;
+
 /// A triangle in the making, as bits: the least corner of its box, its id, minus the greatest corner, 0.
 pub(super) type Item = [u32; 8];
 
@@ -41,8 +43,8 @@ impl Extent {
         let mut centers = bounds;
         for item in items {
             let sides = load(simd, item);
-            bounds = bounds.min(sides);
-            centers = centers.min(center(sides));
+            bounds = bounds.lesser(sides);
+            centers = centers.lesser(center(sides));
         }
         Self { bounds: bounds.into(), centers: centers.into() }
     }
@@ -169,7 +171,7 @@ impl Bins {
         let mut bounds = [f32x8::splat(simd, f32::INFINITY); 2];
         for (at, bin) in self.boxes[place.axis % 3].iter().enumerate().take(rule.count) {
             let side = &mut bounds[usize::from(at >= place.bin)];
-            *side = side.min(f32x8::simd_from(simd, *bin));
+            *side = side.lesser(f32x8::simd_from(simd, *bin));
         }
         let (middle, [first, second]) = partition(simd, items, &rule, &place);
         let [a, b] = bounds;
@@ -193,7 +195,7 @@ impl Bins {
             let [x, y, z] = rule.bins_of(simd, sides);
             for (axis, at) in [(0, x), (1, y), (2, z)] {
                 let bin = &mut self.boxes[axis][at % BINS];
-                *bin = f32x8::simd_from(simd, *bin).min(sides).into();
+                *bin = f32x8::simd_from(simd, *bin).lesser(sides).into();
                 self.counts[axis][at % BINS] += 1;
             }
         }
@@ -215,7 +217,7 @@ impl Bins {
                 if sum > 0 {
                     *cost = area(simd, all, unit) * as_cost(sum);
                 }
-                all = all.min(f32x8::simd_from(simd, *bin));
+                all = all.lesser(f32x8::simd_from(simd, *bin));
                 sum += counted;
             }
             // Then of what is behind.
@@ -223,7 +225,7 @@ impl Bins {
             for bin in (1..rule.count).rev() {
                 let places = (boxes.get(bin), counts.get(bin), costs.get(bin));
                 let (Some(bounds), Some(counted), Some(before)) = places else { continue };
-                all = all.min(f32x8::simd_from(simd, *bounds));
+                all = all.lesser(f32x8::simd_from(simd, *bounds));
                 sum += counted;
                 let cost = before + area(simd, all, unit) * as_cost(sum);
                 if sum > 0 && cost < best.cost {
@@ -251,8 +253,8 @@ fn partition<S: Simd>(
         let is_first = rule.bin_of(&item, cut.axis) < cut.bin;
         let mask = mask32x8::splat(simd, is_first);
         let center = center(load(simd, &item));
-        first = first.min(mask.select(center, nothing));
-        second = second.min(mask.select(nothing, center));
+        first = first.lesser(mask.select(center, nothing));
+        second = second.lesser(mask.select(nothing, center));
         if let Some(slot) = items.get_mut(at) {
             *slot = if is_first { other } else { item };
         }
