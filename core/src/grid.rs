@@ -12,14 +12,14 @@ use crate::blob::{Header, corrupt};
 use crate::cell::Lattice;
 use crate::config::Config;
 use crate::control::{Control, Watch};
-use crate::counters::Tally;
+use crate::counters::{Counters, Tally};
 use crate::dda::Line;
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::method::Method;
 use crate::options::{Cull, QueryOptions};
-use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
-use crate::search::{Any, Closest, Outcome, Search, test_all};
+use crate::ray::{Hit, Ray, RayF64};
+use crate::search::{Boxes, One, Outcome, Search, test_all};
 use crate::simd::{IS_SMALL, SimdLevel};
 use crate::structure::{self, Structure, by_kind};
 use crate::triangle::TriangleTest;
@@ -234,9 +234,7 @@ impl<'a> Grid<'a> {
         if IS_SMALL {
             return self.intersect_with(ray, &mut QueryOptions::default());
         }
-        let mut closest = Closest(None);
-        self.search(ray, ray.t_min, Cull::None, &mut closest, &mut ());
-        closest.0
+        self.one(ray, false)
     }
 
     /// Returns true if [`intersect`](Self::intersect) would find a hit. It stops at the first hit, so it is faster.
@@ -260,14 +258,15 @@ impl<'a> Grid<'a> {
         if IS_SMALL {
             return self.occluded_with(ray, &mut QueryOptions::default());
         }
-        self.any(ray) != INVALID_ID
+        self.one(ray, true).is_some()
     }
 
-    /// A triangle that a ray hits, or [`INVALID_ID`].
-    pub(crate) fn any(&self, ray: &Ray) -> u32 {
-        let mut any = Any(INVALID_ID);
-        self.search(ray, ray.t_min, Cull::None, &mut any, &mut ());
-        any.0
+    /// The closest hit of a ray, or any.
+    #[inline(always)]
+    pub(crate) fn one(&self, ray: &Ray, is_any: bool) -> Option<Hit> {
+        let mut one = One { hit: None, is_any };
+        self.search(ray, ray.t_min, Cull::None, &mut one, &mut ());
+        one.hit
     }
 
     /// Traverses the structure along a ray and passes the hits to a search: all from `begin` on, which is no
@@ -367,27 +366,27 @@ impl<'a> Grid<'a> {
 
     /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it
     /// meets.
-    pub(crate) fn search_boxes<F: Search, T: Tally>(
+    pub(crate) fn search_boxes(
         &self,
         ray: &RayF64,
-        search: &mut F,
-        tally: &mut T,
+        search: &mut Boxes<'_>,
+        counters: &mut Counters,
     ) {
-        by_kind!(&self.structure, tree => tree.search_boxes(&self.scope(), ray, search, tally), ());
+        by_kind!(&self.structure, tree => tree.search_boxes(&self.scope(), ray, search, counters), ());
     }
 
     /// The same for a line, and a range of `t`. The `t` along the line is `scale` times that.
-    pub(crate) fn search_boxes_along<F: Search, T: Tally>(
+    pub(crate) fn search_boxes_along(
         &self,
         line: &LineF64,
         scale: f64,
         range: [f32; 2],
-        search: &mut F,
-        tally: &mut T,
+        search: &mut Boxes<'_>,
+        counters: &mut Counters,
     ) {
         by_kind!(
             &self.structure,
-            tree => tree.search_boxes_along(&self.scope(), line, scale, range, search, tally),
+            tree => tree.search_boxes_along(&self.scope(), line, scale, range, search, counters),
             ()
         );
     }

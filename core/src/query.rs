@@ -9,8 +9,8 @@
 use crate::counters::Counters;
 use crate::grid::Grid;
 use crate::options::{QueryOptions, Selection, Verdict};
-use crate::ray::{Hit, INVALID_ID, Ray};
-use crate::search::{All, NearestHits};
+use crate::ray::{Hit, Ray};
+use crate::search::{All, NearestHits, Triangles};
 
 /// The most hits that a walk collects.
 const ROOM: usize = 16;
@@ -138,8 +138,7 @@ impl Grid<'_> {
         options: &mut QueryOptions<'_>,
     ) -> Option<u32> {
         if options.are_plain() {
-            let id = self.any(ray);
-            return (id != INVALID_ID).then_some(id);
+            return self.one(ray, true).map(|hit| hit.primitive);
         }
         if options.filter.is_some() {
             return self.intersect_at(place, ray, options).map(|hit| hit.primitive);
@@ -208,7 +207,8 @@ impl Grid<'_> {
         let selection = Selection::new(self.mesh(), options);
         let mut all = All { selection: &selection, hits, count: 0 };
         let mut work = Counters::default();
-        self.search(ray, ray.t_min, options.cull, &mut all, &mut work);
+        let mut show = Triangles(&mut |hit| all.show(hit));
+        self.search(ray, ray.t_min, options.cull, &mut show, &mut work);
         all.sort();
         if let Some(counters) = &mut options.counters {
             counters.add(&work);
@@ -271,7 +271,8 @@ impl Grid<'_> {
         let mut nearest = NearestHits { selection: &selection, after, hits, count: 0, is_any };
         let begin = after.map_or(ray.t_min, |after| after.t);
         let mut work = Counters::default();
-        self.search(ray, begin, options.cull, &mut nearest, &mut work);
+        let mut show = Triangles(&mut |hit| nearest.show(hit));
+        self.search(ray, begin, options.cull, &mut show, &mut work);
         if let Some(counters) = &mut options.counters {
             counters.add(&work);
         }

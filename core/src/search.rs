@@ -57,35 +57,55 @@ pub(crate) trait Search {
     }
 }
 
-/// The closest hit; where several are equally close, the one of the triangle with the lowest id.
+/// One hit: the closest, and where several are equally close, that of the triangle with the lowest id; or any.
 #[derive(Debug)]
-pub(crate) struct Closest(pub(crate) Option<Hit>);
+pub(crate) struct One {
+    /// The hit so far.
+    pub(crate) hit: Option<Hit>,
+    pub(crate) is_any: bool,
+}
 
-impl Search for Closest {
+impl Search for One {
     #[inline(always)]
     fn show(&mut self, hit: Hit) -> Outcome {
-        if self.0.is_some_and(|best| !hit.is_closer(&best)) {
+        if self.hit.is_some_and(|best| !hit.is_closer(&best)) {
             return Outcome::Unchanged;
         }
-        self.0 = Some(hit);
-        Outcome::EndsAt(hit.t)
+        self.hit = Some(hit);
+        if self.is_any { Outcome::Done } else { Outcome::EndsAt(hit.t) }
     }
 
     #[inline(always)]
     fn knows(&self, id: u32) -> bool {
-        self.0.is_some_and(|best| best.primitive == id)
+        self.hit.is_some_and(|best| best.primitive == id)
     }
 }
 
-/// Any hit: its triangle, or [`INVALID_ID`].
-#[derive(Debug)]
-pub(crate) struct Any(pub(crate) u32);
+/// Any other search for triangles. It is called through a pointer, because a traversal is compiled once for each type
+/// of search and takes 10 KB each time.
+pub(crate) struct Triangles<'s>(pub(crate) &'s mut dyn FnMut(Hit) -> Outcome);
 
-impl Search for Any {
+impl Search for Triangles<'_> {
     #[inline(always)]
     fn show(&mut self, hit: Hit) -> Outcome {
-        self.0 = hit.primitive;
-        Outcome::Done
+        (self.0)(hit)
+    }
+}
+
+/// Any search for boxes: gets the number of each that the ray meets.
+pub(crate) struct Boxes<'s>(pub(crate) &'s mut dyn FnMut(u32) -> Outcome);
+
+impl Search for Boxes<'_> {
+    const OF_BOXES: bool = true;
+
+    #[inline(always)]
+    fn show(&mut self, _: Hit) -> Outcome {
+        Outcome::Unchanged
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, id: u32) -> Outcome {
+        (self.0)(id)
     }
 }
 
@@ -141,11 +161,9 @@ impl All<'_> {
             self.count = kept;
         }
     }
-}
 
-impl Search for All<'_> {
-    #[inline(never)]
-    fn show(&mut self, hit: Hit) -> Outcome {
+    /// Takes a hit.
+    pub(crate) fn show(&mut self, hit: Hit) -> Outcome {
         if !self.selection.has(hit.primitive) {
             return Outcome::Unchanged;
         }
@@ -199,10 +217,9 @@ fn sift_down(heap: &mut [Hit]) {
     }
 }
 
-impl Search for NearestHits<'_> {
-    // Out of line: hits are rare, and the walk keeps its registers.
-    #[inline(never)]
-    fn show(&mut self, hit: Hit) -> Outcome {
+impl NearestHits<'_> {
+    /// Takes a hit.
+    pub(crate) fn show(&mut self, hit: Hit) -> Outcome {
         let is_behind = self.after.is_none_or(|after| after.is_closer(&hit));
         if !is_behind || !self.selection.has(hit.primitive) {
             return Outcome::Unchanged;

@@ -19,10 +19,10 @@ use crate::error::Error;
 use crate::grid::Grid;
 use crate::mesh::{Strided, TriangleMesh};
 use crate::method::Content;
-use crate::options::{Cull, QueryOptions, Selection};
+use crate::options::{QueryOptions, Selection};
 use crate::ray::{Hit, Ray};
 use crate::refit::{Refit, refit_content};
-use crate::search::{Outcome, Search};
+use crate::search::{self, Outcome};
 use crate::sizes::sizes_with;
 
 /// A view of the boxes of the caller's shapes: six floats each, two opposite corners.
@@ -289,7 +289,8 @@ impl<'a> Shapes<'a> {
         let selection = Selection::new(self.grid.mesh(), options);
         let mut offered = Offered { selection: &selection, ray: *ray, best: None, test, is_any };
         let mut work = Counters::default();
-        self.grid.search(ray, ray.t_min, Cull::None, &mut offered, &mut work);
+        let mut offer = search::Boxes(&mut |id| offered.offer(id));
+        self.grid.search_boxes(&ray.into(), &mut offer, &mut work);
         let best = offered.best;
         if let Some(counters) = &mut options.counters {
             counters.add(&work);
@@ -308,15 +309,7 @@ struct Offered<'q, 't> {
     is_any: bool,
 }
 
-impl Search for Offered<'_, '_> {
-    const OF_BOXES: bool = true;
-
-    fn show(&mut self, _: Hit) -> Outcome {
-        Outcome::Unchanged
-    }
-
-    // Out of line: the walk keeps its registers.
-    #[inline(never)]
+impl Offered<'_, '_> {
     fn offer(&mut self, id: u32) -> Outcome {
         if !self.selection.has(id) {
             return Outcome::Unchanged;

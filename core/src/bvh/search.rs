@@ -6,12 +6,12 @@ use super::slab::Slab;
 use super::walk::OneRay;
 use crate::aabb::Aabb;
 use crate::approach::{Approach, LineF64};
-use crate::counters::Tally;
+use crate::counters::{Counters, Tally};
 use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
 use crate::options::Cull;
 use crate::ray::{Ray, RayF64, round};
-use crate::search::{Search, test_all};
+use crate::search::{Boxes, Search, test_all};
 use crate::simd::{SimdLevel, dispatch};
 use crate::triangle::TriangleTest;
 
@@ -48,34 +48,33 @@ impl Bvh<'_> {
 
     /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it
     /// meets.
-    #[inline(always)]
-    pub(crate) fn search_boxes<F: Search, T: Tally>(
+    pub(crate) fn search_boxes(
         &self,
         scope: &Scope<'_>,
         ray: &RayF64,
-        search: &mut F,
-        tally: &mut T,
+        search: &mut Boxes<'_>,
+        counters: &mut Counters,
     ) {
         let narrow = &ray.rounded();
         if narrow.origin.map(|c| f64::from(c).to_bits()) == ray.origin.map(f64::to_bits) {
-            return self.search(scope, narrow, ray.t_min, Cull::None, search, tally);
+            return self.search(scope, narrow, ray.t_min, Cull::None, search, counters);
         }
         if !narrow.is_valid() {
             return;
         }
         let line = LineF64 { origin: ray.origin, direction: ray.direction.map(f64::from) };
-        self.search_boxes_along(scope, &line, 1.0, [ray.t_min, ray.t_max], search, tally);
+        self.search_boxes_along(scope, &line, 1.0, [ray.t_min, ray.t_max], search, counters);
     }
 
     /// The same for a line, and a range of `t`. The `t` along the line is `scale` times that.
-    pub(crate) fn search_boxes_along<F: Search, T: Tally>(
+    pub(crate) fn search_boxes_along(
         &self,
         scope: &Scope<'_>,
         line: &LineF64,
         scale: f64,
         [t_min, t_max]: [f32; 2],
-        search: &mut F,
-        tally: &mut T,
+        search: &mut Boxes<'_>,
+        counters: &mut Counters,
     ) {
         // Beyond f32 every origin is remote.
         let most = f64::from(f32::MAX);
@@ -83,10 +82,10 @@ impl Bvh<'_> {
         let ray = &Ray { origin, t_min, direction: line.direction.map(round), t_max };
         let Some(approach) = Approach::of_line(ray, line, &scope.bounds) else { return };
         if approach.is_remote {
-            return test_all(scope.mesh, &TriangleTest::from(ray, &approach), search, tally);
+            return test_all(scope.mesh, &TriangleTest::from(ray, &approach), search, counters);
         }
         let afar = (Slab::along(ray, &approach, scale), RayFilter::NONE);
-        self.walk(scope, ray, t_min, Cull::None, Some(&afar), search, tally);
+        self.walk(scope, ray, t_min, Cull::None, Some(&afar), search, counters);
     }
 
     /// Walks a ray through a tree; false if it comes from afar and must be brought to the box.

@@ -11,7 +11,7 @@ use crate::counters::Counters;
 use crate::limits::MAX_NESTING;
 use crate::options::{Cull, QueryOptions, Verdict};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
-use crate::search::{Outcome, Search};
+use crate::search::{Boxes, Outcome};
 
 /// Where a ray meets a scene: 32 bytes.
 #[repr(C)]
@@ -218,17 +218,14 @@ impl Scene<'_> {
             counters: work.as_mut(),
         };
         let mut steps = Counters::default();
+        let mut offer = Boxes(&mut |number| offered.offer(number));
         if level == 0 {
             let cut = RayF64 { t_max, ..*ray };
-            if offered.counters.is_some() {
-                self.tree.search_boxes(&cut, &mut offered, &mut steps);
-            } else {
-                self.tree.search_boxes(&cut, &mut offered, &mut ());
-            }
+            self.tree.search_boxes(&cut, &mut offer, &mut steps);
         } else {
             let Seen { line, scale, .. } = Seen::new(line)?;
             let range = [ray.t_min, t_max];
-            self.tree.search_boxes_along(&line, scale, range, &mut offered, &mut steps);
+            self.tree.search_boxes_along(&line, scale, range, &mut offer, &mut steps);
         }
         let best = offered.best;
         if let (Some(counters), Some(work)) = (counters, work) {
@@ -264,15 +261,7 @@ struct Offered<'q, 'f> {
     counters: Option<&'q mut Counters>,
 }
 
-impl Search for Offered<'_, '_> {
-    const OF_BOXES: bool = true;
-
-    fn show(&mut self, _: Hit) -> Outcome {
-        Outcome::Unchanged
-    }
-
-    // Out of line: the walk keeps its registers.
-    #[inline(never)]
+impl Offered<'_, '_> {
     fn offer(&mut self, number: u32) -> Outcome {
         let Some(hit) = self.ask(number) else { return Outcome::Unchanged };
         if self.best.is_some_and(|best| !hit.is_closer(&best)) {
