@@ -475,7 +475,6 @@ mod tests {
         for level in SimdLevel::available() {
             assert_eq!(dispatch(level, Lines(rays, triangles)), expected, "{level:?}");
         }
-        assert_eq!(Lines(rays, triangles).run(fearless_simd::Fallback::new()), expected);
     }
 
     #[test]

@@ -157,7 +157,6 @@ impl<S: Simd> Corners<S> {
 mod tests {
     use alloc::vec::Vec;
 
-    use fearless_simd::Fallback;
     use glam::Vec3A;
 
     use super::*;
@@ -220,7 +219,7 @@ mod tests {
             // Behind the last one there is none, nor before the first.
             let ends = [5993, 5997, 5999, 6000, u32::MAX - 5];
             for first in (0..6000).step_by(LANES).chain(ends) {
-                let found = Of(&mesh, &lattice, first).run(Fallback::new());
+                let found = dispatch(SimdLevel::detect(), Of(&mesh, &lattice, first));
                 for level in SimdLevel::available() {
                     assert_eq!(dispatch(level, Of(&mesh, &lattice, first)), found, "{level:?}");
                 }
