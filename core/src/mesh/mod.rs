@@ -9,12 +9,14 @@
 //! read goes through bytes, which costs nothing on the machines that matter and removes a rule.
 
 mod parts;
+mod strided;
+mod wide;
 
 use core::fmt;
 use core::ops::Range;
 
 use glam::{Vec3A, Vec4};
-use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
+use zerocopy::{IntoBytes, transmute};
 
 use crate::aabb::Aabb;
 use crate::error::{Error, MeshField};
@@ -22,6 +24,9 @@ use crate::limits::{MAX_COORDINATE, MAX_TRIANGLES};
 use crate::method::Content;
 pub use parts::MeshPart;
 pub(crate) use parts::{Near, Piece};
+pub use strided::Strided;
+pub(crate) use wide::WideMesh;
+use wide::vector;
 
 /// Three corners, in scene units.
 pub type Triangle = [[f32; 3]; 3];
@@ -62,93 +67,6 @@ enum Layout<'a> {
 
 /// Bytes of a box: least x, y, z, greatest x, y, z.
 pub(crate) const BOX_BYTES: usize = size_of::<[f32; 6]>();
-
-/// `count` elements in a slice of bytes, one every `stride` bytes.
-#[derive(Clone, Copy)]
-pub struct Strided<'a> {
-    /// The bytes, from the first element's first to at least the last element's last.
-    pub bytes: &'a [u8],
-    /// Bytes from one element to the next.
-    pub stride: usize,
-    /// Number of elements.
-    pub count: usize,
-}
-
-impl fmt::Debug for Strided<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Strided")
-            .field("bytes", &self.bytes.len())
-            .field("stride", &self.stride)
-            .field("count", &self.count)
-            .finish()
-    }
-}
-
-impl<'a> Strided<'a> {
-    /// Elements that lie side by side: numbers, arrays of them, and structs that derive these traits.
-    ///
-    /// ```
-    /// use hgrid_core::Strided;
-    /// use zerocopy::{Immutable, IntoBytes};
-    ///
-    /// #[derive(Clone, Copy, Immutable, IntoBytes)]
-    /// #[repr(C)]
-    /// struct Vertex {
-    ///     position: [f32; 3],
-    ///     color: u32,
-    /// }
-    ///
-    /// let vertices = [Vertex { position: [0.0; 3], color: 7 }; 3];
-    /// let view = Strided::new(&vertices);
-    /// assert_eq!((view.stride, view.count), (16, 3));
-    /// ```
-    ///
-    /// The fields take bytes from anywhere else, such as `bytemuck::cast_slice(&vertices)`.
-    #[must_use]
-    pub fn new<T: Immutable + IntoBytes>(elements: &'a [T]) -> Self {
-        let count = elements.len();
-        Self { bytes: elements.as_bytes(), stride: size_of::<T>(), count }
-    }
-
-    /// Element `index`, or zeros if there is none.
-    #[inline(always)]
-    pub(crate) fn read<T: FromBytes>(&self, index: usize) -> T {
-        let start = index.saturating_mul(self.stride);
-        let element = self.bytes.get(start..).and_then(|rest| T::read_from_prefix(rest).ok());
-        element.map_or_else(T::new_zeroed, |(element, _)| element)
-    }
-
-    /// No elements.
-    const NONE: Self = Self { bytes: &[], stride: 0, count: 0 };
-
-    /// The same elements of `size` bytes without the bytes after the
-    /// last of them, if all lie inside.
-    pub(crate) fn cut(self, size: usize) -> Option<Self> {
-        let Some(last) = self.count.checked_sub(1) else {
-            return Some(Self { bytes: &[], ..self });
-        };
-        let end = last.checked_mul(self.stride)?.checked_add(size)?;
-        let bytes = self.bytes.get(..end).filter(|_| self.stride >= size)?;
-        Some(Self { bytes, ..self })
-    }
-
-    /// The first `N` bytes of element `index`.
-    #[inline(always)]
-    pub(crate) fn element<const N: usize>(&self, index: usize) -> Option<&'a [u8; N]> {
-        if index >= self.count {
-            return None;
-        }
-        self.bytes.get(index * self.stride..)?.first_chunk::<N>()
-    }
-
-    /// Elements of `N` bytes from `first` on, if they lie side by side.
-    #[inline(always)]
-    pub(crate) fn tight<const N: usize>(&self, first: usize, count: usize) -> &'a [[u8; N]] {
-        let bytes = self.bytes.get(first.saturating_mul(N)..).unwrap_or_default();
-        let elements = if self.stride == N { bytes.as_chunks().0 } else { &[] };
-        elements.get(..count).unwrap_or_default()
-    }
-}
 
 /// A view of the caller's triangle mesh: vertices of three floats, triangles of three indices.
 #[derive(Clone, Copy)]
@@ -556,25 +474,6 @@ impl<'a> TriangleMesh<'a> {
         bounds
     }
 
-    /// This mesh for reading many triangles fast.
-    #[inline(always)]
-    pub(crate) fn wide(&self) -> WideMesh<'a> {
-        let stride = |array: &Strided<'_>| u16::try_from(array.stride);
-        match (stride(&self.positions), stride(&self.indices), self.layout) {
-            (
-                Ok(position_stride),
-                Ok(index_stride),
-                Layout::Indexed(IndexType::U32) | Layout::Packed(_),
-            ) => WideMesh {
-                positions: self.positions.bytes,
-                indices: self.indices.bytes,
-                position_stride,
-                index_stride,
-            },
-            _ => WideMesh { positions: &[], indices: &[], position_stride: 0, index_stride: 0 },
-        }
-    }
-
     #[inline(always)]
     fn vertices_of(&self, triangle: u32) -> Option<[usize; 3]> {
         match self.layout {
@@ -613,72 +512,6 @@ impl<'a> TriangleMesh<'a> {
         let coordinate = |at: usize| f32::from_ne_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]);
         Some([coordinate(0), coordinate(4), coordinate(8)])
     }
-}
-
-/// A mesh whose vertices are read in pieces of sixteen bytes, which is one load and one check each.
-///
-/// Strides of 16 bits leave products of an index without overflow, so that the end of the bytes is
-/// all there is to check: they end with the last element, so what lies inside is an element.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct WideMesh<'a> {
-    positions: &'a [u8],
-    indices: &'a [u8],
-    position_stride: u16,
-    index_stride: u16,
-}
-
-impl<'a> WideMesh<'a> {
-    /// Whether nothing can be read this way.
-    pub(crate) const fn is_empty(&self) -> bool {
-        self.indices.is_empty()
-    }
-
-    /// The corners of a triangle, each with the four bytes behind it.
-    ///
-    /// `None` does not mean that there is no such triangle: one with the mesh's last vertex has
-    /// nothing behind it, and some layouts are not read this way at all.
-    #[inline(always)]
-    pub(crate) fn corners(&self, triangle: u32) -> Option<[&'a [u8; 16]; 3]> {
-        let indices: &[u8; 12] = element(self.indices, self.index_stride, triangle)?;
-        self.vertices(self.position_stride, transmute!(*indices))
-    }
-
-    /// Those of four triangles that follow one another, if all of them can be read this way.
-    #[inline(always)]
-    pub(crate) fn four(&self, first: u32) -> Option<[[&'a [u8; 16]; 3]; 4]> {
-        // What most meshes have: one load of indices, and products that the compiler knows.
-        if (self.index_stride, self.position_stride) == (12, 12) {
-            let indices: &[u8; 48] = element(self.indices, 12, first)?;
-            let [a, b, c, d]: [[u32; 3]; 4] = transmute!(*indices);
-            let corners = |vertices| self.vertices(12, vertices);
-            return Some([corners(a)?, corners(b)?, corners(c)?, corners(d)?]);
-        }
-        let corners = |place| self.corners(first.wrapping_add(place));
-        Some([corners(0)?, corners(1)?, corners(2)?, corners(3)?])
-    }
-
-    /// Vertices, each with the four bytes behind it.
-    #[inline(always)]
-    fn vertices(&self, stride: u16, [a, b, c]: [u32; 3]) -> Option<[&'a [u8; 16]; 3]> {
-        let vertex = |index| element(self.positions, stride, index);
-        Some([vertex(a)?, vertex(b)?, vertex(c)?])
-    }
-}
-
-/// A corner from its bytes and those behind it.
-#[inline(always)]
-fn vector(bytes: &[u8; 16]) -> Vec3A {
-    let row: [f32; 4] = transmute!(*bytes);
-    Vec3A::from_vec4(Vec4::from_array(row))
-}
-
-/// `N` bytes from where an element starts, if all of them are there.
-#[inline(always)]
-fn element<const N: usize>(bytes: &[u8], stride: u16, index: u32) -> Option<&[u8; N]> {
-    // Not checked where pointers have 64 bits: the compiler sees that these two cannot overflow.
-    let start = (index as usize).checked_mul(usize::from(stride))?;
-    let end = start.checked_add(N)?;
-    bytes.get(start..end)?.first_chunk()
 }
 
 #[cfg(test)]

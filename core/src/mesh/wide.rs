@@ -1,0 +1,93 @@
+//! Reading many triangles fast: sixteen bytes a vertex.
+
+use glam::{Vec3A, Vec4};
+use zerocopy::transmute;
+
+use super::{IndexType, Layout, Strided, TriangleMesh};
+
+/// A mesh whose vertices are read in pieces of sixteen bytes, which is one load and one check each.
+///
+/// Strides of 16 bits leave products of an index without overflow, so that the end of the bytes is
+/// all there is to check: they end with the last element, so what lies inside is an element.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WideMesh<'a> {
+    positions: &'a [u8],
+    indices: &'a [u8],
+    position_stride: u16,
+    index_stride: u16,
+}
+
+impl<'a> WideMesh<'a> {
+    /// Whether nothing can be read this way.
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.indices.is_empty()
+    }
+
+    /// The corners of a triangle, each with the four bytes behind it.
+    ///
+    /// `None` does not mean that there is no such triangle: one with the mesh's last vertex has
+    /// nothing behind it, and some layouts are not read this way at all.
+    #[inline(always)]
+    pub(crate) fn corners(&self, triangle: u32) -> Option<[&'a [u8; 16]; 3]> {
+        let indices: &[u8; 12] = element(self.indices, self.index_stride, triangle)?;
+        self.vertices(self.position_stride, transmute!(*indices))
+    }
+
+    /// Those of four triangles that follow one another, if all of them can be read this way.
+    #[inline(always)]
+    pub(crate) fn four(&self, first: u32) -> Option<[[&'a [u8; 16]; 3]; 4]> {
+        // What most meshes have: one load of indices, and products that the compiler knows.
+        if (self.index_stride, self.position_stride) == (12, 12) {
+            let indices: &[u8; 48] = element(self.indices, 12, first)?;
+            let [a, b, c, d]: [[u32; 3]; 4] = transmute!(*indices);
+            let corners = |vertices| self.vertices(12, vertices);
+            return Some([corners(a)?, corners(b)?, corners(c)?, corners(d)?]);
+        }
+        let corners = |place| self.corners(first.wrapping_add(place));
+        Some([corners(0)?, corners(1)?, corners(2)?, corners(3)?])
+    }
+
+    /// Vertices, each with the four bytes behind it.
+    #[inline(always)]
+    fn vertices(&self, stride: u16, [a, b, c]: [u32; 3]) -> Option<[&'a [u8; 16]; 3]> {
+        let vertex = |index| element(self.positions, stride, index);
+        Some([vertex(a)?, vertex(b)?, vertex(c)?])
+    }
+}
+
+impl<'a> TriangleMesh<'a> {
+    /// This mesh for reading many triangles fast.
+    #[inline(always)]
+    pub(crate) fn wide(&self) -> WideMesh<'a> {
+        let stride = |array: &Strided<'_>| u16::try_from(array.stride);
+        match (stride(&self.positions), stride(&self.indices), self.layout) {
+            (
+                Ok(position_stride),
+                Ok(index_stride),
+                Layout::Indexed(IndexType::U32) | Layout::Packed(_),
+            ) => WideMesh {
+                positions: self.positions.bytes,
+                indices: self.indices.bytes,
+                position_stride,
+                index_stride,
+            },
+            _ => WideMesh { positions: &[], indices: &[], position_stride: 0, index_stride: 0 },
+        }
+    }
+}
+
+/// A corner from its bytes and those behind it.
+#[inline(always)]
+pub(super) fn vector(bytes: &[u8; 16]) -> Vec3A {
+    let row: [f32; 4] = transmute!(*bytes);
+    Vec3A::from_vec4(Vec4::from_array(row))
+}
+
+/// `N` bytes from where an element starts, if all of them are there.
+#[inline(always)]
+fn element<const N: usize>(bytes: &[u8], stride: u16, index: u32) -> Option<&[u8; N]> {
+    // Not checked where pointers have 64 bits: the compiler sees that these two cannot overflow.
+    let start = (index as usize).checked_mul(usize::from(stride))?;
+    let end = start.checked_add(N)?;
+    bytes.get(start..end)?.first_chunk()
+}
