@@ -4,6 +4,7 @@
 //! caller's regions lie apart is asked while they are still numbers.
 
 use core::ffi::c_void;
+use core::ptr::null_mut;
 
 /// A region as the caller passes it.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +14,9 @@ pub(crate) struct Region {
 }
 
 impl Region {
+    /// No bytes.
+    pub(crate) const NONE: Self = Self { start: null_mut(), bytes: 0 };
+
     pub(crate) fn span(self) -> Span {
         Span::new(self.start, self.bytes)
     }

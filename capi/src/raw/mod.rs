@@ -27,6 +27,7 @@
 mod ask;
 mod join;
 mod scene;
+mod shapes;
 
 use core::ffi::c_void;
 use core::ptr::{NonNull, null_mut};
@@ -37,9 +38,11 @@ use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 pub(crate) use ask::{Arrays, batch, closest, locate, query, query_all, surface};
 pub(crate) use join::{join, parts_of};
 pub(crate) use scene::{
-    build_scene, build_shapes, open_packed_scene, open_scene, open_shapes, pack_scene, query_scene,
-    query_shapes, refit_scene, refit_shapes, scene, scene_locate, scene_normal, shapes,
-    validate_scene, validate_shapes, write_object,
+    build_scene, open_packed_scene, open_scene, pack_scene, query_scene, refit_scene, scene,
+    scene_locate, scene_normal, validate_scene, write_object,
+};
+pub(crate) use shapes::{
+    build_shapes, open_shapes, query_shapes, refit_shapes, shapes, validate_shapes,
 };
 
 use crate::input::Input;
@@ -152,6 +155,26 @@ unsafe fn bytes_mut(start: *mut c_void, count: usize) -> Result<&'static mut [u8
             Ok(unsafe { slice::from_raw_parts_mut(start.as_ptr().cast(), count.min(MAX_BYTES)) })
         }
     }
+}
+
+/// Regions to write, once it is sure that they lie apart from each other and from what is read.
+///
+/// # Safety
+/// The caller's promise.
+unsafe fn apart<const N: usize>(
+    inputs: [Span; N],
+    [one, other]: [Region; 2],
+) -> Result<[&'static mut [u8]; 2], hgrid_status> {
+    let (first, second) = (one.span(), other.span());
+    let is_shared = |input: &Span| input.overlaps(first) || input.overlaps(second);
+    if first.overlaps(second) || inputs.iter().any(is_shared) {
+        return Err(HGRID_ERROR_OVERLAP);
+    }
+    // SAFETY: the caller's promise; nothing else that this call reads or writes lies there.
+    let one = unsafe { bytes_mut(one.start, one.bytes) }?;
+    // SAFETY: the same.
+    let other = unsafe { bytes_mut(other.start, other.bytes) }?;
+    Ok([one, other])
 }
 
 /// A mesh.
@@ -348,9 +371,8 @@ pub(crate) unsafe fn refit(
     let description = unsafe { read_sized(description) }?;
     // SAFETY: the caller's promise.
     let mesh = unsafe { mesh(&description) }?;
-    let none = Region { start: null_mut(), bytes: 0 };
     // SAFETY: the caller's promise.
-    let [blob, _] = unsafe { regions(&mesh, [blob, none]) }?;
+    let [blob, _] = unsafe { regions(&mesh, [blob, Region::NONE]) }?;
     let refitted = hgrid_core::refit(blob, &mesh);
     report.note(&refitted);
     refitted.and_then(|_| Grid::open(blob, mesh)).map_err(status_of)

@@ -1,4 +1,4 @@
-//! Shapes and scenes, by their addresses.
+//! Scenes, by their addresses.
 //!
 //! "The caller's promise" is the contract at the head of the module above.
 
@@ -8,51 +8,26 @@ use core::ptr::NonNull;
 use core::slice;
 
 use hgrid_core::{
-    ALIGNMENT, BlobInfo, Boxes, Content, Counters, Cull, Hit, Instance, Member, Object, ObjectTest,
-    QueryOptions, Ray, Scene, SceneHit, SceneOptions, ShapeHit, Shapes, Sizes, Verdict,
+    ALIGNMENT, BlobInfo, Content, Counters, Cull, Instance, Member, Object, Scene, SceneHit,
+    SceneOptions, Verdict,
 };
 
-use super::ask::{add, all_options};
+use super::ask::add;
 use super::{
-    bytes, bytes_mut, config, read, read_sized, shares, span_of, strided, write, write_grid,
+    apart, bytes, bytes_mut, config, read, read_sized, shares, span_of, write, write_grid,
 };
 use crate::input::controlled;
-use crate::questions::{
-    hgrid_counters, hgrid_query_options, hgrid_ray, hgrid_refit_report, verdict,
-};
+use crate::questions::{hgrid_counters, hgrid_refit_report, verdict};
 use crate::scene::{
     hgrid_instance, hgrid_object, hgrid_ray_f64, hgrid_scene, hgrid_scene_hit, hgrid_scene_options,
 };
-use crate::shapes::{hgrid_boxes, hgrid_shape_hit, hgrid_shapes};
 use crate::span::{Region, Span};
 use crate::status::{
-    HGRID_ERROR_INDEX_TOO_SMALL, HGRID_ERROR_INVALID_MASKS, HGRID_ERROR_INVALID_POSITIONS,
-    HGRID_ERROR_MISALIGNED, HGRID_ERROR_NOT_A_GRID, HGRID_ERROR_NULL_ARGUMENT,
-    HGRID_ERROR_OTHER_CONTENT, HGRID_ERROR_OVERLAP, HGRID_ERROR_STRUCT_SIZE,
-    HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
+    HGRID_ERROR_INDEX_TOO_SMALL, HGRID_ERROR_MISALIGNED, HGRID_ERROR_NOT_A_GRID,
+    HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OTHER_CONTENT, HGRID_ERROR_OVERLAP,
+    HGRID_ERROR_STRUCT_SIZE, HGRID_ERROR_TOO_MANY_TRIANGLES, hgrid_status, status_of,
 };
 use crate::types::{Elements, hgrid_config, hgrid_grid, hgrid_report};
-
-/// The test of [`hgrid_boxes`].
-type ShapeTest =
-    unsafe extern "C" fn(*mut c_void, u32, *const hgrid_ray, *mut hgrid_shape_hit) -> bool;
-
-/// What a [`hgrid_shapes`] holds.
-#[repr(C)]
-pub(crate) struct Tested {
-    tag: u64,
-    pub(crate) shapes: Shapes<'static>,
-    test: Option<ShapeTest>,
-    context: *mut c_void,
-}
-
-// SAFETY: by the docs of `hgrid_object_shapes` any number of threads may call the test with its context.
-unsafe impl Sync for Tested {}
-
-const SHAPES_TAG: u64 = u64::from_le_bytes(*b"hgridsh1");
-
-const _: () = assert!(size_of::<Tested>() <= size_of::<hgrid_shapes>());
-const _: () = assert!(align_of::<Tested>() <= align_of::<hgrid_shapes>());
 
 /// What a [`hgrid_scene`] holds.
 #[repr(C)]
@@ -65,226 +40,6 @@ const SCENE_TAG: u64 = u64::from_le_bytes(*b"hgridsc1");
 
 const _: () = assert!(size_of::<SceneView>() <= size_of::<hgrid_scene>());
 const _: () = assert!(align_of::<SceneView>() <= align_of::<hgrid_scene>());
-
-impl ObjectTest for Tested {
-    #[inline]
-    fn test(&self, shape: u32, ray: &Ray) -> Option<ShapeHit> {
-        let test = self.test?;
-        let ray = hgrid_ray::from(*ray);
-        let mut hit = hgrid_shape_hit { t: f32::NAN, u: 0.0, v: 0.0 };
-        // SAFETY: a function of this type by the caller's promise; ray and hit live until it returns.
-        let is_hit = unsafe { test(self.context, shape, &raw const ray, &raw mut hit) };
-        is_hit.then(|| hit.into())
-    }
-}
-
-/// The arrays of some boxes.
-fn elements(boxes: &hgrid_boxes) -> Result<[Elements; 2], hgrid_status> {
-    let hgrid_boxes { reserved, boxes, box_stride, count, masks, mask_stride, .. } = *boxes;
-    if reserved != 0 {
-        return Err(HGRID_ERROR_STRUCT_SIZE);
-    }
-    let boxes = Elements::new(boxes, box_stride, count, size_of::<[f32; 6]>());
-    let mask_count = if masks.is_null() { 0 } else { count };
-    let masks = Elements::new(masks, mask_stride, mask_count, size_of::<u32>());
-    let masks = masks.filter(|masks| mask_count == 0 || masks.stride >= size_of::<u32>());
-    Ok([boxes.ok_or(HGRID_ERROR_INVALID_POSITIONS)?, masks.ok_or(HGRID_ERROR_INVALID_MASKS)?])
-}
-
-/// The caller's boxes.
-///
-/// # Safety
-/// The caller's promise.
-unsafe fn boxes(description: &hgrid_boxes) -> Result<Boxes<'static>, hgrid_status> {
-    let [boxes, masks] = elements(description)?;
-    // SAFETY: the caller's promise.
-    let boxes = unsafe { strided(boxes) }?;
-    // SAFETY: the caller's promise.
-    let masks = unsafe { strided(masks) }?;
-    let boxes = Boxes::strided(boxes).map_err(status_of)?;
-    if masks.count == 0 { Ok(boxes) } else { boxes.with_masks(masks).map_err(status_of) }
-}
-
-/// Regions to write, once it is sure that they lie apart from each other and from what is read.
-///
-/// # Safety
-/// The caller's promise.
-unsafe fn apart<const N: usize>(
-    inputs: [Span; N],
-    [one, other]: [Region; 2],
-) -> Result<[&'static mut [u8]; 2], hgrid_status> {
-    let (first, second) = (one.span(), other.span());
-    let is_shared = |input: &Span| input.overlaps(first) || input.overlaps(second);
-    if first.overlaps(second) || inputs.iter().any(is_shared) {
-        return Err(HGRID_ERROR_OVERLAP);
-    }
-    // SAFETY: the caller's promise; nothing else that this call reads or writes lies there.
-    let one = unsafe { bytes_mut(one.start, one.bytes) }?;
-    // SAFETY: the same.
-    let other = unsafe { bytes_mut(other.start, other.bytes) }?;
-    Ok([one, other])
-}
-
-/// Writes a view of shapes.
-///
-/// # Safety
-/// The caller's promise.
-unsafe fn write_shapes(
-    to: NonNull<hgrid_shapes>,
-    shapes: &Shapes<'static>,
-    description: &hgrid_boxes,
-) {
-    let hgrid_boxes { test, context, .. } = *description;
-    // SAFETY: large enough and aligned as the assertions above say.
-    unsafe { write(to.cast(), Tested { tag: SHAPES_TAG, shapes: *shapes, test, context }) }
-}
-
-/// The shapes of a view.
-///
-/// # Safety
-/// The caller's promise; and a view with the right tag was written by [`write_shapes`] or copied from one that was,
-/// and all that it refers to is where it was.
-pub(crate) unsafe fn shapes<'a>(view: *const hgrid_shapes) -> Result<&'a Tested, hgrid_status> {
-    // SAFETY: the caller's promise; the tag comes first.
-    if unsafe { read(view.cast::<u64>()) }? != SHAPES_TAG {
-        return Err(HGRID_ERROR_NOT_A_GRID);
-    }
-    // SAFETY: not NULL, aligned as the assertions above say, and a view by its tag.
-    Ok(unsafe { &*view.cast() })
-}
-
-/// Builds a tree of shapes.
-///
-/// # Safety
-/// The caller's promise.
-pub(crate) unsafe fn build_shapes(
-    description: *const hgrid_boxes,
-    settings: *const hgrid_config,
-    memory: [Region; 2],
-    to: NonNull<hgrid_shapes>,
-    report: &mut hgrid_report,
-) -> Result<(), hgrid_status> {
-    // SAFETY: the caller's promise.
-    let description = unsafe { read_sized(description) }?;
-    // SAFETY: the caller's promise.
-    let boxes = unsafe { boxes(&description) }?;
-    // SAFETY: the caller's promise.
-    let (config, caller) = unsafe { config(settings) }?;
-    let inputs = elements(&description)?.map(|array| Span::new(array.start, array.bytes));
-    // SAFETY: the caller's promise.
-    let [index, scratch] = unsafe { apart(inputs, memory) }?;
-    let built =
-        controlled(caller, |control| Shapes::build_with(boxes, &config, index, scratch, control));
-    let built = built.map_err(|error| report.note_error(error))?;
-    report.note_built(built.blob(), Sizes::bound(boxes.count(), &config));
-    report.skipped_count = built.skipped_count();
-    report.reference_count = built.count() - built.skipped_count();
-    // SAFETY: the caller's promise.
-    unsafe { write_shapes(to, &built, &description) };
-    Ok(())
-}
-
-/// Opens a tree of shapes.
-///
-/// # Safety
-/// The caller's promise.
-pub(crate) unsafe fn open_shapes(
-    blob: *const c_void,
-    blob_bytes: usize,
-    description: *const hgrid_boxes,
-    to: NonNull<hgrid_shapes>,
-) -> Result<(), hgrid_status> {
-    // SAFETY: the caller's promise.
-    let description = unsafe { read_sized(description) }?;
-    // SAFETY: the caller's promise.
-    let boxes = unsafe { boxes(&description) }?;
-    // SAFETY: the caller's promise.
-    let blob = unsafe { bytes(blob, blob_bytes) }?;
-    let opened = Shapes::open(blob, boxes).map_err(status_of)?;
-    // SAFETY: the caller's promise.
-    unsafe { write_shapes(to, &opened, &description) };
-    Ok(())
-}
-
-/// Gives a tree of shapes other boxes.
-///
-/// # Safety
-/// The caller's promise.
-pub(crate) unsafe fn refit_shapes(
-    description: *const hgrid_boxes,
-    blob: Region,
-    to: NonNull<hgrid_shapes>,
-    report: &mut hgrid_refit_report,
-) -> Result<(), hgrid_status> {
-    if blob.start.is_null() {
-        return Err(HGRID_ERROR_NULL_ARGUMENT);
-    }
-    // SAFETY: the caller's promise.
-    let description = unsafe { read_sized(description) }?;
-    // SAFETY: the caller's promise.
-    let boxes = unsafe { boxes(&description) }?;
-    let inputs = elements(&description)?.map(|array| Span::new(array.start, array.bytes));
-    // SAFETY: the caller's promise.
-    let [blob, _] = unsafe { apart(inputs, [blob, NOTHING]) }?;
-    let refitted = Shapes::refit(blob, &boxes);
-    report.note(&refitted);
-    let opened = refitted.and_then(|_| Shapes::open(blob, boxes)).map_err(status_of)?;
-    // SAFETY: the caller's promise.
-    unsafe { write_shapes(to, &opened, &description) };
-    Ok(())
-}
-
-/// No region.
-const NOTHING: Region = Region { start: core::ptr::null_mut(), bytes: 0 };
-
-/// Proves that a tree of shapes is right.
-///
-/// # Safety
-/// That of [`shapes`].
-pub(crate) unsafe fn validate_shapes(
-    view: *const hgrid_shapes,
-    scratch: Region,
-) -> Result<(), hgrid_status> {
-    // SAFETY: this function's contract.
-    let tested = unsafe { shapes(view) }?;
-    if !scratch.span().is_empty() && span_of(tested.shapes.blob()).overlaps(scratch.span()) {
-        return Err(HGRID_ERROR_OVERLAP);
-    }
-    // SAFETY: the caller's promise; nothing else that this call reads lies there.
-    let scratch = unsafe { bytes_mut(scratch.start, scratch.bytes) }?;
-    tested.shapes.validate(scratch).map_err(status_of)
-}
-
-/// Asks a tree of shapes for the closest hit or any.
-///
-/// # Safety
-/// That of [`shapes`].
-pub(crate) unsafe fn query_shapes(
-    view: *const hgrid_shapes,
-    ray: *const hgrid_ray,
-    asked: *const hgrid_query_options,
-    is_any: bool,
-) -> Result<Option<Hit>, hgrid_status> {
-    // SAFETY: this function's contract.
-    let tested = unsafe { shapes(view) }?;
-    // SAFETY: the caller's promise.
-    let ray: Ray = unsafe { read(ray) }?.into();
-    let mut test = |id: u32, ray: &Ray| tested.test(id, ray);
-    let mut find = |options: &mut QueryOptions<'_>| {
-        if is_any {
-            let is_hit = tested.shapes.occluded_with(&ray, options, &mut test);
-            is_hit.then_some(Hit::MISS)
-        } else {
-            tested.shapes.intersect_with(&ray, options, &mut test)
-        }
-    };
-    // SAFETY: the caller's promise.
-    match unsafe { all_options(asked) }? {
-        None => Ok(find(&mut QueryOptions::default())),
-        // SAFETY: the caller's promise.
-        Some(asked) => Ok(unsafe { asked.ask(find) }),
-    }
-}
 
 /// Writes an object.
 ///
@@ -426,7 +181,7 @@ pub(crate) unsafe fn refit_scene(
     let objects = unsafe { objects(shown) }?;
     let shown = Span::new(shown.0.cast(), size_of_val(objects));
     // SAFETY: the caller's promise.
-    let [blob, _] = unsafe { apart([span, shown], [blob, NOTHING]) }?;
+    let [blob, _] = unsafe { apart([span, shown], [blob, Region::NONE]) }?;
     let refitted = Scene::refit(blob, instances, objects);
     report.note(&refitted);
     let opened = refitted.and_then(|_| Scene::open(blob, objects)).map_err(status_of)?;
