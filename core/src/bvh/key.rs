@@ -99,7 +99,7 @@ mod tests {
     use alloc::vec::Vec;
 
     use super::*;
-    use crate::simd::{Kernel, SimdLevel, dispatch};
+    use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
 
     struct Eight<'k> {
         keys: &'k Keys,
@@ -130,6 +130,10 @@ mod tests {
 
     #[test]
     fn every_kind_of_vectors_gives_the_same_keys() {
+        // Machines without vectors never run this kernel.
+        if !HAS_VECTORS {
+            return;
+        }
         let mut state = 1;
         for scale in [1.0, 1e-38, 1e-30, 1e10, 1e36] {
             for flat in [Vec3A::ONE, Vec3A::new(1.0, 0.0, 1.0), Vec3A::ZERO] {

@@ -162,6 +162,12 @@ mod tests {
                     let expected = (expected, cells);
 
                     let mut batch = Batch::empty();
+                    batch.place_each(&spread, places.clone());
+                    assert_eq!(rows(&batch, &spread, places.clone()), expected);
+                    // Machines without vectors never run this kernel.
+                    if !HAS_VECTORS {
+                        continue;
+                    }
                     for level in SimdLevel::available() {
                         dispatch(
                             level,
@@ -177,8 +183,6 @@ mod tests {
                     let placed = batch.is_placed.count_ones();
                     let is_expected = if count > 1 && first == 0 { 40..=62 } else { 0..=1 };
                     assert!(is_expected.contains(&placed), "{placed} of {count}");
-                    batch.place_each(&spread, places.clone());
-                    assert_eq!(rows(&batch, &spread, places), expected);
                 }
             }
         }
