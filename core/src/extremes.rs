@@ -8,13 +8,13 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16};
 
 /// Chooses between the numbers of two vectors, lane by lane. Where one of them is a NaN, the result is either, or a
-/// NaN; on x86 and in WebAssembly it is the one of `other`.
+/// NaN; with the vectors of x86 and of WebAssembly it is the one of `other`.
 pub(crate) trait Extremes {
     fn lesser(self, other: Self) -> Self;
     fn greater(self, other: Self) -> Self;
 }
 
-/// Vectors that the machine has, or that it takes apart by itself.
+/// Vectors of any length: `fearless_simd` splits those that are too long for the machine.
 #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
 macro_rules! implement {
     ($($vector:ident)*) => {$(
@@ -69,7 +69,7 @@ implement!(f32x4 f32x8 f32x16);
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 use core::arch::wasm32::{f32x4 as four, f32x4_extract_lane, f32x4_pmax, f32x4_pmin, v128};
 
-/// Lane by lane in the source; the compiler makes no instruction of it.
+/// Compiles to nothing.
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 #[inline(always)]
 fn vector<S: Simd>(lanes: f32x4<S>) -> v128 {
@@ -83,4 +83,38 @@ fn lanes<S: Simd>(simd: S, vector: v128) -> f32x4<S> {
     let [a, b] = [f32x4_extract_lane::<0>(vector), f32x4_extract_lane::<1>(vector)];
     let [c, d] = [f32x4_extract_lane::<2>(vector), f32x4_extract_lane::<3>(vector)];
     f32x4::simd_from(simd, [a, b, c, d])
+}
+
+#[cfg(test)]
+#[cfg(any(target_arch = "x86", target_arch = "x86_64", target_arch = "wasm32"))]
+mod tests {
+    use super::*;
+    use crate::simd::{Kernel, SimdLevel, dispatch};
+
+    struct Both([f32; 16], [f32; 16]);
+
+    impl Kernel for Both {
+        type Output = [[f32; 16]; 2];
+
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let [one, other] = [self.0, self.1].map(|lanes| f32x16::simd_from(simd, lanes));
+            [one.lesser(other).into(), one.greater(other).into()]
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_gives_the_other_operand() {
+        let numbers = [-1.0, -0.0, 0.0, 2.0, f32::NAN];
+        for level in SimdLevel::available().filter(|&level| level > SimdLevel::Scalar) {
+            for a in numbers {
+                for b in numbers {
+                    let [least, most] = dispatch(level, Both([a; 16], [b; 16]));
+                    let expected = [if a < b { a } else { b }, if a > b { a } else { b }];
+                    for (found, expected) in [least, most].into_iter().zip(expected) {
+                        assert_eq!(found.map(f32::to_bits), [expected.to_bits(); 16], "{a} {b}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -258,12 +258,17 @@ impl<'a> Grid<'a> {
         if IS_SMALL {
             return self.occluded_with(ray, &mut QueryOptions::default());
         }
-        self.one(ray, true).is_some()
+        self.any(ray).is_some()
+    }
+
+    /// Any hit of a ray.
+    pub(crate) fn any(&self, ray: &Ray) -> Option<Hit> {
+        self.one(ray, true)
     }
 
     /// The closest hit of a ray, or any.
     #[inline(always)]
-    pub(crate) fn one(&self, ray: &Ray, is_any: bool) -> Option<Hit> {
+    fn one(&self, ray: &Ray, is_any: bool) -> Option<Hit> {
         let mut one = One { hit: None, is_any };
         self.search(ray, ray.t_min, Cull::None, &mut one, &mut ());
         one.hit

@@ -11,6 +11,7 @@ use crate::grid::Grid;
 use crate::options::{QueryOptions, Selection, Verdict};
 use crate::ray::{Hit, Ray};
 use crate::search::{All, NearestHits, Triangles};
+use crate::simd::IS_SMALL;
 
 /// The most hits that a walk collects.
 const ROOM: usize = 16;
@@ -137,8 +138,9 @@ impl Grid<'_> {
         ray: &Ray,
         options: &mut QueryOptions<'_>,
     ) -> Option<u32> {
-        if options.are_plain() {
-            return self.one(ray, true).map(|hit| hit.primitive);
+        // Save flash as `intersect` does.
+        if options.are_plain() && !IS_SMALL {
+            return self.any(ray).map(|hit| hit.primitive);
         }
         if options.filter.is_some() {
             return self.intersect_at(place, ray, options).map(|hit| hit.primitive);

@@ -310,6 +310,7 @@ struct Offered<'q, 't> {
 }
 
 impl Offered<'_, '_> {
+    /// Tests a shape whose box the ray meets.
     fn offer(&mut self, id: u32) -> Outcome {
         if !self.selection.has(id) {
             return Outcome::Unchanged;

@@ -1,5 +1,5 @@
 //! The only place where a caller's pointer becomes a reference or a value: here for builds
-//! and blobs, in `ask` for queries.
+//! and blobs, in `ask` for queries, in `join` for arrays of meshes, in `shapes` and `scene` for those.
 //!
 //! # The contract with C
 //!

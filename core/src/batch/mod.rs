@@ -461,7 +461,7 @@ impl Answer for u32 {
     }
 
     fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
-        grid.one(ray, true).map_or(INVALID_ID, |hit| hit.primitive)
+        grid.any(ray).map_or(INVALID_ID, |hit| hit.primitive)
     }
 
     fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self {

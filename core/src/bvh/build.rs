@@ -1,7 +1,7 @@
 //! Building a tree: two passes over the triangles, then bin after bin in cache, then a tree on top.
 //!
 //! ```text
-//! bounds    the box of the vertices; of the triangles if some vertices are unused  (mesh.rs)
+//! bounds    the box of the vertices; of the triangles if some vertices are unused  (mesh/)  
 //! census    each triangle's key, and how many there are in each bin             (census.rs, key.rs)
 //! scatter   each triangle's entry into its bin
 //! roots     bins sorted and cut into subtrees                                   (roots.rs, subtree.rs)

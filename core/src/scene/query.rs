@@ -262,6 +262,7 @@ struct Offered<'q, 'f> {
 }
 
 impl Offered<'_, '_> {
+    /// Asks an instance whose box the ray meets.
     fn offer(&mut self, number: u32) -> Outcome {
         let Some(hit) = self.ask(number) else { return Outcome::Unchanged };
         if self.best.is_some_and(|best| !hit.is_closer(&best)) {
@@ -270,9 +271,7 @@ impl Offered<'_, '_> {
         (self.best, self.limit) = (Some(hit), hit.t);
         if self.question.is_any { Outcome::Done } else { Outcome::EndsAt(hit.t) }
     }
-}
 
-impl Offered<'_, '_> {
     /// What a ray hits in an instance, no farther than what was hit before.
     fn ask(&mut self, number: u32) -> Option<SceneHit> {
         let Self { scene, line, ray, level, question, .. } = *self;
