@@ -4,6 +4,9 @@
 //! processor seven instructions; `f32x4.pmin` and `f32x4.pmax` compare and choose, as x86 does in one. Slab tests
 //! are made of these operations.
 
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+use core::arch::wasm32::{f32x4 as four, f32x4_extract_lane, f32x4_pmax, f32x4_pmin, v128};
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16};
 
@@ -66,10 +69,7 @@ macro_rules! implement {
 
 implement!(f32x4 f32x8 f32x16);
 
-#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-use core::arch::wasm32::{f32x4 as four, f32x4_extract_lane, f32x4_pmax, f32x4_pmin, v128};
-
-/// Compiles to nothing.
+/// The same lanes as a vector of the machine; this compiles to nothing.
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 #[inline(always)]
 fn vector<S: Simd>(lanes: f32x4<S>) -> v128 {

@@ -29,7 +29,7 @@ use crate::status::{
 };
 use crate::types::{Elements, hgrid_config, hgrid_grid, hgrid_report};
 
-/// What a [`hgrid_scene`] holds.
+/// The contents of a [`hgrid_scene`].
 #[repr(C)]
 struct SceneView {
     tag: u64,
@@ -193,7 +193,7 @@ pub(crate) unsafe fn refit_scene(
 /// Proves that a scene is right.
 ///
 /// # Safety
-/// That of [`scene`].
+/// The contract of [`scene`].
 pub(crate) unsafe fn validate_scene(
     view: *const hgrid_scene,
     scratch: Region,
@@ -223,7 +223,7 @@ fn reads(scene: &Scene<'_>, span: Span) -> bool {
 /// Writes a scene and all that it shows.
 ///
 /// # Safety
-/// That of [`scene`].
+/// The contract of [`scene`].
 pub(crate) unsafe fn pack_scene(
     view: *const hgrid_scene,
     to: Region,
@@ -324,7 +324,7 @@ const _: () = assert!(align_of::<Object<'_>>() <= align_of::<Member<'_>>());
 /// Asks a scene for the closest hit or any.
 ///
 /// # Safety
-/// That of [`scene`].
+/// The contract of [`scene`].
 pub(crate) unsafe fn query_scene(
     view: *const hgrid_scene,
     ray: *const hgrid_ray_f64,
@@ -375,7 +375,7 @@ pub(crate) unsafe fn query_scene(
 /// A normal in the space of a scene.
 ///
 /// # Safety
-/// That of [`scene`].
+/// The contract of [`scene`].
 pub(crate) unsafe fn scene_normal(
     view: *const hgrid_scene,
     hit: *const hgrid_scene_hit,
@@ -396,7 +396,7 @@ pub(crate) unsafe fn scene_normal(
 /// Writes the instance and the grid that a hit names.
 ///
 /// # Safety
-/// That of [`scene`].
+/// The contract of [`scene`].
 pub(crate) unsafe fn scene_locate(
     view: *const hgrid_scene,
     hit: *const hgrid_scene_hit,

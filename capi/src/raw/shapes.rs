@@ -24,7 +24,7 @@ use crate::types::{Elements, hgrid_config, hgrid_report};
 type ShapeTest =
     unsafe extern "C" fn(*mut c_void, u32, *const hgrid_ray, *mut hgrid_shape_hit) -> bool;
 
-/// What a [`hgrid_shapes`] holds.
+/// The contents of a [`hgrid_shapes`].
 #[repr(C)]
 pub(crate) struct Tested {
     tag: u64,
@@ -192,7 +192,7 @@ pub(crate) unsafe fn refit_shapes(
 /// Proves that a tree of shapes is right.
 ///
 /// # Safety
-/// That of [`shapes`].
+/// The contract of [`shapes`].
 pub(crate) unsafe fn validate_shapes(
     view: *const hgrid_shapes,
     scratch: Region,
@@ -210,7 +210,7 @@ pub(crate) unsafe fn validate_shapes(
 /// Asks a tree of shapes for the closest hit or any.
 ///
 /// # Safety
-/// That of [`shapes`].
+/// The contract of [`shapes`].
 pub(crate) unsafe fn query_shapes(
     view: *const hgrid_shapes,
     ray: *const hgrid_ray,

@@ -18,7 +18,7 @@ pub(crate) struct WideMesh<'a> {
 }
 
 impl<'a> WideMesh<'a> {
-    /// Whether nothing can be read this way.
+    /// Returns true if no triangle can be read this way.
     pub(crate) const fn is_empty(&self) -> bool {
         self.indices.is_empty()
     }
@@ -33,10 +33,10 @@ impl<'a> WideMesh<'a> {
         self.vertices(self.position_stride, transmute!(*indices))
     }
 
-    /// Those of four triangles that follow one another, if all of them can be read this way.
+    /// The corners of four triangles that follow one another; `None` if one of them cannot be read this way.
     #[inline(always)]
     pub(crate) fn four(&self, first: u32) -> Option<[[&'a [u8; 16]; 3]; 4]> {
-        // What most meshes have: one load of indices, and products that the compiler knows.
+        // Most meshes are packed: load all indices at once, and let the compiler know the products.
         if (self.index_stride, self.position_stride) == (12, 12) {
             let indices: &[u8; 48] = element(self.indices, 12, first)?;
             let [a, b, c, d]: [[u32; 3]; 4] = transmute!(*indices);
