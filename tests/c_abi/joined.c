@@ -100,7 +100,6 @@ static void answers_are_the_same(const hgrid_grid *one, const hgrid_grid *other)
         for (int i = 0; i < RAYS; i++) {
             rays[i] = ray_down((float)(i % 8) / 8 + 0.03f, (float)(i / 8) / 8 + 0.01f);
             hgrid_hit a = {0, 0, 0, 0}, b = a;
-            hgrid_closest c, d;
             const bool is_hit = hgrid_intersect(one, &rays[i], &options, &a);
             CHECK(hgrid_intersect(other, &rays[i], &options, &b) == is_hit);
             CHECK(memcmp(&a, &b, sizeof a) == 0);
@@ -111,7 +110,10 @@ static void answers_are_the_same(const hgrid_grid *one, const hgrid_grid *other)
                 CHECK(hgrid_surface_at(other, &rays[i], &a, &t));
                 CHECK(memcmp(&s, &t, sizeof s) == 0);
             }
+            if (i % 4 != 0)
+                continue;
             hgrid_point_query near_start = {{0, 0, 0}, INFINITY};
+            hgrid_closest c, d;
             memcpy(near_start.point, rays[i].origin, sizeof near_start.point);
             CHECK(hgrid_closest_point(one, &near_start, &options, &c));
             CHECK(hgrid_closest_point(other, &near_start, &options, &d));

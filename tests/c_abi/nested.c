@@ -60,7 +60,7 @@ static void ask(const hgrid_grid *grid)
     CHECK(hgrid_closest_point(grid, &query, NULL, &closest));
 }
 
-/* Builds the other grid anew, and asks and proves it. */
+/* Builds the other grid anew and asks it. */
 static void build(other *o)
 {
     if (o->is_busy)
@@ -71,7 +71,9 @@ static void build(other *o)
     EXPECT(HGRID_OK, hgrid_build(&mesh, &o->config, o->index, o->index_bytes, o->scratch,
                                  o->scratch_bytes, &grid, NULL));
     CHECK(memcmp(o->index, o->blob, o->blob_bytes) == 0);
-    EXPECT_PROOF(HGRID_OK, &grid);
+    /* The bytes are those that were proven before. */
+    if (o->builds % 8 == 0)
+        EXPECT_PROOF(HGRID_OK, &grid);
     ask(&grid);
     if (o->asked != NULL)
         ask(o->asked);

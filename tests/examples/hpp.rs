@@ -48,9 +48,9 @@ fn it_does_what_it_says_in_the_oldest_dialect() {
 }
 
 #[test]
-#[ignore = "slow: compiles much C++ six times"]
+#[ignore = "slow: compiles much C++ five times"]
 fn it_does_what_it_says_in_every_dialect() {
-    it_does_what_it_says(["c++14", "c++17", "c++20"].into_iter().flat_map(compilers));
+    it_does_what_it_says(["c++14", "c++17", "c++20"].into_iter().flat_map(compilers).skip(1));
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn what_cannot_work_does_not_compile() {
 #[test]
 #[ignore = "slow: starts compilers a hundred times"]
 fn what_cannot_work_compiles_in_no_dialect() {
-    is_refused(|| ["c++14", "c++17"].into_iter().flat_map(compilers));
+    is_refused(|| ["c++14", "c++17"].into_iter().flat_map(compilers).skip(1));
 }
 
 fn is_refused<Compilers: Iterator<Item = Command>>(every: impl Fn() -> Compilers) {
