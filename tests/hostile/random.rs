@@ -24,7 +24,7 @@ fn calls_from_c() {
 /// Few enough for each run of Miri.
 #[test]
 fn a_few_calls_from_c() {
-    run(c_abi, 5, 300);
+    run(c_abi, 3, 300);
 }
 
 #[test]
