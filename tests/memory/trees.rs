@@ -117,6 +117,19 @@ fn many_nested(count: usize) -> Mesh {
     mesh
 }
 
+#[test]
+fn crowds_leave_alone_what_is_behind_the_blob() {
+    let mesh = nested(20_000, 2);
+    let config = config(Quality::Fast);
+    let bound = Sizes::bound(20_000, &config).unwrap();
+    let [mut index, mut scratch] = [bound.index_bytes, bound.scratch_bytes].map(Guarded::new);
+    let before = index.region().to_vec();
+    let grid = Grid::build(mesh.view(), &config, index.region(), scratch.region()).unwrap();
+    let used = grid.blob().len();
+    assert!(used < 3 * bound.index_bytes / 4, "{used} of {} bytes", bound.index_bytes);
+    assert_eq!(index.region()[used..], before[used..]);
+}
+
 /// Builds in the memory that is enough for so many triangles, and returns nodes and levels.
 fn builds_in_its_bound(mesh: &Mesh, quality: Quality) -> [u32; 2] {
     let (view, config) = (mesh.view(), config(quality));

@@ -11,8 +11,8 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | spare |
 //! ```
 //!
-//! `spare` is the second buffer of the sort. `sizes` computes the exact size by a build without an index: it puts
-//! the keys and the top tree into `spare` and only counts ids and nodes. A build also puts the keys there if they do
+//! `spare` is the second buffer of the sort and of binning crowded bins again. `sizes` computes the exact size by a build
+//! without an index: it also puts the keys and the top tree into `spare`, and only counts ids and nodes. A build also puts the keys there if they do
 //! not fit into the index: an index of exact size has no room for keys of triangles that are skipped.
 //!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
@@ -37,7 +37,7 @@ use super::layout::{
     small_spare,
 };
 use super::node::Node;
-use super::roots::{RECORD, Record, Roots, Side};
+use super::roots::{RECORD, Record, Roots};
 use super::subtree::Subtree;
 use super::top::{self, ITEM, Item, Top};
 use super::units::{SEAM, Units, is_seam, starts};
@@ -405,7 +405,7 @@ impl Kernel for UnitsTask<'_> {
             Roots::new(mesh, least, entries, spare, ids, first, nodes, child, counts, subtree);
         let units = Units::new(sizes).skip_while(|unit| unit.start < range.start);
         for unit in units.take_while(|unit| unit.start < range.end) {
-            roots.unit(unit.start - range.start..unit.end - range.start, Side::Entries, shift, 0);
+            roots.unit(unit.start - range.start..unit.end - range.start, shift, 0);
         }
         let made = Made { first, child, nodes: roots.node_count, roots: roots.root_count };
         (made, roots.last)

@@ -20,6 +20,7 @@ mod batch;
 mod boxes;
 mod build;
 mod census;
+mod crowd;
 mod group;
 mod high;
 mod key;

@@ -6,13 +6,13 @@
 //!     crowded: a box of its own around the centres, new keys, new bins; then these
 //!     else:    sort by key, cut where high bits of the key change, make a subtree of each part
 //!
-//! entries | records of roots | used up | this unit | later units      |
-//! spare   |                            | the same unit, while it is binned again |
+//! entries | records of roots | used up | this unit | later units |
+//! spare   | second buffer of the sort, and of binning a crowded unit again | untouched |
 //! ```
 //!
-//! A unit's entries lie in one of the two arrays, and binning moves them to the other. The record of
-//! a root is 112 bytes, written over entries that were used up: [`PRICE`](super::layout::PRICE) of them
-//! for each root, 192 bytes.
+//! Binning again copies a unit's entries to the start of `spare` and back. All units use that start, so a mesh of several
+//! crowded units touches less of `spare` than it has entries. The record of a root is 112 bytes, written over entries that
+//! were used up: [`PRICE`](super::layout::PRICE) of them for each root, 192 bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
 
@@ -24,6 +24,7 @@ use crate::aabb::Aabb;
 use crate::mesh::TriangleMesh;
 use crate::simd::{SimdLevel, dispatch};
 
+use super::crowd::{self, NewKeys};
 use super::key::{KEY_BITS, Keys};
 use super::layout::{CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_ROOT, MOST_UNIT, PRICE, bin_bits};
 use super::node::Node;
@@ -72,7 +73,7 @@ pub(crate) struct Roots<'w> {
     pub(crate) least: f32,
     /// Where the entries are, and where the records go.
     pub(crate) entries: &'w mut [Entry],
-    /// The second buffer of the sort: as long as `entries`, or long enough for any unit that is sorted.
+    /// Room for the entries of any unit: as long as `entries` if units are crowded.
     pub(crate) spare: &'w mut [Entry],
     /// The ids, each at the place of its entry; empty if only the size is computed.
     pub(crate) ids: &'w mut [u32],
@@ -91,13 +92,6 @@ pub(crate) struct Roots<'w> {
     pub(crate) root_count: u32,
     /// The record of the last root.
     pub(crate) last: Record,
-}
-
-/// Where the entries of a unit lie.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Side {
-    Entries,
-    Spare,
 }
 
 impl<'w> Roots<'w> {
@@ -136,49 +130,41 @@ impl<'w> Roots<'w> {
 
     /// Makes the roots of a unit that lies `depth` divisions deep. Its bins are in order; the keys of one bin differ
     /// only in their lowest `shift` bits.
-    pub(crate) fn unit(&mut self, range: Range<usize>, side: Side, shift: u32, depth: u32) {
-        if range.len() > MOST_UNIT {
-            let centers = self.centers(range.clone(), side);
+    pub(crate) fn unit(&mut self, range: Range<usize>, shift: u32, depth: u32) {
+        let Some(entries) = self.entries.get_mut(range.clone()) else { return };
+        if entries.len() > MOST_UNIT {
+            let centers = crowd::centers(self.mesh, entries);
             // Equal centres have no order but that of their ids.
             if depth < DIVISIONS && centers.size().max_element() > 0.0 {
-                self.divide(range, side, &centers, depth);
-            } else {
-                self.cut(range, side);
+                self.divide(range, &centers, depth);
+                return;
             }
-            return;
-        }
-        let (entries, spare) = match side {
-            Side::Entries => {
-                (self.entries.get_mut(range.clone()), spare_for(self.spare, &range, depth))
-            }
-            Side::Spare => (self.spare.get_mut(range.clone()), self.entries.get_mut(range.clone())),
-        };
-        if let (Some(entries), Some(spare)) = (entries, spare) {
-            let differing = |[first, last]: [&Entry; 2]| 32 - (first[0] ^ last[0]).leading_zeros();
+        } else if let Some(spare) = self.spare.get_mut(..entries.len()) {
+            // The keys of one bin differ only in their lowest `shift` bits.
             let ends = entries.first().zip(entries.last());
-            let bits = ends.map_or(0, |(first, last)| differing([first, last]));
-            sort(entries, spare, bits.max(shift));
+            let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
+            sort(entries, spare, (32 - differing.leading_zeros()).max(shift));
         }
-        self.cut(range, side);
+        self.cut(range);
     }
 
     /// Makes roots of sorted entries: halves them where a high bit of the key changes, until parts
     /// are small enough.
-    fn cut(&mut self, range: Range<usize>, side: Side) {
+    fn cut(&mut self, range: Range<usize>) {
         let mut start = range.start;
         while start < range.end {
             let mut end = range.end;
             while end - start > MOST_ROOT {
-                end = start + self.split(start..end, side);
+                end = start + self.split(start..end);
             }
-            self.root(start..end, side);
+            self.root(start..end);
             start = end;
         }
     }
 
     /// Where to cut a range in two, none of them smaller than a piece.
-    fn split(&self, range: Range<usize>, side: Side) -> usize {
-        let entries = self.on(side).get(range).unwrap_or_default();
+    fn split(&self, range: Range<usize>) -> usize {
+        let entries = self.entries.get(range).unwrap_or_default();
         let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return 0 };
         let differing = first[0] ^ last[0];
         let middle = if differing == 0 {
@@ -191,15 +177,11 @@ impl<'w> Roots<'w> {
     }
 
     /// Makes the subtree of a few entries, and leaves a record of it.
-    fn root(&mut self, range: Range<usize>, side: Side) {
+    fn root(&mut self, range: Range<usize>) {
         let count = range.len() as u32;
         let first = self.first + range.start as u32;
         let child = self.child + self.node_count;
-        let entries = match side {
-            Side::Entries => self.entries.get(range.clone()),
-            Side::Spare => self.spare.get(range.clone()),
-        };
-        let Some(entries) = entries else { return };
+        let Some(entries) = self.entries.get(range.clone()) else { return };
         let subtree = &mut *self.subtree;
         let (mesh, least, by) = (self.mesh, self.least, Cut::Keys);
         dispatch(self.level, Build { subtree, mesh, entries, first, child, least, by });
@@ -219,100 +201,66 @@ impl<'w> Roots<'w> {
     }
 
     /// Bins a crowded unit by keys of its own, and makes the roots of its units.
-    fn divide(&mut self, range: Range<usize>, side: Side, centers: &Aabb, depth: u32) {
-        let keys = Keys::new(centers);
+    fn divide(&mut self, range: Range<usize>, centers: &Aabb, depth: u32) {
         let bits = bin_bits(range.len() as u64).min(KEY_BITS);
         let shift = KEY_BITS - bits;
-        let (from, to, other) = match side {
-            Side::Entries => (
-                self.entries.get_mut(range.clone()),
-                self.spare.get_mut(range.clone()),
-                Side::Spare,
-            ),
-            Side::Spare => (
-                self.spare.get_mut(range.clone()),
-                self.entries.get_mut(range.clone()),
-                Side::Entries,
-            ),
-        };
-        let counts = self.counts.get_mut(..1 << bits);
-        let (Some(from), Some(to), Some(counts)) = (from, to, counts) else { return };
-        counts.fill(0);
-        for entry in &mut *from {
-            let bounds = self.mesh.corners(entry[1]).and_then(Aabb::of).unwrap_or(Aabb::EMPTY);
-            entry[0] = keys.of(&bounds);
-            if let Some(count) = counts.get_mut((entry[0] >> shift) as usize) {
-                *count += 1;
-            }
-        }
-        let mut next = starts(counts);
-        for count in &mut *counts {
-            let next = &mut next[usize::from(*count as usize <= CROWD)];
-            *next += core::mem::replace(count, *next);
-        }
-        for entry in from {
-            if let Some(head) = counts.get_mut((entry[0] >> shift) as usize) {
-                if let Some(slot) = to.get_mut(*head as usize) {
-                    *slot = *entry;
-                }
-                *head += 1;
-            }
-        }
-
-        // Crowded bins come first, then all others in order.
+        self.bin(range.clone(), centers, bits);
         let mut savings = Savings::default();
         let mut start = range.start;
         while start < range.end {
-            let mut end = self.bin_end(start..range.end, other, shift);
+            let mut end = self.bin_end(start..range.end, shift);
             if end - start <= CROWD {
                 // Seams are counted from the first entry of the tree, not from that of this task.
                 let before = self.first as usize;
                 while end < range.end
                     && !savings.pay(&(before + start..before + end), range.end - end)
                 {
-                    end = self.bin_end(end..range.end, other, shift);
+                    end = self.bin_end(end..range.end, shift);
                 }
             }
-            self.unit(start..end, other, shift, depth + 1);
+            self.unit(start..end, shift, depth + 1);
             start = end;
         }
     }
 
+    /// Sorts a crowded unit into `2^bits` bins, by keys in the box of its centres. Out of line, as [`sort`]: divisions
+    /// inside one another would keep its variables on the stack.
+    #[inline(never)]
+    fn bin(&mut self, range: Range<usize>, centers: &Aabb, bits: u32) {
+        let rule = &Keys::new(centers);
+        let shift = KEY_BITS - bits;
+
+        // Find new keys, and count those of each bin.
+        let entries = self.entries.get_mut(range);
+        let counts = self.counts.get_mut(..1 << bits);
+        let (Some(entries), Some(counts)) = (entries, counts) else { return };
+        counts.fill(0);
+        dispatch(self.level, NewKeys { mesh: self.mesh, entries, rule, shift, counts });
+
+        // Copy the entries to `spare` in the order of their bins, crowded bins first. Then copy them back in that order.
+        let mut next = starts(counts);
+        for count in &mut *counts {
+            let next = &mut next[usize::from(*count as usize <= CROWD)];
+            *next += core::mem::replace(count, *next);
+        }
+        let Some(binned) = self.spare.get_mut(..entries.len()) else { return };
+        for entry in &*entries {
+            if let Some(head) = counts.get_mut((entry[0] >> shift) as usize) {
+                if let Some(slot) = binned.get_mut(*head as usize) {
+                    *slot = *entry;
+                }
+                *head += 1;
+            }
+        }
+        copy(binned, Some(entries));
+    }
+
     /// Where the bin ends that begins with a range.
-    fn bin_end(&self, range: Range<usize>, side: Side, shift: u32) -> usize {
-        let entries = self.on(side).get(range.clone()).unwrap_or_default();
+    fn bin_end(&self, range: Range<usize>, shift: u32) -> usize {
+        let entries = self.entries.get(range.clone()).unwrap_or_default();
         let Some(first) = entries.first() else { return range.end };
         let bin = first[0] >> shift;
         let others = entries.iter().position(|entry| entry[0] >> shift != bin);
         others.map_or(range.end, |count| range.start + count)
     }
-
-    /// The box of the centres of some triangles.
-    fn centers(&self, range: Range<usize>, side: Side) -> Aabb {
-        let mut centers = Aabb::EMPTY;
-        for entry in self.on(side).get(range).unwrap_or_default() {
-            let Some(bounds) = self.mesh.corners(entry[1]).and_then(Aabb::of) else { continue };
-            let center = (bounds.min + bounds.max) * 0.5;
-            centers.min = centers.min.min(center);
-            centers.max = centers.max.max(center);
-        }
-        centers
-    }
-
-    fn on(&self, side: Side) -> &[Entry] {
-        match side {
-            Side::Entries => self.entries,
-            Side::Spare => self.spare,
-        }
-    }
-}
-
-/// Returns the part of `spare` that a bin is sorted with: its start, which touches few pages, or, in a division,
-/// where other bins lie in `spare`, the bin's own range.
-fn spare_for<'b>(
-    spare: &'b mut [Entry],
-    range: &Range<usize>,
-    depth: u32,
-) -> Option<&'b mut [Entry]> {
-    if depth > 0 { spare.get_mut(range.clone()) } else { spare.get_mut(..range.len()) }
 }

@@ -10,6 +10,7 @@ const COUNTS: usize = 1 << PASS_BITS;
 
 /// Sorts entries by the lowest `bits` bits of their keys; the others are the same in all. Equal keys
 /// keep their order. `spare` has room for as many entries.
+#[inline(never)]
 pub(crate) fn sort(entries: &mut [Entry], spare: &mut [Entry], bits: u32) {
     if entries.len() <= FEW {
         insert(entries);

@@ -25,8 +25,7 @@ use crate::method::Content;
 pub use parts::MeshPart;
 pub(crate) use parts::{Near, Piece};
 pub use strided::Strided;
-pub(crate) use wide::WideMesh;
-use wide::vector;
+pub(crate) use wide::{WideMesh, vector};
 
 /// Three corners, in scene units.
 pub type Triangle = [[f32; 3]; 3];

@@ -78,7 +78,7 @@ impl<'a> TriangleMesh<'a> {
 
 /// A corner from its bytes and those behind it.
 #[inline(always)]
-pub(super) fn vector(bytes: &[u8; 16]) -> Vec3A {
+pub(crate) fn vector(bytes: &[u8; 16]) -> Vec3A {
     let row: [f32; 4] = transmute!(*bytes);
     Vec3A::from_vec4(Vec4::from_array(row))
 }
