@@ -88,6 +88,17 @@ impl World<'_> {
         }
     }
 
+    /// The number of the geometry that was hit; 0 for instances.
+    #[must_use]
+    pub fn geometry(&self, hit: &SceneHit) -> u32 {
+        match self {
+            Self::Mesh(grid) => {
+                grid.mesh().locate(hit.primitive).map_or(0, |(geometry, _)| geometry)
+            }
+            Self::Instances(_) => 0,
+        }
+    }
+
     /// The point where a ray met a triangle, with starts for rays that leave it.
     #[must_use]
     pub fn surface(&self, ray: &Ray, hit: &SceneHit) -> Option<Surface> {

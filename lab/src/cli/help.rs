@@ -110,7 +110,7 @@ Scenes:
   procedural:knot[:TRIANGLES]     a closed, finely bumped surface, like a scan
   procedural:stage[:TRIANGLES]    the same on a floor eighty times its size
   procedural:soup[:TRIANGLES]     a cube full of small triangles
-  A+B                             A in the middle of B, as bunny.ply+stadium.ply
+  A+B                             A in the middle of B, each in its colour: bunny.ply+stadium.ply
   TRIANGLES is a number like 5000, 20K or 3M, up to 100M";
 
 const VIEWS: &str = "\

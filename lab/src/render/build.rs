@@ -39,7 +39,8 @@ fn build_mesh<T>(
     threads: &Threads,
     then: impl FnOnce(World<'_>, Built) -> Result<T>,
 ) -> Result<T> {
-    let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
+    let mut parts = scene.parts()?;
+    let mesh = scene.mesh(&mut parts)?;
     let start = Instant::now();
     let index = threads.parallel(|parallel| Regions::fresh(mesh, config, parallel))?.index;
     let seconds = start.elapsed().as_secs_f64();

@@ -74,6 +74,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 
     let summary = Summary {
         scene: facts,
+        geometries: scene.geometries.len().max(1),
         instances: built.instances,
         load_seconds,
         method: args.method.name(),
@@ -168,6 +169,7 @@ fn heat(args: &RenderArgs, grid: &Grid<'_>, tiles: &Tiles) -> Result<Outcome> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
     use std::path::Path;
 
     use clap::Parser as _;
@@ -176,8 +178,12 @@ mod tests {
 
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-    /// Runs the command in a folder of its own that has a file, and returns whether there is a picture.
-    fn run_words(name: &str, words: &[&str], file: Option<(&str, &str)>) -> (Result<()>, bool) {
+    /// Runs the command in a folder of its own that has a file, and returns the pixels of the picture, if there is one.
+    fn run_words(
+        name: &str,
+        words: &[&str],
+        file: Option<(&str, &str)>,
+    ) -> (Result<()>, Option<Vec<u8>>) {
         let folder = std::env::temp_dir().join(format!("hgrid-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let output = folder.join("picture.png");
@@ -191,9 +197,14 @@ mod tests {
         let words = own.chain(words.iter().map(|&word| word.to_owned())).chain(scene);
         let result =
             RenderArgs::try_parse_from(words).map_err(Into::into).and_then(|args| run(&args));
-        let is_written = output.exists();
+        let pixels = std::fs::read(&output).ok().map(|bytes| {
+            let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+            let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+            reader.next_frame(&mut pixels).unwrap();
+            pixels
+        });
         std::fs::remove_dir_all(&folder).unwrap();
-        (result, is_written)
+        (result, pixels)
     }
 
     #[test]
@@ -211,10 +222,29 @@ mod tests {
         {
             let words: Vec<_> =
                 ["procedural:knot:500"].into_iter().chain(options.split(' ')).collect();
-            let (result, is_written) = run_words(&format!("shading-{at}"), &words, None);
+            let (result, pixels) = run_words(&format!("shading-{at}"), &words, None);
             result.unwrap();
-            assert!(is_written, "{options}");
+            assert!(pixels.is_some(), "{options}");
         }
+    }
+
+    #[test]
+    fn geometries_have_colours_of_their_own() {
+        let orange = |spec: &str| -> Vec<bool> {
+            let (result, pixels) = run_words("geometries", &[spec, "--view", "30,60"], None);
+            result.unwrap();
+            let pixels = pixels.unwrap();
+            let (pixels, _) = pixels.as_chunks();
+            pixels.iter().map(|[red, _, blue]| red.saturating_sub(*blue) > 30).collect()
+        };
+        let [inner, outer] = ["procedural:knot:500", "procedural:stage:500"];
+        assert!(!orange(inner).contains(&true));
+        // A floor all around the knot.
+        let both = orange(&format!("{inner}+{outer}"));
+        let corners = [0, 19, 380, 399].map(|at| both[at]);
+        assert!(corners == [true; 4], "{corners:?}");
+        let floor = both.iter().filter(|is_orange| **is_orange).count();
+        assert!((200..350).contains(&floor), "{floor} of 400 pixels");
     }
 
     #[test]
@@ -238,11 +268,11 @@ mod tests {
         ];
         for (at, (words, text, expected)) in cases.into_iter().enumerate() {
             let words: Vec<_> = words.split(' ').collect();
-            let (result, is_written) =
+            let (result, pixels) =
                 run_words(&format!("failure-{at}"), &words, Some(("a.obj", text)));
             let message = format!("{:#}", result.unwrap_err());
             assert!(message.contains(expected), "{message}");
-            assert!(!is_written);
+            assert!(pixels.is_none());
         }
     }
 }

@@ -24,6 +24,11 @@ const KEY: [f32; 3] = [0.92, 0.86, 0.76];
 const SKY: [f32; 3] = [0.21, 0.25, 0.31];
 const GROUND: [f32; 3] = [0.11, 0.10, 0.085];
 
+/// How much red, green and blue the geometries of a scene reflect; the sixth is like the first. The first is grey, and so
+/// is a scene of one geometry.
+const TINTS: [[f32; 3]; 5] =
+    [[1.0, 1.0, 1.0], [1.0, 0.74, 0.48], [0.55, 0.78, 1.0], [0.62, 0.92, 0.58], [1.0, 0.6, 0.62]];
+
 /// How far away something hides the sky: in parts of half the scene's diagonal, and in a room in
 /// parts of the distance that is seen.
 const REACH: f64 = 0.5;
@@ -195,20 +200,21 @@ impl<'a> Studio<'a> {
                 let left = 1.0 - fade * (1.0 - shade * closed);
                 light[at] = light[at].map(|c| c * left);
             } else {
-                light[at] = self.surface(normal, lit, open);
+                let geometry = self.world.geometry(&seen.hits[at]) as usize;
+                light[at] = self.surface(normal, TINTS[geometry % TINTS.len()], lit, open);
             }
         }
         reached.rays
     }
 
     /// Returns the light of a surface, as film takes it: bright light never quite becomes white.
-    fn surface(&self, normal: [f32; 3], lit: f32, open: f32) -> [f32; 3] {
+    fn surface(&self, normal: [f32; 3], tint: [f32; 3], lit: f32, open: f32) -> [f32; 3] {
         let dot = crate::shade::dot;
         let key = lit * dot(normal, self.around.lamp).max(0.0);
         let sky = 0.5 + 0.5 * dot(normal, self.up);
         [0, 1, 2].map(|c| {
             let fill = open * (SKY[c] * sky + GROUND[c] * (1.0 - sky));
-            1.0 - (-KEY[c] * key - self.exposure * fill).exp()
+            1.0 - (-tint[c] * (KEY[c] * key + self.exposure * fill)).exp()
         })
     }
 

@@ -13,6 +13,8 @@ pub struct Summary {
     /// The scene.
     #[serde(flatten)]
     pub scene: SceneFacts,
+    /// Geometries: the meshes of `A+B`, each in a colour of its own; 1 for any other scene.
+    pub geometries: usize,
     /// Instances by which its meshes are shown; 0 for one mesh where it is.
     pub instances: usize,
     /// Reading or generating it.
@@ -66,6 +68,10 @@ impl fmt::Display for Summary {
             (HumanCount(scene.triangles as u64), HumanCount(scene.vertices as u64));
         let loaded = seconds(self.load_seconds);
         write!(f, "{}: {triangles} triangles, {vertices} vertices", scene.scene)?;
+        match self.geometries {
+            1 => {}
+            geometries => write!(f, " in {geometries} geometries")?,
+        }
         match self.instances {
             0 => {}
             instances => write!(f, " in {} instances", HumanCount(instances as u64))?,

@@ -18,6 +18,7 @@ mod stl;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
+use hgrid_core::{Error, MeshPart, TriangleMesh};
 
 use self::format::{ENDINGS, Format};
 use self::model::{Mesh, Model};
@@ -34,6 +35,8 @@ pub struct Scene {
     pub positions: Vec<[f32; 3]>,
     /// Three vertices for each triangle.
     pub indices: Vec<[u32; 3]>,
+    /// The first triangle of each geometry, in ascending order from 0 on; empty for a scene of one geometry.
+    pub geometries: Vec<usize>,
     /// The part that pictures are about, if that is not all of it.
     pub focus: Option<Bounds>,
     /// The axis that the format of the file says is up, if it says so: true for z, false for y.
@@ -43,7 +46,7 @@ pub struct Scene {
 impl Scene {
     /// Loads a file, or makes a scene from `procedural:NAME[:TRIANGLES]`, or puts one of them into
     /// another: `bunny.ply+stadium.ply` is the bunny, as large as it is, in the middle of the
-    /// stadium, and pictures are of the bunny. Instances become triangles.
+    /// stadium, pictures are of the bunny, and each of the two is a geometry. Instances become triangles.
     ///
     /// # Errors
     /// If the words name no scene or the file cannot be read; the message says what to do.
@@ -106,11 +109,45 @@ impl Scene {
         let (min, max) = self.framed_bounds();
         let focus = Some((place(min), place(max)));
         let name = format!("{}+{}", self.name, outer.name);
+        let before = self.indices.len();
+        let mut geometries = self.or_whole();
+        geometries.extend(outer.or_whole().iter().map(|first| before + first));
         let first = u32::try_from(self.positions.len()).unwrap_or(u32::MAX);
-        let behind = outer.indices.into_iter().map(|triangle| triangle.map(|v| v + first));
+        let behind =
+            outer.indices.into_iter().map(|triangle| triangle.map(|v| v.saturating_add(first)));
         let positions = self.positions.into_iter().map(place).chain(outer.positions).collect();
         let indices = self.indices.into_iter().chain(behind).collect();
-        Self { name, positions, indices, focus, is_z_up: self.is_z_up }
+        Self { name, positions, indices, geometries, focus, is_z_up: self.is_z_up }
+    }
+
+    /// The first triangle of each geometry, also of one alone.
+    fn or_whole(&self) -> Vec<usize> {
+        if self.geometries.is_empty() { vec![0] } else { self.geometries.clone() }
+    }
+
+    /// Returns the meshes of several geometries, for [`mesh`](Self::mesh); nothing for one geometry.
+    ///
+    /// # Errors
+    /// If a mesh is larger than the core takes.
+    pub fn parts(&self) -> Result<Vec<MeshPart<'_>>, Error> {
+        let ends = self.geometries.iter().skip(1).copied().chain([self.indices.len()]);
+        let part = |(&first, end)| {
+            let indices = self.indices.get(first..end).unwrap_or_default();
+            Ok(MeshPart::new(TriangleMesh::new(&self.positions, indices)?))
+        };
+        self.geometries.iter().zip(ends).map(part).collect()
+    }
+
+    /// Returns all triangles as one mesh, which knows of each triangle the geometry, given the scene's
+    /// [`parts`](Self::parts).
+    ///
+    /// # Errors
+    /// If there are more triangles or vertices than the core takes.
+    pub fn mesh<'a>(&'a self, parts: &'a mut [MeshPart<'_>]) -> Result<TriangleMesh<'a>, Error> {
+        if parts.is_empty() {
+            return TriangleMesh::new(&self.positions, &self.indices);
+        }
+        TriangleMesh::join(parts)
     }
 
     /// The box around all finite vertices, or `None` if there are none.
@@ -158,6 +195,17 @@ mod tests {
         for axis in 0..3 {
             assert!(((high[axis] - low[axis]) - (max[axis] - min[axis])).abs() < 1e-5);
         }
+        let mut parts = scene.parts().unwrap();
+        let joined = scene.mesh(&mut parts).unwrap();
+        let merged = scene.mesh(&mut []).unwrap();
+        let found = [0, 1999, 2000, 4999].map(|triangle| joined.locate(triangle).unwrap());
+        assert_eq!(found, [(0, 0), (0, 1999), (1, 0), (1, 2999)]);
+        for triangle in 0..5000 {
+            assert_eq!(joined.triangle(triangle), merged.triangle(triangle));
+        }
+        let three = Scene::load(&format!("{spec}+procedural:soup:500")).unwrap();
+        assert_eq!(three.geometries, [0, 2000, 5000]);
+        assert!(small.parts().unwrap().is_empty());
         let message = format!("{:#}", Scene::load("procedural:knot+nothing").unwrap_err());
         assert!(message.contains("`nothing`"), "{message}");
     }
