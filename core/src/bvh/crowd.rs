@@ -10,6 +10,7 @@ use crate::simd::{HAS_VECTORS, Kernel};
 
 use super::key::Keys;
 use super::layout::Entry;
+use super::subtree::slow_bounds;
 
 /// Finds the box around the centres of the triangles' boxes.
 pub(crate) fn centers(mesh: &TriangleMesh<'_>, entries: &[Entry]) -> Aabb {
@@ -98,12 +99,6 @@ fn bounds(mesh: &TriangleMesh<'_>, wide: &WideMesh<'_>, id: u32) -> Aabb {
     let Some([a, b, c]) = wide.corners(id) else { return slow_bounds(mesh, id) };
     let (a, b, c) = (vector(a), vector(b), vector(c));
     Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
-}
-
-/// The box of a triangle that cannot be read fast.
-#[inline(never)]
-fn slow_bounds(mesh: &TriangleMesh<'_>, id: u32) -> Aabb {
-    mesh.corners(id).and_then(Aabb::of).unwrap_or(Aabb::EMPTY)
 }
 
 #[cfg(test)]

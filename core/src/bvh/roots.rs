@@ -243,6 +243,7 @@ impl<'w> Roots<'w> {
             let next = &mut next[usize::from(*count as usize <= CROWD)];
             *next += core::mem::replace(count, *next);
         }
+        debug_assert!(self.spare.len() >= entries.len());
         let Some(binned) = self.spare.get_mut(..entries.len()) else { return };
         for entry in &*entries {
             if let Some(head) = counts.get_mut((entry[0] >> shift) as usize) {

@@ -294,8 +294,15 @@ impl Subtree {
 /// The box of a triangle that cannot be read with vectors.
 #[cold]
 #[inline(never)]
+pub(crate) fn slow_bounds(mesh: &TriangleMesh<'_>, id: u32) -> Aabb {
+    mesh.corners(id).and_then(Aabb::of).unwrap_or(Aabb::EMPTY)
+}
+
+/// The sides of this box.
+#[cold]
+#[inline(never)]
 fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
-    let bounds = mesh.corners(id).and_then(Aabb::of).unwrap_or(Aabb::EMPTY);
+    let bounds = slow_bounds(mesh, id);
     let ([x, y, z], [u, v, w]) = (bounds.min.to_array(), (-bounds.max).to_array());
     [x, y, z, 0.0, u, v, w, 0.0]
 }
