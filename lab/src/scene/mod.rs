@@ -110,18 +110,24 @@ impl Scene {
         let focus = Some((place(min), place(max)));
         let name = format!("{}+{}", self.name, outer.name);
         let before = self.indices.len();
-        let mut geometries = self.or_whole();
-        geometries.extend(outer.or_whole().iter().map(|first| before + first));
-        let first = u32::try_from(self.positions.len()).unwrap_or(u32::MAX);
-        let behind =
-            outer.indices.into_iter().map(|triangle| triangle.map(|v| v.saturating_add(first)));
+        let mut geometries = self.first_triangles();
+        geometries.extend(outer.first_triangles().iter().map(|first| before + first));
+        // An index out of range stays one, for the core to refuse.
+        let [own, others] = [&self, &outer].map(|scene| scene.positions.len());
+        let shift = u32::try_from(own).unwrap_or(u32::MAX);
+        let vertex = |v: u32, count: usize, shift: u32| {
+            if (v as usize) < count { v.saturating_add(shift) } else { u32::MAX }
+        };
+        let inside = self.indices.into_iter().map(|triangle| triangle.map(|v| vertex(v, own, 0)));
+        let behind = outer.indices.into_iter();
+        let behind = behind.map(|triangle| triangle.map(|v| vertex(v, others, shift)));
         let positions = self.positions.into_iter().map(place).chain(outer.positions).collect();
-        let indices = self.indices.into_iter().chain(behind).collect();
+        let indices = inside.chain(behind).collect();
         Self { name, positions, indices, geometries, focus, is_z_up: self.is_z_up }
     }
 
     /// The first triangle of each geometry, also of one alone.
-    fn or_whole(&self) -> Vec<usize> {
+    fn first_triangles(&self) -> Vec<usize> {
         if self.geometries.is_empty() { vec![0] } else { self.geometries.clone() }
     }
 
@@ -206,6 +212,9 @@ mod tests {
         let three = Scene::load(&format!("{spec}+procedural:soup:500")).unwrap();
         assert_eq!(three.geometries, [0, 2000, 5000]);
         assert!(small.parts().unwrap().is_empty());
+        let bad = Scene { indices: vec![[0, 1, 999_999]], ..small.clone() };
+        assert_eq!(bad.clone().within(small.clone()).indices[0], [0, 1, u32::MAX]);
+        assert_eq!(small.clone().within(bad).indices[2000][2], u32::MAX);
         let message = format!("{:#}", Scene::load("procedural:knot+nothing").unwrap_err());
         assert!(message.contains("`nothing`"), "{message}");
     }
