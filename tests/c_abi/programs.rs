@@ -48,6 +48,9 @@ const PROGRAMS: [(&str, Flavour); 21] = [
 pub(crate) const SANITIZERS: [&str; 4] =
     ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-O0"];
 
+/// What a program is told to do a part of its work, if it can: the test with sanitizers runs all of it.
+const PART: &str = "part";
+
 /// Compiles a program of this folder against a library.
 pub(crate) fn compile(
     name: &str,
@@ -157,7 +160,7 @@ fn pass_as_cpp_with_the_larger_flavour(programs: impl Iterator<Item = (&'static 
     for (name, _) in programs {
         let (flags, library) = (["-DHGRID_STD"], Flavour::Std.static_library());
         let Some(compiler) = clang("c++17").or_else(|| cpp_compiler("c++17")) else { return };
-        run(Command::new(compile(name, compiler, &flags, &library, dir.path())).arg("part"));
+        run(Command::new(compile(name, compiler, &flags, &library, dir.path())).arg(PART));
     }
 }
 
@@ -180,7 +183,7 @@ fn pass_with_the_shared_libraries(programs: impl Iterator<Item = (&'static str, 
         let compiler = clang("c11").unwrap_or_else(|| compiler("c11"));
         let program = compile(name, compiler, &[], &flavour.shared_library(), dir.path());
         for library in [flavour, Flavour::Std] {
-            run(Command::new(&program).arg("part").env("LD_LIBRARY_PATH", library.dir()));
+            run(Command::new(&program).arg(PART).env("LD_LIBRARY_PATH", library.dir()));
         }
     }
 }
@@ -198,11 +201,15 @@ fn run_side_by_side(commands: Vec<Command>) {
     thread::scope(|scope| (0..count).for_each(|_| drop(scope.spawn(work))));
 }
 
-/// Runs all programs in valgrind, which is slow: those that can do a part of their work are asked for it.
+/// Runs all programs in valgrind, which is slow: a part of their work, unless `HGRID_WHOLE` is set, as `.ci/slow valgrind`
+/// does.
 fn run_in_valgrind(programs: &[PathBuf], options: &[&str]) {
     let valgrind = programs.iter().map(|program| {
         let mut valgrind = command("valgrind");
-        valgrind.args(["--quiet", "--error-exitcode=99"]).args(options).arg(program).arg("part");
+        valgrind.args(["--quiet", "--error-exitcode=99"]).args(options).arg(program);
+        if env::var_os("HGRID_WHOLE").is_none() {
+            valgrind.arg(PART);
+        }
         valgrind
     });
     run_side_by_side(valgrind.collect());
