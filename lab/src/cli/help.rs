@@ -88,7 +88,8 @@ Examples:
 
 This needs a program with the peers in it; docs/performance.md tells how they are set up and measured:
   apt-get install libembree-dev g++
-  RUSTFLAGS='-C target-cpu=native' cargo run --release -p hgrid-lab --features peers -- compare ...";
+  RUSTFLAGS='-C target-cpu=native' cargo run --release -p hgrid-lab --features peers -- compare ...
+With --features embree instead it has Embree alone.";
 
 pub(super) const ANIMATE_EXAMPLES: &str = "\
 Examples:

@@ -16,7 +16,7 @@ pub mod agreement;
 mod charts;
 pub mod first;
 mod grid;
-#[cfg(feature = "peers")]
+#[cfg(feature = "embree")]
 mod heap;
 pub mod input;
 mod instanced;
@@ -285,17 +285,17 @@ mod tests {
         check_instances(&methods(&[Method::Bvh]), 0);
     }
 
-    #[cfg(feature = "peers")]
+    #[cfg(feature = "embree")]
     #[test]
     fn embree_agrees_with_hgrid_on_instances() {
         let mut systems = methods(&[Method::Bvh]);
         let embree = [Peer::EmbreeLow, Peer::EmbreeDynamic, Peer::EmbreeMedium];
         systems.extend(peers::systems(&embree).unwrap());
-        // Two builds, bytes kept and at most; single primary rays, ao, bounces and random rays.
-        check_instances(&systems, 8);
+        // Two builds, bytes kept and at most; single primary rays, ao, bounces, and random rays beside both qualities.
+        check_instances(&systems, 9);
     }
 
-    #[cfg(not(feature = "peers"))]
+    #[cfg(not(feature = "embree"))]
     #[test]
     fn without_the_peers_nothing_is_measured() {
         let args = CompareArgs::parse_from(["hgrid", "no/such.ply"]);
@@ -303,7 +303,7 @@ mod tests {
         assert!(error.contains("--features peers") && !error.contains("such.ply"), "{error}");
     }
 
-    #[cfg(feature = "peers")]
+    #[cfg(feature = "embree")]
     #[test]
     fn all_peers_agree_with_hgrid() {
         let mut systems = methods(&[]);
@@ -323,7 +323,7 @@ mod tests {
                     assert_eq!(run.samples.len(), 2);
                 }
             }
-            assert_eq!(scene.ratios.len(), 13);
+            assert_eq!(scene.ratios.len(), 14);
         }
         assert!(comparison.text().contains("time to image / best peer"));
     }

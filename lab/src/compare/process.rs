@@ -6,13 +6,13 @@ use anyhow::Result;
 /// nobody tells.
 #[must_use]
 pub fn page_faults() -> Option<u64> {
-    #[cfg(feature = "peers")]
+    #[cfg(feature = "embree")]
     {
         use nix::sys::resource::{UsageWho, getrusage};
         let usage = getrusage(UsageWho::RUSAGE_SELF).ok()?;
         u64::try_from(usage.minor_page_faults()).ok()
     }
-    #[cfg(not(feature = "peers"))]
+    #[cfg(not(feature = "embree"))]
     None
 }
 
@@ -23,7 +23,7 @@ pub fn page_faults() -> Option<u64> {
 /// # Errors
 /// If the system refuses.
 pub fn pin_to_one_core() -> Result<()> {
-    #[cfg(feature = "peers")]
+    #[cfg(feature = "embree")]
     {
         use anyhow::Context as _;
         use nix::sched::{CpuSet, sched_getcpu, sched_setaffinity};
@@ -41,13 +41,13 @@ pub fn pin_to_one_core() -> Result<()> {
 /// Lets the heap keep what is freed, so that a build can use the memory of the one before. (It gives
 /// large blocks back to the system otherwise.)
 pub fn keep_heap() {
-    #[cfg(feature = "peers")]
+    #[cfg(feature = "embree")]
     super::heap::keep();
 }
 
 /// Gives the system what the heap does not use.
 pub fn give_back_heap() {
-    #[cfg(feature = "peers")]
+    #[cfg(feature = "embree")]
     super::heap::give_back();
 }
 

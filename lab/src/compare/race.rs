@@ -117,17 +117,17 @@ fn turn(
 
 /// Bytes on the heap before a build.
 fn heap_before() -> usize {
-    #[cfg(feature = "peers")]
+    #[cfg(feature = "embree")]
     return super::heap::start_peak();
-    #[cfg(not(feature = "peers"))]
+    #[cfg(not(feature = "embree"))]
     0
 }
 
 /// Bytes that a build has put on the heap since.
 fn heap_since(before: usize) -> Bytes {
-    #[cfg(feature = "peers")]
+    #[cfg(feature = "embree")]
     return super::heap::since(before);
-    #[cfg(not(feature = "peers"))]
+    #[cfg(not(feature = "embree"))]
     Bytes { index: 0, peak: before }
 }
 

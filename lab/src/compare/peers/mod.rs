@@ -1,11 +1,11 @@
-//! The other libraries: one adapter each, all behind the feature `peers`.
+//! The other libraries: one adapter each, Embree's behind the feature `embree`, the others behind `peers`.
 //!
 //! An adapter turns the rays of hgrid into those of its library and the answers back, inside the
 //! time that is measured: who uses the library does the same.
 
 #[cfg(feature = "peers")]
 mod bvh;
-#[cfg(feature = "peers")]
+#[cfg(feature = "embree")]
 mod embree;
 #[cfg(feature = "peers")]
 mod obvhs;
@@ -66,35 +66,49 @@ impl Peer {
         }
     }
 
-    /// Whether this program has it: tinybvh-rs leaves out a layout that the compiler may not use.
-    #[cfg(feature = "peers")]
-    const fn is_built(self) -> bool {
-        !matches!(self, Self::Tinybvh8 | Self::Tinybvh8Hq) || cfg!(target_feature = "avx2")
+    /// Why this program does not have it, and how to build one that does; `None` if it has it.
+    #[cfg(feature = "embree")]
+    fn lack(self) -> Option<&'static str> {
+        match self {
+            Self::EmbreeLow | Self::EmbreeDynamic | Self::EmbreeMedium => None,
+            _ if cfg!(not(feature = "peers")) => {
+                Some("is not in this program: build it with --features peers, not embree")
+            }
+            // tinybvh-rs leaves out a layout that the compiler may not use.
+            Self::Tinybvh8 | Self::Tinybvh8Hq if cfg!(not(target_feature = "avx2")) => Some(
+                "needs a program that may use AVX2: build it with RUSTFLAGS='-C target-cpu=native'",
+            ),
+            _ => None,
+        }
     }
 
-    #[cfg(feature = "peers")]
+    #[cfg(feature = "embree")]
     fn system(self) -> Result<Box<dyn System>> {
-        anyhow::ensure!(
-            self.is_built(),
-            "{} needs a program that may use AVX2: build it with RUSTFLAGS='-C target-cpu=native'",
-            self.name()
-        );
+        if let Some(lack) = self.lack() {
+            anyhow::bail!("{} {lack}", self.name());
+        }
         Ok(match self {
             Self::EmbreeLow => Box::new(embree::Embree::new(self, embree::Quality::Low)?),
             Self::EmbreeDynamic => Box::new(embree::Embree::new(self, embree::Quality::Dynamic)?),
             Self::EmbreeMedium => Box::new(embree::Embree::new(self, embree::Quality::Medium)?),
+            #[cfg(feature = "peers")]
             Self::Tinybvh2 => Box::new(tinybvh::Tinybvh2(self)),
-            #[cfg(target_feature = "avx2")]
+            #[cfg(all(feature = "peers", target_feature = "avx2"))]
             Self::Tinybvh8 => Box::new(tinybvh::Tinybvh8 { peer: self, is_hq: false }),
-            #[cfg(target_feature = "avx2")]
+            #[cfg(all(feature = "peers", target_feature = "avx2"))]
             Self::Tinybvh8Hq => Box::new(tinybvh::Tinybvh8 { peer: self, is_hq: true }),
-            #[cfg(not(target_feature = "avx2"))]
-            Self::Tinybvh8 | Self::Tinybvh8Hq => anyhow::bail!("not in this program"),
+            #[cfg(feature = "peers")]
             Self::ObvhsFast => Box::new(obvhs::Obvhs::fast(self)),
+            #[cfg(feature = "peers")]
             Self::ObvhsSlow => Box::new(obvhs::Obvhs::slow(self)),
+            #[cfg(feature = "peers")]
             Self::Bvh => Box::new(bvh::BvhSystem(self)),
+            #[cfg(feature = "peers")]
             Self::ParryBinned => Box::new(parry::Parry::binned(self)),
+            #[cfg(feature = "peers")]
             Self::ParryPloc => Box::new(parry::Parry::ploc(self)),
+            #[cfg(not(all(feature = "peers", target_feature = "avx2")))]
+            _ => anyhow::bail!("{} is not in this program", self.name()),
         })
     }
 }
@@ -103,9 +117,9 @@ impl Peer {
 ///
 /// # Errors
 /// If this program has no peers or not this one, or a library does not start.
-#[cfg(feature = "peers")]
+#[cfg(feature = "embree")]
 pub fn systems(peers: &[Peer]) -> Result<Vec<Box<dyn System>>> {
-    let all = Peer::value_variants().iter().copied().filter(|peer| peer.is_built());
+    let all = Peer::value_variants().iter().copied().filter(|peer| peer.lack().is_none());
     let peers = if peers.is_empty() { all.collect() } else { peers.to_vec() };
     peers.into_iter().map(Peer::system).collect()
 }
@@ -114,12 +128,13 @@ pub fn systems(peers: &[Peer]) -> Result<Vec<Box<dyn System>>> {
 ///
 /// # Errors
 /// Always; the message says how to build a program that has them.
-#[cfg(not(feature = "peers"))]
+#[cfg(not(feature = "embree"))]
 pub fn systems(_: &[Peer]) -> Result<Vec<Box<dyn System>>> {
     anyhow::bail!(
         "this program was built without the other ray tracers. On Debian: \
          apt-get install libembree-dev g++, then \
-         cargo run --release -p hgrid-lab --features peers -- compare ..."
+         cargo run --release -p hgrid-lab --features peers -- compare ... \
+         (with --features embree for Embree alone, which compiles sooner)"
     )
 }
 
@@ -139,7 +154,7 @@ mod tests {
         }
     }
 
-    #[cfg(not(feature = "peers"))]
+    #[cfg(not(feature = "embree"))]
     #[test]
     fn without_the_peers_the_error_says_how_to_get_them() {
         let error = systems(&[]).map(|_| ()).unwrap_err().to_string();
