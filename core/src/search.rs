@@ -255,15 +255,21 @@ pub(crate) fn test_all<F: Search, T: Tally>(
     search: &mut F,
     tally: &mut T,
 ) {
-    for id in 0..mesh.triangle_count() {
-        // Of those that the structure has: with finite corners.
-        let is_finite = |corner: &[f32; 3]| corner.iter().all(|c| c.abs() <= MAX_COORDINATE);
-        if !mesh.triangle(id).is_some_and(|triangle| triangle.iter().all(is_finite)) {
-            continue;
-        }
+    for_finite(mesh, &mut |id| {
         tally.primitive_test();
-        let outcome = if F::OF_BOXES { search.offer(id) } else { search.decide(test, mesh, id) };
-        if outcome == Outcome::Done {
+        if F::OF_BOXES { search.offer(id) } else { search.decide(test, mesh, id) }
+    });
+}
+
+/// Names the triangles with finite corners, those that the structure has, until the search is over. Through a pointer: it
+/// is compiled once.
+#[cold]
+#[inline(never)]
+fn for_finite(mesh: &TriangleMesh<'_>, ask: &mut dyn FnMut(u32) -> Outcome) {
+    for id in 0..mesh.triangle_count() {
+        let is_finite = |corner: &[f32; 3]| corner.iter().all(|c| c.abs() <= MAX_COORDINATE);
+        let is_there = mesh.triangle(id).is_some_and(|triangle| triangle.iter().all(is_finite));
+        if is_there && ask(id) == Outcome::Done {
             return;
         }
     }

@@ -4,7 +4,7 @@ use crate::aabb::Aabb;
 use crate::config::BuildFlags;
 use crate::control::Watch;
 use crate::error::Error;
-use crate::mesh::{Piece, TriangleMesh};
+use crate::mesh::TriangleMesh;
 
 /// What part of a build the survey is, about.
 const SHARE: [f32; 2] = [0.0, 0.15];
@@ -52,8 +52,8 @@ impl Survey {
 /// The finite triangles of a mesh with their boxes, in the order of their ids.
 #[inline(always)]
 pub(crate) fn boxes<'m>(mesh: &'m TriangleMesh<'_>) -> impl Iterator<Item = (u32, Aabb)> + 'm {
-    let triangles = mesh.pieces(0..mesh.triangle_count()).flat_map(Piece::each);
-    triangles.filter_map(|(id, corners)| Some((id, Aabb::of(corners?)?)))
+    let mut reader = mesh.reader();
+    (0..mesh.triangle_count()).filter_map(move |id| Some((id, Aabb::of(reader.corners(id)?)?)))
 }
 
 /// The most references a grid of so many triangles may have.
