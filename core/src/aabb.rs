@@ -36,7 +36,7 @@ impl Aabb {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Whether it is a finite box with an inside on every axis.
+    /// Returns true if it is a finite box with an inside on every axis.
     pub(crate) fn is_proper(&self) -> bool {
         let limit = Vec3A::splat(2.0 * MAX_COORDINATE);
         let finite = self.min.abs().cmple(limit) & self.max.abs().cmple(limit);
@@ -59,7 +59,7 @@ impl Aabb {
                     return None;
                 }
             } else {
-                // No branch: which way a ray runs is as good as random.
+                // No branch: the sign of the direction is unpredictable.
                 let (a, b) = (low * inverse, high * inverse);
                 near = greater(near, lesser(a, b));
                 far = lesser(far, greater(a, b));

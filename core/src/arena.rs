@@ -18,9 +18,8 @@ pub struct Sizes {
     pub index_bytes: usize,
     /// For the region that only the build needs.
     pub scratch_bytes: usize,
-    /// Whether `index_bytes` is what the build needs, to the byte, or only no less than
-    /// that. `scratch_bytes` is enough; for
-    /// one-level and fixed grids it is exact.
+    /// True if `index_bytes` is what the build needs, to the byte; otherwise it is no less. `scratch_bytes` is enough,
+    /// and exact for one-level and fixed grids.
     pub is_exact: bool,
 }
 

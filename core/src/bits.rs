@@ -27,7 +27,7 @@ pub(crate) const fn halves(word: u64) -> [u32; 2] {
     [word as u32, (word >> 32) as u32]
 }
 
-/// Whether a bit is set; a bit past the end is not.
+/// Returns true if a bit is set; a bit past the end is not.
 #[inline(always)]
 pub(crate) fn is_set(words: &[u64], bit: usize) -> bool {
     words.get(bit / WORD_BITS).is_some_and(|word| word >> (bit % WORD_BITS) & 1 != 0)

@@ -72,7 +72,7 @@ pub(crate) struct Header {
     pub(crate) depth: u32,
     /// What it is built over, as [`Content`] numbers it.
     content: u32,
-    /// Whether the mesh lies behind the grid: see [`HasMesh`]. Above these two bits the number of parts that
+    /// True if the mesh lies behind the grid: see [`HasMesh`]. Above these two bits the number of parts that
     /// the mesh was joined from, 0 if it was not.
     mesh: u32,
     /// Nodes of a tree; 0 for a method without nodes.
@@ -220,7 +220,7 @@ impl Header {
         Content::from_u32(self.content).ok_or(corrupt(core::mem::offset_of!(Self, content)))
     }
 
-    /// Whether the mesh lies behind the grid.
+    /// Returns true if the mesh lies behind the grid.
     pub(crate) fn has_mesh(&self) -> Result<HasMesh, Error> {
         match (self.mesh & 3, self.part_count()) {
             (0, 0) => Ok(HasMesh::No),
@@ -268,7 +268,7 @@ impl Header {
         Ok(Lattice::new(bounds, self.resolution))
     }
 
-    /// Whether the header says what the mesh says: what was skipped, its box, and the resolution
+    /// Returns true if the header says what the mesh says: what was skipped, its box, and the resolution
     /// that `rule` has for the box's size and so many triangles.
     pub(crate) fn check(
         &self,
@@ -302,7 +302,7 @@ impl Header {
         Ok(survey)
     }
 
-    /// Whether the fields that mean nothing to the method are zero, as a build leaves them.
+    /// Returns true if the fields that mean nothing to the method are zero, as a build leaves them.
     pub(crate) fn unused_is_zero(&self, method: Method) -> bool {
         let is_tree = method == Method::Bvh;
         (method == Method::Fixed || self.macrocell_factor == 0)

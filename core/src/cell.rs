@@ -60,7 +60,7 @@ impl CellRange {
         })
     }
 
-    /// Whether a cell is one of them.
+    /// Returns true if a cell is one of them.
     pub(crate) fn contains(&self, cell: [u32; 3]) -> bool {
         (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&cell[axis]))
     }
@@ -265,8 +265,8 @@ pub(crate) const fn whole(position: f32) -> u32 {
 /// The whole parts of positions between 0 and four times [`MAX_RESOLUTION`] (quarters); an odd
 /// whole number may count as the end of the cell before it, which the margin allows.
 ///
-/// Adding 1.5 * 2^23 rounds to whole numbers and leaves them in the low bits: 5 to 10 % of a build
-/// less than with casts, which must saturate.
+/// Adding 1.5 * 2^23 rounds to whole numbers and leaves them in the low bits: casts take longer, because they must
+/// saturate.
 #[inline(always)]
 fn wholes(position: Vec3A) -> [u32; 3] {
     let shifted = position - Vec3A::splat(0.5) + Vec3A::splat(WHOLE_SHIFT);

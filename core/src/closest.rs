@@ -62,7 +62,7 @@ impl ClosestPoint {
         distance.is_finite().then_some(Self { position, distance, u, v, primitive })
     }
 
-    /// Whether this point is reported rather than the other: closer, then of a lower id.
+    /// Returns true if this point is reported rather than the other: closer, then of a lower id.
     fn is_closer(&self, other: &Self) -> bool {
         self.distance < other.distance
             || (self.distance <= other.distance && self.primitive < other.primitive)
@@ -214,7 +214,7 @@ impl ClosestPoint {
         Self { position: [0.0; 3], distance: 0.0, u: 0.0, v: 0.0, primitive: INVALID_ID };
 }
 
-/// Less than this part of its distance nobody sees.
+/// A difference below this part of the distance is invisible.
 const FAR: f64 = 1.0 / 1_125_899_906_842_624.0; // 2^-50
 
 /// A cube around a point, rounded outwards.

@@ -59,7 +59,7 @@ pub enum Parameters {
     },
     /// Parameters of [`Method::Bvh`].
     Bvh {
-        /// How much time the build takes for rays that are faster.
+        /// A higher quality takes a longer build and makes rays faster.
         quality: Quality,
     },
 }

@@ -78,7 +78,7 @@ impl Control<'_> {
     /// The most tasks at once.
     pub const MAX_TASKS: u32 = 64;
 
-    /// One task after the other, and silence.
+    /// One task at a time, without a progress callback.
     pub(crate) const SERIAL: Control<'static> = Control {
         tasks: 1,
         run: &|count, task| {
@@ -96,14 +96,14 @@ pub(crate) const OFTEN: u32 = 1 << 16;
 /// Smaller steps than this are not reported.
 const LEAST: f32 = 1.0 / 256.0;
 
-/// How far a build is, and who wants to know.
+/// The progress of a build, and the callback that receives it.
 pub(crate) struct Watch<'c> {
     progress: Option<&'c dyn Fn(f32) -> bool>,
     done: Cell<f32>,
 }
 
 impl<'c> Watch<'c> {
-    /// Nobody wants to know.
+    /// A watch without a callback.
     pub(crate) const fn none() -> Self {
         Self { progress: None, done: Cell::new(f32::NEG_INFINITY) }
     }
@@ -119,8 +119,8 @@ impl<'c> Watch<'c> {
         if done >= 1.0 {
             return Ok(());
         }
-        // Not for nothing; and where a build starts anew, with coarser
-        // cells say, it does not go back.
+        // Report only steps of at least LEAST. Progress never decreases, even if a build starts again with coarser
+        // cells.
         if done >= self.done.get() + LEAST {
             self.done.set(done);
             if !progress(done) {

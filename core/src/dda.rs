@@ -230,7 +230,7 @@ impl Walk {
     /// Every call moves one axis towards its end, whatever the floats say: a walk takes at most as
     /// many steps as it has cells on the three axes together.
     ///
-    /// All axes at once: which one is next is as good as random in a walk of a few cells.
+    /// It compares all axes at once: in a walk of a few cells, the processor cannot predict which one is next.
     #[inline(always)]
     pub(crate) fn advance(&mut self, limit: f32) -> Step {
         if !HAS_VECTORS {

@@ -9,25 +9,22 @@
 //! so they drop the same triangles. What passes, about one triangle a ray, is decided in f64 one
 //! by one.
 //!
-//! What was measured (Zen 4, November 2026, one to eight triangles a call): rows transposed in
-//! registers beat floats written one by one to where the lanes want them (13 to 28 ns against
-//! 23 to 46 ns). Rows that are copied through memory cost single rays a tenth of their time, and `map` over
-//! arrays of vectors costs half of it: the pieces are stored one by one, and a load of the whole waits for
-//! these stores.
+//! Rows are transposed in registers: a row that is copied through memory, or `map` over arrays of vectors, stores
+//! pieces, and the load of the whole waits for these stores.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 use zerocopy::{transmute, transmute_ref};
 
 use crate::filter::RayFilter;
-use crate::mesh::{Near, TriangleMesh};
+use crate::mesh::{LastPart, TriangleMesh};
 use crate::ray::Ray;
 
 /// How many triangles are tested at once.
 pub(crate) const LANES: usize = 8;
 
 /// A vertex and four bytes that mean nothing.
-pub(crate) type Row = [u8; 16];
+pub(crate) type VertexBytes = [u8; 16];
 
 /// Up to eight triangles, one a lane.
 #[derive(Clone, Copy)]
@@ -58,8 +55,7 @@ impl<S: Simd> Eight<S> {
 
 /// The first eight of some ids; where there are fewer, the last once more: it is read, too.
 ///
-/// Number by number, and so into registers: what is copied is waited for, up to a twelfth of a
-/// ray's time where lists are short.
+/// They are read number by number, into registers: a load of a copied array would wait for its stores.
 #[inline(always)]
 pub(crate) fn first_eight(ids: &[u32]) -> [u32; LANES] {
     let last = ids.len().saturating_sub(1);
@@ -79,7 +75,7 @@ fn four<'m, S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'m>,
     ids: [u32; 4],
-    near: &mut Option<Near<'m>>,
+    near: &mut Option<LastPart<'m>>,
 ) -> ([[f32x4<S>; 3]; 3], u32) {
     let wide = mesh.wide();
     let rows = |id: u32| -> Option<[f32x4<S>; 3]> {
@@ -100,7 +96,7 @@ fn four<'m, S: Simd>(
 
 /// The corners of four triangles, by corner and axis, from their rows.
 #[inline(always)]
-pub(crate) fn corners_of<S: Simd>(simd: S, rows: &[[Row; 4]; 3]) -> [[f32x4<S>; 3]; 3] {
+pub(crate) fn corners_of<S: Simd>(simd: S, rows: &[[VertexBytes; 4]; 3]) -> [[f32x4<S>; 3]; 3] {
     let row = |at: usize, lane: usize| load(simd, &rows[at][lane]);
     [
         corner([row(0, 0), row(0, 1), row(0, 2), row(0, 3)]),
@@ -123,8 +119,8 @@ pub(crate) fn corner<S: Simd>(vertices: [f32x4<S>; 4]) -> [f32x4<S>; 3] {
 fn read<'m>(
     mesh: &TriangleMesh<'m>,
     ids: [u32; 4],
-    near: &mut Option<Near<'m>>,
-) -> ([[Row; 4]; 3], u32) {
+    near: &mut Option<LastPart<'m>>,
+) -> ([[VertexBytes; 4]; 3], u32) {
     let is_joined = !mesh.parts().is_empty();
     let (mut rows, mut used) = ([[[0; 16]; 4]; 3], 0);
     let [a, b, c] = &mut rows;
@@ -190,20 +186,20 @@ pub(crate) fn columns<S: Simd>(
 
 /// A ray as two rows.
 #[inline(always)]
-fn halves(ray: &Ray) -> &[Row; 2] {
+fn halves(ray: &Ray) -> &[VertexBytes; 2] {
     transmute_ref!(ray)
 }
 
 /// One half of four rays.
 #[inline(always)]
-fn rows_of<S: Simd>(simd: S, [a, b, c, d]: [&[Row; 2]; 4], half: usize) -> [f32x4<S>; 4] {
+fn rows_of<S: Simd>(simd: S, [a, b, c, d]: [&[VertexBytes; 2]; 4], half: usize) -> [f32x4<S>; 4] {
     let half = half % 2;
     [load(simd, &a[half]), load(simd, &b[half]), load(simd, &c[half]), load(simd, &d[half])]
 }
 
 /// Sixteen bytes as four numbers.
 #[inline(always)]
-pub(crate) fn load<S: Simd>(simd: S, row: &Row) -> f32x4<S> {
+pub(crate) fn load<S: Simd>(simd: S, row: &VertexBytes) -> f32x4<S> {
     u8x16::simd_from(simd, *row).bitcast()
 }
 

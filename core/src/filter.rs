@@ -98,7 +98,7 @@ pub(crate) trait Lanes:
     /// The greater of two numbers. With a NaN among them it is any number or NaN.
     fn or_greater(self, other: Self) -> Self;
 
-    /// Whether one of three numbers is below `-error` and one above `error`, `edges[2]` being NaN if
+    /// Returns true if one of three numbers is below `-error` and one above `error`, `edges[2]` being NaN if
     /// one of the others is.
     fn are_opposite(edges: [Self; 3], error: Self) -> Self::Mask;
 }
@@ -428,7 +428,7 @@ mod tests {
         points.iter().flatten().fold(0.0, |largest, x| greater(largest, x.abs()))
     }
 
-    /// Whether the f64 test finds the line among the corners.
+    /// Returns true if the f64 test finds the line among the corners.
     fn is_hit(origin: [f32; 3], direction: [f32; 3], triangle: &Triangle) -> bool {
         let ray = Ray { t_min: f32::NEG_INFINITY, ..Ray::new(origin, direction) };
         TriangleTest::new(&ray).unwrap().test(triangle).is_some()

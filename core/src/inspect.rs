@@ -1,4 +1,4 @@
-//! What a grid and its mesh are like: an O(n) look, for reports and for comparing grids.
+//! Statistics of a grid and its mesh, in one O(n) pass, for reports and for comparing grids.
 
 use crate::aabb::Aabb;
 use crate::grid::Grid;
@@ -6,7 +6,7 @@ use crate::hash::Hash;
 use crate::ray::INVALID_ID;
 use crate::visit::EVERYWHERE;
 
-/// What a look at all of a grid finds.
+/// The statistics of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Statistics {
     /// Triangles left out because a coordinate is not finite.

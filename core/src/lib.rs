@@ -29,10 +29,11 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | plain types of the API | `limits`, `error`, `method`, `config`, `control`, `ray`, `mesh`, `options`, `counters` |
-//! | memory | `arena`, `bump`, `bits`, `lists`, `hash`, `blob`, `tasks`, `survey` |
-//! | rays and triangles | `aabb`, `simd`, `approach`, `filter`, `exact`, `eight`, `pairs`, `triangle`, `surface` |
-//! | cells | `cell`, `spans`, `dda` |
+//! | plain types of the API | `limits`, `method`, `error`, `config`, `control`, `counters`, `ray`, `aabb`, `mesh`, `options` |
+//! | vectors and tasks | `simd`, `extremes`, `tasks` |
+//! | memory | `arena`, `bits`, `lists`, `hash`, `survey`, `cell`, `blob`, `bump` |
+//! | rays and triangles | `filter`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |
+//! | cells | `spans`, `dda` |
 //! | receivers of a traversal: of hits, of id lists | `search`, `visit` |
 //! | structures, a folder each | `one_level`; `fixed` and `variable` on top of it; `recursive`; `bvh` |
 //! | the list of structures, and the view that queries run on | `structure`, `grid` |

@@ -1,4 +1,4 @@
-//! How much of a thing there may be.
+//! The limits of meshes, grids and scenes, and the alignment of memory.
 
 /// The most triangles a mesh may have: ids are 32 bits and one of them means "none". A tree
 /// takes half as many.

@@ -6,7 +6,7 @@ pub(crate) fn pairs(numbers: &[u32]) -> impl Iterator<Item = (u32, u32)> {
     numbers.iter().copied().zip(numbers.iter().skip(1).copied())
 }
 
-/// Whether every id is larger than the one before it: each is listed once.
+/// Returns true if every id is larger than the one before it: each is listed once.
 pub(crate) fn ascends(ids: &[u32]) -> bool {
     pairs(ids).all(|(id, next)| id < next)
 }

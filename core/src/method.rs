@@ -1,4 +1,4 @@
-//! What a blob is: the method that built it, how long that took, and what it is built over.
+//! The method of a grid, the quality of a tree, and the kind of thing that a blob is built over.
 
 /// The number of `brick`, a removed method. No other method gets it.
 pub(crate) const REMOVED_METHOD: u32 = 5;
@@ -54,8 +54,8 @@ impl Method {
         }
     }
 
-    /// Whether this library has it. A feature of the package that is off leaves its method out, and
-    /// who asks for it gets [`Error::MethodLeftOut`](crate::Error::MethodLeftOut); the default, `Bvh`, is no exception.
+    /// Returns true if this library was built with the method. Without its feature, a call with the method returns
+    /// [`Error::MethodLeftOut`](crate::Error::MethodLeftOut); the default, `Bvh`, is no exception.
     ///
     /// ```
     /// use hgrid_core::{Config, Method};
@@ -75,7 +75,7 @@ impl Method {
     }
 }
 
-/// How much time a build of [`Method::Bvh`] takes for rays that are faster.
+/// The quality of a tree ([`Method::Bvh`]): a higher quality takes a longer build and makes rays faster.
 ///
 /// Trees of both qualities have the same format, and the same rays have the same hits.
 #[non_exhaustive]

@@ -54,27 +54,26 @@ pub type Filter<'q> = dyn FnMut(usize, &Hit) -> Verdict + 'q;
 /// ```
 pub struct QueryOptions<'q> {
     /// A triangle is seen if a bit of this is set in its mask, too: see
-    /// [`TriangleMesh::with_masks`](crate::TriangleMesh::with_masks). At first all bits, which sees
-    /// every triangle, even one whose mask is 0.
+    /// [`TriangleMesh::with_masks`](crate::TriangleMesh::with_masks). The default
+    /// is all bits: every triangle is seen, even one whose mask is 0.
     pub mask: u32,
     /// Which sides are not hit.
     pub cull: Cull,
     /// A triangle that is not hit: the one that the ray leaves, which it cannot hit again, without
     /// any epsilon. A neighbour across an edge still may be, where the origin was rounded to just
-    /// below it. At first [`INVALID_ID`].
+    /// below it. The default is [`INVALID_ID`], which names none.
     pub skip: u32,
-    /// Says of a hit whether it counts: gets the place of the ray in its batch, 0 for a single one,
-    /// and the hit. Asked about hits from near to far, where `t` is equal by ascending id, and about
-    /// each triangle at most once for each ray; all about one ray of a batch before the next, in their
-    /// order. A ray of [`occluded_with`](crate::Grid::occluded_with) and its like that an opaque triangle
+    /// Decides whether a hit counts. It receives the ray's place in its batch, 0 for a single ray, and the hit. It is
+    /// asked about hits from near to far, where `t` is equal by ascending id, and about each triangle at most once for
+    /// each ray; about all hits of one ray of a batch before those of the next. A ray of [`occluded_with`](crate::Grid::occluded_with) and its like that an opaque triangle
     /// blocks may be asked about or not.
     pub filter: Option<&'q mut Filter<'q>>,
-    /// The filter is asked about a triangle if a bit of this is set in its mask, too; the others are
-    /// opaque: their hits count unasked, and rays that meet no others cost what they cost without a
-    /// filter. At first all bits, which asks about every triangle, even one whose mask is 0.
+    /// The filter is asked about a triangle if a bit of this is set in its mask, too. The others are opaque: their hits
+    /// count, and rays that meet only them cost what they cost without a filter. The default is all bits: the filter is
+    /// asked about every triangle, even one whose mask is 0.
     pub filter_mask: u32,
-    /// Where to add up the work. The rays of a batch are then traced one by one: those of a group
-    /// share their work, and none of it could be told to be one ray's.
+    /// Where to add up the work. With counters, the rays of a batch are traced one by one, because the rays of a group
+    /// share work that belongs to no single ray.
     pub counters: Option<&'q mut Counters>,
     /// Memory in which rays of [`Coherence::Incoherent`](crate::Coherence::Incoherent) may be
     /// sorted, 16 bytes a ray: see there. It holds anything before and after. Queries of one ray or
@@ -180,7 +179,7 @@ impl<'q> Selection<'q> {
         Self { mesh, choice: options.choice() }
     }
 
-    /// Whether a triangle is one of them.
+    /// Returns true if a triangle is one of them.
     pub(crate) fn has(&self, primitive: u32) -> bool {
         self.choice.has(self.mesh, primitive)
     }

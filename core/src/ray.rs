@@ -36,7 +36,7 @@ impl Ray {
         Self { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
     }
 
-    /// Whether this ray can hit anything at all: finite, not null, a range that is not empty.
+    /// Returns true if this ray can hit anything at all: finite, not null, a range that is not empty.
     #[inline]
     pub(crate) fn is_valid(&self) -> bool {
         let (origin, direction) =
@@ -124,7 +124,7 @@ impl Hit {
     /// What a batch writes for a ray that hits nothing.
     pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: INVALID_ID };
 
-    /// Whether this hit is reported rather than the other: smaller `t`, then smaller id.
+    /// Returns true if this hit is reported rather than the other: smaller `t`, then smaller id.
     #[inline(always)]
     #[must_use]
     pub const fn is_closer(&self, other: &Self) -> bool {

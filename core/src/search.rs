@@ -24,9 +24,10 @@ pub(crate) enum Outcome {
 
 /// Receives the hits of a traversal.
 pub(crate) trait Search {
-    /// Leaves hold boxes of the caller's shapes, which are offered, not triangles, which are tested.
+    /// True if leaves hold boxes of the caller's shapes, which the traversal offers, and not triangles, which it tests.
     const OF_BOXES: bool = false;
 
+    /// Receives a hit and tells where the ray ends.
     fn show(&mut self, hit: Hit) -> Outcome;
 
     /// Takes a shape whose box the ray meets.
@@ -35,7 +36,7 @@ pub(crate) trait Search {
         Outcome::Unchanged
     }
 
-    /// Whether a triangle need not be shown again, as the ray met it in a cell before.
+    /// Returns true if the search already has the hit with this triangle, which a grid may list in several cells.
     #[inline(always)]
     fn knows(&self, _: u32) -> bool {
         false
@@ -83,9 +84,9 @@ impl Search for One {
 
 /// Any other search for triangles. It is called through a pointer, because a traversal is compiled once for each type
 /// of search and takes 10 KB each time.
-pub(crate) struct Triangles<'s>(pub(crate) &'s mut dyn FnMut(Hit) -> Outcome);
+pub(crate) struct TriangleSearch<'s>(pub(crate) &'s mut dyn FnMut(Hit) -> Outcome);
 
-impl Search for Triangles<'_> {
+impl Search for TriangleSearch<'_> {
     #[inline(always)]
     fn show(&mut self, hit: Hit) -> Outcome {
         (self.0)(hit)
@@ -93,9 +94,9 @@ impl Search for Triangles<'_> {
 }
 
 /// Any search for boxes: gets the number of each that the ray meets.
-pub(crate) struct Boxes<'s>(pub(crate) &'s mut dyn FnMut(u32) -> Outcome);
+pub(crate) struct BoxSearch<'s>(pub(crate) &'s mut dyn FnMut(u32) -> Outcome);
 
-impl Search for Boxes<'_> {
+impl Search for BoxSearch<'_> {
     const OF_BOXES: bool = true;
 
     #[inline(always)]
@@ -118,20 +119,20 @@ pub(crate) struct NearestHits<'q> {
     pub(crate) hits: &'q mut [Hit],
     /// How many of the hits are there.
     pub(crate) count: usize,
-    /// Whether any hits will do, if only they fill the room.
+    /// True if the search ends once the room is full, with any hits.
     pub(crate) is_any: bool,
 }
 
 /// The nearest hits of a tree, which shows each triangle once, and how many hits there are.
 #[derive(Debug)]
-pub(crate) struct All<'q> {
+pub(crate) struct AllHits<'q> {
     pub(crate) selection: &'q Selection<'q>,
     /// The nearest so far as a heap, the farthest first.
     pub(crate) hits: &'q mut [Hit],
     pub(crate) count: usize,
 }
 
-impl All<'_> {
+impl AllHits<'_> {
     /// Sorts the hits that there was room for, each triangle once.
     pub(crate) fn sort(&mut self) {
         let count = self.count.min(self.hits.len());

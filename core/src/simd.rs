@@ -71,7 +71,7 @@ impl SimdLevel {
         Self::ALL.iter().copied().filter(|level| level.is_available())
     }
 
-    /// Whether this machine has this level.
+    /// Returns true if this machine has this level.
     #[must_use]
     pub fn is_available(self) -> bool {
         machine::BASE <= self && self <= Self::detect()
@@ -91,10 +91,10 @@ impl SimdLevel {
     }
 }
 
-/// Whether the target is a microcontroller, where flash is dearer than a few instructions a ray.
+/// True if the target is a microcontroller, where flash is dearer than a few instructions a ray.
 pub(crate) const IS_SMALL: bool = cfg!(all(target_os = "none", target_pointer_width = "32"));
 
-/// Whether the target has vectors at all. Without them eight or sixteen lanes one after the other
+/// True if the target has vectors at all. Without them eight or sixteen lanes one after the other
 /// are up to twice the work, much code, and minutes of compilation.
 pub(crate) const HAS_VECTORS: bool = cfg!(any(
     all(

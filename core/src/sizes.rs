@@ -205,7 +205,7 @@ fn fits(
     Ok(needed)
 }
 
-/// Whether a coarser grid may do: one that would be too fine is one that is too large.
+/// Returns true if a coarser grid may do: one that would be too fine is one that is too large.
 const fn is_too_large(error: Error) -> bool {
     matches!(error, Error::OutOfMemory { .. } | Error::InvalidConfig(ConfigField::Density))
 }

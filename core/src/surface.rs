@@ -32,7 +32,7 @@ pub struct Surface {
     pub above: [f32; 3],
     /// Where rays start that go on through the triangle.
     pub below: [f32; 3],
-    /// Whether the ray met the front, from which the vertices appear counter-clockwise: 1 or 0.
+    /// 1 if the ray met the front, from which the vertices appear counter-clockwise, else 0.
     pub is_front: u32,
 }
 

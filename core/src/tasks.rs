@@ -70,7 +70,7 @@ pub(crate) fn run_several<T: Portable, R: Portable>(
         match (state, slot) {
             (State::Task(task), Some(slot)) => {
                 let result = work(task);
-                // Whoever comes in between finds nothing, and says so.
+                // If the caller runs the task again meanwhile, that run finds the slot empty and sets `is_broken`.
                 if slot.replace(State::Result(result)).is_none() {
                     is_broken.store(true, Ordering::Relaxed);
                 }
@@ -111,7 +111,7 @@ mod with_atomics {
             Self(TryLock::new(value))
         }
 
-        /// What was there, if nobody else is looking: only who runs the same task could be.
+        /// Swaps the value; `None` if another thread holds the lock, which only a second run of the same task can do.
         pub(super) fn replace(&self, value: T) -> Option<T> {
             Some(core::mem::replace(&mut *self.0.try_lock()?, value))
         }
@@ -172,7 +172,7 @@ mod without_atomics {
             Self(RefCell::new(value))
         }
 
-        /// What was there, if nobody else is looking.
+        /// Swaps the value; `None` if it is borrowed, which only a second run of the same task can do.
         pub(super) fn replace(&self, value: T) -> Option<T> {
             Some(core::mem::replace(&mut *self.0.try_borrow_mut().ok()?, value))
         }

@@ -202,9 +202,8 @@ impl TriangleTest {
 
     /// The hit with a triangle that passed, or [`Hit::MISS`].
     ///
-    /// Out of line: rare, and inside it would take the registers from the filter. The triangle
-    /// is read anew and the hit comes back in registers: what is stored number by number and
-    /// loaded in pieces is waited for.
+    /// Out of line: rare, and inside it would take the registers from the filter. The triangle is read again and the
+    /// hit is returned in registers, because a load that spans several stores waits for all of them.
     #[inline(never)]
     pub(crate) fn decide(&self, mesh: &TriangleMesh<'_>, id: u32) -> Hit {
         let hit = mesh.triangle(id).and_then(
@@ -234,7 +233,7 @@ impl TriangleTest {
     #[inline(always)]
     fn resolve(&self, &[a, b, c]: &Triangle) -> Option<TriangleHit> {
         let triangle = [self.axis.to_z(a), self.axis.to_z(b), self.axis.to_z(c)];
-        // Said for each: what is mapped over arrays is called, corner by corner.
+        // Written out three times: the compiler does not inline `map` over arrays.
         let [a, b, c] = [self.shear(triangle[0]), self.shear(triangle[1]), self.shear(triangle[2])];
 
         // Compute the edge functions; drop what has two of opposite signs.

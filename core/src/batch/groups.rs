@@ -15,7 +15,7 @@ struct Asked<'r, 'm, 'q, B, A, const ASKS: bool> {
     tree: &'r Bvh<'m>,
     batch: &'r mut B,
     options: &'r mut QueryOptions<'q>,
-    /// Whether the options change nothing.
+    /// True if the options change nothing.
     is_plain: bool,
     answers: PhantomData<A>,
 }

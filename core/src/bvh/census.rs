@@ -124,6 +124,7 @@ impl Kernel for KeysTask<'_> {
             for keys in eights {
                 let mut is_done = false;
                 if HAS_VECTORS {
+                    // Load the corners of eight triangles.
                     let (head, tail) =
                         (four(simd, &wide, first), four(simd, &wide, first.wrapping_add(4)));
                     let a = Corners::join(head[0], tail[0]);
@@ -131,6 +132,7 @@ impl Kernel for KeysTask<'_> {
                     let c = Corners::join(head[2], tail[2]);
                     let largest = a.largest().max(b.largest()).max(c.largest());
                     if largest.simd_le(limit).all_true() {
+                        // Find their boxes, and grow the box of all.
                         let min = [
                             a.x.lesser(b.x).lesser(c.x),
                             a.y.lesser(b.y).lesser(c.y),
@@ -147,6 +149,7 @@ impl Kernel for KeysTask<'_> {
                             high[1].greater(max[1]),
                             high[2].greater(max[2]),
                         ];
+                        // Write the keys, and count the bin of each.
                         *keys = self.rule.of_eight(simd, min, max).into();
                         for key in &*keys {
                             self.add(*key);
@@ -154,6 +157,7 @@ impl Kernel for KeysTask<'_> {
                         is_done = true;
                     }
                 }
+                // One by one if a corner is not finite or the triangles cannot be read as vectors.
                 if !is_done {
                     self.one_by_one(&piece, first, keys)?;
                 }

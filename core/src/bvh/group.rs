@@ -45,7 +45,7 @@ const fn octets(rays: u64) -> u32 {
 
 /// A child that waits, and the rays that met it.
 #[derive(Clone, Copy)]
-pub(crate) struct Waiting {
+pub(crate) struct GroupEntry {
     /// Node and slot.
     place: u32,
     /// The least distance at which one of the rays enters.
@@ -53,16 +53,16 @@ pub(crate) struct Waiting {
     rays: u64,
 }
 
-impl Waiting {
+impl GroupEntry {
     const NONE: Self = Self { place: 0, near: 0.0, rays: 0 };
 }
 
 /// The stack of a group.
-pub(crate) struct Stack([Waiting; STACK]);
+pub(crate) struct Stack([GroupEntry; STACK]);
 
 impl Stack {
     pub(crate) const fn new() -> Self {
-        Self([Waiting::NONE; STACK])
+        Self([GroupEntry::NONE; STACK])
     }
 }
 
@@ -128,16 +128,19 @@ impl<const ANY: bool> Descent<'_, '_, ANY> {
             match child {
                 Child::Inner(number) => {
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
+                    // Decode the eight boxes.
                     let boxes = WideBoxes::decode(simd, node, rays.center, rays.spread);
                     let count = mask.count_ones();
                     // Mask unused slots: their boxes are inside out, but this slab test sorts near and far side
                     // itself and would meet them.
                     let (mut some, mut all, mut enter) = (node.used(), 0, f32x8::splat(simd, 0.0));
+                    // Intersect the beam with them, if the rays are many.
                     if count > FEW_RAYS {
                         let beam = boxes.meet_beam(simd, &beam);
                         some &= beam.some;
                         (all, enter) = (some & beam.all, beam.enter);
                     }
+                    // Intersect the rays with the boxes that the beam did not decide.
                     let unsure = some & !all;
                     let mut met = if count <= octets(mask) * unsure.count_ones() {
                         one_by_one(simd, &boxes, rays, mask)
@@ -154,12 +157,13 @@ impl<const ANY: bool> Descent<'_, '_, ANY> {
                         slots &= slots - 1;
                         let (rays, near) = (by[slot as usize % WIDTH], near[slot as usize % WIDTH]);
                         let place = number << 3 | slot;
-                        push::<ANY>(stack, &mut top, base, Waiting { place, near, rays });
+                        push::<ANY>(stack, &mut top, base, GroupEntry { place, near, rays });
                     }
                 }
                 Child::Leaf { first, count } => {
                     let ids = bvh.leaf(first, count);
                     if mask.count_ones() <= octets(mask) * count {
+                        // Few rays: filter all triangles of the leaf for each ray.
                         let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
                         let triangles = Eight::of(simd, mesh, lanes, ids.len());
                         let mut rest = mask;
@@ -177,6 +181,7 @@ impl<const ANY: bool> Descent<'_, '_, ANY> {
                             }
                         }
                     } else {
+                        // Many rays: filter each triangle for eight rays at a time.
                         for &id in ids {
                             let Some(triangle) = mesh.triangle(id) else { continue };
                             let corners = crate::filter::splat(simd, &triangle);
@@ -195,6 +200,7 @@ impl<const ANY: bool> Descent<'_, '_, ANY> {
                             }
                         }
                     }
+                    // Decide in f64 what passed.
                     rays.decide::<S, ANY>(simd, mesh);
                 }
             }
@@ -306,7 +312,12 @@ fn side_by_side<S: Simd>(
 
 /// Pushes a child; for closest hits behind those of the same node that begin farther away.
 #[inline(always)]
-fn push<const ANY: bool>(stack: &mut [Waiting], top: &mut usize, base: usize, waiting: Waiting) {
+fn push<const ANY: bool>(
+    stack: &mut [GroupEntry],
+    top: &mut usize,
+    base: usize,
+    waiting: GroupEntry,
+) {
     let mut at = *top;
     if at >= stack.len() {
         return;

@@ -13,8 +13,8 @@
 //! - Of the nodes above `R` roots, `a` have eight children and `b` have fewer, all of them roots. Then
 //!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. A root and its part of those are
 //!   11 / 7 nodes.
-//! - There is no more than one root for [`PRICE`] triangles ([`units`](super::units)). The rest of
-//!   [`SHARE`] nodes a triangle pays for the nodes below roots: a root that would have more is built
+//! - There is no more than one root for [`TRIANGLES_PER_ROOT`] triangles ([`units`](super::units)). The rest of
+//!   [`NODES`] nodes a triangle is left for the nodes below roots: a root that would have more is built
 //!   again by halving its entries ([`most_of_root`]).
 //! - One more root may stand behind the crowded bins of the tree, and behind those of each division of a
 //!   crowded bin. A crowded bin has more than [`CROWD`] triangles, and at most [`DIVISIONS`] of them that are
@@ -29,7 +29,7 @@ use crate::blob::HEADER_BYTES;
 use super::node::Node;
 
 /// Triangles for each root, at least, on average.
-pub(crate) const PRICE: usize = 24;
+pub(crate) const TRIANGLES_PER_ROOT: usize = 24;
 
 /// Triangles of a root, at most.
 pub(crate) const MOST_ROOT: usize = 128;
@@ -37,18 +37,18 @@ pub(crate) const MOST_ROOT: usize = 128;
 /// Triangles of each root of a unit that has more than [`MOST_ROOT`], at least.
 pub(crate) const LEAST_PIECE: usize = 32;
 
-const _: () = assert!(PRICE <= LEAST_PIECE && 2 * LEAST_PIECE <= MOST_ROOT);
+const _: () = assert!(TRIANGLES_PER_ROOT <= LEAST_PIECE && 2 * LEAST_PIECE <= MOST_ROOT);
 
 /// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above and below them may cost.
-const SHARE: u64 = 24_780;
+const NODES: u64 = 24_780;
 const WHOLE: u64 = 168_000;
 
-/// The part of [`SHARE`] that pays for the nodes below the roots.
-const SHARE_BELOW: u64 = SHARE - WHOLE * 11 / 7 / PRICE as u64;
+/// The part of [`NODES`] for the nodes below the roots.
+const NODES_BELOW: u64 = NODES - WHOLE * 11 / 7 / TRIANGLES_PER_ROOT as u64;
 
 /// The most nodes below a root of so many triangles.
 pub(crate) const fn most_of_root(triangles: usize) -> usize {
-    (SHARE_BELOW * triangles as u64 / WHOLE) as usize
+    (NODES_BELOW * triangles as u64 / WHOLE) as usize
 }
 
 /// Bins with more entries are crowded: they come first, and are divided again above [`MOST_UNIT`].
@@ -56,7 +56,7 @@ pub(crate) const CROWD: usize = 4096;
 
 /// Entries of a unit of bins that is not divided, at most: a bin, and what is too little for a root before
 /// and behind it.
-pub(crate) const MOST_UNIT: usize = CROWD + 2 * PRICE;
+pub(crate) const MOST_UNIT: usize = CROWD + 2 * TRIANGLES_PER_ROOT;
 
 /// Divisions of a bin inside one another, at most.
 pub(crate) const DIVISIONS: u32 = 5;
@@ -86,13 +86,13 @@ const fn late_roots(triangles: u64) -> u64 {
 
 /// The most nodes below the roots that hold so many triangles.
 pub(crate) const fn most_below(triangles: u64) -> u64 {
-    (triangles * SHARE_BELOW).div_ceil(WHOLE)
+    (triangles * NODES_BELOW).div_ceil(WHOLE)
 }
 
 /// The most nodes of a tree over so many triangles.
 pub(crate) const fn most_nodes(triangles: u64) -> u64 {
     // The root of all is one more.
-    (triangles * SHARE).div_ceil(WHOLE) + 11 * late_roots(triangles) / 7 + 3
+    (triangles * NODES).div_ceil(WHOLE) + 11 * late_roots(triangles) / 7 + 3
 }
 
 /// Bytes of an index with so many ids and nodes.

@@ -12,6 +12,17 @@
 //! Each triangle stands in one leaf. So index and scratch are bounded by the number of triangles alone,
 //! wherever they lie ([`layout`]).
 //!
+//! The modules:
+//!
+//! ```text
+//! format         node, layout, validate
+//! build          build: census (key), units, crowd, sort, roots (subtree), top; high/ for quality `high`
+//! one ray        search, walk (slab; shape_leaf for shapes)
+//! batches        batch: order, rays, group (boxes)
+//! points         nearest
+//! moved meshes   refit
+//! ```
+//!
 //! Sources: binning by Morton code with SAH on top, Pantaleoni and Luebke 2010 and Garanzha et al. 2011;
 //! nodes with quantised boxes, Ylitie et al. 2017. Departures: bins are sorted in cache, no level of the tree
 //! is bound to a level of the grid, and leaves hold ids, not triangles.
@@ -93,7 +104,7 @@ impl<'a> Bvh<'a> {
     /// Lends a stack that is enough for a ray or a point: a small one for nearly all trees, which is sooner
     /// set to zeros.
     #[inline(always)]
-    pub(crate) fn with_stack<R>(&self, walk: impl FnOnce(&mut [walk::Waiting]) -> R) -> R {
+    pub(crate) fn with_stack<R>(&self, walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
         if self.levels <= walk::FEW_LEVELS {
             walk(&mut [0; walk::SMALL_STACK])
         } else {
@@ -142,6 +153,6 @@ impl<'a> Bvh<'a> {
 
 /// Out of line, or shallow trees would have the large stack, too.
 #[inline(never)]
-fn with_deep_stack<R>(walk: impl FnOnce(&mut [walk::Waiting]) -> R) -> R {
+fn with_deep_stack<R>(walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
     walk(&mut [0; walk::STACK])
 }

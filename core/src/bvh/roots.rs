@@ -2,7 +2,7 @@
 //! ([`top`](super::top)) treats each as one item.
 //!
 //! ```text
-//! for each unit (a crowded bin, or bins side by side that pay for a root):
+//! for each unit (a crowded bin, or bins side by side that make up a root):
 //!     crowded: a box of its own around the centres, new keys, new bins; then these
 //!     else:    sort by key, cut where high bits of the key change, make a subtree of each part
 //!
@@ -12,7 +12,7 @@
 //!
 //! Binning again copies a unit's entries to the start of `spare` and back. All units use that start, so a mesh of several
 //! crowded units touches less of `spare` than it has entries. The record of a root is 112 bytes, written over entries that
-//! were used up: [`PRICE`](super::layout::PRICE) of them for each root, 192 bytes.
+//! were used up: [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192 bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
 
@@ -26,16 +26,18 @@ use crate::simd::{SimdLevel, dispatch};
 
 use super::crowd::{self, NewKeys};
 use super::key::{KEY_BITS, Keys};
-use super::layout::{CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_ROOT, MOST_UNIT, PRICE, bin_bits};
+use super::layout::{
+    CROWD, DIVISIONS, Entry, LEAST_PIECE, MOST_ROOT, MOST_UNIT, TRIANGLES_PER_ROOT, bin_bits,
+};
 use super::node::Node;
 use super::sort::sort;
 use super::subtree::{Build, Cut, Subtree};
-use super::units::{Savings, starts};
+use super::units::{RootBudget, starts};
 
 /// The record of a root: its node, its box and its counts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, FromBytes, Immutable, IntoBytes)]
-pub(crate) struct Record {
+pub(crate) struct RootRecord {
     pub(crate) node: Node,
     pub(crate) min: [f32; 3],
     pub(crate) max: [f32; 3],
@@ -46,11 +48,11 @@ pub(crate) struct Record {
 }
 
 /// A record in entries.
-pub(crate) const RECORD: usize = size_of::<Record>() / size_of::<Entry>();
+pub(crate) const RECORD: usize = size_of::<RootRecord>() / size_of::<Entry>();
 
-const _: () = assert!(size_of::<Record>() == 112 && RECORD <= PRICE);
+const _: () = assert!(size_of::<RootRecord>() == 112 && RECORD <= TRIANGLES_PER_ROOT);
 
-impl Record {
+impl RootRecord {
     /// Writes it to the start of some entries, if it has room there.
     pub(crate) fn write(&self, entries: Option<&mut [Entry]>) {
         if let Some(slot) = entries.and_then(|entries| entries.first_chunk_mut::<RECORD>()) {
@@ -91,7 +93,7 @@ pub(crate) struct Roots<'w> {
     pub(crate) node_count: u32,
     pub(crate) root_count: u32,
     /// The record of the last root.
-    pub(crate) last: Record,
+    pub(crate) last: RootRecord,
 }
 
 impl<'w> Roots<'w> {
@@ -108,7 +110,7 @@ impl<'w> Roots<'w> {
         counts: &'w mut [u32],
         subtree: &'w mut Subtree,
     ) -> Self {
-        let last = Record::new_zeroed();
+        let last = RootRecord::new_zeroed();
         let (node_count, root_count) = (0, 0);
         Self {
             mesh,
@@ -193,7 +195,7 @@ impl<'w> Roots<'w> {
         let (node, &[x, y, z, _, u, v, w, _]) = self.subtree.root();
         let (min, max) = ([x, y, z], [-u, -v, -w]);
         let levels = self.subtree.levels();
-        let record = Record { node: *node, min, max, count, levels };
+        let record = RootRecord { node: *node, min, max, count, levels };
         let start = self.root_count as usize * RECORD;
         record.write(self.entries.get_mut(start..));
         self.last = record;
@@ -205,7 +207,7 @@ impl<'w> Roots<'w> {
         let bits = bin_bits(range.len() as u64).min(KEY_BITS);
         let shift = KEY_BITS - bits;
         self.bin(range.clone(), centers, bits);
-        let mut savings = Savings::default();
+        let mut budget = RootBudget::default();
         let mut start = range.start;
         while start < range.end {
             let mut end = self.bin_end(start..range.end, shift);
@@ -213,7 +215,7 @@ impl<'w> Roots<'w> {
                 // Seams are counted from the first entry of the tree, not from that of this task.
                 let before = self.first as usize;
                 while end < range.end
-                    && !savings.pay(&(before + start..before + end), range.end - end)
+                    && !budget.take_roots(&(before + start..before + end), range.end - end)
                 {
                     end = self.bin_end(end..range.end, shift);
                 }

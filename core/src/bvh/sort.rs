@@ -33,13 +33,16 @@ fn pass(from: &[Entry], to: &mut [Entry], shift: u32, width: u32) {
     let mut heads = [0_u16; COUNTS];
     let mask = (1 << width) - 1;
     let digit = |entry: &Entry| (entry[0] >> shift & mask) as usize % COUNTS;
+    // Count the entries of each digit.
     for entry in from {
         heads[digit(entry)] += 1;
     }
+    // Sum up the counts: where each digit starts.
     let mut end = 0;
     for head in heads.iter_mut().take(mask as usize + 1) {
         end += core::mem::replace(head, end);
     }
+    // Move the entries.
     for entry in from {
         let head = &mut heads[digit(entry)];
         if let Some(slot) = to.get_mut(*head as usize) {

@@ -1,12 +1,13 @@
 //! Groups bins into units, each of which is cut into roots by itself.
 //!
 //! A unit should be a single bin: neighbours in Morton order may lie far apart, and a root over both has a large box.
-//! But the memory bound allows only one root for [`PRICE`] triangles. So a balance is kept, like savings: each unit
-//! adds its triangles and subtracts [`PRICE`] for each root. A bin for which the balance is too small joins the next.
+//! But the memory bound allows only one root for [`TRIANGLES_PER_ROOT`] triangles. A running balance keeps to it: each
+//! unit adds its triangles and subtracts that number for each of its roots. A bin that would make the balance negative
+//! joins the next bin.
 
 use core::ops::Range;
 
-use super::layout::{CROWD, LEAST_PIECE, MOST_ROOT, PRICE};
+use super::layout::{CROWD, LEAST_PIECE, MOST_ROOT, TRIANGLES_PER_ROOT};
 
 /// Where the entries of crowded bins start, and where those of the others: crowded bins come first, so
 /// that the others lie side by side.
@@ -14,28 +15,30 @@ pub(crate) fn starts(sizes: &[u32]) -> [u32; 2] {
     [0, sizes.iter().filter(|&&size| size as usize > CROWD).sum()]
 }
 
-/// Triangles that are saved up for roots.
+/// The balance: triangles that count towards further roots.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Savings(usize);
+pub(crate) struct RootBudget(usize);
 
-impl Savings {
+impl RootBudget {
     /// Subtracts the roots of a unit from the balance and returns true; returns false if the balance is too small, or
     /// would be too small for a root over the `rest` entries behind the unit.
-    pub(crate) fn pay(&mut self, unit: &Range<usize>, rest: usize) -> bool {
+    pub(crate) fn take_roots(&mut self, unit: &Range<usize>, rest: usize) -> bool {
         let count = unit.len();
         let roots = if count > MOST_ROOT { count / LEAST_PIECE } else { 1 };
-        let Some(left) = (self.0 + count).checked_sub(roots * PRICE) else { return false };
+        let Some(left) = (self.0 + count).checked_sub(roots * TRIANGLES_PER_ROOT) else {
+            return false;
+        };
         let left = if is_seam(unit) { 0 } else { left };
-        let is_paid = rest == 0 || left + rest >= PRICE;
-        if is_paid {
+        let is_enough = rest == 0 || left + rest >= TRIANGLES_PER_ROOT;
+        if is_enough {
             self.0 = left;
         }
-        is_paid
+        is_enough
     }
 }
 
-/// Returns true if a task may end behind this unit. Nothing is saved beyond it, so that a task
-/// pays for its roots with its own triangles.
+/// Returns true if a task may end behind this unit. The balance starts again behind it, so that the roots of a task
+/// depend on its own triangles alone.
 pub(crate) const fn is_seam(unit: &Range<usize>) -> bool {
     unit.end - unit.start > CROWD || unit.start / SEAM != unit.end / SEAM
 }
@@ -44,14 +47,14 @@ pub(crate) const fn is_seam(unit: &Range<usize>) -> bool {
 pub(crate) const SEAM: usize = 16_384;
 
 /// The units of some bins, given how many entries each bin has: first each crowded bin, then the
-/// others, gathered until their root is paid for. What is left over belongs to the last unit.
+/// others, gathered until the balance is enough for their root. What is left over belongs to the last unit.
 #[derive(Clone)]
 pub(crate) struct Units<'s> {
     sizes: &'s [u32],
     bin: usize,
     is_crowded: bool,
     start: usize,
-    savings: Savings,
+    budget: RootBudget,
     /// Entries of all bins.
     all: usize,
 }
@@ -59,7 +62,7 @@ pub(crate) struct Units<'s> {
 impl<'s> Units<'s> {
     pub(crate) fn new(sizes: &'s [u32]) -> Self {
         let all = sizes.iter().map(|&size| size as usize).sum();
-        Self { sizes, bin: 0, is_crowded: true, start: 0, savings: Savings::default(), all }
+        Self { sizes, bin: 0, is_crowded: true, start: 0, budget: RootBudget::default(), all }
     }
 
     /// The size of the next bin of its kind.
@@ -89,7 +92,7 @@ impl Iterator for Units<'_> {
         let mut end = start;
         while let Some(size) = self.next_bin() {
             end += size;
-            if size > CROWD || self.savings.pay(&(start..end), self.all - end) {
+            if size > CROWD || self.budget.take_roots(&(start..end), self.all - end) {
                 break;
             }
         }
@@ -110,7 +113,7 @@ mod tests {
     fn units(sizes: &[u32]) -> Vec<Range<usize>> {
         let all: usize = sizes.iter().map(|&size| size as usize).sum();
         let units: Vec<_> = Units::new(sizes).collect();
-        let (mut end, mut saved) = (0, 0);
+        let (mut end, mut balance) = (0, 0);
         let [_, others] = starts(sizes);
         for unit in &units {
             assert_eq!(unit.start, end, "{sizes:?}: {units:?}");
@@ -122,13 +125,16 @@ mod tests {
             if is_crowded {
                 continue;
             }
-            // Triangles pay for all roots but the only one, and one behind crowded bins.
+            // There are triangles for all roots but the only one, and one behind crowded bins.
             let roots = if unit.len() > MOST_ROOT { unit.len() / LEAST_PIECE } else { 1 };
             let is_last = unit.end == all && (units.len() == 1 || others > 0);
-            assert!(saved + unit.len() >= roots * PRICE || is_last, "{sizes:?}: {units:?}");
-            saved = (saved + unit.len()).saturating_sub(roots * PRICE);
-            // Nothing is saved beyond a seam.
-            saved = if is_seam(unit) { 0 } else { saved };
+            assert!(
+                balance + unit.len() >= roots * TRIANGLES_PER_ROOT || is_last,
+                "{sizes:?}: {units:?}"
+            );
+            balance = (balance + unit.len()).saturating_sub(roots * TRIANGLES_PER_ROOT);
+            // The balance starts again behind a seam.
+            balance = if is_seam(unit) { 0 } else { balance };
         }
         assert_eq!(end, all, "{sizes:?}: {units:?}");
         units
@@ -137,7 +143,7 @@ mod tests {
     #[expect(clippy::cast_possible_truncation, reason = "small")]
     #[test]
     fn triangles_pay_for_roots() {
-        let (price, crowd) = (PRICE as u32, CROWD as u32);
+        let (price, crowd) = (TRIANGLES_PER_ROOT as u32, CROWD as u32);
         assert_eq!(units(&[]), []);
         assert_eq!(units(&[0, 0, 0]), []);
         assert_eq!(units(&[0, 1, 0]), vec![0..1]);
@@ -155,7 +161,7 @@ mod tests {
         // Crowded ones come first, and a small rest stays by itself.
         let more = crowd as usize + 1;
         assert_eq!(units(&[1, crowd + 1, 2]), [0..more, more..more + 3]);
-        // Nothing is saved beyond a seam, so a rest behind one joins what lies before it.
+        // The balance starts again behind a seam, so a rest behind one joins what lies before it.
         assert_eq!(units(&[price - 1, crowd, price - 1]).len(), 1);
         let mut state = 1_u32;
         for _ in 0..if cfg!(miri) { 20 } else { 2000 } {

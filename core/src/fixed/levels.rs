@@ -59,7 +59,7 @@ impl Level {
         self.start as usize * WORD_BITS
     }
 
-    /// Whether any cell of a macrocell on the level above is full.
+    /// Returns true if any cell of a macrocell on the level above is full.
     fn any_in(&self, words: &[u64], [x, y, z]: [u32; 3], factor: u32) -> bool {
         let [width, height, depth] = self.resolution;
         let xs = span(x, factor, width);
@@ -135,7 +135,7 @@ impl Levels {
         self.all.get(level.wrapping_sub(1)).copied().unwrap_or(Level::NONE)
     }
 
-    /// Whether anything is in a macrocell.
+    /// Returns true if anything is in a macrocell.
     #[inline(always)]
     pub(super) fn is_full(&self, words: &[u64], level: usize, cell: [u32; 3]) -> bool {
         is_set(words, self.level(level).bit(cell))
@@ -196,9 +196,8 @@ impl Levels {
 
 /// Sets the bit of every macrocell that has a bit set below it.
 ///
-/// All rows of a row of macrocells are laid over each other first, 64 cells at a
-/// time. With a division for each full cell a build took 1.05 times as long on
-/// bunny, 1.04 on dragon, 1.01 on sponza.
+/// All rows of a row of macrocells are laid over each other first, 64 cells at a time: a division for each full cell
+/// takes longer.
 fn scale_down(below: &Level, from: &[u64], above: &Level, to: &mut [u64], factor: u32) {
     let [width, height, depth] = below.resolution;
     let [columns, rows, layers] = above.resolution;

@@ -132,7 +132,7 @@ impl<'s> Plan<'s> {
         header
     }
 
-    /// Whether the sizes are exact.
+    /// Returns true if the sizes are exact.
     pub(super) const fn is_exact(&self) -> bool {
         self.rows.is_some()
     }

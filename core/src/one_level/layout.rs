@@ -139,7 +139,7 @@ impl Layout {
         self.cells.div_ceil(WORD_BITS as u64) + 1
     }
 
-    /// Whether the number of every cell's bit fits a word of this machine.
+    /// Returns true if the number of every cell's bit fits a word of this machine.
     fn is_addressable(&self) -> bool {
         usize::try_from(self.cells + 2 * WORD_BITS as u64).is_ok()
     }

@@ -38,7 +38,7 @@ pub(crate) use build::{Overlay, Plan, Rows, build_under};
 pub(crate) use displacement::displace;
 use layout::Sections;
 pub(crate) use layout::{Layout, longest};
-pub(crate) use placed::Batch;
+pub(crate) use placed::PlacedBatch;
 pub(crate) use spread::{Spread, fill, mark};
 pub(crate) use triangles::MeshSpread;
 pub(crate) use validate::{check_header, slots_are_sound};
@@ -180,7 +180,7 @@ impl<'a> OneLevel<'a> {
         self.sections.references.get(start as usize..end as usize)
     }
 
-    /// Whether the domain bit of a cell is set.
+    /// Returns true if the domain bit of a cell is set.
     #[inline(always)]
     pub(crate) fn is_marked(&self, cell: [u32; 3]) -> bool {
         is_set(self.sections.domain_bits, self.bit(cell))

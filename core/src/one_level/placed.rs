@@ -1,9 +1,8 @@
-//! Primitives whose cells are found before the first of them is spread.
+//! Finds the cells of a batch of primitives before it spreads the first of them.
 //!
-//! How many cells a primitive has is as good as random, and what depends on it is a mispredicted
-//! branch: what was loaded and computed for the primitives behind it would have to
-//! be done again. So a pass goes from batch to batch, and the branches of a batch
-//! depend on what is in the first cache.
+//! The number of cells of a primitive is unpredictable, so a branch on it is often mispredicted, and the processor
+//! discards its work on the next primitives. A pass therefore finds the cells of a whole batch first, and branches on
+//! numbers in the L1 cache afterwards.
 
 use core::ops::Range;
 
@@ -17,7 +16,7 @@ use crate::error::Error;
 /// The cells of a primitive: the row and the place in it of the first, and how
 /// many more there are on each axis.
 #[derive(Debug, Clone, Copy)]
-struct Placed {
+struct CellSpan {
     row: usize,
     x: u32,
     more: u32,
@@ -37,7 +36,7 @@ const XZ: u32 = X | Z;
 const YZ: u32 = Y | Z;
 const XYZ: u32 = X | Y | Z;
 
-impl Placed {
+impl CellSpan {
     /// More cells on each axis.
     const fn more(self) -> [u32; 3] {
         [self.more & MOST_MORE, self.more >> MORE_BITS & MOST_MORE, self.more >> (2 * MORE_BITS)]
@@ -51,7 +50,7 @@ impl Placed {
 }
 
 /// The cells of primitives side by side, in eights.
-pub(crate) struct Batch {
+pub(crate) struct PlacedBatch {
     pub(super) rows: [[u32; LANES]; Self::EIGHTS],
     pub(super) xs: [[u32; LANES]; Self::EIGHTS],
     pub(super) more: [[u32; LANES]; Self::EIGHTS],
@@ -60,9 +59,9 @@ pub(crate) struct Batch {
 }
 
 /// Progress is told at some places, all of which are a batch's first.
-const _: () = assert!(OFTEN.is_multiple_of(Batch::SIZE));
+const _: () = assert!(OFTEN.is_multiple_of(PlacedBatch::SIZE));
 
-impl Batch {
+impl PlacedBatch {
     /// As many as the bits that say which of them are placed.
     const SIZE: u32 = u64::BITS;
     const EIGHTS: usize = Self::SIZE as usize / LANES;
@@ -139,7 +138,7 @@ impl Batch {
                     visit(place, row + behind, x, length);
                 }
             };
-            // For the common shapes a straight way: 5 % of a build less than loops alone.
+            // Common shapes need no loops.
             match placed.more {
                 0 => show(&[0], 1),
                 X => show(&[0], 2),
@@ -162,11 +161,11 @@ impl Batch {
     }
 
     #[inline(always)]
-    fn get(&self, lane: usize) -> Option<Placed> {
+    fn get(&self, lane: usize) -> Option<CellSpan> {
         let row = *self.rows.as_flattened().get(lane)? as usize;
         let x = *self.xs.as_flattened().get(lane)?;
         let more = *self.more.as_flattened().get(lane)?;
-        (self.is_placed >> lane & 1 == 1).then_some(Placed { row, x, more })
+        (self.is_placed >> lane & 1 == 1).then_some(CellSpan { row, x, more })
     }
 
     /// Places one primitive after the other.

@@ -24,7 +24,7 @@ use crate::error::Error;
 use crate::lists::{ascends, pairs};
 use crate::mesh::TriangleMesh;
 
-/// Whether the header says what the mesh and Woo's rule say.
+/// Returns true if the header says what the mesh and Woo's rule say.
 pub(crate) fn check_header(
     header: &Header,
     lattice: &Lattice,
@@ -34,7 +34,7 @@ pub(crate) fn check_header(
 }
 
 impl OneLevel<'_> {
-    /// Whether this is what a build makes of the mesh; the error names the first byte that is not.
+    /// Returns true if this is what a build makes of the mesh; the error names the first byte that is not.
     pub(crate) fn validate(
         &self,
         header: &Header,
@@ -134,7 +134,7 @@ impl OneLevel<'_> {
     }
 }
 
-/// Whether a table is as displaced rows leave it: a row without marked cells has offset 0, every
+/// Returns true if a table is as displaced rows leave it: a row without marked cells has offset 0, every
 /// marked cell has a slot of its own, and of the slots those are full.
 ///
 /// Finds accidents. Slot numbers can be chosen so that their scrambled sums agree, so a proof counts

@@ -25,7 +25,7 @@ impl Overlap {
         Self { corners, edges, normal: edges[0].cross(edges[1]), slack }
     }
 
-    /// Whether the triangle and a box share a point. The triangle's own box must overlap it.
+    /// Returns true if the triangle and a box share a point. The triangle's own box must overlap it.
     pub(super) fn with(&self, center: Vec3A, half: Vec3A) -> bool {
         let [a, b, c] = self.corners.map(|corner| corner - center);
 

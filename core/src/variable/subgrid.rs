@@ -56,7 +56,7 @@ impl Frame {
         Self { low, high: core::array::from_fn(|k| high[k].max(low[k])), resolution: [1; 3] }
     }
 
-    /// Whether this is the frame around what primitives reach of a cell, whatever its resolution.
+    /// Returns true if this is the frame around what primitives reach of a cell, whatever its resolution.
     pub(super) fn is_around(&self, reach: &Aabb, cell: [u32; 3]) -> bool {
         *self == Self { resolution: self.resolution, ..Self::around(reach, cell) }
     }
@@ -218,7 +218,7 @@ impl<'a> Subgrid<'a> {
         self.domain_bits.iter().map(|word| word.count_ones()).sum()
     }
 
-    /// Whether its sections are as displaced rows leave them, whatever is listed.
+    /// Returns true if its sections are as displaced rows leave them, whatever is listed.
     pub(super) fn is_sound(&self) -> bool {
         let hash = self.hash;
         let is_cut = hash.first() == Some(&0)

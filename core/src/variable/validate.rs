@@ -15,7 +15,7 @@
 //! a query reads a list from its start to its end, however long it is.
 
 use super::subgrid::Subgrid;
-use super::{Content, Variable};
+use super::{CellContent, Variable};
 use crate::aabb::Aabb;
 use crate::bits::{WORD_BITS, extent};
 use crate::blob::{Header, corrupt};
@@ -28,7 +28,7 @@ use crate::one_level::{check_header, slots_are_sound};
 use crate::survey::{boxes, reference_limit};
 
 impl Variable<'_> {
-    /// Whether this is what a build makes of the mesh.
+    /// Returns true if this is what a build makes of the mesh.
     pub(crate) fn validate(
         &self,
         header: &Header,
@@ -47,7 +47,7 @@ impl Variable<'_> {
             match self.content(cell) {
                 None if self.top.is_marked(cell) => return Err(at(self.top.lists())),
                 None => {}
-                Some(Content::List(ids)) => {
+                Some(CellContent::List(ids)) => {
                     let covers = |&id: &u32| {
                         let bounds = mesh.corners(id).and_then(Aabb::of);
                         bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
@@ -58,7 +58,7 @@ impl Variable<'_> {
                     listed += ids.len() as u64;
                     words_of_cells += ids.len() as u64;
                 }
-                Some(Content::Subgrid(words)) => {
+                Some(CellContent::Subgrid(words)) => {
                     let grid = Subgrid::open(words).ok_or(at(words))?;
                     let inside = Inside { grid, cell, lattice, mesh };
                     let in_cells = inside.listed().ok_or(at(words))?;
@@ -79,7 +79,7 @@ impl Variable<'_> {
         for (_, bounds) in boxes(mesh) {
             for cell in lattice.range(&bounds).cells() {
                 match self.content(cell) {
-                    Some(Content::Subgrid(words)) => {
+                    Some(CellContent::Subgrid(words)) => {
                         let grid = Subgrid::open(words).ok_or(at(words))?;
                         expected += grid.frame.range(cell, &lattice.reach(&bounds)).count();
                     }
@@ -90,7 +90,7 @@ impl Variable<'_> {
         if listed == expected { Ok(()) } else { Err(at(self.top.lists())) }
     }
 
-    /// Whether the table of the top cuts the pool into parts, as displaced rows leave it.
+    /// Returns true if the table of the top cuts the pool into parts, as displaced rows leave it.
     fn check_table(&self, header: &Header, lattice: &Lattice, blob: &[u8]) -> Result<(), Error> {
         let at = |section: usize, byte: usize| corrupt(section - blob.as_ptr().addr() + byte);
         let hash = self.top.hash();
@@ -176,7 +176,7 @@ impl Inside<'_> {
         are_right.then_some(listed)
     }
 
-    /// Whether a build makes this subgrid of the triangles in it.
+    /// Returns true if a build makes this subgrid of the triangles in it.
     fn is_built(&self, header: &Header) -> bool {
         let (mut count, mut all) = (0_u32, Aabb::EMPTY);
         for reach in self.reaches() {
@@ -194,7 +194,7 @@ impl Inside<'_> {
             && self.is_settled(header.density, count)
     }
 
-    /// Whether it is the finest of the grids that have not too many references.
+    /// Returns true if it is the finest of the grids that have not too many references.
     fn is_settled(&self, density: f32, count: u32) -> bool {
         let mut density = f64::from(density);
         let mut frame = self.grid.frame;

@@ -45,11 +45,11 @@ use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
 use crate::tasks::{self, run, task_count};
-use cut::Item;
-use grow::{Cursor, Grow, Grown, RECORD, Record};
+use cut::TriangleItem;
+use grow::{Cursor, Grow, Grown, RECORD, RangeRecord};
 
 /// The most nodes of a tree over so many triangles.
-const fn most_nodes(triangles: u64) -> u64 {
+const fn most_high_nodes(triangles: u64) -> u64 {
     let nodes = triangles.saturating_sub(2) / 7;
     if nodes < 1 { 1 } else { nodes }
 }
@@ -59,7 +59,7 @@ pub(crate) const fn bound(triangles: u32) -> (u64, u64) {
     let triangles = triangles as u64;
     // Never ask for 0 bytes of scratch: callers allocate what they are told.
     let items = if triangles < 1 { 1 } else { triangles };
-    (index_bytes(triangles, most_nodes(triangles)), section_bytes::<Item>(items))
+    (index_bytes(triangles, most_high_nodes(triangles)), section_bytes::<TriangleItem>(items))
 }
 
 /// Triangles of the ranges that tasks take, at most: a part of all, so that there are enough for many tasks.
@@ -96,7 +96,7 @@ pub(super) fn build_in(
     if available_bytes < needed_bytes {
         return Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes });
     }
-    let items = match split_mut::<Item>(scratch, triangles.into()) {
+    let items = match split_mut::<TriangleItem>(scratch, triangles.into()) {
         Some((items, _)) => items,
         None => &mut [],
     };
@@ -127,7 +127,7 @@ pub(super) fn build_in(
     watch.at(TOP)?;
     let scene = Lattice::pad(&bounds);
     let extent = scene.size().max_element();
-    let work = Work { least: extent * LEAST_NODE, unit: inverse_power(extent), tasks };
+    let work = HighInputs { least: extent * LEAST_NODE, unit: inverse_power(extent), tasks };
     let (node_count, levels) = work.make(items, ids, nodes, control, watch)?;
 
     watch.at(DONE)?;
@@ -167,14 +167,14 @@ struct ItemsTask<'w> {
     mesh: &'w TriangleMesh<'w>,
     flags: BuildFlags,
     first: u32,
-    items: &'w mut [Item],
+    items: &'w mut [TriangleItem],
 }
 
 /// Writes the items of all triangles that are finite, and returns how many there are and the box around them.
 fn boxes(
     mesh: &TriangleMesh<'_>,
     flags: BuildFlags,
-    items: &mut [Item],
+    items: &mut [TriangleItem],
     tasks: u32,
     control: &Control<'_>,
 ) -> Result<(usize, Aabb), Error> {
@@ -258,7 +258,7 @@ fn move_down<T: Copy>(all: &mut [T], from: usize, count: usize, to: usize) {
 }
 
 /// What the steps after the first pass share.
-struct Work {
+struct HighInputs {
     least: f32,
     unit: f32,
     tasks: u32,
@@ -266,16 +266,16 @@ struct Work {
 
 /// The work of a task: ranges that wait.
 struct RangesTask<'w> {
-    work: &'w Work,
+    work: &'w HighInputs,
     /// Before the first of its ranges.
     cursor: Cursor,
     /// The nodes at the top.
     top: &'w [Node],
-    /// How many ranges.
+    /// The number of ranges.
     ranges: u32,
     /// The number of its first item among all.
     start: u32,
-    items: &'w mut [Item],
+    items: &'w mut [TriangleItem],
     ids: &'w mut [u32],
     /// Where its ids lie in the index.
     first: u32,
@@ -304,7 +304,7 @@ impl Ranges {
             all.count += 1;
             all.end = waiter.end;
             all.triangles += triangles;
-            all.nodes += most_nodes(triangles.into()) as u32 - 1;
+            all.nodes += most_high_nodes(triangles.into()) as u32 - 1;
         }
         all
     }
@@ -336,18 +336,18 @@ impl RangesTask<'_> {
             node_count += nodes;
             id_count += ids;
             if let Some(place) = items.first_chunk_mut::<RECORD>() {
-                *place = transmute!(Record { root, nodes, levels, unused: [0; 2] });
+                *place = transmute!(RangeRecord { root, nodes, levels, unused: [0; 2] });
             }
         }
         node_count
     }
 }
 
-impl Work {
+impl HighInputs {
     /// Makes all nodes and ids; returns how many nodes and levels there are.
     fn make(
         &self,
-        items: &mut [Item],
+        items: &mut [TriangleItem],
         ids: &mut [u32],
         nodes: &mut [Node],
         control: &Control<'_>,
@@ -436,7 +436,8 @@ impl Work {
                 let Some(waiter) = cursor.next(top) else { break };
                 let behind = items.get(waiter.start as usize..).unwrap_or_default();
                 let Some(record) = behind.first_chunk::<RECORD>() else { break };
-                let Record { mut root, nodes: below, levels: levels_of, .. } = transmute!(*record);
+                let RangeRecord { mut root, nodes: below, levels: levels_of, .. } =
+                    transmute!(*record);
                 let moved = child - count;
                 if moved > 0 {
                     let from = child as usize..(child + below) as usize;
