@@ -1,4 +1,10 @@
 //! A batch of rays, group by group.
+//!
+//! ```text
+//! for each window of rays, as many as there is memory to sort:
+//!     sort them if they are scattered (order.rs)
+//!     for each 64: trace them as a group (group.rs), answer each in its place; those that cannot go along, alone
+//! ```
 
 use super::Bvh;
 use super::group::{Group, Stack};

@@ -1,4 +1,11 @@
 //! The boxes of a node as numbers, and the slab tests of rays and beams against them.
+//!
+//! ```text
+//! decode      side = byte * step + node's origin - origin of the group
+//! beam        the interval of all rays against eight boxes: which are met by none, which by all
+//! one ray     against eight boxes
+//! eight rays  against one box
+//! ```
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
@@ -51,13 +58,16 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
     /// The eight boxes of a node relative to a point, grown on each side.
     #[inline(always)]
     pub(crate) fn decode(simd: S, node: &Node, center: [f32; 3], growth: f32) -> Self {
+        // The exponents of x, y and z stand in the three low bytes.
         let origin = node.origin();
         let word = u32x8::splat(simd, node.word);
         let steps = [word << 23, word << 15, word << 7];
+        // Turn the bytes of both sides of an axis into numbers.
         let growth = f32x8::splat(simd, growth);
         let [a, b, c, d, e, f] = node.bounds;
         let (rows, others, last) = (bytes(simd, a, d), bytes(simd, b, e), bytes(simd, c, f));
         let rows = [rows, others, last];
+        // Scale them, and move them to the origin of the group.
         let mut boxes = Self { low: [growth; 3], high: [growth; 3] };
         for axis in 0..3 {
             let step = (steps[axis] & 0x7f80_0000).bitcast::<f32x8<S>>();

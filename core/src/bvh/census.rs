@@ -1,4 +1,9 @@
 //! The census: the key of every triangle, how many fall into each bin, and the box around them all.
+//!
+//! ```text
+//! for each task:              a share of the triangles, and counts of its own
+//!     for eight triangles:    load corners; find boxes; keys of their centres; count the bin of each key
+//! ```
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, u32x8};

@@ -1,4 +1,12 @@
 //! The queries of a scene: closest hit and any hit of a ray.
+//!
+//! ```text
+//! walk the tree of the scene; for each instance whose box the ray meets, about from near to far:
+//!     drop it by its mask
+//!     move the ray into the space of its object, in f64, and end it at the closest hit so far
+//!     a grid or shapes:   round the ray to f32, ask the object, move the `t` of its hit back
+//!     a scene:            do the same there, with the ray still in f64
+//! ```
 
 use core::fmt;
 

@@ -1,4 +1,11 @@
-//! Building, opening, proving and moving scenes.
+//! Builds, opens, proves and refits scenes.
+//!
+//! ```text
+//! build   index | room for the tree ... | table | boxes | instances |
+//!         compute boxes and instances at the end of the index, build the tree over the boxes at its start
+//!         | tree | table | boxes | instances |        close the gap
+//! refit   compute the boxes again, then those of the tree's nodes
+//! ```
 
 use core::mem::offset_of;
 
