@@ -32,7 +32,7 @@ typedef struct {
 hgrid_mesh mesh_of(const scene *s);
 
 /* Builds on so many threads, as far as the method can use them, or ends the program with the reason.
- * The progress may be NULL: nobody waits. */
+ * The progress may be NULL: then none is reported. */
 built_grid build_grid(const hgrid_mesh *mesh, const hgrid_config *config, uint32_t threads,
                       progress *p);
 

@@ -137,7 +137,7 @@ static camera camera_of(const hgrid_grid *grid)
 
 /* Maps the file and opens the grid in it: nothing is read and nothing is copied until a ray comes by.
  *
- * This file has just been written by a process that we trust, and nobody changes it. A file that
+ * A process that we trust has just written this file, and no other changes it. A file that
  * others may write is not for mapping; and hgrid_validate would prove that it is sound. */
 static hgrid_grid map(const char *path)
 {

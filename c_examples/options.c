@@ -29,7 +29,7 @@ static const char HELP[] =
     "the work\n"
     "  --threads COUNT    that draw and, with bvh, build, 1 to 256; 1. The picture\n"
     "                     is the same with any number\n"
-    "  --progress         say how far it is, even where nobody sits at a terminal\n"
+    "  --progress         report progress even if standard error is no terminal\n"
     "  --help             this text\n"
     "\n"
     "Try: raytracer --shadows --ao 64 --threads 4\n"

@@ -27,7 +27,7 @@ typedef struct {
     uint32_t *tests, *steps;
     /* How many threads draw, at least 1. The picture does not depend on it. */
     uint32_t threads;
-    /* NULL: nobody waits. */
+    /* NULL: no progress is reported. */
     progress *progress;
 } picture_job;
 

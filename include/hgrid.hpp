@@ -1131,7 +1131,7 @@ public:
     }
     /// Opens a blob that brings its mesh, as `pack` makes them.
     static result<view> open(span<const byte> blob) noexcept { return open(blob, nullptr); }
-    /// Memory that nobody keeps: give it a name, or `grid::adopt` it.
+    /// A temporary would be freed at once: give the memory a name, or `grid::adopt` it.
     template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
     static result<view> open(Blob &&, const mesh &) = delete;
     /// The same.

@@ -1,8 +1,8 @@
 //! A bump allocator over words that the caller brought, for the structures whose size is known only
 //! when they are built.
 //!
-//! It only moves forward and hands out words that nobody else has. When it runs out it goes on
-//! counting: what a build used or would have needed is known at the end, to the word, either way.
+//! It only moves forward and hands out each word once. When it runs out it goes on counting, so that the words
+//! that a build used, or would have needed, are known at its end.
 //!
 //! ```text
 //! blob | header | fixed sections, if any | pool of words, list after list ->     | padding |

@@ -1,4 +1,4 @@
-//! Counting work the way the paper's Table 1 counts it, at no cost where nobody counts.
+//! Counts work as the paper's Table 1 does, at no cost for queries without counters.
 
 /// Work done by queries, summed over all of them, as in the paper's Table 1.
 #[repr(C)]

@@ -91,7 +91,7 @@ impl SimdLevel {
     }
 }
 
-/// True if the target is a microcontroller, where flash is dearer than a few instructions a ray.
+/// True if the target is a microcontroller, where flash matters more than a few instructions a ray.
 pub(crate) const IS_SMALL: bool = cfg!(all(target_os = "none", target_pointer_width = "32"));
 
 /// True if the target has vectors at all. Without them eight or sixteen lanes one after the other
@@ -148,7 +148,7 @@ mod machine {
     pub(super) const BASE: SimdLevel = SimdLevel::Sse2;
 
     /// The answer of [`ask`], for an instruction that takes a hundred cycles and under a hypervisor
-    /// thousands. Whoever comes first writes what all others would.
+    /// thousands. The first thread writes what all others would write.
     static DETECTED: AtomicU8 = AtomicU8::new(UNKNOWN);
     const UNKNOWN: u8 = u8::MAX;
 

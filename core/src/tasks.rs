@@ -1,6 +1,6 @@
 //! Work cut into tasks that the caller runs, on threads of the caller's if it has any.
 //!
-//! Every task owns the data that it changes. Whoever runs a task takes it out of its slot: a second run finds
+//! Every task owns the data that it changes. The thread that runs a task takes it out of its slot: a second run finds
 //! the slot empty, and a task that was never run is still there at the end. [`Shared`] holds words that all
 //! tasks write, no two of them the same word.
 //!

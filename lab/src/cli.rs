@@ -26,13 +26,13 @@ use crate::compare::first::COMMAND as FIRST_BUILD;
 use crate::compare::peers::Peer;
 use crate::compare::workloads::Workload;
 
-/// The picture that is written when nobody names one.
+/// The picture that is written by default.
 pub const DEFAULT_OUTPUT: &str = "hgrid.png";
 
-/// The folder that figures are written into when nobody names one.
+/// The folder that figures are written into by default.
 pub const DEFAULT_FOLDER: &str = "figures";
 
-/// The scene that is rendered when nobody names one.
+/// The scene that is rendered by default.
 pub const DEFAULT_SCENE: &str = "procedural:knot:500K";
 
 /// Ray tracing with trees and hashed grids: renders, packs, measures.

@@ -60,7 +60,7 @@ fn has_no_holes(mesh: &Mesh, rays: usize) {
     let mut holes = 0;
     for i in 0..rays {
         let [a, b] = edges[random.below(edges.len())].map(|vertex| mesh.positions[vertex as usize]);
-        // Not closer to a vertex than rounding may move the ray: what covers that, nobody asked.
+        // Stay away from vertices by more than rounding moves the ray: there it may pass by the surface.
         let along = 0.001 + 0.998 * random.unit();
         let mut target: [f32; 3] = std::array::from_fn(|k| a[k] + (b[k] - a[k]) * along);
         if random.below(4) == 0 {

@@ -186,7 +186,7 @@ static void counters_add_up(hgrid_coherence coherence)
     CHECK(work.grid_steps == expected_work.grid_steps + 3);
     CHECK(memcmp(&occluded_work, &expected_occluded_work, sizeof occluded_work) == 0);
 
-    /* Options without counters are as good as none. */
+    /* Options without counters change nothing. */
     options.counters = NULL;
     memset(hits, 0xc7, sizeof hits);
     EXPECT(HGRID_OK, hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, coherence, &options));

@@ -95,7 +95,7 @@ static void macros_are_no_less_than_the_function(void)
     }
 }
 
-/* Too little scratch is no error, but as good as none. */
+/* Too little scratch is no error: it is not used. */
 static void sizes_are_told_with_any_scratch(void)
 {
     for (int method = 0; method < METHODS; method++) {

@@ -153,7 +153,7 @@ static void a_blob_opens_elsewhere(void)
     EXPECT_PROOF(HGRID_OK, &opened);
     check_same(&opened);
 
-    /* Bytes behind the blob are nobody's business. */
+    /* Bytes behind the blob are ignored. */
     unsigned char *longer = (unsigned char *)guarded(built.index_bytes + 64);
     memcpy(longer, blob, built.index_bytes);
     EXPECT(HGRID_OK, hgrid_open(longer, built.index_bytes + 64, &mesh, &opened));

@@ -54,7 +54,7 @@ fn a_packed_blob_needs_nothing_else() {
                 assert_eq!(packed.intersect(&ray), grid.intersect(&ray));
                 oracle::check(&packed, &ray);
             }
-            // It is a blob like any other, for whoever has the mesh; and it can be packed again.
+            // With the mesh it opens as any other blob, and it can be packed again.
             let with_mesh = Grid::open(packed.blob(), *grid.mesh()).unwrap();
             prove(&with_mesh).unwrap();
             let mut again = memory(packed.packed_bytes());

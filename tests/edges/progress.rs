@@ -1,4 +1,4 @@
-//! Builds that are watched: what is done grows to exactly 1, and whoever has enough may say so.
+//! Builds with a progress callback: progress grows to exactly 1, and the callback may cancel.
 
 use std::cell::{Cell, RefCell};
 

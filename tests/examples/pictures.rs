@@ -139,7 +139,7 @@ const FACES: [&[u8]; 7] = [
     &[0, 4, 8],
 ];
 
-/// The house as text, faces before vertices, with a comment and an element that nobody asked for.
+/// The house as text, faces before vertices, with a comment and an element that the loader skips.
 pub(crate) fn ascii() -> Vec<u8> {
     let mut text = String::from(
         "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nelement face 7\r\n\

@@ -53,7 +53,7 @@ pub(crate) fn raytracer() -> Command {
     Command::new(PROGRAM.get_or_init(|| raytracer_with(&[])))
 }
 
-/// The same with sanitizers, for files that nobody trusts.
+/// The same with sanitizers, for files that are not trusted.
 pub(crate) fn watched_raytracer() -> Command {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     Command::new(PROGRAM.get_or_init(|| raytracer_with(&WATCHED)))

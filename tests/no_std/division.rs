@@ -26,7 +26,7 @@ fn quotients_and_rests_are_those_of_the_processor() {
             let expected = [a.wrapping_div(b), a.wrapping_rem(b)];
             assert_eq!(divide_signed(a, b), expected, "{a} / {b}");
         }
-        // Nobody asks for it, but it must end.
+        // Its result is not defined, but it must end.
         let _ = divide(dividend, 0);
     }
 }

@@ -13,7 +13,7 @@ pub struct Guarded {
 }
 
 impl Guarded {
-    /// One that nobody has written to.
+    /// One that was not written to.
     #[must_use]
     pub fn new(bytes: usize) -> Self {
         let mut blocks = vec![Block::ZERO; Block::count_for(bytes) + 2];
@@ -26,14 +26,14 @@ impl Guarded {
         &mut Block::bytes_mut(&mut self.blocks)[64..64 + self.bytes]
     }
 
-    /// Whether nobody wrote beside it.
+    /// True if nothing was written beside it.
     #[must_use]
     pub fn around_is_intact(&self) -> bool {
         let all = Block::bytes(&self.blocks);
         all[..64].iter().chain(&all[64 + self.bytes..]).all(|&byte| byte == CANARY)
     }
 
-    /// Whether nobody wrote to it, either.
+    /// True if nothing was written to it, either.
     #[must_use]
     pub fn is_untouched(&self) -> bool {
         Block::bytes(&self.blocks).iter().all(|&byte| byte == CANARY)

@@ -2,7 +2,7 @@
 
 use hgrid_core::{ALIGNMENT, Config, Error, Grid, TriangleMesh, sizes};
 
-/// Aligned memory of zeros. Pages that nobody touches cost nothing.
+/// Aligned memory of zeros. Pages that are not touched cost nothing.
 #[derive(Debug, Clone)]
 struct Region {
     bytes: Vec<u8>,

@@ -119,7 +119,7 @@ pub fn leave_out(reason: &str) {
     let line = format!("skipped in {}: {reason}\n", thread.name().unwrap_or("a thread"));
     let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
     if said.insert(line.clone()) {
-        // Where standard error is closed nobody reads the line.
+        // If standard error is closed, the line is lost.
         let _ = stderr().write_all(line.as_bytes());
     }
 }

@@ -25,7 +25,7 @@ use crate::approach::{Approach, FAR_EXTENTS};
 use crate::filter::{NEARBY_LONG, NEARBY_SHORT, RayFilter};
 use crate::ray::{Ray, round};
 
-/// The inverse of a direction that is zero, or as good as zero.
+/// The inverse of a direction that is zero, or too small to divide by.
 pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0; // 2^75
 
 /// The factor that widens far distances by their relative error: 1 + 2^-20.

@@ -8,9 +8,9 @@
 //!
 //! Two cells with equal lists could still share a slot while another slot stays orphaned. A sum of
 //! scrambled slot numbers over the cells and one over the slots with lists tell accidents of that
-//! kind. Somebody who means harm can make the two sums equal, so nothing rests on them: the answers
+//! kind. An attacker can make the two sums equal, so nothing rests on them: the answers
 //! are right either way, and as the lists of all cells have as many ids as the blob, no query is
-//! shown more. Where among the free slots a row came to lie is left to whoever wrote the blob, too.
+//! shown more. Where among the free slots a row came to lie is not checked, either.
 
 use super::spread::count_references;
 use super::triangles::MeshSpread;

@@ -81,7 +81,7 @@ pub enum View {
 }
 
 impl View {
-    /// The view of a measurement that nobody chose one for: from the front, or from above if the
+    /// The default view of a measurement: from the front, or from above if the
     /// scene is flat.
     #[must_use]
     pub fn of(bounds: Bounds, up: Up) -> Self {

@@ -1,4 +1,4 @@
-//! A camera for a scene that nobody chose one for: it looks at things and into rooms.
+//! The default camera of a scene: it looks at things and into rooms.
 //!
 //! ```text
 //! flat, as a map          from above, at an angle
@@ -7,8 +7,7 @@
 //! anything else           from the front, a little above
 //! ```
 //!
-//! A room shows the fronts of its triangles to whoever stands in the middle of it; a solid shows
-//! backs there. Rays from the middle tell which of the two a scene is.
+//! From its middle, a room shows the fronts of its triangles and a solid shows backs. Rays from the middle tell which of the two a scene is.
 
 use hgrid_core::{Ray, SceneHit};
 

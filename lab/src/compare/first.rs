@@ -53,7 +53,7 @@ pub fn in_this_process(scene: &str, instances: u32, system: &dyn System) -> Resu
     let scene = Scene::load(scene)?;
     let field = Field::over(&scene, instances);
     let input = Input::of_field(scene, field.as_ref());
-    // What loading has left behind is nobody's.
+    // Free what loading has left behind.
     give_back_heap();
     let watch = Watch::start();
     let mut measured = None;

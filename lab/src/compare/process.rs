@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 
-/// Minor page faults so far: pages that were given when they were first touched. `None` where
-/// nobody tells.
+/// Minor page faults so far: pages that were given when they were first touched. `None` if
+/// the system does not tell.
 #[must_use]
 pub fn page_faults() -> Option<u64> {
     #[cfg(feature = "embree")]

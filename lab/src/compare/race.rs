@@ -8,7 +8,7 @@
 //!
 //! As in [`measure`](crate::measure), taking turns lets a machine that others use disturb all
 //! alike. A structure is dropped before the next is built. Arrays for answers and pixels are
-//! written once before the clock runs, so that their pages are in nobody's time.
+//! written once before the clock runs, so that no time has their page faults in it.
 
 use core::cell::Cell;
 

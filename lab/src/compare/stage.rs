@@ -34,7 +34,7 @@ impl<'a> Stage<'a> {
         Ok(Self {
             rays,
             shader,
-            // Not zero: zeros may come as pages that nobody has touched.
+            // Not zero: zeros may come as pages that were never touched.
             pixels: vec![[1; 3]; pixels],
             hits: vec![Hit::MISS; pixels.max(rays.random.questions.len())],
             occluded: vec![1; rays.ao.questions.len()],

@@ -27,7 +27,7 @@ pub const AO_REACH: f64 = 0.1;
 /// How far from its surface such a ray starts, likewise: far above rounding, far below triangles.
 const AO_START: f64 = 1e-5;
 
-/// What is asked of a system.
+/// The questions of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Workload {

@@ -31,7 +31,7 @@ pub fn run(data: &[u8]) {
     caller.settle();
 }
 
-/// What a view holds that nobody has written.
+/// The bytes of a view that was not written.
 pub(super) const UNWRITTEN: hgrid_grid =
     hgrid_grid { opaque: [MaybeUninit::new(0xc7c7_c7c7_c7c7_c7c7); 64] };
 

@@ -11,7 +11,7 @@ use super::memory::{Memory, rarely};
 /// What is larger is not built.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// A mesh that nobody has filled.
+/// A mesh that was not filled.
 const EMPTY: hgrid_mesh = hgrid_mesh {
     struct_size: size_of::<hgrid_mesh>() as u32,
     index_type: HGRID_INDEX_U32,

@@ -25,7 +25,7 @@ pub(super) struct Options {
     options: Struct<hgrid_query_options>,
     filter: Lent<Filter>,
     counters: Lent<hgrid_counters>,
-    /// Nobody here reads it; it has to live as long as the options that point to it.
+    /// Not read here; it has to live as long as the options that point to it.
     _scratch: Lent<[u8; SCRATCH]>,
 }
 

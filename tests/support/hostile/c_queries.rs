@@ -16,7 +16,7 @@ use super::rays;
 
 use crate::owned::prove;
 
-/// A hit that nobody has written.
+/// A hit that was not written.
 const UNTOUCHED: hgrid_hit = hgrid_hit { t: 7.0, u: 7.0, v: 7.0, primitive: 7 };
 
 fn for_c(ray: &Ray) -> hgrid_ray {

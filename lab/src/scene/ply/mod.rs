@@ -148,7 +148,7 @@ fn is_corner_list(name: &str) -> bool {
     name == "vertex_indices" || name == "vertex_index"
 }
 
-/// An element that nobody asked for.
+/// An element that the loader skips.
 struct Skipped;
 
 impl PropertyAccess for Skipped {

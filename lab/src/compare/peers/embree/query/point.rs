@@ -39,7 +39,7 @@ impl Scene<'_> {
 
 /// Makes the radius smaller if a triangle is closer, and tells whether it is.
 unsafe extern "C" fn closer(arguments: *mut PointArguments) -> bool {
-    // SAFETY: Embree passes arguments that nobody else has.
+    // SAFETY: no one else uses the arguments that Embree passes.
     let arguments = unsafe { &*arguments };
     // SAFETY: the pointer is the one that `distances` gave.
     let input = unsafe { &*arguments.user.cast::<Input>() };
