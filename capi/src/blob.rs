@@ -1,11 +1,11 @@
-//! Grids that are stored: opening, proving, packing, and looking at all of one.
+//! Blobs, which are grids as they are stored: opening, proving, packing, and looking at all of one.
 
 use core::ffi::c_void;
 use core::ptr::NonNull;
 
 use hgrid_core::Grid;
 
-use crate::questions::{hgrid_blob_info, hgrid_refit_report, hgrid_statistics};
+use crate::query_types::{hgrid_blob_info, hgrid_refit_report, hgrid_statistics};
 use crate::raw;
 use crate::span::Region;
 use crate::status::{
