@@ -62,7 +62,7 @@
  * start at a multiple of HGRID_ALIGNMENT (64) bytes and overlap nothing else that the call uses.
  * They may hold anything before. The library allocates nothing, keeps nothing, touches nothing
  * outside the regions, and there is nothing to free. Programs that would rather not think of memory
- * link a library with the feature std, are compiled with -DHGRID_STD (or define it before anything
+ * link a library with the feature malloc, are compiled with -DHGRID_MALLOC (or define it before anything
  * includes this file), and have hgrid_create and hgrid_destroy as well.
  *
  * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are constants that are enough for every mesh with
@@ -1326,7 +1326,7 @@ typedef struct hgrid_scene_options {
     struct hgrid_counters *counters;
 } hgrid_scene_options;
 
-#if defined(HGRID_STD)
+#if defined(HGRID_MALLOC)
 /**
  * Where `hgrid_create` gets its memory from. Initialise it with
  * `HGRID_ALLOCATOR_INIT` and set both functions.
@@ -2875,12 +2875,12 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
                         struct hgrid_instance *instance,
                         struct hgrid_grid *grid);
 
-#if defined(HGRID_STD)
+#if defined(HGRID_MALLOC)
 /**
  * Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and
  * with, and `hgrid_build`, in one call.
  *
- * Only in libraries that were built with the feature `std`, and declared only where `HGRID_STD` is
+ * Only in libraries that were built with the feature `malloc`, and declared only where `HGRID_MALLOC` is
  * defined. It takes as long as those three calls. To build again for every frame, keep the memory and
  * call `hgrid_build`.
  *
@@ -2925,7 +2925,7 @@ hgrid_status hgrid_create(const struct hgrid_mesh *mesh,
                           struct hgrid_report *report);
 #endif
 
-#if defined(HGRID_STD)
+#if defined(HGRID_MALLOC)
 /**
  * Gives back all memory of a grid that `hgrid_create` made.
  *
@@ -3084,7 +3084,7 @@ bool hgrid_has_method(uint32_t method);
  */
 #define HGRID_SCENE_INIT {{0}}
 
-#if defined(HGRID_STD)
+#if defined(HGRID_MALLOC)
 /**
  * An allocator without functions: set allocate and release, and context if they need it.
  */

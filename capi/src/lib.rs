@@ -10,7 +10,7 @@
 //! reach; a test looks in the library for the symbols of all these but the state. Core remembers in one byte
 //! which vector instructions the processor has.
 //!
-//! The feature `std` adds the module `create`, which does allocate: it gets memory from the caller's
+//! The feature `malloc` adds the module `create`, which does allocate: it gets memory from the caller's
 //! allocator or the system's, and keeps the pointers to it.
 #![no_std]
 
@@ -31,7 +31,7 @@ mod shapes;
 
 mod scene;
 
-#[cfg(feature = "std")]
+#[cfg(feature = "malloc")]
 mod create;
 
 mod status;
@@ -46,13 +46,13 @@ mod raw;
 #[cfg(not(feature = "rlib"))]
 mod runtime;
 mod span;
-#[cfg(feature = "std")]
+#[cfg(feature = "malloc")]
 mod system;
 
 pub use crate::batch::*;
 pub use crate::blob::*;
 pub use crate::build::*;
-#[cfg(feature = "std")]
+#[cfg(feature = "malloc")]
 pub use crate::create::*;
 pub use crate::query::*;
 pub use crate::query_types::*;
