@@ -90,8 +90,10 @@
  *   HGRID_METHOD_BVH         the default: a tree of boxes over a grid of the triangles' centres, for rays of
  *                            every kind in scenes of every kind; what it takes at most is known from the
  *                            number of triangles
- *   HGRID_METHOD_ONE_LEVEL   one hashed grid; the structure that the others are built from
- *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
+ *   HGRID_METHOD_ONE_LEVEL   one hashed grid, the least memory on large scans; fixed and variable are
+ *                            built from it
+ *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells: the shortest time to a first image
+ *                            among the grids
  *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
  *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
  *
@@ -162,6 +164,11 @@
  * it has no global state but one byte that remembers which vector instructions the processor has. Any
  * number of threads may query one grid at once, and calls that share no memory they write never disturb
  * each other. The text of each function has the details.
+ *
+ * Sanitizers
+ * ----------
+ * The library is compiled without instrumentation, so address and thread sanitizers do not see its
+ * memory accesses. docs/c.md tells how to check them.
  *
  * Results
  * -------
@@ -362,8 +369,8 @@
  * The quality of a tree that is built with SAH at every node, down to single triangles.
  *
  * Choose it for a scene that is traced for long, above all where large and small triangles mix, as in
- * architecture. Rays are answered sooner and the index is smaller; the build takes about ten times
- * as long. It takes 32 bytes of scratch a triangle, whatever the number of tasks:
+ * architecture. Rays are answered sooner and the index is smaller; the build takes several times as
+ * long. It takes 32 bytes of scratch a triangle, whatever the number of tasks:
  * `HGRID_INDEX_BOUND` and `HGRID_BVH_HIGH_SCRATCH_BOUND` hold for it. All queries answer as with the
  * other quality, and the blob has the same format.
  */
@@ -2398,9 +2405,7 @@ hgrid_status hgrid_mesh_of(const struct hgrid_grid *grid,
 /**
  * Proves that a blob is the grid of its mesh, and so that every answer will be right.
  *
- * Takes at most about the time of a build with one level and fixed, two or three times that with
- * variable, three to five times with recursive, and three times with bvh, whose builds are
- * short; on damaged bytes it may take much longer. A grid that was just built needs no
+ * Takes a small multiple of the time of a build; on damaged bytes it may take much longer. A grid that was just built needs no
  * proof; a blob from a file, a network or another process may.
  *
  * A tree (`HGRID_METHOD_BVH`) is proven in scratch: a bit for each triangle, of which `hgrid_validate_bytes`

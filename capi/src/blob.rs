@@ -217,9 +217,7 @@ pub unsafe extern "C" fn hgrid_mesh_of(
 
 /// Proves that a blob is the grid of its mesh, and so that every answer will be right.
 ///
-/// Takes at most about the time of a build with one level and fixed, two or three times that with
-/// variable, three to five times with recursive, and three times with bvh, whose builds are
-/// short; on damaged bytes it may take much longer. A grid that was just built needs no
+/// Takes a small multiple of the time of a build; on damaged bytes it may take much longer. A grid that was just built needs no
 /// proof; a blob from a file, a network or another process may.
 ///
 /// A tree (`HGRID_METHOD_BVH`) is proven in scratch: a bit for each triangle, of which `hgrid_validate_bytes`
