@@ -217,8 +217,8 @@ pub unsafe extern "C" fn hgrid_mesh_of(
 
 /// Proves that a blob is the grid of its mesh, and so that every answer will be right.
 ///
-/// Takes a small multiple of the time of a build; on damaged bytes it may take much longer. A grid that was just built needs no
-/// proof; a blob from a file, a network or another process may.
+/// Takes a small multiple of the time of a build; on damaged bytes it may take much longer. A grid that
+/// was just built needs no proof; a blob from a file, a network or another process may.
 ///
 /// A tree (`HGRID_METHOD_BVH`) is proven in scratch: a bit for each triangle, of which `hgrid_validate_bytes`
 /// and `HGRID_VALIDATE_BOUND` tell the bytes. The other methods take none. The scratch may lie at any
