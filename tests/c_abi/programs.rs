@@ -20,7 +20,7 @@ use crate::header::DIALECTS;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
 /// flavour of the library that they need.
-const PROGRAMS: [(&str, Flavour); 21] = [
+const PROGRAMS: [(&str, Flavour); 22] = [
     ("queries", Flavour::Bare),
     ("options", Flavour::Bare),
     ("batches", Flavour::Bare),
@@ -40,6 +40,7 @@ const PROGRAMS: [(&str, Flavour); 21] = [
     ("refits", Flavour::Bare),
     ("joined", Flavour::Bare),
     ("scenes", Flavour::Bare),
+    ("scene_refusals", Flavour::Bare),
     ("packed_scenes", Flavour::Bare),
     ("create", Flavour::Malloc),
 ];
