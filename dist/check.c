@@ -73,7 +73,7 @@ static int build_and_trace(const char *method, hgrid_config config)
     const hgrid_status proof = hgrid_validate(&grid, scratch, sizeof scratch);
     if (proof != HGRID_OK)
         found += wrong(method, hgrid_status_string(proof));
-#ifdef HGRID_STD
+#ifdef HGRID_MALLOC
     hgrid_grid *created;
     if (hgrid_create(&mesh, &config, NULL, &created, NULL) != HGRID_OK)
         return found + wrong(method, "hgrid_create fails");

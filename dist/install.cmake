@@ -25,8 +25,8 @@ file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/hgrid-build.cmake"
   "# How CMake built and installed this hgrid.\n"
   "set(_hgrid_libdirs \"${CMAKE_INSTALL_LIBDIR}\")\n"
   "set(_hgrid_includedir \"${CMAKE_INSTALL_INCLUDEDIR}\")\n")
-if(HGRID_STD)
-  file(APPEND "${CMAKE_CURRENT_BINARY_DIR}/hgrid-build.cmake" "set(_hgrid_definitions HGRID_STD)\n")
+if(HGRID_MALLOC)
+  file(APPEND "${CMAKE_CURRENT_BINARY_DIR}/hgrid-build.cmake" "set(_hgrid_definitions HGRID_MALLOC)\n")
 endif()
 
 install(FILES include/hgrid.h include/hgrid.hpp DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")

@@ -62,7 +62,7 @@
  * start at a multiple of HGRID_ALIGNMENT (64) bytes and overlap nothing else that the call uses.
  * They may hold anything before. The library allocates nothing, keeps nothing, touches nothing
  * outside the regions, and there is nothing to free. Programs that would rather not think of memory
- * link a library with the feature std, are compiled with -DHGRID_STD (or define it before anything
+ * link a library with the feature malloc, are compiled with -DHGRID_MALLOC (or define it before anything
  * includes this file), and have hgrid_create and hgrid_destroy as well.
  *
  * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are constants that are enough for every mesh with
@@ -90,8 +90,10 @@
  *   HGRID_METHOD_BVH         the default: a tree of boxes over a grid of the triangles' centres, for rays of
  *                            every kind in scenes of every kind; what it takes at most is known from the
  *                            number of triangles
- *   HGRID_METHOD_ONE_LEVEL   one hashed grid; the structure that the others are built from
- *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells, for many rays on one build
+ *   HGRID_METHOD_ONE_LEVEL   one hashed grid, the least memory on large scans; fixed and variable are
+ *                            built from it
+ *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells: the shortest time to a first image
+ *                            among the grids
  *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
  *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
  *
@@ -162,6 +164,11 @@
  * it has no global state but one byte that remembers which vector instructions the processor has. Any
  * number of threads may query one grid at once, and calls that share no memory they write never disturb
  * each other. The text of each function has the details.
+ *
+ * Sanitizers
+ * ----------
+ * The library is compiled without instrumentation, so address and thread sanitizers do not see its
+ * memory accesses. docs/c.md tells how to check them.
  *
  * Results
  * -------
@@ -362,8 +369,8 @@
  * The quality of a tree that is built with SAH at every node, down to single triangles.
  *
  * Choose it for a scene that is traced for long, above all where large and small triangles mix, as in
- * architecture. Rays are answered sooner and the index is smaller; the build takes about ten times
- * as long. It takes 32 bytes of scratch a triangle, whatever the number of tasks:
+ * architecture. Rays are answered sooner and the index is smaller; the build takes several times as
+ * long. It takes 32 bytes of scratch a triangle, whatever the number of tasks:
  * `HGRID_INDEX_BOUND` and `HGRID_BVH_HIGH_SCRATCH_BOUND` hold for it. All queries answer as with the
  * other quality, and the blob has the same format.
  */
@@ -1326,7 +1333,7 @@ typedef struct hgrid_scene_options {
     struct hgrid_counters *counters;
 } hgrid_scene_options;
 
-#if defined(HGRID_STD)
+#if defined(HGRID_MALLOC)
 /**
  * Where `hgrid_create` gets its memory from. Initialise it with
  * `HGRID_ALLOCATOR_INIT` and set both functions.
@@ -2398,10 +2405,8 @@ hgrid_status hgrid_mesh_of(const struct hgrid_grid *grid,
 /**
  * Proves that a blob is the grid of its mesh, and so that every answer will be right.
  *
- * Takes at most about the time of a build with one level and fixed, two or three times that with
- * variable, three to five times with recursive, and three times with bvh, whose builds are
- * short; on damaged bytes it may take much longer. A grid that was just built needs no
- * proof; a blob from a file, a network or another process may.
+ * Takes a small multiple of the time of a build; on damaged bytes it may take much longer. A grid that
+ * was just built needs no proof; a blob from a file, a network or another process may.
  *
  * A tree (`HGRID_METHOD_BVH`) is proven in scratch: a bit for each triangle, of which `hgrid_validate_bytes`
  * and `HGRID_VALIDATE_BOUND` tell the bytes. The other methods take none. The scratch may lie at any
@@ -2875,12 +2880,12 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
                         struct hgrid_instance *instance,
                         struct hgrid_grid *grid);
 
-#if defined(HGRID_STD)
+#if defined(HGRID_MALLOC)
 /**
  * Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and
  * with, and `hgrid_build`, in one call.
  *
- * Only in libraries that were built with the feature `std`, and declared only where `HGRID_STD` is
+ * Only in libraries that were built with the feature `malloc`, and declared only where `HGRID_MALLOC` is
  * defined. It takes as long as those three calls. To build again for every frame, keep the memory and
  * call `hgrid_build`.
  *
@@ -2925,7 +2930,7 @@ hgrid_status hgrid_create(const struct hgrid_mesh *mesh,
                           struct hgrid_report *report);
 #endif
 
-#if defined(HGRID_STD)
+#if defined(HGRID_MALLOC)
 /**
  * Gives back all memory of a grid that `hgrid_create` made.
  *
@@ -3084,7 +3089,7 @@ bool hgrid_has_method(uint32_t method);
  */
 #define HGRID_SCENE_INIT {{0}}
 
-#if defined(HGRID_STD)
+#if defined(HGRID_MALLOC)
 /**
  * An allocator without functions: set allocate and release, and context if they need it.
  */

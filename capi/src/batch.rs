@@ -1,96 +1,190 @@
-//! The arrays of a batch of rays, checked as addresses before anything is read.
-//!
-//! Rays and answers may lie in the same structs of the caller, `{ray; hit}` after `{ray; hit}`. In
-//! Rust, a mutable reference to bytes that another reference covers is undefined behaviour, and so
-//! is a reference to the caller's other fields, which another thread may be writing. So this module
-//! makes no references: it reads rays and writes answers through their addresses, one by one.
+//! Batches: queries of many rays, from the caller's structs into the caller's structs.
 
-use core::ffi::c_void;
+use hgrid_core::{Grid, QueryOptions};
 
-use crate::questions::hgrid_ray;
-use crate::span::Span;
-use crate::status::{
-    HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_INVALID_RAYS, HGRID_ERROR_NULL_ARGUMENT,
-    HGRID_ERROR_OVERLAP, hgrid_status,
-};
-use crate::types::Elements;
+use crate::query_types::{self, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray};
+use crate::raw;
+use crate::raw::Batch;
+use crate::status::{HGRID_OK, hgrid_status};
+use crate::types::hgrid_grid;
 
-/// An array of the caller's, as it is passed: where it starts, and its stride.
-pub(crate) type Array<T> = (T, usize);
-
-/// As many answers as rays, no byte of them in a ray.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Batch<T> {
+/// Finds the closest triangle that each of many rays hits: what `hgrid_intersect` would find for
+/// each, bit for bit, but sooner.
+///
+/// A ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of
+/// `hits`. A miss writes a hit, too: with `primitive` equal to `HGRID_INVALID_ID`, `t` equal to
+/// `INFINITY`, `u` and `v` equal to 0. Here is a tile of 8 x 8 pixels:
+///
+/// ```c
+/// static size_t trace_tile(const hgrid_grid *grid, const hgrid_ray rays[64], float depth[64])
+/// {
+///     hgrid_hit hits[64];
+///     size_t found = 0;
+///     if (hgrid_intersect_n(grid, rays, 0, hits, 0, 64, HGRID_COHERENCE_COHERENT, NULL) != HGRID_OK)
+///         return 0;
+///     for (size_t i = 0; i < 64; i++) {
+///         depth[i] = hits[i].t;
+///         found += hits[i].primitive != HGRID_INVALID_ID;
+///     }
+///     return found;
+/// }
+/// ```
+///
+/// Rays and hits may lie in structs of yours, also in the same ones: with `struct {hgrid_ray ray;
+/// hgrid_hit hit; int pixel;}` both strides are the size of the struct. A stride of 0 means side by
+/// side. Neither array needs any alignment, and bytes between elements are neither read nor written.
+/// No hit may overlap a ray, nor anything else that the call uses; if the two arrays interleave, their
+/// strides must be equal.
+///
+/// `coherence` is what you know about the rays, one of `HGRID_COHERENCE_...`; it has no influence on
+/// the hits. For rays without any order lend memory to sort them in, and pass as many as you have in
+/// one call:
+///
+/// ```c
+/// static hgrid_status trace_all(const hgrid_grid *grid, const hgrid_ray *rays, hgrid_hit *hits,
+///                               size_t count, void *scratch, size_t scratch_bytes)
+/// {
+///     hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+///     options.scratch = scratch, options.scratch_bytes = scratch_bytes;
+///     return hgrid_intersect_n(grid, rays, 0, hits, 0, count, HGRID_COHERENCE_INCOHERENT, &options);
+/// }
+/// ```
+///
+/// With `count` 0 nothing is done. Rays are read and hits are written in any order, and a
+/// ray perhaps more than once, before its hit is written.
+///
+/// `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for
+/// all rays.
+///
+/// Returns `HGRID_OK` and has written all hits, or returns the reason and has written none:
+/// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`, `HGRID_ERROR_STRUCT_SIZE` and
+/// `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and
+/// `HGRID_ERROR_INVALID_ANSWERS` (a stride, or a count that is impossible), `HGRID_ERROR_OVERLAP`
+/// (also of `scratch`),
+/// `HGRID_ERROR_INVALID_COHERENCE`. An invalid ray (a NaN, say, or no direction) is no error: it misses.
+///
+/// The call allocates nothing and needs at most 36 KiB of stack.
+///
+/// Threads: any number of queries on the same grid at once; each thread with hits and counters of
+/// its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_intersect_n(
+    grid: *const hgrid_grid,
     rays: *const hgrid_ray,
     ray_stride: usize,
-    answers: *mut T,
-    answer_stride: usize,
-    pub(crate) count: usize,
-    /// From the first byte to the last of the rays, and of the answers.
-    spans: [Span; 2],
+    hits: *mut hgrid_hit,
+    hit_stride: usize,
+    count: usize,
+    coherence: hgrid_coherence,
+    options: *const hgrid_query_options,
+) -> hgrid_status {
+    let call = || {
+        let batch = Batch::new((rays, ray_stride), (hits, hit_stride), count)?;
+        let coherence = query_types::coherence(coherence)?;
+        let trace = |grid: &Grid<'_>,
+                     rays: &mut raw::Arrays<'_, hgrid_hit>,
+                     options: &mut QueryOptions<'_>| {
+            grid.intersect_batch(rays, coherence, options);
+        };
+        // SAFETY: the caller's promise.
+        unsafe { raw::batch(grid, &batch, options, trace) }
+    };
+    call().err().unwrap_or(HGRID_OK)
 }
 
-impl<T> Batch<T> {
-    /// Checks the arrays. A stride of 0 means that elements lie side by side.
-    pub(crate) fn new(
-        (rays, ray_stride): Array<*const hgrid_ray>,
-        (answers, answer_stride): Array<*mut T>,
-        count: usize,
-    ) -> Result<Self, hgrid_status> {
-        let ray_elements = elements::<hgrid_ray>(rays.cast(), ray_stride, count);
-        let ray_elements = ray_elements.ok_or(HGRID_ERROR_INVALID_RAYS)?;
-        let answer_elements = elements::<T>(answers.cast(), answer_stride, count);
-        let answer_elements = answer_elements.ok_or(HGRID_ERROR_INVALID_ANSWERS)?;
-        if count > 0 && (rays.is_null() || answers.is_null()) {
-            return Err(HGRID_ERROR_NULL_ARGUMENT);
-        }
-        if overlap(&ray_elements, &answer_elements, size_of::<T>()) {
-            return Err(HGRID_ERROR_OVERLAP);
-        }
-        let (ray_stride, answer_stride) = (ray_elements.stride, answer_elements.stride);
-        let spans = [&ray_elements, &answer_elements].map(span);
-        Ok(Self { rays, ray_stride, answers, answer_stride, count, spans })
-    }
-
-    /// Returns true if a region overlaps the bytes of the rays or of the answers.
-    pub(crate) fn overlaps(&self, other: Span) -> bool {
-        self.spans.iter().any(|span| span.overlaps(other))
-    }
-
-    /// The address of a ray, of any alignment.
-    pub(crate) const fn ray(&self, index: usize) -> *const hgrid_ray {
-        self.rays.wrapping_byte_add(index.wrapping_mul(self.ray_stride))
-    }
-
-    /// The address of an answer, of any alignment.
-    pub(crate) const fn answer(&self, index: usize) -> *mut T {
-        self.answers.wrapping_byte_add(index.wrapping_mul(self.answer_stride))
-    }
-}
-
-/// The elements of an array, if none lies in the next one and all fit into memory.
-fn elements<T>(start: *const c_void, stride: usize, count: usize) -> Option<Elements> {
-    let size = size_of::<T>();
-    Elements::new(start, stride, count, size).filter(|elements| elements.stride >= size)
-}
-
-/// From the first element's first byte to the last element's last.
-fn span(elements: &Elements) -> Span {
-    Span::new(elements.start, elements.bytes)
-}
-
-/// Whether a byte of an answer lies in a ray.
+/// Tells for each of many rays whether it hits anything: what `hgrid_occluded` would say for each,
+/// but sooner.
 ///
-/// With one stride for both, the distance from a ray's start to the start of the next answer is the
-/// same everywhere: the answer lies between two rays, or all of them are hit.
-fn overlap(rays: &Elements, answers: &Elements, answer_bytes: usize) -> bool {
-    if !span(rays).overlaps(span(answers)) {
-        return false;
-    }
-    let distance = answers.start.addr().wrapping_sub(rays.start.addr()).cast_signed();
-    let distance = distance.checked_rem_euclid(rays.stride.cast_signed());
-    let is_between = distance.map(isize::cast_unsigned).is_some_and(|distance| {
-        distance >= size_of::<hgrid_ray>() && distance.saturating_add(answer_bytes) <= rays.stride
-    });
-    rays.stride != answers.stride || !is_between
+/// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes
+/// from `occluded` on. All else is as with `hgrid_intersect_n`: strides, structs that
+/// hold a ray and its byte, coherence, options and their `scratch`, stack. `rays` and `occluded` may be
+/// NULL if `count` is 0, `options` may be NULL. Returns `HGRID_OK` and has written all
+/// bytes, or returns what `hgrid_intersect_n` returns and has written none. For the
+/// shadow rays of a tile, towards one light, which start where `hgrid_surface_at` says:
+///
+/// ```c
+/// static size_t count_lit(const hgrid_grid *grid, const hgrid_ray *rays, size_t count)
+/// {
+///     unsigned char occluded[64];
+///     size_t lit = 0;
+///     for (size_t first = 0; first < count; first += 64) {
+///         const size_t n = count - first < 64 ? count - first : 64;
+///         if (hgrid_occluded_n(grid, rays + first, 0, occluded, 0, n, HGRID_COHERENCE_COHERENT,
+///                              NULL) != HGRID_OK)
+///             return 0;
+///         for (size_t i = 0; i < n; i++)
+///             lit += !occluded[i];
+///     }
+///     return lit;
+/// }
+/// ```
+///
+/// Threads: any number of queries on the same grid at once; each thread with bytes and counters of
+/// its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluded_n(
+    grid: *const hgrid_grid,
+    rays: *const hgrid_ray,
+    ray_stride: usize,
+    occluded: *mut u8,
+    occluded_stride: usize,
+    count: usize,
+    coherence: hgrid_coherence,
+    options: *const hgrid_query_options,
+) -> hgrid_status {
+    let call = || {
+        let batch = Batch::new((rays, ray_stride), (occluded, occluded_stride), count)?;
+        let coherence = query_types::coherence(coherence)?;
+        let trace =
+            |grid: &Grid<'_>, rays: &mut raw::Arrays<'_, u8>, options: &mut QueryOptions<'_>| {
+                grid.occluded_batch(rays, coherence, options);
+            };
+        // SAFETY: the caller's promise.
+        unsafe { raw::batch(grid, &batch, options, trace) }
+    };
+    call().err().unwrap_or(HGRID_OK)
+}
+
+/// Names for each of many rays a triangle that blocks it: as `hgrid_occluder` would, but sooner.
+///
+/// Writes a `uint32_t` for each ray, a triangle or `HGRID_INVALID_ID`, every `occluder_stride` bytes
+/// from `occluders` on. It is `HGRID_INVALID_ID` where `hgrid_occluded_n` writes 0. Where several
+/// triangles block a ray, it may be another one than `hgrid_occluder` names. All else is as with
+/// `hgrid_occluded_n`. `rays` and `occluders` may be NULL if `count` is 0, `options` may be NULL.
+/// Returns `HGRID_OK` and has written all names, or returns what `hgrid_intersect_n` returns and has
+/// written none.
+///
+/// Threads: any number of queries on the same grid at once; each thread with names and counters of
+/// its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluder_n(
+    grid: *const hgrid_grid,
+    rays: *const hgrid_ray,
+    ray_stride: usize,
+    occluders: *mut u32,
+    occluder_stride: usize,
+    count: usize,
+    coherence: hgrid_coherence,
+    options: *const hgrid_query_options,
+) -> hgrid_status {
+    let call = || {
+        let batch = Batch::new((rays, ray_stride), (occluders, occluder_stride), count)?;
+        let coherence = query_types::coherence(coherence)?;
+        let trace =
+            |grid: &Grid<'_>, rays: &mut raw::Arrays<'_, u32>, options: &mut QueryOptions<'_>| {
+                grid.occluder_batch(rays, coherence, options);
+            };
+        // SAFETY: the caller's promise.
+        unsafe { raw::batch(grid, &batch, options, trace) }
+    };
+    call().err().unwrap_or(HGRID_OK)
 }

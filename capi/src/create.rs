@@ -1,4 +1,4 @@
-//! `hgrid_create`: builds a grid in memory that the library allocates. Needs the feature `std`.
+//! `hgrid_create`: builds a grid in memory that the library allocates. Needs the feature `malloc`.
 //!
 //! It adds nothing to what [`hgrid_sizes`] and [`hgrid_build`] do: it asks the first, gets so much
 //! memory, and does what the second does.
@@ -64,7 +64,7 @@ pub struct hgrid_allocator {
 /// Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and
 /// with, and `hgrid_build`, in one call.
 ///
-/// Only in libraries that were built with the feature `std`, and declared only where `HGRID_STD` is
+/// Only in libraries that were built with the feature `malloc`, and declared only where `HGRID_MALLOC` is
 /// defined. It takes as long as those three calls. To build again for every frame, keep the memory and
 /// call `hgrid_build`.
 ///

@@ -3,35 +3,35 @@
 //! Every function checks what it was given, calls core, and writes the answer. The docs of all that
 //! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
 //! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
-//! structs and threads that they rely on. `build`, `stored`, `query`, `many`, `shapes` and `scene` hold the functions,
-//! `types` and `questions` the structs, and `raw` every use of a caller's pointer.
+//! structs and threads that they rely on. `build`, `query`, `batch`, `blob`, `shapes` and `scene` hold
+//! the functions, `types` and `query_types` the structs, and `raw` every use of a caller's pointer.
 //!
 //! This package allocates nothing, keeps no state, starts no thread, and has no panic that a caller could
 //! reach; a test looks in the library for the symbols of all these but the state. Core remembers in one byte
 //! which vector instructions the processor has.
 //!
-//! The feature `std` adds the module `create`, which does allocate: it gets memory from the caller's
+//! The feature `malloc` adds the module `create`, which does allocate: it gets memory from the caller's
 //! allocator or the system's, and keeps the pointers to it.
 #![no_std]
 
 // What C sees, in the order of the header.
 mod types;
 
-mod questions;
+mod query_types;
 
 mod build;
 
 mod query;
 
-mod many;
+mod batch;
 
-mod stored;
+mod blob;
 
 mod shapes;
 
 mod scene;
 
-#[cfg(feature = "std")]
+#[cfg(feature = "malloc")]
 mod create;
 
 mod status;
@@ -39,7 +39,6 @@ mod status;
 mod version;
 
 // What it is made of.
-mod batch;
 #[cfg(all(target_arch = "arm", target_endian = "little", unix))]
 mod division;
 mod input;
@@ -47,19 +46,19 @@ mod raw;
 #[cfg(not(feature = "rlib"))]
 mod runtime;
 mod span;
-#[cfg(feature = "std")]
+#[cfg(feature = "malloc")]
 mod system;
 
+pub use crate::batch::*;
+pub use crate::blob::*;
 pub use crate::build::*;
-#[cfg(feature = "std")]
+#[cfg(feature = "malloc")]
 pub use crate::create::*;
-pub use crate::many::*;
 pub use crate::query::*;
-pub use crate::questions::*;
+pub use crate::query_types::*;
 pub use crate::scene::*;
 pub use crate::shapes::*;
 pub use crate::status::*;
-pub use crate::stored::*;
 pub use crate::types::*;
 pub use crate::version::*;
 

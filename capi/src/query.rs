@@ -4,7 +4,7 @@ use core::ptr::NonNull;
 
 use hgrid_core::{Grid, INVALID_ID, QueryOptions};
 
-use crate::questions::{
+use crate::query_types::{
     hgrid_closest, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, hgrid_surface,
 };
 use crate::raw;

@@ -6,7 +6,7 @@ use core::ptr::NonNull;
 
 use hgrid_core::ShapeHit;
 
-use crate::questions::{hgrid_hit, hgrid_query_options, hgrid_ray, hgrid_refit_report};
+use crate::query_types::{hgrid_hit, hgrid_query_options, hgrid_ray, hgrid_refit_report};
 use crate::raw;
 use crate::span::Region;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};

@@ -71,5 +71,5 @@ pub(crate) unsafe extern "C" fn take(_: *mut c_void, memory: *mut c_void, _: usi
 
 #[cfg(not(any(unix, windows)))]
 compile_error!(
-    "the feature `std` needs an operating system: build without it and bring the memory"
+    "the feature `malloc` needs an operating system: build without it and bring the memory"
 );

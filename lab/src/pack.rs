@@ -1,6 +1,6 @@
 //! Grid and mesh in one file: the `pack` command.
 //!
-//! The file is a blob as core/src/packed.rs describes it, or C source with its bytes: an array that
+//! The file is a blob as core/src/packed/mod.rs describes it, or C source with its bytes: an array that
 //! a program for a microcontroller has in flash and opens there.
 
 use std::fs::{self, File};

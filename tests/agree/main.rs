@@ -1,5 +1,6 @@
 //! Does every query agree with brute force, at the boundaries above all?
 
+mod arrays;
 mod batches;
 mod closest;
 mod exact;

@@ -1,8 +1,8 @@
 /* Does hgrid_create build what hgrid_build builds, in memory that it gives back to the byte, whatever
- * goes wrong? For libraries with the feature std. */
+ * goes wrong? For libraries with the feature malloc. */
 
-#ifndef HGRID_STD
-#define HGRID_STD
+#ifndef HGRID_MALLOC
+#define HGRID_MALLOC
 #endif
 #include "versions.h"
 

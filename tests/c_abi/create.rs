@@ -19,7 +19,7 @@ fn it_leaks_nothing() {
     }
     let dir = TempDir::new().expect("a folder");
     let program =
-        compile("create", compiler("c99"), &[], &Flavour::Std.static_library(), dir.path());
+        compile("create", compiler("c99"), &[], &Flavour::Malloc.static_library(), dir.path());
     let mut valgrind = command("valgrind");
     valgrind.args(["--quiet", "--error-exitcode=99", "--leak-check=full"]);
     run(valgrind.args(["--show-leak-kinds=all", "--errors-for-leak-kinds=all"]).arg(program));
@@ -27,8 +27,8 @@ fn it_leaks_nothing() {
 
 #[test]
 fn its_example_runs_by_every_compiler() {
-    let all = examples(&seen_by(Flavour::Std));
-    let common = examples(&seen_by(Flavour::NoStd));
+    let all = examples(&seen_by(Flavour::Malloc));
+    let common = examples(&seen_by(Flavour::Bare));
     let [example] = &all.iter().filter(|example| !common.contains(example)).collect::<Vec<_>>()[..]
     else {
         panic!("one example")
@@ -37,7 +37,7 @@ fn its_example_runs_by_every_compiler() {
     let [source, program] = ["example.c", "example"].map(|name| dir.path().join(name));
     fs::write(&source, include_str!("created.c").replace("FUNCTIONS", example)).expect("a file");
     for mut compiler in compilers("c99") {
-        compiler.arg(&source).arg(Flavour::Std.static_library()).arg("-o").arg(&program);
+        compiler.arg(&source).arg(Flavour::Malloc.static_library()).arg("-o").arg(&program);
         run(&mut compiler);
         run(&mut Command::new(&program));
     }

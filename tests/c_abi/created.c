@@ -1,6 +1,6 @@
 /* The example in the header of hgrid_create, put in place of FUNCTIONS and run: three rays, two hits. */
 
-#define HGRID_STD
+#define HGRID_MALLOC
 #include <hgrid.h>
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* Prints what the header says as numbers, one "name value" a line, for the test to compare. */
 
-#define HGRID_STD
+#define HGRID_MALLOC
 #include <hgrid.h>
 
 #include <stdio.h>

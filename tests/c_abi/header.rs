@@ -17,15 +17,15 @@ pub(crate) fn committed() -> String {
     fs::read_to_string(root().join("include/hgrid.h")).expect("include/hgrid.h")
 }
 
-/// What a program sees of it that is compiled for a flavour: without `HGRID_STD`, the
+/// What a program sees of it that is compiled for a flavour: without `HGRID_MALLOC`, the
 /// lines that need it are not there.
 pub(crate) fn seen_by(flavour: Flavour) -> String {
     let (mut header, mut rest) = (String::new(), committed());
-    while let Some((before, behind)) = rest.split_once("\n#if defined(HGRID_STD)\n") {
+    while let Some((before, behind)) = rest.split_once("\n#if defined(HGRID_MALLOC)\n") {
         let (inside, behind) = behind.split_once("\n#endif\n").expect("its end");
         header.push_str(before);
         header.push('\n');
-        if flavour == Flavour::Std {
+        if flavour == Flavour::Malloc {
             header.push_str(inside);
             header.push('\n');
         }
@@ -162,7 +162,7 @@ fn it_compiles_alone_in_every_dialect() {
 fn it_compiles_in_the_oldest_dialect_with_all_that_it_defines() {
     let dir = TempDir::new().expect("a folder");
     let source = dir.path().join("old.c");
-    fs::write(&source, "#define HGRID_STD\n#include <hgrid.h>\n").expect("a file");
+    fs::write(&source, "#define HGRID_MALLOC\n#include <hgrid.h>\n").expect("a file");
     for mut compiler in compilers("c89") {
         // The compiler's own <stdbool.h> needs the one: _Bool is younger.
         let named = ["-Wno-long-long", "-Wno-unknown-warning-option", "-Wno-c99-extensions"];
@@ -175,7 +175,7 @@ fn it_compiles_in_the_oldest_dialect_with_all_that_it_defines() {
 #[test]
 fn no_function_takes_or_returns_a_float_by_value() {
     let declarations = declarations(&committed());
-    assert!(declarations.len() > functions(Flavour::Std).len());
+    assert!(declarations.len() > functions(Flavour::Malloc).len());
     for declaration in declarations {
         let words = declaration.split(['(', ')', ',']).map(str::trim);
         for word in words.filter(|word| !word.contains('*')) {
@@ -356,7 +356,7 @@ fn bounds_are_no_less_than_those_of_core() {
 
 #[test]
 fn every_function_says_what_callers_must_know() {
-    for function in functions(Flavour::Std) {
+    for function in functions(Flavour::Malloc) {
         let text = documentation(&function);
         assert!(text.contains("Threads: "), "{function} says nothing about threads");
         let takes_pointers = parameters(&function).iter().any(|parameter| parameter.is_pointer);
@@ -381,7 +381,7 @@ fn its_example_runs() {
 
 #[test]
 fn its_functions_examples_run() {
-    let examples = examples(&seen_by(Flavour::NoStd));
+    let examples = examples(&seen_by(Flavour::Bare));
     // A new one that the program does not call is an unused function: a warning, so an error.
     assert!(examples.len() >= 5);
     let source = include_str!("tile.c").replace("FUNCTIONS", &examples.join("\n"));

@@ -1,6 +1,6 @@
 /* Uses every macro the way a program does, in every dialect, without a warning. */
 
-#define HGRID_STD
+#define HGRID_MALLOC
 #include <hgrid.h>
 #include <hgrid.h>
 

@@ -20,28 +20,29 @@ use crate::header::DIALECTS;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
 /// flavour of the library that they need.
-const PROGRAMS: [(&str, Flavour); 21] = [
-    ("queries", Flavour::NoStd),
-    ("options", Flavour::NoStd),
-    ("batches", Flavour::NoStd),
-    ("memory", Flavour::NoStd),
-    ("budgets", Flavour::NoStd),
-    ("methods", Flavour::NoStd),
-    ("parallel", Flavour::NoStd),
-    ("progress", Flavour::NoStd),
-    ("nested", Flavour::NoStd),
-    ("threads", Flavour::NoStd),
-    ("nulls", Flavour::NoStd),
-    ("structs", Flavour::NoStd),
-    ("regions", Flavour::NoStd),
-    ("refusals", Flavour::NoStd),
-    ("blobs", Flavour::NoStd),
-    ("stored", Flavour::NoStd),
-    ("refits", Flavour::NoStd),
-    ("joined", Flavour::NoStd),
-    ("scenes", Flavour::NoStd),
-    ("packed_scenes", Flavour::NoStd),
-    ("create", Flavour::Std),
+const PROGRAMS: [(&str, Flavour); 22] = [
+    ("queries", Flavour::Bare),
+    ("options", Flavour::Bare),
+    ("batches", Flavour::Bare),
+    ("memory", Flavour::Bare),
+    ("budgets", Flavour::Bare),
+    ("methods", Flavour::Bare),
+    ("parallel", Flavour::Bare),
+    ("progress", Flavour::Bare),
+    ("nested", Flavour::Bare),
+    ("threads", Flavour::Bare),
+    ("nulls", Flavour::Bare),
+    ("structs", Flavour::Bare),
+    ("regions", Flavour::Bare),
+    ("refusals", Flavour::Bare),
+    ("blobs", Flavour::Bare),
+    ("stored", Flavour::Bare),
+    ("refits", Flavour::Bare),
+    ("joined", Flavour::Bare),
+    ("scenes", Flavour::Bare),
+    ("scene_refusals", Flavour::Bare),
+    ("packed_scenes", Flavour::Bare),
+    ("create", Flavour::Malloc),
 ];
 
 /// They turn optimisation off: optimised programs take four times as long to compile.
@@ -158,7 +159,7 @@ fn they_pass_as_cpp_with_the_larger_flavour() {
 fn pass_as_cpp_with_the_larger_flavour(programs: impl Iterator<Item = (&'static str, Flavour)>) {
     let dir = TempDir::new().expect("a folder");
     for (name, _) in programs {
-        let (flags, library) = (["-DHGRID_STD"], Flavour::Std.static_library());
+        let (flags, library) = (["-DHGRID_MALLOC"], Flavour::Malloc.static_library());
         let Some(compiler) = clang("c++17").or_else(|| cpp_compiler("c++17")) else { return };
         run(Command::new(compile(name, compiler, &flags, &library, dir.path())).arg(PART));
     }
@@ -182,7 +183,7 @@ fn pass_with_the_shared_libraries(programs: impl Iterator<Item = (&'static str, 
     for (name, flavour) in programs {
         let compiler = clang("c11").unwrap_or_else(|| compiler("c11"));
         let program = compile(name, compiler, &[], &flavour.shared_library(), dir.path());
-        for library in [flavour, Flavour::Std] {
+        for library in [flavour, Flavour::Malloc] {
             run(Command::new(&program).arg(PART).env("LD_LIBRARY_PATH", library.dir()));
         }
     }

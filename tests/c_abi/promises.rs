@@ -63,7 +63,7 @@ fn inherited(text: &str) -> BTreeSet<i32> {
 fn every_status_that_a_function_names_is_returned_by_it_and_no_other() {
     let reached = reached();
     let mut count = 0;
-    for function in functions(Flavour::Std) {
+    for function in functions(Flavour::Malloc) {
         let text = documentation(&function);
         let named = named(&text);
         if named.is_empty() {
@@ -95,7 +95,7 @@ fn every_status_is_reached_and_described() {
 
 #[test]
 fn null_is_tried_in_every_pointer_argument() {
-    let pointers = functions(Flavour::Std).into_iter().flat_map(|function| {
+    let pointers = functions(Flavour::Malloc).into_iter().flat_map(|function| {
         let pointers = parameters(&function).into_iter().filter(|parameter| parameter.is_pointer);
         pointers.map(move |parameter| format!("{function}.{}", parameter.name)).collect::<Vec<_>>()
     });
@@ -111,7 +111,7 @@ fn every_struct_is_tried_in_other_sizes() {
         structs().into_iter().filter(|(_, fields)| fields[0] == "struct_size").collect();
     assert_eq!(sized.len(), 10);
     let is_sized = |kind: &str| sized.iter().any(|(name, _)| name == kind);
-    let takes = functions(Flavour::Std).into_iter().flat_map(|function| {
+    let takes = functions(Flavour::Malloc).into_iter().flat_map(|function| {
         let structs =
             parameters(&function).into_iter().filter(|p| p.is_pointer && is_sized(&p.kind));
         structs.map(move |parameter| format!("{function}.{}", parameter.name)).collect::<Vec<_>>()

@@ -21,16 +21,16 @@ const ALLOCATOR: [&str; 2] = ["posix_memalign", "free"];
 
 /// Whether a flavour may need a symbol.
 fn may_need(flavour: Flavour, name: &str) -> bool {
-    MEMORY.contains(&name) || flavour == Flavour::Std && ALLOCATOR.contains(&name)
+    MEMORY.contains(&name) || flavour == Flavour::Malloc && ALLOCATOR.contains(&name)
 }
 
 /// The committed list of what a flavour exports: `symbols.txt`, a name a line, and
-/// `std` behind what only that one has.
+/// `malloc` behind what only that one has.
 fn exports(flavour: Flavour) -> BTreeSet<String> {
     let lines = include_str!("symbols.txt").lines();
     let names = lines.filter_map(|line| match line.split_once(' ') {
         None => Some(line),
-        Some((name, "std")) => (flavour == Flavour::Std).then_some(name),
+        Some((name, "malloc")) => (flavour == Flavour::Malloc).then_some(name),
         Some((_, other)) => panic!("no flavour: {other}"),
     });
     names.map(str::to_owned).collect()
@@ -58,10 +58,10 @@ fn callers(archive: &Path, words: &[&str]) -> String {
 #[test]
 fn the_committed_list_is_what_the_header_declares() {
     let path = root().join("tests/c_abi/symbols.txt");
-    let all = functions(Flavour::Std);
-    let common = functions(Flavour::NoStd);
+    let all = functions(Flavour::Malloc);
+    let common = functions(Flavour::Bare);
     let line = |name: &String| {
-        let flavour = if common.contains(name) { "" } else { " std" };
+        let flavour = if common.contains(name) { "" } else { " malloc" };
         format!("{name}{flavour}\n")
     };
     let list: String = all.iter().map(line).collect();
@@ -157,7 +157,7 @@ fn two_copies_in_one_program_do_not_clash() {
     let dir = TempDir::new().expect("a folder");
     let [copy, program] = ["copy.o", "copies"].map(|name| dir.path().join(name));
     let mut objcopy = command("objcopy");
-    for function in functions(Flavour::NoStd) {
+    for function in functions(Flavour::Bare) {
         objcopy.arg("--redefine-sym").arg(format!("{function}=other_{function}"));
     }
     run(objcopy.arg(extract_ours(&static_library(), dir.path())).arg(&copy));

@@ -30,7 +30,7 @@ fn options() -> Vec<String> {
         format!("-DHGRID_CARGO={}", env!("CARGO")),
         format!("-DHGRID_TARGET_DIR={}", target_dir().join("cmake").display()),
         "-DHGRID_METHODS=bvh".to_owned(),
-        "-DHGRID_STD=ON".to_owned(),
+        "-DHGRID_MALLOC=ON".to_owned(),
     ]
 }
 
@@ -87,7 +87,7 @@ fn asks_pkg_config(prefix: &Path, lib: &str) {
     let mut ask = command("pkg-config");
     let ask = ask.env("PKG_CONFIG_PATH", lib.join("pkgconfig"));
     let answer = output_of(ask.args(["--static", "--cflags", "--libs", "hgrid"]));
-    assert!(answer.contains("-DHGRID_STD"), "{answer}");
+    assert!(answer.contains("-DHGRID_MALLOC"), "{answer}");
     // The folder's name has a space, which pkg-config escapes for the shell.
     let path = prefix.join("program");
     let source = root().join("c_examples/minimal.c");
@@ -131,7 +131,7 @@ fn a_cross_build_gets_a_static_library_for_the_target() {
     fs::write(&toolchain, TOOLCHAIN).expect("a file");
     let ask = |options: &[&str]| {
         let mut cmake = cargo_cmake();
-        cmake.args(self::options()).args(["-DHGRID_METHODS=one-level", "-DHGRID_STD=OFF"]);
+        cmake.args(self::options()).args(["-DHGRID_METHODS=one-level", "-DHGRID_MALLOC=OFF"]);
         cmake.arg(format!("-DCMAKE_TOOLCHAIN_FILE={}", toolchain.display())).args(options);
         configure(cmake, root(), &dir.path().join("build"))
     };

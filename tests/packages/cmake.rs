@@ -62,7 +62,7 @@ fn a_project_links_what_cargo_c_installs() {
     if !has_cmake() || !is_installed("binutils") {
         return;
     }
-    let Some(Prefix { dir, .. }) = installed(Flavour::NoStd) else { return };
+    let Some(Prefix { dir, .. }) = installed(Flavour::Bare) else { return };
     let (_dir, [shared, static_]) = build_and_run(dir);
     assert!(dynamic(&shared, "NEEDED").contains(&soname()));
     assert!(!dynamic(&static_, "NEEDED").contains(&soname()));

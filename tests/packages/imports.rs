@@ -1,5 +1,5 @@
-//! Do the modules of core import downwards only? A cycle of imports is a house without a ground floor: nobody
-//! can read one part before all others.
+//! Do the modules of core import downwards only? With a cycle of imports, no module can be understood
+//! alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -79,7 +79,7 @@ fn cycle(mut imports: Imports) -> Vec<String> {
             break;
         }
     }
-    // Whoever is left imports another that is left, so this comes to a module where it was before.
+    // Each module that is left imports another that is left, so this reaches a module twice.
     let mut way: Vec<String> = Vec::new();
     let mut module = imports.keys().next().cloned();
     while let Some(at) = module {

@@ -36,7 +36,7 @@ fn name(path: &Path) -> Option<String> {
 
 #[test]
 fn cargo_c_installs_what_is_listed_and_no_more() {
-    let Some(prefix) = installed(Flavour::NoStd) else { return };
+    let Some(prefix) = installed(Flavour::Bare) else { return };
     let lib = prefix.lib.strip_prefix(&prefix.dir).expect("below");
     let full_name = format!("libhgrid.so.{VERSION}");
     let names = ["libhgrid.a", "libhgrid.so", &soname(), &full_name, "pkgconfig/hgrid.pc"];
@@ -55,7 +55,7 @@ fn cargo_c_installs_what_is_listed_and_no_more() {
 
 #[test]
 fn the_shared_library_has_the_name_of_its_compatible_versions() {
-    let Some(prefix) = installed(Flavour::NoStd) else { return };
+    let Some(prefix) = installed(Flavour::Bare) else { return };
     if is_installed("binutils") {
         assert_eq!(dynamic(&prefix.lib.join("libhgrid.so"), "SONAME"), [soname()]);
         for name in ["libhgrid.so", &soname()] {

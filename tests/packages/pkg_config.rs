@@ -30,7 +30,7 @@ fn prefix(flavour: Flavour) -> Option<&'static Prefix> {
 
 #[test]
 fn a_program_links_the_shared_library() {
-    let Some(prefix) = prefix(Flavour::NoStd) else { return };
+    let Some(prefix) = prefix(Flavour::Bare) else { return };
     assert_eq!(ask(prefix, &["--modversion"]), VERSION);
     let dir = TempDir::new().expect("a folder");
     let path = dir.path().join("minimal");
@@ -43,7 +43,7 @@ fn a_program_links_the_shared_library() {
 
 #[test]
 fn a_program_links_the_static_library() {
-    let Some(prefix) = prefix(Flavour::NoStd) else { return };
+    let Some(prefix) = prefix(Flavour::Bare) else { return };
     let answer = ask(prefix, &["--static", "--cflags", "--libs"]);
     // Neither -lm nor -lpthread nor any other: nothing but the library itself.
     assert_eq!(answer.matches(" -l").count(), 1, "{answer}");
@@ -57,7 +57,7 @@ fn a_program_links_the_static_library() {
 
 #[test]
 fn a_program_links_the_flavour_that_gets_memory_itself() {
-    let Some(prefix) = prefix(Flavour::Std) else { return };
+    let Some(prefix) = prefix(Flavour::Malloc) else { return };
     let dir = TempDir::new().expect("a folder");
     let path = dir.path().join("created");
     let source = root().join("tests/packages/outside/created.c");

@@ -56,7 +56,7 @@ pub(crate) fn laid_out(lib: &str) -> (TempDir, Prefix) {
         }
     }
     let lib = dir.join(lib);
-    for library in [Flavour::static_library, Flavour::shared_library].map(|of| of(Flavour::NoStd)) {
+    for library in [Flavour::static_library, Flavour::shared_library].map(|of| of(Flavour::Bare)) {
         let name = library.file_name().expect("a name");
         copy(&library, &lib.join(name));
     }

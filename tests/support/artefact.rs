@@ -56,21 +56,21 @@ pub fn cargo_in(target_dir: &Path, subcommand: &str) -> Command {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flavour {
     /// Nothing: what needs no operating system.
-    NoStd,
-    /// The feature `std`: the same, and `hgrid_create`.
-    Std,
+    Bare,
+    /// The feature `malloc`: the same, and `hgrid_create`.
+    Malloc,
 }
 
 impl Flavour {
     /// Both.
-    pub const ALL: [Self; 2] = [Self::NoStd, Self::Std];
+    pub const ALL: [Self; 2] = [Self::Bare, Self::Malloc];
 
     /// What to tell cargo.
     #[must_use]
     pub fn features(self) -> &'static [&'static str] {
         match self {
-            Self::NoStd => &[],
-            Self::Std => &["--features", "std"],
+            Self::Bare => &[],
+            Self::Malloc => &["--features", "malloc"],
         }
     }
 
@@ -79,8 +79,8 @@ impl Flavour {
         static DIRS: [OnceLock<PathBuf>; 2] = [const { OnceLock::new() }; 2];
         DIRS[self as usize].get_or_init(|| {
             let target = match self {
-                Self::NoStd => target_dir(),
-                Self::Std => target_dir().join("std"),
+                Self::Bare => target_dir(),
+                Self::Malloc => target_dir().join("malloc"),
             };
             let mut build = cargo_in(&target, "build");
             run(build.args(["--release", "-p", "hgrid-capi"]).args(self.features()));
@@ -124,19 +124,19 @@ pub fn library_with(features: &str) -> PathBuf {
 
 /// Where the libraries of the usual flavour lie.
 pub fn library_dir() -> &'static Path {
-    Flavour::NoStd.dir()
+    Flavour::Bare.dir()
 }
 
 /// The usual static library.
 #[must_use]
 pub fn static_library() -> PathBuf {
-    Flavour::NoStd.static_library()
+    Flavour::Bare.static_library()
 }
 
 /// The usual shared library.
 #[must_use]
 pub fn shared_library() -> PathBuf {
-    Flavour::NoStd.shared_library()
+    Flavour::Bare.shared_library()
 }
 
 /// The compiler that a build script would use, so `$CC` or `$CXX` if they are set.

@@ -8,9 +8,9 @@ use hgrid_core::{
     ClosestPoint, Counters, Cull, Grid, Hit, QueryOptions, Ray, Surface, TriangleMesh, Verdict,
 };
 
+use super::arrays::Batch;
 use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
-use crate::batch::Batch;
-use crate::questions::{
+use crate::query_types::{
     hgrid_counters, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, verdict,
 };
 use crate::span::Region;

@@ -1,5 +1,6 @@
 //! The only place where a caller's pointer becomes a reference or a value: here for builds
 //! and blobs, in `ask` for queries, in `join` for arrays of meshes, in `shapes` and `scene` for those.
+//! `arrays` checks the addresses of a batch before `ask` reads them.
 //!
 //! # The contract with C
 //!
@@ -24,6 +25,7 @@
 //! "as long as the caller says": blob and mesh stay unchanged while the view is in use, and between
 //! calls nothing here looks at them.
 
+mod arrays;
 mod ask;
 mod join;
 mod scene;
@@ -35,6 +37,7 @@ use core::slice;
 
 use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
+pub(crate) use arrays::Batch;
 pub(crate) use ask::{Arrays, batch, closest, locate, query, query_all, surface};
 pub(crate) use join::{join, parts_of};
 pub(crate) use scene::{
@@ -46,7 +49,7 @@ pub(crate) use shapes::{
 };
 
 use crate::input::Input;
-use crate::questions::hgrid_refit_report;
+use crate::query_types::hgrid_refit_report;
 use crate::span::{Region, Span};
 use crate::status::{
     HGRID_ERROR_NOT_A_GRID, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,

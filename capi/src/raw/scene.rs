@@ -17,7 +17,7 @@ use super::{
     apart, bytes, bytes_mut, config, read, read_sized, shares, span_of, write, write_grid,
 };
 use crate::input::controlled;
-use crate::questions::{hgrid_counters, hgrid_refit_report, verdict};
+use crate::query_types::{hgrid_counters, hgrid_refit_report, verdict};
 use crate::scene::{
     hgrid_instance, hgrid_object, hgrid_ray_f64, hgrid_scene, hgrid_scene_hit, hgrid_scene_options,
 };

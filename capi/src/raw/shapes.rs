@@ -10,7 +10,7 @@ use hgrid_core::{Boxes, Hit, ObjectTest, QueryOptions, Ray, ShapeHit, Shapes, Si
 use super::ask::all_options;
 use super::{apart, bytes, bytes_mut, config, read, read_sized, span_of, strided, write};
 use crate::input::controlled;
-use crate::questions::{hgrid_query_options, hgrid_ray, hgrid_refit_report};
+use crate::query_types::{hgrid_query_options, hgrid_ray, hgrid_refit_report};
 use crate::shapes::{hgrid_boxes, hgrid_shape_hit, hgrid_shapes};
 use crate::span::{Region, Span};
 use crate::status::{

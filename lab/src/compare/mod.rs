@@ -9,8 +9,9 @@
 //! race: all systems in turn --> numbers --> tables, ratios, charts
 //! ```
 //!
-//! Everything but the peers is compiled always; the peers are behind the feature of that name,
-//! because they need libraries of the system. docs/performance.md says how each is set up and measured.
+//! Everything but the peers is compiled always; the peers need libraries of the system. Without the
+//! features `peers` and `embree` the command says how to build with them. docs/performance.md says how each
+//! is set up and measured.
 
 pub mod agreement;
 mod charts;

@@ -1,6 +1,6 @@
-/* A stranger's program: a grid without a thought for memory. The library was built with std. */
+/* A stranger's program: a grid without a thought for memory. The library was built with malloc. */
 
-#define HGRID_STD
+#define HGRID_MALLOC
 #include <hgrid.h>
 
 #include <stdio.h>

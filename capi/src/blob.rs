@@ -1,11 +1,11 @@
-//! Grids that are stored: opening, proving, packing, and looking at all of one.
+//! Blobs, which are grids as they are stored: opening, proving, packing, and looking at all of one.
 
 use core::ffi::c_void;
 use core::ptr::NonNull;
 
 use hgrid_core::Grid;
 
-use crate::questions::{hgrid_blob_info, hgrid_refit_report, hgrid_statistics};
+use crate::query_types::{hgrid_blob_info, hgrid_refit_report, hgrid_statistics};
 use crate::raw;
 use crate::span::Region;
 use crate::status::{
@@ -217,10 +217,8 @@ pub unsafe extern "C" fn hgrid_mesh_of(
 
 /// Proves that a blob is the grid of its mesh, and so that every answer will be right.
 ///
-/// Takes at most about the time of a build with one level and fixed, two or three times that with
-/// variable, three to five times with recursive, and three times with bvh, whose builds are
-/// short; on damaged bytes it may take much longer. A grid that was just built needs no
-/// proof; a blob from a file, a network or another process may.
+/// Takes a small multiple of the time of a build; on damaged bytes it may take much longer. A grid that
+/// was just built needs no proof; a blob from a file, a network or another process may.
 ///
 /// A tree (`HGRID_METHOD_BVH`) is proven in scratch: a bit for each triangle, of which `hgrid_validate_bytes`
 /// and `HGRID_VALIDATE_BOUND` tell the bytes. The other methods take none. The scratch may lie at any
