@@ -25,7 +25,8 @@
 //! # Ok::<(), hgrid_core::Error>(())
 //! ```
 //!
-//! The modules in layers, lowest first. Imports form no cycle; a test checks this.
+//! The modules in layers, lowest first. A module imports modules of its layer and of lower ones, in no cycle; a test
+//! checks this.
 //!
 //! | layer | modules |
 //! |---|---|

@@ -101,6 +101,27 @@ fn modules_of_core_import_downwards_only() {
     assert!(way.is_empty(), "modules of core import one another in a circle: {}", way.join(" -> "));
 }
 
+/// The modules of each layer, the lowest first: the table in lib.rs.
+fn layers(lib: &str) -> Vec<Vec<String>> {
+    let rows = lib.lines().skip_while(|line| !line.starts_with("//! | layer | modules |")).skip(2);
+    let rows = rows.map_while(|line| line.strip_prefix("//! | ")?.split(" | ").nth(1));
+    rows.map(|row| row.split('`').skip(1).step_by(2).map(str::to_owned).collect()).collect()
+}
+
+#[test]
+fn modules_import_those_of_their_layer_and_of_lower_ones() {
+    let layers = layers(&fs::read_to_string(root().join("core/src/lib.rs")).expect("lib.rs"));
+    let layer =
+        |module: &str| layers.iter().position(|layer| layer.iter().any(|name| name == module));
+    for (module, named) in imports() {
+        let own = layer(&module).unwrap_or_else(|| panic!("the table in lib.rs lacks {module}"));
+        for name in named {
+            let is_below = layer(&name).is_none_or(|other| other <= own);
+            assert!(is_below, "the table in lib.rs has {module} below {name}, which it imports");
+        }
+    }
+}
+
 #[test]
 fn circles_are_found() {
     let of = |pairs: &[(&str, &str)]| {
