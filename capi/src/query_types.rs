@@ -411,7 +411,7 @@ impl From<Surface> for hgrid_surface {
 }
 
 impl hgrid_query_options {
-    /// Whether these are the defaults, which need not be looked at.
+    /// Returns true if these are the defaults, which need not be looked at.
     pub(crate) const fn are_default(&self) -> bool {
         self.mask == u32::MAX
             && self.cull == HGRID_CULL_NONE

@@ -35,12 +35,12 @@ impl Span {
         Self { start, end: start.saturating_add(bytes) }
     }
 
-    /// Whether there is no byte.
+    /// Returns true if there is no byte.
     pub(crate) const fn is_empty(self) -> bool {
         self.start >= self.end
     }
 
-    /// Whether any byte lies in both; an empty span shares none.
+    /// Returns true if any byte lies in both; an empty span shares none.
     pub(crate) const fn overlaps(self, other: Self) -> bool {
         let start = if self.start > other.start { self.start } else { other.start };
         let end = if self.end < other.end { self.end } else { other.end };

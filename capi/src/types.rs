@@ -522,7 +522,7 @@ impl hgrid_mesh {
         }
     }
 
-    /// Whether it is made of others.
+    /// Returns true if it is made of others.
     pub(crate) const fn has_parts(&self) -> bool {
         !self.parts.is_null() || self.part_count > 0
     }

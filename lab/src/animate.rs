@@ -119,7 +119,7 @@ pub struct Report {
     pub triangles: usize,
     /// Moving instances of it; 0 if it is shown where it is.
     pub instances: u32,
-    /// Whether later frames are refitted, not built.
+    /// True if later frames are refitted, not built.
     pub is_refitted: bool,
     /// The method's name.
     pub method: &'static str,

@@ -141,7 +141,7 @@ impl Measurement {
         self.titled(self.density)
     }
 
-    /// Whether the time is that of tiles whose rays were traced together; the work never is.
+    /// Returns true if the time is that of tiles whose rays were traced together; the work never is.
     #[must_use]
     pub fn is_in_tiles(&self) -> bool {
         self.method == Method::Bvh.name()
@@ -257,7 +257,7 @@ struct Memory {
     peak: usize,
 }
 
-/// Whether a method's count of references is one: the others keep ids and grids in one pool.
+/// Returns true if a method's count of references is one: the others keep ids and grids in one pool.
 const fn has_references(method: Method) -> bool {
     matches!(method, Method::OneLevel | Method::Fixed)
 }

@@ -7,7 +7,7 @@
 use std::fs::{self, File};
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 
-/// Whether a page is in memory, or was moved out of it.
+/// The bits of a page that is in memory, or was moved out of it.
 const PRESENT_OR_SWAPPED: u64 = 0b11 << 62;
 
 /// Bytes of the region's pages that hold something, if the system tells.

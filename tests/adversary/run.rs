@@ -39,7 +39,7 @@ struct Asked {
     ray: Ray,
     /// All hits, the nearest first.
     hits: Vec<Hit>,
-    /// Whether each of them shows its front.
+    /// True if each of them shows its front.
     fronts: Vec<bool>,
 }
 

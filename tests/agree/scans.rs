@@ -116,7 +116,7 @@ fn covered_vertices(mesh: &Mesh, edges: &[[u32; 2]]) -> Vec<u32> {
     met.into_iter().filter(|&vertex| balance[vertex as usize] == 0).collect()
 }
 
-/// Whether every edge is passed once in each direction.
+/// Returns true if every edge is passed once in each direction.
 fn is_closed(mesh: &Mesh) -> bool {
     let mut passes: HashMap<[u32; 2], i32> = HashMap::new();
     for triangle in &mesh.indices {

@@ -265,7 +265,7 @@ pub(crate) fn structs() -> Vec<(String, Vec<String>)> {
     structs
 }
 
-/// Whether a line of the table is the same on machines with pointers of 32 bits.
+/// Returns true if a line of the table is the same on machines with pointers of 32 bits.
 fn is_number(line: &str) -> bool {
     line.starts_with("HGRID_")
 }

@@ -19,7 +19,7 @@ const MEMORY: [&str; 5] = ["memcpy", "memmove", "memset", "memcmp", "bcmp"];
 /// What `hgrid_create` asks of the C library.
 const ALLOCATOR: [&str; 2] = ["posix_memalign", "free"];
 
-/// Whether a flavour may need a symbol.
+/// Returns true if a flavour may need a symbol.
 fn may_need(flavour: Flavour, name: &str) -> bool {
     MEMORY.contains(&name) || flavour == Flavour::Malloc && ALLOCATOR.contains(&name)
 }

@@ -336,7 +336,7 @@ fn meets([origin, direction]: [Point; 2], [a, b, c]: [Point; 3]) -> Option<f64> 
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0).then_some(t)
 }
 
-/// Whether a ray meets a box that is a little larger.
+/// Returns true if a ray meets a box that is a little larger.
 fn enters([origin, direction]: [Point; 2], leaf: &Leaf, slack: f64) -> bool {
     let (mut near, mut far) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {

@@ -22,7 +22,7 @@ const CONTENT: Range<usize> = 104..108;
 /// Where the header has the quality of a tree.
 const QUALITY: usize = 120;
 
-/// Whether a valid blob with a bit of this byte flipped is one that somebody may have made.
+/// Returns true if a valid blob with a bit of this byte flipped is one that somebody may have made.
 fn is_fit(at: usize, copy: &Copy, grid: &Grid<'_>) -> bool {
     let rebuilt = Owned::build(grid.mesh(), &grid.config()).unwrap();
     // Why a list was not divided is not proven: see core/src/variable/validate.rs.

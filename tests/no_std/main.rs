@@ -30,7 +30,7 @@ fn rustlib(target: &str) -> PathBuf {
     Path::new(&rustc("sysroot")).join("lib/rustlib").join(target)
 }
 
-/// Whether Rust can build for a target. If it cannot, the test says so and ends.
+/// Returns true if Rust can build for a target. If it cannot, the test says so and ends.
 fn is_available(target: &str) -> bool {
     if !is_installed("rust-targets") {
         return false;

@@ -98,7 +98,7 @@ impl Line {
         self.range_answer(corners, &self.places(corners))
     }
 
-    /// Whether the whole line, whatever the ray's range, passes through a triangle.
+    /// Returns true if the whole line, whatever the ray's range, passes through a triangle.
     #[must_use]
     pub fn passes(&self, corners: &Corners) -> bool {
         // A NaN is not small enough.
@@ -124,7 +124,7 @@ impl Line {
         has(Ordering::Less) != has(Ordering::Greater)
     }
 
-    /// Whether a triangle that the line passes through shows its front.
+    /// Returns true if a triangle that the line passes through shows its front.
     #[must_use]
     pub fn sees_front(&self, corners: &Corners) -> bool {
         let signs = edges(&self.places(corners)).map(|(p, q)| edge_sign(p, q));
@@ -170,7 +170,7 @@ impl Line {
         }
     }
 
-    /// Whether the t of the places lies in the range, or no farther outside than a part of the
+    /// Returns true if the t of the places lies in the range, or no farther outside than a part of the
     /// corners' range. That t is rounded: next to the limit either may be.
     fn places_answer(&self, places: &[Place; 3], outside: f64) -> Answer {
         let ([from, to], along) = self.along(places);
@@ -212,7 +212,7 @@ impl Line {
         }
     }
 
-    /// Whether the numbers of a hit are as exact as they are said to be: `u` and `v` to
+    /// Returns true if the numbers of a hit are as exact as they are said to be: `u` and `v` to
     /// (2^-24 + 2^-38) of their value, `t` to 2^-24 |t| + 2^-38 (|t| + Z), all to 2^-149. The `t` lies
     /// in the range: of a triangle that is grazed, whose `t` does not, it is the end.
     #[must_use]
@@ -284,7 +284,7 @@ impl Line {
         is_t && is_weight(hit.u, &weights[1]) && is_weight(hit.v, &weights[2])
     }
 
-    /// Whether the places of a triangle's corners are up to 2^-50 L from where the corners are, L the
+    /// Returns true if the places of a triangle's corners are up to 2^-50 L from where the corners are, L the
     /// largest difference of a coordinate between the origin and a corner.
     #[must_use]
     pub fn holds_places(&self, corners: &Corners) -> bool {

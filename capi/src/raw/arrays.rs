@@ -79,7 +79,7 @@ fn span(elements: &Elements) -> Span {
     Span::new(elements.start, elements.bytes)
 }
 
-/// Whether a byte of an answer lies in a ray.
+/// Returns true if a byte of an answer lies in a ray.
 ///
 /// With one stride for both, the distance from a ray's start to the start of the next answer is the
 /// same everywhere: the answer lies between two rays, or all of them are hit.

@@ -262,7 +262,7 @@ impl Caller {
         unsafe { run(self.context, count, call, (&raw const task).cast_mut().cast()) }
     }
 
-    /// Whether the caller wants to know how far a build is.
+    /// Returns true if the caller wants to know how far a build is.
     pub(crate) const fn is_watching(&self) -> bool {
         self.progress.is_some()
     }

@@ -50,7 +50,7 @@ pub fn hits(hits: &[Hit]) -> u64 {
     count(hits.iter(), is_hit)
 }
 
-/// Whether so many differing rays are too many.
+/// Returns true if so many differing rays are too many.
 #[must_use]
 pub const fn is_off(differing: u64, rays: u64) -> bool {
     differing * 1000 > rays * MARKED_ABOVE

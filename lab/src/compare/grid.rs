@@ -31,7 +31,7 @@ impl GridSystem {
     }
 }
 
-/// Whether a method is one of the paper's, which trace the rays of a batch one by one.
+/// Returns true if a method is one of the paper's, which trace the rays of a batch one by one.
 const fn is_of_paper(method: Method) -> bool {
     matches!(method, Method::OneLevel | Method::Variable | Method::Fixed | Method::Recursive)
 }

@@ -58,7 +58,7 @@ pub struct SystemNumbers {
     pub system: String,
     /// The library and its version, if it tells.
     pub version: Option<String>,
-    /// Whether it is not hgrid.
+    /// True if it is not hgrid.
     pub is_peer: bool,
     /// The first build in a new process.
     pub first_build: Build,
@@ -118,7 +118,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// Whether so many answers differ that the time means little.
+    /// Returns true if so many answers differ that the time means little.
     #[must_use]
     pub const fn is_off(&self) -> bool {
         is_off(self.differing, self.rays)

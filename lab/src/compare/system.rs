@@ -11,7 +11,7 @@ use super::mode::Mode;
 use super::samples::Watch;
 use super::workloads::Workload;
 
-/// Whether an answer is a hit.
+/// Returns true if an answer is a hit.
 #[must_use]
 pub const fn is_hit(hit: &Hit) -> bool {
     hit.primitive != INVALID_ID
@@ -34,7 +34,7 @@ pub trait System {
     /// The name in tables.
     fn name(&self) -> String;
 
-    /// Whether it is not hgrid.
+    /// Returns true if it is not hgrid.
     fn is_peer(&self) -> bool {
         true
     }

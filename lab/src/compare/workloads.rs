@@ -63,7 +63,7 @@ impl Workload {
         }
     }
 
-    /// Whether points are asked, not rays.
+    /// Returns true if points are asked, not rays.
     #[must_use]
     pub const fn asks_points(self) -> bool {
         matches!(self, Self::Near | Self::Far)

@@ -82,7 +82,7 @@ impl Curves {
 }
 
 impl Curve {
-    /// Whether the density means anything to the method.
+    /// Returns true if the density means anything to the method.
     fn is_curve(&self) -> bool {
         let first = self.points.first().map(|point| point.resolution);
         self.points.len() < 2 || self.points.iter().any(|point| Some(point.resolution) != first)

@@ -23,7 +23,7 @@ fn levels(grid: &Grid<'_>) -> impl Iterator<Item = SimdLevel> {
     SimdLevel::available().filter(move |level| all || *level == SimdLevel::detect())
 }
 
-/// Whether a hit, or none, is one that the ray has with that triangle, wherever it was found.
+/// Returns true if a hit, or none, is one that the ray has with that triangle, wherever it was found.
 fn is_possible(grid: &Grid<'_>, ray: &Ray, hit: &Hit) -> bool {
     let test = TriangleTest::new(ray);
     let triangle = grid.mesh().triangle(hit.primitive);

@@ -158,7 +158,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     agrees(&grid, &rays);
 }
 
-/// Whether two errors have one reason: what is too small may be named by either call.
+/// Returns true if two errors have one reason: what is too small may be named by either call.
 fn is_same(one: Error, other: Error) -> bool {
     one == other || matches!(other, Error::OutOfMemory { .. })
 }

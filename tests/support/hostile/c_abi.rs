@@ -35,7 +35,7 @@ pub fn run(data: &[u8]) {
 pub(super) const UNWRITTEN: hgrid_grid =
     hgrid_grid { opaque: [MaybeUninit::new(0xc7c7_c7c7_c7c7_c7c7); 64] };
 
-/// Whether it still holds that.
+/// Returns true if it still holds that.
 pub(super) fn is_unwritten(grid: &hgrid_grid) -> bool {
     // SAFETY: it was made of numbers, and a library that keeps its promise has written none.
     let words = grid.opaque.map(|word| unsafe { word.assume_init() });
@@ -58,7 +58,7 @@ pub(super) struct Opened {
     pub(super) from: usize,
     /// `None` for the blob's own.
     pub(super) mesh: Option<hgrid_mesh>,
-    /// Whether the library built it of this mesh.
+    /// True if the library built it of this mesh.
     pub(super) is_right: bool,
 }
 

@@ -145,7 +145,7 @@ impl Options {
         answer
     }
 
-    /// Whether the filter was shown, and the counters count, what the questions in Rust came to.
+    /// Returns true if the filter was shown, and the counters count, what the questions in Rust came to.
     pub(super) fn agree(&self, told: &Told) -> bool {
         let is_counting = !self.options.is_null() && !self.options.value().counters.is_null();
         let work = if is_counting { told.work } else { Counters::default() };
@@ -176,12 +176,12 @@ impl Options {
             }
     }
 
-    /// Whether rays of a batch may be traced together.
+    /// Returns true if rays of a batch may be traced together.
     pub(super) fn let_rays_go_together(&self) -> bool {
         self.options.is_null() || self.options.value().counters.is_null()
     }
 
-    /// Whether a filter is asked.
+    /// Returns true if a filter is asked.
     pub(super) fn have_filter(&self) -> bool {
         !self.options.is_null() && self.options.value().filter.is_some()
     }

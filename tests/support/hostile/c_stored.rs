@@ -228,7 +228,7 @@ impl Caller<'_> {
     }
 }
 
-/// Whether two descriptions are of one mesh.
+/// Returns true if two descriptions are of one mesh.
 fn same(one: &hgrid_mesh, other: &hgrid_mesh) -> bool {
     let numbers = |mesh: &hgrid_mesh| {
         let addresses = [mesh.positions.addr(), mesh.indices.addr()];

@@ -34,7 +34,7 @@ impl Loop {
         move |count, task| self.run(count, task)
     }
 
-    /// Whether it does what is asked of it.
+    /// Returns true if it does what is asked of it.
     pub(super) const fn is_right(self) -> bool {
         matches!(self, Self::Forwards | Self::Backwards)
     }

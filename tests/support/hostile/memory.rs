@@ -138,7 +138,7 @@ impl<T: Copy> Struct<T> {
         Self { all, is_null: false }
     }
 
-    /// Whether the library takes it.
+    /// Returns true if the library takes it.
     pub(super) fn is_sound(&self) -> bool {
         // SAFETY: as above.
         let size = unsafe { (&raw const self.all.value).cast::<u32>().read() } as usize;

@@ -24,7 +24,7 @@ struct Line {
     name: String,
     color: RGBColor,
     is_peer: bool,
-    /// Whether it is the second one of its colour.
+    /// True if it is the second one of its colour.
     is_again: bool,
     points: Vec<(f64, f64)>,
 }

@@ -36,7 +36,7 @@ impl System for Tinybvh2 {
 #[cfg(target_feature = "avx2")]
 pub(super) struct Tinybvh8 {
     pub(super) peer: Peer,
-    /// Whether triangles are split between nodes.
+    /// True if triangles are split between nodes.
     pub(super) is_hq: bool,
 }
 
