@@ -106,6 +106,7 @@ mod fixed;
 mod grid;
 mod hash;
 mod inspect;
+mod invariant;
 mod limits;
 mod lists;
 mod mesh;
