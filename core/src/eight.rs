@@ -20,14 +20,14 @@ use fearless_simd::{Simd, f32x4, f32x8, u8x16};
 use zerocopy::{transmute, transmute_ref};
 
 use crate::filter::RayFilter;
-use crate::mesh::{Near, TriangleMesh};
+use crate::mesh::{LastPart, TriangleMesh};
 use crate::ray::Ray;
 
 /// How many triangles are tested at once.
 pub(crate) const LANES: usize = 8;
 
 /// A vertex and four bytes that mean nothing.
-pub(crate) type Row = [u8; 16];
+pub(crate) type VertexBytes = [u8; 16];
 
 /// Up to eight triangles, one a lane.
 #[derive(Clone, Copy)]
@@ -79,7 +79,7 @@ fn four<'m, S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'m>,
     ids: [u32; 4],
-    near: &mut Option<Near<'m>>,
+    near: &mut Option<LastPart<'m>>,
 ) -> ([[f32x4<S>; 3]; 3], u32) {
     let wide = mesh.wide();
     let rows = |id: u32| -> Option<[f32x4<S>; 3]> {
@@ -100,7 +100,7 @@ fn four<'m, S: Simd>(
 
 /// The corners of four triangles, by corner and axis, from their rows.
 #[inline(always)]
-pub(crate) fn corners_of<S: Simd>(simd: S, rows: &[[Row; 4]; 3]) -> [[f32x4<S>; 3]; 3] {
+pub(crate) fn corners_of<S: Simd>(simd: S, rows: &[[VertexBytes; 4]; 3]) -> [[f32x4<S>; 3]; 3] {
     let row = |at: usize, lane: usize| load(simd, &rows[at][lane]);
     [
         corner([row(0, 0), row(0, 1), row(0, 2), row(0, 3)]),
@@ -123,8 +123,8 @@ pub(crate) fn corner<S: Simd>(vertices: [f32x4<S>; 4]) -> [f32x4<S>; 3] {
 fn read<'m>(
     mesh: &TriangleMesh<'m>,
     ids: [u32; 4],
-    near: &mut Option<Near<'m>>,
-) -> ([[Row; 4]; 3], u32) {
+    near: &mut Option<LastPart<'m>>,
+) -> ([[VertexBytes; 4]; 3], u32) {
     let is_joined = !mesh.parts().is_empty();
     let (mut rows, mut used) = ([[[0; 16]; 4]; 3], 0);
     let [a, b, c] = &mut rows;
@@ -190,20 +190,20 @@ pub(crate) fn columns<S: Simd>(
 
 /// A ray as two rows.
 #[inline(always)]
-fn halves(ray: &Ray) -> &[Row; 2] {
+fn halves(ray: &Ray) -> &[VertexBytes; 2] {
     transmute_ref!(ray)
 }
 
 /// One half of four rays.
 #[inline(always)]
-fn rows_of<S: Simd>(simd: S, [a, b, c, d]: [&[Row; 2]; 4], half: usize) -> [f32x4<S>; 4] {
+fn rows_of<S: Simd>(simd: S, [a, b, c, d]: [&[VertexBytes; 2]; 4], half: usize) -> [f32x4<S>; 4] {
     let half = half % 2;
     [load(simd, &a[half]), load(simd, &b[half]), load(simd, &c[half]), load(simd, &d[half])]
 }
 
 /// Sixteen bytes as four numbers.
 #[inline(always)]
-pub(crate) fn load<S: Simd>(simd: S, row: &Row) -> f32x4<S> {
+pub(crate) fn load<S: Simd>(simd: S, row: &VertexBytes) -> f32x4<S> {
     u8x16::simd_from(simd, *row).bitcast()
 }
 

@@ -19,7 +19,7 @@ use crate::mesh::TriangleMesh;
 use crate::method::Method;
 use crate::options::{Cull, QueryOptions};
 use crate::ray::{Hit, Ray, RayF64};
-use crate::search::{Boxes, One, Outcome, Search, test_all};
+use crate::search::{BoxSearch, One, Outcome, Search, test_all};
 use crate::simd::{IS_SMALL, SimdLevel};
 use crate::structure::{self, Structure, by_kind};
 use crate::triangle::TriangleTest;
@@ -374,7 +374,7 @@ impl<'a> Grid<'a> {
     pub(crate) fn search_boxes(
         &self,
         ray: &RayF64,
-        search: &mut Boxes<'_>,
+        search: &mut BoxSearch<'_>,
         counters: &mut Counters,
     ) {
         by_kind!(&self.structure, tree => tree.search_boxes(&self.scope(), ray, search, counters), ());
@@ -386,7 +386,7 @@ impl<'a> Grid<'a> {
         line: &LineF64,
         scale: f64,
         range: [f32; 2],
-        search: &mut Boxes<'_>,
+        search: &mut BoxSearch<'_>,
         counters: &mut Counters,
     ) {
         by_kind!(

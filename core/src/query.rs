@@ -10,7 +10,7 @@ use crate::counters::Counters;
 use crate::grid::Grid;
 use crate::options::{QueryOptions, Selection, Verdict};
 use crate::ray::{Hit, Ray};
-use crate::search::{All, NearestHits, Triangles};
+use crate::search::{AllHits, NearestHits, TriangleSearch};
 use crate::simd::IS_SMALL;
 
 /// The most hits that a walk collects.
@@ -207,9 +207,9 @@ impl Grid<'_> {
     /// Walks a ray through a tree once, and keeps the nearest hits in order; returns how many there are.
     fn heap(&self, ray: &Ray, options: &mut QueryOptions<'_>, hits: &mut [Hit]) -> usize {
         let selection = Selection::new(self.mesh(), options);
-        let mut all = All { selection: &selection, hits, count: 0 };
+        let mut all = AllHits { selection: &selection, hits, count: 0 };
         let mut work = Counters::default();
-        let mut show = Triangles(&mut |hit| all.show(hit));
+        let mut show = TriangleSearch(&mut |hit| all.show(hit));
         self.search(ray, ray.t_min, options.cull, &mut show, &mut work);
         all.sort();
         if let Some(counters) = &mut options.counters {
@@ -273,7 +273,7 @@ impl Grid<'_> {
         let mut nearest = NearestHits { selection: &selection, after, hits, count: 0, is_any };
         let begin = after.map_or(ray.t_min, |after| after.t);
         let mut work = Counters::default();
-        let mut show = Triangles(&mut |hit| nearest.show(hit));
+        let mut show = TriangleSearch(&mut |hit| nearest.show(hit));
         self.search(ray, begin, options.cull, &mut show, &mut work);
         if let Some(counters) = &mut options.counters {
             counters.add(&work);

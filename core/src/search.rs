@@ -83,9 +83,9 @@ impl Search for One {
 
 /// Any other search for triangles. It is called through a pointer, because a traversal is compiled once for each type
 /// of search and takes 10 KB each time.
-pub(crate) struct Triangles<'s>(pub(crate) &'s mut dyn FnMut(Hit) -> Outcome);
+pub(crate) struct TriangleSearch<'s>(pub(crate) &'s mut dyn FnMut(Hit) -> Outcome);
 
-impl Search for Triangles<'_> {
+impl Search for TriangleSearch<'_> {
     #[inline(always)]
     fn show(&mut self, hit: Hit) -> Outcome {
         (self.0)(hit)
@@ -93,9 +93,9 @@ impl Search for Triangles<'_> {
 }
 
 /// Any search for boxes: gets the number of each that the ray meets.
-pub(crate) struct Boxes<'s>(pub(crate) &'s mut dyn FnMut(u32) -> Outcome);
+pub(crate) struct BoxSearch<'s>(pub(crate) &'s mut dyn FnMut(u32) -> Outcome);
 
-impl Search for Boxes<'_> {
+impl Search for BoxSearch<'_> {
     const OF_BOXES: bool = true;
 
     #[inline(always)]
@@ -124,14 +124,14 @@ pub(crate) struct NearestHits<'q> {
 
 /// The nearest hits of a tree, which shows each triangle once, and how many hits there are.
 #[derive(Debug)]
-pub(crate) struct All<'q> {
+pub(crate) struct AllHits<'q> {
     pub(crate) selection: &'q Selection<'q>,
     /// The nearest so far as a heap, the farthest first.
     pub(crate) hits: &'q mut [Hit],
     pub(crate) count: usize,
 }
 
-impl All<'_> {
+impl AllHits<'_> {
     /// Sorts the hits that there was room for, each triangle once.
     pub(crate) fn sort(&mut self) {
         let count = self.count.min(self.hits.len());

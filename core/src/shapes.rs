@@ -287,9 +287,10 @@ impl<'a> Shapes<'a> {
         is_any: bool,
     ) -> Option<Hit> {
         let selection = Selection::new(self.grid.mesh(), options);
-        let mut offered = Offered { selection: &selection, ray: *ray, best: None, test, is_any };
+        let mut offered =
+            ShapeSearch { selection: &selection, ray: *ray, best: None, test, is_any };
         let mut work = Counters::default();
-        let mut offer = search::Boxes(&mut |id| offered.offer(id));
+        let mut offer = search::BoxSearch(&mut |id| offered.offer(id));
         self.grid.search_boxes(&ray.into(), &mut offer, &mut work);
         let best = offered.best;
         if let Some(counters) = &mut options.counters {
@@ -300,7 +301,7 @@ impl<'a> Shapes<'a> {
 }
 
 /// Shapes are tested as they are met.
-struct Offered<'q, 't> {
+struct ShapeSearch<'q, 't> {
     selection: &'q Selection<'q>,
     /// The ray up to the closest hit so far.
     ray: Ray,
@@ -309,7 +310,7 @@ struct Offered<'q, 't> {
     is_any: bool,
 }
 
-impl Offered<'_, '_> {
+impl ShapeSearch<'_, '_> {
     /// Tests a shape whose box the ray meets.
     fn offer(&mut self, id: u32) -> Outcome {
         if !self.selection.has(id) {

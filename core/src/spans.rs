@@ -9,7 +9,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
-use crate::eight::{Row, corner, corners_of, join, load};
+use crate::eight::{VertexBytes, corner, corners_of, join, load};
 use crate::extremes::Extremes;
 use crate::limits::MAX_COORDINATE;
 use crate::mesh::WideMesh;
@@ -24,7 +24,7 @@ pub(crate) struct Span<S: Simd> {
 /// What takes triangles to their cells.
 #[derive(Clone, Copy)]
 pub(crate) struct Spans<S: Simd> {
-    axes: [Axis<S>; 3],
+    axes: [AxisScale<S>; 3],
 }
 
 impl<S: Simd> Spans<S> {
@@ -33,9 +33,9 @@ impl<S: Simd> Spans<S> {
     #[inline(always)]
     pub(crate) fn new(simd: S, lattice: &Lattice, parts: u32) -> Self {
         debug_assert!(parts.is_power_of_two());
-        let x = Axis::new(simd, lattice, 0, parts);
-        let y = Axis::new(simd, lattice, 1, parts);
-        let z = Axis::new(simd, lattice, 2, parts);
+        let x = AxisScale::new(simd, lattice, 0, parts);
+        let y = AxisScale::new(simd, lattice, 1, parts);
+        let z = AxisScale::new(simd, lattice, 2, parts);
         Self { axes: [x, y, z] }
     }
 
@@ -67,7 +67,7 @@ impl<S: Simd> Spans<S> {
 #[inline(always)]
 pub(crate) fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4<S>; 3]; 3] {
     if let Some([a, b, c, d]) = mesh.four(first) {
-        let row = |row: &Row| load(simd, row);
+        let row = |row: &VertexBytes| load(simd, row);
         return [
             corner([row(a[0]), row(b[0]), row(c[0]), row(d[0])]),
             corner([row(a[1]), row(b[1]), row(c[1]), row(d[1])]),
@@ -80,7 +80,7 @@ pub(crate) fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4
 /// The corners of four triangles; no numbers for those that are not there or cannot be read.
 #[cold]
 #[inline(never)]
-fn read(mesh: &WideMesh<'_>, first: u32) -> [[Row; 4]; 3] {
+fn read(mesh: &WideMesh<'_>, first: u32) -> [[VertexBytes; 4]; 3] {
     let mut rows = [[[0xff; 16]; 4]; 3];
     let [a, b, c] = &mut rows;
     for (place, ((a, b), c)) in (0..4).zip(a.iter_mut().zip(b).zip(c)) {
@@ -93,14 +93,14 @@ fn read(mesh: &WideMesh<'_>, first: u32) -> [[Row; 4]; 3] {
 
 /// What takes coordinates on one axis to cells.
 #[derive(Clone, Copy)]
-struct Axis<S: Simd> {
+struct AxisScale<S: Simd> {
     origin: f32x8<S>,
     cells_per_unit: f32x8<S>,
     margin: f32x8<S>,
     end: f32x8<S>,
 }
 
-impl<S: Simd> Axis<S> {
+impl<S: Simd> AxisScale<S> {
     #[inline(always)]
     fn new(simd: S, lattice: &Lattice, axis: usize, parts: u32) -> Self {
         let end = as_f32(parts * lattice.resolution[axis]) - 0.5;

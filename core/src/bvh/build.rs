@@ -38,9 +38,9 @@ use super::layout::{
     small_spare,
 };
 use super::node::Node;
-use super::roots::{RECORD, Record, Roots};
+use super::roots::{RECORD, RootRecord, Roots};
 use super::subtree::Subtree;
-use super::top::{self, ITEM, Item, Top};
+use super::top::{self, ITEM, RootItem, Top};
 use super::units::{SEAM, Units, is_seam, starts};
 use crate::aabb::Aabb;
 use crate::arena::{Sizes, section_bytes, split_mut, whole};
@@ -235,7 +235,7 @@ fn build_in(
     let (ids, _) = split_mut::<u32>(ids, finite.into()).unwrap_or_default();
     let nodes = whole::<Node>(nodes);
     let scene = Lattice::pad(&bounds);
-    let work = Work { mesh, least: least_node(&scene), sizes, shift: KEY_BITS - bits };
+    let work = BuildInputs { mesh, least: least_node(&scene), sizes, shift: KEY_BITS - bits };
     let made = work.roots(entries, &mut *spare, ids, nodes, counts, control)?;
 
     // Build the tree on top of them.
@@ -374,7 +374,7 @@ fn scatter(
 }
 
 /// The inputs that the steps after binning share.
-struct Work<'w> {
+struct BuildInputs<'w> {
     mesh: &'w TriangleMesh<'w>,
     least: f32,
     /// Entries of each bin.
@@ -385,7 +385,7 @@ struct Work<'w> {
 
 /// A task: its share of the units, and the memory for their subtrees.
 struct UnitsTask<'w> {
-    work: &'w Work<'w>,
+    work: &'w BuildInputs<'w>,
     /// The entries of the units among all.
     range: Range<usize>,
     entries: &'w mut [Entry],
@@ -407,12 +407,12 @@ struct Made {
 }
 
 impl Kernel for UnitsTask<'_> {
-    type Output = (Made, Record);
+    type Output = (Made, RootRecord);
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> Self::Output {
         let Self { work, range, entries, spare, ids, nodes, child, counts } = self;
-        let Work { mesh, least, sizes, shift } = *work;
+        let BuildInputs { mesh, least, sizes, shift } = *work;
         let first = range.start as u32;
         let subtree = &mut Subtree::new();
         let mut roots =
@@ -426,7 +426,7 @@ impl Kernel for UnitsTask<'_> {
     }
 }
 
-impl Work<'_> {
+impl BuildInputs<'_> {
     /// Makes the subtrees and their records. The `spare` of a single task may be shorter than its entries.
     fn roots(
         &self,
@@ -436,7 +436,7 @@ impl Work<'_> {
         nodes: &mut [Node],
         counts: &mut [u32],
         control: &Control<'_>,
-    ) -> Result<All, Error> {
+    ) -> Result<TaskTotals, Error> {
         if !IS_SMALL && counts.len() > self.sizes.len() {
             return self.roots_of_tasks(entries, spare, ids, nodes, counts, control);
         }
@@ -446,7 +446,7 @@ impl Work<'_> {
         let nodes = nodes.get_mut(1..).unwrap_or_default();
         let all = UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
         let (made, last) = dispatch(SimdLevel::detect(), all);
-        Ok(All { nodes: 1 + made.nodes, roots: made.roots, last })
+        Ok(TaskTotals { nodes: 1 + made.nodes, roots: made.roots, last })
     }
 
     /// The same by several tasks. Out of line: what they return takes stack.
@@ -459,7 +459,7 @@ impl Work<'_> {
         nodes: &mut [Node],
         counts: &mut [u32],
         control: &Control<'_>,
-    ) -> Result<All, Error> {
+    ) -> Result<TaskTotals, Error> {
         let bits = KEY_BITS - self.shift;
         let tasks = counts.len() >> bits;
         let mut ends = [0; tasks::MOST];
@@ -503,7 +503,7 @@ impl Work<'_> {
         )?;
 
         // Move nodes and records together.
-        let mut all = All { nodes: 1, roots: 0, last: Record::new_zeroed() };
+        let mut all = TaskTotals { nodes: 1, roots: 0, last: RootRecord::new_zeroed() };
         for (made, last) in made.into_iter().flatten() {
             let moved = made.child - all.nodes;
             let from = made.child as usize..(made.child + made.nodes) as usize;
@@ -526,7 +526,7 @@ impl Work<'_> {
                 all.last.write(entries.get_mut(to..));
             } else if let Some(of_task) = entries.get_mut(records.clone()).or_bug("too few entries")
             {
-                for record in whole::<Record>(of_task.as_mut_bytes()) {
+                for record in whole::<RootRecord>(of_task.as_mut_bytes()) {
                     record.node.child -= moved;
                 }
                 move_down(entries, records, to);
@@ -557,7 +557,7 @@ impl Work<'_> {
         entries: &mut [Entry],
         spare: &mut [Entry],
         nodes: &mut [Node],
-        all: &All,
+        all: &TaskTotals,
     ) -> Option<(u32, u32)> {
         // One root or none is all there is.
         if all.roots < 2 {
@@ -570,16 +570,16 @@ impl Work<'_> {
         let roots = all.roots as usize;
         debug_assert!(roots * (RECORD + ITEM) <= entries.len(), "entries do not pay for the roots");
         let (records, rest) = entries.split_at_mut_checked(roots * RECORD)?;
-        let records = &*whole::<Record>(records.as_mut_bytes());
-        let items = whole::<Item>(rest.get_mut(..roots * ITEM)?.as_mut_bytes());
+        let records = &*whole::<RootRecord>(records.as_mut_bytes());
+        let items = whole::<RootItem>(rest.get_mut(..roots * ITEM)?.as_mut_bytes());
         let record = |at: u32| {
             let record = records.get(at as usize).or_bug("an item without a record");
             record.map_or((Node::EMPTY, 0), |r| (r.node, r.levels))
         };
         let mut build = |nodes: &mut [Node]| {
             for (at, (item, record)) in (0..).zip(items.iter_mut().zip(records)) {
-                let Record { min, max, count, .. } = *record;
-                *item = Item { min, max, count, record: at };
+                let RootRecord { min, max, count, .. } = *record;
+                *item = RootItem { min, max, count, record: at };
             }
             top::build(items, record, nodes, all.nodes, self.least)
         };
@@ -594,12 +594,12 @@ impl Work<'_> {
 }
 
 /// The sums over all tasks.
-struct All {
+struct TaskTotals {
     /// Nodes, with one for the root of all.
     nodes: u32,
     roots: u32,
     /// The record of the last root.
-    last: Record,
+    last: RootRecord,
 }
 
 /// Moves elements to an earlier place.

@@ -45,7 +45,7 @@ const fn octets(rays: u64) -> u32 {
 
 /// A child that waits, and the rays that met it.
 #[derive(Clone, Copy)]
-pub(crate) struct Waiting {
+pub(crate) struct GroupEntry {
     /// Node and slot.
     place: u32,
     /// The least distance at which one of the rays enters.
@@ -53,16 +53,16 @@ pub(crate) struct Waiting {
     rays: u64,
 }
 
-impl Waiting {
+impl GroupEntry {
     const NONE: Self = Self { place: 0, near: 0.0, rays: 0 };
 }
 
 /// The stack of a group.
-pub(crate) struct Stack([Waiting; STACK]);
+pub(crate) struct Stack([GroupEntry; STACK]);
 
 impl Stack {
     pub(crate) const fn new() -> Self {
-        Self([Waiting::NONE; STACK])
+        Self([GroupEntry::NONE; STACK])
     }
 }
 
@@ -154,7 +154,7 @@ impl<const ANY: bool> Descent<'_, '_, ANY> {
                         slots &= slots - 1;
                         let (rays, near) = (by[slot as usize % WIDTH], near[slot as usize % WIDTH]);
                         let place = number << 3 | slot;
-                        push::<ANY>(stack, &mut top, base, Waiting { place, near, rays });
+                        push::<ANY>(stack, &mut top, base, GroupEntry { place, near, rays });
                     }
                 }
                 Child::Leaf { first, count } => {
@@ -306,7 +306,12 @@ fn side_by_side<S: Simd>(
 
 /// Pushes a child; for closest hits behind those of the same node that begin farther away.
 #[inline(always)]
-fn push<const ANY: bool>(stack: &mut [Waiting], top: &mut usize, base: usize, waiting: Waiting) {
+fn push<const ANY: bool>(
+    stack: &mut [GroupEntry],
+    top: &mut usize,
+    base: usize,
+    waiting: GroupEntry,
+) {
     let mut at = *top;
     if at >= stack.len() {
         return;

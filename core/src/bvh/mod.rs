@@ -93,7 +93,7 @@ impl<'a> Bvh<'a> {
     /// Lends a stack that is enough for a ray or a point: a small one for nearly all trees, which is sooner
     /// set to zeros.
     #[inline(always)]
-    pub(crate) fn with_stack<R>(&self, walk: impl FnOnce(&mut [walk::Waiting]) -> R) -> R {
+    pub(crate) fn with_stack<R>(&self, walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
         if self.levels <= walk::FEW_LEVELS {
             walk(&mut [0; walk::SMALL_STACK])
         } else {
@@ -142,6 +142,6 @@ impl<'a> Bvh<'a> {
 
 /// Out of line, or shallow trees would have the large stack, too.
 #[inline(never)]
-fn with_deep_stack<R>(walk: impl FnOnce(&mut [walk::Waiting]) -> R) -> R {
+fn with_deep_stack<R>(walk: impl FnOnce(&mut [walk::StackEntry]) -> R) -> R {
     walk(&mut [0; walk::STACK])
 }

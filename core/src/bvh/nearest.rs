@@ -28,7 +28,7 @@ use fearless_simd::{Simd, f32x8, u32x8};
 use super::Bvh;
 use super::boxes::{bits, splat};
 use super::node::{Child, Node, WIDTH};
-use super::walk::{Waiting, bytes};
+use super::walk::{StackEntry, bytes};
 use crate::aabb::{Aabb, greater};
 use crate::counters::Tally;
 use crate::eight::{Eight, first_eight};
@@ -57,7 +57,7 @@ pub(crate) struct ClosestSearch<'r, F, T> {
     /// Tests a triangle; returns how far triangles matter from then on.
     pub(crate) test: F,
     pub(crate) tally: &'r mut T,
-    pub(crate) stack: &'r mut [Waiting],
+    pub(crate) stack: &'r mut [StackEntry],
 }
 
 /// A point that distances are measured from.
@@ -201,7 +201,7 @@ fn outside<S: Simd>(simd: S, low: f32x8<S>, high: f32x8<S>) -> f32x8<S> {
 
 /// A child to come back to.
 #[inline(always)]
-fn waiting(node: u32, slot: u32, away: f32) -> Waiting {
+fn waiting(node: u32, slot: u32, away: f32) -> StackEntry {
     u64::from(away.to_bits()) << 32 | u64::from(node << 3 | slot)
 }
 

@@ -191,7 +191,7 @@ impl Node {
         let end = f32x4::splat(simd, 0.0).combine(f32x4::splat(simd, -255.0));
         let sign = f32x4::splat(simd, 1.0).combine(f32x4::splat(simd, -1.0));
         let unused = u32x4::splat(simd, 0xff).combine(u32x4::splat(simd, 0));
-        let rule = Rule { origin, inverse, end, sign, unused };
+        let rule = Quantiser { origin, inverse, end, sign, unused };
         let first: [u32; 8] = rule.four(children, 0, count).into();
         let second: [u32; 8] = rule.four(children, 4, count).into();
         for (row, lane) in self.bounds.iter_mut().zip([0, 1, 2, 4, 5, 6]) {
@@ -238,7 +238,7 @@ impl Node {
 }
 
 /// How the sides of a box become bytes: the three low ones, then the three high ones, mirrored.
-struct Rule<S: Simd> {
+struct Quantiser<S: Simd> {
     origin: f32x8<S>,
     inverse: f32x8<S>,
     end: f32x8<S>,
@@ -248,7 +248,7 @@ struct Rule<S: Simd> {
 }
 
 // Functions, not closures: a closure is compiled for the processor around it only where it is inlined.
-impl<S: Simd> Rule<S> {
+impl<S: Simd> Quantiser<S> {
     /// The sides of four children, lane by lane the bytes of one word.
     #[inline(always)]
     fn four(&self, children: &[f32x8<S>; WIDTH], first: usize, count: usize) -> u32x8<S> {

@@ -23,9 +23,9 @@ pub(crate) const GROUP: usize = 64;
 pub(crate) const OCTETS: usize = GROUP / 8;
 
 /// A number of each ray.
-type Row = [[f32; 8]; OCTETS];
+type PerRay = [[f32; 8]; OCTETS];
 
-const ZEROS: Row = [[0.0; 8]; OCTETS];
+const ZEROS: PerRay = [[0.0; 8]; OCTETS];
 
 /// Rays that go down together.
 pub(crate) struct Rays {
@@ -37,17 +37,17 @@ pub(crate) struct Rays {
     pub(crate) center: [f32; 3],
     pub(crate) spread: f32,
     /// Relative to the center.
-    origin: [Row; 3],
-    inverse: [Row; 3],
-    start: Row,
-    end: Row,
+    origin: [PerRay; 3],
+    inverse: [PerRay; 3],
+    start: PerRay,
+    end: PerRay,
     /// For the filter, with origins that are not relative.
-    anchor: [Row; 3],
-    direction: [Row; 3],
-    slope: Row,
-    floor: Row,
+    anchor: [PerRay; 3],
+    direction: [PerRay; 3],
+    slope: PerRay,
+    floor: PerRay,
     /// From `t` to distances.
-    scale: Row,
+    scale: PerRay,
     given: [Ray; GROUP],
     pub(crate) hits: [Hit; GROUP],
     /// Pairs of a ray and a triangle that passed the filter.
@@ -408,7 +408,7 @@ const fn bits_below(count: usize) -> u64 {
 
 /// The least and the greatest number of a row.
 #[inline(always)]
-fn interval<S: Simd>(simd: S, row: &Row) -> [f32; 2] {
+fn interval<S: Simd>(simd: S, row: &PerRay) -> [f32; 2] {
     let first = f32x8::simd_from(simd, row[0]);
     let (mut low, mut high) = (first, first);
     for octet in row.iter().skip(1) {
@@ -425,7 +425,7 @@ fn ends<S: Simd>(simd: S, [low, high]: [f32; 2]) -> [f32x8<S>; 2] {
 
 /// Eight rays of three rows.
 #[inline(always)]
-fn octet_of<S: Simd>(simd: S, rows: &[Row; 3], octet: usize) -> [f32x8<S>; 3] {
+fn octet_of<S: Simd>(simd: S, rows: &[PerRay; 3], octet: usize) -> [f32x8<S>; 3] {
     let octet = octet % OCTETS;
     let [a, b, c] = rows;
     [
@@ -437,19 +437,19 @@ fn octet_of<S: Simd>(simd: S, rows: &[Row; 3], octet: usize) -> [f32x8<S>; 3] {
 
 /// Sixteen rays of a row.
 #[inline(always)]
-fn sixteen<S: Simd>(simd: S, row: &Row, which: usize) -> f32x16<S> {
+fn sixteen<S: Simd>(simd: S, row: &PerRay, which: usize) -> f32x16<S> {
     let rows: &[[f32; 16]; OCTETS / 2] = transmute_ref!(row);
     f32x16::simd_from(simd, rows[which % (OCTETS / 2)])
 }
 
 #[inline(always)]
-fn put(row: &mut Row, ray: usize, number: f32) {
+fn put(row: &mut PerRay, ray: usize, number: f32) {
     let row: &mut [f32; GROUP] = transmute_mut!(row);
     row[ray % GROUP] = number;
 }
 
 #[inline(always)]
-fn get(row: &Row, ray: u32) -> f32 {
+fn get(row: &PerRay, ray: u32) -> f32 {
     // Flat, so that its place is one index from where the row lies.
     let row: &[f32; GROUP] = transmute_ref!(row);
     row[ray as usize % GROUP]

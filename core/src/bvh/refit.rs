@@ -124,16 +124,16 @@ struct Tree<'b> {
 }
 
 /// The corners of a box, tight.
-type Corners = [[f32; 3]; 2];
+type BoxCorners = [[f32; 3]; 2];
 
 /// A node whose children get their boxes.
 #[derive(Clone, Copy)]
-struct OpenNode {
+struct RefitNode {
     number: u32,
     /// Child nodes that have no box yet, and the one that is about to get it.
     rest: u32,
     slot: u32,
-    boxes: [Corners; WIDTH],
+    boxes: [BoxCorners; WIDTH],
 }
 
 impl Tree<'_> {
@@ -143,7 +143,7 @@ impl Tree<'_> {
         let Self { mesh, ids, nodes, least } = self;
         let mut reader = mesh.reader();
         let none = [[0.0; 3]; 2];
-        let mut levels = [OpenNode { number: 0, rest: 0, slot: 0, boxes: [none; WIDTH] }; N];
+        let mut levels = [RefitNode { number: 0, rest: 0, slot: 0, boxes: [none; WIDTH] }; N];
         let mut cost = Cost::default();
         let (mut depth, mut next) = (0, Some(0_u32));
         while let Some(level) = levels.get_mut(depth) {
@@ -186,7 +186,7 @@ impl Tree<'_> {
             cost.add(node, level.number == 0);
             let Some(above) = depth.checked_sub(1) else { return (bounds, cost.total()) };
             depth = above;
-            if let Some(OpenNode { slot, boxes, .. }) = levels.get_mut(above)
+            if let Some(RefitNode { slot, boxes, .. }) = levels.get_mut(above)
                 && let Some(corners) = boxes.get_mut(*slot as usize)
             {
                 *corners = [bounds.min.to_array(), bounds.max.to_array()];

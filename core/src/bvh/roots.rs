@@ -36,7 +36,7 @@ use super::units::{Savings, starts};
 /// The record of a root: its node, its box and its counts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, FromBytes, Immutable, IntoBytes)]
-pub(crate) struct Record {
+pub(crate) struct RootRecord {
     pub(crate) node: Node,
     pub(crate) min: [f32; 3],
     pub(crate) max: [f32; 3],
@@ -47,11 +47,11 @@ pub(crate) struct Record {
 }
 
 /// A record in entries.
-pub(crate) const RECORD: usize = size_of::<Record>() / size_of::<Entry>();
+pub(crate) const RECORD: usize = size_of::<RootRecord>() / size_of::<Entry>();
 
-const _: () = assert!(size_of::<Record>() == 112 && RECORD <= PRICE);
+const _: () = assert!(size_of::<RootRecord>() == 112 && RECORD <= PRICE);
 
-impl Record {
+impl RootRecord {
     /// Writes it to the start of some entries, if it has room there.
     pub(crate) fn write(&self, entries: Option<&mut [Entry]>) {
         if let Some(slot) = entries.and_then(|entries| entries.first_chunk_mut::<RECORD>()) {
@@ -92,7 +92,7 @@ pub(crate) struct Roots<'w> {
     pub(crate) node_count: u32,
     pub(crate) root_count: u32,
     /// The record of the last root.
-    pub(crate) last: Record,
+    pub(crate) last: RootRecord,
 }
 
 impl<'w> Roots<'w> {
@@ -109,7 +109,7 @@ impl<'w> Roots<'w> {
         counts: &'w mut [u32],
         subtree: &'w mut Subtree,
     ) -> Self {
-        let last = Record::new_zeroed();
+        let last = RootRecord::new_zeroed();
         let (node_count, root_count) = (0, 0);
         Self {
             mesh,
@@ -198,7 +198,7 @@ impl<'w> Roots<'w> {
         let (node, &[x, y, z, _, u, v, w, _]) = self.subtree.root();
         let (min, max) = ([x, y, z], [-u, -v, -w]);
         let levels = self.subtree.levels();
-        let record = Record { node: *node, min, max, count, levels };
+        let record = RootRecord { node: *node, min, max, count, levels };
         let start = self.root_count as usize * RECORD;
         // The only root of a task may have fewer entries than its record takes.
         let is_only = self.root_count == 0 && range.end == self.entries.len();

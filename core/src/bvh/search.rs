@@ -11,7 +11,7 @@ use crate::filter::RayFilter;
 use crate::mesh::TriangleMesh;
 use crate::options::Cull;
 use crate::ray::{Ray, RayF64, round};
-use crate::search::{Boxes, Search, test_all};
+use crate::search::{BoxSearch, Search, test_all};
 use crate::simd::{SimdLevel, dispatch};
 use crate::triangle::TriangleTest;
 
@@ -52,7 +52,7 @@ impl Bvh<'_> {
         &self,
         scope: &Scope<'_>,
         ray: &RayF64,
-        search: &mut Boxes<'_>,
+        search: &mut BoxSearch<'_>,
         counters: &mut Counters,
     ) {
         let narrow = &ray.rounded();
@@ -73,7 +73,7 @@ impl Bvh<'_> {
         line: &LineF64,
         scale: f64,
         [t_min, t_max]: [f32; 2],
-        search: &mut Boxes<'_>,
+        search: &mut BoxSearch<'_>,
         counters: &mut Counters,
     ) {
         // Beyond f32 every origin is remote.

@@ -42,9 +42,9 @@ const _: () = assert!(MOST_NODES <= MOST_ROOT && LEAF <= 8);
 pub(crate) struct Subtree {
     nodes: [Node; MOST_NODES],
     /// The ranges of entries that the children of each node hold.
-    children: [[ChildRange; WIDTH]; MOST_NODES],
+    children: [[EntryRange; WIDTH]; MOST_NODES],
     /// The range of each node.
-    ranges: [ChildRange; MOST_NODES],
+    ranges: [EntryRange; MOST_NODES],
     /// Levels above each node.
     above: [u8; MOST_NODES],
     count: usize,
@@ -70,14 +70,14 @@ pub(crate) enum Cut {
 
 /// A range of entries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct ChildRange {
+struct EntryRange {
     start: u8,
     end: u8,
 }
 
 const _: () = assert!(MOST_ROOT <= u8::MAX as usize && MOST_ROOT == 128);
 
-impl ChildRange {
+impl EntryRange {
     const NONE: Self = Self { start: 0, end: 0 };
 
     const fn count(self) -> usize {
@@ -128,8 +128,8 @@ impl Subtree {
     pub(crate) fn new() -> Self {
         Self {
             nodes: [Node::new_zeroed(); MOST_NODES],
-            children: [[ChildRange::NONE; WIDTH]; MOST_NODES],
-            ranges: [ChildRange::NONE; MOST_NODES],
+            children: [[EntryRange::NONE; WIDTH]; MOST_NODES],
+            ranges: [EntryRange::NONE; MOST_NODES],
             above: [0; MOST_NODES],
             count: 0,
             boxes: [[0.0; 8]; BOXES],
@@ -190,7 +190,7 @@ impl Subtree {
         {
             *change = (32 - (one[0] ^ next[0]).leading_zeros()) as u8;
         }
-        self.ranges[0] = ChildRange { start: 0, end: count as u8 };
+        self.ranges[0] = EntryRange { start: 0, end: count as u8 };
     }
 
     /// Cuts all ranges of more than a leaf, breadth first.
@@ -318,19 +318,19 @@ fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
 /// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys: where
 /// keys change in the highest bits, and in the middle of what is left.
 #[inline(always)]
-fn parts(range: ChildRange, levels: u32, changes: impl Fn(u8) -> u128) -> [ChildRange; WIDTH] {
-    let mut parts = [ChildRange::NONE; WIDTH];
+fn parts(range: EntryRange, levels: u32, changes: impl Fn(u8) -> u128) -> [EntryRange; WIDTH] {
+    let mut parts = [EntryRange::NONE; WIDTH];
     let mut start = range.start;
     let mut count = 0;
     let mut cuts = highest(range, levels, changes);
     while cuts != 0 && count < WIDTH - 1 {
         let end = cuts.trailing_zeros() as u8 + 1;
         cuts &= cuts - 1;
-        parts[count] = ChildRange { start, end };
+        parts[count] = EntryRange { start, end };
         start = end;
         count += 1;
     }
-    parts[count] = ChildRange { start, end: range.end };
+    parts[count] = EntryRange { start, end: range.end };
     for count in count + 1..WIDTH {
         let mut largest = 0;
         for (at, part) in parts.iter().enumerate().take(count) {
@@ -338,7 +338,7 @@ fn parts(range: ChildRange, levels: u32, changes: impl Fn(u8) -> u128) -> [Child
                 largest = at;
             }
         }
-        let ChildRange { start, end } = parts[largest];
+        let EntryRange { start, end } = parts[largest];
         if end < start + 2 {
             break;
         }
@@ -347,7 +347,7 @@ fn parts(range: ChildRange, levels: u32, changes: impl Fn(u8) -> u128) -> [Child
         let half = if count > LEAF { count.div_ceil(2).next_multiple_of(LEAF) } else { count / 2 };
         let middle = start + half as u8;
         parts[largest].end = middle;
-        let mut next = ChildRange { start: middle, end };
+        let mut next = EntryRange { start: middle, end };
         for slot in parts.iter_mut().skip(largest + 1) {
             next = core::mem::replace(slot, next);
         }
@@ -357,7 +357,7 @@ fn parts(range: ChildRange, levels: u32, changes: impl Fn(u8) -> u128) -> [Child
 
 /// The seven changes in the highest bits inside a range, as bits; all of them if there are fewer.
 #[inline(always)]
-fn highest(range: ChildRange, levels: u32, changes: impl Fn(u8) -> u128) -> u128 {
+fn highest(range: EntryRange, levels: u32, changes: impl Fn(u8) -> u128) -> u128 {
     // A range of one entry or none has no inside.
     let Some(last) = range.end.checked_sub(1).filter(|&last| last > range.start) else { return 0 };
     let inside = (1_u128 << last) - (1 << range.start);

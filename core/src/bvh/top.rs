@@ -21,7 +21,7 @@ use super::node::{Node, WIDTH};
 /// A root, as the tree above sees it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, FromBytes, Immutable, IntoBytes)]
-pub(crate) struct Item {
+pub(crate) struct RootItem {
     pub(crate) min: [f32; 3],
     pub(crate) max: [f32; 3],
     /// Triangles below it.
@@ -31,13 +31,13 @@ pub(crate) struct Item {
 }
 
 /// An item in entries.
-pub(crate) const ITEM: usize = size_of::<Item>() / size_of::<Entry>();
+pub(crate) const ITEM: usize = size_of::<RootItem>() / size_of::<Entry>();
 
 /// Levels from which on parts are halved.
 const DEEP: u32 = 20;
 const BINS: usize = 16;
 
-impl Item {
+impl RootItem {
     fn bounds(&self) -> Aabb {
         Aabb { min: Vec3A::from_array(self.min), max: Vec3A::from_array(self.max) }
     }
@@ -70,7 +70,7 @@ fn surface(bounds: &Aabb) -> f32 {
 
 /// A range of items that becomes a child.
 #[derive(Clone, Copy)]
-struct ChildRange {
+struct ItemRange {
     start: u32,
     end: u32,
     bounds: Aabb,
@@ -78,7 +78,7 @@ struct ChildRange {
     priority: f32,
 }
 
-impl ChildRange {
+impl ItemRange {
     const NONE: Self = Self { start: 0, end: 0, bounds: Aabb::EMPTY, priority: -1.0 };
 
     #[expect(clippy::cast_precision_loss, reason = "a priority")]
@@ -109,7 +109,7 @@ pub(crate) struct Top {
 /// `child` is where `nodes` will lie in the index. No step is smaller than that of a box of size
 /// `least`.
 pub(crate) fn build(
-    items: &mut [Item],
+    items: &mut [RootItem],
     record: impl Fn(u32) -> (Node, u32),
     nodes: &mut [Node],
     child: u32,
@@ -132,7 +132,7 @@ pub(crate) fn build(
         }
         let (start, end, level) = (node.child, node.first, u32::from(node.counts[0]));
         let bounds = bounds_of(items, start, end);
-        let parts = parts(items, ChildRange::new(start, end, bounds, level >= DEEP), level >= DEEP);
+        let parts = parts(items, ItemRange::new(start, end, bounds, level >= DEEP), level >= DEEP);
         let mut node = Node { child: child + count, ..Node::EMPTY };
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let parts = parts.iter().zip(&mut boxes).enumerate();
@@ -174,14 +174,14 @@ fn waiting(start: u32, end: u32, level: u32) -> Node {
     }
 }
 
-fn bounds_of(items: &[Item], start: u32, end: u32) -> Aabb {
+fn bounds_of(items: &[RootItem], start: u32, end: u32) -> Aabb {
     let items = items.get(start as usize..end as usize).or_bug("a part behind the items");
     items.unwrap_or_default().iter().fold(Aabb::EMPTY, |all, item| all.union(&item.bounds()))
 }
 
 /// Cuts a range of items into eight parts, or into single items.
-fn parts(items: &mut [Item], all: ChildRange, halve: bool) -> [ChildRange; WIDTH] {
-    let mut parts = [ChildRange::NONE; WIDTH];
+fn parts(items: &mut [RootItem], all: ItemRange, halve: bool) -> [ItemRange; WIDTH] {
+    let mut parts = [ItemRange::NONE; WIDTH];
     parts[0] = all;
     for count in 1..WIDTH {
         let mut widest = 0;
@@ -200,8 +200,8 @@ fn parts(items: &mut [Item], all: ChildRange, halve: bool) -> [ChildRange; WIDTH
         #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
         let middle = part.start + middle as u32;
         parts[widest] =
-            ChildRange::new(part.start, middle, bounds_of(items, part.start, middle), halve);
-        parts[count] = ChildRange::new(middle, part.end, bounds_of(items, middle, part.end), halve);
+            ItemRange::new(part.start, middle, bounds_of(items, part.start, middle), halve);
+        parts[count] = ItemRange::new(middle, part.end, bounds_of(items, middle, part.end), halve);
     }
     parts
 }
@@ -218,7 +218,7 @@ impl Bin {
 }
 
 /// Cuts two or more items in two where the SAH cost is least; returns how many are in the first part.
-fn cut(items: &mut [Item], halve: bool) -> usize {
+fn cut(items: &mut [RootItem], halve: bool) -> usize {
     let half = items.len() / 2;
     if halve || items.len() < 3 {
         return half;
@@ -231,7 +231,7 @@ fn cut(items: &mut [Item], halve: bool) -> usize {
     }
     #[expect(clippy::cast_precision_loss, reason = "sixteen")]
     let scale = (Vec3A::splat(BINS as f32 * 0.999) / centers.size()).min(Vec3A::splat(f32::MAX));
-    let bin_of = |item: &Item| {
+    let bin_of = |item: &RootItem| {
         ((item.center() - centers.min) * scale).to_array().map(
             #[expect(
                 clippy::cast_possible_truncation,
@@ -289,7 +289,7 @@ fn cut(items: &mut [Item], halve: bool) -> usize {
 }
 
 /// Moves items for which something holds before the others; returns how many there are.
-fn partition(items: &mut [Item], is_first: impl Fn(&Item) -> bool) -> usize {
+fn partition(items: &mut [RootItem], is_first: impl Fn(&RootItem) -> bool) -> usize {
     let mut count = 0;
     for at in 0..items.len() {
         if items.get(at).is_some_and(&is_first) {
@@ -313,11 +313,11 @@ mod tests {
 
     /// The tree over items of these boxes, each a root with one level: every item once, in so many levels.
     fn build_over(boxes: &[Aabb]) -> u32 {
-        let mut items: Vec<Item> = (0..)
+        let mut items: Vec<RootItem> = (0..)
             .zip(boxes)
             .map(|(record, bounds)| {
                 let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
-                Item { min, max, count: 100, record }
+                RootItem { min, max, count: 100, record }
             })
             .collect();
         // A root says by its ids which one it is.

@@ -39,7 +39,7 @@ pub(crate) const SMALL_STACK: usize = 7 * FEW_LEVELS as usize + 1;
 
 /// A child on the stack: in the high half the bits of the distance at which the ray enters it, in the low
 /// half its node and slot.
-pub(crate) type Waiting = u64;
+pub(crate) type StackEntry = u64;
 
 /// The traversal of a single ray: the ray, and the search that receives its hits.
 pub(crate) struct OneRay<'r, F, T> {
@@ -55,7 +55,7 @@ pub(crate) struct OneRay<'r, F, T> {
     pub(crate) afar: Option<&'r (Slab, RayFilter)>,
     pub(crate) search: &'r mut F,
     pub(crate) tally: &'r mut T,
-    pub(crate) stack: &'r mut [Waiting],
+    pub(crate) stack: &'r mut [StackEntry],
 }
 
 /// The ray in vectors.
@@ -70,7 +70,7 @@ struct Wide<S: Simd> {
 }
 
 /// Which side is the near one on each axis: 0 for the low side, [`FLIP`] for the high side.
-pub(super) type Near = [usize; 3];
+pub(super) type NearSides = [usize; 3];
 /// The distance in rows of [`Node::bounds`] from the low side of an axis to its high side. XOR with it swaps the sides.
 const FLIP: usize = 3;
 
@@ -114,7 +114,7 @@ impl<S: Simd> Wide<S> {
     /// Intersects the ray with the boxes of a node. Returns a mask of those that it does not enter before its end, and
     /// the entry distances.
     #[inline(always)]
-    fn meet(&self, simd: S, node: &Node, flips: Near, end: f32) -> (u32, f32x8<S>) {
+    fn meet(&self, simd: S, node: &Node, flips: NearSides, end: f32) -> (u32, f32x8<S>) {
         // Splat integers: floats would be loaded into one lane first and then broadcast.
         let [x, y, z] = node.origin;
         let origin = [u32x8::splat(simd, x), u32x8::splat(simd, y), u32x8::splat(simd, z)];
@@ -148,7 +148,7 @@ impl<S: Simd> Wide<S> {
         simd: S,
         mesh: &TriangleMesh<'_>,
         ids: &[u32],
-        flips: Near,
+        flips: NearSides,
         pad: f32,
         end: f32,
     ) -> (u32, [f32; WIDTH]) {
@@ -172,7 +172,7 @@ impl<S: Simd> Wide<S> {
 
 /// Where the near sides lie.
 #[inline(always)]
-pub(super) fn flips_of(slab: &Slab) -> Near {
+pub(super) fn flips_of(slab: &Slab) -> NearSides {
     slab.inverse.map(|inverse| if inverse < 0.0 { FLIP } else { 0 })
 }
 
@@ -389,7 +389,7 @@ fn offer_leaf<S: Simd, F: Search>(
 /// Pushes a child so that the nearest child of a node is popped first. `near` holds the bits of a distance: distance
 /// and child are stored as one integer, because a pop that spans two stores would wait for both.
 #[inline(always)]
-fn push(stack: &mut [Waiting], top: &mut usize, base: usize, node: u32, slot: u32, near: u32) {
+fn push(stack: &mut [StackEntry], top: &mut usize, base: usize, node: u32, slot: u32, near: u32) {
     let waiting = u64::from(near) << 32 | u64::from(node << 3 | slot);
     let mut at = *top;
     let Some(_) = stack.get(at) else { return };
@@ -410,7 +410,7 @@ fn push(stack: &mut [Waiting], top: &mut usize, base: usize, node: u32, slot: u3
 
 /// Pops the next child that does not begin behind the end of the ray.
 #[inline(always)]
-fn pop(bvh: &Bvh<'_>, stack: &[Waiting], top: &mut usize, end: f32) -> Option<Child> {
+fn pop(bvh: &Bvh<'_>, stack: &[StackEntry], top: &mut usize, end: f32) -> Option<Child> {
     loop {
         *top = top.checked_sub(1)?;
         let waiting = *stack.get(*top)?;

@@ -23,7 +23,7 @@ use crate::error::{Error, MeshField};
 use crate::limits::{MAX_COORDINATE, MAX_TRIANGLES};
 use crate::method::Content;
 pub use parts::MeshPart;
-pub(crate) use parts::{Near, Piece};
+pub(crate) use parts::{LastPart, Piece};
 pub use strided::Strided;
 pub(crate) use wide::{WideMesh, vector};
 
@@ -51,7 +51,7 @@ impl IndexType {
 
 /// How the corners of a triangle are found.
 #[derive(Debug, Clone, Copy)]
-enum Layout<'a> {
+enum IndexLayout<'a> {
     /// By three indices of so many bytes.
     Indexed(IndexType),
     /// By three indices of four bytes. The mesh was joined before it was packed: here are the first triangles
@@ -74,7 +74,7 @@ pub struct TriangleMesh<'a> {
     positions: Strided<'a>,
     /// For boxes and parts only their number.
     indices: Strided<'a>,
-    layout: Layout<'a>,
+    layout: IndexLayout<'a>,
     /// No elements: every triangle has all bits. For parts only their number, if any has masks.
     masks: Strided<'a>,
 }
@@ -93,7 +93,7 @@ impl<'a> TriangleMesh<'a> {
         Self {
             positions: none,
             indices: none,
-            layout: Layout::Indexed(IndexType::U32),
+            layout: IndexLayout::Indexed(IndexType::U32),
             masks: none,
         }
     };
@@ -166,7 +166,7 @@ impl<'a> TriangleMesh<'a> {
         if indices.count > MAX_TRIANGLES {
             return Err(Error::TooManyTriangles);
         }
-        let layout = Layout::Indexed(index_type);
+        let layout = IndexLayout::Indexed(index_type);
         Ok(Self { positions, indices, layout, masks: Strided::NONE })
     }
 
@@ -180,7 +180,7 @@ impl<'a> TriangleMesh<'a> {
             return Err(Error::TooManyTriangles);
         }
         let indices = Strided { count: positions.count, ..Strided::NONE };
-        let layout = Layout::Boxes(content);
+        let layout = IndexLayout::Boxes(content);
         Ok(Self { positions, indices, layout, masks: Strided::NONE })
     }
 
@@ -194,42 +194,44 @@ impl<'a> TriangleMesh<'a> {
         let positions = Strided { count: vertices as usize, ..Strided::NONE };
         let indices = Strided { count: triangles as usize, ..Strided::NONE };
         let masks = if has_masks { indices } else { Strided::NONE };
-        Self { positions, indices, layout: Layout::Joined(parts), masks }
+        Self { positions, indices, layout: IndexLayout::Joined(parts), masks }
     }
 
     /// The same mesh, of indices of four bytes, with the first triangles of the parts that it was packed from.
     pub(crate) const fn numbered(self, numbering: &'a [[u8; 4]]) -> Self {
-        debug_assert!(matches!(self.layout, Layout::Indexed(IndexType::U32)));
-        Self { layout: Layout::Packed(numbering), ..self }
+        debug_assert!(matches!(self.layout, IndexLayout::Indexed(IndexType::U32)));
+        Self { layout: IndexLayout::Packed(numbering), ..self }
     }
 
     /// The first triangles of the parts that a packed mesh was made of.
     pub(crate) const fn numbering(&self) -> &'a [[u8; 4]] {
         match self.layout {
-            Layout::Packed(numbering) => numbering,
-            Layout::Indexed(_) | Layout::Boxes(_) | Layout::Joined(_) => &[],
+            IndexLayout::Packed(numbering) => numbering,
+            IndexLayout::Indexed(_) | IndexLayout::Boxes(_) | IndexLayout::Joined(_) => &[],
         }
     }
 
     /// Returns true for a mesh with arrays of its own.
     pub(crate) const fn can_be_part(&self) -> bool {
-        matches!(self.layout, Layout::Indexed(_) | Layout::Packed(_))
+        matches!(self.layout, IndexLayout::Indexed(_) | IndexLayout::Packed(_))
     }
 
     /// The meshes that were joined ([`join`](Self::join)); none if this one was not.
     #[must_use]
     pub const fn parts(&self) -> &'a [MeshPart<'a>] {
         match self.layout {
-            Layout::Joined(parts) => parts,
-            Layout::Indexed(_) | Layout::Packed(_) | Layout::Boxes(_) => &[],
+            IndexLayout::Joined(parts) => parts,
+            IndexLayout::Indexed(_) | IndexLayout::Packed(_) | IndexLayout::Boxes(_) => &[],
         }
     }
 
     /// What it is made of.
     pub(crate) const fn content(&self) -> Content {
         match self.layout {
-            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => Content::Triangles,
-            Layout::Boxes(content) => content,
+            IndexLayout::Indexed(_) | IndexLayout::Packed(_) | IndexLayout::Joined(_) => {
+                Content::Triangles
+            }
+            IndexLayout::Boxes(content) => content,
         }
     }
 
@@ -256,7 +258,7 @@ impl<'a> TriangleMesh<'a> {
     /// ```
     pub fn with_masks(self, masks: Strided<'a>) -> Result<Self, Error> {
         let is_one_each = |masks: &Strided<'_>| masks.count == self.indices.count;
-        let is_joined = matches!(self.layout, Layout::Joined(_));
+        let is_joined = matches!(self.layout, IndexLayout::Joined(_));
         let masks = masks.cut(size_of::<u32>()).filter(is_one_each).filter(|_| !is_joined);
         Ok(Self { masks: masks.ok_or(Error::InvalidMesh(MeshField::Masks))?, ..self })
     }
@@ -265,7 +267,7 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     #[must_use]
     pub fn mask(&self, triangle: u32) -> u32 {
-        if let Layout::Joined(_) = self.layout {
+        if let IndexLayout::Joined(_) = self.layout {
             return self.mask_of_part(triangle);
         }
         self.own_mask(triangle)
@@ -293,8 +295,10 @@ impl<'a> TriangleMesh<'a> {
     #[must_use]
     pub const fn vertex_count(&self) -> usize {
         match self.layout {
-            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => self.positions.count,
-            Layout::Boxes(_) => 2 * self.positions.count,
+            IndexLayout::Indexed(_) | IndexLayout::Packed(_) | IndexLayout::Joined(_) => {
+                self.positions.count
+            }
+            IndexLayout::Boxes(_) => 2 * self.positions.count,
         }
     }
 
@@ -304,7 +308,7 @@ impl<'a> TriangleMesh<'a> {
     pub fn triangle(&self, triangle: u32) -> Option<Triangle> {
         // A joined mesh has nothing of its own.
         let found = self.own_triangle(triangle);
-        if found.is_none() && matches!(self.layout, Layout::Joined(_)) {
+        if found.is_none() && matches!(self.layout, IndexLayout::Joined(_)) {
             return self.triangle_of_part(triangle);
         }
         found
@@ -331,15 +335,17 @@ impl<'a> TriangleMesh<'a> {
 
     /// An array, if there is one.
     const fn own(&self, array: Strided<'a>) -> Strided<'a> {
-        if matches!(self.layout, Layout::Joined(_)) { Strided::NONE } else { array }
+        if matches!(self.layout, IndexLayout::Joined(_)) { Strided::NONE } else { array }
     }
 
     /// The width of the vertex indices; of a joined mesh, where each part has its own, four bytes.
     #[must_use]
     pub const fn index_type(&self) -> IndexType {
         match self.layout {
-            Layout::Indexed(index_type) => index_type,
-            Layout::Packed(_) | Layout::Boxes(_) | Layout::Joined(_) => IndexType::U32,
+            IndexLayout::Indexed(index_type) => index_type,
+            IndexLayout::Packed(_) | IndexLayout::Boxes(_) | IndexLayout::Joined(_) => {
+                IndexType::U32
+            }
         }
     }
 
@@ -401,7 +407,7 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     pub(crate) fn corners(&self, triangle: u32) -> Option<[Vec3A; 3]> {
         let found = self.own_corners(triangle);
-        if found.is_none() && matches!(self.layout, Layout::Joined(_)) {
+        if found.is_none() && matches!(self.layout, IndexLayout::Joined(_)) {
             return self.corners_of_part(triangle);
         }
         found
@@ -476,34 +482,34 @@ impl<'a> TriangleMesh<'a> {
     #[inline(always)]
     fn vertices_of(&self, triangle: u32) -> Option<[usize; 3]> {
         match self.layout {
-            Layout::Indexed(IndexType::U32) | Layout::Packed(_) => {
+            IndexLayout::Indexed(IndexType::U32) | IndexLayout::Packed(_) => {
                 let b = self.indices.element::<12>(triangle as usize)?;
                 let index = |at: usize| {
                     u32::from_ne_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]) as usize
                 };
                 Some([index(0), index(4), index(8)])
             }
-            Layout::Indexed(IndexType::U16) => {
+            IndexLayout::Indexed(IndexType::U16) => {
                 let b = self.indices.element::<6>(triangle as usize)?;
                 let index = |at: usize| usize::from(u16::from_ne_bytes([b[at], b[at + 1]]));
                 Some([index(0), index(2), index(4)])
             }
-            Layout::Boxes(_) => {
+            IndexLayout::Boxes(_) => {
                 let box_at = triangle as usize;
                 let greatest = box_at.checked_mul(2)?.checked_add(1)?;
                 (box_at < self.positions.count).then_some([greatest - 1, greatest, greatest])
             }
-            Layout::Joined(_) => None,
+            IndexLayout::Joined(_) => None,
         }
     }
 
     #[inline(always)]
     fn vertex(&self, vertex: usize) -> Option<[f32; 3]> {
         let b = match self.layout {
-            Layout::Indexed(_) | Layout::Packed(_) | Layout::Joined(_) => {
+            IndexLayout::Indexed(_) | IndexLayout::Packed(_) | IndexLayout::Joined(_) => {
                 self.positions.element::<12>(vertex)?
             }
-            Layout::Boxes(_) => {
+            IndexLayout::Boxes(_) => {
                 let corners = self.positions.element::<BOX_BYTES>(vertex / 2)?.as_chunks::<12>().0;
                 corners.get(vertex % 2)?
             }

@@ -209,10 +209,10 @@ impl<'a> TriangleMesh<'a> {
 
     /// The mesh or the part of a triangle for reading many triangles fast.
     #[inline(never)]
-    pub(crate) fn near(&self, triangle: u32) -> Near<'a> {
+    pub(crate) fn near(&self, triangle: u32) -> LastPart<'a> {
         match self.place_of(triangle) {
-            Some((_, part)) => Near { wide: part.mesh.wide(), first: part.first },
-            None => Near { wide: self.wide(), first: 0 },
+            Some((_, part)) => LastPart { wide: part.mesh.wide(), first: part.first },
+            None => LastPart { wide: self.wide(), first: 0 },
         }
     }
 }
@@ -238,12 +238,12 @@ impl<'m> Piece<'m> {
 
 /// The mesh or the part that was read last.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Near<'a> {
+pub(crate) struct LastPart<'a> {
     wide: WideMesh<'a>,
     first: u32,
 }
 
-impl<'a> Near<'a> {
+impl<'a> LastPart<'a> {
     /// The corners of a triangle, if it lies here and can be read this way.
     #[inline(always)]
     pub(crate) fn corners(&self, triangle: u32) -> Option<[&'a [u8; 16]; 3]> {

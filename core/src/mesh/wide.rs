@@ -3,7 +3,7 @@
 use glam::{Vec3A, Vec4};
 use zerocopy::transmute;
 
-use super::{IndexType, Layout, Strided, TriangleMesh};
+use super::{IndexLayout, IndexType, Strided, TriangleMesh};
 
 /// A mesh whose vertices are read in pieces of sixteen bytes, which is one load and one check each.
 ///
@@ -64,7 +64,7 @@ impl<'a> TriangleMesh<'a> {
             (
                 Ok(position_stride),
                 Ok(index_stride),
-                Layout::Indexed(IndexType::U32) | Layout::Packed(_),
+                IndexLayout::Indexed(IndexType::U32) | IndexLayout::Packed(_),
             ) => WideMesh {
                 positions: self.positions.bytes,
                 indices: self.indices.bytes,

@@ -65,7 +65,7 @@ impl Kernel for Displace<'_> {
                 *offset = 0;
                 continue;
             };
-            let row = Row { domain_bits, start: start + first, width: last - first + 1 };
+            let row = CellRow { domain_bits, start: start + first, width: last - first + 1 };
 
             // Clear what is read when it is tried at the end of the table: its words and a vector.
             let behind = slots / WORD_BITS + row.width.div_ceil(WORD_BITS) + WORDS;
@@ -113,13 +113,13 @@ const WORDS: usize = 8;
 
 /// A row of cells among the domain bits, from the first full cell to the last.
 #[derive(Clone, Copy)]
-struct Row<'a> {
+struct CellRow<'a> {
     domain_bits: &'a [u64],
     start: usize,
     width: usize,
 }
 
-impl Row<'_> {
+impl CellRow<'_> {
     /// The first slot of a word at which the row fits, counted from the word on.
     #[inline(always)]
     fn fit_one(self, occupied: &[u64], word: usize) -> Option<usize> {

@@ -38,7 +38,7 @@ pub(crate) use build::{Overlay, Plan, Rows, build_under};
 pub(crate) use displacement::displace;
 use layout::Sections;
 pub(crate) use layout::{Layout, longest};
-pub(crate) use placed::Batch;
+pub(crate) use placed::PlacedBatch;
 pub(crate) use spread::{Spread, fill, mark};
 pub(crate) use triangles::MeshSpread;
 pub(crate) use validate::{check_header, slots_are_sound};

@@ -17,7 +17,7 @@ use crate::error::Error;
 /// The cells of a primitive: the row and the place in it of the first, and how
 /// many more there are on each axis.
 #[derive(Debug, Clone, Copy)]
-struct Placed {
+struct CellSpan {
     row: usize,
     x: u32,
     more: u32,
@@ -37,7 +37,7 @@ const XZ: u32 = X | Z;
 const YZ: u32 = Y | Z;
 const XYZ: u32 = X | Y | Z;
 
-impl Placed {
+impl CellSpan {
     /// More cells on each axis.
     const fn more(self) -> [u32; 3] {
         [self.more & MOST_MORE, self.more >> MORE_BITS & MOST_MORE, self.more >> (2 * MORE_BITS)]
@@ -51,7 +51,7 @@ impl Placed {
 }
 
 /// The cells of primitives side by side, in eights.
-pub(crate) struct Batch {
+pub(crate) struct PlacedBatch {
     pub(super) rows: [[u32; LANES]; Self::EIGHTS],
     pub(super) xs: [[u32; LANES]; Self::EIGHTS],
     pub(super) more: [[u32; LANES]; Self::EIGHTS],
@@ -60,9 +60,9 @@ pub(crate) struct Batch {
 }
 
 /// Progress is told at some places, all of which are a batch's first.
-const _: () = assert!(OFTEN.is_multiple_of(Batch::SIZE));
+const _: () = assert!(OFTEN.is_multiple_of(PlacedBatch::SIZE));
 
-impl Batch {
+impl PlacedBatch {
     /// As many as the bits that say which of them are placed.
     const SIZE: u32 = u64::BITS;
     const EIGHTS: usize = Self::SIZE as usize / LANES;
@@ -162,11 +162,11 @@ impl Batch {
     }
 
     #[inline(always)]
-    fn get(&self, lane: usize) -> Option<Placed> {
+    fn get(&self, lane: usize) -> Option<CellSpan> {
         let row = *self.rows.as_flattened().get(lane)? as usize;
         let x = *self.xs.as_flattened().get(lane)?;
         let more = *self.more.as_flattened().get(lane)?;
-        (self.is_placed >> lane & 1 == 1).then_some(Placed { row, x, more })
+        (self.is_placed >> lane & 1 == 1).then_some(CellSpan { row, x, more })
     }
 
     /// Places one primitive after the other.

@@ -7,7 +7,7 @@
 
 use core::ops::Range;
 
-use super::placed::Batch;
+use super::placed::PlacedBatch;
 use super::slot;
 use crate::bits::set_range;
 use crate::cell::CellRange;
@@ -31,7 +31,7 @@ pub(crate) trait Spread {
 
     /// Places the primitives at some places, as many as a batch has or fewer: those that it can, at
     /// the cells that [`range`](Self::range) says.
-    fn place(&self, places: Range<u32>, batch: &mut Batch);
+    fn place(&self, places: Range<u32>, batch: &mut PlacedBatch);
 }
 
 /// Marks the cells that primitives overlap and counts the references, up to a limit.
@@ -57,10 +57,10 @@ pub(crate) fn count_references(
     spread: &dyn Spread,
     limit: u32,
     watch: &Watch<'_>,
-    mut visit: impl FnMut(&Batch, Range<u32>),
+    mut visit: impl FnMut(&PlacedBatch, Range<u32>),
 ) -> Result<Option<u32>, Error> {
     let mut count = 0;
-    let is_all = Batch::each::<false>(spread, watch, [0.15, 0.4], |batch, places| {
+    let is_all = PlacedBatch::each::<false>(spread, watch, [0.15, 0.4], |batch, places| {
         count += batch.references(spread, places.clone());
         let goes_on = count <= u64::from(limit);
         if goes_on {
@@ -81,7 +81,7 @@ pub(crate) fn fill(
 ) -> Result<(), Error> {
     // Count the references of each slot.
     hash.fill(0);
-    Batch::each::<false>(spread, watch, [0.5, 0.7], |batch, places| {
+    PlacedBatch::each::<false>(spread, watch, [0.5, 0.7], |batch, places| {
         batch.each_row::<false>(spread, places, |_, row, x, length| {
             for count in slots(row_offsets, hash, row, x, length) {
                 *count += 1;
@@ -98,7 +98,7 @@ pub(crate) fn fill(
     }
 
     // Put every primitive before the end of its lists, the last one first: lists ascend.
-    Batch::each::<true>(spread, watch, [0.7, 1.0], |batch, places| {
+    PlacedBatch::each::<true>(spread, watch, [0.7, 1.0], |batch, places| {
         batch.each_row::<true>(spread, places, |place, row, x, length| {
             for end in slots(row_offsets, hash, row, x, length) {
                 *end = end.wrapping_sub(1);
@@ -156,7 +156,7 @@ mod tests {
             self.ranges[place as usize]
         }
 
-        fn place(&self, places: Range<u32>, batch: &mut Batch) {
+        fn place(&self, places: Range<u32>, batch: &mut PlacedBatch) {
             batch.place_each(self, places);
         }
     }

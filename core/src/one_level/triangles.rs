@@ -5,7 +5,7 @@ use core::ops::Range;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x8};
 
-use super::placed::{Batch, MORE_BITS, MOST_MORE};
+use super::placed::{MORE_BITS, MOST_MORE, PlacedBatch};
 use super::spread::Spread;
 use crate::aabb::Aabb;
 use crate::cell::{CellRange, Lattice};
@@ -43,7 +43,7 @@ impl Spread for MeshSpread<'_> {
         Some(self.lattice.range(&bounds))
     }
 
-    fn place(&self, places: Range<u32>, batch: &mut Batch) {
+    fn place(&self, places: Range<u32>, batch: &mut PlacedBatch) {
         let (wide, first) = (self.wide, places.start);
         // Of joined meshes the part of the first triangle: others are placed one by one.
         let (wide, first) = if self.mesh.parts().is_empty() {
@@ -65,7 +65,7 @@ struct PlaceBatch<'f, 'm> {
     wide: WideMesh<'m>,
     /// The first triangle, as `wide` calls it.
     first: u32,
-    batch: &'f mut Batch,
+    batch: &'f mut PlacedBatch,
 }
 
 impl Kernel for PlaceBatch<'_, '_> {
@@ -101,7 +101,11 @@ mod tests {
     use crate::cell::row;
 
     /// The rows of cells of a batch's primitives, and their number of cells.
-    fn rows(batch: &Batch, spread: &MeshSpread<'_>, places: Range<u32>) -> (Vec<[usize; 4]>, u64) {
+    fn rows(
+        batch: &PlacedBatch,
+        spread: &MeshSpread<'_>,
+        places: Range<u32>,
+    ) -> (Vec<[usize; 4]>, u64) {
         let mut rows = Vec::new();
         batch.each_row::<false>(spread, places.clone(), |place, row, x, length| {
             rows.push([place as usize, row, x as usize, length as usize]);
@@ -161,7 +165,7 @@ mod tests {
                     }
                     let expected = (expected, cells);
 
-                    let mut batch = Batch::empty();
+                    let mut batch = PlacedBatch::empty();
                     batch.place_each(&spread, places.clone());
                     assert_eq!(rows(&batch, &spread, places.clone()), expected);
                     // Machines without vectors never run this kernel.

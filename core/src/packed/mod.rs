@@ -81,7 +81,7 @@ impl BlobInfo {
         let content = header.content()?;
         let total_bytes = match content {
             Content::Instances => ends_of(&header).1,
-            Content::Triangles | Content::Shapes => Sections::of(&header)?.end,
+            Content::Triangles | Content::Shapes => MeshSections::of(&header)?.end,
             Content::Packed => header.blob_bytes,
         };
         let Header { vertex_count, triangle_count, blob_bytes: grid_bytes, .. } = header;
@@ -99,7 +99,7 @@ impl BlobInfo {
 }
 
 /// Where the mesh lies behind a grid.
-struct Sections {
+struct MeshSections {
     positions: u64,
     indices: u64,
     masks: u64,
@@ -107,7 +107,7 @@ struct Sections {
     end: u64,
 }
 
-impl Sections {
+impl MeshSections {
     fn of(header: &Header) -> Result<Self, Error> {
         let has_mesh = header.has_mesh()?;
         let triangles = u64::from(header.triangle_count);
@@ -131,7 +131,7 @@ impl<'a> Grid<'a> {
     /// Bytes that [`pack`](Self::pack) writes.
     #[must_use]
     pub fn packed_bytes(&self) -> u64 {
-        let packed = self.packed_header().and_then(|header| Sections::of(&header));
+        let packed = self.packed_header().and_then(|header| MeshSections::of(&header));
         packed.map_or(0, |sections| sections.end)
     }
 
@@ -166,7 +166,7 @@ impl<'a> Grid<'a> {
     pub fn pack<'t>(&self, to: &'t mut [u8]) -> Result<&'t mut [u8], Error> {
         check_alignment(to, Region::Index)?;
         let header = self.packed_header()?;
-        let sections = Sections::of(&header)?;
+        let sections = MeshSections::of(&header)?;
         let mesh = self.mesh();
         if let Some(triangle) = mesh.first_without_vertices() {
             return Err(Error::IndexOutOfRange { triangle });
@@ -232,7 +232,7 @@ impl<'a> Grid<'a> {
         if has_mesh == HasMesh::No {
             return Err(Error::NoMesh);
         }
-        let Sections { positions, indices, masks, parts, end } = Sections::of(&header)?;
+        let MeshSections { positions, indices, masks, parts, end } = MeshSections::of(&header)?;
         let (needed_bytes, available_bytes) = (end, blob.len() as u64);
         let truncated = Error::Truncated { needed_bytes, available_bytes };
         let damaged = corrupt(offset_of!(Header, triangle_count));
@@ -272,7 +272,7 @@ impl<'a> Grid<'a> {
             let first = u32::from_ne_bytes(*first);
             let is_next = first >= before && (at > 0 || first == 0);
             if !is_next || first > self.mesh().triangle_count() {
-                let Sections { parts, .. } = Sections::of(&self.packed_header()?)?;
+                let MeshSections { parts, .. } = MeshSections::of(&self.packed_header()?)?;
                 let offset = parts.saturating_add(at as u64 * size_of::<u32>() as u64);
                 return Err(Error::Corrupt { offset });
             }

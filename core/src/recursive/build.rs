@@ -129,7 +129,7 @@ struct Root {
     /// Its own cells are the unit of all boxes below it.
     lattice: Lattice,
     density: f32,
-    rule: Rule,
+    rule: Fineness,
 }
 
 impl Root {
@@ -145,7 +145,7 @@ impl Root {
         let size = bounds.size().to_array().map(f64::from);
         let limit = u64::from(reference_limit(mesh.triangle_count()));
         loop {
-            let rule = Rule { density: f64::from(density), depth };
+            let rule = Fineness { density: f64::from(density), depth };
             let resolution = rule.resolution(size, survey.finite_count, 0).ok_or(TOO_FINE)?;
             let lattice = Lattice::new(bounds, resolution);
             if references(mesh, &lattice, limit) <= limit {
@@ -161,7 +161,7 @@ fn references(mesh: &TriangleMesh<'_>, lattice: &Lattice, limit: u64) -> u64 {
     let node = Node::root(lattice.resolution);
     let mut references = 0;
     for id in 0..mesh.triangle_count() {
-        if let Some(placed) = Placed::new(mesh, lattice, id) {
+        if let Some(placed) = PlacedTriangle::new(mesh, lattice, id) {
             placed.each_cell(&node, |_, _| references += 1);
         }
         if references > limit {
@@ -215,12 +215,12 @@ fn run(
 
 /// How finely a grid is cut.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rule {
+pub(super) struct Fineness {
     pub(super) density: f64,
     pub(super) depth: u32,
 }
 
-impl Rule {
+impl Fineness {
     /// Manta's resolution for a box of this size with so many primitives at this depth; `None` if
     /// an axis would need more cells than a grid can have.
     pub(super) fn resolution(
@@ -315,14 +315,14 @@ const fn rounded(part: f64) -> u32 {
 }
 
 /// A triangle in the cells of the root.
-pub(super) struct Placed {
+pub(super) struct PlacedTriangle {
     /// Its box, grown by the margin.
     pub(super) reach: Aabb,
     overlap: Overlap,
     margin: Vec3A,
 }
 
-impl Placed {
+impl PlacedTriangle {
     pub(super) fn new(mesh: &TriangleMesh<'_>, lattice: &Lattice, id: u32) -> Option<Self> {
         let corners = mesh.corners(id)?;
         let reach = lattice.reach(&Aabb::of(corners)?);
@@ -366,14 +366,15 @@ const TOO_FINE: Error = Error::InvalidConfig(ConfigField::Density);
 struct Builder<'m, 'p> {
     mesh: &'m TriangleMesh<'m>,
     lattice: &'m Lattice,
-    rule: Rule,
+    rule: Fineness,
     pool: Bump<'p>,
     watch: &'m Watch<'m>,
 }
 
 impl Builder<'_, '_> {
-    fn place(&self, id: u32) -> Option<Placed> {
-        Placed::new(self.mesh, self.lattice, id).or_bug("a list with a triangle that is not finite")
+    fn place(&self, id: u32) -> Option<PlacedTriangle> {
+        PlacedTriangle::new(self.mesh, self.lattice, id)
+            .or_bug("a list with a triangle that is not finite")
     }
 
     /// Puts a grid of these primitives in this box into the pool, and all grids in it.

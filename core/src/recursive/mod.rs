@@ -32,7 +32,7 @@ use crate::error::Error;
 use crate::limits::MAX_DEPTH;
 use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes, sizes};
-use node::{Content, Node};
+use node::{CellContent, Node};
 
 /// A cell with no more primitives than this is not divided.
 const FEW: usize = 4;
@@ -73,8 +73,8 @@ impl<'a> Recursive<'a> {
             visitor.spend(1)
                 && match node.content(self.pool, cell) {
                     None => true,
-                    Some(Content::List(ids)) => visitor.list(ids),
-                    Some(Content::Grid(at)) => Node::open(self.pool, at)
+                    Some(CellContent::List(ids)) => visitor.list(ids),
+                    Some(CellContent::Grid(at)) => Node::open(self.pool, at)
                         .filter(|_| depth > 0)
                         .is_none_or(|inner| self.visit_node(&inner, reach, depth - 1, visitor)),
                 }
@@ -101,8 +101,8 @@ impl<'a> Recursive<'a> {
             tally.cell_step();
             match node.content(self.pool, walk.cell()) {
                 None => {}
-                Some(Content::List(ids)) => limit = leaf(ids, tally),
-                Some(Content::Grid(at)) => {
+                Some(CellContent::List(ids)) => limit = leaf(ids, tally),
+                Some(CellContent::Grid(at)) => {
                     // Go down, unless the ray passes the grid within its cell.
                     let slot = around.get_mut(depth);
                     let inner = Node::open(self.pool, at);

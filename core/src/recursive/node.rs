@@ -13,7 +13,7 @@ const RESOLUTION_BITS: u32 = (MAX_RESOLUTION_OF_RECURSIVE + 1).ilog2();
 
 /// What a cell holds.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Content<'a> {
+pub(super) enum CellContent<'a> {
     /// Primitive ids, ascending.
     List(&'a [u32]),
     /// Where in the pool its grid starts.
@@ -113,15 +113,19 @@ impl Node {
 
     /// What a cell holds; `None` if it is empty.
     #[inline(always)]
-    pub(super) fn content<'a>(&self, pool: &'a [u32], [x, y, z]: [u32; 3]) -> Option<Content<'a>> {
+    pub(super) fn content<'a>(
+        &self,
+        pool: &'a [u32],
+        [x, y, z]: [u32; 3],
+    ) -> Option<CellContent<'a>> {
         let [width, height, _] = self.resolution;
         let cell = row(height, y, z) * width as usize + x as usize;
         let ends = pool.get(self.entries.checked_add(cell)?..)?.first_chunk::<2>()?;
         let (start, end) = ((ends[0] & !GRID) as usize, (ends[1] & !GRID) as usize);
         if ends[0] & GRID != 0 {
-            Some(Content::Grid(start))
+            Some(CellContent::Grid(start))
         } else if start < end {
-            pool.get(start..end).map(Content::List)
+            pool.get(start..end).map(CellContent::List)
         } else {
             None
         }

@@ -9,8 +9,8 @@
 //! Whether a list is long because nothing would separate its triangles would take memory to prove:
 //! a list may have any length. Queries do not mind.
 
-use super::build::{Placed, Rule, inside};
-use super::node::{Content, HEAD_WORDS, Node};
+use super::build::{Fineness, PlacedTriangle, inside};
+use super::node::{CellContent, HEAD_WORDS, Node};
 use super::{FEW, Recursive};
 use crate::aabb::Aabb;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
@@ -31,7 +31,7 @@ struct Check<'a> {
     pool: &'a [u32],
     mesh: &'a TriangleMesh<'a>,
     lattice: &'a Lattice,
-    rule: Rule,
+    rule: Fineness,
     /// Where the pool goes on.
     cursor: usize,
     /// The cells around the list that is read, from the root on.
@@ -73,7 +73,7 @@ impl Recursive<'_> {
         if header.hash_count != 0 {
             return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
         }
-        let rule = Rule { density: f64::from(header.density), depth: header.depth };
+        let rule = Fineness { density: f64::from(header.density), depth: header.depth };
         header.check(lattice, mesh, |size, count| {
             rule.resolution(size.to_array().map(f64::from), count, 0)
         })?;
@@ -97,7 +97,7 @@ impl Recursive<'_> {
         }
         let mut expected = 0;
         for id in 0..mesh.triangle_count() {
-            if let Some(placed) = Placed::new(mesh, lattice, id) {
+            if let Some(placed) = PlacedTriangle::new(mesh, lattice, id) {
                 expected += check.expected(&root, &placed, 0);
             }
             if expected > check.listed {
@@ -128,7 +128,7 @@ impl Check<'_> {
             *self.places.get_mut(depth).ok_or(wrong)? = Some((*node, cell));
             let references = match node.content(self.pool, cell) {
                 None => 0,
-                Some(Content::List(ids)) => {
+                Some(CellContent::List(ids)) => {
                     if !ascends(ids) || !ids.iter().all(|&id| self.count(id, depth)) {
                         return Err(wrong);
                     }
@@ -136,7 +136,7 @@ impl Check<'_> {
                     self.cursor += ids.len();
                     ids.len() as u64
                 }
-                Some(Content::Grid(inner)) => {
+                Some(CellContent::Grid(inner)) => {
                     let inner = Node::open(self.pool, inner).ok_or(wrong)?;
                     let start = self.cursor;
                     self.grid(&inner, depth + 1)?;
@@ -165,7 +165,7 @@ impl Check<'_> {
     /// Whether a triangle overlaps all of the cells around a list, down to a depth. Counts it in
     /// each of their grids where this is the first list that has it.
     fn count(&mut self, id: u32, depth: usize) -> bool {
-        let Some(placed) = Placed::new(self.mesh, self.lattice, id) else { return false };
+        let Some(placed) = PlacedTriangle::new(self.mesh, self.lattice, id) else { return false };
         let mut is_first = true;
         for (place, contents) in self.places.iter().zip(&mut self.contents).take(depth + 1).rev() {
             let Some((node, cell)) = place else { return false };
@@ -227,7 +227,7 @@ impl Check<'_> {
         node: &Node,
         around: &mut [Option<CellOfGrid>; LEVELS],
         depth: usize,
-        visit: &mut impl FnMut(&Placed),
+        visit: &mut impl FnMut(&PlacedTriangle),
     ) {
         let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
         for cell in all.cells() {
@@ -237,13 +237,14 @@ impl Check<'_> {
             let here = around.get(..=depth).unwrap_or_default();
             match node.content(self.pool, cell) {
                 None => {}
-                Some(Content::List(ids)) => {
-                    let placed = ids.iter().map(|&id| Placed::new(self.mesh, self.lattice, id));
+                Some(CellContent::List(ids)) => {
+                    let placed =
+                        ids.iter().map(|&id| PlacedTriangle::new(self.mesh, self.lattice, id));
                     for placed in placed.flatten().filter(|placed| is_first(placed, here)) {
                         visit(&placed);
                     }
                 }
-                Some(Content::Grid(at)) => {
+                Some(CellContent::Grid(at)) => {
                     if let Some(inner) = Node::open(self.pool, at).filter(|_| depth + 1 < LEVELS) {
                         self.each_in(&inner, around, depth + 1, visit);
                     }
@@ -253,11 +254,11 @@ impl Check<'_> {
     }
 
     /// How many lists below a grid must have a triangle.
-    fn expected(&self, node: &Node, placed: &Placed, depth: u32) -> u64 {
+    fn expected(&self, node: &Node, placed: &PlacedTriangle, depth: u32) -> u64 {
         let mut sum = 0;
         placed.each_cell(node, |_, cell| {
             sum += match node.content(self.pool, cell) {
-                Some(Content::Grid(at)) if depth + 1 < MAX_DEPTH => Node::open(self.pool, at)
+                Some(CellContent::Grid(at)) if depth + 1 < MAX_DEPTH => Node::open(self.pool, at)
                     .map_or(0, |inner| self.expected(&inner, placed, depth + 1)),
                 _ => 1,
             };
@@ -267,7 +268,7 @@ impl Check<'_> {
 }
 
 /// Whether these cells are the first of their grids that a triangle overlaps.
-fn is_first(placed: &Placed, places: &[Option<CellOfGrid>]) -> bool {
+fn is_first(placed: &PlacedTriangle, places: &[Option<CellOfGrid>]) -> bool {
     places.iter().flatten().all(|(node, cell)| {
         let mut first = None;
         placed.each_cell(node, |_, cell| {

@@ -78,7 +78,7 @@ impl Instance {
 /// An instance as a blob has it: `linear` is the inverse.
 #[repr(transparent)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes)]
-pub(super) struct Placed(Instance);
+pub(super) struct StoredInstance(Instance);
 
 /// How far the product of a matrix and its rounded inverse may be from one.
 const RESIDUE: f64 = 1.0 / 1024.0;
@@ -92,7 +92,7 @@ const ROUNDING: f64 = 1.0 / 4_194_304.0; // 2^-22
 
 type Matrix = [[f64; 3]; 3];
 
-impl Placed {
+impl StoredInstance {
     /// The instance ready for rays; `None` if its matrix has no inverse in f32 or is not finite.
     pub(super) fn new(instance: &Instance) -> Option<Self> {
         let linear = instance.linear.map(|row| row.map(f64::from));

@@ -23,7 +23,7 @@ use crate::limits::MAX_NESTING;
 use crate::ray::Ray;
 use crate::shapes::{ShapeHit, Shapes};
 pub use instance::Instance;
-use instance::Placed;
+use instance::StoredInstance;
 pub use query::{SceneFilter, SceneHit, SceneOptions};
 pub(crate) use store::ends_of;
 
@@ -122,7 +122,7 @@ impl Object<'_> {
 pub struct Scene<'a> {
     blob: &'a [u8],
     tree: Grid<'a>,
-    instances: &'a [Placed],
+    instances: &'a [StoredInstance],
     objects: &'a [Object<'a>],
     /// Scenes inside one another, this one included.
     levels: usize,

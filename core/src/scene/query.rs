@@ -11,7 +11,7 @@ use crate::counters::Counters;
 use crate::limits::MAX_NESTING;
 use crate::options::{Cull, QueryOptions, Verdict};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
-use crate::search::{Boxes, Outcome};
+use crate::search::{BoxSearch, Outcome};
 
 /// Where a ray meets a scene: 32 bytes.
 #[repr(C)]
@@ -206,7 +206,7 @@ impl Scene<'_> {
         }
         let mut work = counters.is_some().then(Counters::default);
         let t_max = if limit < ray.t_max { limit } else { ray.t_max };
-        let mut offered = Offered {
+        let mut offered = InstanceSearch {
             scene: self,
             line,
             ray,
@@ -218,7 +218,7 @@ impl Scene<'_> {
             counters: work.as_mut(),
         };
         let mut steps = Counters::default();
-        let mut offer = Boxes(&mut |number| offered.offer(number));
+        let mut offer = BoxSearch(&mut |number| offered.offer(number));
         if level == 0 {
             let cut = RayF64 { t_max, ..*ray };
             self.tree.search_boxes(&cut, &mut offer, &mut steps);
@@ -248,7 +248,7 @@ struct Question {
 type Shown<'f> = dyn FnMut(&SceneHit) -> Verdict + 'f;
 
 /// Instances are asked as they are met.
-struct Offered<'q, 'f> {
+struct InstanceSearch<'q, 'f> {
     scene: &'q Scene<'q>,
     line: &'q LineF64,
     ray: &'q RayF64,
@@ -261,7 +261,7 @@ struct Offered<'q, 'f> {
     counters: Option<&'q mut Counters>,
 }
 
-impl Offered<'_, '_> {
+impl InstanceSearch<'_, '_> {
     /// Asks an instance whose box the ray meets.
     fn offer(&mut self, number: u32) -> Outcome {
         let Some(hit) = self.ask(number) else { return Outcome::Unchanged };

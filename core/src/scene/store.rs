@@ -4,7 +4,7 @@ use core::mem::offset_of;
 
 use zerocopy::IntoBytes;
 
-use super::instance::{Instance, Placed};
+use super::instance::{Instance, StoredInstance};
 use super::{Object, Scene, Table};
 use crate::arena::{Sizes, align_up, check_alignment, section_bytes, split, split_mut};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
@@ -18,13 +18,13 @@ use crate::mesh::{BOX_BYTES, Strided, TriangleMesh};
 use crate::method::Content;
 use crate::refit::{Refit, refit_content};
 
-type Sides = [f32; 6];
+type BoxSides = [f32; 6];
 
 /// Bytes behind the tree: table, boxes and instances.
 const fn behind_bytes(instances: u64) -> u64 {
     section_bytes::<Table>(1)
-        + section_bytes::<Sides>(instances)
-        + section_bytes::<Placed>(instances)
+        + section_bytes::<BoxSides>(instances)
+        + section_bytes::<StoredInstance>(instances)
 }
 
 /// Where the tree of a scene ends and its table starts, and the bytes of all of it.
@@ -34,12 +34,15 @@ pub(crate) fn ends_of(header: &Header) -> (u64, u64) {
 }
 
 /// The boxes of instances as the tree sees them.
-fn boxes_of<'a>(sides: &'a [Sides], placed: &'a [Placed]) -> Result<TriangleMesh<'a>, Error> {
+fn boxes_of<'a>(
+    sides: &'a [BoxSides],
+    placed: &'a [StoredInstance],
+) -> Result<TriangleMesh<'a>, Error> {
     let bytes = sides.as_bytes();
     let boxes = Strided { bytes, stride: BOX_BYTES, count: sides.len() };
     // No instances have no masks.
     let bytes = placed.as_bytes().get(offset_of!(Instance, mask)..).unwrap_or_default();
-    let masks = Strided { bytes, stride: size_of::<Placed>(), count: placed.len() };
+    let masks = Strided { bytes, stride: size_of::<StoredInstance>(), count: placed.len() };
     TriangleMesh::of_boxes(boxes, Content::Instances)?.with_masks(masks)
 }
 
@@ -47,15 +50,15 @@ fn boxes_of<'a>(sides: &'a [Sides], placed: &'a [Placed]) -> Result<TriangleMesh
 fn place(
     instances: &[Instance],
     objects: &[Object<'_>],
-    sides: &mut [Sides],
-    places: &mut [Placed],
+    sides: &mut [BoxSides],
+    places: &mut [StoredInstance],
 ) -> Result<(), Error> {
     let to = sides.iter_mut().zip(places);
     for (number, (instance, to)) in (0_u32..).zip(instances.iter().zip(to)) {
         let Some(object) = objects.get(instance.object as usize) else {
             return Err(Error::InstanceWithoutObject { instance: number });
         };
-        let placed = Placed::new(instance);
+        let placed = StoredInstance::new(instance);
         let bounds = placed.and_then(|placed| placed.bounds(&object.bounds()));
         let (Some(placed), Some(bounds)) = (placed, bounds) else {
             return Err(Error::InstanceWithoutInverse { instance: number });
@@ -146,8 +149,8 @@ impl<'a> Scene<'a> {
         let room = room.ok_or(short(HEADER_BYTES as u64))?;
         let (head, tail) = index.split_at_mut_checked(room).ok_or(short(0))?;
         let sections = split_mut::<Table>(tail, 1).and_then(|(table, rest)| {
-            let (sides, rest) = split_mut::<Sides>(rest, count)?;
-            Some((table, sides, split_mut::<Placed>(rest, count)?.0))
+            let (sides, rest) = split_mut::<BoxSides>(rest, count)?;
+            Some((table, sides, split_mut::<StoredInstance>(rest, count)?.0))
         });
         let (table, sides, placed) = sections.ok_or(short(0))?;
         place(instances, objects, sides, placed)?;
@@ -215,8 +218,8 @@ impl<'a> Scene<'a> {
         let count = u64::from(header.triangle_count);
         let sections = behind.and_then(|behind| {
             let (table, behind) = split::<Table>(behind, 1)?;
-            let (sides, behind) = split::<Sides>(behind, count)?;
-            Some((*table.first()?, sides, split::<Placed>(behind, count)?.0))
+            let (sides, behind) = split::<BoxSides>(behind, count)?;
+            Some((*table.first()?, sides, split::<StoredInstance>(behind, count)?.0))
         });
         let (table, sides, instances) =
             sections.ok_or(corrupt(offset_of!(Header, triangle_count)))?;
@@ -252,10 +255,10 @@ impl<'a> Scene<'a> {
         self.tree.validate(scratch)?;
         let table_bytes = section_bytes::<Table>(1);
         let instances_at =
-            start + table_bytes + section_bytes::<Sides>(header.triangle_count.into());
+            start + table_bytes + section_bytes::<BoxSides>(header.triangle_count.into());
         let mut object_count = 0;
         for (number, placed) in (0_u32..).zip(self.instances) {
-            let instance_at = instances_at + u64::from(number) * size_of::<Placed>() as u64;
+            let instance_at = instances_at + u64::from(number) * size_of::<StoredInstance>() as u64;
             let object = self.objects.get(placed.object() as usize).ok_or(at(instance_at))?;
             let bounds = placed.bounds(&object.bounds()).ok_or(at(instance_at))?;
             object_count = object_count.max(placed.object().saturating_add(1));
@@ -327,8 +330,8 @@ impl<'a> Scene<'a> {
         let damaged = corrupt(offset_of!(Header, triangle_count));
         let (head, tail) = index.split_at_mut_checked(start).ok_or(damaged)?;
         let sections = split_mut::<Table>(tail, 1).and_then(|(table, rest)| {
-            let (sides, rest) = split_mut::<Sides>(rest, count)?;
-            Some((table, sides, split_mut::<Placed>(rest, count)?.0))
+            let (sides, rest) = split_mut::<BoxSides>(rest, count)?;
+            Some((table, sides, split_mut::<StoredInstance>(rest, count)?.0))
         });
         let (table, sides, placed) = sections.ok_or(damaged)?;
         place(instances, objects, sides, placed)?;

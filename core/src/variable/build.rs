@@ -25,7 +25,9 @@ use crate::error::{ConfigField, Error, Region};
 use crate::invariant::OrBug;
 use crate::lists::pairs;
 use crate::mesh::TriangleMesh;
-use crate::one_level::{Batch, Layout, MeshSpread, Plan, Rows, Spread, displace, fill, mark, slot};
+use crate::one_level::{
+    Layout, MeshSpread, PlacedBatch, Plan, Rows, Spread, displace, fill, mark, slot,
+};
 use crate::survey::reference_limit;
 
 /// The primitives of one cell over its subgrid.
@@ -61,7 +63,7 @@ impl Spread for CellSpread<'_> {
         Some(self.frame.range(self.cell, &self.reach(id)?))
     }
 
-    fn place(&self, places: Range<u32>, batch: &mut Batch) {
+    fn place(&self, places: Range<u32>, batch: &mut PlacedBatch) {
         batch.place_each(self, places);
     }
 }

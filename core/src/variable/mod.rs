@@ -35,7 +35,7 @@ use subgrid::Subgrid;
 
 /// What a cell of the top holds.
 #[derive(Debug, Clone, Copy)]
-enum Content<'a> {
+enum CellContent<'a> {
     /// Primitive ids, ascending.
     List(&'a [u32]),
     /// The words of a subgrid.
@@ -64,18 +64,18 @@ impl<'a> Variable<'a> {
 
     /// What a cell holds; `None` if it is empty.
     #[inline(always)]
-    fn content(&self, cell: [u32; 3]) -> Option<Content<'a>> {
+    fn content(&self, cell: [u32; 3]) -> Option<CellContent<'a>> {
         let [start, end] = self.top.ends(cell)?;
         let part = (start & !GRID) as usize..(end & !GRID) as usize;
         let words = self.top.lists().get(part)?;
-        Some(if start & GRID == 0 { Content::List(words) } else { Content::Subgrid(words) })
+        Some(if start & GRID == 0 { CellContent::List(words) } else { CellContent::Subgrid(words) })
     }
 
     /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.
     pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
         self.top.each_marked(reach, |cell| match self.content(cell) {
-            Some(Content::List(ids)) => visitor.list(ids),
-            Some(Content::Subgrid(words)) => {
+            Some(CellContent::List(ids)) => visitor.list(ids),
+            Some(CellContent::Subgrid(words)) => {
                 Subgrid::open(words).is_none_or(|grid| grid.visit(cell, reach, visitor))
             }
             None => true,
@@ -99,12 +99,12 @@ impl<'a> Variable<'a> {
             tally.cell_step();
             let content = match &inside {
                 None => self.content(walk.cell()),
-                Some((subgrid, _)) => subgrid.references(walk.cell()).map(Content::List),
+                Some((subgrid, _)) => subgrid.references(walk.cell()).map(CellContent::List),
             };
             match content {
                 None => {}
-                Some(Content::List(ids)) => limit = leaf(ids, tally),
-                Some(Content::Subgrid(words)) => {
+                Some(CellContent::List(ids)) => limit = leaf(ids, tally),
+                Some(CellContent::Subgrid(words)) => {
                     let subgrid = Subgrid::open(words);
                     let enter = subgrid.and_then(|grid| Some((grid, grid.walk(line, &walk)?)));
                     if let Some((subgrid, within)) = enter {

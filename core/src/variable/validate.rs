@@ -15,7 +15,7 @@
 //! a query reads a list from its start to its end, however long it is.
 
 use super::subgrid::Subgrid;
-use super::{Content, Variable};
+use super::{CellContent, Variable};
 use crate::aabb::Aabb;
 use crate::bits::{WORD_BITS, extent};
 use crate::blob::{Header, corrupt};
@@ -47,7 +47,7 @@ impl Variable<'_> {
             match self.content(cell) {
                 None if self.top.is_marked(cell) => return Err(at(self.top.lists())),
                 None => {}
-                Some(Content::List(ids)) => {
+                Some(CellContent::List(ids)) => {
                     let covers = |&id: &u32| {
                         let bounds = mesh.corners(id).and_then(Aabb::of);
                         bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
@@ -58,7 +58,7 @@ impl Variable<'_> {
                     listed += ids.len() as u64;
                     words_of_cells += ids.len() as u64;
                 }
-                Some(Content::Subgrid(words)) => {
+                Some(CellContent::Subgrid(words)) => {
                     let grid = Subgrid::open(words).ok_or(at(words))?;
                     let inside = Inside { grid, cell, lattice, mesh };
                     let in_cells = inside.listed().ok_or(at(words))?;
@@ -79,7 +79,7 @@ impl Variable<'_> {
         for (_, bounds) in boxes(mesh) {
             for cell in lattice.range(&bounds).cells() {
                 match self.content(cell) {
-                    Some(Content::Subgrid(words)) => {
+                    Some(CellContent::Subgrid(words)) => {
                         let grid = Subgrid::open(words).ok_or(at(words))?;
                         expected += grid.frame.range(cell, &lattice.reach(&bounds)).count();
                     }

@@ -15,7 +15,7 @@ use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 use crate::extremes::Extremes;
 
 /// A triangle in the making, as bits: the least corner of its box, its id, minus the greatest corner, 0.
-pub(super) type Item = [u32; 8];
+pub(super) type TriangleItem = [u32; 8];
 
 /// Where the id stands in an item.
 pub(super) const ID: usize = 3;
@@ -38,7 +38,7 @@ impl Extent {
 
     /// The extent of some triangles.
     #[inline(always)]
-    pub(super) fn of<S: Simd>(simd: S, items: &[Item]) -> Self {
+    pub(super) fn of<S: Simd>(simd: S, items: &[TriangleItem]) -> Self {
         let mut bounds = f32x8::splat(simd, f32::INFINITY);
         let mut centers = bounds;
         for item in items {
@@ -61,7 +61,7 @@ pub(super) struct Bins {
 
 /// The box of an item: without its id, which would be a number too small for fast arithmetic.
 #[inline(always)]
-fn load<S: Simd>(simd: S, item: &Item) -> f32x8<S> {
+fn load<S: Simd>(simd: S, item: &TriangleItem) -> f32x8<S> {
     let word = u32::MAX;
     let mask = u32x8::simd_from(simd, [word, word, word, 0, word, word, word, 0]);
     (u32x8::simd_from(simd, *item) & mask).bitcast()
@@ -93,7 +93,7 @@ const fn as_cost(count: u32) -> f32 {
 }
 
 /// How centres become bins.
-struct Rule {
+struct BinScale {
     /// The least corner of the box of twice the centres.
     low: [f32; 3],
     /// Bins for each unit; as large as can be where all centres have the same coordinate.
@@ -102,7 +102,7 @@ struct Rule {
     count: usize,
 }
 
-impl Rule {
+impl BinScale {
     #[inline(always)]
     fn new(items: usize, centers: &Sides) -> Self {
         let count = bin_count(items);
@@ -129,7 +129,7 @@ impl Rule {
 
     /// The bin of an item on one axis.
     #[inline(always)]
-    fn bin_of(&self, item: &Item, axis: usize) -> usize {
+    fn bin_of(&self, item: &TriangleItem, axis: usize) -> usize {
         let twice = f32::from_bits(item[axis % 3]) - f32::from_bits(item[4 + axis % 3]);
         let place = (twice - self.low[axis % 3]) * self.scale[axis % 3] - 0.5;
         bin(place + SHIFT)
@@ -161,11 +161,11 @@ impl Bins {
     pub(super) fn cut<S: Simd>(
         &mut self,
         simd: S,
-        items: &mut [Item],
+        items: &mut [TriangleItem],
         centers: &Sides,
         unit: f32,
     ) -> Option<(usize, [Extent; 2])> {
-        let rule = Rule::new(items.len(), centers);
+        let rule = BinScale::new(items.len(), centers);
         self.fill(simd, items, &rule);
         let place = self.best(simd, &rule, unit)?;
         let mut bounds = [f32x8::splat(simd, f32::INFINITY); 2];
@@ -184,7 +184,7 @@ impl Bins {
 
     /// Grows the boxes of the bins, and counts.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, items: &[Item], rule: &Rule) {
+    fn fill<S: Simd>(&mut self, simd: S, items: &[TriangleItem], rule: &BinScale) {
         for (boxes, counts) in self.boxes.iter_mut().zip(&mut self.counts) {
             for (bin, counted) in boxes.iter_mut().zip(counts).take(rule.count) {
                 (*bin, *counted) = (NOTHING, 0);
@@ -203,7 +203,7 @@ impl Bins {
 
     /// Sweeps over each axis from both ends, for the cut of least cost.
     #[inline(always)]
-    fn best<S: Simd>(&self, simd: S, rule: &Rule, unit: f32) -> Option<Split> {
+    fn best<S: Simd>(&self, simd: S, rule: &BinScale, unit: f32) -> Option<Split> {
         debug_assert!(rule.count <= BINS, "more bins than there is room for");
         let mut best = Split { axis: 0, bin: 0, cost: f32::INFINITY };
         for (axis, (boxes, counts)) in self.boxes.iter().zip(&self.counts).enumerate() {
@@ -242,8 +242,8 @@ impl Bins {
 #[inline(always)]
 fn partition<S: Simd>(
     simd: S,
-    items: &mut [Item],
-    rule: &Rule,
+    items: &mut [TriangleItem],
+    rule: &BinScale,
     cut: &Split,
 ) -> (usize, [f32x8<S>; 2]) {
     let nothing = f32x8::splat(simd, f32::INFINITY);

@@ -5,7 +5,7 @@ use fearless_simd::{Simd, f32x8};
 use glam::Vec3A;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
-use super::cut::{Bins, Extent, ID, Item, Sides, area};
+use super::cut::{Bins, Extent, ID, Sides, TriangleItem, area};
 use crate::aabb::Aabb;
 use crate::bvh::LEVELS;
 use crate::bvh::node::{LEAF, Node, WIDTH};
@@ -23,7 +23,7 @@ const _: () = assert!(MOST_LEVELS <= LEVELS);
 /// A range of triangles over which nodes are to be made.
 pub(super) struct Grow<'w> {
     /// The triangles, in any order that the mesh alone determines.
-    pub(super) items: &'w mut [Item],
+    pub(super) items: &'w mut [TriangleItem],
     /// Levels of nodes above.
     pub(super) level: u32,
     /// A range of at most this many triangles is left to a task: its node stores the range, if there is room
@@ -70,14 +70,14 @@ const STACK: usize = (WIDTH - 1) * MOST_LEVELS as usize + 1;
 
 /// A part of a range, which becomes a child.
 #[derive(Clone, Copy)]
-struct ChildRange {
+struct SubRange {
     start: u32,
     end: u32,
     extent: Extent,
     area: f32,
 }
 
-impl ChildRange {
+impl SubRange {
     const NONE: Self = Self { start: 0, end: 0, extent: Extent::NOTHING, area: 0.0 };
 
     const fn count(&self) -> u32 {
@@ -189,15 +189,15 @@ impl Kernel for Grow<'_> {
 impl Grow<'_> {
     /// Cuts a range into eight parts in the order of its items, or into single triangles if there are fewer.
     #[inline(always)]
-    fn parts<S: Simd>(&mut self, simd: S, bins: &mut Bins, job: &Job) -> [ChildRange; WIDTH] {
-        let mut parts = [ChildRange::NONE; WIDTH];
+    fn parts<S: Simd>(&mut self, simd: S, bins: &mut Bins, job: &Job) -> [SubRange; WIDTH] {
+        let mut parts = [SubRange::NONE; WIDTH];
         debug_assert!(
             job.start <= job.end && job.end as usize <= self.items.len(),
             "a job behind the items"
         );
         let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
         let extent = Extent::of(simd, all);
-        parts[0] = ChildRange { start: job.start, end: job.end, extent, area: 0.0 };
+        parts[0] = SubRange { start: job.start, end: job.end, extent, area: 0.0 };
         let halve = job.level >= DEEP;
         for count in 1..WIDTH {
             let Some(at) = choose(&parts, halve) else { break };
@@ -219,9 +219,9 @@ impl Grow<'_> {
                 |extent: &Extent| area(simd, f32x8::simd_from(simd, extent.bounds), self.unit);
             // The parts behind it make room for its second half.
             let mut next =
-                ChildRange { start: middle, end: part.end, extent: second, area: area(&second) };
+                SubRange { start: middle, end: part.end, extent: second, area: area(&second) };
             parts[at] =
-                ChildRange { start: part.start, end: middle, extent: first, area: area(&first) };
+                SubRange { start: part.start, end: middle, extent: first, area: area(&first) };
             for slot in parts.iter_mut().take(count + 1).skip(at + 1) {
                 core::mem::swap(slot, &mut next);
             }
@@ -232,7 +232,7 @@ impl Grow<'_> {
 
 /// The extents of the first and the second half of some items.
 #[inline(always)]
-fn halves<S: Simd>(simd: S, items: &[Item]) -> (usize, [Extent; 2]) {
+fn halves<S: Simd>(simd: S, items: &[TriangleItem]) -> (usize, [Extent; 2]) {
     let middle = items.len() / 2;
     let (first, second) = items.split_at_checked(middle).unwrap_or_default();
     (middle, [Extent::of(simd, first), Extent::of(simd, second)])
@@ -240,7 +240,7 @@ fn halves<S: Simd>(simd: S, items: &[Item]) -> (usize, [Extent; 2]) {
 
 /// Which part to cut next.
 #[inline(always)]
-fn choose(parts: &[ChildRange; WIDTH], halve: bool) -> Option<usize> {
+fn choose(parts: &[SubRange; WIDTH], halve: bool) -> Option<usize> {
     let mut best = None;
     let mut most = (false, -1.0, 0);
     for (at, part) in parts.iter().enumerate() {
@@ -313,7 +313,7 @@ impl Cursor {
 /// The result of a task for one range, written over the first items of the range.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, FromBytes, Immutable, IntoBytes)]
-pub(super) struct Record {
+pub(super) struct RangeRecord {
     pub(super) root: Node,
     /// Nodes below the root.
     pub(super) nodes: u32,
@@ -322,6 +322,7 @@ pub(super) struct Record {
 }
 
 /// A record in items.
-pub(super) const RECORD: usize = size_of::<Record>() / size_of::<Item>();
+pub(super) const RECORD: usize = size_of::<RangeRecord>() / size_of::<TriangleItem>();
 
-const _: () = assert!(size_of::<Record>() == RECORD * size_of::<Item>() && RECORD <= LEAF);
+const _: () =
+    assert!(size_of::<RangeRecord>() == RECORD * size_of::<TriangleItem>() && RECORD <= LEAF);

@@ -46,8 +46,8 @@ use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
 use crate::tasks::{self, run, task_count};
-use cut::Item;
-use grow::{Cursor, Grow, Grown, RECORD, Record};
+use cut::TriangleItem;
+use grow::{Cursor, Grow, Grown, RECORD, RangeRecord};
 
 /// The most nodes of a tree over so many triangles.
 const fn most_nodes(triangles: u64) -> u64 {
@@ -60,7 +60,7 @@ pub(crate) const fn bound(triangles: u32) -> (u64, u64) {
     let triangles = triangles as u64;
     // Never ask for 0 bytes of scratch: callers allocate what they are told.
     let items = if triangles < 1 { 1 } else { triangles };
-    (index_bytes(triangles, most_nodes(triangles)), section_bytes::<Item>(items))
+    (index_bytes(triangles, most_nodes(triangles)), section_bytes::<TriangleItem>(items))
 }
 
 /// Triangles of the ranges that tasks take, at most: a part of all, so that there are enough for many tasks.
@@ -97,10 +97,11 @@ pub(super) fn build_in(
     if available_bytes < needed_bytes {
         return Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes });
     }
-    let items = match split_mut::<Item>(scratch, triangles.into()).or_bug("too little scratch") {
-        Some((items, _)) => items,
-        None => &mut [],
-    };
+    let items =
+        match split_mut::<TriangleItem>(scratch, triangles.into()).or_bug("too little scratch") {
+            Some((items, _)) => items,
+            None => &mut [],
+        };
     // Tasks fill their parts of the index side by side, which takes the bound. With less room, run one task.
     let mut tasks = task_count(control, triangles as usize / LEAST_TASK);
     if index_available < index_bound {
@@ -129,7 +130,7 @@ pub(super) fn build_in(
     watch.at(TOP)?;
     let scene = Lattice::pad(&bounds);
     let extent = scene.size().max_element();
-    let work = Work { least: extent * LEAST_NODE, unit: inverse_power(extent), tasks };
+    let work = HighInputs { least: extent * LEAST_NODE, unit: inverse_power(extent), tasks };
     let (node_count, levels) = work.make(items, ids, nodes, control, watch)?;
 
     watch.at(DONE)?;
@@ -170,14 +171,14 @@ struct ItemsTask<'w> {
     mesh: &'w TriangleMesh<'w>,
     flags: BuildFlags,
     first: u32,
-    items: &'w mut [Item],
+    items: &'w mut [TriangleItem],
 }
 
 /// Writes the items of all triangles that are finite, and returns how many there are and the box around them.
 fn boxes(
     mesh: &TriangleMesh<'_>,
     flags: BuildFlags,
-    items: &mut [Item],
+    items: &mut [TriangleItem],
     tasks: u32,
     control: &Control<'_>,
 ) -> Result<(usize, Aabb), Error> {
@@ -262,7 +263,7 @@ fn move_down<T: Copy>(all: &mut [T], from: usize, count: usize, to: usize) {
 }
 
 /// What the steps after the first pass share.
-struct Work {
+struct HighInputs {
     least: f32,
     unit: f32,
     tasks: u32,
@@ -270,7 +271,7 @@ struct Work {
 
 /// The work of a task: ranges that wait.
 struct RangesTask<'w> {
-    work: &'w Work,
+    work: &'w HighInputs,
     /// Before the first of its ranges.
     cursor: Cursor,
     /// The nodes at the top.
@@ -279,7 +280,7 @@ struct RangesTask<'w> {
     ranges: u32,
     /// The number of its first item among all.
     start: u32,
-    items: &'w mut [Item],
+    items: &'w mut [TriangleItem],
     ids: &'w mut [u32],
     /// Where its ids lie in the index.
     first: u32,
@@ -341,18 +342,18 @@ impl RangesTask<'_> {
             node_count += nodes;
             id_count += ids;
             if let Some(place) = items.first_chunk_mut::<RECORD>().or_bug("a range too short") {
-                *place = transmute!(Record { root, nodes, levels, unused: [0; 2] });
+                *place = transmute!(RangeRecord { root, nodes, levels, unused: [0; 2] });
             }
         }
         node_count
     }
 }
 
-impl Work {
+impl HighInputs {
     /// Makes all nodes and ids; returns how many nodes and levels there are.
     fn make(
         &self,
-        items: &mut [Item],
+        items: &mut [TriangleItem],
         ids: &mut [u32],
         nodes: &mut [Node],
         control: &Control<'_>,
@@ -444,7 +445,8 @@ impl Work {
                 let behind = items.get(waiter.start as usize..).unwrap_or_default();
                 let record = behind.first_chunk::<RECORD>().or_bug("a range without a record");
                 let Some(record) = record else { break };
-                let Record { mut root, nodes: below, levels: levels_of, .. } = transmute!(*record);
+                let RangeRecord { mut root, nodes: below, levels: levels_of, .. } =
+                    transmute!(*record);
                 let moved = child - count;
                 if moved > 0 {
                     let from = child as usize..(child + below) as usize;
