@@ -137,6 +137,7 @@ pub(crate) fn whole<T: FromBytes + IntoBytes>(bytes: &mut [u8]) -> &mut [T] {
 
 /// Copies words between sections of the same length.
 pub(crate) fn copy<T: Copy>(from: &[T], to: &mut [T]) {
+    debug_assert!(from.len() == to.len(), "sections of two lengths");
     for (to, from) in to.iter_mut().zip(from) {
         *to = *from;
     }

@@ -1,5 +1,7 @@
 //! Bit sets in rows of 64-bit words.
 
+use crate::invariant::OrBug;
+
 /// Bits in a word.
 pub(crate) const WORD_BITS: usize = 64;
 
@@ -11,7 +13,7 @@ pub(crate) fn set_range(words: &mut [u64], bit: usize, more: usize) {
     loop {
         let room = WORD_BITS - 1 - shift;
         let mask = (u64::MAX >> (WORD_BITS - 1 - left.min(room))) << shift;
-        let Some(bits) = words.get_mut(word) else { return };
+        let Some(bits) = words.get_mut(word).or_bug("a range of bits past the end") else { return };
         *bits |= mask;
         if left <= room {
             return;
@@ -118,6 +120,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(debug_assertions, should_panic(expected = "a range of bits past the end"))]
     fn what_is_past_the_end_is_dropped() {
         let mut row = [0u64; 1];
         set_range(&mut row, 62, 5);

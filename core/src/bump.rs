@@ -11,6 +11,7 @@
 use crate::arena::{section_bytes, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::error::{ConfigField, Error, Region};
+use crate::invariant::OrBug;
 
 /// The bit of an offset into a pool that says "a grid lies there", not
 /// a list. The others say where.
@@ -64,10 +65,11 @@ pub(crate) fn finish(index: &mut [u8], header: Header) -> Result<&[u8], Error> {
     let words = u64::from(header.reference_count);
     let padding = section_bytes::<u32>(words) - words * size_of::<u32>() as u64;
     let padding = usize::try_from(padding).ok().and_then(|padding| bytes?.checked_sub(padding));
-    if let Some(padding) = padding.and_then(|start| blob.get_mut(start..)) {
+    let padding = padding.and_then(|start| blob.get_mut(start..));
+    if let Some(padding) = padding.or_bug("padding before the blob") {
         padding.fill(0);
     }
-    if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>() {
+    if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>().or_bug("a blob without a header") {
         *head = header.to_bytes();
     }
     Ok(blob)

@@ -31,7 +31,7 @@
 //! | layer | modules |
 //! |---|---|
 //! | plain types of the API | `limits`, `method`, `error`, `config`, `control`, `counters`, `ray`, `aabb`, `mesh`, `options` |
-//! | vectors and tasks | `simd`, `extremes`, `tasks` |
+//! | helpers | `invariant`, `simd`, `extremes`, `tasks` |
 //! | memory | `arena`, `bits`, `lists`, `hash`, `survey`, `cell`, `blob`, `bump` |
 //! | rays and triangles | `filter`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |
 //! | cells | `spans`, `dda` |
@@ -108,6 +108,7 @@ mod fixed;
 mod grid;
 mod hash;
 mod inspect;
+mod invariant;
 mod limits;
 mod lists;
 mod mesh;

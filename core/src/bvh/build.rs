@@ -32,7 +32,7 @@ use zerocopy::{FromZeros, IntoBytes};
 
 use super::census::{Census, count, share, take};
 use super::high;
-use super::key::{KEY_BITS, Keys};
+use super::key::{KEY_BITS, Keys, NO_KEY};
 use super::layout::{
     CROWD, Entry, MOST_TRIANGLES, bin_bits, index_bytes, most_below, most_nodes, scratch_bytes,
     small_spare,
@@ -49,6 +49,7 @@ use crate::cell::Lattice;
 use crate::config::{BuildFlags, Parameters};
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
+use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
@@ -113,7 +114,7 @@ pub(crate) fn build<'a>(
     let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
     let blob = usize::try_from(needed_bytes).ok().and_then(|bytes| index.get_mut(..bytes));
     let blob = blob.ok_or(too_small)?;
-    if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>() {
+    if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>().or_bug("a blob without a header") {
         *head = header.to_bytes();
     }
     Ok(blob)
@@ -211,6 +212,7 @@ fn build_in(
 
     // Give each bin its place, and each task its place in it.
     watch.at(SCATTER)?;
+    debug_assert!(counts.len() == tasks as usize * sizes.len(), "a bin of a task without a count");
     for (bin, size) in sizes.iter_mut().enumerate() {
         *size = (0..tasks as usize).filter_map(|task| counts.get(task << bits | bin)).sum();
     }
@@ -219,12 +221,14 @@ fn build_in(
         return Err(scratch_error);
     }
     place_tasks(sizes, counts, bits);
+    debug_assert!(finite as usize <= entries.len(), "more finite triangles than entries");
     let entries = entries.get_mut(..finite as usize).unwrap_or_default();
     scatter(keys, entries, counts, bits, control)?;
 
     // Cut bins into subtrees.
     watch.at(ROOTS)?;
     let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
+    // No index, or one that is too small, is legal: ids and nodes for which there is no room are only counted.
     let behind = index.as_mut().and_then(|index| index.get_mut(HEADER_BYTES..));
     let parts = behind.and_then(|behind| behind.split_at_mut_checked(ids_bytes));
     let (ids, nodes) = parts.unwrap_or_default();
@@ -244,7 +248,8 @@ fn build_in(
             return Err(index_error(needed_bytes));
         }
         let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
-        if let Some(padding) = index.get_mut(used..needed_bytes as usize) {
+        let padding = index.get_mut(used..needed_bytes as usize);
+        if let Some(padding) = padding.or_bug("nodes behind the end of the index") {
             padding.fill(0);
         }
     }
@@ -335,8 +340,12 @@ fn scatter(
     if IS_SMALL || tasks == 1 {
         for (id, &key) in (0..).zip(keys) {
             // A triangle that is left out has a key behind that of all bins.
-            let Some(head) = counts.get_mut((key >> shift) as usize) else { continue };
-            if let Some(entry) = entries.get_mut(*head as usize) {
+            let Some(head) = counts.get_mut((key >> shift) as usize) else {
+                debug_assert!(key == NO_KEY, "a key behind those of all bins");
+                continue;
+            };
+            let entry = entries.get_mut(*head as usize);
+            if let Some(entry) = entry.or_bug("a bin has more entries than were counted") {
                 *entry = [key, id];
             }
             *head += 1;
@@ -348,11 +357,15 @@ fn scatter(
     let parts = (0..tasks).map(|task| {
         let heads = take(&mut counts, 1 << bits);
         let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
-        (range.start as u32, keys.get(range).unwrap_or_default(), heads)
+        let first = range.start as u32;
+        (first, keys.get(range).or_bug("a task behind the keys").unwrap_or_default(), heads)
     });
     let move_all = |(first, keys, heads): (u32, &[u32], &mut [u32])| {
         for (id, &key) in (first..).zip(keys) {
-            let Some(head) = heads.get_mut((key >> shift) as usize) else { continue };
+            let Some(head) = heads.get_mut((key >> shift) as usize) else {
+                debug_assert!(key == NO_KEY, "a key behind those of all bins");
+                continue;
+            };
             entries.set(2 * *head as usize, [key, id]);
             *head += 1;
         }
@@ -429,6 +442,7 @@ impl BuildInputs<'_> {
         }
         // The root of all comes first.
         let (range, child) = (0..entries.len(), 1);
+        // To have no nodes is legal: then they are only counted.
         let nodes = nodes.get_mut(1..).unwrap_or_default();
         let all = UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
         let (made, last) = dispatch(SimdLevel::detect(), all);
@@ -451,13 +465,14 @@ impl BuildInputs<'_> {
         let mut ends = [0; tasks::MOST];
         self.cut(&mut ends, tasks, entries.len());
         // The root of all comes first.
+        debug_assert!(!nodes.is_empty(), "several tasks without room for nodes");
         let (mut rest_of_nodes, mut child) = (nodes.get_mut(1..).unwrap_or_default(), 1);
         let (mut rest, mut spare, mut ids) = (&mut *entries, spare, ids);
         let mut start = 0;
         let mut all_counts = counts;
         let parts = (0..tasks).map(|task| {
             let counts = take(&mut all_counts, 1 << bits);
-            let end = ends.get(task).copied().unwrap_or(start);
+            let end = ends.get(task).copied().or_bug("too many tasks").unwrap_or(start);
             let (count, is_last) = (end - start, task + 1 == tasks);
             let entries = take(&mut rest, count);
             let ids = take(&mut ids, count);
@@ -480,7 +495,7 @@ impl BuildInputs<'_> {
             parts,
             |part| dispatch(level, part),
             |result| {
-                if let Some(slot) = slots.next() {
+                if let Some(slot) = slots.next().or_bug("more results than tasks") {
                     *slot = Some(result);
                 }
                 Ok(())
@@ -492,6 +507,7 @@ impl BuildInputs<'_> {
         for (made, last) in made.into_iter().flatten() {
             let moved = made.child - all.nodes;
             let from = made.child as usize..(made.child + made.nodes) as usize;
+            debug_assert!(from.end <= nodes.len(), "a task made more nodes than it has room for");
             if moved > 0 && from.end <= nodes.len() {
                 for node in nodes.get_mut(from.clone()).unwrap_or_default() {
                     node.child -= moved;
@@ -508,7 +524,8 @@ impl BuildInputs<'_> {
                 all.last = last;
                 all.last.node.child -= moved;
                 all.last.write(entries.get_mut(to..));
-            } else if let Some(of_task) = entries.get_mut(records.clone()) {
+            } else if let Some(of_task) = entries.get_mut(records.clone()).or_bug("too few entries")
+            {
                 for record in whole::<RootRecord>(of_task.as_mut_bytes()) {
                     record.node.child -= moved;
                 }
@@ -544,17 +561,24 @@ impl BuildInputs<'_> {
     ) -> Option<(u32, u32)> {
         // One root or none is all there is.
         if all.roots < 2 {
+            // To have no nodes is legal: then they are only counted.
             if let Some(root) = nodes.first_mut() {
                 *root = if all.roots == 1 { all.last.node } else { Node::EMPTY };
             }
             return Some((all.nodes, all.last.levels.max(1)));
         }
         let roots = all.roots as usize;
+        debug_assert!(
+            roots * (RECORD + ITEM) <= entries.len(),
+            "too few entries for the records of the roots"
+        );
         let (records, rest) = entries.split_at_mut_checked(roots * RECORD)?;
         let records = &*whole::<RootRecord>(records.as_mut_bytes());
         let items = whole::<RootItem>(rest.get_mut(..roots * ITEM)?.as_mut_bytes());
-        let record =
-            |at: u32| records.get(at as usize).map_or((Node::EMPTY, 0), |r| (r.node, r.levels));
+        let record = |at: u32| {
+            let record = records.get(at as usize).or_bug("an item without a record");
+            record.map_or((Node::EMPTY, 0), |r| (r.node, r.levels))
+        };
         let mut build = |nodes: &mut [Node]| {
             for (at, (item, record)) in (0..).zip(items.iter_mut().zip(records)) {
                 let RootRecord { min, max, count, .. } = *record;
@@ -564,6 +588,7 @@ impl BuildInputs<'_> {
         };
         let behind = nodes.get_mut(all.nodes as usize..).and_then(&mut build);
         let Top { root, count, levels } = behind.or_else(|| build(whole(spare.as_mut_bytes())))?;
+        // To have no nodes is legal: then they are only counted.
         if let Some(slot) = nodes.first_mut() {
             *slot = root;
         }
@@ -582,6 +607,7 @@ struct TaskTotals {
 
 /// Moves elements to an earlier place.
 fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
+    debug_assert!(to <= from.start && from.end <= elements.len(), "elements move past an end");
     for (at, to) in from.zip(to..) {
         let Some(&element) = elements.get(at) else { return };
         if let Some(slot) = elements.get_mut(to) {

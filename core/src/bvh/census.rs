@@ -14,6 +14,7 @@ use crate::config::BuildFlags;
 use crate::control::Control;
 use crate::error::Error;
 use crate::extremes::Extremes;
+use crate::invariant::OrBug;
 use crate::limits::MAX_COORDINATE;
 use crate::mesh::Piece;
 use crate::mesh::TriangleMesh;
@@ -170,6 +171,7 @@ impl Kernel for KeysTask<'_> {
             }
             self.one_by_one(&piece, first, rest)?;
         }
+        debug_assert!(all_keys.is_empty(), "a triangle got no key");
         let least = |lanes: [f32; 8]| lanes.into_iter().fold(f32::INFINITY, f32::min);
         let most = |lanes: [f32; 8]| lanes.into_iter().fold(f32::NEG_INFINITY, f32::max);
         let low = low.map(|lanes| least(lanes.into()));
@@ -182,7 +184,8 @@ impl Kernel for KeysTask<'_> {
 impl KeysTask<'_> {
     #[inline(always)]
     fn add(&mut self, key: u32) {
-        if let Some(count) = self.counts.get_mut((key >> self.shift) as usize) {
+        let count = self.counts.get_mut((key >> self.shift) as usize);
+        if let Some(count) = count.or_bug("a key behind those of all bins") {
             *count += 1;
         }
     }

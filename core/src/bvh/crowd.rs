@@ -5,6 +5,7 @@ use fearless_simd::{Simd, f32x4, f32x8};
 use crate::aabb::Aabb;
 use crate::eight::{LANES, corner, join, load};
 use crate::extremes::Extremes;
+use crate::invariant::OrBug;
 use crate::mesh::{TriangleMesh, WideMesh, vector};
 use crate::simd::{HAS_VECTORS, Kernel};
 
@@ -52,7 +53,8 @@ impl Kernel for NewKeys<'_> {
                 one_by_one(mesh, entries, rule);
             }
             for entry in entries {
-                if let Some(count) = counts.get_mut((entry[0] >> shift) as usize) {
+                let count = counts.get_mut((entry[0] >> shift) as usize);
+                if let Some(count) = count.or_bug("a key behind those of all bins") {
                     *count += 1;
                 }
             }

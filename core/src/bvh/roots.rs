@@ -21,6 +21,7 @@ use core::ops::Range;
 use zerocopy::{FromBytes, FromZeros, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
+use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::simd::{SimdLevel, dispatch};
 
@@ -133,6 +134,7 @@ impl<'w> Roots<'w> {
     /// Makes the roots of a unit that lies `depth` divisions deep. Its bins are in order; the keys of one bin differ
     /// only in their lowest `shift` bits.
     pub(crate) fn unit(&mut self, range: Range<usize>, shift: u32, depth: u32) {
+        debug_assert!(range.end <= self.entries.len(), "a unit behind the entries");
         let Some(entries) = self.entries.get_mut(range.clone()) else { return };
         if entries.len() > MOST_UNIT {
             let centers = crowd::centers(self.mesh, entries);
@@ -141,7 +143,7 @@ impl<'w> Roots<'w> {
                 self.divide(range, &centers, depth);
                 return;
             }
-        } else if let Some(spare) = self.spare.get_mut(..entries.len()) {
+        } else if let Some(spare) = self.spare.get_mut(..entries.len()).or_bug("no room to sort") {
             // The keys of one bin differ only in their lowest `shift` bits.
             let ends = entries.first().zip(entries.last());
             let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
@@ -167,6 +169,7 @@ impl<'w> Roots<'w> {
     /// Where to cut a range in two, none of them smaller than a piece.
     fn split(&self, range: Range<usize>) -> usize {
         let entries = self.entries.get(range).unwrap_or_default();
+        debug_assert!(entries.len() > MOST_ROOT, "too few entries to cut");
         let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return 0 };
         let differing = first[0] ^ last[0];
         let middle = if differing == 0 {
@@ -183,11 +186,13 @@ impl<'w> Roots<'w> {
         let count = range.len() as u32;
         let first = self.first + range.start as u32;
         let child = self.child + self.node_count;
+        debug_assert!(range.end <= self.entries.len(), "a root behind the entries");
         let Some(entries) = self.entries.get(range.clone()) else { return };
         let subtree = &mut *self.subtree;
         let (mesh, least, by) = (self.mesh, self.least, Cut::Keys);
         dispatch(self.level, Build { subtree, mesh, entries, first, child, least, by });
-        copy(self.subtree.ids(), self.ids.get_mut(range));
+        // Too little room for ids and nodes is legal: they are counted.
+        copy(self.subtree.ids(), self.ids.get_mut(range.clone()));
 
         let below = self.subtree.below();
         copy(below, self.nodes.get_mut(self.node_count as usize..));
@@ -197,6 +202,9 @@ impl<'w> Roots<'w> {
         let levels = self.subtree.levels();
         let record = RootRecord { node: *node, min, max, count, levels };
         let start = self.root_count as usize * RECORD;
+        // The only root of a task may have fewer entries than its record takes.
+        let is_only = self.root_count == 0 && range.end == self.entries.len();
+        debug_assert!(is_only || start + RECORD <= range.end, "a record over entries to come");
         record.write(self.entries.get_mut(start..));
         self.last = record;
         self.root_count += 1;
@@ -233,8 +241,8 @@ impl<'w> Roots<'w> {
         let shift = KEY_BITS - bits;
 
         // Find new keys, and count those of each bin.
-        let entries = self.entries.get_mut(range);
-        let counts = self.counts.get_mut(..1 << bits);
+        let entries = self.entries.get_mut(range).or_bug("a unit behind the entries");
+        let counts = self.counts.get_mut(..1 << bits).or_bug("more bins than the tree has");
         let (Some(entries), Some(counts)) = (entries, counts) else { return };
         counts.fill(0);
         dispatch(self.level, NewKeys { mesh: self.mesh, entries, rule, shift, counts });
@@ -248,8 +256,9 @@ impl<'w> Roots<'w> {
         debug_assert!(self.spare.len() >= entries.len());
         let Some(binned) = self.spare.get_mut(..entries.len()) else { return };
         for entry in &*entries {
-            if let Some(head) = counts.get_mut((entry[0] >> shift) as usize) {
-                if let Some(slot) = binned.get_mut(*head as usize) {
+            let head = counts.get_mut((entry[0] >> shift) as usize);
+            if let Some(head) = head.or_bug("a key behind those of all bins") {
+                if let Some(slot) = binned.get_mut(*head as usize).or_bug("a bin is too small") {
                     *slot = *entry;
                 }
                 *head += 1;
@@ -261,7 +270,7 @@ impl<'w> Roots<'w> {
     /// Where the bin ends that begins with a range.
     fn bin_end(&self, range: Range<usize>, shift: u32) -> usize {
         let entries = self.entries.get(range.clone()).unwrap_or_default();
-        let Some(first) = entries.first() else { return range.end };
+        let Some(first) = entries.first().or_bug("a bin without entries") else { return range.end };
         let bin = first[0] >> shift;
         let others = entries.iter().position(|entry| entry[0] >> shift != bin);
         others.map_or(range.end, |count| range.start + count)

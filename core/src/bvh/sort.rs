@@ -1,6 +1,7 @@
 //! Sorting the entries of a bin by their keys, stably, where they lie in cache.
 
 use super::layout::Entry;
+use crate::invariant::OrBug;
 
 /// Few entries are sorted by insertion.
 const FEW: usize = 24;
@@ -16,6 +17,7 @@ pub(crate) fn sort(entries: &mut [Entry], spare: &mut [Entry], bits: u32) {
         insert(entries);
         return;
     }
+    debug_assert!(spare.len() >= entries.len(), "too little room to sort");
     let Some(spare) = spare.get_mut(..entries.len()) else { return };
     // Two passes bring the entries back to where they were.
     let passes = bits.div_ceil(2 * PASS_BITS) * 2;
@@ -45,7 +47,7 @@ fn pass(from: &[Entry], to: &mut [Entry], shift: u32, width: u32) {
     // Move the entries.
     for entry in from {
         let head = &mut heads[digit(entry)];
-        if let Some(slot) = to.get_mut(*head as usize) {
+        if let Some(slot) = to.get_mut(*head as usize).or_bug("a digit has too many entries") {
             *slot = *entry;
         }
         *head = head.wrapping_add(1);

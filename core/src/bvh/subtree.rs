@@ -22,6 +22,7 @@ use zerocopy::{FromZeros, transmute};
 use crate::aabb::Aabb;
 use crate::eight::load;
 use crate::extremes::Extremes;
+use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::simd::Kernel;
 
@@ -104,6 +105,7 @@ impl Kernel for Build<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Self { subtree, mesh, entries, first, child, least, mut by } = self;
+        debug_assert!(entries.len() <= MOST_ROOT, "too many entries for a subtree");
         let entries = entries.get(..entries.len().min(MOST_ROOT)).unwrap_or_default();
         subtree.read(simd, mesh, entries);
         loop {
@@ -113,6 +115,7 @@ impl Kernel for Build<'_> {
             }
             by = Cut::Halves;
         }
+        debug_assert!(subtree.id_count == entries.len(), "a subtree without some of its entries");
         // Quantise, children before parents.
         for at in (0..subtree.count).rev() {
             subtree.quantise(simd, at, [first, child], least);
@@ -217,6 +220,7 @@ impl Subtree {
     /// each other.
     #[inline(always)]
     fn cut(&mut self, at: usize, levels: u32, changes: impl Fn(u8) -> u128) {
+        debug_assert!(at < self.count && self.count <= MOST_NODES, "a node behind the last");
         let (Some(&range), Some(&above)) = (self.ranges.get(at), self.above.get(at)) else {
             return;
         };
@@ -226,6 +230,7 @@ impl Subtree {
         for (slot, part) in parts.iter().enumerate() {
             let count = part.count();
             if count > LEAF {
+                debug_assert!(self.count < MOST_NODES, "a subtree has too many nodes");
                 let places = (self.ranges.get_mut(self.count), self.above.get_mut(self.count));
                 if let (Some(range_of), Some(above_of)) = places {
                     (*range_of, *above_of) = (*part, above + 1);
@@ -239,8 +244,8 @@ impl Subtree {
             let from = self.sources.get(usize::from(part.start)..);
             let to = self.ids.get_mut(self.id_count..);
             if let (Some(from), Some(to)) = (
-                from.and_then(|from| from.first_chunk::<LEAF>()),
-                to.and_then(|to| to.first_chunk_mut()),
+                from.and_then(|from| from.first_chunk::<LEAF>()).or_bug("a leaf behind all ids"),
+                to.and_then(|to| to.first_chunk_mut()).or_bug("no room for the ids of a leaf"),
             ) {
                 *to = *from;
             }
@@ -258,6 +263,7 @@ impl Subtree {
     /// index.
     #[inline(always)]
     fn quantise<S: Simd>(&mut self, simd: S, at: usize, places: [u32; 2], least: f32) {
+        debug_assert!(at < self.count && self.count <= MOST_NODES, "a node behind the last");
         let (Some(node), Some(parts)) = (self.nodes.get_mut(at), self.children.get(at)) else {
             return;
         };
@@ -277,6 +283,7 @@ impl Subtree {
             child += usize::from(is_node);
             for place in 0..LEAF {
                 let of_one = self.boxes.get(first + place.min(last)).copied();
+                debug_assert!(of_one.is_some(), "a child without a box");
                 *sides = sides.lesser(f32x8::simd_from(simd, of_one.unwrap_or([f32::INFINITY; 8])));
             }
             bounds = bounds.lesser(*sides);
@@ -295,7 +302,8 @@ impl Subtree {
 #[cold]
 #[inline(never)]
 pub(crate) fn slow_bounds(mesh: &TriangleMesh<'_>, id: u32) -> Aabb {
-    mesh.corners(id).and_then(Aabb::of).unwrap_or(Aabb::EMPTY)
+    let bounds = mesh.corners(id).and_then(Aabb::of);
+    bounds.or_bug("an entry is not of a finite triangle").unwrap_or(Aabb::EMPTY)
 }
 
 /// The sides of this box.

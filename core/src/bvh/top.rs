@@ -13,6 +13,7 @@ use glam::Vec3A;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::aabb::Aabb;
+use crate::invariant::OrBug;
 
 use super::layout::Entry;
 use super::node::{Node, WIDTH};
@@ -138,7 +139,7 @@ pub(crate) fn build(
         for (slot, (part, bounds)) in parts.filter(|(_, (part, _))| part.end > part.start) {
             node.set_inner(slot);
             *bounds = part.bounds;
-            let below = match items.get(part.start as usize) {
+            let below = match items.get(part.start as usize).or_bug("a part behind the items") {
                 Some(item) if part.end - part.start == 1 => {
                     let (node, below) = record(item.record);
                     levels = levels.max(level + 1 + below);
@@ -174,8 +175,8 @@ fn waiting(start: u32, end: u32, level: u32) -> Node {
 }
 
 fn bounds_of(items: &[RootItem], start: u32, end: u32) -> Aabb {
-    let items = items.get(start as usize..end as usize).unwrap_or_default();
-    items.iter().fold(Aabb::EMPTY, |all, item| all.union(&item.bounds()))
+    let items = items.get(start as usize..end as usize).or_bug("a part behind the items");
+    items.unwrap_or_default().iter().fold(Aabb::EMPTY, |all, item| all.union(&item.bounds()))
 }
 
 /// Cuts a range of items into eight parts, or into single items.
@@ -194,7 +195,7 @@ fn parts(items: &mut [RootItem], all: ItemRange, halve: bool) -> [ItemRange; WID
             break;
         }
         let range = part.start as usize..part.end as usize;
-        let Some(items_of) = items.get_mut(range) else { break };
+        let Some(items_of) = items.get_mut(range).or_bug("a part behind the items") else { break };
         let middle = cut(items_of, halve);
         #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
         let middle = part.start + middle as u32;

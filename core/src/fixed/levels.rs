@@ -15,6 +15,7 @@ use core::num::NonZeroU32;
 use core::ops::Range;
 
 use crate::bits::{WORD_BITS, extent, is_set, load, low_bits, set_range};
+use crate::invariant::OrBug;
 use crate::limits::MAX_RESOLUTION;
 
 /// A level of so few cells needs no coarser one above it.
@@ -151,6 +152,7 @@ impl Levels {
             let Some((lower, upper)) = usize::try_from(level.start)
                 .ok()
                 .and_then(|start| words.split_at_mut_checked(start))
+                .or_bug("a level behind the words of all")
             else {
                 return;
             };

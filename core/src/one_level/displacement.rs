@@ -71,6 +71,7 @@ impl Kernel for Displace<'_> {
             let behind = slots / WORD_BITS + row.width.div_ceil(WORD_BITS) + WORDS;
             if cleared < behind {
                 let end = occupied.len().min(behind + CLEARED_WORDS);
+                // To find nothing is legal: all words were cleared.
                 occupied.get_mut(cleared..end).unwrap_or_default().fill(0);
                 cleared = end.max(behind);
             }
@@ -160,6 +161,7 @@ impl CellRow<'_> {
         for from in (0..self.width).step_by(WORD_BITS) {
             let ([low, high], at) = (bits_at(self.word(from), slot), (slot + from) / WORD_BITS);
             for (at, bits) in [(at, low), (at + 1, high)] {
+                debug_assert!(bits == 0 || at < occupied.len(), "a row past the end of the table");
                 if let Some(word) = occupied.get_mut(at) {
                     *word |= bits;
                 }

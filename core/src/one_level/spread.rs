@@ -13,6 +13,7 @@ use crate::bits::set_range;
 use crate::cell::CellRange;
 use crate::control::Watch;
 use crate::error::Error;
+use crate::invariant::OrBug;
 
 /// Primitives with the cells that each belongs into. The lists hold the places of primitives.
 ///
@@ -101,7 +102,8 @@ pub(crate) fn fill(
         batch.each_row::<true>(spread, places, |place, row, x, length| {
             for end in slots(row_offsets, hash, row, x, length) {
                 *end = end.wrapping_sub(1);
-                if let Some(reference) = references.get_mut(*end as usize) {
+                let reference = references.get_mut(*end as usize);
+                if let Some(reference) = reference.or_bug("a cell has too many references") {
                     *reference = place;
                 }
             }
@@ -122,7 +124,7 @@ fn slots<'h>(
 ) -> &'h mut [u32] {
     let start = row_offsets.get(row).and_then(|&offset| slot(offset, x));
     let slots = start.and_then(|start| hash.get_mut(start..start + length as usize));
-    slots.unwrap_or_default()
+    slots.or_bug("cells without slots in the table").unwrap_or_default()
 }
 
 #[cfg(test)]

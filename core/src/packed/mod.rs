@@ -23,6 +23,7 @@ use crate::arena::{align_up, check_alignment, section_bytes};
 use crate::blob::{BLOB_VERSION, HEADER_BYTES, HasMesh, Header, corrupt};
 use crate::error::{Error, Region};
 use crate::grid::Grid;
+use crate::invariant::OrBug;
 use crate::limits::{ALIGNMENT, MAX_TRIANGLES};
 use crate::mesh::{IndexType, Strided, TriangleMesh};
 use crate::method::{Content, Method};
@@ -179,7 +180,9 @@ impl<'a> Grid<'a> {
         // Copy the grid, tell in its header what follows, and clear what the sections leave over.
         let mut out = Out { bytes: &mut *to };
         out.put(&header.to_bytes());
-        out.put(self.blob().get(HEADER_BYTES..).unwrap_or_default());
+        out.put(
+            self.blob().get(HEADER_BYTES..).or_bug("a grid without header").unwrap_or_default(),
+        );
         out.pad();
         mesh.each_vertex(|vertex| out.put(vertex));
         out.pad();
@@ -296,6 +299,7 @@ pub(crate) struct Out<'t> {
 impl Out<'_> {
     pub(crate) fn put(&mut self, bytes: &[u8]) {
         let rest = core::mem::take(&mut self.bytes);
+        debug_assert!(bytes.len() <= rest.len(), "more bytes than were planned");
         if let Some((to, rest)) = rest.split_at_mut_checked(bytes.len()) {
             to.copy_from_slice(bytes);
             self.bytes = rest;

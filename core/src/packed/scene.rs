@@ -21,6 +21,7 @@ use crate::arena::{check_alignment, section_bytes, split};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::error::{Error, Region};
 use crate::grid::Grid;
+use crate::invariant::OrBug;
 use crate::method::Content;
 use crate::ray::INVALID_ID;
 use crate::scene::{Object, Scene};
@@ -196,12 +197,12 @@ impl<'a> Scene<'a> {
         let (keys, _) = rest.as_chunks_mut::<8>();
         let mut free = keys.iter_mut();
         self.each_member(&mut |object| {
-            if let (Some(to), Some(key)) = (free.next(), key(object)) {
+            if let (Some(to), Some(key)) = (free.next().or_bug("no room for a key"), key(object)) {
                 *to = key.to_ne_bytes();
             }
             Ok(())
         })?;
-        let keys = keys.get(..members as usize).unwrap_or_default();
+        let keys = keys.get(..members as usize).or_bug("a key is missing").unwrap_or_default();
         let number_of = |object: &Object<'_>| {
             let wanted = key(object)?.to_ne_bytes();
             u32::try_from(keys.iter().position(|key| *key == wanted)?).ok()
@@ -227,7 +228,7 @@ impl<'a> Scene<'a> {
 
         // Write the members over their keys, and the scene behind them.
         let copy = |blob: &[u8], to: &mut [u8]| {
-            if let Some(to) = to.get_mut(..blob.len()) {
+            if let Some(to) = to.get_mut(..blob.len()).or_bug("more bytes than were planned") {
                 to.copy_from_slice(blob);
             }
             blob.len()
@@ -238,7 +239,8 @@ impl<'a> Scene<'a> {
                 Object::Scene(scene) => copy(scene.blob(), rest),
                 Object::Shapes(..) | Object::Nothing => 0,
             };
-            rest = take(&mut rest).get_mut(bytes..).unwrap_or_default();
+            let behind = take(&mut rest).get_mut(bytes..);
+            rest = behind.or_bug("more bytes than were planned").unwrap_or_default();
             Ok(())
         })?;
         copy(self.blob(), rest);

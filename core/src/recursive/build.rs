@@ -29,6 +29,7 @@ use crate::cell::{CellRange, Lattice, as_f32, row, whole};
 use crate::config::{BuildFlags, Parameters};
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
+use crate::invariant::OrBug;
 use crate::limits::MAX_RESOLUTION_OF_RECURSIVE;
 use crate::mesh::TriangleMesh;
 use crate::survey::{Survey, boxes, reference_limit};
@@ -189,6 +190,7 @@ fn run(
     }
     let (scratch, _) = split_mut::<u32>(scratch, needed_bytes / 4).ok_or(too_small)?;
 
+    // An index that is too small is legal, and the sizes have none: the pool counts.
     let (header, pool) = index.split_at_mut_checked(HEADER_BYTES).unwrap_or_default();
     // What was here is no grid any more, should the build end with an error.
     header.fill(0);
@@ -372,6 +374,7 @@ struct Builder<'m, 'p> {
 impl Builder<'_, '_> {
     fn place(&self, id: u32) -> Option<PlacedTriangle> {
         PlacedTriangle::new(self.mesh, self.lattice, id)
+            .or_bug("a list with a triangle that is not finite")
     }
 
     /// Puts a grid of these primitives in this box into the pool, and all grids in it.
@@ -414,9 +417,11 @@ impl Builder<'_, '_> {
         for &id in ids.iter().rev() {
             let Some(placed) = self.place(id) else { continue };
             placed.each_cell(&node, |cell, _| {
+                debug_assert!(cell < starts.len(), "a cell behind the last");
                 let Some(start) = starts.get_mut(cell) else { return };
                 *start = start.wrapping_sub(1);
-                if let Some(reference) = lists.get_mut(*start as usize) {
+                let reference = lists.get_mut(*start as usize);
+                if let Some(reference) = reference.or_bug("a cell has too many references") {
                     *reference = id;
                 }
             });
@@ -424,12 +429,14 @@ impl Builder<'_, '_> {
 
         // Move list after list into the pool, crowded ones as grids.
         let words = HEAD_WORDS + node.cells() + 1;
+        // An exhausted pool is legal, here and below: it counts.
         let mut entries = self.pool.take(words).and_then(|words| {
             let (head, entries) = words.split_first_chunk_mut()?;
             *head = node.head();
             Some(entries)
         });
         let mut entry = |cell: usize, value: u32| {
+            debug_assert!(cell <= node.cells(), "a cell behind the last");
             if let Some(entry) = entries.as_mut().and_then(|entries| entries.get_mut(cell)) {
                 *entry = value;
             }
@@ -443,7 +450,7 @@ impl Builder<'_, '_> {
             }
             let ends = starts.get(number..).and_then(|ends| ends.first_chunk::<2>());
             let list = ends.and_then(|ends| lists.get(ends[0] as usize..ends[1] as usize));
-            let list = list.unwrap_or_default();
+            let list = list.or_bug("a list behind the references").unwrap_or_default();
             let start = self.pool.offset()?;
             let is_crowded = list.len() > FEW && depth + 1 < self.rule.depth;
             let share = (*looks).checked_div(later).unwrap_or(0) * list.len() as u64;
@@ -509,7 +516,7 @@ impl Builder<'_, '_> {
                 }
                 looked += placed.each_cell(&node, |cell, _| {
                     references += 1;
-                    if let Some(start) = starts.get_mut(cell) {
+                    if let Some(start) = starts.get_mut(cell).or_bug("a cell behind the last") {
                         *start += 1;
                     }
                 });

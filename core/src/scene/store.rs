@@ -19,6 +19,7 @@ use crate::config::Config;
 use crate::control::Control;
 use crate::error::{Error, Region};
 use crate::grid::Grid;
+use crate::invariant::OrBug;
 use crate::limits::{ALIGNMENT, MAX_NESTING};
 use crate::mesh::{BOX_BYTES, Strided, TriangleMesh};
 use crate::method::Content;
@@ -46,6 +47,7 @@ fn boxes_of<'a>(
 ) -> Result<TriangleMesh<'a>, Error> {
     let bytes = sides.as_bytes();
     let boxes = Strided { bytes, stride: BOX_BYTES, count: sides.len() };
+    // No instances have no masks.
     let bytes = placed.as_bytes().get(offset_of!(Instance, mask)..).unwrap_or_default();
     let masks = Strided { bytes, stride: size_of::<StoredInstance>(), count: placed.len() };
     TriangleMesh::of_boxes(boxes, Content::Instances)?.with_masks(masks)
@@ -160,7 +162,7 @@ impl<'a> Scene<'a> {
         let (table, sides, placed) = sections.ok_or(short(0))?;
         place(instances, objects, sides, placed)?;
         let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
-        if let Some(table) = table.first_mut() {
+        if let Some(table) = table.first_mut().or_bug("a scene without a table") {
             *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };
         }
         let boxes = boxes_of(sides, placed)?;
@@ -341,7 +343,7 @@ impl<'a> Scene<'a> {
         let (table, sides, placed) = sections.ok_or(damaged)?;
         place(instances, objects, sides, placed)?;
         let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
-        if let Some(table) = table.first_mut() {
+        if let Some(table) = table.first_mut().or_bug("a scene without a table") {
             *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };
         }
         refit_content(head, &boxes_of(sides, placed)?)
@@ -350,6 +352,7 @@ impl<'a> Scene<'a> {
 
 /// Moves the bytes from `from` on down to `to`, which is before it; both and the end are multiples of 64.
 fn close_gap(bytes: &mut [u8], to: usize, from: usize) {
+    debug_assert!(to <= from && from <= bytes.len(), "a tree longer than its room");
     let count = bytes.len().saturating_sub(from) / 64;
     for block in 0..count {
         let block_at = |start: usize| start + 64 * block..start + 64 * (block + 1);

@@ -22,6 +22,7 @@ use crate::cell::{CellRange, Lattice};
 use crate::config::{BuildFlags, Parameters};
 use crate::control::Watch;
 use crate::error::{ConfigField, Error, Region};
+use crate::invariant::OrBug;
 use crate::lists::pairs;
 use crate::mesh::TriangleMesh;
 use crate::one_level::{
@@ -41,7 +42,8 @@ struct CellSpread<'m> {
 impl CellSpread<'_> {
     /// What a primitive reaches, in cells of the top.
     fn reach(&self, id: u32) -> Option<Aabb> {
-        let bounds = self.mesh.corners(id).and_then(Aabb::of)?;
+        let bounds = self.mesh.corners(id).and_then(Aabb::of);
+        let bounds = bounds.or_bug("a list with a triangle that is not finite")?;
         Some(self.lattice.reach(&bounds))
     }
 }
@@ -57,7 +59,7 @@ impl Spread for CellSpread<'_> {
 
     #[inline(always)]
     fn range(&self, place: u32) -> Option<CellRange> {
-        let id = *self.ids.get(place as usize)?;
+        let id = *self.ids.get(place as usize).or_bug("a place behind the list")?;
         Some(self.frame.range(self.cell, &self.reach(id)?))
     }
 
@@ -224,7 +226,7 @@ fn run(
     let top = plan.layout.with_references(0);
     let split = usize::try_from(top.index_bytes()).ok();
     let (head, pool) = match split.and_then(|bytes| index.split_at_mut_checked(bytes)) {
-        Some((head, pool)) => (top.sections_mut(head), pool),
+        Some((head, pool)) => (top.sections_mut(head).or_bug("sections past their end"), pool),
         None => (None, &mut [][..]),
     };
     let mut pool = Bump::over(pool);
@@ -238,12 +240,15 @@ fn run(
 
     // Move list after list into the pool, crowded ones as subgrids.
     let mut entry = |slot: usize, value: u32| {
+        debug_assert!(slots.as_ref().is_none_or(|hash| slot < hash.len()), "a slot too many");
         if let Some(entry) = slots.as_mut().and_then(|hash| hash.get_mut(slot)) {
             *entry = value;
         }
     };
-    let lists = pairs(hash)
-        .map(|(start, end)| references.get(start as usize..end as usize).unwrap_or_default());
+    let lists = pairs(hash).map(|(start, end)| {
+        let list = references.get(start as usize..end as usize);
+        list.or_bug("a list behind the references").unwrap_or_default()
+    });
     let slot_count = plan.layout.hash_count;
     for (slot, (ids, &owner)) in lists.zip(&*owners).enumerate() {
         watch.step(u32::try_from(slot).unwrap_or(u32::MAX), slot_count, [0.5, 1.0])?;
@@ -255,6 +260,7 @@ fn run(
             entry(slot, start | GRID);
         } else {
             entry(slot, start);
+            // An exhausted pool is legal: it counts.
             if let Some(words) = pool.take(ids.len()) {
                 copy(ids, words);
             }
@@ -273,6 +279,7 @@ fn assign([width, ..]: [u32; 3], row_offsets: &[i32], domain_bits: &[u64], owner
         let first = row * width as usize;
         each_one(domain_bits, first, width as usize, |x| {
             let owner = u32::try_from(x).ok().and_then(|x| owners.get_mut(slot(offset, x)?));
+            debug_assert!(owner.is_some(), "a cell without a slot in the table");
             if let (Some(owner), Ok(cell)) = (owner, u32::try_from(first + x)) {
                 *owner = cell;
             }
@@ -298,11 +305,14 @@ impl CellSpread<'_> {
     /// primitives. A pile of equal triangles stays a list.
     fn subdivide(mut self, density: f32, bench: &mut Bench<'_>, pool: &mut Bump<'_>) -> bool {
         let Some(layout) = self.plan(density, bench) else { return false };
-        let Some(sections) = pool.take(layout.words()).and_then(|words| layout.sections_mut(words))
+        // An exhausted pool is legal: it counts.
+        let Some(words) = pool.take(layout.words()) else { return true };
+        let Some(sections) = layout.sections_mut(words).or_bug("a subgrid larger than its words")
         else {
             return true;
         };
-        let rows = bench.row_offsets.get(..sections.row_offsets.len()).unwrap_or_default();
+        let rows = bench.row_offsets.get(..sections.row_offsets.len());
+        let rows = rows.or_bug("more rows than on the bench").unwrap_or_default();
         for (to, from) in sections.row_offsets.iter_mut().zip(rows) {
             *to = from.cast_unsigned();
         }
@@ -310,12 +320,15 @@ impl CellSpread<'_> {
         for (to, from) in sections.domain_bits.iter_mut().zip(halves) {
             *to = from;
         }
-        if fill(&self, rows, sections.hash, sections.references, &Watch::none()).is_err() {
+        let filled = fill(&self, rows, sections.hash, sections.references, &Watch::none());
+        debug_assert!(filled.is_ok(), "a subgrid without its lists");
+        if filled.is_err() {
             return false;
         }
         // The lists hold places in the cell's list: replace them by its ids, which ascend as well.
         for reference in sections.references {
-            *reference = self.ids.get(*reference as usize).copied().unwrap_or(u32::MAX);
+            let id = self.ids.get(*reference as usize).copied();
+            *reference = id.or_bug("a place behind the list").unwrap_or(u32::MAX);
         }
         true
     }
@@ -323,7 +336,7 @@ impl CellSpread<'_> {
     /// Plans a subgrid: its frame, and its rows on the bench.
     fn plan(&mut self, density: f32, bench: &mut Bench<'_>) -> Option<SubLayout> {
         let reaches = self.ids.iter().filter_map(|&id| self.reach(id));
-        let reach = reaches.reduce(|all, reach| all.union(&reach))?;
+        let reach = reaches.reduce(|all, reach| all.union(&reach)).or_bug("an empty list")?;
         self.frame = Frame::around(&reach, self.cell);
         let count = u32::try_from(self.ids.len()).ok()?;
 
@@ -336,26 +349,29 @@ impl CellSpread<'_> {
                 continue;
             }
             let cells = self.frame.cells();
-            let domain_bits = bench.domain_bits.get_mut(..cells.div_ceil(WORD_BITS))?;
+            let domain_bits = bench.domain_bits.get_mut(..cells.div_ceil(WORD_BITS));
+            let domain_bits = domain_bits.or_bug("more cells than on the bench")?;
             let references = mark(self, domain_bits, reference_limit(count), &Watch::none());
-            if let Some(references) = references.ok()? {
+            if let Some(references) = references.ok().or_bug("a plan that ends early")? {
                 break (cells, references);
             }
         };
-        let domain_bits = bench.domain_bits.get(..cells.div_ceil(WORD_BITS))?;
+        let domain_bits =
+            bench.domain_bits.get(..cells.div_ceil(WORD_BITS)).or_bug("too many cells")?;
         let lists: u32 = domain_bits.iter().map(|word| word.count_ones()).sum();
         if 4 * u64::from(reference_count) > 3 * u64::from(count) * u64::from(lists) {
             return None;
         }
 
         let [width, height, depth] = self.frame.resolution.map(|cells| cells as usize);
-        let row_offsets = bench.row_offsets.get_mut(..height * depth)?;
+        let row_offsets = bench.row_offsets.get_mut(..height * depth).or_bug("too many rows")?;
         // A few words more, if there are: the last ones are not read eight at a time. And no
         // more, which first fit would clear.
         let enough = cells.div_ceil(WORD_BITS) + 1;
         let words = bench.occupied.len().min(enough + 8).max(enough);
-        let occupied = bench.occupied.get_mut(..words)?;
-        let hash_count = displace(bench.domain_bits, width, row_offsets, occupied)?;
+        let occupied = bench.occupied.get_mut(..words).or_bug("more slots than on the bench")?;
+        let hash_count = displace(bench.domain_bits, width, row_offsets, occupied);
+        let hash_count = hash_count.or_bug("more slots than can be named")?;
         Some(SubLayout { frame: self.frame, hash_count, reference_count })
     }
 }

@@ -202,6 +202,7 @@ impl Bins {
     /// Sweeps over each axis from both ends, for the cut of least cost.
     #[inline(always)]
     fn best<S: Simd>(&self, simd: S, rule: &BinScale, unit: f32) -> Option<Split> {
+        debug_assert!(rule.count <= BINS, "more bins than there is room for");
         let mut best = Split { axis: 0, bin: 0, cost: f32::INFINITY };
         for (axis, (boxes, counts)) in self.boxes.iter().zip(&self.counts).enumerate() {
             if rule.scale[axis % 3] >= f32::MAX {

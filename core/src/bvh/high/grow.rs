@@ -18,6 +18,7 @@ use super::cut::{Bins, Extent, ID, TriangleItem, area};
 use crate::aabb::Aabb;
 use crate::bvh::LEVELS;
 use crate::bvh::node::{LEAF, Node, Sides, WIDTH};
+use crate::invariant::OrBug;
 use crate::simd::Kernel;
 
 /// Levels from which on ranges are halved.
@@ -153,6 +154,8 @@ impl Kernel for Grow<'_> {
                     let count = part.count() as u8;
                     node.counts[slot % WIDTH] = count;
                     let items = self.items.get(part.start as usize..part.end as usize);
+                    debug_assert!(items.is_some(), "a leaf behind the items");
+                    // Too little room for ids is legal: they are counted.
                     let ids = self.ids.get_mut(grown.ids as usize..).unwrap_or_default();
                     for (id, item) in ids.iter_mut().zip(items.unwrap_or_default()) {
                         *id = item[ID];
@@ -165,10 +168,11 @@ impl Kernel for Grow<'_> {
                 grown.nodes += 1;
                 let (start, end) = (part.start, part.end);
                 let below = Job { place: place + 1, start, end, level: job.level + 1 };
+                // Too little room for nodes is legal: they are counted.
                 match self.nodes.get_mut(place as usize) {
                     Some(node) if part.count() <= self.wait => *node = waiting(&below),
                     _ => {
-                        if let Some(slot) = stack.get_mut(jobs) {
+                        if let Some(slot) = stack.get_mut(jobs).or_bug("too many jobs wait") {
                             *slot = below;
                             jobs += 1;
                         }
@@ -199,6 +203,10 @@ impl Grow<'_> {
     #[inline(always)]
     fn parts<S: Simd>(&mut self, simd: S, bins: &mut Bins, job: &Job) -> [SubRange; WIDTH] {
         let mut parts = [SubRange::NONE; WIDTH];
+        debug_assert!(
+            job.start <= job.end && job.end as usize <= self.items.len(),
+            "a job behind the items"
+        );
         let all = self.items.get(job.start as usize..job.end as usize).unwrap_or_default();
         let extent = Extent::of(simd, all);
         parts[0] = SubRange { start: job.start, end: job.end, extent, area: 0.0 };
@@ -208,7 +216,7 @@ impl Grow<'_> {
             let at = at % WIDTH;
             let part = parts[at];
             let range = part.start as usize..part.end as usize;
-            let Some(items) = self.items.get_mut(range) else { break };
+            let Some(items) = self.items.get_mut(range).or_bug("a part too long") else { break };
             let found = if halve || items.len() < 3 {
                 None
             } else {
@@ -301,13 +309,14 @@ impl Cursor {
                 continue;
             }
             level[0] += 1;
+            // A node for which there was no room is legal: its range did not wait.
             let Some(node) = nodes.get(place as usize) else { continue };
             if node.word == WAITING {
                 let (start, end, level) = (node.child, node.first, u32::from(node.counts[0]));
                 return Some(Waiter { place, start, end, level });
             }
             let below = [node.child, node.child + node.inner().count_ones()];
-            *self.levels.get_mut(self.depth)? = below;
+            *self.levels.get_mut(self.depth).or_bug("a node below the most levels")? = below;
             self.depth += 1;
         }
     }

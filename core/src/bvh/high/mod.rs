@@ -41,6 +41,7 @@ use crate::cell::Lattice;
 use crate::config::{BuildFlags, Parameters};
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
+use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
@@ -96,10 +97,11 @@ pub(super) fn build_in(
     if available_bytes < needed_bytes {
         return Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes });
     }
-    let items = match split_mut::<TriangleItem>(scratch, triangles.into()) {
-        Some((items, _)) => items,
-        None => &mut [],
-    };
+    let items =
+        match split_mut::<TriangleItem>(scratch, triangles.into()).or_bug("too little scratch") {
+            Some((items, _)) => items,
+            None => &mut [],
+        };
     // Tasks fill their parts of the index side by side, which takes the bound. With less room, run one task.
     let mut tasks = task_count(control, triangles as usize / LEAST_TASK);
     if index_available < index_bound {
@@ -114,10 +116,11 @@ pub(super) fn build_in(
     // Find the boxes.
     watch.at(BOXES)?;
     let (finite, bounds) = boxes(mesh, flags, items, tasks, control)?;
-    let items = items.get_mut(..finite).unwrap_or_default();
+    let items = items.get_mut(..finite).or_bug("more triangles than items").unwrap_or_default();
 
     // Cut the index.
     let ids_bytes = section_bytes::<u32>(finite as u64) as usize;
+    // No index, or one that is too small, is legal: ids and nodes for which there is no room are only counted.
     let parts = behind.and_then(|behind| behind.split_at_mut_checked(ids_bytes));
     let (ids, nodes) = parts.unwrap_or_default();
     let (ids, _) = split_mut::<u32>(ids, finite as u64).unwrap_or_default();
@@ -141,7 +144,8 @@ pub(super) fn build_in(
             });
         }
         let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
-        if let Some(padding) = index.get_mut(used..needed_bytes as usize) {
+        let padding = index.get_mut(used..needed_bytes as usize);
+        if let Some(padding) = padding.or_bug("nodes behind the end of the index") {
             padding.fill(0);
         }
     }
@@ -195,7 +199,7 @@ fn boxes(
         |result| {
             let (count, bounds_of) = result?;
             bounds = bounds.union(&bounds_of);
-            if let Some(slot) = slots.next() {
+            if let Some(slot) = slots.next().or_bug("more results than tasks") {
                 *slot = count;
             }
             Ok(())
@@ -237,7 +241,7 @@ impl Kernel for ItemsTask<'_> {
                 // Of the two zeros the positive one, whatever the order of a union.
                 let [x, y, z] = (box_of.min + Vec3A::ZERO).to_array().map(f32::to_bits);
                 let [nx, ny, nz] = (-(box_of.max + Vec3A::ZERO)).to_array().map(f32::to_bits);
-                if let Some(item) = items.get_mut(count) {
+                if let Some(item) = items.get_mut(count).or_bug("more triangles than items") {
                     *item = [x, y, z, triangle, nx, ny, nz, 0];
                 }
                 count += 1;
@@ -249,6 +253,7 @@ impl Kernel for ItemsTask<'_> {
 
 /// Copies elements to a place before them; nothing where there are none. (`copy_within` can panic.)
 fn move_down<T: Copy>(all: &mut [T], from: usize, count: usize, to: usize) {
+    debug_assert!(to <= from && from + count <= all.len(), "elements move past an end");
     for at in 0..count {
         let element = all.get(from + at).copied();
         if let (Some(element), Some(slot)) = (element, all.get_mut(to + at)) {
@@ -318,9 +323,10 @@ impl RangesTask<'_> {
         let level = SimdLevel::detect();
         let (mut node_count, mut id_count) = (0, 0);
         for _ in 0..ranges {
-            let Some(waiter) = cursor.next(top) else { break };
+            let Some(waiter) = cursor.next(top).or_bug("a range is missing") else { break };
             let range = (waiter.start - start) as usize..(waiter.end - start) as usize;
-            let Some(items) = items.get_mut(range) else { break };
+            let Some(items) = items.get_mut(range).or_bug("a range too long") else { break };
+            // Too little room for nodes and ids is legal: they are counted.
             let grow = Grow {
                 items,
                 level: waiter.level,
@@ -335,7 +341,7 @@ impl RangesTask<'_> {
             let Grown { root, nodes, ids, levels } = dispatch(level, grow);
             node_count += nodes;
             id_count += ids;
-            if let Some(place) = items.first_chunk_mut::<RECORD>() {
+            if let Some(place) = items.first_chunk_mut::<RECORD>().or_bug("a range too short") {
                 *place = transmute!(RangeRecord { root, nodes, levels, unused: [0; 2] });
             }
         }
@@ -355,6 +361,7 @@ impl HighInputs {
     ) -> Result<(u32, u32), Error> {
         let all = items.len() as u32;
         if all == 0 {
+            // To have no nodes is legal: then they are only counted.
             if let Some(root) = nodes.first_mut() {
                 *root = Node::EMPTY;
             }
@@ -373,6 +380,7 @@ impl HighInputs {
         };
         let level = SimdLevel::detect();
         let Grown { root, nodes: below, ids: top_ids, mut levels } = dispatch(level, grow);
+        // To have no nodes and ids is legal, here and below: then they are only counted.
         if let Some(slot) = nodes.first_mut() {
             *slot = root;
         }
@@ -433,21 +441,23 @@ impl HighInputs {
         for TaskRanges { ranges, mut child } in plans {
             for _ in 0..ranges {
                 let top = nodes.get(..(top_count as usize).min(nodes.len())).unwrap_or_default();
-                let Some(waiter) = cursor.next(top) else { break };
+                let Some(waiter) = cursor.next(top).or_bug("a range is missing") else { break };
                 let behind = items.get(waiter.start as usize..).unwrap_or_default();
-                let Some(record) = behind.first_chunk::<RECORD>() else { break };
+                let record = behind.first_chunk::<RECORD>().or_bug("a range without a record");
+                let Some(record) = record else { break };
                 let RangeRecord { mut root, nodes: below, levels: levels_of, .. } =
                     transmute!(*record);
                 let moved = child - count;
                 if moved > 0 {
                     let from = child as usize..(child + below) as usize;
-                    for node in nodes.get_mut(from).unwrap_or_default() {
+                    for node in nodes.get_mut(from).or_bug("too many nodes").unwrap_or_default() {
                         node.child -= moved;
                     }
                     move_down(nodes, child as usize, below as usize, count as usize);
                 }
                 root.child -= moved;
-                if let Some(slot) = nodes.get_mut(waiter.place as usize) {
+                let slot = nodes.get_mut(waiter.place as usize);
+                if let Some(slot) = slot.or_bug("a range waits behind the nodes") {
                     *slot = root;
                 }
                 child += below;
