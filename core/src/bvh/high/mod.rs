@@ -456,8 +456,7 @@ impl HighInputs {
                     move_down(nodes, child as usize, below as usize, count as usize);
                 }
                 root.child -= moved;
-                let slot = nodes.get_mut(waiter.place as usize);
-                if let Some(slot) = slot.or_bug("a range waits behind the nodes") {
+                if let Some(slot) = nodes.get_mut(waiter.place as usize).or_bug("no such node") {
                     *slot = root;
                 }
                 child += below;
