@@ -4,7 +4,7 @@ use hgrid_core::{Grid, QueryOptions};
 
 use crate::query_types::{self, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray};
 use crate::raw;
-use crate::raw::Batch;
+use crate::raw::BatchArrays;
 use crate::status::{HGRID_OK, hgrid_status};
 use crate::types::hgrid_grid;
 
@@ -82,7 +82,7 @@ pub unsafe extern "C" fn hgrid_intersect_n(
     options: *const hgrid_query_options,
 ) -> hgrid_status {
     let call = || {
-        let batch = Batch::new((rays, ray_stride), (hits, hit_stride), count)?;
+        let batch = BatchArrays::new((rays, ray_stride), (hits, hit_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace = |grid: &Grid<'_>,
                      rays: &mut raw::Arrays<'_, hgrid_hit>,
@@ -139,7 +139,7 @@ pub unsafe extern "C" fn hgrid_occluded_n(
     options: *const hgrid_query_options,
 ) -> hgrid_status {
     let call = || {
-        let batch = Batch::new((rays, ray_stride), (occluded, occluded_stride), count)?;
+        let batch = BatchArrays::new((rays, ray_stride), (occluded, occluded_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace =
             |grid: &Grid<'_>, rays: &mut raw::Arrays<'_, u8>, options: &mut QueryOptions<'_>| {
@@ -177,7 +177,7 @@ pub unsafe extern "C" fn hgrid_occluder_n(
     options: *const hgrid_query_options,
 ) -> hgrid_status {
     let call = || {
-        let batch = Batch::new((rays, ray_stride), (occluders, occluder_stride), count)?;
+        let batch = BatchArrays::new((rays, ray_stride), (occluders, occluder_stride), count)?;
         let coherence = query_types::coherence(coherence)?;
         let trace =
             |grid: &Grid<'_>, rays: &mut raw::Arrays<'_, u32>, options: &mut QueryOptions<'_>| {

@@ -23,8 +23,8 @@ use crate::ray::Ray;
 /// How many triangles are tested at once.
 pub(crate) const LANES: usize = 8;
 
-/// A vertex and four bytes that mean nothing.
-pub(crate) type VertexBytes = [u8; 16];
+/// Sixteen bytes that are loaded as four numbers: a vertex and what follows it, half a ray, a part of a box.
+pub(crate) type RowBytes = [u8; 16];
 
 /// Up to eight triangles, one a lane.
 #[derive(Clone, Copy)]
@@ -41,10 +41,13 @@ impl<S: Simd> Eight<S> {
     pub(crate) fn of(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; LANES], count: usize) -> Self {
         let [i, j, k, l, m, n, o, p] = ids;
         // The part of a joined mesh that the triangles before lie in.
-        let mut near = None;
-        let (low, used) = four(simd, mesh, [i, j, k, l], &mut near);
-        let (high, used_high) =
-            if count > LANES / 2 { four(simd, mesh, [m, n, o, p], &mut near) } else { (low, 0) };
+        let mut last_part = None;
+        let (low, used) = four(simd, mesh, [i, j, k, l], &mut last_part);
+        let (high, used_high) = if count > LANES / 2 {
+            four(simd, mesh, [m, n, o, p], &mut last_part)
+        } else {
+            (low, 0)
+        };
         // Written out: arrays that are mapped live in memory.
         let ([a, b, c], [d, e, f]) = (low, high);
         let corners = [join(a, d), join(b, e), join(c, f)];
@@ -75,7 +78,7 @@ fn four<'m, S: Simd>(
     simd: S,
     mesh: &TriangleMesh<'m>,
     ids: [u32; 4],
-    near: &mut Option<LastPart<'m>>,
+    last_part: &mut Option<LastPart<'m>>,
 ) -> ([[f32x4<S>; 3]; 3], u32) {
     let wide = mesh.wide();
     let rows = |id: u32| -> Option<[f32x4<S>; 3]> {
@@ -90,13 +93,13 @@ fn four<'m, S: Simd>(
         let corners = [corner([a, d, g, j]), corner([b, e, h, k]), corner([c, f, i, l])];
         return (corners, 0xf);
     }
-    let (rows, used) = read(mesh, ids, near);
+    let (rows, used) = read(mesh, ids, last_part);
     (corners_of(simd, &rows), used)
 }
 
 /// The corners of four triangles, by corner and axis, from their rows.
 #[inline(always)]
-pub(crate) fn corners_of<S: Simd>(simd: S, rows: &[[VertexBytes; 4]; 3]) -> [[f32x4<S>; 3]; 3] {
+pub(crate) fn corners_of<S: Simd>(simd: S, rows: &[[RowBytes; 4]; 3]) -> [[f32x4<S>; 3]; 3] {
     let row = |at: usize, lane: usize| load(simd, &rows[at][lane]);
     [
         corner([row(0, 0), row(0, 1), row(0, 2), row(0, 3)]),
@@ -119,18 +122,18 @@ pub(crate) fn corner<S: Simd>(vertices: [f32x4<S>; 4]) -> [f32x4<S>; 3] {
 fn read<'m>(
     mesh: &TriangleMesh<'m>,
     ids: [u32; 4],
-    near: &mut Option<LastPart<'m>>,
-) -> ([[VertexBytes; 4]; 3], u32) {
+    last_part: &mut Option<LastPart<'m>>,
+) -> ([[RowBytes; 4]; 3], u32) {
     let is_joined = !mesh.parts().is_empty();
     let (mut rows, mut used) = ([[[0; 16]; 4]; 3], 0);
     let [a, b, c] = &mut rows;
     for (lane, (((id, a), b), c)) in ids.into_iter().zip(a).zip(b).zip(c).enumerate() {
         if is_joined {
-            let mut found = near.and_then(|near| near.corners(id));
+            let mut found = last_part.and_then(|last_part| last_part.corners(id));
             if found.is_none() {
-                let other = mesh.near(id);
+                let other = mesh.part_around(id);
                 found = other.corners(id);
-                *near = Some(other);
+                *last_part = Some(other);
             }
             if let Some(corners) = found {
                 [*a, *b, *c] = corners.map(|corner| *corner);
@@ -186,20 +189,20 @@ pub(crate) fn columns<S: Simd>(
 
 /// A ray as two rows.
 #[inline(always)]
-fn halves(ray: &Ray) -> &[VertexBytes; 2] {
+fn halves(ray: &Ray) -> &[RowBytes; 2] {
     transmute_ref!(ray)
 }
 
 /// One half of four rays.
 #[inline(always)]
-fn rows_of<S: Simd>(simd: S, [a, b, c, d]: [&[VertexBytes; 2]; 4], half: usize) -> [f32x4<S>; 4] {
+fn rows_of<S: Simd>(simd: S, [a, b, c, d]: [&[RowBytes; 2]; 4], half: usize) -> [f32x4<S>; 4] {
     let half = half % 2;
     [load(simd, &a[half]), load(simd, &b[half]), load(simd, &c[half]), load(simd, &d[half])]
 }
 
 /// Sixteen bytes as four numbers.
 #[inline(always)]
-pub(crate) fn load<S: Simd>(simd: S, row: &VertexBytes) -> f32x4<S> {
+pub(crate) fn load<S: Simd>(simd: S, row: &RowBytes) -> f32x4<S> {
     u8x16::simd_from(simd, *row).bitcast()
 }
 

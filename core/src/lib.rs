@@ -30,7 +30,7 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | plain types of the API | `limits`, `method`, `error`, `config`, `control`, `counters`, `ray`, `aabb`, `mesh`, `options` |
+//! | plain types | `limits`, `method`, `error`, `config`, `control`, `counters`, `ray`, `aabb`, `mesh`, `options` |
 //! | helpers | `invariant`, `simd`, `extremes`, `tasks` |
 //! | memory | `arena`, `bits`, `lists`, `hash`, `survey`, `cell`, `blob`, `bump` |
 //! | rays and triangles | `filter`, `approach`, `exact`, `eight`, `triangle`, `pairs`, `surface` |

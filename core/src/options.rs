@@ -65,8 +65,8 @@ pub struct QueryOptions<'q> {
     pub skip: u32,
     /// Decides whether a hit counts. It receives the ray's place in its batch, 0 for a single ray, and the hit. It is
     /// asked about hits from near to far, where `t` is equal by ascending id, and about each triangle at most once for
-    /// each ray; about all hits of one ray of a batch before those of the next. A ray of [`occluded_with`](crate::Grid::occluded_with) and its like that an opaque triangle
-    /// blocks may be asked about or not.
+    /// each ray; about all hits of one ray of a batch before those of the next. It may or may not be asked about a ray
+    /// of [`occluded_with`](crate::Grid::occluded_with) and its like that an opaque triangle blocks.
     pub filter: Option<&'q mut Filter<'q>>,
     /// The filter is asked about a triangle if a bit of this is set in its mask, too. The others are opaque: their hits
     /// count, and rays that meet only them cost what they cost without a filter. The default is all bits: the filter is

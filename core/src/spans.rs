@@ -9,7 +9,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 
 use crate::cell::{Lattice, WHOLE_BITS, WHOLE_SHIFT, as_f32};
-use crate::eight::{VertexBytes, corner, corners_of, join, load};
+use crate::eight::{RowBytes, corner, corners_of, join, load};
 use crate::extremes::Extremes;
 use crate::limits::MAX_COORDINATE;
 use crate::mesh::WideMesh;
@@ -67,7 +67,7 @@ impl<S: Simd> Spans<S> {
 #[inline(always)]
 pub(crate) fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4<S>; 3]; 3] {
     if let Some([a, b, c, d]) = mesh.four(first) {
-        let row = |row: &VertexBytes| load(simd, row);
+        let row = |row: &RowBytes| load(simd, row);
         return [
             corner([row(a[0]), row(b[0]), row(c[0]), row(d[0])]),
             corner([row(a[1]), row(b[1]), row(c[1]), row(d[1])]),
@@ -80,7 +80,7 @@ pub(crate) fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4
 /// The corners of four triangles; no numbers for those that are not there or cannot be read.
 #[cold]
 #[inline(never)]
-fn read(mesh: &WideMesh<'_>, first: u32) -> [[VertexBytes; 4]; 3] {
+fn read(mesh: &WideMesh<'_>, first: u32) -> [[RowBytes; 4]; 3] {
     let mut rows = [[[0xff; 16]; 4]; 3];
     let [a, b, c] = &mut rows;
     for (place, ((a, b), c)) in (0..4).zip(a.iter_mut().zip(b).zip(c)) {

@@ -39,7 +39,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns true if who reads the output, as `head` does, has seen enough.
+/// Returns true if the reader of the output, such as `head`, has closed it.
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
     let mut causes = error.chain().filter_map(|cause| cause.downcast_ref::<io::Error>());
     causes.any(|cause| cause.kind() == io::ErrorKind::BrokenPipe)

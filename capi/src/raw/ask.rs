@@ -8,7 +8,7 @@ use hgrid_core::{
     ClosestPoint, Counters, Cull, Grid, Hit, QueryOptions, Ray, Surface, TriangleMesh, Verdict,
 };
 
-use super::arrays::Batch;
+use super::batch_arrays::BatchArrays;
 use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
 use crate::query_types::{
     hgrid_counters, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, verdict,
@@ -251,7 +251,7 @@ pub(crate) unsafe fn locate(
 /// That of [`grid`]; and the elements of both arrays are the caller's to be read and written.
 pub(crate) unsafe fn batch<T>(
     view: *const hgrid_grid,
-    batch: &Batch<T>,
+    batch: &BatchArrays<T>,
     asked: *const hgrid_query_options,
     trace: impl FnOnce(&Grid<'static>, &mut Arrays<'_, T>, &mut QueryOptions<'_>),
 ) -> Result<(), hgrid_status> {
@@ -281,7 +281,7 @@ pub(crate) unsafe fn batch<T>(
 }
 
 /// The arrays of a batch while it runs: by [`batch`]'s contract rays may be read and answers written.
-pub(crate) struct Arrays<'b, T>(&'b Batch<T>);
+pub(crate) struct Arrays<'b, T>(&'b BatchArrays<T>);
 
 impl<A, T: From<A>> hgrid_core::Batch<A> for Arrays<'_, T> {
     #[inline(always)]

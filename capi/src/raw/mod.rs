@@ -1,6 +1,6 @@
 //! The only place where a caller's pointer becomes a reference or a value: here for builds
 //! and blobs, in `ask` for queries, in `join` for arrays of meshes, in `shapes` and `scene` for those.
-//! `arrays` checks the addresses of a batch before `ask` reads them.
+//! `batch_arrays` checks the addresses of a batch before `ask` reads them.
 //!
 //! # The contract with C
 //!
@@ -25,8 +25,8 @@
 //! "as long as the caller says": blob and mesh stay unchanged while the view is in use, and between
 //! calls nothing here looks at them.
 
-mod arrays;
 mod ask;
+mod batch_arrays;
 mod join;
 mod scene;
 mod shapes;
@@ -37,8 +37,8 @@ use core::slice;
 
 use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
-pub(crate) use arrays::Batch;
 pub(crate) use ask::{Arrays, batch, closest, locate, query, query_all, surface};
+pub(crate) use batch_arrays::BatchArrays;
 pub(crate) use join::{join, parts_of};
 pub(crate) use scene::{
     build_scene, open_packed_scene, open_scene, pack_scene, query_scene, refit_scene, scene,

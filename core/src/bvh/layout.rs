@@ -14,7 +14,7 @@
 //!   `R >= 7 a + b` and `b <= R / 2`, so `a + b <= 4 R / 7`. A root and its part of those are
 //!   11 / 7 nodes.
 //! - There is no more than one root for [`TRIANGLES_PER_ROOT`] triangles ([`units`](super::units)). The rest of
-//!   [`NODES`] nodes a triangle is left for the nodes below roots: a root that would have more is built
+//!   [`NODES_PER_TRIANGLE`] is left for the nodes below roots: a root that would have more is built
 //!   again by halving its entries ([`most_of_root`]).
 //! - One more root may stand behind the crowded bins of the tree, and behind those of each division of a
 //!   crowded bin. A crowded bin has more than [`CROWD`] triangles, and at most [`DIVISIONS`] of them that are
@@ -40,15 +40,16 @@ pub(crate) const LEAST_PIECE: usize = 32;
 const _: () = assert!(TRIANGLES_PER_ROOT <= LEAST_PIECE && 2 * LEAST_PIECE <= MOST_ROOT);
 
 /// Nodes for each triangle, in parts of [`WHOLE`], that roots and the nodes above and below them may cost.
-const NODES: u64 = 24_780;
+const NODES_PER_TRIANGLE: u64 = 24_780;
 const WHOLE: u64 = 168_000;
 
-/// The part of [`NODES`] for the nodes below the roots.
-const NODES_BELOW: u64 = NODES - WHOLE * 11 / 7 / TRIANGLES_PER_ROOT as u64;
+/// The part of [`NODES_PER_TRIANGLE`] for the nodes below the roots.
+const NODES_PER_TRIANGLE_BELOW: u64 =
+    NODES_PER_TRIANGLE - WHOLE * 11 / 7 / TRIANGLES_PER_ROOT as u64;
 
 /// The most nodes below a root of so many triangles.
 pub(crate) const fn most_of_root(triangles: usize) -> usize {
-    (NODES_BELOW * triangles as u64 / WHOLE) as usize
+    (NODES_PER_TRIANGLE_BELOW * triangles as u64 / WHOLE) as usize
 }
 
 /// Bins with more entries are crowded: they come first, and are divided again above [`MOST_UNIT`].
@@ -86,13 +87,13 @@ const fn late_roots(triangles: u64) -> u64 {
 
 /// The most nodes below the roots that hold so many triangles.
 pub(crate) const fn most_below(triangles: u64) -> u64 {
-    (triangles * NODES_BELOW).div_ceil(WHOLE)
+    (triangles * NODES_PER_TRIANGLE_BELOW).div_ceil(WHOLE)
 }
 
 /// The most nodes of a tree over so many triangles.
 pub(crate) const fn most_nodes(triangles: u64) -> u64 {
     // The root of all is one more.
-    (triangles * NODES).div_ceil(WHOLE) + 11 * late_roots(triangles) / 7 + 3
+    (triangles * NODES_PER_TRIANGLE).div_ceil(WHOLE) + 11 * late_roots(triangles) / 7 + 3
 }
 
 /// Bytes of an index with so many ids and nodes.

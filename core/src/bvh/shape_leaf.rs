@@ -12,7 +12,7 @@ use super::node::WIDTH;
 use super::slab::Slab;
 use super::walk::flips_of;
 use crate::aabb::{Aabb, greater, lesser};
-use crate::eight::{VertexBytes, first_eight, join, load, transpose};
+use crate::eight::{RowBytes, first_eight, join, load, transpose};
 use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
 
@@ -49,7 +49,7 @@ fn four<S: Simd>(
 
 /// A box as two rows of four numbers that overlap: x y z X and z X Y Z. Zeros where there is no such box.
 #[inline(always)]
-fn rows(mesh: &TriangleMesh<'_>, id: u32) -> [VertexBytes; 2] {
+fn rows(mesh: &TriangleMesh<'_>, id: u32) -> [RowBytes; 2] {
     let Some(bytes) = mesh.box_bytes(id) else { return [[0; 16]; 2] };
     let (Some(first), Some(last)) = (bytes.first_chunk(), bytes.last_chunk()) else {
         return [[0; 16]; 2];

@@ -164,13 +164,13 @@ impl Subtree {
     /// Reads ids, boxes and where keys change.
     #[inline(always)]
     fn read<S: Simd>(&mut self, simd: S, mesh: &TriangleMesh<'_>, entries: &[Entry]) {
-        let mut near = mesh.near(entries.first().map_or(0, |entry| entry[1]));
+        let mut near = mesh.part_around(entries.first().map_or(0, |entry| entry[1]));
         for (entry, (id, sides)) in entries.iter().zip(self.sources.iter_mut().zip(&mut self.boxes))
         {
             *id = entry[1];
             let mut found = near.corners(entry[1]);
             if found.is_none() {
-                near = mesh.near(entry[1]);
+                near = mesh.part_around(entry[1]);
                 found = near.corners(entry[1]);
             }
             let Some([a, b, c]) = found else {

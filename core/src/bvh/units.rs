@@ -142,33 +142,33 @@ mod tests {
 
     #[expect(clippy::cast_possible_truncation, reason = "small")]
     #[test]
-    fn triangles_pay_for_roots() {
-        let (price, crowd) = (TRIANGLES_PER_ROOT as u32, CROWD as u32);
+    fn there_are_triangles_for_each_root() {
+        let (per_root, crowd) = (TRIANGLES_PER_ROOT as u32, CROWD as u32);
         assert_eq!(units(&[]), []);
         assert_eq!(units(&[0, 0, 0]), []);
         assert_eq!(units(&[0, 1, 0]), vec![0..1]);
-        assert_eq!(units(&[price, price]).len(), 2);
+        assert_eq!(units(&[per_root, per_root]).len(), 2);
         // Too little joins the next, and so does what would leave too little.
-        assert_eq!(units(&[1, price]).len(), 1);
-        assert_eq!(units(&[price, price - 1]).len(), 1);
-        assert_eq!(units(&[price - 1, 1, price]).len(), 2);
+        assert_eq!(units(&[1, per_root]).len(), 1);
+        assert_eq!(units(&[per_root, per_root - 1]).len(), 1);
+        assert_eq!(units(&[per_root - 1, 1, per_root]).len(), 2);
         // A large bin saves for small ones behind it.
-        assert_eq!(units(&[3 * price, 1, 0, 2, price - 3]).len(), 4);
-        assert_eq!(units(&[price, 3 * price, 1, 0, 2, price - 3]).len(), 5);
+        assert_eq!(units(&[3 * per_root, 1, 0, 2, per_root - 3]).len(), 4);
+        assert_eq!(units(&[per_root, 3 * per_root, 1, 0, 2, per_root - 3]).len(), 5);
         // Bins that are cut spend more.
         assert_eq!(units(&[5 * 32, 5 * 8 - 1, 1]).len(), 3);
-        assert_eq!(units(&[crowd, price, crowd]).len(), 3);
+        assert_eq!(units(&[crowd, per_root, crowd]).len(), 3);
         // Crowded ones come first, and a small rest stays by itself.
         let more = crowd as usize + 1;
         assert_eq!(units(&[1, crowd + 1, 2]), [0..more, more..more + 3]);
         // The balance starts again behind a seam, so a rest behind one joins what lies before it.
-        assert_eq!(units(&[price - 1, crowd, price - 1]).len(), 1);
+        assert_eq!(units(&[per_root - 1, crowd, per_root - 1]).len(), 1);
         let mut state = 1_u32;
         for _ in 0..if cfg!(miri) { 20 } else { 2000 } {
             let mut sizes = [0; 64];
             for size in &mut sizes {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                let some = [0, 1, price - 1, price, 100, crowd, crowd + 1, 5000];
+                let some = [0, 1, per_root - 1, per_root, 100, crowd, crowd + 1, 5000];
                 *size = some[(state >> 29) as usize];
             }
             units(&sizes);

@@ -207,9 +207,9 @@ impl<'a> TriangleMesh<'a> {
         Reader { whole: self, mesh: self, first: 0 }
     }
 
-    /// The mesh or the part of a triangle for reading many triangles fast.
+    /// The mesh or the part that has a triangle, to read further triangles from.
     #[inline(never)]
-    pub(crate) fn near(&self, triangle: u32) -> LastPart<'a> {
+    pub(crate) fn part_around(&self, triangle: u32) -> LastPart<'a> {
         match self.place_of(triangle) {
             Some((_, part)) => LastPart { wide: part.mesh.wide(), first: part.first },
             None => LastPart { wide: self.wide(), first: 0 },

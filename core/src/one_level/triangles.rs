@@ -49,7 +49,7 @@ impl Spread for MeshSpread<'_> {
         let (wide, first) = if self.mesh.parts().is_empty() {
             (wide, first)
         } else {
-            self.mesh.near(first).own(first)
+            self.mesh.part_around(first).own(first)
         };
         if HAS_VECTORS && !wide.is_empty() {
             dispatch(SimdLevel::detect(), PlaceBatch { spread: self, wide, first, batch });

@@ -7,7 +7,8 @@
 //! anything else           from the front, a little above
 //! ```
 //!
-//! From its middle, a room shows the fronts of its triangles and a solid shows backs. Rays from the middle tell which of the two a scene is.
+//! From its middle, a room shows the fronts of its triangles and a solid shows backs.
+//! Rays from the middle tell which of the two a scene is.
 
 use hgrid_core::{Ray, SceneHit};
 

@@ -134,7 +134,7 @@ pub fn systems(_: &[Peer]) -> Result<Vec<Box<dyn System>>> {
         "this program was built without the other ray tracers. On Debian: \
          apt-get install libembree-dev g++, then \
          cargo run --release -p hgrid-lab --features peers -- compare ... \
-         (with --features embree for Embree alone, which compiles sooner)"
+         (with --features embree for Embree alone, which needs no C++ compiler)"
     )
 }
 

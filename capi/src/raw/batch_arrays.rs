@@ -20,7 +20,7 @@ pub(crate) type Array<T> = (T, usize);
 
 /// As many answers as rays, no byte of them in a ray.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Batch<T> {
+pub(crate) struct BatchArrays<T> {
     rays: *const hgrid_ray,
     ray_stride: usize,
     answers: *mut T,
@@ -30,7 +30,7 @@ pub(crate) struct Batch<T> {
     spans: [Span; 2],
 }
 
-impl<T> Batch<T> {
+impl<T> BatchArrays<T> {
     /// Checks the arrays. A stride of 0 means that elements lie side by side.
     pub(crate) fn new(
         (rays, ray_stride): Array<*const hgrid_ray>,
