@@ -17,8 +17,7 @@ pub(crate) fn committed() -> String {
     fs::read_to_string(root().join("include/hgrid.h")).expect("include/hgrid.h")
 }
 
-/// What a program sees of it that is compiled for a flavour: without `HGRID_MALLOC`, the
-/// lines that need it are not there.
+/// Returns the header as a program for a flavour sees it: without `HGRID_MALLOC`, the lines that need it are not there.
 pub(crate) fn seen_by(flavour: Flavour) -> String {
     let (mut header, mut rest) = (String::new(), committed());
     while let Some((before, behind)) = rest.split_once("\n#if defined(HGRID_MALLOC)\n") {

@@ -49,7 +49,7 @@ const PROGRAMS: [(&str, Flavour); 22] = [
 pub(crate) const SANITIZERS: [&str; 4] =
     ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-O0"];
 
-/// What a program is told to do a part of its work, if it can: the test with sanitizers runs all of it.
+/// The argument that makes a program do a part of its work, if it can. The test with sanitizers runs all of it.
 const PART: &str = "part";
 
 /// Compiles a program of this folder against a library.

@@ -184,7 +184,7 @@ fn what_cannot_work_compiles_in_no_other_dialect() {
     is_refused(["c++14", "c++17"].into_iter().flat_map(compilers).skip(1));
 }
 
-/// What the lines of [`REFUSED`] need.
+/// The header and the types that the lines of [`REFUSED`] use.
 const PRELUDE: &str = "\
 #include <hgrid.hpp>
 #include <array>

@@ -26,7 +26,7 @@ fn quotients_and_rests_are_those_of_the_processor() {
             let expected = [a.wrapping_div(b), a.wrapping_rem(b)];
             assert_eq!(divide_signed(a, b), expected, "{a} / {b}");
         }
-        // Its result is not defined, but it must end.
+        // A division by zero has no defined result, but the function must return.
         let _ = divide(dividend, 0);
     }
 }

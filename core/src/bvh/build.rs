@@ -1,9 +1,9 @@
 //! Building a tree: two passes over the triangles, then bin after bin in cache, then a tree on top.
 //!
 //! ```text
-//! bounds    the box of the vertices; of the triangles if some vertices are unused  (mesh/)  
+//! bounds    the box of the vertices; of the triangles if some vertices are unused  (mesh/)
 //! census    each triangle's key, and how many there are in each bin             (census.rs, key.rs)
-//! scatter   each triangle's entry into its bin
+//! scatter   each triangle's entry into its bin                                  (bins.rs)
 //! roots     bins sorted and cut into subtrees                                   (roots.rs, subtree.rs)
 //! top       a tree over the subtrees                                            (top.rs)
 //!
@@ -30,9 +30,10 @@ use core::ops::Range;
 use fearless_simd::Simd;
 use zerocopy::{FromZeros, IntoBytes};
 
+use super::bins::{place_tasks, scatter};
 use super::census::{Census, count, share, take};
 use super::high;
-use super::key::{KEY_BITS, Keys, NO_KEY};
+use super::key::{KEY_BITS, Keys};
 use super::layout::{
     CROWD, Entry, MOST_TRIANGLES, bin_bits, index_bytes, most_below, most_nodes, scratch_bytes,
     small_spare,
@@ -41,7 +42,7 @@ use super::node::Node;
 use super::roots::{RECORD, RootRecord, Roots};
 use super::subtree::Subtree;
 use super::top::{self, ITEM, RootItem, Top};
-use super::units::{SEAM, Units, is_seam, starts};
+use super::units::{SEAM, Units, is_seam};
 use crate::aabb::Aabb;
 use crate::arena::{Sizes, section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
@@ -53,7 +54,7 @@ use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
-use crate::tasks::{self, Shared, run, run_several, task_count};
+use crate::tasks::{self, run, run_several, task_count};
 
 /// The memory that any mesh with so many triangles and a build with so many tasks needs.
 pub(crate) const fn bound(triangles: u32, quality: Quality, tasks: u32) -> Option<(u64, u64)> {
@@ -313,64 +314,6 @@ fn vertex_bounds(
         },
     )?;
     Ok(bounds)
-}
-
-/// Turns the bin counts of all tasks into write positions: within a bin, entries are in the order of the tasks.
-fn place_tasks(sizes: &mut [u32], counts: &mut [u32], bits: u32) {
-    let mut next = starts(sizes);
-    for (bin, &size) in sizes.iter().enumerate() {
-        let next = &mut next[usize::from(size as usize <= CROWD)];
-        for task in 0..counts.len() >> bits {
-            let Some(count) = counts.get_mut(task << bits | bin) else { continue };
-            *next += core::mem::replace(count, *next);
-        }
-    }
-}
-
-/// Moves every triangle's entry to its bin.
-fn scatter(
-    keys: &[u32],
-    entries: &mut [Entry],
-    counts: &mut [u32],
-    bits: u32,
-    control: &Control<'_>,
-) -> Result<(), Error> {
-    let tasks = counts.len() >> bits;
-    let shift = KEY_BITS - bits;
-    if IS_SMALL || tasks == 1 {
-        for (id, &key) in (0..).zip(keys) {
-            // A triangle that is left out has a key behind that of all bins.
-            let Some(head) = counts.get_mut((key >> shift) as usize) else {
-                debug_assert!(key == NO_KEY, "a key behind those of all bins");
-                continue;
-            };
-            let entry = entries.get_mut(*head as usize);
-            if let Some(entry) = entry.or_bug("a bin has more entries than were counted") {
-                *entry = [key, id];
-            }
-            *head += 1;
-        }
-        return Ok(());
-    }
-    let entries = Shared::new(entries.as_flattened_mut());
-    let mut counts = counts;
-    let parts = (0..tasks).map(|task| {
-        let heads = take(&mut counts, 1 << bits);
-        let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
-        let first = range.start as u32;
-        (first, keys.get(range).or_bug("a task behind the keys").unwrap_or_default(), heads)
-    });
-    let move_all = |(first, keys, heads): (u32, &[u32], &mut [u32])| {
-        for (id, &key) in (first..).zip(keys) {
-            let Some(head) = heads.get_mut((key >> shift) as usize) else {
-                debug_assert!(key == NO_KEY, "a key behind those of all bins");
-                continue;
-            };
-            entries.set(2 * *head as usize, [key, id]);
-            *head += 1;
-        }
-    };
-    run(control, parts, move_all, |()| Ok(()))
 }
 
 /// The inputs that the steps after binning share.

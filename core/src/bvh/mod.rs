@@ -16,7 +16,7 @@
 //!
 //! ```text
 //! format         node, layout, validate
-//! build          build: census (key), units, crowd, sort, roots (subtree), top; high/ for quality `high`
+//! build          build: census (key), bins, units, crowd, sort, roots (subtree), top; high/ for quality `high`
 //! one ray        search, walk (slab; shape_leaf for shapes)
 //! batches        batch: order, rays, group (boxes)
 //! points         nearest
@@ -28,6 +28,7 @@
 //! is bound to a level of the grid, and leaves hold ids, not triangles.
 
 mod batch;
+mod bins;
 mod boxes;
 mod build;
 mod census;

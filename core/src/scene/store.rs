@@ -47,7 +47,7 @@ fn boxes_of<'a>(
 ) -> Result<TriangleMesh<'a>, Error> {
     let bytes = sides.as_bytes();
     let boxes = Strided { bytes, stride: BOX_BYTES, count: sides.len() };
-    // No instances have no masks.
+    // Without instances there are no masks.
     let bytes = placed.as_bytes().get(offset_of!(Instance, mask)..).unwrap_or_default();
     let masks = Strided { bytes, stride: size_of::<StoredInstance>(), count: placed.len() };
     TriangleMesh::of_boxes(boxes, Content::Instances)?.with_masks(masks)
