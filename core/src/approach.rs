@@ -20,7 +20,7 @@ use glam::Vec3A;
 
 use crate::aabb::{Aabb, greater};
 use crate::filter::Reach;
-use crate::ray::{Ray, round};
+use crate::ray::{Ray, RayF64, round};
 
 /// Origins farther than this many extents from the box's centre are moved.
 ///
@@ -39,6 +39,12 @@ const OFF: f64 = 8.0 * f64::EPSILON;
 pub(crate) struct LineF64 {
     pub(crate) origin: [f64; 3],
     pub(crate) direction: [f64; 3],
+}
+
+impl From<&RayF64> for LineF64 {
+    fn from(ray: &RayF64) -> Self {
+        Self { origin: ray.origin, direction: ray.direction.map(f64::from) }
+    }
 }
 
 /// Where a ray meets a box.

@@ -81,6 +81,11 @@ impl RayF64 {
         Self { origin, direction, t_min: 0.0, t_max: f32::INFINITY, reserved: 0 }
     }
 
+    /// Returns true if the origin is the same in f32.
+    pub(crate) fn is_exact(&self) -> bool {
+        self.origin.map(|c| f64::from(round(c)).to_bits()) == self.origin.map(f64::to_bits)
+    }
+
     /// The same ray from the nearest origin in f32.
     pub(crate) fn rounded(&self) -> Ray {
         let Self { origin, direction, t_min, t_max, .. } = *self;

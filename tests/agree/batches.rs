@@ -45,7 +45,7 @@ pub(crate) const CLOSE: usize = 40 * 128;
 const LIMITED: Range<usize> = 28 * 128..36 * 128;
 
 /// What no kernel for many rays may stumble over.
-fn odd_rays() -> Vec<Ray> {
+pub(crate) fn odd_rays() -> Vec<Ray> {
     let sound = Ray::new([0.1, 0.2, 3.0], [0.01, 0.02, -1.0]);
     let mut rays = vec![
         sound,

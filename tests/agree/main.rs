@@ -12,6 +12,7 @@ mod own_shapes;
 mod range;
 mod refit;
 mod scans;
+mod scene_batches;
 mod scenes;
 mod snapped;
 mod surfaces;

@@ -10,7 +10,7 @@ use hgrid_tests::random::Random;
 use hgrid_tests::scenes::{Built, packed, prove_packed, scattered, with_packed};
 
 /// Objects to show: grids of some methods.
-fn with_grids(run: impl FnOnce(&[Object<'_>], &[Mesh])) {
+pub(crate) fn with_grids(run: impl FnOnce(&[Object<'_>], &[Mesh])) {
     let meshes = [ball(6, 1.0), soup(200, 0.2, 5), soup(60, 0.5, 6).scaled(0.1)];
     let methods = [Method::Bvh, Method::OneLevel, Method::Bvh];
     let views: Vec<TriangleMesh<'_>> = meshes.iter().map(Mesh::view).collect();
@@ -25,7 +25,7 @@ fn with_grids(run: impl FnOnce(&[Object<'_>], &[Mesh])) {
     run(&objects, &meshes);
 }
 
-fn ray(random: &mut Random, round: usize, width: f32) -> RayF64 {
+pub(crate) fn ray(random: &mut Random, round: usize, width: f32) -> RayF64 {
     let far = [0.5, 2.0, 30.0, 3e4, 1e9][round % 5] * width;
     let (from, to) = (random.point().map(|c| c * far), random.point().map(|c| c * width));
     let mut ray = Ray::new(from, std::array::from_fn(|k| to[k] - from[k]));
@@ -460,24 +460,25 @@ fn filters_see_the_hits_of_the_scene() {
     });
 }
 
+/// A box as a shape: where a ray enters it, in f64.
+pub(crate) fn enter(sides: &[f32; 6], ray: &Ray) -> Option<ShapeHit> {
+    let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
+    for k in 0..3 {
+        let d = f64::from(ray.direction[k]);
+        let at = |side: usize| (f64::from(sides[side]) - f64::from(ray.origin[k])) / d;
+        let (a, b) = (at(k), at(k + 3));
+        near = near.max(a.min(b));
+        far = far.min(a.max(b));
+    }
+    (near <= far).then_some(ShapeHit { t: near as f32, u: 0.5, v: 0.25 })
+}
+
 #[test]
 fn shapes_stand_in_scenes() {
     let boxes = [[-1.0, -1.0, -1.0, 1.0, 1.0, 1.0], [3.0, -1.0, -1.0, 5.0, 1.0, 1.0]];
     let view = Boxes::new(&boxes).unwrap();
     let tree = Built::shapes(view, &Config::default()).unwrap();
-    // The box itself is the shape: its entry, in f64.
-    let test = |id: u32, ray: &Ray| {
-        let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
-        for k in 0..3 {
-            let d = f64::from(ray.direction[k]);
-            let at =
-                |side: usize| (f64::from(boxes[id as usize][side]) - f64::from(ray.origin[k])) / d;
-            let (a, b) = (at(k), at(k + 3));
-            near = near.max(a.min(b));
-            far = far.min(a.max(b));
-        }
-        (near <= far).then_some(ShapeHit { t: near as f32, u: 0.5, v: 0.25 })
-    };
+    let test = |id: u32, ray: &Ray| enter(&boxes[id as usize], ray);
     let shapes = Shapes::open(tree.bytes(), view).unwrap();
     let objects = [Object::Shapes(&shapes, &test)];
     let instances = scattered(20, 1, 20.0, 2);

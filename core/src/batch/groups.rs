@@ -2,7 +2,7 @@
 
 use core::marker::PhantomData;
 
-use super::{Answer, Batch, Coherence, alone};
+use super::{Batch, Coherence, GridAnswer, alone};
 use crate::arena::whole;
 use crate::bvh::{Bvh, Groups, Scope, SortKey, Together};
 use crate::grid::Grid;
@@ -20,7 +20,7 @@ struct Asked<'r, 'm, 'q, B, A, const ASKS: bool> {
     answers: PhantomData<A>,
 }
 
-impl<A: Answer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_, B, A, ASKS> {
+impl<A: GridAnswer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_, B, A, ASKS> {
     #[inline(always)]
     fn count(&self) -> usize {
         self.batch.count()
@@ -32,7 +32,7 @@ impl<A: Answer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_, B,
     }
 
     #[inline(always)]
-    fn found(&mut self, place: usize, hit: &Hit) {
+    fn found(&mut self, place: usize, _: usize, hit: &Hit) {
         self.batch.answer(place, A::of(hit));
     }
 
@@ -67,7 +67,7 @@ const FEW: usize = 256;
 
 /// Answers all rays of a batch.
 #[inline(always)]
-pub(super) fn trace<A: Answer, const ANY: bool>(
+pub(super) fn trace<A: GridAnswer, const ANY: bool>(
     grid: &Grid<'_>,
     tree: &Bvh<'_>,
     batch: &mut impl Batch<A>,
@@ -75,44 +75,40 @@ pub(super) fn trace<A: Answer, const ANY: bool>(
     options: &mut QueryOptions<'_>,
 ) {
     let (is_plain, answers) = (options.are_plain(), PhantomData::<A>);
+    let lent = core::mem::take(&mut options.scratch);
     if options.filter.is_none() {
-        Asked::<_, A, false> { grid, tree, batch, options, is_plain, answers }
-            .all::<ANY>(coherence);
+        let mut asked = Asked::<_, A, false> { grid, tree, batch, options, is_plain, answers };
+        with_window(coherence, lent, &mut |memory| asked.groups::<ANY>(memory));
     } else {
-        Asked::<_, A, true> { grid, tree, batch, options, is_plain, answers }.all::<ANY>(coherence);
+        let mut asked = Asked::<_, A, true> { grid, tree, batch, options, is_plain, answers };
+        with_window(coherence, lent, &mut |memory| asked.groups::<ANY>(memory));
     }
+    options.scratch = lent;
 }
 
-impl<A: Answer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
-    /// Traces all rays, in the order in which they go together best.
-    #[inline(always)]
-    fn all<const ANY: bool>(&mut self, coherence: Coherence) {
-        match coherence {
-            Coherence::Coherent => self.groups::<ANY>(&mut []),
-            Coherence::Incoherent => self.sorted::<ANY>(),
-        }
+/// Passes `trace` the memory to sort rays in: what the caller lent, or a little on the stack; none for rays that keep
+/// their order.
+#[inline(always)]
+pub(crate) fn with_window(
+    coherence: Coherence,
+    lent: &mut [u8],
+    trace: &mut dyn FnMut(&mut [SortKey]),
+) {
+    if coherence == Coherence::Coherent {
+        return trace(&mut []);
     }
+    let start = lent.as_ptr().align_offset(align_of::<SortKey>());
+    let memory = whole::<SortKey>(lent.get_mut(start..).unwrap_or_default());
+    if memory.len() < 2 * FEW { with_few(trace) } else { trace(memory) }
+}
 
-    /// Traces rays in groups, in the order that a window of them is sorted into.
-    #[inline(always)]
-    fn sorted<const ANY: bool>(&mut self) {
-        let lent = core::mem::take(&mut self.options.scratch);
-        let start = lent.as_ptr().align_offset(align_of::<SortKey>());
-        let memory = whole::<SortKey>(lent.get_mut(start..).unwrap_or_default());
-        if memory.len() < 2 * FEW {
-            self.sorted_on_the_stack::<ANY>();
-        } else {
-            self.groups::<ANY>(memory);
-        }
-        self.options.scratch = lent;
-    }
+/// Out of line: the window takes stack only where it is wanted.
+#[inline(never)]
+fn with_few(trace: &mut dyn FnMut(&mut [SortKey])) {
+    trace(&mut [0; 2 * FEW]);
+}
 
-    /// Out of line: the window takes stack only where it is wanted.
-    #[inline(never)]
-    fn sorted_on_the_stack<const ANY: bool>(&mut self) {
-        self.groups::<ANY>(&mut [0; 2 * FEW]);
-    }
-
+impl<A: GridAnswer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
     /// Traces rays in groups, in windows that are sorted in memory or as given.
     #[inline(never)]
     fn groups<const ANY: bool>(&mut self, memory: &mut [SortKey]) {

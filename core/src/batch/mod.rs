@@ -16,7 +16,7 @@
 //! ```
 
 #[cfg(feature = "bvh")]
-mod groups;
+pub(crate) mod groups;
 
 use core::fmt;
 
@@ -136,31 +136,47 @@ impl<'a> StridedMut<'a> {
 /// assert_eq!(shadows.map(|shadow| shadow.is_lit), [false, true]);
 /// # Ok::<(), Error>(())
 /// ```
-pub trait Batch<A> {
+pub trait Batch<A, R = Ray> {
     /// Number of rays.
     fn count(&self) -> usize;
 
     /// Returns the ray at a place below the count: the same one each time.
-    fn ray(&self, place: usize) -> Ray;
+    fn ray(&self, place: usize) -> R;
 
     /// Takes the answer to the ray at a place. There is one for each place, in any order.
     fn answer(&mut self, place: usize, answer: A);
 }
 
 /// Arrays of rays and answers.
-struct Arrays<'r, 'a, 'b> {
+pub(crate) struct Arrays<'r, 'a, 'b> {
     rays: &'r Strided<'a>,
     answers: &'r mut StridedMut<'b>,
 }
 
-impl<A: Answer> Batch<A> for Arrays<'_, '_, '_> {
+impl<'r, 'a, 'b> Arrays<'r, 'a, 'b> {
+    /// Arrays of rays `R` and of answers `A`, as many as rays.
+    pub(crate) fn new<R, A: Answer>(
+        rays: &'r Strided<'a>,
+        answers: &'r mut StridedMut<'b>,
+    ) -> Result<Self, Error> {
+        if rays.cut(size_of::<R>()).is_none() {
+            return Err(Error::InvalidBatch(BatchField::Rays));
+        }
+        if !answers.holds(size_of::<A::Stored>()) || answers.count != rays.count {
+            return Err(Error::InvalidBatch(BatchField::Answers));
+        }
+        Ok(Self { rays, answers })
+    }
+}
+
+impl<A: Answer, R: FromBytes> Batch<A, R> for Arrays<'_, '_, '_> {
     #[inline(always)]
     fn count(&self) -> usize {
         self.rays.count
     }
 
     #[inline(always)]
-    fn ray(&self, place: usize) -> Ray {
+    fn ray(&self, place: usize) -> R {
         self.rays.read(place)
     }
 
@@ -234,8 +250,8 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) -> Result<(), Error> {
-        check(rays, hits, size_of::<Hit>())?;
-        self.intersect_batch(&mut Arrays { rays, answers: hits }, coherence, options);
+        let mut arrays = Arrays::new::<Ray, Hit>(rays, hits)?;
+        self.intersect_batch(&mut arrays, coherence, options);
         Ok(())
     }
 
@@ -341,8 +357,8 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) -> Result<(), Error> {
-        check(rays, occluded, size_of::<u8>())?;
-        self.occluded_batch(&mut Arrays { rays, answers: occluded }, coherence, options);
+        let mut arrays = Arrays::new::<Ray, bool>(rays, occluded)?;
+        self.occluded_batch(&mut arrays, coherence, options);
         Ok(())
     }
 
@@ -369,8 +385,8 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) -> Result<(), Error> {
-        check(rays, occluders, size_of::<u32>())?;
-        self.occluder_batch(&mut Arrays { rays, answers: occluders }, coherence, options);
+        let mut arrays = Arrays::new::<Ray, u32>(rays, occluders)?;
+        self.occluder_batch(&mut arrays, coherence, options);
         Ok(())
     }
 
@@ -387,12 +403,15 @@ impl Grid<'_> {
 }
 
 /// The answer to one ray of a batch: a hit, a flag, or the id of a triangle.
-trait Answer: Sized {
+pub(crate) trait Answer: Sized {
     /// The type of an element in an array of answers.
     type Stored: Immutable + IntoBytes;
 
     fn stored(self) -> Self::Stored;
+}
 
+/// The answer of a grid.
+trait GridAnswer: Answer {
     /// Makes the answer from the hit that a group found.
     fn of(hit: &Hit) -> Self;
 
@@ -410,7 +429,9 @@ impl Answer for Hit {
     fn stored(self) -> Self {
         self
     }
+}
 
+impl GridAnswer for Hit {
     #[inline(always)]
     fn of(hit: &Hit) -> Self {
         *hit
@@ -432,7 +453,9 @@ impl Answer for bool {
     fn stored(self) -> u8 {
         self.into()
     }
+}
 
+impl GridAnswer for bool {
     #[inline(always)]
     fn of(hit: &Hit) -> Self {
         hit.primitive != INVALID_ID
@@ -454,7 +477,9 @@ impl Answer for u32 {
     fn stored(self) -> Self {
         self
     }
+}
 
+impl GridAnswer for u32 {
     #[inline(always)]
     fn of(hit: &Hit) -> Self {
         hit.primitive
@@ -471,7 +496,7 @@ impl Answer for u32 {
 
 /// Answers all rays of a batch: a tree's in groups, others one by one.
 #[inline(always)]
-fn trace<A: Answer, const ANY: bool>(
+fn trace<A: GridAnswer, const ANY: bool>(
     grid: &Grid<'_>,
     batch: &mut impl Batch<A>,
     coherence: Coherence,
@@ -492,7 +517,7 @@ fn trace<A: Answer, const ANY: bool>(
 
 /// Answers one ray. It is plain if the options change nothing.
 #[inline(never)]
-fn alone<A: Answer>(
+fn alone<A: GridAnswer>(
     grid: &Grid<'_>,
     batch: &mut impl Batch<A>,
     place: usize,
@@ -502,14 +527,4 @@ fn alone<A: Answer>(
     let ray = batch.ray(place);
     let answer = if is_plain { A::plain(grid, &ray) } else { A::with(grid, place, &ray, options) };
     batch.answer(place, answer);
-}
-
-fn check(rays: &Strided<'_>, answers: &StridedMut<'_>, size: usize) -> Result<(), Error> {
-    if rays.cut(size_of::<Ray>()).is_none() {
-        return Err(Error::InvalidBatch(BatchField::Rays));
-    }
-    if !answers.holds(size) || answers.count != rays.count {
-        return Err(Error::InvalidBatch(BatchField::Answers));
-    }
-    Ok(())
 }

@@ -26,8 +26,20 @@ pub(crate) trait Together {
     /// The ray at a place.
     fn ray(&self, place: usize) -> Ray;
 
-    /// Answers for a ray that was traced with others: its hit or [`Hit::MISS`].
-    fn found(&mut self, place: usize, hit: &Hit);
+    /// The ray at a place, which becomes that of a lane of the next group. Lanes are filled one after the other.
+    #[inline(always)]
+    fn load(&mut self, _lane: usize, place: usize) -> Ray {
+        self.ray(place)
+    }
+
+    /// Traces a group. Returns a mask of the rays that must be traced alone.
+    #[inline(always)]
+    fn trace(&mut self, group: &mut Group<'_>, level: SimdLevel, is_any: bool) -> u64 {
+        group.trace(level, is_any)
+    }
+
+    /// Answers for a ray that was traced with others: its lane in the group, and its hit or [`Hit::MISS`].
+    fn found(&mut self, place: usize, lane: usize, hit: &Hit);
 
     /// Traces a ray alone, and answers for it.
     fn alone(&mut self, place: usize);
@@ -76,16 +88,17 @@ impl<C: Together> Groups<'_, C> {
             };
             for start in (0..of_window).step_by(GROUP) {
                 group.count = (of_window - start).min(GROUP);
-                let slots = (start..).zip(places.iter_mut().zip(group.rays.slots()));
-                for (at, (place, ray)) in slots.take(group.count) {
+                let slots = places.iter_mut().zip(group.rays.slots()).enumerate();
+                for (lane, (place, ray)) in slots.take(group.count) {
+                    let at = start + lane;
                     *place = first + order.as_ref().map_or(at, |order| order.place(at));
-                    *ray = batch.ray(*place);
+                    *ray = batch.load(lane, *place);
                 }
-                let alone = group.trace(level, is_any);
+                let alone = batch.trace(&mut group, level, is_any);
                 for (lane, &place) in places.iter().enumerate().take(group.count) {
                     let (is_alone, hit) = (alone >> lane & 1 != 0, &group.rays.hits[lane % GROUP]);
                     if !is_alone && !batch.asks(hit) {
-                        batch.found(place, hit);
+                        batch.found(place, lane, hit);
                     } else if batch.keeps_order()
                         && let Some(order) = &mut order
                     {

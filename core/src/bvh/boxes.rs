@@ -11,9 +11,11 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
 
 use super::node::{Node, WIDTH};
+use super::shape_leaf::boxes_of_leaf;
 use super::slab::WIDER;
 use super::walk::bytes;
 use crate::extremes::Extremes;
+use crate::mesh::TriangleMesh;
 
 /// Sides of eight boxes, or of one box in all lanes, by axis.
 #[derive(Clone, Copy)]
@@ -76,6 +78,23 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
             boxes.high[axis] = rows[axis].1 * step + base + growth;
         }
         boxes
+    }
+
+    /// The boxes of a leaf relative to a point, grown on each side; the last one again where there are fewer than eight.
+    #[inline(always)]
+    pub(crate) fn of_leaf(
+        simd: S,
+        mesh: &TriangleMesh<'_>,
+        ids: &[u32],
+        center: [f32; 3],
+        growth: f32,
+    ) -> Self {
+        let (mut low, mut high) = boxes_of_leaf(simd, mesh, ids);
+        for axis in 0..3 {
+            low[axis] = low[axis] - center[axis] - growth;
+            high[axis] = high[axis] - center[axis] + growth;
+        }
+        Self { low, high }
     }
 
     /// The sides as arrays.

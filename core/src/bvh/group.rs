@@ -4,7 +4,7 @@
 //! a leaf's triangles are fetched once for all of them, and no ray waits for another.
 //!
 //! ```text
-//! prepare the rays; if they start far apart, all are to be traced alone
+//! prepare the rays; if they start far apart and want their closest hits, all are to be traced alone
 //! stack = [(root, all rays)]
 //! pop a child and its rays, without those that are done or end before it begins
 //! node: decode the eight boxes
@@ -12,8 +12,7 @@
 //!       many:     intersect the beam of all rays with the eight boxes, then sixteen rays at a time with each
 //!                 box that is left
 //!       push the children with the rays that met them, those that begin nearest last
-//! leaf: filter its triangles, all at once for each ray or eight rays at a time for each triangle;
-//!       decide what passes in f64, eight pairs of a ray and a triangle at a time
+//! leaf: test its triangles, or offer its boxes (group_leaf.rs)
 //! ```
 //!
 //! The rays may go anywhere: rays of a camera share most nodes, rays from a surface share the first ones.
@@ -22,12 +21,12 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16, u32x8};
 
 use super::Bvh;
-use super::boxes::{WideBoxes, bits};
+use super::boxes::{Beam, WideBoxes, bits};
+use super::group_leaf::{Boxes, Leaf, Leaves, Offer, Triangles};
 use super::node::{Child, WIDTH};
 use super::rays::{GROUP, OCTETS, Rays};
 use super::walk::STACK;
 use crate::aabb::Aabb;
-use crate::eight::{Eight, first_eight};
 use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
 use crate::simd::{Kernel, SimdLevel, dispatch};
@@ -37,7 +36,7 @@ const FEW_RAYS: u32 = 8;
 
 /// Counts the vectors of eight rays that hold at least one of some rays.
 #[inline(always)]
-const fn octets(rays: u64) -> u32 {
+pub(super) const fn octets(rays: u64) -> u32 {
     let pairs = rays | rays >> 1;
     let fours = pairs | pairs >> 2;
     ((fours | fours >> 4) & 0x0101_0101_0101_0101).count_ones()
@@ -85,27 +84,37 @@ impl Group<'_> {
     /// Not generic over the batch: kernels are the largest functions of the library, and all batches of a program
     /// share them.
     #[inline(never)]
-    pub(super) fn trace(&mut self, level: SimdLevel, is_any: bool) -> u64 {
+    pub(crate) fn trace(&mut self, level: SimdLevel, is_any: bool) -> u64 {
         if is_any {
-            dispatch(level, Descent::<true>(self))
+            dispatch(level, Descent { group: self, leaves: Triangles::<true> })
         } else {
-            dispatch(level, Descent::<false>(self))
+            dispatch(level, Descent { group: self, leaves: Triangles::<false> })
         }
+    }
+
+    /// Offers `offer` the boxes of a tree of boxes that rays meet, each once and about from near to far: its number, the
+    /// rays as a mask, and all rays, so that it can end some. Returns what [`trace`](Self::trace) returns.
+    #[inline(never)]
+    pub(crate) fn offer(&mut self, level: SimdLevel, is_any: bool, offer: &mut Offer<'_>) -> u64 {
+        dispatch(level, Descent { group: self, leaves: Boxes { offer, is_any } })
     }
 }
 
-/// The kernel over a group; with `ANY` the first hit of a ray ends it.
-struct Descent<'r, 'g, const ANY: bool>(&'r mut Group<'g>);
+/// The kernel over a group.
+struct Descent<'r, 'g, L> {
+    group: &'r mut Group<'g>,
+    leaves: L,
+}
 
-impl<const ANY: bool> Kernel for Descent<'_, '_, ANY> {
+impl<L: Leaves> Kernel for Descent<'_, '_, L> {
     type Output = u64;
     const IS_WIDE: bool = true;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u64 {
-        let Group { bounds, rays, count, .. } = self.0;
+        let Group { bounds, rays, count, .. } = &mut *self.group;
         let alone = rays.prepare(simd, *count, bounds);
-        if rays.are_scattered(bounds) {
+        if !self.leaves.takes_scattered() && rays.are_scattered(bounds) {
             return alone | rays.alive;
         }
         self.descend(simd);
@@ -113,13 +122,14 @@ impl<const ANY: bool> Kernel for Descent<'_, '_, ANY> {
     }
 }
 
-impl<const ANY: bool> Descent<'_, '_, ANY> {
+impl<L: Leaves> Descent<'_, '_, L> {
     #[inline(always)]
     fn descend<S: Simd>(self, simd: S) {
-        let Group { bvh, mesh, rays, stack, .. } = self.0;
+        let Self { group: Group { bvh, mesh, bounds, rays, stack, .. }, mut leaves } = self;
         let stack = &mut stack.0;
         let mut budget = bvh.budget();
         let mut top = 0;
+        let mut met = Met::NONE;
         let beam = rays.beam(simd);
         let (mut child, mut mask) = (Child::Inner(0), rays.alive);
         loop {
@@ -128,28 +138,12 @@ impl<const ANY: bool> Descent<'_, '_, ANY> {
             match child {
                 Child::Inner(number) => {
                     let Some(node) = bvh.nodes.get(number as usize) else { return };
-                    // Decode the eight boxes.
-                    let boxes = WideBoxes::decode(simd, node, rays.center, rays.spread);
-                    let count = mask.count_ones();
+                    let boxes = WideBoxes::decode(simd, node, rays.center, rays.growth);
                     // Mask unused slots: their boxes are inside out, but this slab test sorts near and far side
                     // itself and would meet them.
-                    let (mut some, mut all, mut enter) = (node.used(), 0, f32x8::splat(simd, 0.0));
-                    // Intersect the beam with them, if the rays are many.
-                    if count > FEW_RAYS {
-                        let beam = boxes.meet_beam(simd, &beam);
-                        some &= beam.some;
-                        (all, enter) = (some & beam.all, beam.enter);
-                    }
-                    // Intersect the rays with the boxes that the beam did not decide.
-                    let unsure = some & !all;
-                    let mut met = if count <= octets(mask) * unsure.count_ones() {
-                        one_by_one(simd, &boxes, rays, mask)
-                    } else {
-                        side_by_side(simd, &boxes, rays, mask, unsure)
-                    };
-                    met.add_all(all, mask, enter);
-                    let Met { slots, rays: by, near } = met;
-                    let mut slots = slots & some;
+                    met.meet(simd, &boxes, rays, &beam, mask, node.used());
+                    let Met { rays: by, near, .. } = &met;
+                    let mut slots = met.slots;
                     // Push what is met, the nearest last.
                     let base = top;
                     while slots != 0 {
@@ -157,51 +151,12 @@ impl<const ANY: bool> Descent<'_, '_, ANY> {
                         slots &= slots - 1;
                         let (rays, near) = (by[slot as usize % WIDTH], near[slot as usize % WIDTH]);
                         let place = number << 3 | slot;
-                        push::<ANY>(stack, &mut top, base, GroupEntry { place, near, rays });
+                        push::<L>(stack, &mut top, base, GroupEntry { place, near, rays });
                     }
                 }
                 Child::Leaf { first, count } => {
-                    let ids = bvh.leaf(first, count);
-                    if mask.count_ones() <= octets(mask) * count {
-                        // Few rays: filter all triangles of the leaf for each ray.
-                        let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
-                        let triangles = Eight::of(simd, mesh, lanes, ids.len());
-                        let mut rest = mask;
-                        while rest != 0 {
-                            let ray = rest.trailing_zeros();
-                            rest &= rest - 1;
-                            let filter = rays.filter(simd, ray);
-                            let dropped = bits(filter.drops(&triangles.corners));
-                            let mut survivors = !dropped & triangles.used;
-                            while survivors != 0 {
-                                let lane = survivors.trailing_zeros();
-                                survivors &= survivors - 1;
-                                let Some(&id) = ids.get(lane as usize) else { break };
-                                rays.candidate::<S, ANY>(simd, mesh, ray, id);
-                            }
-                        }
-                    } else {
-                        // Many rays: filter each triangle for eight rays at a time.
-                        for &id in ids {
-                            let Some(triangle) = mesh.triangle(id) else { continue };
-                            let corners = crate::filter::splat(simd, &triangle);
-                            for (octet, first) in (0..OCTETS).zip((0..).step_by(8)) {
-                                let of_octet = mask >> (8 * octet) & 0xff;
-                                if of_octet == 0 {
-                                    continue;
-                                }
-                                let dropped = bits(rays.filters(simd, octet).drops(&corners));
-                                let mut survivors = of_octet & !u64::from(dropped);
-                                while survivors != 0 {
-                                    let ray = first + survivors.trailing_zeros();
-                                    survivors &= survivors - 1;
-                                    rays.candidate::<S, ANY>(simd, mesh, ray, id);
-                                }
-                            }
-                        }
-                    }
-                    // Decide in f64 what passed.
-                    rays.decide::<S, ANY>(simd, mesh);
+                    let leaf = Leaf { bvh, mesh, bounds, first, ids: bvh.leaf(first, count) };
+                    leaves.enter(simd, &leaf, rays, &beam, mask);
                 }
             }
             // Pop the next child that a ray still has to look at.
@@ -210,7 +165,7 @@ impl<const ANY: bool> Descent<'_, '_, ANY> {
                 top = below;
                 let Some(waiting) = stack.get(top) else { return };
                 mask = waiting.rays & rays.alive;
-                if !ANY && mask != 0 {
+                if !L::IS_ANY && mask != 0 {
                     mask = rays.ending_behind(simd, waiting.near, mask);
                 }
                 if mask != 0 {
@@ -224,16 +179,48 @@ impl<const ANY: bool> Descent<'_, '_, ANY> {
     }
 }
 
-/// What rays met of the boxes of a node.
-struct Met {
+/// What rays met of up to eight boxes.
+pub(super) struct Met {
     /// The boxes that any of them met, as bits.
-    slots: u32,
+    pub(super) slots: u32,
     /// For each box the rays that met it, as bits, and where the first one enters.
-    rays: [u64; WIDTH],
-    near: [f32; WIDTH],
+    pub(super) rays: [u64; WIDTH],
+    pub(super) near: [f32; WIDTH],
 }
 
 impl Met {
+    pub(super) const NONE: Self = Self { slots: 0, rays: [0; WIDTH], near: [0.0; WIDTH] };
+
+    /// Intersects some rays of a group with the boxes that are used.
+    #[inline(always)]
+    pub(super) fn meet<S: Simd>(
+        &mut self,
+        simd: S,
+        boxes: &WideBoxes<f32x8<S>>,
+        rays: &Rays,
+        beam: &Beam<S>,
+        mask: u64,
+        used: u32,
+    ) {
+        let count = mask.count_ones();
+        let (mut some, mut all, mut enter) = (used, 0, f32x8::splat(simd, 0.0));
+        // Intersect the beam with them, if the rays are many.
+        if count > FEW_RAYS {
+            let beam = boxes.meet_beam(simd, beam);
+            some &= beam.some;
+            (all, enter) = (some & beam.all, beam.enter);
+        }
+        // Intersect the rays with the boxes that the beam did not decide.
+        let unsure = some & !all;
+        if count <= octets(mask) * unsure.count_ones() {
+            one_by_one(simd, boxes, rays, mask, self);
+        } else {
+            side_by_side(simd, boxes, rays, mask, unsure, self);
+        }
+        self.add_all(all, mask, enter);
+        self.slots &= some;
+    }
+
     /// Adds boxes that all rays meet, each with a lower bound of their entry distances.
     #[inline(always)]
     fn add_all<S: Simd>(&mut self, all: u32, rays: u64, enter: f32x8<S>) {
@@ -251,7 +238,13 @@ impl Met {
 
 /// Intersects few rays with all boxes of a node.
 #[inline(always)]
-fn one_by_one<S: Simd>(simd: S, boxes: &WideBoxes<f32x8<S>>, rays: &Rays, mask: u64) -> Met {
+fn one_by_one<S: Simd>(
+    simd: S,
+    boxes: &WideBoxes<f32x8<S>>,
+    rays: &Rays,
+    mask: u64,
+    met: &mut Met,
+) {
     let zero = u32x8::splat(simd, 0);
     let far_away = f32x8::splat(simd, f32::INFINITY);
     let mut least = far_away;
@@ -272,7 +265,7 @@ fn one_by_one<S: Simd>(simd: S, boxes: &WideBoxes<f32x8<S>>, rays: &Rays, mask: 
     for ((mask, low), high) in masks.iter_mut().zip(low).zip(high) {
         *mask = u64::from(low) | u64::from(high) << 32;
     }
-    Met { slots: bits(slots), rays: masks, near: least.into() }
+    (met.slots, met.rays, met.near) = (bits(slots), masks, least.into());
 }
 
 /// Intersects many rays with the boxes of a node that their beam meets, sixteen rays at a time.
@@ -282,48 +275,43 @@ fn side_by_side<S: Simd>(
     boxes: &WideBoxes<f32x8<S>>,
     rays: &Rays,
     mask: u64,
-    met: u32,
-) -> Met {
+    unsure: u32,
+    met: &mut Met,
+) {
     let far_away = f32x16::splat(simd, f32::INFINITY);
     let sides = boxes.sides();
-    let (mut slots, mut masks, mut nearest) = (0, [0; WIDTH], [f32::INFINITY; WIDTH]);
-    let mut rest = met;
+    met.slots = 0;
+    let mut rest = unsure;
     while rest != 0 {
         let slot = rest.trailing_zeros() as usize % WIDTH;
         rest &= rest - 1;
         let child = WideBoxes::<f32x16<S>>::one(simd, &sides, slot);
-        let mut least = far_away;
+        let (mut by, mut least) = (0, far_away);
         for which in 0..GROUP / 16 {
             let of_sixteen = mask >> (16 * which) & 0xffff;
             if of_sixteen == 0 {
                 continue;
             }
-            let (near, met) = child.meet(simd, &rays.sixteen(simd, which));
+            let (near, is_met) = child.meet(simd, &rays.sixteen(simd, which));
             // An invalid ray may have a NaN distance.
-            let met = met & mask32x16::from_bitmask(simd, of_sixteen);
-            masks[slot] |= met.to_bitmask() << (16 * which);
-            least = least.lesser(met.select(near, far_away));
+            let is_met = is_met & mask32x16::from_bitmask(simd, of_sixteen);
+            by |= is_met.to_bitmask() << (16 * which);
+            least = least.lesser(is_met.select(near, far_away));
         }
-        nearest[slot] = least.reduce_min();
-        slots |= u32::from(masks[slot] != 0) << slot;
+        (met.rays[slot], met.near[slot]) = (by, least.reduce_min());
+        met.slots |= u32::from(by != 0) << slot;
     }
-    Met { slots, rays: masks, near: nearest }
 }
 
 /// Pushes a child; for closest hits behind those of the same node that begin farther away.
 #[inline(always)]
-fn push<const ANY: bool>(
-    stack: &mut [GroupEntry],
-    top: &mut usize,
-    base: usize,
-    waiting: GroupEntry,
-) {
+fn push<L: Leaves>(stack: &mut [GroupEntry], top: &mut usize, base: usize, waiting: GroupEntry) {
     let mut at = *top;
     if at >= stack.len() {
         return;
     }
     *top += 1;
-    while !ANY
+    while !L::IS_ANY
         && at > base
         && let Some(&below) = stack.get(at - 1)
         && below.near < waiting.near

@@ -218,7 +218,7 @@ mod tests {
             self.0[place]
         }
 
-        fn found(&mut self, _: usize, _: &Hit) {}
+        fn found(&mut self, _: usize, _: usize, _: &Hit) {}
 
         fn alone(&mut self, _: usize) {}
 

@@ -40,9 +40,14 @@ pub(crate) struct Rays {
     pub(crate) alive: u64,
     /// The triangles that they see.
     choice: Choice,
-    /// The point that boxes and origins are relative to, and the growth of boxes that covers the rounding.
+    /// By how much origins may be off, in scene units: they are given in f64 and were rounded. 0 for rays in f32.
+    pub(crate) off: f32,
+    /// The point that boxes and origins are relative to.
     pub(crate) center: [f32; 3],
-    pub(crate) spread: f32,
+    /// How far the origins lie apart, in units of rounding: the growth of boxes that covers it.
+    spread: f32,
+    /// The growth of boxes that covers all of this.
+    pub(crate) growth: f32,
     /// Relative to the center.
     origin: [PerRay; 3],
     inverse: [PerRay; 3],
@@ -81,7 +86,9 @@ impl Rays {
             alive: 0,
             choice,
             center: [0.0; 3],
+            off: 0.0,
             spread: 0.0,
+            growth: 0.0,
             origin: [ZEROS; 3],
             inverse: [ZEROS; 3],
             start: ZEROS,
@@ -206,6 +213,7 @@ impl Rays {
             }
         }
         self.spread = farthest.reduce_max() * 8.0 * UNIT;
+        self.growth = self.spread + self.off;
     }
 
     /// All rays as one beam, before any of them is done.
@@ -399,11 +407,22 @@ impl Rays {
         }
         self.hits[at] = hit;
         if !ANY {
-            // What rounds to the same t may lie farther away: see `Slab::nearby`.
-            let scale = get(&self.scale, ray);
-            let (end, tiny) = (hit.t * scale, TINY * scale.max(1.0));
-            put(&mut self.end, at, end + (end.abs() * (WIDER - 1.0) + tiny));
+            self.end_at(ray, hit.t);
         }
+    }
+
+    /// Ends a ray: nothing else matters to it.
+    pub(crate) fn finish(&mut self, ray: u32) {
+        self.alive &= !(1 << (ray % u64::BITS));
+    }
+
+    /// Ends a ray at a `t`.
+    #[inline(always)]
+    pub(crate) fn end_at(&mut self, ray: u32, t: f32) {
+        // What rounds to the same t may lie farther away: see `Slab::nearby`.
+        let scale = get(&self.scale, ray);
+        let (end, tiny) = (t * scale, TINY * scale.max(1.0));
+        put(&mut self.end, ray as usize % GROUP, end + (end.abs() * (WIDER - 1.0) + tiny));
     }
 }
 

@@ -56,14 +56,13 @@ impl Bvh<'_> {
         counters: &mut Counters,
     ) {
         let narrow = &ray.rounded();
-        if narrow.origin.map(|c| f64::from(c).to_bits()) == ray.origin.map(f64::to_bits) {
+        if ray.is_exact() {
             return self.search(scope, narrow, ray.t_min, Cull::None, search, counters);
         }
         if !narrow.is_valid() {
             return;
         }
-        let line = LineF64 { origin: ray.origin, direction: ray.direction.map(f64::from) };
-        self.search_boxes_along(scope, &line, 1.0, [ray.t_min, ray.t_max], search, counters);
+        self.search_boxes_along(scope, &ray.into(), 1.0, [ray.t_min, ray.t_max], search, counters);
     }
 
     /// The same for a line, and a range of `t`. The `t` along the line is `scale` times that.

@@ -199,6 +199,12 @@ pub(super) struct Seen {
 const FAR_EXTENTS: f64 = 4.0;
 
 impl Seen {
+    /// A place for a ray.
+    pub(super) const NONE: Self = {
+        let line = LineF64 { origin: [0.0; 3], direction: [0.0; 3] };
+        Self { line, scale: 1.0, shift: 0.0 }
+    };
+
     /// `None` if the line has no direction.
     pub(super) fn new(line: &LineF64) -> Option<Self> {
         let [x, y, z] = line.direction.map(f64::abs);
@@ -214,8 +220,14 @@ impl Seen {
         })
     }
 
-    /// The ray in f32 for an object with this box: from near the box. `None` if it passes the box.
-    pub(super) fn narrow(&mut self, ray: &RayF64, bounds: &([f32; 3], [f32; 3])) -> Option<Ray> {
+    /// The ray in f32 for an object with this box, up to a `t` of the scene's ray: from near the box. `None` if it passes
+    /// the box.
+    pub(super) fn narrow(
+        &mut self,
+        ray: &RayF64,
+        limit: f32,
+        bounds: &([f32; 3], [f32; 3]),
+    ) -> Option<Ray> {
         let LineF64 { origin, direction } = self.line;
         let (center, half) = grown(bounds);
         let away = |axis: usize| (origin[axis] - center[axis]).abs();
@@ -225,11 +237,12 @@ impl Seen {
             self.shift = self.entry(&center, &half)?;
         }
         let at = |axis: usize| round(origin[axis] + self.shift * direction[axis]);
+        let (limit, t_max) = (self.limit(limit), self.inward(ray.t_max));
         Some(Ray {
             origin: [at(0), at(1), at(2)],
             t_min: self.inward(ray.t_min),
             direction: direction.map(round),
-            t_max: self.inward(ray.t_max),
+            t_max: if limit < t_max { limit } else { t_max },
         })
     }
 
@@ -258,7 +271,7 @@ impl Seen {
     }
 
     /// A `t` of the object's ray that is no nearer than all that stand for this one of the scene's ray.
-    pub(super) fn limit(&self, t: f32) -> f32 {
+    fn limit(&self, t: f32) -> f32 {
         round(f64::from(t.next_up()) * self.scale - self.shift).next_up()
     }
 

@@ -10,6 +10,9 @@
 //! a scene is opened, so the blob can be moved as every other. An instance keeps the inverse of its matrix
 //! ([`instance`]).
 
+mod batch;
+#[cfg(feature = "bvh")]
+mod groups;
 mod instance;
 mod query;
 mod store;
@@ -22,6 +25,7 @@ use crate::grid::Grid;
 use crate::limits::MAX_NESTING;
 use crate::ray::Ray;
 use crate::shapes::{ShapeHit, Shapes};
+use crate::simd::SimdLevel;
 pub use instance::Instance;
 use instance::StoredInstance;
 pub use query::{SceneFilter, SceneHit, SceneOptions};
@@ -153,6 +157,13 @@ struct Table {
 const _: () = assert!(size_of::<Table>() == 64);
 
 impl<'a> Scene<'a> {
+    /// The same scene with a tree whose queries use no more than these instructions: the same hits, slower. Objects keep
+    /// their own.
+    #[must_use]
+    pub const fn with_simd(self, simd: SimdLevel) -> Self {
+        Self { tree: self.tree.with_simd(simd), ..self }
+    }
+
     /// Number of instances.
     #[must_use]
     pub const fn instance_count(&self) -> u32 {

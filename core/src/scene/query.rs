@@ -12,10 +12,11 @@ use core::fmt;
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-use super::instance::Seen;
+use super::instance::{Seen, StoredInstance};
 use super::{Object, Scene};
 use crate::approach::LineF64;
 use crate::counters::Counters;
+use crate::grid::Grid;
 use crate::limits::MAX_NESTING;
 use crate::options::{Cull, QueryOptions, Verdict};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
@@ -72,13 +73,16 @@ pub struct SceneOptions<'q> {
     /// another instance. [`Verdict::AcceptAndStop`] is the same as [`Verdict::Accept`]. Shapes are not shown to it: their
     /// test decides.
     pub filter: Option<&'q mut SceneFilter<'q>>,
-    /// Where to add up the work: an instance that is offered is a primitive test.
+    /// Where to add up the work: an instance that is offered is a primitive test. With counters or a filter, the rays of a
+    /// batch are traced one by one.
     pub counters: Option<&'q mut Counters>,
+    /// Memory to sort the rays of a batch in, as [`QueryOptions::scratch`].
+    pub scratch: &'q mut [u8],
 }
 
 impl Default for SceneOptions<'_> {
     fn default() -> Self {
-        Self { mask: u32::MAX, cull: Cull::None, filter: None, counters: None }
+        Self { mask: u32::MAX, cull: Cull::None, filter: None, counters: None, scratch: &mut [] }
     }
 }
 
@@ -89,6 +93,7 @@ impl fmt::Debug for SceneOptions<'_> {
             .field("cull", &self.cull)
             .field("filter", &self.filter.is_some())
             .field("counters", &self.counters)
+            .field("scratch", &self.scratch.len())
             .finish()
     }
 }
@@ -171,7 +176,7 @@ impl Scene<'_> {
     }
 
     /// The answer for the ray at a place of a batch.
-    fn ask(
+    pub(super) fn ask(
         &self,
         place: usize,
         ray: &RayF64,
@@ -179,7 +184,7 @@ impl Scene<'_> {
         is_any: bool,
     ) -> Option<SceneHit> {
         let mut work = options.counters.is_some().then(Counters::default);
-        let question = Question { mask: options.mask, cull: options.cull, is_any };
+        let question = Question::new(options, is_any);
         let mut show;
         let filter: Option<&mut Shown<'_>> = match &mut options.filter {
             Some(filter) => {
@@ -188,12 +193,33 @@ impl Scene<'_> {
             }
             None => None,
         };
-        let line = LineF64 { origin: ray.origin, direction: ray.direction.map(f64::from) };
-        let hit = self.trace(&line, ray, f32::INFINITY, 0, &question, filter, work.as_mut());
+        let hit = self.trace(
+            &LineF64::from(ray),
+            ray,
+            f32::INFINITY,
+            0,
+            &question,
+            filter,
+            work.as_mut(),
+        );
         if let (Some(counters), Some(work)) = (&mut options.counters, work) {
             counters.add(&work);
         }
         hit
+    }
+
+    /// An instance that a query sees, and its object.
+    pub(super) fn shown(
+        &self,
+        number: u32,
+        question: &Question,
+    ) -> Option<(&StoredInstance, &Object<'_>)> {
+        let mask = question.mask;
+        if mask != u32::MAX && self.tree.mesh().mask(number) & mask == 0 {
+            return None;
+        }
+        let placed = self.instances.get(number as usize)?;
+        Some((placed, self.objects.get(placed.object() as usize)?))
     }
 
     /// The closest hit of a ray no farther than a limit, or any; at a level of nesting. `line` is the ray as this
@@ -245,33 +271,44 @@ impl Scene<'_> {
 }
 
 /// What holds for all instances.
-#[derive(Debug)]
-struct Question {
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Question {
     mask: u32,
     cull: Cull,
-    is_any: bool,
+    pub(super) is_any: bool,
+}
+
+impl Question {
+    pub(super) const fn new(options: &SceneOptions<'_>, is_any: bool) -> Self {
+        Self { mask: options.mask, cull: options.cull, is_any }
+    }
+
+    /// The options of queries of objects.
+    pub(super) fn options<'q>(self) -> QueryOptions<'q> {
+        QueryOptions { mask: self.mask, cull: self.cull, ..QueryOptions::default() }
+    }
 }
 
 /// A filter of one ray.
-type Shown<'f> = dyn FnMut(&SceneHit) -> Verdict + 'f;
+pub(super) type Shown<'f> = dyn FnMut(&SceneHit) -> Verdict + 'f;
 
 /// The search over the instances whose boxes a ray meets.
-struct InstanceSearch<'q, 'f> {
-    scene: &'q Scene<'q>,
-    line: &'q LineF64,
-    ray: &'q RayF64,
-    level: usize,
-    question: &'q Question,
-    best: Option<SceneHit>,
+pub(super) struct InstanceSearch<'q, 'f> {
+    pub(super) scene: &'q Scene<'q>,
+    pub(super) line: &'q LineF64,
+    pub(super) ray: &'q RayF64,
+    pub(super) level: usize,
+    pub(super) question: &'q Question,
+    pub(super) best: Option<SceneHit>,
     /// Nothing farther matters.
-    limit: f32,
-    filter: Option<&'q mut Shown<'f>>,
-    counters: Option<&'q mut Counters>,
+    pub(super) limit: f32,
+    pub(super) filter: Option<&'q mut Shown<'f>>,
+    pub(super) counters: Option<&'q mut Counters>,
 }
 
 impl InstanceSearch<'_, '_> {
     /// Asks an instance whose box the ray meets.
-    fn offer(&mut self, number: u32) -> Outcome {
+    pub(super) fn offer(&mut self, number: u32) -> Outcome {
         let Some(hit) = self.ask(number) else { return Outcome::Unchanged };
         if self.best.is_some_and(|best| !hit.is_closer(&best)) {
             return Outcome::Unchanged;
@@ -283,12 +320,8 @@ impl InstanceSearch<'_, '_> {
     /// What a ray hits in an instance, no farther than what was hit before.
     fn ask(&mut self, number: u32) -> Option<SceneHit> {
         let Self { scene, line, ray, level, question, .. } = *self;
-        let &Question { mask, cull, is_any } = question;
-        if mask != u32::MAX && scene.tree.mesh().mask(number) & mask == 0 {
-            return None;
-        }
-        let placed = scene.instances.get(number as usize)?;
-        let object = scene.objects.get(placed.object() as usize)?;
+        let is_any = question.is_any;
+        let (placed, object) = scene.shown(number, question)?;
         let line = placed.line(line);
 
         // Inside a scene the ray keeps its f64 and its `t`.
@@ -314,35 +347,18 @@ impl InstanceSearch<'_, '_> {
         }
 
         let mut seen = Seen::new(&line)?;
-        let bounds = object.bounds();
-        let mut inside = seen.narrow(ray, &bounds)?;
-        let limit = seen.limit(self.limit);
-        inside.t_max = if limit < inside.t_max { limit } else { inside.t_max };
+        let inside = seen.narrow(ray, self.limit, &object.bounds())?;
         let outward = |hit: &Hit| outward(&seen, ray, level, number, hit);
         let mut show;
-        let mut options = QueryOptions {
-            mask,
-            cull,
-            counters: self.counters.as_deref_mut(),
-            ..QueryOptions::default()
-        };
+        let mut options = question.options();
+        options.counters = self.counters.as_deref_mut();
         let hit = match object {
             Object::Grid(grid) => {
                 if let Some(filter) = &mut self.filter {
                     show = |_: usize, hit: &Hit| filter(&outward(hit));
                     options.filter = Some(&mut show);
                 }
-                let is_plain = options.are_plain();
-                match (is_any, is_plain) {
-                    (false, true) => grid.intersect(&inside),
-                    (true, true) => {
-                        grid.occluded(&inside).then_some(Hit { t: inside.t_min, ..Hit::MISS })
-                    }
-                    (false, false) => grid.intersect_with(&inside, &mut options),
-                    (true, false) => grid
-                        .occluded_with(&inside, &mut options)
-                        .then_some(Hit { t: inside.t_min, ..Hit::MISS }),
-                }
+                ask_grid(grid, &inside, is_any, &mut options)
             }
             Object::Shapes(shapes, test) => {
                 let mut test = |id: u32, ray: &Ray| test.test(id, ray);
@@ -359,8 +375,23 @@ impl InstanceSearch<'_, '_> {
     }
 }
 
+/// The closest hit of a ray in a grid; if `is_any` is true, a hit that only says that there is one.
+pub(super) fn ask_grid(
+    grid: &Grid<'_>,
+    ray: &Ray,
+    is_any: bool,
+    options: &mut QueryOptions<'_>,
+) -> Option<Hit> {
+    let is_plain = options.are_plain();
+    if !is_any {
+        return if is_plain { grid.intersect(ray) } else { grid.intersect_with(ray, options) };
+    }
+    let is_hit = if is_plain { grid.occluded(ray) } else { grid.occluded_with(ray, options) };
+    is_hit.then_some(Hit { t: ray.t_min, ..Hit::MISS })
+}
+
 /// A hit of an object as one of the scene at a level.
-fn outward(seen: &Seen, ray: &RayF64, level: usize, number: u32, hit: &Hit) -> SceneHit {
+pub(super) fn outward(seen: &Seen, ray: &RayF64, level: usize, number: u32, hit: &Hit) -> SceneHit {
     let mut path = [INVALID_ID; MAX_NESTING];
     if let Some(place) = path.get_mut(level) {
         *place = number;

@@ -1,0 +1,161 @@
+//! What a group of rays does in a leaf.
+//!
+//! ```text
+//! triangles   filter them, all at once for each ray or eight rays at a time for each triangle;
+//!             decide what passes in f64, eight pairs of a ray and a triangle at a time
+//! boxes       intersect them as the boxes of a node; offer each that rays meet, the nearest first
+//! ```
+
+use fearless_simd::Simd;
+
+use super::Bvh;
+use super::boxes::{Beam, WideBoxes, bits};
+use super::group::{Met, octets};
+use super::rays::{OCTETS, Rays};
+use super::shape_leaf::{nearest_of, pad_of};
+use crate::aabb::Aabb;
+use crate::eight::{Eight, first_eight};
+use crate::mesh::TriangleMesh;
+
+/// A leaf that some rays of a group enter.
+pub(super) struct Leaf<'r> {
+    pub(super) bvh: &'r Bvh<'r>,
+    pub(super) mesh: &'r TriangleMesh<'r>,
+    /// The box of the tree.
+    pub(super) bounds: &'r Aabb,
+    /// Place of the first id among those of the tree.
+    pub(super) first: u32,
+    pub(super) ids: &'r [u32],
+}
+
+/// What the leaves of a tree hold.
+pub(super) trait Leaves {
+    /// True if the first hit of a ray ends it, so that no order matters.
+    const IS_ANY: bool;
+
+    /// Returns true if rays that start far apart go together, too: in any order, they still share the first nodes, and
+    /// many end soon.
+    fn takes_scattered(&self) -> bool;
+
+    /// Lets the rays of a mask enter a leaf.
+    fn enter<S: Simd>(
+        &mut self,
+        simd: S,
+        leaf: &Leaf<'_>,
+        rays: &mut Rays,
+        beam: &Beam<S>,
+        mask: u64,
+    );
+}
+
+/// Triangles, which are tested; with `ANY` the first hit of a ray ends it.
+pub(super) struct Triangles<const ANY: bool>;
+
+impl<const ANY: bool> Leaves for Triangles<ANY> {
+    const IS_ANY: bool = ANY;
+
+    #[inline(always)]
+    fn takes_scattered(&self) -> bool {
+        ANY
+    }
+
+    #[inline(always)]
+    fn enter<S: Simd>(
+        &mut self,
+        simd: S,
+        leaf: &Leaf<'_>,
+        rays: &mut Rays,
+        _: &Beam<S>,
+        mask: u64,
+    ) {
+        let Leaf { bvh, mesh, first, ids, .. } = *leaf;
+        if mask.count_ones() as usize <= octets(mask) as usize * ids.len() {
+            // Few rays: filter all triangles of the leaf for each ray.
+            let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
+            let triangles = Eight::of(simd, mesh, lanes, ids.len());
+            let mut rest = mask;
+            while rest != 0 {
+                let ray = rest.trailing_zeros();
+                rest &= rest - 1;
+                let filter = rays.filter(simd, ray);
+                let dropped = bits(filter.drops(&triangles.corners));
+                let mut survivors = !dropped & triangles.used;
+                while survivors != 0 {
+                    let lane = survivors.trailing_zeros();
+                    survivors &= survivors - 1;
+                    let Some(&id) = ids.get(lane as usize) else { break };
+                    rays.candidate::<S, ANY>(simd, mesh, ray, id);
+                }
+            }
+        } else {
+            // Many rays: filter each triangle for eight rays at a time.
+            for &id in ids {
+                let Some(triangle) = mesh.triangle(id) else { continue };
+                let corners = crate::filter::splat(simd, &triangle);
+                for (octet, first) in (0..OCTETS).zip((0..).step_by(8)) {
+                    let of_octet = mask >> (8 * octet) & 0xff;
+                    if of_octet == 0 {
+                        continue;
+                    }
+                    let dropped = bits(rays.filters(simd, octet).drops(&corners));
+                    let mut survivors = of_octet & !u64::from(dropped);
+                    while survivors != 0 {
+                        let ray = first + survivors.trailing_zeros();
+                        survivors &= survivors - 1;
+                        rays.candidate::<S, ANY>(simd, mesh, ray, id);
+                    }
+                }
+            }
+        }
+        // Decide in f64 what passed.
+        rays.decide::<S, ANY>(simd, mesh);
+    }
+}
+
+/// Takes the number of a box, the rays that meet it as a mask, and all rays of the group.
+pub(crate) type Offer<'o> = dyn FnMut(u32, u64, &mut Rays) + 'o;
+
+/// Boxes, which are offered.
+pub(super) struct Boxes<'o, 'f> {
+    pub(super) offer: &'o mut Offer<'f>,
+    /// True if what is offered ends a ray at its first hit.
+    pub(super) is_any: bool,
+}
+
+impl Leaves for Boxes<'_, '_> {
+    const IS_ANY: bool = false;
+
+    #[inline(always)]
+    fn takes_scattered(&self) -> bool {
+        self.is_any
+    }
+
+    #[inline(always)]
+    fn enter<S: Simd>(
+        &mut self,
+        simd: S,
+        leaf: &Leaf<'_>,
+        rays: &mut Rays,
+        beam: &Beam<S>,
+        mask: u64,
+    ) {
+        let Leaf { mesh, bounds, ids, .. } = *leaf;
+        // A box in the caller's memory has no margin of its own, unlike one of a node.
+        let growth = rays.growth + pad_of(bounds);
+        let boxes = WideBoxes::of_leaf(simd, mesh, ids, rays.center, growth);
+        let used = (1_u32 << ids.len().min(8)) - 1;
+        let mut met = Met::NONE;
+        met.meet(simd, &boxes, rays, beam, mask, used);
+        let Met { mut slots, rays: by, near } = met;
+        while slots != 0 {
+            let slot = nearest_of(slots, &near) % by.len();
+            slots &= !(1 << slot);
+            let left = rays.ending_behind(simd, near[slot], by[slot] & rays.alive);
+            if left != 0
+                && let Some(&number) = ids.get(slot)
+            {
+                (self.offer)(number, left, rays);
+            }
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Many rays at once in a scene: [`Grid::intersect_n`](crate::Grid::intersect_n) and its like for scenes.
+//!
+//! A batch answers each ray as [`Scene::intersect`] or [`Scene::occluded`] would, bit for bit. Rays go together through the
+//! tree of the scene and through the trees of its objects ([`groups`](super::groups)). With a filter or counters each ray
+//! is traced alone, in the order of the rays.
+
+use super::Scene;
+use super::query::{SceneHit, SceneOptions};
+use crate::batch::{Answer, Arrays, Batch, Coherence, StridedMut};
+use crate::error::Error;
+use crate::mesh::Strided;
+use crate::ray::RayF64;
+use crate::simd::HAS_VECTORS;
+
+impl Answer for SceneHit {
+    type Stored = Self;
+
+    fn stored(self) -> Self {
+        self
+    }
+}
+
+/// The answer of a scene.
+pub(super) trait SceneAnswer: Answer {
+    /// True if any hit is an answer.
+    const IS_ANY: bool;
+
+    fn of(hit: Option<SceneHit>) -> Self;
+}
+
+impl SceneAnswer for SceneHit {
+    const IS_ANY: bool = false;
+
+    fn of(hit: Option<SceneHit>) -> Self {
+        hit.unwrap_or(Self::MISS)
+    }
+}
+
+impl SceneAnswer for bool {
+    const IS_ANY: bool = true;
+
+    fn of(hit: Option<SceneHit>) -> Self {
+        hit.is_some()
+    }
+}
+
+impl Scene<'_> {
+    /// The closest hit of each ray, an array of [`RayF64`]; [`SceneHit::MISS`] where there is none. The options are for all
+    /// rays.
+    ///
+    /// # Errors
+    /// [`Error::InvalidBatch`] if a stride is below its element, an array ends before its last
+    /// element, or there are not as many hits as rays. Nothing is written then.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let config = Config::default();
+    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
+    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
+    /// # let scratch = Block::bytes_mut(&mut scratch);
+    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
+    /// # let objects = [Object::Grid(&grid)];
+    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    /// let rays = [0.25, 2.0].map(|x| RayF64::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
+    /// let mut hits = [SceneHit::MISS; 2];
+    /// let (rays, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
+    /// scene.intersect_n(&rays, answers, Coherence::Coherent, &mut SceneOptions::default())?;
+    /// assert_eq!([hits[0].t, hits[1].t], [1.0, f32::INFINITY]);
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn intersect_n(
+        &self,
+        rays: &Strided<'_>,
+        hits: &mut StridedMut<'_>,
+        coherence: Coherence,
+        options: &mut SceneOptions<'_>,
+    ) -> Result<(), Error> {
+        let mut arrays = Arrays::new::<RayF64, SceneHit>(rays, hits)?;
+        self.intersect_batch(&mut arrays, coherence, options);
+        Ok(())
+    }
+
+    /// The closest hit of each ray: [`intersect_n`](Self::intersect_n), wherever rays and hits lie.
+    pub fn intersect_batch(
+        &self,
+        batch: &mut impl Batch<SceneHit, RayF64>,
+        coherence: Coherence,
+        options: &mut SceneOptions<'_>,
+    ) {
+        trace(self, batch, coherence, options);
+    }
+
+    /// For each ray, an array of [`RayF64`], a byte: 1 if anything is hit, 0 if not. The options are for all rays.
+    ///
+    /// # Errors
+    /// The same as of [`intersect_n`](Self::intersect_n).
+    pub fn occluded_n(
+        &self,
+        rays: &Strided<'_>,
+        occluded: &mut StridedMut<'_>,
+        coherence: Coherence,
+        options: &mut SceneOptions<'_>,
+    ) -> Result<(), Error> {
+        let mut arrays = Arrays::new::<RayF64, bool>(rays, occluded)?;
+        self.occluded_batch(&mut arrays, coherence, options);
+        Ok(())
+    }
+
+    /// Tells for each ray whether it hits anything: [`occluded_n`](Self::occluded_n), wherever rays and answers lie.
+    pub fn occluded_batch(
+        &self,
+        batch: &mut impl Batch<bool, RayF64>,
+        coherence: Coherence,
+        options: &mut SceneOptions<'_>,
+    ) {
+        trace(self, batch, coherence, options);
+    }
+}
+
+/// Answers all rays of a batch.
+fn trace<A: SceneAnswer>(
+    scene: &Scene<'_>,
+    batch: &mut impl Batch<A, RayF64>,
+    coherence: Coherence,
+    options: &mut SceneOptions<'_>,
+) {
+    #[cfg(feature = "bvh")]
+    if HAS_VECTORS
+        && options.filter.is_none()
+        && options.counters.is_none()
+        && let Some(tree) = scene.tree.tree()
+    {
+        return super::groups::trace(scene, tree, batch, coherence, options);
+    }
+    for place in 0..batch.count() {
+        alone(scene, batch, place, options);
+    }
+}
+
+/// Answers one ray.
+#[inline(never)]
+pub(super) fn alone<A: SceneAnswer>(
+    scene: &Scene<'_>,
+    batch: &mut impl Batch<A, RayF64>,
+    place: usize,
+    options: &mut SceneOptions<'_>,
+) {
+    let hit = scene.ask(place, &batch.ray(place), options, A::IS_ANY);
+    batch.answer(place, A::of(hit));
+}

@@ -1,0 +1,246 @@
+//! Batches of rays in a scene, in groups.
+//!
+//! ```text
+//! take up to 64 rays through the tree of the scene together
+//! an instance whose box some of them meet: drop it by its mask; else
+//!     a tree of triangles: move each of them into its space, as a single query does
+//!                          take them through it together
+//!                          move the `t` of what they hit back, and end them there
+//!     all else, or a few:  ask it for each of them alone
+//! ```
+
+use core::marker::PhantomData;
+
+use super::batch::{SceneAnswer, alone};
+use super::instance::{Seen, StoredInstance};
+use super::query::{InstanceSearch, Question, SceneHit, SceneOptions, ask_grid, outward};
+use super::{Object, Scene};
+use crate::approach::LineF64;
+use crate::batch::groups::with_window;
+use crate::batch::{Batch, Coherence};
+use crate::bvh::{Bvh, GROUP, Group, Groups, Rays, Scope, SortKey, Stack, Together};
+use crate::grid::Grid;
+use crate::options::Choice;
+use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
+use crate::search::Outcome;
+use crate::simd::SimdLevel;
+
+/// As many rays or fewer are asked for one by one.
+const FEW: u32 = 2;
+
+/// Answers all rays of a batch.
+pub(super) fn trace<A: SceneAnswer, B: Batch<A, RayF64>>(
+    scene: &Scene<'_>,
+    tree: &Bvh<'_>,
+    batch: &mut B,
+    coherence: Coherence,
+    options: &mut SceneOptions<'_>,
+) {
+    let lent = core::mem::take(&mut options.scratch);
+    let travellers = Travellers::new(scene, Question::new(options, A::IS_ANY));
+    let mut asked = Asked { scene, batch, options, answers: PhantomData::<A>, travellers };
+    with_window(coherence, lent, &mut |memory| asked.groups(tree, memory));
+    options.scratch = lent;
+}
+
+/// A batch with its scene and its options.
+struct Asked<'r, 'q, B, A> {
+    scene: &'r Scene<'r>,
+    batch: &'r mut B,
+    options: &'r mut SceneOptions<'q>,
+    answers: PhantomData<A>,
+    travellers: Travellers<'r>,
+}
+
+impl<A: SceneAnswer, B: Batch<A, RayF64>> Asked<'_, '_, B, A> {
+    /// Traces rays in groups, in windows that are sorted in memory or as given.
+    #[inline(never)]
+    fn groups(&mut self, bvh: &Bvh<'_>, memory: &mut [SortKey]) {
+        let Scope { mesh, bounds, simd } = self.scene.tree.scope();
+        Groups { bvh, mesh, bounds, choice: Choice::ALL, memory, batch: self }.trace(simd, false);
+    }
+}
+
+impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for Asked<'_, '_, B, A> {
+    fn count(&self) -> usize {
+        self.batch.count()
+    }
+
+    fn ray(&self, place: usize) -> Ray {
+        self.batch.ray(place).rounded()
+    }
+
+    fn load(&mut self, lane: usize, place: usize) -> Ray {
+        self.travellers.load(lane, self.batch.ray(place))
+    }
+
+    fn trace(&mut self, group: &mut Group<'_>, level: SimdLevel, _: bool) -> u64 {
+        self.travellers.trace(group, level)
+    }
+
+    fn found(&mut self, place: usize, lane: usize, _: &Hit) {
+        let hit = &self.travellers.best[lane % GROUP];
+        let hit = (hit.path[0] != INVALID_ID).then_some(*hit);
+        self.batch.answer(place, A::of(hit));
+    }
+
+    fn alone(&mut self, place: usize) {
+        alone(self.scene, self.batch, place, self.options);
+    }
+
+    fn keeps_order(&self) -> bool {
+        false
+    }
+
+    fn asks(&self, _: &Hit) -> bool {
+        false
+    }
+
+    fn ask(&mut self, _: usize, _: &Hit) {}
+}
+
+/// The rays of a group in a scene, and what they hit. It is not generic over the batch: all batches share its code.
+struct Travellers<'r> {
+    scene: &'r Scene<'r>,
+    question: Question,
+    rays: [RayF64; GROUP],
+    /// The largest coordinate of an origin that was rounded, or 0.
+    largest: f32,
+    best: [SceneHit; GROUP],
+    /// Those of the rays that enter an object, as it sees them, and their lanes in the group.
+    seen: [Seen; GROUP],
+    lanes: [u32; GROUP],
+    inside: Rays,
+    stack: Stack,
+}
+
+impl<'r> Travellers<'r> {
+    fn new(scene: &'r Scene<'r>, question: Question) -> Self {
+        Self {
+            scene,
+            question,
+            rays: [RayF64::new([0.0; 3], [0.0; 3]); GROUP],
+            largest: 0.0,
+            best: [SceneHit::MISS; GROUP],
+            seen: [Seen::NONE; GROUP],
+            lanes: [0; GROUP],
+            inside: Rays::new(question.options().choice()),
+            stack: Stack::new(),
+        }
+    }
+
+    /// Takes the ray of a lane; returns it as the tree of the scene sees it, with its origin rounded.
+    fn load(&mut self, lane: usize, ray: RayF64) -> Ray {
+        if lane == 0 {
+            self.largest = 0.0;
+        }
+        let rounded = ray.rounded();
+        if !ray.is_exact() {
+            let coordinates = rounded.origin.map(f32::abs).into_iter();
+            self.largest = coordinates.filter(|c| c.is_finite()).fold(self.largest, f32::max);
+        }
+        self.rays[lane % GROUP] = ray;
+        rounded
+    }
+
+    /// Finds a hit of each ray of a group. Returns a mask of those that must be traced alone instead.
+    fn trace(&mut self, group: &mut Group<'_>, level: SimdLevel) -> u64 {
+        self.best = [SceneHit::MISS; GROUP];
+        group.rays.off = self.largest * f32::EPSILON;
+        let is_any = self.question.is_any;
+        group.offer(level, is_any, &mut |number, mask, outer| self.offer(number, mask, outer))
+    }
+
+    /// Asks an instance for some rays.
+    fn offer(&mut self, number: u32, mask: u64, outer: &mut Rays) {
+        let Some((placed, object)) = self.scene.shown(number, &self.question) else { return };
+        if let Object::Grid(grid) = object
+            && let Some(tree) = grid.tree()
+            && mask.count_ones() > FEW
+        {
+            self.together(number, placed, (grid, tree), mask, outer);
+            return;
+        }
+        for lane in lanes(mask) {
+            let (ray, best) =
+                (&self.rays[lane as usize % GROUP], &mut self.best[lane as usize % GROUP]);
+            let mut search = InstanceSearch {
+                scene: self.scene,
+                line: &ray.into(),
+                ray,
+                level: 0,
+                question: &self.question,
+                best: (best.path[0] != INVALID_ID).then_some(*best),
+                limit: best.t,
+                filter: None,
+                counters: None,
+            };
+            let outcome = search.offer(number);
+            *best = search.best.unwrap_or(SceneHit::MISS);
+            match outcome {
+                Outcome::Unchanged => {}
+                Outcome::EndsAt(t) => outer.end_at(lane, t),
+                Outcome::Done => outer.finish(lane),
+            }
+        }
+    }
+
+    /// Takes some rays through the tree of an instance's object together.
+    fn together(
+        &mut self,
+        number: u32,
+        placed: &StoredInstance,
+        (grid, bvh): (&Grid<'_>, &Bvh<'_>),
+        mask: u64,
+        outer: &mut Rays,
+    ) {
+        let Scope { mesh, bounds, simd } = grid.scope();
+        let corners = grid.bounds();
+        let mut count = 0;
+        for lane in lanes(mask) {
+            let ray = &self.rays[lane as usize % GROUP];
+            let Some(mut seen) = Seen::new(&placed.line(&LineF64::from(ray))) else { continue };
+            let limit = self.best[lane as usize % GROUP].t;
+            let Some(inside) = seen.narrow(ray, limit, &corners) else { continue };
+            self.inside.slots()[count % GROUP] = inside;
+            self.seen[count % GROUP] = seen;
+            self.lanes[count % GROUP] = lane;
+            count += 1;
+        }
+        let is_any = self.question.is_any;
+        let (rays, stack) = (&mut self.inside, &mut self.stack);
+        let alone = Group { bvh, mesh, bounds: &bounds, rays, stack, count }.trace(simd, is_any);
+        for at in 0..count.min(GROUP) {
+            let hit = if alone >> at & 1 == 0 {
+                let hit = self.inside.hits[at];
+                (hit.primitive != INVALID_ID).then_some(hit)
+            } else {
+                ask_grid(grid, &self.inside.slots()[at], is_any, &mut self.question.options())
+            };
+            let Some(hit) = hit else { continue };
+            let lane = self.lanes[at];
+            let (ray, best) =
+                (&self.rays[lane as usize % GROUP], &mut self.best[lane as usize % GROUP]);
+            let hit = outward(&self.seen[at], ray, 0, number, &hit);
+            if !hit.is_closer(best) {
+                continue;
+            }
+            *best = hit;
+            if is_any {
+                outer.finish(lane);
+            } else {
+                outer.end_at(lane, hit.t);
+            }
+        }
+    }
+}
+
+/// The lanes of a mask.
+fn lanes(mask: u64) -> impl Iterator<Item = u32> {
+    let mut rest = mask;
+    core::iter::from_fn(move || {
+        let lane = rest.trailing_zeros();
+        rest &= rest.wrapping_sub(1);
+        (lane < u64::BITS).then_some(lane)
+    })
+}

@@ -1,0 +1,242 @@
+//! Many rays at once in a scene answer as each of them alone, bit for bit: whatever the scene shows, however far from zero
+//! it lies, with every kind of vectors.
+
+use hgrid_core::{
+    BatchField, Boxes, Coherence, Config, Counters, Cull, Error, Instance, Object, Ray, RayF64,
+    Scene, SceneHit, SceneOptions, Shapes, SimdLevel, Strided, StridedMut, Verdict,
+};
+use hgrid_lab::camera::{Camera, Up, View};
+use hgrid_tests::random::Random;
+use hgrid_tests::scenes::{Built, scattered};
+
+use super::batches::{COHERENCES, odd_rays};
+use super::scenes::{enter, ray, with_grids};
+
+/// Rays of every kind: tiles of cameras near and far, rays from one place, rays from anywhere, and odd ones.
+fn rays(scene: &Scene<'_>, width: f64) -> Vec<RayF64> {
+    let mut rays: Vec<RayF64> = Vec::new();
+    let bounds = scene.bounds();
+    for (view, size) in [(View::Front, 24_u16), (View::ThreeQuarter, 40), (View::Top, 200)] {
+        let camera = Camera::framing(bounds, view, Up::Y);
+        let at = |i: u16| (i % 16, i / 16);
+        rays.extend((0..256).map(|i| RayF64::from(&camera.ray(at(i).0, at(i).1, size))));
+    }
+    // As from a surface: origins that f32 does not have, side by side, and ends.
+    let mut random = Random(11);
+    for _ in 0..4 {
+        let from = random.point().map(|c| f64::from(c) * width);
+        rays.extend((0..128).map(|i| {
+            let from = [from[0] + 1e-3 * f64::from(i) + 1e-11, from[1], from[2]];
+            let t_max = [f32::INFINITY, 0.5][i as usize % 2] * width as f32;
+            RayF64 { t_max, ..RayF64::new(from, random.point()) }
+        }));
+    }
+    rays.extend((0..300).map(|round| ray(&mut random, round, width as f32)));
+    rays.extend(odd_rays().iter().map(RayF64::from));
+    rays
+}
+
+/// The bits of a hit.
+fn bits(hit: &SceneHit) -> ([u32; 4], [u32; 4]) {
+    ([hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive], hit.path)
+}
+
+/// Asks for all rays together in every way, and compares with each alone. Returns the number of hits.
+fn compare(scene: &Scene<'_>, rays: &[RayF64]) -> usize {
+    let mut hits = 0;
+    for (mask, cull) in [(u32::MAX, Cull::None), (6, Cull::None), (u32::MAX, Cull::Back)] {
+        let alone = |ray| {
+            let mut options = SceneOptions { mask, cull, ..SceneOptions::default() };
+            scene.intersect_with(ray, &mut options)
+        };
+        let alone: Vec<_> = rays.iter().map(alone).collect();
+        hits += alone.iter().flatten().count();
+        let expected: Vec<_> =
+            alone.iter().map(|hit| bits(&hit.unwrap_or(SceneHit::MISS))).collect();
+        let blocked: Vec<u8> = alone.iter().map(|hit| hit.is_some().into()).collect();
+        let mut memory = vec![0; 16 * rays.len() + 16];
+        for level in SimdLevel::available() {
+            let scene = scene.with_simd(level);
+            for coherence in COHERENCES {
+                for lent in [0, 16 * rays.len() + 16] {
+                    let scratch = &mut memory[..lent];
+                    let options =
+                        &mut SceneOptions { mask, cull, scratch, ..SceneOptions::default() };
+                    let (given, mut found) = (Strided::new(rays), vec![SceneHit::MISS; rays.len()]);
+                    let answers = &mut StridedMut::new(&mut found);
+                    scene.intersect_n(&given, answers, coherence, options).unwrap();
+                    for (place, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                        let ray = rays[place];
+                        assert_eq!(bits(found), *expected, "{level:?} {coherence:?} {ray:?}");
+                    }
+                    let mut occluded = vec![7_u8; rays.len()];
+                    let answers = &mut StridedMut::new(&mut occluded);
+                    scene.occluded_n(&given, answers, coherence, options).unwrap();
+                    assert_eq!(occluded, blocked, "{level:?} {coherence:?}");
+                }
+            }
+        }
+    }
+    hits
+}
+
+#[test]
+fn batches_in_scenes_of_grids_answer_as_each_ray_alone() {
+    with_grids(|objects, _| {
+        for (count, width) in [(0, 1.0), (1, 1.0), (7, 3.0), (60, 6.0), (150, 200.0)] {
+            let mut instances = scattered(count, 3, width, 8);
+            instances.iter_mut().for_each(|instance| instance.mask = 1 << (instance.id % 3));
+            // Places that two instances share: the first of them is reported.
+            for second in count / 2..count {
+                let Instance { id, mask, .. } = instances[second];
+                instances[second] = Instance { id, mask, ..instances[second - count / 2] };
+            }
+            let built = Built::scene(&instances, objects, &Config::default()).unwrap();
+            let scene = built.open(objects).unwrap();
+            let hits = compare(&scene, &rays(&scene, width));
+            assert!(count == 0 || width > 10.0 || hits > 100, "{hits} hits");
+        }
+    });
+}
+
+#[test]
+fn batches_far_from_zero_answer_as_each_ray_alone() {
+    with_grids(|objects, _| {
+        let instances = scattered(60, 3, 6.0, 8);
+        let here = Built::scene(&instances, objects, &Config::default()).unwrap();
+        let near = rays(&here.open(objects).unwrap(), 6.0);
+        for offset in [1e4, 1e6, 1e8] {
+            let moved = |at: [f64; 3]| at.map(|c| c + offset);
+            let mut instances = instances.clone();
+            for instance in &mut instances {
+                instance.translation = moved(instance.translation);
+            }
+            let built = Built::scene(&instances, objects, &Config::default()).unwrap();
+            let scene = built.open(objects).unwrap();
+            let far: Vec<_> =
+                near.iter().map(|ray| RayF64 { origin: moved(ray.origin), ..*ray }).collect();
+            let hits = compare(&scene, &far);
+            assert!(hits > 200, "{hits} hits, {offset}");
+        }
+    });
+}
+
+#[test]
+fn batches_meet_what_is_smaller_than_the_rounding_of_their_origins() {
+    with_grids(|objects, _| {
+        let mut random = Random(17);
+        // Specks near zero in a scene that is a few units wide.
+        let aside = |x, y| Instance { translation: [x, y, 0.0], ..Instance::new(0) };
+        let mut instances = vec![aside(3.0, -3.0), aside(-3.0, 3.0)];
+        let mut specks = scattered(64, 1, 1e-3, 6);
+        for speck in &mut specks {
+            let size = 1e-10;
+            speck.linear = [[size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]];
+        }
+        instances.extend(&specks);
+        let built = Built::scene(&instances, objects, &Config::default()).unwrap();
+        let scene = built.open(objects).unwrap();
+        // Through each of them, from a place that f64 has and f32 has not.
+        let ray = |speck: &Instance| {
+            let direction = random.point().map(|c| 1.0 + 1e-3 * c);
+            let origin = std::array::from_fn(|k| speck.translation[k] - f64::from(direction[k]));
+            RayF64 { t_min: 0.5, ..RayF64::new(origin, direction) }
+        };
+        let rays: Vec<_> = specks.iter().map(ray).collect();
+        let hits = compare(&scene, &rays);
+        assert!(hits > 2 * rays.len(), "{hits} hits");
+    });
+}
+
+#[test]
+fn batches_in_scenes_of_shapes_and_scenes_answer_as_each_ray_alone() {
+    with_grids(|objects, _| {
+        let boxes = [[-1.0, -1.0, -1.0, 1.0, 1.0, 1.0], [3.0, -1.0, -1.0, 5.0, 1.0, 1.0]];
+        let view = Boxes::new(&boxes).unwrap();
+        let tree = Built::shapes(view, &Config::default()).unwrap();
+        let test = |id: u32, ray: &Ray| enter(&boxes[id as usize], ray);
+        let shapes = Shapes::open(tree.bytes(), view).unwrap();
+        let inner = scattered(5, 3, 2.0, 31);
+        let inner_built = Built::scene(&inner, objects, &Config::default()).unwrap();
+        let inner_scene = inner_built.open(objects).unwrap();
+        let all =
+            [objects[0], Object::Shapes(&shapes, &test), Object::Scene(&inner_scene), objects[2]];
+        let mut instances = scattered(40, 4, 12.0, 33);
+        instances.iter_mut().for_each(|instance| instance.mask = 1 << (instance.id % 3));
+        let built = Built::scene(&instances, &all, &Config::default()).unwrap();
+        let scene = built.open(&all).unwrap();
+        let hits = compare(&scene, &rays(&scene, 12.0));
+        assert!(hits > 200, "{hits} hits");
+    });
+}
+
+#[test]
+fn filters_and_counters_see_the_rays_of_a_batch_in_order() {
+    with_grids(|objects, _| {
+        let instances = scattered(60, 3, 6.0, 8);
+        let built = Built::scene(&instances, objects, &Config::default()).unwrap();
+        let scene = built.open(objects).unwrap();
+        let rays = rays(&scene, 6.0);
+        let accepts = |hit: &SceneHit| (hit.primitive + hit.path[0]).is_multiple_of(3);
+        let verdict = |hit: &SceneHit| if accepts(hit) { Verdict::Accept } else { Verdict::Reject };
+
+        let mut work = Counters::default();
+        let alone: Vec<_> = rays
+            .iter()
+            .map(|ray| {
+                let mut filter = |_: usize, hit: &SceneHit| verdict(hit);
+                let (filter, counters) = (Some(&mut filter as &mut _), Some(&mut work));
+                let mut options = SceneOptions { filter, counters, ..SceneOptions::default() };
+                scene.intersect_with(ray, &mut options).unwrap_or(SceneHit::MISS)
+            })
+            .collect();
+        for coherence in COHERENCES {
+            let (mut last, mut counted) = (0, Counters::default());
+            let mut filter = |place: usize, hit: &SceneHit| {
+                assert!(place >= last, "{place} after {last}");
+                last = place;
+                verdict(hit)
+            };
+            let (filter, counters) = (Some(&mut filter as &mut _), Some(&mut counted));
+            let mut options = SceneOptions { filter, counters, ..SceneOptions::default() };
+            let (given, mut found) = (Strided::new(&rays), vec![SceneHit::MISS; rays.len()]);
+            scene
+                .intersect_n(&given, &mut StridedMut::new(&mut found), coherence, &mut options)
+                .unwrap();
+            assert_eq!(found, alone);
+            assert_eq!(counted, work);
+            assert!(last > rays.len() / 2);
+        }
+    });
+}
+
+#[test]
+fn arrays_that_do_not_fit_are_refused() {
+    with_grids(|objects, _| {
+        let built = Built::scene(&[Instance::new(0)], objects, &Config::default()).unwrap();
+        let scene = built.open(objects).unwrap();
+        let rays = [RayF64::new([0.0, 0.0, 5.0], [0.0, 0.0, -1.0]); 4];
+        let narrow = rays.map(|ray| Ray { t_min: ray.t_min, ..Ray::new([0.0; 3], ray.direction) });
+        let marked = SceneHit { primitive: 77, ..SceneHit::MISS };
+        let mut hits = [marked; 4];
+        let options = &mut SceneOptions::default();
+        let coherence = Coherence::Coherent;
+
+        let mut ask = |rays: &Strided<'_>, count: usize| {
+            let answers = &mut StridedMut::new(&mut hits[..count]);
+            scene.intersect_n(rays, answers, coherence, options)
+        };
+        let refused = |field| Err(Error::InvalidBatch(field));
+        assert_eq!(ask(&Strided::new(&rays), 3), refused(BatchField::Answers));
+        // Rays of 32 bytes are no rays of 48.
+        assert_eq!(ask(&Strided::new(&narrow), 4), refused(BatchField::Rays));
+        assert!(hits.iter().all(|hit| hit == &marked));
+        let mut occluded = [7_u8; 5];
+        let answers = &mut StridedMut::new(&mut occluded);
+        let answer = scene.occluded_n(&Strided::new(&rays), answers, coherence, options);
+        assert_eq!((answer, occluded), (refused(BatchField::Answers), [7; 5]));
+        let answers = &mut StridedMut::new(&mut occluded[..4]);
+        scene.occluded_n(&Strided::new(&rays), answers, coherence, options).unwrap();
+        assert_eq!(occluded, [1, 1, 1, 1, 7]);
+    });
+}
