@@ -3,18 +3,39 @@
 //! ```text
 //! World      closest hits       any hit               surface
 //! mesh       a tile together    all rays together     the mesh's
-//! instances  one by one         one by one            that of the triangle where its instance puts it, with starts
+//! instances  a tile together    all rays together     that of the triangle where its instance puts it, with starts
 //!                                                     as far off as rays of instances need
 //! ```
 
 use hgrid_core::{
-    Coherence, Grid, Hit, INVALID_ID, Instance, MAX_NESTING, Object, Ray, Scene, SceneHit, Strided,
-    StridedMut, Surface, TriangleMesh,
+    Batch, Coherence, Grid, Hit, INVALID_ID, Instance, MAX_NESTING, Object, Ray, RayF64, Scene,
+    SceneHit, SceneOptions, Strided, StridedMut, Surface, TriangleMesh,
 };
 
 use crate::scene::Bounds;
 use crate::scene::model::{determinant, moved, transform_of};
 use crate::tiles::{TILE_RAYS, intersect};
+
+/// Rays in f32 that are asked of a scene together, the places for their answers, and what is written there.
+pub(crate) struct SceneBatch<'r, A, T> {
+    pub(crate) rays: &'r [Ray],
+    pub(crate) answers: &'r mut [T],
+    pub(crate) write: fn(A) -> T,
+}
+
+impl<A, T> Batch<A, RayF64> for SceneBatch<'_, A, T> {
+    fn count(&self) -> usize {
+        self.rays.len()
+    }
+
+    fn ray(&self, place: usize) -> RayF64 {
+        (&self.rays[place]).into()
+    }
+
+    fn answer(&mut self, place: usize, answer: A) {
+        self.answers[place] = (self.write)(answer);
+    }
+}
 
 /// A built structure, with the queries of a picture.
 #[derive(Debug, Clone, Copy)]
@@ -47,9 +68,9 @@ impl World<'_> {
                 }
             }
             Self::Instances(scene) => {
-                for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = scene.intersect(&ray.into()).unwrap_or(SceneHit::MISS);
-                }
+                let mut batch = SceneBatch { rays, answers: hits, write: |hit| hit };
+                let options = &mut SceneOptions::default();
+                scene.intersect_batch(&mut batch, Coherence::Coherent, options);
             }
         }
     }
@@ -81,9 +102,9 @@ impl World<'_> {
                 debug_assert_eq!(answered, Ok(()));
             }
             Self::Instances(scene) => {
-                for (ray, occluded) in rays.iter().zip(occluded) {
-                    *occluded = scene.occluded(&ray.into()).into();
-                }
+                let mut batch = SceneBatch { rays, answers: occluded, write: u8::from };
+                let options = &mut SceneOptions::default();
+                scene.occluded_batch(&mut batch, Coherence::Coherent, options);
             }
         }
     }

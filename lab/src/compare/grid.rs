@@ -50,9 +50,9 @@ impl System for GridSystem {
     fn modes(&self, workload: Workload, of_instances: bool) -> &'static [Mode] {
         let method = self.config.method();
         match workload {
-            // Scenes are trees, and are asked ray by ray.
-            _ if of_instances && method == Method::Bvh => one_by_one(workload),
-            _ if of_instances => &[],
+            // Scenes are trees, and have no points.
+            _ if of_instances && method != Method::Bvh => &[],
+            Workload::Near | Workload::Far if of_instances => &[],
             // Far from the mesh, a point can take another method as long as a picture.
             Workload::Near | Workload::Far if method == Method::default() => &[Mode::Single],
             Workload::Near | Workload::Far => &[],
@@ -99,7 +99,8 @@ impl Tracer for GridTracer<'_> {
             return each(rays, hits, |ray| self.grid.intersect(ray).unwrap_or(Hit::MISS));
         };
         let memory = &mut self.memory.borrow_mut();
-        let options = &mut call.options(rays.len(), memory);
+        let scratch = call.memory(rays.len(), memory);
+        let options = &mut QueryOptions { scratch, ..QueryOptions::default() };
         for (rays, hits) in rays.chunks(call.rays).zip(hits.chunks_mut(call.rays)) {
             let (rays, answers) = (&Strided::new(rays), &mut StridedMut::new(&mut *hits));
             if self.grid.intersect_n_with(rays, answers, call.coherence, options).is_err() {
@@ -113,7 +114,8 @@ impl Tracer for GridTracer<'_> {
             return each(rays, occluded, |ray| self.grid.occluded(ray).into());
         };
         let memory = &mut self.memory.borrow_mut();
-        let options = &mut call.options(rays.len(), memory);
+        let scratch = call.memory(rays.len(), memory);
+        let options = &mut QueryOptions { scratch, ..QueryOptions::default() };
         for (rays, occluded) in rays.chunks(call.rays).zip(occluded.chunks_mut(call.rays)) {
             let (rays, answers) = (&Strided::new(rays), &mut StridedMut::new(&mut *occluded));
             if self.grid.occluded_n_with(rays, answers, call.coherence, options).is_err() {
@@ -134,16 +136,16 @@ impl Tracer for GridTracer<'_> {
     }
 }
 
-/// How `intersect_n` and `occluded_n` are called.
-struct Call {
+/// How batches are called.
+pub(super) struct Call {
     /// Rays in a call, at most.
-    rays: usize,
-    coherence: Coherence,
+    pub(super) rays: usize,
+    pub(super) coherence: Coherence,
 }
 
 impl Call {
     /// The calls of a mode; none if it hands rays over one by one.
-    const fn of(mode: Mode) -> Option<Self> {
+    pub(super) const fn of(mode: Mode) -> Option<Self> {
         match mode {
             Mode::Coherent => Some(Self { rays: TILE_RAYS, coherence: Coherence::Coherent }),
             Mode::Batch => Some(Self { rays: usize::MAX, coherence: Coherence::Incoherent }),
@@ -151,12 +153,12 @@ impl Call {
         }
     }
 
-    /// Options that lend memory for sorting so many rays, if the call may sort them.
-    fn options<'m>(&self, rays: usize, memory: &'m mut Vec<u8>) -> QueryOptions<'m> {
+    /// Memory to sort so many rays in, if the call may sort them.
+    pub(super) fn memory<'m>(&self, rays: usize, memory: &'m mut Vec<u8>) -> &'m mut [u8] {
         if self.coherence == Coherence::Incoherent {
             // Sixteen bytes a ray, and those in front of the first that is aligned.
             memory.resize(memory.len().max(16 * rays + 16), 0);
         }
-        QueryOptions { scratch: memory, ..QueryOptions::default() }
+        memory
     }
 }

@@ -1,13 +1,16 @@
 //! Instances of a mesh by hgrid: a scene over the tree of the mesh, which is built once.
 
-use anyhow::{Context as _, Result};
-use hgrid_core::{Config, Grid, Hit, Instance, Object, Ray, Scene, Sizes};
+use core::cell::RefCell;
 
+use anyhow::{Context as _, Result};
+use hgrid_core::{Config, Grid, Hit, Instance, Object, Ray, Scene, SceneOptions, Sizes};
+
+use super::grid::Call;
 use super::input::Input;
 use super::mode::Mode;
 use super::system::{Bytes, Tracer, Use, each};
 use crate::regions::Regions;
-use crate::world::on_mesh;
+use crate::world::{SceneBatch, on_mesh};
 
 /// Builds the mesh's tree and the scene, and calls `then` with the scene. With `start` it builds the scene
 /// before, calls `start`, and builds the scene alone in the memory that it has just written.
@@ -27,7 +30,7 @@ pub(super) fn build(
         start();
     }
     let scene = Scene::build(instances, &objects, config, index, scratch)?;
-    then(&SceneTracer { scene, instances, config })
+    then(&SceneTracer { scene, instances, config, memory: RefCell::default() })
 }
 
 /// Returns the memory that is enough for a scene of these instances.
@@ -40,19 +43,41 @@ struct SceneTracer<'a> {
     scene: Scene<'a>,
     instances: &'a [Instance],
     config: &'a Config,
+    /// Where rays are sorted, kept from call to call.
+    memory: RefCell<Vec<u8>>,
 }
 
 impl Tracer for SceneTracer<'_> {
-    fn intersect(&self, _: Mode, rays: &[Ray], hits: &mut [Hit]) {
-        each(rays, hits, |ray| self.scene.intersect(&ray.into()).map_or(Hit::MISS, on_mesh));
+    fn intersect(&self, mode: Mode, rays: &[Ray], hits: &mut [Hit]) {
+        let Some(call) = Call::of(mode) else {
+            return each(rays, hits, |ray| {
+                self.scene.intersect(&ray.into()).map_or(Hit::MISS, on_mesh)
+            });
+        };
+        let memory = &mut self.memory.borrow_mut();
+        let scratch = call.memory(rays.len(), memory);
+        let options = &mut SceneOptions { scratch, ..SceneOptions::default() };
+        for (rays, answers) in rays.chunks(call.rays).zip(hits.chunks_mut(call.rays)) {
+            let mut batch = SceneBatch { rays, answers, write: on_mesh };
+            self.scene.intersect_batch(&mut batch, call.coherence, options);
+        }
     }
 
-    fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [u8]) {
-        each(rays, occluded, |ray| self.scene.occluded(&ray.into()).into());
+    fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [u8]) {
+        let Some(call) = Call::of(mode) else {
+            return each(rays, occluded, |ray| self.scene.occluded(&ray.into()).into());
+        };
+        let memory = &mut self.memory.borrow_mut();
+        let scratch = call.memory(rays.len(), memory);
+        let options = &mut SceneOptions { scratch, ..SceneOptions::default() };
+        for (rays, answers) in rays.chunks(call.rays).zip(occluded.chunks_mut(call.rays)) {
+            let mut batch = SceneBatch { rays, answers, write: u8::from };
+            self.scene.occluded_batch(&mut batch, call.coherence, options);
+        }
     }
 
     fn bytes(&self) -> Result<Option<Bytes>> {
-        let Self { scene, instances, config } = self;
+        let Self { scene, instances, config, .. } = self;
         let index_bytes = scene.blob().len();
         let mut regions = Regions::counted(bound(instances, config)?)?;
         let Regions { index, scratch } = &mut regions;

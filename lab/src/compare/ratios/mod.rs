@@ -119,9 +119,6 @@ fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>
         Ratio::new(what, &entry(hgrid)?, &entry(peer)?)
     };
     let coherent = || {
-        if hgrid.instances > 0 {
-            return None; // Ray by ray: the row below.
-        }
         let (what, theirs) = medium("coherent primary rays", Workload::Primary)?;
         Ratio::new(what, &Entry::in_mode(hgrid, Workload::Primary, Mode::Coherent)?, &theirs)
     };
@@ -130,9 +127,7 @@ fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>
         Ratio::new(what, &Entry::best(hgrid, workload)?, &theirs)
     };
     let random = |peer, quality| {
-        // Instances are traced ray by ray by hgrid and by the peer.
-        let what = if hgrid.instances > 0 { "random rays" } else { "random rays in one call" };
-        let (what, theirs) = best(peer, quality, what, Workload::Random)?;
+        let (what, theirs) = best(peer, quality, "random rays in one call", Workload::Random)?;
         Ratio::new(what, &Entry::in_mode(hgrid, Workload::Random, Mode::Batch)?, &theirs)
     };
     let points = |what: &str, workload| {
