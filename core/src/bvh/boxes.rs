@@ -150,7 +150,7 @@ impl<V> WideBoxes<V> {
         }
     }
 
-    /// Where rays enter the boxes, and which of them they meet.
+    /// Returns, for each lane, the distance at which the ray enters the box, and a mask of the lanes that meet.
     #[inline(always)]
     pub(crate) fn meet<S: Simd>(&self, simd: S, rays: &Slabs<V>) -> (V, V::Mask)
     where
@@ -163,7 +163,7 @@ impl<V> WideBoxes<V> {
         (near, !near.simd_gt(far))
     }
 
-    /// Where rays cross the near and the far sides on an axis.
+    /// Returns the distances at which rays cross the near and the far sides on an axis.
     #[inline(always)]
     fn cross<S: Simd>(&self, rays: &Slabs<V>, axis: usize) -> (V, V)
     where

@@ -335,7 +335,7 @@ struct UnitsTask<'w> {
     spare: &'w mut [Entry],
     ids: &'w mut [u32],
     nodes: &'w mut [Node],
-    /// Where the nodes lie.
+    /// The number of the first of the nodes in the index.
     child: u32,
     counts: &'w mut [u32],
 }
@@ -478,7 +478,7 @@ impl BuildInputs<'_> {
         Ok(all)
     }
 
-    /// Where the units of each task end, at seams: about as many entries for each.
+    /// Finds the ends of the units of each task, at seams: about as many entries for each.
     fn cut(&self, ends: &mut [usize], tasks: usize, entries: usize) {
         let mut units = Units::new(self.sizes);
         let mut end = 0;

@@ -179,7 +179,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
     }
 }
 
-/// What rays met of up to eight boxes.
+/// The intersections of rays with up to eight boxes.
 pub(super) struct Met {
     /// The boxes that any of them met, as bits.
     pub(super) slots: u32,

@@ -1,4 +1,4 @@
-//! What a group of rays does in a leaf.
+//! A group of rays in a leaf.
 //!
 //! ```text
 //! triangles   filter them, all at once for each ray or eight rays at a time for each triangle;
@@ -28,7 +28,7 @@ pub(super) struct Leaf<'r> {
     pub(super) ids: &'r [u32],
 }
 
-/// What the leaves of a tree hold.
+/// The content of the leaves of a tree.
 pub(super) trait Leaves {
     /// True if the first hit of a ray ends it, so that no order matters.
     const IS_ANY: bool;

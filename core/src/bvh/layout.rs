@@ -1,4 +1,4 @@
-//! How much memory a tree takes, and where everything lies in it.
+//! The memory that a tree takes, and the place of everything in it.
 //!
 //! ```text
 //! index    | header 128 B | ids: u32 a triangle | nodes: 80 B each                        |

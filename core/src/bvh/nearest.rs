@@ -40,9 +40,9 @@ use crate::simd::Kernel;
 const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 /// More than what underflows in a squared distance.
 const TINY: f32 = f32::MIN_POSITIVE;
-/// How far a scalar product may be off, in parts of the vectors' sums of magnitudes.
+/// Error bound of a scalar product, in parts of the product of the vectors' sums of magnitudes.
 const DOTS: f32 = 1.0 / 2_097_152.0; // 2^-21
-/// By how much the test in f64 may report a point as too near, in parts of the largest coordinate.
+/// The most by which the test in f64 may report a point as too near, in parts of the largest coordinate.
 const SLACK: f32 = 1.0 / 1_048_576.0 / 1_048_576.0; // 2^-40
 
 /// A point, and what is looked for.
@@ -193,7 +193,7 @@ fn sum<S: Simd>([x, y, z]: Vectors<S>) -> f32x8<S> {
     x.abs() + y.abs() + z.abs()
 }
 
-/// How far zero lies outside of intervals.
+/// Returns the distance of zero from each interval, 0 inside.
 #[inline(always)]
 fn outside<S: Simd>(simd: S, low: f32x8<S>, high: f32x8<S>) -> f32x8<S> {
     low.greater(-high).greater(f32x8::splat(simd, 0.0))

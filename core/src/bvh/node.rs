@@ -10,7 +10,7 @@
 //! ```
 //!
 //! The quantised box holds the exact one and at least a sixty-fourth of a step more on each side.
-//! That absorbs the rounding of `bound * step + (origin - ray origin)` where the ray starts near the
+//! This margin absorbs the rounding of `bound * step + (origin - ray origin)` where the ray starts near the
 //! node: there the terms are below 2^9 steps, so three roundings are below 2^-13 steps. Where the ray
 //! starts far away, the error is relative, and the far side of a slab test has a margin for it
 //! ([`slab`](super::slab)).
@@ -37,14 +37,14 @@ pub(crate) type Sides = [f32; 8];
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromBytes, Immutable, IntoBytes)]
 pub(crate) struct Node {
-    /// The bits of three f32: where bound 0 lies.
+    /// The bits of three f32: the position of bound 0.
     pub(crate) origin: [u32; 3],
     /// From low to high byte: the step of each axis, a power of two, as the exponent bits of an f32; and
     /// the mask of inner children: bit `s` says that child `s` is a node.
     pub(crate) word: u32,
     /// The first child node; the others follow it.
     pub(crate) child: u32,
-    /// Where the ids of the first leaf lie; those of the others follow them.
+    /// Place of the first id of the first leaf; those of the others follow.
     pub(crate) first: u32,
     /// Ids of each leaf.
     pub(crate) counts: [u8; WIDTH],
@@ -54,7 +54,7 @@ pub(crate) struct Node {
 
 const _: () = assert!(size_of::<Node>() == 80 && align_of::<Node>() == 4);
 
-/// What a child is.
+/// A child of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Child {
     /// The node with this number.
@@ -79,7 +79,7 @@ impl Node {
         bounds: [[0xff; WIDTH], [0xff; WIDTH], [0xff; WIDTH], [0; WIDTH], [0; WIDTH], [0; WIDTH]],
     };
 
-    /// Where bound 0 lies.
+    /// Returns the position of bound 0.
     #[inline(always)]
     pub(crate) const fn origin(&self) -> [f32; 3] {
         let [x, y, z] = self.origin;
@@ -130,7 +130,7 @@ impl Node {
         self.word |= 1 << (24 + slot % WIDTH);
     }
 
-    /// What child `slot` is. A slot that is not used is a leaf of no ids.
+    /// Returns child `slot`. A slot that is not used is a leaf of no ids.
     #[inline(always)]
     pub(crate) fn child(&self, slot: u32) -> Child {
         let below = (1_u32 << (slot % 8)) - 1;
@@ -237,7 +237,7 @@ impl Node {
     }
 }
 
-/// How the sides of a box become bytes: the three low ones, then the three high ones, mirrored.
+/// The map from the sides of a box to bytes: the three low ones, then the three high ones, mirrored.
 struct Quantiser<S: Simd> {
     origin: f32x8<S>,
     inverse: f32x8<S>,

@@ -73,7 +73,7 @@ impl Sorted<'_> {
     }
 }
 
-/// How many rays memory is enough to sort at once.
+/// Returns the number of rays that memory is enough to sort at once.
 #[inline(always)]
 pub(crate) const fn window(memory: &[SortKey]) -> usize {
     let rays = memory.len() / 2;

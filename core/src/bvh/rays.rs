@@ -40,11 +40,11 @@ pub(crate) struct Rays {
     pub(crate) alive: u64,
     /// The triangles that they see.
     choice: Choice,
-    /// By how much origins may be off, in scene units: they are given in f64 and were rounded. 0 for rays in f32.
+    /// The most that origins may be off, in scene units: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) off: f32,
     /// The point that boxes and origins are relative to.
     pub(crate) center: [f32; 3],
-    /// How far the origins lie apart, in units of rounding: the growth of boxes that covers it.
+    /// Eight roundings of the origin farthest from the center: the growth of boxes that covers them.
     spread: f32,
     /// The growth of boxes that covers all of this.
     pub(crate) growth: f32,
@@ -73,7 +73,7 @@ const SCATTERED: f32 = 8.0 * UNIT / 4.0;
 
 /// Pairs that are decided at once.
 const PAIRS: usize = 8;
-/// As many are decided one by one.
+/// At most this many are decided one by one.
 const FEW_PAIRS: usize = 2;
 
 /// 2^-24: how much rounding to f32 changes a number, in parts of it.
@@ -106,7 +106,7 @@ impl Rays {
         }
     }
 
-    /// Where rays are put before [`prepare`](Self::prepare).
+    /// Returns the slots that rays are put in before [`prepare`](Self::prepare).
     pub(crate) fn slots(&mut self) -> &mut [Ray] {
         &mut self.given
     }
@@ -293,7 +293,7 @@ impl Rays {
         }
     }
 
-    /// Those of some rays that do not end before a distance.
+    /// Returns those of some rays that do not end before a distance.
     #[inline(always)]
     pub(crate) fn ending_behind<S: Simd>(&self, simd: S, distance: f32, rays: u64) -> u64 {
         let distance = f32x16::splat(simd, distance);
@@ -419,7 +419,7 @@ impl Rays {
     /// Ends a ray at a `t`.
     #[inline(always)]
     pub(crate) fn end_at(&mut self, ray: u32, t: f32) {
-        // What rounds to the same t may lie farther away: see `Slab::nearby`.
+        // Hits that round to the same t may lie farther away: see `Slab::nearby`.
         let scale = get(&self.scale, ray);
         let (end, tiny) = (t * scale, TINY * scale.max(1.0));
         put(&mut self.end, ray as usize % GROUP, end + (end.abs() * (WIDER - 1.0) + tiny));

@@ -74,17 +74,17 @@ pub(crate) struct Roots<'w> {
     pub(crate) mesh: &'w TriangleMesh<'w>,
     /// No step of a node is smaller than that of a box of this size.
     pub(crate) least: f32,
-    /// Where the entries are, and where the records go.
+    /// The entries, over which the records are written.
     pub(crate) entries: &'w mut [Entry],
     /// Room for the entries of any unit: as long as `entries` if units are crowded.
     pub(crate) spare: &'w mut [Entry],
     /// The ids, each at the place of its entry; empty if only the size is computed.
     pub(crate) ids: &'w mut [u32],
-    /// Where the ids lie in the index.
+    /// Place of the first id in the index.
     pub(crate) first: u32,
-    /// Where the nodes go.
+    /// Destination of the nodes.
     pub(crate) nodes: &'w mut [Node],
-    /// Where the nodes lie in the index.
+    /// The number of the first of the nodes in the index.
     pub(crate) child: u32,
     /// One for each bin of the tree, so no fewer than any division of it has bins.
     counts: &'w mut [u32],
@@ -166,7 +166,7 @@ impl<'w> Roots<'w> {
         }
     }
 
-    /// Where to cut a range in two, none of them smaller than a piece.
+    /// Returns the length of the first part of a range cut in two, neither part smaller than a piece.
     fn split(&self, range: Range<usize>) -> usize {
         let entries = self.entries.get(range).unwrap_or_default();
         debug_assert!(entries.len() > MOST_ROOT, "too few entries to cut");
@@ -267,7 +267,7 @@ impl<'w> Roots<'w> {
         copy(binned, Some(entries));
     }
 
-    /// Where the bin ends that begins with a range.
+    /// Finds the end of the bin at the start of a range.
     fn bin_end(&self, range: Range<usize>, shift: u32) -> usize {
         let entries = self.entries.get(range.clone()).unwrap_or_default();
         let Some(first) = entries.first().or_bug("a bin without entries") else { return range.end };

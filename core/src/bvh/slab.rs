@@ -31,13 +31,13 @@ pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0
 /// The factor that widens far distances by their relative error: 1 + 2^-20.
 pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 
-/// How much earlier a ray starts, relative to its start: more than [`WIDER`] brings a far side with a
-/// negative distance nearer.
+/// The amount by which a ray starts earlier, relative to its start: more than [`WIDER`] brings a far side
+/// with a negative distance nearer.
 pub(crate) const EARLIER: f32 = 2.0 * (WIDER - 1.0);
 
-/// How much farther back near sides are taken where sides may lie behind the start: a far side with a
-/// negative distance does not go farther by [`WIDER`], it comes nearer. `distance` is that of the scene's
-/// farthest corner.
+/// Returns the amount by which near sides are taken farther back where sides may lie behind the start: a far
+/// side with a negative distance does not go farther by [`WIDER`], it comes nearer. `distance` is that of the
+/// scene's farthest corner.
 #[inline(always)]
 fn behind(distance: f32) -> f32 {
     2.0 * (WIDER - 1.0) * distance
@@ -49,7 +49,7 @@ pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
 /// A ray, ready for boxes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slab {
-    /// Where the ray starts, moved by the slack so that near sides come nearer and far ones go farther.
+    /// Start of the ray, moved by the slack so that near sides come nearer and far ones go farther.
     pub(crate) origin_near: [f32; 3],
     pub(crate) origin_far: [f32; 3],
     /// One over the scaled direction.

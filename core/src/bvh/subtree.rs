@@ -59,10 +59,10 @@ pub(crate) struct Subtree {
     changes: [u8; MOST_ROOT],
 }
 
-/// How ranges are cut.
+/// The rule by which ranges are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cut {
-    /// Where the highest bit changes in which keys differ.
+    /// At the change of the highest bit in which keys differ.
     Keys,
     /// In halves of whole leaves, the largest first: fewer nodes, worse boxes.
     Halves,
@@ -95,7 +95,7 @@ pub(crate) struct Build<'w> {
     pub(crate) first: u32,
     pub(crate) child: u32,
     pub(crate) least: f32,
-    /// How to cut at first.
+    /// The rule to cut by at first.
     pub(crate) by: Cut,
 }
 

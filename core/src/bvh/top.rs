@@ -26,7 +26,7 @@ pub(crate) struct RootItem {
     pub(crate) max: [f32; 3],
     /// Triangles below it.
     pub(crate) count: u32,
-    /// Which record it is.
+    /// The number of its record.
     pub(crate) record: u32,
 }
 
@@ -206,7 +206,7 @@ fn parts(items: &mut [RootItem], all: ItemRange, halve: bool) -> [ItemRange; WID
     parts
 }
 
-/// What a bin has.
+/// The box and the cost of the items in a bin.
 #[derive(Clone, Copy)]
 struct Bin {
     bounds: Aabb,

@@ -9,8 +9,8 @@ use core::ops::Range;
 
 use super::layout::{CROWD, LEAST_PIECE, MOST_ROOT, TRIANGLES_PER_ROOT};
 
-/// Where the entries of crowded bins start, and where those of the others: crowded bins come first, so
-/// that the others lie side by side.
+/// Returns the places at which the entries of crowded bins start, and those of the others: crowded bins come
+/// first, so that the others lie side by side.
 pub(crate) fn starts(sizes: &[u32]) -> [u32; 2] {
     [0, sizes.iter().filter(|&&size| size as usize > CROWD).sum()]
 }
@@ -47,7 +47,7 @@ pub(crate) const fn is_seam(unit: &Range<usize>) -> bool {
 pub(crate) const SEAM: usize = 16_384;
 
 /// The units of some bins, given how many entries each bin has: first each crowded bin, then the
-/// others, gathered until the balance is enough for their root. What is left over belongs to the last unit.
+/// others, gathered until the balance is enough for their root. The rest belongs to the last unit.
 #[derive(Clone)]
 pub(crate) struct Units<'s> {
     sizes: &'s [u32],

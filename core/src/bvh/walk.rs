@@ -69,7 +69,7 @@ struct Wide<S: Simd> {
     filter: LineFilter<f32x8<S>>,
 }
 
-/// Which side is the near one on each axis: 0 for the low side, [`FLIP`] for the high side.
+/// The near side on each axis: 0 for the low side, [`FLIP`] for the high side.
 pub(super) type NearSides = [usize; 3];
 /// The distance in rows of [`Node::bounds`] from the low side of an axis to its high side. XOR with it swaps the sides.
 const FLIP: usize = 3;
@@ -170,7 +170,7 @@ impl<S: Simd> Wide<S> {
     }
 }
 
-/// Where the near sides lie.
+/// Finds the near side on each axis.
 #[inline(always)]
 pub(super) fn flips_of(slab: &Slab) -> NearSides {
     slab.inverse.map(|inverse| if inverse < 0.0 { FLIP } else { 0 })

@@ -18,7 +18,7 @@ use crate::extremes::Extremes;
 /// A triangle in the making, as bits: the least corner of its box, its id, minus the greatest corner, 0.
 pub(super) type TriangleItem = [u32; 8];
 
-/// Where the id stands in an item.
+/// Index of the id in an item.
 pub(super) const ID: usize = 3;
 
 /// The box of nothing.
@@ -90,7 +90,7 @@ const fn as_cost(count: u32) -> f32 {
     count as f32
 }
 
-/// How centres become bins.
+/// The map from centres to bins.
 struct BinScale {
     /// The least corner of the box of twice the centres.
     low: [f32; 3],
@@ -140,7 +140,7 @@ const fn bin(place: f32) -> usize {
     place.to_bits() as usize % BINS
 }
 
-/// Where a range is cut: bins of an axis from this one on are the second part.
+/// A split of a range: bins of an axis from this one on are the second part.
 #[derive(Clone, Copy)]
 struct Split {
     axis: usize,

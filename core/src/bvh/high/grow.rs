@@ -38,13 +38,13 @@ pub(super) struct Grow<'w> {
     /// A range of at most this many triangles is left to a task: its node stores the range, if there is room
     /// for the node.
     pub(super) wait: u32,
-    /// Where the nodes below the root go.
+    /// Destination of the nodes below the root.
     pub(super) nodes: &'w mut [Node],
     /// The number of the first of them in the index.
     pub(super) child: u32,
-    /// Where the ids of leaves go.
+    /// Destination of the ids of leaves.
     pub(super) ids: &'w mut [u32],
-    /// Where the first of them lies in the index.
+    /// Place of the first of them in the index.
     pub(super) first: u32,
     /// The factor that scales lengths before areas are computed from them.
     pub(super) unit: f32,
@@ -67,7 +67,7 @@ pub(super) struct Grown {
 /// A node to be made.
 #[derive(Clone, Copy)]
 struct Job {
-    /// Where it goes: 0 for the root, otherwise one more than its place.
+    /// Destination of the node: 0 for the root, otherwise one more than its place.
     place: u32,
     start: u32,
     end: u32,
@@ -250,7 +250,7 @@ fn halves<S: Simd>(simd: S, items: &[TriangleItem]) -> (usize, [Extent; 2]) {
     (middle, [Extent::of(simd, first), Extent::of(simd, second)])
 }
 
-/// Which part to cut next.
+/// Chooses the part to cut next.
 #[inline(always)]
 fn choose(parts: &[SubRange; WIDTH], halve: bool) -> Option<usize> {
     let mut best = None;

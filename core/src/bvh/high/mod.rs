@@ -208,7 +208,7 @@ fn boxes(
     let mut finite = 0;
     for (task, count) in counts.into_iter().enumerate().take(tasks) {
         let first = share(all, task, tasks);
-        // Those of a task stand behind those that others left out.
+        // Move the items of a task down over the places that earlier tasks left empty.
         if finite < first {
             move_down(items, first, count, finite);
         }
@@ -262,7 +262,7 @@ fn move_down<T: Copy>(all: &mut [T], from: usize, count: usize, to: usize) {
     }
 }
 
-/// What the steps after the first pass share.
+/// The inputs that the steps after the first pass share.
 struct HighInputs {
     least: f32,
     unit: f32,
@@ -282,7 +282,7 @@ struct RangesTask<'w> {
     start: u32,
     items: &'w mut [TriangleItem],
     ids: &'w mut [u32],
-    /// Where its ids lie in the index.
+    /// Place of its first id in the index.
     first: u32,
 }
 
@@ -290,7 +290,7 @@ struct RangesTask<'w> {
 #[derive(Debug, Clone, Copy, Default)]
 struct Ranges {
     count: u32,
-    /// Where the last one ends.
+    /// End of the last one.
     end: u32,
     /// Triangles in them.
     triangles: u32,
