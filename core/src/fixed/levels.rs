@@ -42,7 +42,7 @@ impl Level {
         x as u64 * y as u64 * z as u64
     }
 
-    /// Where the next level's words start.
+    /// Returns the place at which the next level's words start.
     const fn end(&self) -> u64 {
         self.start + self.cells().div_ceil(WORD_BITS as u64)
     }
@@ -125,7 +125,7 @@ impl Levels {
         (0..level).fold(1, |size: u32, _| size.saturating_mul(self.factor.get()))
     }
 
-    /// How many cells of the level below a macrocell has on each axis.
+    /// Returns the number of cells of the level below that a macrocell has on each axis.
     pub(super) const fn factor(&self) -> NonZeroU32 {
         self.factor
     }

@@ -1,7 +1,7 @@
 //! The multi-level fixed hashed grid (CP10 §3.2): a fine hashed grid under macrocell levels.
 //!
 //! The cells are those of a one-level grid at a high density, 32 by default, so that each lists few
-//! triangles. What that costs in steps the macrocells save: a ray crosses empty space in steps of
+//! triangles. The macrocells save the steps that this costs: a ray crosses empty space in steps of
 //! `factor`, `factor^2`, ... cells, and goes down a level only where something is.
 //!
 //! ```text

@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::mesh::TriangleMesh;
 
 impl Fixed<'_> {
-    /// Returns true if this is what a build makes of the mesh; the error names the first byte that is not.
+    /// Proves that this is what a build makes of the mesh; the error names the first byte that is not.
     pub(crate) fn validate(
         &self,
         header: &Header,

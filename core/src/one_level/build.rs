@@ -29,7 +29,7 @@ use crate::error::{ConfigField, Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::survey::{Survey, reference_limit};
 
-/// What a structure keeps behind the sections of its one-level grid.
+/// The words that a structure keeps behind the sections of its one-level grid.
 pub(crate) trait Overlay {
     /// Words for a grid with this resolution.
     fn words(&self, resolution: [u32; 3]) -> u64;
@@ -164,7 +164,7 @@ pub(crate) fn build_under<'a>(
     let blob = bytes.and_then(|bytes| index.get_mut(..bytes)).ok_or(too_small)?;
     let sections = plan.layout.sections_mut(blob).ok_or(too_small)?;
 
-    // What was here is no grid any more, should the build be cancelled.
+    // Clear the header first: if the build is cancelled, the region must not open as a grid.
     sections.header.fill(0);
     copy(rows.offsets, sections.row_offsets);
     copy(rows.domain_bits, sections.domain_bits);

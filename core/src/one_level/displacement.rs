@@ -11,7 +11,7 @@
 //! ```
 //!
 //! Plain first fit tries every slot from the first free one: quadratic, minutes where the rest of a
-//! build takes a second. It is linear because the search starts at most [`WINDOW_SLOTS`] before the
+//! build takes a second. It is linear because the search starts at most [`WINDOW_SLOTS`] and a word before the
 //! end of the table, and fast because many offsets are tried at once: 64 for each word, 512 with
 //! vectors. Rows keep their natural order: sorting them by length gains about 1 % of the table.
 
@@ -21,7 +21,7 @@ use fearless_simd::{Simd, u64x8};
 use crate::bits::{WORD_BITS, each_one, extent, load, low_bits};
 use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
 
-/// How far back from the end of the table a row looks for holes.
+/// Number of slots before the end of the table in which a row looks for holes.
 ///
 /// More finds more holes and takes longer; core/DESIGN.md says how it was chosen.
 const WINDOW_SLOTS: usize = 2048;

@@ -1,4 +1,4 @@
-//! How many bytes a one-level grid takes and where they lie: one struct answers both.
+//! The size of a one-level grid and the places of its sections: one struct knows both.
 //!
 //! ```text
 //! index    | header | row_offsets | domain_bits | hash       | references | overlay |
@@ -67,7 +67,7 @@ pub(crate) struct Scratch<'a> {
     pub(crate) row_offsets: &'a mut [i32],
     pub(crate) domain_bits: &'a mut [u64],
     pub(crate) occupied: &'a mut [u64],
-    /// What is behind them.
+    /// The bytes behind them.
     pub(crate) rest: &'a mut [u8],
 }
 

@@ -12,7 +12,7 @@
 //! ```
 //!
 //! Most cells of a scan are empty, so a ray mostly reads bits that lie next to each other and stay
-//! in the cache. What a cell costs is one bit and, if it is not empty, about 1.2 slots of 4 bytes.
+//! in the cache. A cell costs one bit and, if it is not empty, about 1.2 slots of 4 bytes.
 
 mod build;
 mod displacement;
@@ -148,7 +148,7 @@ impl<'a> OneLevel<'a> {
         self.sections.references
     }
 
-    /// Where each row starts in the hash table.
+    /// Returns the start of each row in the hash table.
     pub(crate) const fn row_offsets(&self) -> &'a [i32] {
         self.sections.row_offsets
     }
@@ -163,7 +163,7 @@ impl<'a> OneLevel<'a> {
         self.sections.domain_bits
     }
 
-    /// What a structure above this one keeps behind it.
+    /// Returns the words that a structure above this one keeps behind it.
     pub(crate) const fn overlay(&self) -> &'a [u64] {
         self.sections.overlay
     }

@@ -54,7 +54,7 @@ pub(crate) struct PlacedBatch {
     pub(super) rows: [[u32; LANES]; Self::EIGHTS],
     pub(super) xs: [[u32; LANES]; Self::EIGHTS],
     pub(super) more: [[u32; LANES]; Self::EIGHTS],
-    /// Which of them are placed; of the others the cells are not known here.
+    /// Bits of those that are placed; of the others the cells are not known here.
     pub(super) is_placed: u64,
 }
 
@@ -62,7 +62,7 @@ pub(crate) struct PlacedBatch {
 const _: () = assert!(OFTEN.is_multiple_of(PlacedBatch::SIZE));
 
 impl PlacedBatch {
-    /// As many as the bits that say which of them are placed.
+    /// Primitives of a batch: as many as `is_placed` has bits.
     const SIZE: u32 = u64::BITS;
     const EIGHTS: usize = Self::SIZE as usize / LANES;
 

@@ -1,7 +1,7 @@
 //! Spreading primitives over cells: mark, count, and sort them into lists.
 //!
 //! Two passes of a compact grid (LD08) over a hash table: count the references of every slot, sum
-//! up, and fill in reverse, so that every list ascends. What is spread comes from a
+//! up, and fill in reverse, so that every list ascends. The primitives come from a
 //! [`Spread`]: the triangles of a mesh over a lattice, or the triangles of one cell over a subgrid;
 //! batch after batch of them is placed (`placed.rs`) and then spread.
 

@@ -24,7 +24,7 @@ use crate::error::Error;
 use crate::lists::{ascends, pairs};
 use crate::mesh::TriangleMesh;
 
-/// Returns true if the header says what the mesh and Woo's rule say.
+/// Checks that the header says what the mesh and Woo's rule say.
 pub(crate) fn check_header(
     header: &Header,
     lattice: &Lattice,
@@ -34,7 +34,7 @@ pub(crate) fn check_header(
 }
 
 impl OneLevel<'_> {
-    /// Returns true if this is what a build makes of the mesh; the error names the first byte that is not.
+    /// Proves that this is what a build makes of the mesh; the error names the first byte that is not.
     pub(crate) fn validate(
         &self,
         header: &Header,

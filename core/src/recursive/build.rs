@@ -126,7 +126,7 @@ pub(crate) fn build<'a>(
 /// The outermost grid, as fine as its references allow.
 struct Root {
     survey: Survey,
-    /// Its own cells are the unit of all boxes below it.
+    /// The grid's own cells, which are the unit of all boxes below it.
     lattice: Lattice,
     density: f32,
     rule: Fineness,
@@ -156,7 +156,7 @@ impl Root {
     }
 }
 
-/// How many references the outermost grid has, or some number above the limit.
+/// Counts the references of the outermost grid, or returns some number above the limit.
 fn references(mesh: &TriangleMesh<'_>, lattice: &Lattice, limit: u64) -> u64 {
     let node = Node::root(lattice.resolution);
     let mut references = 0;
@@ -192,7 +192,7 @@ fn run(
 
     // An index that is too small is legal, and the sizes have none: the pool counts.
     let (header, pool) = index.split_at_mut_checked(HEADER_BYTES).unwrap_or_default();
-    // What was here is no grid any more, should the build end with an error.
+    // Clear the header first: if the build ends with an error, the region must not open as a grid.
     header.fill(0);
     let mut builder = Builder { mesh, lattice: &lattice, rule, pool: Bump::over(pool), watch };
 
@@ -213,7 +213,7 @@ fn run(
     Ok(header)
 }
 
-/// How finely a grid is cut.
+/// The parameters that decide how finely a grid is cut.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fineness {
     pub(super) density: f64,
@@ -234,8 +234,8 @@ impl Fineness {
         let volume = size.iter().product::<f64>();
         let mut parts = size.map(|s| s * m / root(volume, 3));
 
-        // What an axis has less than one cell of, the others share; a second such axis leaves all
-        // cells to the third.
+        // An axis with less than one cell gets one, and the others share the loss; if one of them then has less
+        // than one, too, it gets one, and the third takes the loss alone.
         for axis in 0..3 {
             if parts[axis] < 1.0 {
                 let share = root(parts[axis], 2);
@@ -316,7 +316,7 @@ const fn rounded(part: f64) -> u32 {
 
 /// A triangle in the cells of the root.
 pub(super) struct PlacedTriangle {
-    /// Its box, grown by the margin.
+    /// The triangle's box, grown by the margin.
     pub(super) reach: Aabb,
     overlap: Overlap,
     margin: Vec3A,

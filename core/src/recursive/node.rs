@@ -11,23 +11,23 @@ use crate::limits::MAX_RESOLUTION_OF_RECURSIVE;
 pub(super) const HEAD_WORDS: usize = 7;
 const RESOLUTION_BITS: u32 = (MAX_RESOLUTION_OF_RECURSIVE + 1).ilog2();
 
-/// What a cell holds.
+/// The content of a cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum CellContent<'a> {
     /// Primitive ids, ascending.
     List(&'a [u32]),
-    /// Where in the pool its grid starts.
+    /// Start of its grid in the pool.
     Grid(usize),
 }
 
 /// A grid: where it lies and how finely it is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Node {
-    /// Where its entries start in the pool.
+    /// Start of its entries in the pool.
     entries: usize,
-    /// Its least corner, in cells of the root.
+    /// Least corner, in cells of the root.
     pub(super) origin: [f32; 3],
-    /// Its cells for each cell of the root.
+    /// Cells of this grid for each cell of the root.
     pub(super) scale: [f32; 3],
     pub(super) resolution: [u32; 3],
 }
@@ -81,12 +81,12 @@ impl Node {
         self.resolution.iter().map(|&cells| cells as usize).product()
     }
 
-    /// Where in the pool the contents of its cells start.
+    /// Returns the start of its cells' contents in the pool.
     pub(super) fn contents(&self) -> usize {
         self.entries.saturating_add(self.cells()).saturating_add(1)
     }
 
-    /// Where in the pool the content of a cell starts, or ends if the number is one too many.
+    /// Returns the start of a cell's content in the pool, or the end of the last one if the number is one too many.
     pub(super) fn start(&self, pool: &[u32], number: usize) -> Option<usize> {
         Some((pool.get(self.entries.checked_add(number)?)? & !GRID) as usize)
     }
@@ -111,7 +111,7 @@ impl Node {
         cells_between(Aabb { min: within(reach.min), max: within(reach.max) }, self.resolution)
     }
 
-    /// What a cell holds; `None` if it is empty.
+    /// Returns the content of a cell; `None` if it is empty.
     #[inline(always)]
     pub(super) fn content<'a>(
         &self,

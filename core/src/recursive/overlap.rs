@@ -12,7 +12,7 @@ pub(super) struct Overlap {
     corners: [Vec3A; 3],
     edges: [Vec3A; 3],
     normal: Vec3A,
-    /// How wrong the plane of a thin triangle may be, for each unit of distance from the triangle.
+    /// Error bound of the plane of a thin triangle, for each unit of distance from the triangle.
     slack: f32,
 }
 
@@ -44,7 +44,7 @@ impl Overlap {
     }
 }
 
-/// How far a box reaches along each axis `unit.cross(edge)`.
+/// Returns the reach of a box along each axis `unit.cross(edge)`.
 fn across(half: Vec3A, edge: Vec3A) -> Vec3A {
     Vec3A::new(
         half.y * edge.z + half.z * edge.y,

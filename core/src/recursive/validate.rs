@@ -6,7 +6,7 @@
 //! if none is missing: one sum against another. A grid in a cell has the box and the resolution
 //! that a build gives to the triangles in it, and so many of them that it was worth it.
 //!
-//! Whether a list is long because nothing would separate its triangles would take memory to prove:
+//! It would take memory to prove that a list is long because nothing would separate its triangles:
 //! a list may have any length. Queries do not mind.
 
 use super::build::{Fineness, PlacedTriangle, inside};
@@ -26,13 +26,13 @@ type CellOfGrid = (Node, [u32; 3]);
 
 const LEVELS: usize = MAX_DEPTH as usize;
 
-/// What a check runs over.
+/// The state of a check.
 struct Check<'a> {
     pool: &'a [u32],
     mesh: &'a TriangleMesh<'a>,
     lattice: &'a Lattice,
     rule: Fineness,
-    /// Where the pool goes on.
+    /// Place in the pool at which its next part must start.
     cursor: usize,
     /// The cells around the list that is read, from the root on.
     places: [Option<CellOfGrid>; LEVELS],
@@ -45,11 +45,11 @@ struct Check<'a> {
 /// The triangles in a grid.
 #[derive(Debug, Clone, Copy)]
 struct Contents {
-    /// How many there are.
+    /// Number of triangles.
     count: u32,
-    /// How many its cells have in all.
+    /// Triangles of each of its cells, added up.
     references: u64,
-    /// How many cells have any.
+    /// Number of cells that have any.
     lists: u64,
     reach: Aabb,
 }
@@ -59,7 +59,7 @@ impl Contents {
 }
 
 impl Recursive<'_> {
-    /// Returns true if this is what a build makes of the mesh.
+    /// Proves that this is what a build makes of the mesh.
     pub(crate) fn validate(
         &self,
         header: &Header,
@@ -253,7 +253,7 @@ impl Check<'_> {
         }
     }
 
-    /// How many lists below a grid must have a triangle.
+    /// Counts the lists below a grid that must have a triangle.
     fn expected(&self, node: &Node, placed: &PlacedTriangle, depth: u32) -> u64 {
         let mut sum = 0;
         placed.each_cell(node, |_, cell| {

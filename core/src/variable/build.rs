@@ -40,7 +40,7 @@ struct CellSpread<'m> {
 }
 
 impl CellSpread<'_> {
-    /// What a primitive reaches, in cells of the top.
+    /// Returns the reach of a primitive, in cells of the top.
     fn reach(&self, id: u32) -> Option<Aabb> {
         let bounds = self.mesh.corners(id).and_then(Aabb::of);
         let bounds = bounds.or_bug("a list with a triangle that is not finite")?;
@@ -231,7 +231,7 @@ fn run(
     };
     let mut pool = Bump::over(pool);
     let mut slots = head.map(|sections| {
-        // What was here is no grid any more, should the build end with an error.
+        // Clear the header first: if the build ends with an error, the region must not open as a grid.
         sections.header.fill(0);
         copy(offsets, sections.row_offsets);
         copy(domain_bits, sections.domain_bits);

@@ -33,7 +33,7 @@ use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes, sizes};
 use subgrid::Subgrid;
 
-/// What a cell of the top holds.
+/// The content of a cell of the top.
 #[derive(Debug, Clone, Copy)]
 enum CellContent<'a> {
     /// Primitive ids, ascending.
@@ -62,7 +62,7 @@ impl<'a> Variable<'a> {
         self.top.list_words()
     }
 
-    /// What a cell holds; `None` if it is empty.
+    /// Returns the content of a cell; `None` if it is empty.
     #[inline(always)]
     fn content(&self, cell: [u32; 3]) -> Option<CellContent<'a>> {
         let [start, end] = self.top.ends(cell)?;

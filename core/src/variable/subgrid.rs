@@ -6,7 +6,7 @@
 //! head  | low x y z, width | high x y z, height | slots, depth      |    8 bits each, slots 24
 //! ```
 //!
-//! Its box is the part of the cell that the primitives reach, in 1/256 of the cell, rounded
+//! The box of a subgrid is the part of the cell that the primitives reach, in 1/256 of the cell, rounded
 //! outwards: so a ray crosses the empty part of the cell in one step, and three words hold it all.
 
 use glam::Vec3A;
@@ -27,7 +27,7 @@ const PARTS: f32 = 256.0;
 const HEAD_WORDS: usize = 3;
 const WORD_BITS: usize = u32::BITS as usize;
 
-/// Where a subgrid lies in its cell and how finely it is cut.
+/// The place of a subgrid in its cell, and its resolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Frame {
     low: [u8; 3],

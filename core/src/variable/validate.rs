@@ -10,8 +10,8 @@
 //! has stops, as damaged bytes could keep it busy for ever.
 //!
 //! A subgrid has the frame and the resolution that a build gives to the primitives in it, and so
-//! many of them that it was worth it. Whether a list is long because nothing would separate its
-//! primitives would take memory to prove, so a list may have any length. No answer depends on it:
+//! many of them that it was worth it. It would take memory to prove that a list is long because nothing
+//! would separate its primitives, so a list may have any length. No answer depends on it:
 //! a query reads a list from its start to its end, however long it is.
 
 use super::subgrid::Subgrid;
@@ -28,7 +28,7 @@ use crate::one_level::{check_header, slots_are_sound};
 use crate::survey::{boxes, reference_limit};
 
 impl Variable<'_> {
-    /// Returns true if this is what a build makes of the mesh.
+    /// Proves that this is what a build makes of the mesh.
     pub(crate) fn validate(
         &self,
         header: &Header,
@@ -90,7 +90,7 @@ impl Variable<'_> {
         if listed == expected { Ok(()) } else { Err(at(self.top.lists())) }
     }
 
-    /// Returns true if the table of the top cuts the pool into parts, as displaced rows leave it.
+    /// Proves that the table of the top cuts the pool into parts, as displaced rows leave it.
     fn check_table(&self, header: &Header, lattice: &Lattice, blob: &[u8]) -> Result<(), Error> {
         let at = |section: usize, byte: usize| corrupt(section - blob.as_ptr().addr() + byte);
         let hash = self.top.hash();
@@ -149,7 +149,7 @@ impl Inside<'_> {
         Some((self.lattice.range(&bounds), self.lattice.reach(&bounds)))
     }
 
-    /// What the triangles in it reach, each once: where its cells begin.
+    /// Returns the reaches of the triangles in it, each once: where its cells begin.
     fn reaches(&self) -> impl Iterator<Item = Aabb> {
         self.lists().flat_map(|(sub, ids)| ids.iter().map(move |&id| (sub, id))).filter_map(
             |(sub, id)| {
