@@ -49,7 +49,7 @@ impl IndexType {
     }
 }
 
-/// How the corners of a triangle are found.
+/// The way in which the corners of a triangle are found.
 #[derive(Debug, Clone, Copy)]
 enum IndexLayout<'a> {
     /// By three indices of so many bytes.
@@ -225,7 +225,7 @@ impl<'a> TriangleMesh<'a> {
         }
     }
 
-    /// What it is made of.
+    /// Returns the content of blobs that are built over it.
     pub(crate) const fn content(&self) -> Content {
         match self.layout {
             IndexLayout::Indexed(_) | IndexLayout::Packed(_) | IndexLayout::Joined(_) => {

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! So a grid over parts is the grid over one mesh with the same triangles, bit for bit, and a hit stays
-//! as small as it is. Reading triangle `i` takes a binary search for its part. What reads many
-//! triangles in order goes from [`Piece`] to piece, and what reads triangles that lie near one another
+//! as small as it is. Reading triangle `i` takes a binary search for its part. Code that reads many
+//! triangles in order goes from [`Piece`] to piece, and code that reads triangles that lie near one another
 //! remembers the part of the last one ([`Reader`]).
 
 use core::ops::Range;
@@ -50,7 +50,7 @@ impl<'a> MeshPart<'a> {
     }
 }
 
-/// How many triangles and vertices parts have before the next one.
+/// The numbers of triangles and vertices that parts have before the next one.
 #[derive(Debug, Default)]
 struct Totals {
     triangles: u32,
@@ -112,7 +112,7 @@ impl<'a> TriangleMesh<'a> {
     /// Makes parts that [`join`](Self::join) has numbered one mesh again: all of them, in their order.
     ///
     /// # Errors
-    /// Those of [`join`](Self::join), and [`Error::InvalidMesh`] with [`MeshField::Parts`] if the
+    /// The errors of [`join`](Self::join), and [`Error::InvalidMesh`] with [`MeshField::Parts`] if the
     /// numbers are not those that it gives.
     pub fn joined(parts: &'a [MeshPart<'a>]) -> Result<Self, Error> {
         let mut totals = Totals::default();
@@ -150,7 +150,7 @@ impl<'a> TriangleMesh<'a> {
         Some((part as u32, triangle.checked_sub(first)?))
     }
 
-    /// Which part a triangle lies in, of a mesh that has parts.
+    /// Finds the part that a triangle lies in, with its number, of a mesh that has parts.
     fn place_of(&self, triangle: u32) -> Option<(usize, &'a MeshPart<'a>)> {
         let parts = self.parts();
         let at = parts.partition_point(|part| part.first <= triangle).checked_sub(1)?;
@@ -221,7 +221,7 @@ impl<'a> TriangleMesh<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Piece<'m> {
     pub(crate) mesh: &'m TriangleMesh<'m>,
-    /// What the first triangle of this mesh is called in the whole.
+    /// The number of this mesh's first triangle in the whole.
     pub(crate) first: u32,
     /// The triangles, as this mesh calls them.
     pub(crate) triangles: Range<u32>,

@@ -30,14 +30,14 @@ use crate::method::{Content, Method};
 use crate::scene::ends_of;
 pub use scene::Member;
 
-/// What the header of a blob says, whether or not the rest of it is there.
+/// The data in the header of a blob, whether or not the rest of the blob is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BlobInfo {
     /// The version of the format.
     pub version: u32,
-    /// What it is built over.
+    /// The content of the blob.
     pub content: Content,
-    /// What built it.
+    /// The method that built it.
     pub method: Method,
     /// True if it is packed: the mesh, or all that a scene shows, is in it.
     pub has_mesh: bool,
@@ -98,7 +98,7 @@ impl BlobInfo {
     }
 }
 
-/// Where the mesh lies behind a grid.
+/// The places of the mesh's arrays behind a grid, in bytes from the start of the blob.
 struct MeshSections {
     positions: u64,
     indices: u64,
@@ -200,12 +200,12 @@ impl<'a> Grid<'a> {
 
     /// Opens a blob that [`pack`](Self::pack) wrote, in O(1): the mesh is its own.
     ///
-    /// What [`open`](Self::open) says of damaged bytes holds here, too;
+    /// The remarks of [`open`](Self::open) on damaged bytes hold here, too;
     /// [`validate`](Self::validate) proves that the grid is one of the mesh
     /// behind it, whatever mesh that is.
     ///
     /// # Errors
-    /// Those of [`open`](Self::open), and [`Error::NoMesh`].
+    /// The errors of [`open`](Self::open), and [`Error::NoMesh`].
     ///
     /// ```
     /// # use hgrid_core::*;

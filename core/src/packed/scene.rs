@@ -57,7 +57,7 @@ impl<'a> Member<'a> {
 struct PackedSizes {
     members: u32,
     references: u64,
-    /// Where the members start.
+    /// Start of the members, in bytes.
     start: u64,
     end: u64,
 }
@@ -250,8 +250,8 @@ impl<'a> Scene<'a> {
     /// Opens a blob that [`pack`](Self::pack) wrote where it lies, in O(members): no copy and no allocation.
     ///
     /// `members` and `objects` are room for views of what is in it: as many as
-    /// [`BlobInfo::triangle_count`] and [`BlobInfo::vertex_count`] say; more is not used. What
-    /// [`open`](Self::open) says of damaged bytes holds here, too.
+    /// [`BlobInfo::triangle_count`] and [`BlobInfo::vertex_count`] say; more is not used. The remarks of
+    /// [`open`](Self::open) on damaged bytes hold here, too.
     ///
     /// # Errors
     /// [`Error::MissingObjects`] if there is less room; [`Error::OtherContent`] for a blob that is no packed scene;
@@ -270,7 +270,7 @@ impl<'a> Scene<'a> {
     /// Scratch of a 64th of the blob's bytes is enough; it need not be aligned.
     ///
     /// # Errors
-    /// Those of [`open_packed`](Self::open_packed) and of the proofs.
+    /// The errors of [`open_packed`](Self::open_packed) and of the proofs.
     pub fn open_packed_proven(
         blob: &'a [u8],
         members: &'a mut [Member<'a>],

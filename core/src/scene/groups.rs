@@ -25,7 +25,7 @@ use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
 use crate::search::Outcome;
 use crate::simd::SimdLevel;
 
-/// As many rays or fewer are asked for one by one.
+/// At most this many rays are asked for one by one.
 const FEW: u32 = 2;
 
 /// Answers all rays of a batch.
@@ -107,7 +107,7 @@ struct Travellers<'r> {
     /// The largest coordinate of an origin that was rounded, or 0.
     largest: f32,
     best: [SceneHit; GROUP],
-    /// Those of the rays that enter an object, as it sees them, and their lanes in the group.
+    /// The rays that enter an object, as it sees them, and their lanes in the group.
     seen: [Seen; GROUP],
     lanes: [u32; GROUP],
     inside: Rays,

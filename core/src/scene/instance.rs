@@ -32,9 +32,9 @@ pub struct Instance {
     /// Rows of the matrix that takes the object's directions to the scene's. Mirrors, shears and scales of any
     /// kind are allowed, as long as the matrix has an inverse.
     pub linear: [[f32; 3]; 3],
-    /// Which of the scene's objects.
+    /// Number of the object among those of the scene.
     pub object: u32,
-    /// Where the object's origin lies in the scene.
+    /// Position of the object's origin in the scene.
     pub translation: [f64; 3],
     /// Seen by queries whose mask has a bit of it.
     pub mask: u32,
@@ -80,14 +80,14 @@ impl Instance {
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes)]
 pub(super) struct StoredInstance(Instance);
 
-/// How far the product of a matrix and its rounded inverse may be from one.
+/// The most that the product of a matrix and its rounded inverse may differ from one.
 const RESIDUE: f64 = 1.0 / 1024.0;
 
-/// What an object's box grows by, in parts of its coordinates and extents: more than the rounding of a ray that
+/// Growth of an object's box, in parts of its coordinates and extents: more than the rounding of a ray that
 /// starts within a few extents of it.
 const GROWTH: f64 = 1.0 / 524_288.0; // 2^-19
 
-/// What a scene's box grows by, in parts of its coordinates: more than they are rounded by.
+/// Growth of an instance's box in the scene, in parts of its coordinates: more than they are rounded by.
 const ROUNDING: f64 = 1.0 / 4_194_304.0; // 2^-22
 
 type Matrix = [[f64; 3]; 3];
@@ -188,7 +188,7 @@ fn inverse_of([a, b, c]: &Matrix) -> Option<Matrix> {
 /// A ray as an object sees it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seen {
-    /// Its direction is scaled: the largest component lies between 1 and 2.
+    /// The ray's line, its direction scaled: the largest component lies between 1 and 2.
     pub(super) line: LineF64,
     /// `t` of this ray = `t` of the scene's ray * scale - shift.
     pub(super) scale: f64,
@@ -246,7 +246,7 @@ impl Seen {
         })
     }
 
-    /// Where the ray's line enters a box.
+    /// Finds the distance at which the ray's line enters a box, in multiples of its direction.
     #[inline(never)]
     fn entry(&self, center: &[f64; 3], half: &[f64; 3]) -> Option<f64> {
         let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);

@@ -34,8 +34,8 @@ pub(crate) use store::ends_of;
 /// Tests the shapes of an object in a scene, from any number of threads at once. Every function like a
 /// [`ShapeTest`](crate::ShapeTest) that needs no `&mut` is one.
 pub trait ObjectTest: Sync {
-    /// Where a ray hits a shape. The ray is the one that the object sees: in the object's space, with a direction
-    /// and a range of its own, for which the answer is, too.
+    /// Returns the hit of a ray on a shape, if there is one. The ray is the one that the object sees: in the
+    /// object's space, with a direction and a range of its own, for which the answer is, too.
     fn test(&self, shape: u32, ray: &Ray) -> Option<ShapeHit>;
 }
 
@@ -45,7 +45,7 @@ impl<F: Fn(u32, &Ray) -> Option<ShapeHit> + Sync> ObjectTest for F {
     }
 }
 
-/// What an instance shows.
+/// An object that instances show.
 #[derive(Clone, Copy, Default)]
 pub enum Object<'a> {
     /// A grid of triangles, by any method.
@@ -144,7 +144,7 @@ impl fmt::Debug for Scene<'_> {
     }
 }
 
-/// What the blob of a scene says beyond its tree.
+/// The table behind the tree in the blob of a scene.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromBytes, Immutable, IntoBytes)]
 struct Table {

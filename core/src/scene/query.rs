@@ -22,7 +22,7 @@ use crate::options::{Cull, QueryOptions, Verdict};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
 use crate::search::{BoxSearch, Outcome};
 
-/// Where a ray meets a scene: 32 bytes.
+/// The hit of a ray in a scene: 32 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct SceneHit {
@@ -60,12 +60,12 @@ impl SceneHit {
 /// Says of a hit whether it counts: gets the place of the ray in its batch, 0 for a single one, and the hit.
 pub type SceneFilter<'q> = dyn FnMut(usize, &SceneHit) -> Verdict + 'q;
 
-/// What a query of a scene may be told. `SceneOptions::default()` changes nothing.
+/// The options of a query of a scene. `SceneOptions::default()` changes nothing.
 pub struct SceneOptions<'q> {
     /// An instance or a triangle is seen if its mask and this have a bit in common. With all bits, the
     /// default, everything is seen, even with a mask of 0.
     pub mask: u32,
-    /// Which sides of triangles are not hit. The front is decided in the space of the triangle's own mesh: an
+    /// The sides of triangles that are not hit. The front is decided in the space of the triangle's own mesh: an
     /// instance that mirrors does not turn it round.
     pub cull: Cull,
     /// Says of a hit whether it counts. Within an instance it is asked from near to far and about each triangle at most
@@ -73,8 +73,8 @@ pub struct SceneOptions<'q> {
     /// another instance. [`Verdict::AcceptAndStop`] is the same as [`Verdict::Accept`]. Shapes are not shown to it: their
     /// test decides.
     pub filter: Option<&'q mut SceneFilter<'q>>,
-    /// Where to add up the work: an instance that is offered is a primitive test. With counters or a filter, the rays of a
-    /// batch are traced one by one.
+    /// Counters that add up the work: an instance that is offered is a primitive test. With counters or a filter, the
+    /// rays of a batch are traced one by one.
     pub counters: Option<&'q mut Counters>,
     /// Memory to sort the rays of a batch in, as [`QueryOptions::scratch`].
     pub scratch: &'q mut [u8],
@@ -270,7 +270,7 @@ impl Scene<'_> {
     }
 }
 
-/// What holds for all instances.
+/// The conditions that hold for all instances.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Question {
     mask: u32,
@@ -317,7 +317,7 @@ impl InstanceSearch<'_, '_> {
         if self.question.is_any { Outcome::Done } else { Outcome::EndsAt(hit.t) }
     }
 
-    /// What a ray hits in an instance, no farther than what was hit before.
+    /// Finds the ray's hit in an instance, no farther than what was hit before.
     fn ask(&mut self, number: u32) -> Option<SceneHit> {
         let Self { scene, line, ray, level, question, .. } = *self;
         let is_any = question.is_any;

@@ -34,7 +34,7 @@ const fn behind_bytes(instances: u64) -> u64 {
         + section_bytes::<StoredInstance>(instances)
 }
 
-/// Where the tree of a scene ends and its table starts, and the bytes of all of it.
+/// Returns the place at which the tree of a scene ends and its table starts, and the bytes of all of it.
 pub(crate) fn ends_of(header: &Header) -> (u64, u64) {
     let start = align_up(header.blob_bytes);
     (start, start.saturating_add(behind_bytes(header.triangle_count.into())))
@@ -127,7 +127,7 @@ impl<'a> Scene<'a> {
     /// Builds a scene with its tree made on the caller's threads: bit by bit the same scene.
     ///
     /// # Errors
-    /// Those of [`build`](Self::build) and of [`Grid::build_with`].
+    /// The errors of [`build`](Self::build) and of [`Grid::build_with`].
     pub fn build_with(
         instances: &[Instance],
         objects: &'a [Object<'a>],
@@ -242,7 +242,7 @@ impl<'a> Scene<'a> {
         Ok(Self { blob, tree, instances, objects, levels, object_count })
     }
 
-    /// How many objects a scene takes, from its bytes.
+    /// Reads from a scene's bytes the number of objects that it takes.
     pub(crate) fn named_in(blob: &[u8]) -> Result<usize, Error> {
         let (start, _) = ends_of(&Header::peek(blob)?);
         let table = usize::try_from(start).ok().and_then(|start| blob.get(start..)?.first_chunk());
@@ -254,7 +254,7 @@ impl<'a> Scene<'a> {
     /// O(instances); the objects have proofs of their own.
     ///
     /// # Errors
-    /// Those of [`Grid::validate`].
+    /// The errors of [`Grid::validate`].
     pub fn validate(&self, scratch: &mut [u8]) -> Result<(), Error> {
         let header = Header::peek(self.blob)?;
         let (start, _) = ends_of(&header);
