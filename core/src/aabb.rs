@@ -24,7 +24,7 @@ impl Aabb {
         finite.all().then(|| Self { min: a.min(b).min(c), max: a.max(b).max(c) })
     }
 
-    /// Its extent on each axis.
+    /// Returns the extent on each axis.
     #[inline(always)]
     pub(crate) fn size(&self) -> Vec3A {
         self.max - self.min

@@ -31,7 +31,7 @@ pub(crate) const FAR_EXTENTS: f32 = 4.0;
 /// Origins farther than this are remote: 2^-49 of such a distance is 2^-20 of an extent.
 const REMOTE_EXTENTS: f64 = (1 << 29) as f64;
 
-/// By how much a ray from afar may be off, in parts of its distance: 2^-49.
+/// The most that a ray from afar may be off, in parts of its distance: 2^-49.
 const OFF: f64 = 8.0 * f64::EPSILON;
 
 /// A ray without a range, in f64.
@@ -47,23 +47,23 @@ impl From<&RayF64> for LineF64 {
     }
 }
 
-/// Where a ray meets a box.
+/// A ray that was brought to a box.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Approach {
     /// The ray's origin, or a point of the ray at the box if that is far away.
     pub(crate) anchor: [f32; 3],
     /// The `t` of the anchor.
     pub(crate) t: f64,
-    /// Where the ray's line enters the box, in multiples of its direction from the anchor.
+    /// Distance from the anchor at which the ray's line enters the box, in multiples of its direction.
     pub(crate) near: f64,
-    /// Where it leaves the box.
+    /// Distance at which it leaves the box.
     pub(crate) far: f64,
     /// One over the direction.
     pub(crate) inverse: [f64; 3],
-    /// How far the line through the anchor may be from the ray that the triangle test sees, on each
+    /// The most that the line through the anchor may be off the ray that the triangle test sees, on each
     /// axis of a plane across the ray's longest axis, in scene units.
     pub(crate) slack: f32,
-    /// How far the box reaches from the anchor, and how large it is.
+    /// Reach of the box from the anchor.
     pub(crate) reach: Reach,
     /// True if the ray starts so far away that a traversal would not be exact enough: all triangles have to
     /// be tested.
@@ -102,6 +102,7 @@ impl Approach {
     }
 
     /// Brings a ray that is given in f64 to a box that holds boxes, not triangles. `ray` is that line, rounded.
+    /// Nothing reads `near` and `far` then: they may be 0.
     #[inline(never)]
     pub(crate) fn of_line(ray: &Ray, line: &LineF64, bounds: &Aabb) -> Option<Self> {
         if !ray.is_valid() {

@@ -67,7 +67,7 @@ impl Block {
     /// A block of zeros.
     pub const ZERO: Self = Self([0; ALIGNMENT]);
 
-    /// How many blocks hold this many bytes.
+    /// Returns the number of blocks that hold this many bytes.
     #[must_use]
     pub const fn count_for(bytes: usize) -> usize {
         bytes.div_ceil(ALIGNMENT)

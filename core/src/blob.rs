@@ -70,7 +70,7 @@ pub(crate) struct Header {
     pub(crate) subdivide_above: u32,
     /// Levels of grids; 0 for a method without nested grids.
     pub(crate) depth: u32,
-    /// What it is built over, as [`Content`] numbers it.
+    /// The content, as [`Content`] numbers it.
     content: u32,
     /// True if the mesh lies behind the grid: see [`HasMesh`]. Above these two bits the number of parts that
     /// the mesh was joined from, 0 if it was not.
@@ -85,14 +85,14 @@ pub(crate) struct Header {
     checksum: u32,
 }
 
-/// What lies behind a grid.
+/// The mesh behind a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum HasMesh {
     /// Nothing: the caller has the mesh.
     No = 0,
-    /// Its mesh.
+    /// The grid's mesh.
     Yes = 1,
-    /// Its mesh and the masks of the triangles.
+    /// The grid's mesh and the masks of the triangles.
     WithMasks = 2,
 }
 
@@ -215,12 +215,12 @@ impl Header {
         Ok(header)
     }
 
-    /// What it is built over.
+    /// Returns the content of the blob.
     pub(crate) fn content(&self) -> Result<Content, Error> {
         Content::from_u32(self.content).ok_or(corrupt(core::mem::offset_of!(Self, content)))
     }
 
-    /// Returns true if the mesh lies behind the grid.
+    /// Returns whether the mesh lies behind the grid, and whether its masks do.
     pub(crate) fn has_mesh(&self) -> Result<HasMesh, Error> {
         match (self.mesh & 3, self.part_count()) {
             (0, 0) => Ok(HasMesh::No),
@@ -230,7 +230,7 @@ impl Header {
         }
     }
 
-    /// How many parts the mesh behind the grid was joined from; 0 if it was not.
+    /// Returns the number of parts that the mesh behind the grid was joined from; 0 if it was not.
     pub(crate) const fn part_count(&self) -> u32 {
         self.mesh >> 2
     }
@@ -268,7 +268,7 @@ impl Header {
         Ok(Lattice::new(bounds, self.resolution))
     }
 
-    /// Returns true if the header says what the mesh says: what was skipped, its box, and the resolution
+    /// Checks that the header says what the mesh says: what was skipped, its box, and the resolution
     /// that `rule` has for the box's size and so many triangles.
     pub(crate) fn check(
         &self,

@@ -47,8 +47,8 @@ impl<'a> Bump<'a> {
         }
     }
 
-    /// Where the pool goes on: the words asked for so far, given or not. An error if
-    /// [`GRID`] leaves no room to say so.
+    /// Returns the offset at which the pool goes on: the words asked for so far, given or not. An error if
+    /// it is not below [`GRID`].
     pub(crate) fn offset(&self) -> Result<u32, Error> {
         let offset = u32::try_from(self.asked).ok().filter(|offset| offset & GRID == 0);
         offset.ok_or(Error::InvalidConfig(ConfigField::Density))

@@ -191,7 +191,7 @@ impl Lattice {
         Vec3A::from_array(self.cells_per_unit)
     }
 
-    /// By how much boxes are grown, in cells.
+    /// Returns the margin by which boxes are grown, in cells.
     #[inline(always)]
     pub(crate) fn margin(&self) -> Vec3A {
         Vec3A::from_array(self.margin)
@@ -202,7 +202,7 @@ impl Lattice {
         1.0 / Vec3A::from_array(self.cells_per_unit)
     }
 
-    /// Where a coordinate lies, in cells from the box's corner.
+    /// Returns the position of a coordinate, in cells from the box's corner.
     #[inline(always)]
     pub(crate) fn position(&self, axis: usize, coordinate: f64) -> f64 {
         (coordinate - f64::from(self.min[axis])) * self.cells_per_unit(axis)
@@ -240,7 +240,7 @@ pub(crate) fn cells_between(reach: Aabb, resolution: [u32; 3]) -> CellRange {
     CellRange { min: wholes(clamp(reach.min)), max: wholes(clamp(reach.max)) }
 }
 
-/// How far a triangle's box is grown before it is spread over cells; see the module's head.
+/// Returns the margin by which a triangle's box is grown before it is spread over cells; see the module's head.
 fn margin(bounds: &Aabb) -> f32 {
     const EXTENT_SHARE: f32 = 1.0 / 262_144.0; // 2^-18
     let extent = bounds.size().max_element();
@@ -273,7 +273,7 @@ fn wholes(position: Vec3A) -> [u32; 3] {
     shifted.to_array().map(|bits| bits.to_bits() & WHOLE_BITS)
 }
 
-/// What is added to round to a whole number: 1.5 * 2^23.
+/// The number that is added to round to a whole number: 1.5 * 2^23.
 pub(crate) const WHOLE_SHIFT: f32 = 12_582_912.0;
 /// The bits of the sum that are the number.
 pub(crate) const WHOLE_BITS: u32 = 0x003f_ffff;

@@ -27,7 +27,7 @@ use crate::ray::{INVALID_ID, round};
 pub struct ClosestPoint {
     /// The point, in scene units.
     pub position: [f32; 3],
-    /// How far it is.
+    /// Distance from the given point, in scene units.
     pub distance: f32,
     /// Weight of the triangle's second vertex, 0 to 1.
     pub u: f32,
@@ -93,7 +93,7 @@ fn weights(a: DVec3, ab: DVec3, ac: DVec3, p: DVec3) -> [f64; 2] {
     closer(closer(first, second), third)
 }
 
-/// Where on an edge a point lies, from 0 to 1, that is this far behind
+/// Returns the place on an edge, from 0 to 1, of a point that is this far behind
 /// its start and before its end.
 fn share(behind: f64, before: f64) -> f64 {
     if behind <= 0.0 {
@@ -197,7 +197,7 @@ impl Grid<'_> {
             });
             let is_all = (center - reach).cmple(min).all() && (center + reach).cmpge(max).all();
             // Until something is found, `best` is as far as anything may be.
-            // As far as what rounds to the same distance may be.
+            // Search as far as points that round to the same distance may be.
             let needed = f64::from(best.distance.next_up());
             if needed <= reach || is_all {
                 break;

@@ -1,4 +1,4 @@
-//! What a caller chooses before a build.
+//! The choices that a caller makes before a build.
 
 use bitflags::bitflags;
 

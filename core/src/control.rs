@@ -1,14 +1,14 @@
-//! What a build asks of its caller on the way: threads, and whether to go on.
+//! The caller's part in a running build: threads, and whether to go on.
 
 use core::cell::Cell;
 use core::fmt;
 
 use crate::error::Error;
 
-/// What a build hands to the caller's loop: does the task with a number.
+/// A function that a build hands to the caller's loop: does the task with a number.
 pub type Task<'t> = dyn Fn(u32) + Sync + 't;
 
-/// How a build runs: in how many tasks, on which threads, and with which progress callback.
+/// The control of a build: the number of tasks, the threads, and the progress callback.
 /// `Control::default()` is one task and no progress callback.
 ///
 /// The grid does not depend on it, to the bit.
@@ -115,7 +115,7 @@ impl<'c> Watch<'c> {
     /// Tells that this much is done; an error if the caller does not want the rest.
     pub(crate) fn at(&self, done: f32) -> Result<(), Error> {
         let Some(progress) = self.progress else { return Ok(()) };
-        // That all is done is said once, at the end, whatever the numbers of a loop round to.
+        // Leave it to `end` to say once that all is done, whatever the numbers of a loop round to.
         if done >= 1.0 {
             return Ok(());
         }

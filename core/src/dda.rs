@@ -21,7 +21,7 @@ use crate::simd::HAS_VECTORS;
 /// A ray in the cells of a lattice, from where it enters the box.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Line {
-    /// Where the line starts, in cells.
+    /// Start of the line, in cells.
     position: Vec3A,
     /// Cells for each unit of distance; zero on an axis that the ray runs parallel to.
     rate: Vec3A,
@@ -29,9 +29,9 @@ pub(crate) struct Line {
     delta: Vec3A,
     /// Distance of the border between no cells and cell 0; infinite if parallel.
     base: Vec3A,
-    /// What to add to the cell on each axis: 1 or -1; 0 if parallel.
+    /// The number to add to the cell on each axis: 1 or -1; 0 if parallel.
     step: Vec3A,
-    /// How far off its cells a line may be, in cells.
+    /// The most that a line may be off its cells, in cells.
     margin: Vec3A,
     /// Distance at which the ray ends.
     pub(crate) end: f32,
@@ -56,7 +56,7 @@ pub(crate) struct Walk {
     delta: Vec3A,
     /// Distance of the border through which the ray leaves cell 0; infinite if parallel.
     base: Vec3A,
-    /// What to add to the cell on each axis: 1 or -1; 0 if parallel.
+    /// The number to add to the cell on each axis: 1 or -1; 0 if parallel.
     step: Vec3A,
     /// The last cell on each axis that the walk enters.
     last: Vec3A,
@@ -65,7 +65,7 @@ pub(crate) struct Walk {
 /// The exits of a walk that only the end of the ray ends.
 pub(crate) const NEVER: Vec3A = Vec3A::INFINITY;
 
-/// What became of a step.
+/// The outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Step {
     /// The walk is in the next cell.
@@ -96,7 +96,7 @@ impl Line {
         let [x, y, z] = direction;
         let longest = greater(x.abs(), greater(y.abs(), z.abs()));
         let scale = longest * lattice.finest();
-        // Its inverse from those that are there: a division is slow.
+        // Compute its inverse from those that are there: a division is slow.
         let least = |[x, y, z]: [f64; 3]| lesser(x, lesser(y, z));
         let inverse_scale = least(approach.inverse.map(f64::abs))
             * least([0, 1, 2].map(|axis| lattice.units_per_cell(axis)));
@@ -136,7 +136,7 @@ impl Line {
         round((f64::from(t.next_up()) - self.start) * self.scale)
     }
 
-    /// What a step on each axis adds, in wrapping arithmetic, to the place of a cell in an array
+    /// Returns the number that a step on each axis adds, in wrapping arithmetic, to the place of a cell in an array
     /// with these strides. No step is taken along an axis that the line runs parallel to.
     #[inline(always)]
     pub(crate) fn moves(&self, strides: [usize; 3]) -> [usize; 3] {
@@ -175,8 +175,8 @@ impl Line {
         (near <= far).then(|| self.walk(near, 1.0, [0; 3], last, Vec3A::splat(far)))
     }
 
-    /// From where to where the line is inside a box given in cells, or along its border; the second
-    /// is less than the first if it passes the box.
+    /// Finds the distances between which the line is inside a box given in cells, or along its border; the
+    /// second is less than the first if it passes the box.
     #[inline(always)]
     fn inside(&self, reach: &Aabb) -> [f32; 2] {
         let low = reach.min - self.margin - self.position;

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The lanes do the same operations in the same order as one triangle alone, none of them fused,
-//! so they drop the same triangles. What passes, about one triangle a ray, is decided in f64 one
+//! so they drop the same triangles. Triangles that pass, about one a ray, are decided in f64 one
 //! by one.
 //!
 //! Rows are transposed in registers: a row that is copied through memory, or `map` over arrays of vectors, stores
@@ -20,7 +20,7 @@ use crate::filter::RayFilter;
 use crate::mesh::{LastPart, TriangleMesh};
 use crate::ray::Ray;
 
-/// How many triangles are tested at once.
+/// Number of triangles that are tested at once.
 pub(crate) const LANES: usize = 8;
 
 /// Sixteen bytes that are loaded as four numbers: a vertex and what follows it, half a ray, a part of a box.
@@ -151,7 +151,7 @@ fn read<'m>(
 }
 
 impl RayFilter {
-    /// Which of a few triangles are not dropped, as bits, one after the other: for machines without vectors.
+    /// Returns a mask of the triangles that are not dropped, tested one after the other: for machines without vectors.
     #[inline(never)]
     pub(crate) fn survivors(&self, mesh: &TriangleMesh<'_>, ids: &[u32]) -> u32 {
         let mut reader = mesh.reader();
@@ -304,7 +304,7 @@ mod tests {
         [hit.t, hit.u, hit.v].map(f32::to_bits)
     }
 
-    /// What the triangles give one by one.
+    /// Tests the triangles one by one.
     fn expected(test: &TriangleTest, mesh: &TriangleMesh<'_>, ids: &[u32]) -> Answer {
         let survivors = test.filter.survivors(mesh, ids);
         let mut hits = Vec::new();

@@ -1,4 +1,4 @@
-//! What can go wrong, with the number that helps: one enum for build and
+//! The errors, with the number that helps: one enum for build and
 //! open, no strings, no allocation.
 //!
 //! A query of one ray has no error: a miss is not one, and a grid that
@@ -9,7 +9,7 @@ use core::fmt;
 use crate::limits;
 use crate::method::{Content, Method};
 
-/// Which of the caller's two memory regions an error speaks of.
+/// The one of the caller's two memory regions that an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Region {
     /// The region that keeps the built grid.
@@ -18,7 +18,7 @@ pub enum Region {
     Scratch,
 }
 
-/// Which part of a mesh description an error speaks of.
+/// The part of a mesh description that an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MeshField {
     /// The vertices: their bytes end before the last vertex, or the stride is below 12 bytes.
@@ -42,7 +42,7 @@ pub enum BatchField {
     Answers,
 }
 
-/// Which field of a [`Config`](crate::Config) an error speaks of.
+/// The field of a [`Config`](crate::Config) that an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ConfigField {
     /// Not a method of this version.
@@ -59,7 +59,7 @@ pub enum ConfigField {
     Flags,
 }
 
-/// Why a build or an open was refused. Nothing outside the caller's regions was touched.
+/// The reason why a build or an open was refused. Nothing outside the caller's regions was touched.
 #[non_exhaustive]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Error {
@@ -154,7 +154,7 @@ pub enum Error {
     CannotRefit,
     /// The grid contradicts itself or its mesh.
     Corrupt {
-        /// Where in the blob, in bytes from its start.
+        /// Place of the contradiction in the blob, in bytes from its start.
         offset: u64,
     },
 }
@@ -258,7 +258,7 @@ impl fmt::Display for Error {
 }
 
 impl Error {
-    /// What is wrong with shapes or scenes.
+    /// Describes errors of shapes and scenes.
     fn describe_scene(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OtherContent(Content::Triangles) => {

@@ -1,4 +1,4 @@
-//! On which side of a plane a point of a ray lies, decided exactly for all finite f32 numbers.
+//! The side of a plane on which a point of a ray lies, decided exactly for all finite f32 numbers.
 //!
 //! ```text
 //! n = (b - a) x (c - a) = a x b + b x c + c x a
@@ -116,7 +116,7 @@ impl Sum {
     }
 }
 
-/// Where a line meets a triangle's plane, compared with `t`; `None` if it runs along the plane or
+/// Compares the place where a line meets a triangle's plane with `t`; `None` if it runs along the plane or
 /// there is none.
 #[cold]
 #[inline(never)]
@@ -165,7 +165,7 @@ mod tests {
             assert_eq!(sum(&[least]), order);
             assert_eq!(sum(&[[huge; 4], least, [huge, -huge, huge, huge]]), order);
             assert_eq!(sum(&[least, [huge, huge, huge, -sign * huge]]), order.reverse());
-            // As many as there ever are, with carries everywhere.
+            // Add as many terms as there ever are, with carries everywhere.
             let mut many = alloc::vec![[huge, huge, huge, sign * huge]; 21];
             many.extend([[huge, -huge, huge, sign * huge]; 21]);
             assert_eq!(sum(&many), Ordering::Equal);

@@ -39,7 +39,7 @@
 //! distance between its ray and the line through the anchor ([`Approach::slack`]). If it reports a
 //! hit, the corners lie within 4 E + 3 s of the ray on that plane, as the ray is among them. Then
 //! moving them changes no edge function by more than 2 * (16 E s + 14 s^2); the 2 is for the
-//! direction, which multiplies areas of that plane. What is left is the second order of u, below
+//! direction, which multiplies areas of that plane. The rest is the second order of u, below
 //! 2^-19 of everything, and underflow:
 //!
 //! ```text
@@ -77,7 +77,7 @@ const UP: f64 = 1.0 + 1.0 / (1 << 20) as f64;
 const NEARBY_UNIT: f32 = 1.001 / 16_777_216.0;
 /// [`MOST_REACH`].
 const NEARBY_REACH: f32 = f32::from_bits(0x5d80_0000); // 2^60
-/// What the floor grows by with the square of the distance: 28 * (7 * 2^-53)^2, and a little more.
+/// Growth of the floor with the square of the distance: 28 * (7 * 2^-53)^2, and a little more.
 const NEARBY_FLOOR: f32 = 2e-29;
 /// Distances count as no less: so nothing is denormal on the way to the floor, which takes long.
 const NEARBY_LEAST: f32 = 1.0 / 32_768.0;
@@ -162,7 +162,7 @@ pub(crate) struct LineFilter<L> {
 /// One ray.
 pub(crate) type RayFilter = LineFilter<f32>;
 
-/// How far away triangles are from a point, and how large.
+/// The distance of triangles from a point, and their extent.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reach {
     /// The most that a coordinate of a corner differs from the point's.
@@ -172,7 +172,7 @@ pub(crate) struct Reach {
 }
 
 impl Reach {
-    /// That of triangles in a box.
+    /// Returns the reach of triangles in a box.
     #[inline(always)]
     pub(crate) fn of(bounds: &Aabb, point: [f32; 3]) -> Self {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());

@@ -90,7 +90,7 @@ impl<'a> Grid<'a> {
     /// take; where there is less, but enough for fewer, there are fewer.
     ///
     /// # Errors
-    /// Those of [`build`](Self::build), [`Error::InvalidParallelFor`] if a task was run twice or
+    /// The errors of [`build`](Self::build), [`Error::InvalidParallelFor`] if a task was run twice or
     /// not at all, and [`Error::Cancelled`] if the progress callback returned false; after these two
     /// the index holds nothing of use.
     ///
@@ -349,7 +349,7 @@ impl<'a> Grid<'a> {
 
     /// Shows the lists of all cells that a box meets, and perhaps some others.
     pub(crate) fn visit(&self, bounds: &Aabb, leaf: &mut dyn FnMut(&[u32])) {
-        // What lies outside belongs to the cells at the border.
+        // Points outside belong to the cells at the border.
         let reach = self.lattice.reach(bounds);
         let visitor = &mut Visitor::new(self.structure.list_words(), leaf);
         self.structure.visit(&reach, visitor);

@@ -113,7 +113,7 @@ impl Quality {
     }
 }
 
-/// What a blob is built over.
+/// The content of a blob.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Content {
@@ -128,7 +128,7 @@ pub enum Content {
 }
 
 impl Content {
-    /// What a number in a blob means.
+    /// Returns the content that a number in a blob means.
     pub(crate) const fn from_u32(value: u32) -> Option<Self> {
         match value {
             0 => Some(Self::Triangles),

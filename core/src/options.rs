@@ -6,7 +6,7 @@ use crate::counters::Counters;
 use crate::mesh::TriangleMesh;
 use crate::ray::{Hit, INVALID_ID};
 
-/// Which sides of triangles a ray does not hit.
+/// The sides of triangles that a ray does not hit.
 ///
 /// The front is where a triangle's vertices appear counter-clockwise. A triangle seen exactly edge
 /// on shows neither side, and is never hit.
@@ -22,7 +22,7 @@ pub enum Cull {
     Front = 2,
 }
 
-/// What a filter says of a hit.
+/// The answer of a filter about a hit.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -38,7 +38,7 @@ pub enum Verdict {
 /// Decides whether a hit counts. Gets the number of the ray in its batch, 0 for a single ray, and the hit.
 pub type Filter<'q> = dyn FnMut(usize, &Hit) -> Verdict + 'q;
 
-/// What a query may be told. `QueryOptions::default()` changes nothing.
+/// The options of a query. `QueryOptions::default()` changes nothing.
 ///
 /// ```
 /// use hgrid_core::{Cull, QueryOptions, Verdict};
@@ -57,7 +57,7 @@ pub struct QueryOptions<'q> {
     /// [`TriangleMesh::with_masks`](crate::TriangleMesh::with_masks). The default
     /// is all bits: every triangle is seen, even one whose mask is 0.
     pub mask: u32,
-    /// Which sides are not hit.
+    /// The sides that are not hit.
     pub cull: Cull,
     /// A triangle that is not hit: the one that the ray leaves, which it cannot hit again, without
     /// any epsilon. A neighbour across an edge still may be, where the origin was rounded to just
@@ -72,8 +72,8 @@ pub struct QueryOptions<'q> {
     /// count, and rays that meet only them cost what they cost without a filter. The default is all bits: the filter is
     /// asked about every triangle, even one whose mask is 0.
     pub filter_mask: u32,
-    /// Where to add up the work. With counters, the rays of a batch are traced one by one, because the rays of a group
-    /// share work that belongs to no single ray.
+    /// Counters that add up the work. With them, the rays of a batch are traced one by one, because the rays of a
+    /// group share work that belongs to no single ray.
     pub counters: Option<&'q mut Counters>,
     /// Memory in which rays of [`Coherence::Incoherent`](crate::Coherence::Incoherent) may be
     /// sorted, 16 bytes a ray: see there. It holds anything before and after. Queries of one ray or
@@ -126,7 +126,7 @@ impl<'q> QueryOptions<'q> {
         self.choice() == Choice::ALL && self.filter.is_none() && !self.are_for_single_rays()
     }
 
-    /// What can be said of triangles without asking the filter.
+    /// Returns the choice of triangles that is made without asking the filter.
     pub(crate) const fn choice(&self) -> Choice {
         let asked = if self.filter.is_some() { self.filter_mask } else { 0 };
         Choice { mask: self.mask, skip: self.skip, cull: self.cull, asked }

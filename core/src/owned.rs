@@ -138,7 +138,7 @@ impl OwnedMesh {
     /// A mesh inside structs: vertices and triangles at any byte stride.
     ///
     /// # Errors
-    /// Those of [`TriangleMesh::strided`].
+    /// The errors of [`TriangleMesh::strided`].
     pub fn strided(
         positions: OwnedStrided,
         indices: OwnedStrided,
@@ -152,7 +152,7 @@ impl OwnedMesh {
     /// The same mesh with a mask for each triangle, a `u32`.
     ///
     /// # Errors
-    /// Those of [`TriangleMesh::with_masks`].
+    /// The errors of [`TriangleMesh::with_masks`].
     pub fn with_masks(self, masks: OwnedStrided) -> Result<Self, Error> {
         let mesh = Self { masks: Some(masks), ..self };
         mesh.try_view()?;
@@ -252,7 +252,7 @@ impl OwnedGrid {
     /// Builds a grid in memory of the global allocator, and keeps as much of it as the grid takes.
     ///
     /// # Errors
-    /// Those of [`Grid::build`]; [`Error::OutOfMemory`] with 0 bytes available if the allocator has none.
+    /// The errors of [`Grid::build`]; [`Error::OutOfMemory`] with 0 bytes available if the allocator has none.
     pub fn build(mesh: OwnedMesh, config: &Config) -> Result<Self, Error> {
         Self::build_with(mesh, config, &Control::SERIAL)
     }
@@ -260,7 +260,7 @@ impl OwnedGrid {
     /// Builds a grid on the caller's threads: [`build`](Self::build), and bit by bit the same grid.
     ///
     /// # Errors
-    /// Those of [`build`](Self::build) and of [`Grid::build_with`].
+    /// The errors of [`build`](Self::build) and of [`Grid::build_with`].
     pub fn build_with(
         mesh: OwnedMesh,
         config: &Config,
@@ -285,7 +285,7 @@ impl OwnedGrid {
     /// Opens a copy of a grid that was built earlier or elsewhere: bytes at any address.
     ///
     /// # Errors
-    /// Those of [`Grid::open`]; [`Error::OutOfMemory`] as of [`build`](Self::build).
+    /// The errors of [`Grid::open`]; [`Error::OutOfMemory`] as of [`build`](Self::build).
     pub fn open(blob: &[u8], mesh: OwnedMesh) -> Result<Self, Error> {
         let mut index = Memory::new(blob.len(), Region::Index)?;
         index.bytes_mut().copy_from_slice(blob);
@@ -312,7 +312,7 @@ impl OwnedGrid {
     /// Gives a tree the boxes of a mesh whose vertices moved, and takes that mesh: see [`refit`](crate::refit).
     ///
     /// # Errors
-    /// Those of [`refit`](crate::refit). After an error grid and mesh are as they were.
+    /// The errors of [`refit`](crate::refit). After an error grid and mesh are as they were.
     pub fn refit(&mut self, mesh: OwnedMesh) -> Result<Refit, Error> {
         let refitted = refit(self.index.bytes_mut(), &mesh.try_view()?)?;
         self.mesh = mesh;

@@ -13,7 +13,7 @@ use crate::mesh::TriangleMesh;
 use crate::ray::{Hit, Ray};
 use crate::triangle::{OUTSIDE, SMALL};
 
-/// What is known of eight pairs.
+/// The decisions on eight pairs.
 pub(crate) struct Decided {
     /// Lanes with a hit, as bits.
     pub(crate) hits: u32,

@@ -14,7 +14,7 @@ pub const INVALID_ID: u32 = u32::MAX;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Ray {
-    /// Where `t` is 0, in scene units.
+    /// The point at which `t` is 0, in scene units.
     pub origin: [f32; 3],
     /// Smallest accepted `t`; negative reaches behind the origin.
     pub t_min: f32,
@@ -56,7 +56,7 @@ impl Ray {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct RayF64 {
-    /// Where `t` is 0, in scene units.
+    /// The point at which `t` is 0, in scene units.
     pub origin: [f64; 3],
     /// Direction, any length but zero.
     pub direction: [f32; 3],
@@ -93,7 +93,7 @@ impl RayF64 {
     }
 }
 
-/// Where a ray meets a triangle: 16 bytes.
+/// The hit of a ray on a triangle: 16 bytes.
 ///
 /// The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
 /// triangle's vertices `a`, `b`, `c`, up to rounding. A hit is a function of the ray and the triangle
@@ -126,7 +126,7 @@ pub struct Hit {
 }
 
 impl Hit {
-    /// What a batch writes for a ray that hits nothing.
+    /// The hit that a batch writes for a ray that hits nothing.
     pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: INVALID_ID };
 
     /// Returns true if this hit is reported rather than the other: smaller `t`, then smaller id.

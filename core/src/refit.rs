@@ -7,7 +7,7 @@ use crate::mesh::TriangleMesh;
 use crate::method::Method;
 use crate::structure;
 
-/// What a refit did to a tree.
+/// The costs of a tree before and after a refit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refit {
     /// The SAH cost that the tree had, with the boxes that it had: how many nodes a random line through its

@@ -1,4 +1,4 @@
-//! What a query does with the hits of a traversal: keep the closest, stop at the first, or collect the
+//! The searches of queries: they keep the closest hit of a traversal, stop at the first, or collect the
 //! nearest in order.
 //!
 //! The traversal passes each hit to a [`Search`], roughly from near to far, and repeats a triangle that lies
@@ -11,7 +11,7 @@ use crate::options::Selection;
 use crate::ray::{Hit, INVALID_ID};
 use crate::triangle::TriangleTest;
 
-/// What became of a hit.
+/// The outcome of showing a hit to a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Outcome {
     /// The search goes on as before.
@@ -117,7 +117,7 @@ pub(crate) struct NearestHits<'q> {
     pub(crate) selection: &'q Selection<'q>,
     pub(crate) after: Option<Hit>,
     pub(crate) hits: &'q mut [Hit],
-    /// How many of the hits are there.
+    /// Number of hits in `hits`.
     pub(crate) count: usize,
     /// True if the search ends once the room is full, with any hits.
     pub(crate) is_any: bool,
@@ -231,7 +231,7 @@ impl NearestHits<'_> {
         if found.get(place).is_some_and(|other| other.primitive == hit.primitive) {
             return Outcome::Unchanged;
         }
-        // What is behind it moves on by one; the last falls out if there is no room.
+        // Hits behind it move on by one; the last falls out if there is no room.
         self.count = (self.count + 1).min(self.hits.len());
         let mut moved = hit;
         for slot in self.hits.iter_mut().take(self.count).skip(place) {

@@ -75,7 +75,7 @@ impl<'a> Boxes<'a> {
     }
 }
 
-/// Where a ray hits a shape, as the caller's test says.
+/// The hit of a ray on a shape, as the caller's test says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeHit {
     /// Distance in multiples of the ray's direction.
@@ -140,7 +140,7 @@ impl<'a> Shapes<'a> {
     /// The memory that a build over these boxes takes: [`sizes`](crate::sizes) for shapes.
     ///
     /// # Errors
-    /// Those of [`sizes`](crate::sizes); [`Error::InvalidConfig`] if the method is not
+    /// The errors of [`sizes`](crate::sizes); [`Error::InvalidConfig`] if the method is not
     /// [`Method::Bvh`](crate::Method::Bvh), here and in all builds.
     pub fn sizes(boxes: &Boxes<'_>, config: &Config, scratch: &mut [u8]) -> Result<Sizes, Error> {
         config.check_tree()?;
@@ -151,7 +151,7 @@ impl<'a> Shapes<'a> {
     /// [`Sizes::bound`] says what is enough for so many shapes.
     ///
     /// # Errors
-    /// Those of [`Grid::build`], with the number of a shape in place of that of a triangle.
+    /// The errors of [`Grid::build`], with the number of a shape in place of that of a triangle.
     pub fn build(
         boxes: Boxes<'a>,
         config: &Config,
@@ -164,7 +164,7 @@ impl<'a> Shapes<'a> {
     /// Builds a tree on the caller's threads: [`Grid::build_with`] for shapes.
     ///
     /// # Errors
-    /// Those of [`Grid::build_with`].
+    /// The errors of [`Grid::build_with`].
     pub fn build_with(
         boxes: Boxes<'a>,
         config: &Config,
@@ -179,7 +179,7 @@ impl<'a> Shapes<'a> {
     /// Opens a tree that was built earlier or elsewhere, in O(1), on the same boxes: [`Grid::open`] for shapes.
     ///
     /// # Errors
-    /// Those of [`Grid::open`].
+    /// The errors of [`Grid::open`].
     pub fn open(blob: &'a [u8], boxes: Boxes<'a>) -> Result<Self, Error> {
         Ok(Self { grid: Grid::open(blob, boxes.0)? })
     }
@@ -187,7 +187,7 @@ impl<'a> Shapes<'a> {
     /// Proves that the blob is a tree of its boxes: [`Grid::validate`] for shapes.
     ///
     /// # Errors
-    /// Those of [`Grid::validate`].
+    /// The errors of [`Grid::validate`].
     pub fn validate(&self, scratch: &mut [u8]) -> Result<(), Error> {
         self.grid.validate(scratch)
     }
@@ -201,7 +201,7 @@ impl<'a> Shapes<'a> {
     /// Gives a built tree the boxes of shapes that moved: [`refit`](crate::refit) for shapes.
     ///
     /// # Errors
-    /// Those of [`refit`](crate::refit).
+    /// The errors of [`refit`](crate::refit).
     pub fn refit(index: &mut [u8], boxes: &Boxes<'_>) -> Result<Refit, Error> {
         refit_content(index, &boxes.0)
     }

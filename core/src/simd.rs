@@ -20,7 +20,7 @@ use fearless_simd::Simd;
 
 /// The vector instructions that queries use. All give the same hits, bit for bit.
 ///
-/// What the machine lacks cannot be forced on it: queries then use the nearest level below that it
+/// A level that the machine lacks cannot be forced on it: queries then use the nearest level below that it
 /// has.
 ///
 /// ```
@@ -77,7 +77,7 @@ impl SimdLevel {
         machine::BASE <= self && self <= Self::detect()
     }
 
-    /// Its name in lower case.
+    /// Returns the name in lower case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -108,7 +108,7 @@ pub(crate) const HAS_VECTORS: bool = cfg!(any(
 
 /// Code for any vector instructions.
 ///
-/// What `run` calls on vectors must be `#[inline(always)]` down to the last function: only what
+/// Functions that `run` calls on vectors must be `#[inline(always)]` down to the last one: only what
 /// ends up inside [`dispatch`], or in a `Simd::vectorize` of its own (`pairs.rs`), is compiled for the level.
 pub(crate) trait Kernel {
     type Output;

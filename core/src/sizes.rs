@@ -1,4 +1,4 @@
-//! How much memory a build takes, asked before the build.
+//! The memory that a build takes, asked before the build.
 
 use crate::arena::{Sizes, check_alignment};
 use crate::config::Config;
@@ -67,7 +67,7 @@ impl Sizes {
 /// for the others. The scratch holds nothing of use afterwards.
 ///
 /// # Errors
-/// Those of [`Grid::build`](crate::Grid::build), but for index memory.
+/// The errors of [`Grid::build`](crate::Grid::build), but for index memory.
 ///
 /// ```
 /// use hgrid_core::{Block, Config, TriangleMesh, sizes};
@@ -90,7 +90,7 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
 /// the answer for several tasks is never exact.
 ///
 /// # Errors
-/// Those of [`Grid::build_with`](crate::Grid::build_with), but for index memory.
+/// The errors of [`Grid::build_with`](crate::Grid::build_with), but for index memory.
 ///
 /// ```
 /// use hgrid_core::{Config, Control, Error, TriangleMesh, sizes, sizes_with};
@@ -181,7 +181,7 @@ fn coarsened(config: &Config, steps: u32) -> Config {
     }
 }
 
-/// What a grid needs, if it fits into so much memory.
+/// Returns the memory that a grid needs, if it fits into so much.
 fn fits(
     mesh: &TriangleMesh<'_>,
     config: &Config,

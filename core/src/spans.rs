@@ -21,7 +21,7 @@ pub(crate) struct Span<S: Simd> {
     pub(crate) last: u32x8<S>,
 }
 
-/// What takes triangles to their cells.
+/// The map from triangles to their cells.
 #[derive(Clone, Copy)]
 pub(crate) struct Spans<S: Simd> {
     axes: [AxisScale<S>; 3],
@@ -91,7 +91,7 @@ fn read(mesh: &WideMesh<'_>, first: u32) -> [[RowBytes; 4]; 3] {
     rows
 }
 
-/// What takes coordinates on one axis to cells.
+/// The map from coordinates on one axis to cells.
 #[derive(Clone, Copy)]
 struct AxisScale<S: Simd> {
     origin: f32x8<S>,

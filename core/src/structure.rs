@@ -44,7 +44,7 @@ macro_rules! methods {
         cells: $($feature:literal $Cells:ident $cells:ident { $($field:ident),* },)*
         trees: $($of_tree:literal $Tree:ident $tree:ident { $($choice:ident),* },)*
     ) => {
-        /// What a build wrote, as its method reads it.
+        /// The result of a build, as its method reads it.
         #[derive(Debug, Clone, Copy)]
         pub(crate) enum Structure<'a> {
             $(#[cfg(feature = $feature)] $Cells(crate::$cells::$Cells<'a>),)*

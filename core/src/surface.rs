@@ -1,4 +1,4 @@
-//! Where a ray met the mesh, and where the next one starts.
+//! The point where a ray met the mesh, and the starts of the next rays.
 //!
 //! A hit's point is off its triangle by rounding, so a ray that starts there may hit the triangle that it
 //! leaves. A ray that starts above the plane and leaves it does not: the triangle test decides exactly on
@@ -28,18 +28,18 @@ pub struct Surface {
     pub position: [f32; 3],
     /// The triangle's normal, of length 1, on the side that the ray came from.
     pub normal: [f32; 3],
-    /// Where rays start that leave on that side: reflections, and rays to lights.
+    /// Start for rays that leave on that side: reflections, and rays to lights.
     pub above: [f32; 3],
-    /// Where rays start that go on through the triangle.
+    /// Start for rays that go on through the triangle.
     pub below: [f32; 3],
     /// 1 if the ray met the front, from which the vertices appear counter-clockwise, else 0.
     pub is_front: u32,
 }
 
-/// By how much a start is lifted, in parts of the distance to the farthest corner.
+/// The amount by which a start is lifted, in parts of the distance to the farthest corner.
 const LIFT: f64 = 1.0 / (1 << 20) as f64;
 
-/// What f32 cannot resolve near zero, a few times.
+/// A few times the resolution of f32 near zero.
 const LEAST: f64 = 1e-44;
 
 impl TriangleMesh<'_> {

@@ -6,10 +6,10 @@ use crate::control::Watch;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 
-/// What part of a build the survey is, about.
+/// The part of a build that the survey is, about.
 const SHARE: [f32; 2] = [0.0, 0.15];
 
-/// What one pass over the triangles tells.
+/// The results of one pass over the triangles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Survey {
     /// The box around all finite triangles; unreferenced vertices do not stretch it.
@@ -60,7 +60,7 @@ pub(crate) fn boxes<'m>(mesh: &'m TriangleMesh<'_>) -> impl Iterator<Item = (u32
 pub(crate) const fn reference_limit(triangles: u32) -> u32 {
     /// Several times what any scan needs, and what a scene of walls and floors needs.
     const PER_TRIANGLE: u32 = 16;
-    /// So that a handful of triangles is not denied the few cells it asks for.
+    /// An addition, so that a handful of triangles is not denied the few cells it asks for.
     const AT_LEAST: u32 = 64;
     triangles.saturating_mul(PER_TRIANGLE).saturating_add(AT_LEAST)
 }

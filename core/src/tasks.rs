@@ -12,7 +12,7 @@ use crate::control::Control;
 use crate::error::Error;
 use crate::simd::IS_SMALL;
 
-/// What is in the slot of a task.
+/// The content of a task's slot.
 enum State<T, R> {
     /// There is no such task, it is being run, or its result was taken.
     Nothing,
@@ -98,9 +98,9 @@ mod with_atomics {
 
     use super::Control;
 
-    /// What tasks take along and bring back.
+    /// Values that tasks take along and bring back.
     pub(crate) use core::marker::Send as Portable;
-    /// What all tasks look at.
+    /// Values that all tasks look at.
     pub(crate) use core::marker::Sync as Lendable;
 
     /// A place from which one of several threads takes something.
@@ -154,12 +154,12 @@ mod without_atomics {
 
     use super::Control;
 
-    /// What tasks take along and bring back: on one core anything.
+    /// Values that tasks take along and bring back: on one core anything.
     pub(crate) trait Portable {}
 
     impl<T> Portable for T {}
 
-    /// What all tasks look at: on one core anything.
+    /// Values that all tasks look at: on one core anything.
     pub(crate) trait Lendable {}
 
     impl<T> Lendable for T {}

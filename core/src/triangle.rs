@@ -54,7 +54,7 @@ use crate::options::Cull;
 use crate::ray::{Hit, Ray, round};
 use crate::simd::IS_SMALL;
 
-/// Where a ray meets a triangle, whether or not a closer one is hit.
+/// The hit of a ray on a triangle, whether or not a closer one is hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriangleHit {
     /// Distance in multiples of the ray's direction.
@@ -114,10 +114,10 @@ impl Axis {
 /// An edge function that is smaller than this part of its products is computed without rounding.
 pub(crate) const SMALL: f64 = 1.0 / (1 << 10) as f64;
 
-/// By how much the t of a hit may lie outside of the range, in parts of the range of its corners.
+/// The most that the t of a hit may lie outside of the range, in parts of the range of its corners.
 pub(crate) const OUTSIDE: f64 = 1.0 / (1 << 21) as f64;
 
-/// How far off a determinant in f64 may be, in parts of the sum of its terms' magnitudes: nine
+/// Error bound of a determinant in f64, in parts of the sum of its terms' magnitudes: nine
 /// roundings, and those of the sum. 2^-49.
 const BOUND: f64 = 8.0 * f64::EPSILON;
 
@@ -336,7 +336,7 @@ impl TriangleTest {
         is_close && (first > from || not_before()) && (last < to || not_behind())
     }
 
-    /// Where the line meets a triangle's plane, compared with `t`; `None` if it runs along the plane
+    /// Compares the place where the line meets a triangle's plane with `t`; `None` if it runs along the plane
     /// or there is none.
     fn compare(&self, triangle: &Triangle, t: f32) -> Option<Ordering> {
         let wide = |[x, y, z]: [f32; 3]| [f64::from(x), f64::from(y), f64::from(z)];
@@ -474,7 +474,7 @@ mod tests {
         assert!(hit(&ray(-1.0, 0.125)).is_some() && hit(&ray(0.125, f32::INFINITY)).is_some());
     }
 
-    /// Whatever axis the ray is nearly parallel to, and whichever way it goes.
+    /// For every axis that the ray is nearly parallel to, and both ways along it.
     #[test]
     fn a_triangle_shows_its_front_where_its_corners_run_counter_clockwise() {
         for axis in 0..3 {
