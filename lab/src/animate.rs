@@ -31,8 +31,8 @@ use crate::threads::Threads;
 use crate::tiles::{TILE_RAYS, Tiles, intersect};
 use crate::vector::{Vector, offset, round, unit};
 
-/// How far a vertex swings to either side, and how far it is from one crest of the wave to the
-/// next, as parts of the largest extent of the scene.
+/// The swing of a vertex to either side, and the distance from one crest of the wave to the next,
+/// as parts of the largest extent of the scene.
 const AMPLITUDE: f64 = 0.01;
 const WAVELENGTH: f64 = 0.3;
 
@@ -85,13 +85,13 @@ fn write_frame(folder: &Path, frame: u32, size: u16, pixels: &[Rgb]) -> Result<(
     image::write_png(&path, (size.into(), size.into()), pixels)
 }
 
-/// What to animate a scene with.
+/// The settings of an animation.
 struct Plan<'a> {
     frames: u32,
     config: Config,
     tiles: Tiles,
     threads: &'a Threads,
-    /// Where instances of the mesh stand, if there are any.
+    /// The places of the mesh's instances, if there are any.
     field: Option<Field>,
     /// Refit instead of building, from the second frame on.
     is_refitted: bool,
@@ -115,7 +115,7 @@ pub struct Frame {
 pub struct Report {
     /// The scene's name.
     pub scene: String,
-    /// Its triangles.
+    /// Triangles of the scene.
     pub triangles: usize,
     /// Moving instances of it; 0 if it is shown where it is.
     pub instances: u32,
@@ -127,7 +127,7 @@ pub struct Report {
     pub threads: u32,
     /// Pixels on each side.
     pub size: u16,
-    /// How often the memory did not do for a frame and had to grow.
+    /// Times that the memory did not do for a frame and had to grow.
     pub grown: u32,
     /// Bytes of the largest grid.
     pub index_bytes: usize,
@@ -282,11 +282,11 @@ fn render(grid: &Grid<'_>, field: Option<&Instances<'_>>, plan: &Plan<'_>, pixel
     });
 }
 
-/// How the vertices of a scene swing.
+/// The wave in which the vertices of a scene swing.
 struct Wave {
     /// The unit normal of each vertex, 0 where it has none.
     normals: Vec<[f32; 3]>,
-    /// How far a vertex swings.
+    /// The swing of a vertex to either side.
     amplitude: f64,
     /// Crests in a unit of length, along x, y and z.
     frequency: Vector,

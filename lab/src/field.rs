@@ -14,11 +14,12 @@ use crate::shade::{Rgb, Shader};
 use crate::tiles::TILE_RAYS;
 use crate::vector::{Vector, offset, round};
 
-/// How far apart instances stand, in extents of the mesh, and on how large a circle they move.
+/// The step from the place of an instance to the next, and the radius of the circle on which each moves,
+/// in extents of the mesh.
 const STEP: f64 = 1.4;
 const CIRCLE: f64 = 0.15;
 
-/// Where instances stand.
+/// The places of instances.
 #[derive(Debug, Clone, Copy)]
 pub struct Field {
     count: u32,
@@ -51,7 +52,7 @@ impl Field {
         scene.focus = Some(self.bounds());
     }
 
-    /// How many there are.
+    /// Returns the number of instances.
     #[must_use]
     pub const fn count(&self) -> u32 {
         self.count

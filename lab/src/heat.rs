@@ -49,7 +49,7 @@ impl Counter {
         }
     }
 
-    /// What is counted, in words.
+    /// Names what is counted, in words.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
@@ -159,7 +159,7 @@ impl Bar {
         Ok(pixels)
     }
 
-    /// Where the colours start, and how many there are.
+    /// Returns the column at which the colours start, and their number.
     const fn span(&self) -> (u32, u32) {
         (2 * self.font, self.width - 4 * self.font)
     }

@@ -1,7 +1,7 @@
 //! Pictures as PNG files.
 //!
-//! Whether the file can be written is asked before the work, and answered without leaving an empty
-//! file behind; the file itself is written in one go when the picture is complete.
+//! A check before the work tells whether the file can be written, and leaves no empty file behind; the
+//! file itself is written in one go when the picture is complete.
 
 use std::fs::{self, OpenOptions};
 use std::io::{Cursor, ErrorKind};
@@ -14,7 +14,7 @@ use crate::shade::Rgb;
 /// Refuses a path where no PNG can be written, or whose name promises another format.
 ///
 /// # Errors
-/// Those of [`check_writable`], and the name that a PNG could have.
+/// The errors of [`check_writable`], and one if the name promises another format.
 pub fn check_picture(path: &Path) -> Result<()> {
     let is_png = path.extension().is_none_or(|ending| ending.eq_ignore_ascii_case("png"));
     ensure!(
@@ -29,7 +29,7 @@ pub fn check_picture(path: &Path) -> Result<()> {
 /// Refuses a path where no file can be written. An existing file stays as it is.
 ///
 /// # Errors
-/// Those of opening the file.
+/// The errors of opening the file.
 pub fn check_writable(path: &Path) -> Result<()> {
     let attempt = match OpenOptions::new().write(true).create_new(true).open(path) {
         Ok(_) => fs::remove_file(path),
@@ -44,7 +44,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// Writes a picture of this width and height, rows from the top.
 ///
 /// # Errors
-/// Those of writing the file.
+/// The errors of writing the file.
 pub fn write_png(path: &Path, size: (u32, u32), pixels: &[Rgb]) -> Result<()> {
     encode(size, pixels)
         .and_then(|bytes| Ok(fs::write(path, bytes)?))

@@ -46,7 +46,7 @@ fn corners([min, max]: [[f32; 3]; 2]) -> String {
     format!("{}  to  {}", point(min), point(max))
 }
 
-/// What is in a file.
+/// The content of a file.
 #[derive(Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 enum Facts {
@@ -81,7 +81,7 @@ struct BlobFacts {
     format: &'static str,
     version: u32,
     method: &'static str,
-    /// What it is built over, one of the four.
+    /// The number of things that it is built over: one of these four.
     #[serde(skip_serializing_if = "Option::is_none")]
     triangles: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]

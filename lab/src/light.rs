@@ -1,4 +1,4 @@
-//! What is in the way of light: shadows of the lamp, and ambient occlusion.
+//! Things in the way of light: shadows of the lamp, and ambient occlusion.
 //!
 //! ```text
 //! spots of a tile -> rays toward the lamp                    -> one call for any hit -> lit
@@ -30,13 +30,13 @@ pub(crate) struct Spot {
     pub(crate) at: usize,
     /// The unit normal on the viewer's side.
     pub(crate) normal: [f32; 3],
-    /// Where rays start that leave on that side.
+    /// The start of rays that leave on that side.
     pub(crate) start: [f32; 3],
     /// Two numbers from 0 to 1 that differ from pixel to pixel.
     pub(crate) noise: [f64; 2],
 }
 
-/// Where light comes from, and how far away something may hide the sky.
+/// The direction of the lamp, and the distance up to which something may hide the sky.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Around {
     /// The direction toward the lamp.
@@ -52,12 +52,12 @@ pub(crate) struct Sample {
     pub(crate) count: u16,
 }
 
-/// How much light reaches the spots of a tile, from 0 to 1.
+/// The light that reaches the spots of a tile, from 0 to 1.
 #[derive(Debug)]
 pub(crate) struct Reached {
-    /// The lamp's.
+    /// The light of the lamp.
     pub(crate) lit: [f32; TILE_RAYS],
-    /// That of sky and ground.
+    /// The light of sky and ground.
     pub(crate) open: [f32; TILE_RAYS],
     /// Rays that were sent to find out.
     pub(crate) rays: u64,

@@ -1,4 +1,4 @@
-//! Where numbers come from: what a reader needs in order to measure them again.
+//! The origin of numbers: what a reader needs in order to measure them again.
 
 use std::env;
 use std::fs;
@@ -16,7 +16,7 @@ pub struct Machine {
     pub cpu: Option<String>,
     /// Operating system and architecture.
     pub system: String,
-    /// When the system gives large pages, if it tells: a build of much memory asks for them.
+    /// The system's setting for large pages, if it tells: a build of much memory asks for them.
     pub large_pages: Option<String>,
     /// The compiler that this program was built with.
     pub rustc: String,

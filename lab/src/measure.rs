@@ -76,7 +76,7 @@ impl SceneFacts {
     }
 }
 
-/// What a method took for a picture of a scene.
+/// The numbers of a method for a picture of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// The structure.
@@ -158,22 +158,22 @@ impl Measurement {
 /// A mesh and the picture to take of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'a> {
-    /// What the grids are built for.
+    /// The mesh that the grids are built for.
     pub mesh: TriangleMesh<'a>,
     /// The picture.
     pub tiles: Tiles,
-    /// Who builds.
+    /// The threads that build.
     pub threads: &'a Threads,
 }
 
-/// What a race gave.
+/// The outcome of a race.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// The numbers of every configuration.
     pub measurements: Vec<Measurement>,
     /// The picture that all of them gave, row by row from the upper left.
     pub pixels: Vec<Rgb>,
-    /// What each pixel's ray cost with the last configuration.
+    /// The cost of each pixel's ray with the last configuration.
     pub costs: Vec<u32>,
 }
 
@@ -262,7 +262,7 @@ const fn has_references(method: Method) -> bool {
     matches!(method, Method::OneLevel | Method::Fixed)
 }
 
-/// What becomes of the rays of all pixels, which lie row by row; the progress moves on.
+/// Returns what `tile` makes of the rays of all pixels, row by row; the progress moves on.
 fn trace<T: Copy>(
     tiles: &Tiles,
     progress: &mut Progress,

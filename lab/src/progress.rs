@@ -10,7 +10,7 @@ use std::io::{self, Read};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// How long work may take before it owes an explanation.
+/// The time that work may take before it owes an explanation.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The progress of one piece of work.

@@ -130,7 +130,7 @@ const MANY_BYTES: usize = 16 << 20;
 /// would write little of each, and wait until the system has cleared all of it.
 fn memory(bytes: usize) -> Result<MmapMut> {
     let memory = map(bytes)?;
-    // Who cannot give them gives small ones.
+    // A system that has no large pages gives small ones.
     #[cfg(target_os = "linux")]
     if bytes >= MANY_BYTES {
         let _ = memory.advise(Advice::HugePage);

@@ -1,4 +1,4 @@
-//! How much of a region was really used: the pages of it that are in memory.
+//! The part of a region that was really used: its pages that the system has given.
 //!
 //! Linux tells it in /proc/self/pagemap, eight bytes for each page of the address space. Builders
 //! that cannot know their needs ask for much more scratch than they write, and what was never

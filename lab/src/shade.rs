@@ -36,7 +36,7 @@ const GROUP: usize = 64;
 /// A number of each pixel of a group.
 type Lanes<T> = [T; GROUP];
 
-/// What surfaces look like in a picture that a camera takes.
+/// The look of surfaces in a picture that a camera takes.
 #[derive(Debug, Clone, Copy)]
 pub struct Shader<'a> {
     mesh: TriangleMesh<'a>,
@@ -67,7 +67,7 @@ impl<'a> Shader<'a> {
     pub fn normals(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
         self.shade(rays, hits, colors, |_, normal| {
             let along = self.axes.map(|axis| 0.5 + 0.5 * dot(normal, axis));
-            // What a screen takes the root of.
+            // A screen takes the root of this.
             along.map(|part| part * part)
         });
     }

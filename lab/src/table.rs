@@ -38,7 +38,7 @@ pub fn run(args: &TableArgs) -> Result<()> {
 /// Every number of a race over some scenes, and where they come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Results {
-    /// Where the numbers come from.
+    /// The origin of the numbers.
     pub machine: Machine,
     /// Pixels on each side of the pictures.
     pub size: u16,
@@ -64,7 +64,7 @@ impl Results {
     /// Runs the race on one scene after the other.
     ///
     /// # Errors
-    /// Those of [`run`].
+    /// The errors of [`run`].
     pub fn measure(scenes: &[String], race: &Race) -> Result<Self> {
         let configs = race.configs();
         let size = race.picture.size;
@@ -169,7 +169,7 @@ impl Results {
         table
     }
 
-    /// What the numbers mean, and where a grid is not what its heading says.
+    /// Says what the numbers mean, and where a grid is not what its heading says.
     fn notes(&self) -> Vec<String> {
         let Self { size, repeats, .. } = self;
         let mut notes = vec![
@@ -223,11 +223,11 @@ pub(crate) fn markdown(table: &mut Table, words: usize) -> String {
     lines.join("\n")
 }
 
-/// Returns how trees trace pictures, as part of a sentence.
+/// The way in which trees trace pictures, as part of a sentence.
 pub(crate) const IN_TILES: &str =
     "trace tiles of 8 x 8 rays together; their tests and steps are those of each ray alone";
 
-/// What times are, as part of a sentence.
+/// Says what times are, as part of a sentence.
 pub(crate) fn times(repeats: u32) -> String {
     match repeats {
         1 => "times of one run".to_owned(),

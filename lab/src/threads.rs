@@ -5,7 +5,7 @@ use hgrid_core::Control;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// So many threads, or only the one that calls.
+/// A number of threads, or only the one that calls.
 #[derive(Debug)]
 pub struct Threads {
     pool: Option<ThreadPool>,
@@ -28,7 +28,7 @@ impl Threads {
         Ok(Self { pool, count: count.max(1) })
     }
 
-    /// How many there are.
+    /// Returns the number of threads.
     #[must_use]
     pub const fn count(&self) -> u32 {
         self.count

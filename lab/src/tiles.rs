@@ -7,9 +7,9 @@
 //! |  8  9 12 .. |
 //! ```
 //!
-//! That is what the packets of other structures and [`Grid::intersect_n`] like best: a call has two
-//! of the tiles that a grid traces together. The rays of a tile are made when it is its turn, as
-//! a renderer does.
+//! The packets of other structures and [`Grid::intersect_n`] like this order best: a call has two of
+//! the tiles that a grid traces together. The rays of a tile are made when it is its turn, as a
+//! renderer does.
 
 use hgrid_core::{Coherence, Grid, Hit, Ray, Strided, StridedMut};
 
@@ -43,7 +43,7 @@ const fn even_bits(at: u16) -> u16 {
 /// A picture and the camera that takes it.
 #[derive(Debug, Clone, Copy)]
 pub struct Tiles {
-    /// From where it is seen.
+    /// The camera that takes it.
     pub camera: Camera,
     /// Pixels on each side.
     pub size: u16,

@@ -31,7 +31,7 @@ fn now() -> String {
     format!("{year}-{month:02}-{day:02}T{h:02}:{m:02}:{s:02}Z")
 }
 
-/// What the processor calls itself, where the system says it.
+/// Returns the processor's name, where the system tells it, and the architecture and the system.
 fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let line = text.lines().find(|line| line.starts_with("model name"));

@@ -6,7 +6,7 @@ use hgrid_tests::random::Random;
 
 type Point = [f32; 3];
 
-/// What rays are made of.
+/// A mesh and the box of its vertices, to aim rays at.
 #[derive(Debug)]
 pub(crate) struct Aims<'m> {
     mesh: &'m Mesh,
@@ -139,7 +139,7 @@ impl<'m> Aims<'m> {
         })
     }
 
-    /// What a renderer traces after a hit, and ranges that end at it or next to it.
+    /// Returns a ray that a renderer traces after a hit, or this one with a range that ends at it or next to it.
     fn next(&self, random: &mut Random, ray: &Ray, hit: &Hit) -> Ray {
         let (t, before, behind) = (hit.t, hit.t.next_down(), hit.t.next_up());
         let (t_min, t_max) = match random.below(9) {
@@ -192,7 +192,7 @@ impl<'m> Aims<'m> {
     }
 }
 
-/// What is no ray, or next to none.
+/// Makes a ray invalid, or nearly so.
 fn spoil(random: &mut Random, ray: &mut Ray) {
     match random.below(6) {
         0 => ray.origin[random.below(3)] = [f32::NAN, f32::INFINITY][random.below(2)],

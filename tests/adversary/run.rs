@@ -16,10 +16,10 @@ use super::rays::Aims;
 /// Rays of a batch: a few more than go down together.
 const BATCH: usize = 72;
 
-/// So many differences are enough to look at.
+/// Differences that are enough to look at.
 const MOST: usize = 20;
 
-/// What was asked, and what came of it.
+/// The record of a run: what was asked, and what came of it.
 #[derive(Debug, Default)]
 pub(crate) struct Done {
     pub(crate) meshes: u64,

@@ -41,10 +41,10 @@ fn close(bounds: ([f32; 3], [f32; 3]), view: View, size: u16, [left, top]: [u16;
 /// Rays in the pieces of large pictures, which come first.
 pub(crate) const CLOSE: usize = 40 * 128;
 
-/// Those of them of which one half has ends of its own.
+/// The rays among them in pieces of which one half has ends of its own.
 const LIMITED: Range<usize> = 28 * 128..36 * 128;
 
-/// What no kernel for many rays may stumble over.
+/// Returns rays that no kernel for many rays may stumble over.
 pub(crate) fn odd_rays() -> Vec<Ray> {
     let sound = Ray::new([0.1, 0.2, 3.0], [0.01, 0.02, -1.0]);
     let mut rays = vec![
@@ -223,7 +223,7 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
     }
 }
 
-/// What a ray moves in a unit of `t` may be far from what a cell is wide.
+/// The length of a ray's direction may be far from the width of a cell.
 #[test]
 fn rays_of_any_speed_agree_at_any_scale() {
     for scale in [1e-30_f32, 1e-20, 1e-10, 1.0, 1e10, 1e20, 1e30] {

@@ -28,7 +28,7 @@ fn check(grid: &Grid<'_>, point: [f32; 3], max: f32) {
     let ask = |options: &mut QueryOptions<'_>| grid.closest_point(point, max, options);
     assert_eq!(ask(&mut QueryOptions::default()), expected, "{point:?} within {max}");
 
-    // What is just as far as allowed counts, and nothing behind it.
+    // A point just as far as allowed counts, and none farther.
     if let Some(closest) = expected {
         let mut options = QueryOptions::default();
         let exactly = grid.closest_point(point, closest.distance, &mut options);

@@ -28,7 +28,7 @@ fn volumes(origin: Point, direction: Point, [a, b, c]: [Point; 3]) -> ([i128; 3]
     (weights, weights.iter().sum(), dot(a, cross(b, c)))
 }
 
-/// How many multiples of the direction a triangle spans.
+/// Returns how many multiples of the direction a triangle spans, at most.
 fn reach_along(direction: Point, corners: [Point; 3]) -> f64 {
     let axis = (0..3).max_by_key(|&k| direction[k].abs()).unwrap();
     let (from, to) = (corners.iter().map(|p| p[axis]).min(), corners.iter().map(|p| p[axis]).max());

@@ -11,7 +11,7 @@ use hgrid_tests::{methods, oracle};
 
 use crate::batches::{CLOSE, COHERENCES, levels_of, rays, scattered, scene};
 
-/// What a filter says, whatever the mask of the triangle is.
+/// Returns the filter's verdict about a hit, whatever the mask of the triangle is.
 fn verdict(hit: &Hit) -> Verdict {
     match hit.primitive / 7 % 3 {
         0 => Verdict::Accept,
@@ -20,7 +20,7 @@ fn verdict(hit: &Hit) -> Verdict {
     }
 }
 
-/// Which triangles there are, and about which of them a filter is asked.
+/// A choice of triangles, and of those among them that a filter is asked about.
 #[derive(Debug, Clone, Copy)]
 struct Asked {
     mask: u32,
@@ -80,7 +80,7 @@ fn walk(grid: &Grid<'_>, hits: &[Hit], asked: Asked) -> (Vec<Hit>, Hit) {
     (shown.copied().collect(), first.map_or(Hit::MISS, |at| hits[at]))
 }
 
-/// Those of a ray among the hits that a filter was shown, in the order of rays.
+/// Returns the hits of one ray among those that a filter was shown, in the order of rays.
 fn of(shown: &[(usize, Hit)], place: usize) -> Vec<Hit> {
     let start = shown.partition_point(|(at, _)| *at < place);
     shown[start..].iter().take_while(|(at, _)| *at == place).map(|(_, hit)| *hit).collect()
@@ -156,8 +156,8 @@ fn check_batches(
         .flat_map(|(at, (shown, _))| shown.iter().map(move |hit| (at, *hit)));
     assert!(shown.iter().copied().eq(in_order), "{what}: the filter saw something else");
 
-    // Whether something blocks, and what: all about one ray before the next. Of a ray that an opaque
-    // triangle blocks the filter may be told or not.
+    // Ask whether something blocks, and what: the filter is asked all about one ray before the next. It may
+    // be shown fewer hits of a ray that an opaque triangle blocks.
     for names in [false, true] {
         shown.clear();
         let mut filter = |place: usize, hit: &Hit| {
@@ -245,7 +245,7 @@ fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
     }
 }
 
-/// What is counted is what single rays take, and less than a filter about everything would.
+/// A batch counts as much work as single rays, and less than with a filter that is asked about everything.
 #[test]
 fn opaque_triangles_cost_no_walk() {
     let mesh = scene();

@@ -96,7 +96,7 @@ fn answers_the_same(joined: &Grid<'_>, one: &Grid<'_>) {
     }
 }
 
-/// Where each triangle comes from.
+/// Returns the origin of each triangle: the number of its mesh, and its id there.
 fn places(meshes: &[Mesh]) -> Vec<(u32, u32)> {
     let counts =
         (0..).zip(meshes).map(|(at, mesh)| (at, u32::try_from(mesh.indices.len()).unwrap()));

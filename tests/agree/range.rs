@@ -30,7 +30,7 @@ fn dot(a: &Vector, b: &Vector) -> BigRational {
     &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2]
 }
 
-/// Where the line meets the plane; `None` if it runs along it or there is none.
+/// Returns the t at which the line meets the plane; `None` if it runs along it or there is none.
 fn plane(ray: &Ray, triangle: &[[f32; 3]; 3]) -> Option<BigRational> {
     let [a, b, c] = triangle.map(vector);
     let normal = cross(&minus(&b, &a), &minus(&c, &a));

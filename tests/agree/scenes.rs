@@ -157,7 +157,7 @@ fn a_scene_answers_as_triangles_that_were_moved_in_f64() {
     });
 }
 
-/// What an object shows.
+/// The mesh or the instances that an object shows.
 enum Shown<'o> {
     Mesh(TriangleMesh<'o>),
     Scene(&'o [Instance], &'o [Object<'o>]),
@@ -168,7 +168,7 @@ struct Moved {
     path: [u32; 4],
     id: u32,
     corners: [[f64; 3]; 3],
-    /// Its normal, of any length, as its own mesh has it.
+    /// The normal, of any length, as the triangle's own mesh has it.
     normal: [f64; 3],
 }
 
@@ -236,8 +236,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Where a line meets the plane of a triangle, and how far inside, as the least weight of a corner; `None` if it
-/// runs along the plane.
+/// Returns the t at which a line meets the plane of a triangle, and how far inside, as the least weight of a
+/// corner; `None` if it nearly runs along the plane.
 fn meet([a, b, c]: &[[f64; 3]; 3], ray: &RayF64) -> Option<(f64, f64)> {
     let d = ray.direction.map(f64::from);
     let (ab, ac, from) = (minus(b, a), minus(c, a), minus(&ray.origin, a));

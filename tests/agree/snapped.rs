@@ -53,7 +53,7 @@ fn rays() -> impl Strategy<Value = Vec<Ray>> {
     prop::collection::vec(ray, 1..30)
 }
 
-/// As many cases as `PROPTEST_CASES` says, or what takes some seconds.
+/// Returns the number of cases: `PROPTEST_CASES`, or what takes some seconds.
 fn cases() -> u32 {
     setting("PROPTEST_CASES", rounds(1500) as u64).try_into().expect("not that many")
 }

@@ -26,14 +26,14 @@ fn leaving(random: &mut Random, normal: Vector, side: f64) -> [f32; 3] {
     loop {
         let mut direction = random.point();
         if random.bits().is_multiple_of(2) {
-            // Its part along the normal becomes a thousandth, a millionth, ... of what it was.
+            // The part along the normal becomes a thousandth or a millionth of what it was.
             let share = 1.0 - 0.001_f64.powi(1 + random.below(2) as i32);
             let part = dot(direction.map(f64::from), normal) / dot(normal, normal) * share;
             let along: [f64; 3] = std::array::from_fn(|i| part * normal[i]);
             direction = std::array::from_fn(|i| (f64::from(direction[i]) - along[i]) as f32);
         }
         let height = dot(direction.map(f64::from), normal) * side;
-        // What is closer to the plane than the direction's own rounding is on neither side.
+        // A direction closer to the plane than its own rounding is on neither side.
         if height > 1e-7 * dot(normal, normal).sqrt() {
             return direction;
         }
@@ -126,7 +126,7 @@ fn icosahedron() -> Mesh {
     mesh
 }
 
-/// How many of the rays that leave a convex mesh hit it, which none should.
+/// Counts the rays that leave a convex mesh and hit it, which none should.
 fn blocked(mesh: &Mesh, method: Method, coherence: Coherence) -> usize {
     let mut owned = None;
     let grid = grid_of(&mut owned, mesh, method);

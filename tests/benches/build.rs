@@ -1,4 +1,4 @@
-//! How long a build takes, for each triangle.
+//! The time of a build, for each triangle.
 //!
 //! Analysis: the times per element should be flat from the smallest mesh to the largest; a bend
 //! upwards is the cache, or something that is not linear. `sizes` is two of the build's five passes

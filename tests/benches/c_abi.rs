@@ -1,4 +1,4 @@
-//! What a call through the C ABI costs over the Rust call: the same
+//! The cost of a call through the C ABI over the Rust call: the same
 //! grid, the same rays, one process.
 //!
 //! Analysis: the C side checks a tag, three pointers and the ray's bytes, and cannot be
@@ -25,7 +25,7 @@ use libloading::{Library, Symbol};
 /// Rays on a side of the picture.
 const SIZE: u16 = 256;
 
-/// How often both sides are timed.
+/// Pairs of timed runs, one of each side.
 const PAIRS: usize = 201;
 
 /// `hgrid_mesh`.
@@ -52,8 +52,8 @@ struct CGrid([u64; 64]);
 type Open = unsafe extern "C" fn(*const u8, usize, *const CMesh, *mut CGrid) -> i32;
 type Intersect = unsafe extern "C" fn(*const CGrid, *const Ray, *const c_void, *mut Hit) -> bool;
 
-/// How many times as long one thing takes as another: the median of pairs one after the other,
-/// which what else the machine does slows down alike.
+/// Returns how many times as long one thing takes as another: the median of pairs one after the
+/// other, which other work of the machine slows down alike.
 fn ratio(one: impl Fn() -> usize, other: impl Fn() -> usize) -> f64 {
     let time = |what: &dyn Fn() -> usize| {
         let start = Instant::now();

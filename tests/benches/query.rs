@@ -1,4 +1,4 @@
-//! How long a ray takes.
+//! The time of a ray.
 //!
 //! Analysis: coherent rays are those of a picture, row by row, so cells and triangles are warm from
 //! the ray before; incoherent rays go from one random point of the box to another, so on a mesh

@@ -92,7 +92,7 @@ struct Sections<'a> {
 }
 
 impl Sections<'_> {
-    /// Where the next section starts, which has so many bytes. Its padding is zero.
+    /// Returns the start of the next section, which has so many bytes, and asserts that its padding is zero.
     fn next(&mut self, bytes: usize) -> usize {
         let (at, end) = (self.at, self.at + bytes);
         self.at = end.next_multiple_of(64);
@@ -326,7 +326,7 @@ fn dot(a: Point, b: Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Where a ray meets a triangle (Möller and Trumbore 1997).
+/// Returns the t at which a ray meets a triangle (Möller and Trumbore 1997).
 fn meets([origin, direction]: [Point; 2], [a, b, c]: [Point; 3]) -> Option<f64> {
     let (ab, ac, from) = (sub(b, a), sub(c, a), sub(origin, a));
     let p = cross(direction, ac);

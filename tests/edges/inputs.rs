@@ -94,7 +94,7 @@ fn densities_outside_the_range_are_refused() {
     assert_eq!((tree.with_density(f32::NAN), tree.density()), (tree, None));
 }
 
-/// What a density asks for that no build takes is still no less than what a lower one asks for.
+/// The bound for a density that no build takes is still no less than the bound for a lower one.
 #[test]
 fn bounds_grow_with_the_density_however_high() {
     for config in methods::configs() {

@@ -1,4 +1,4 @@
-//! What a value prints for a debugger is a line, however large the value is.
+//! A value prints one line for a debugger, however large it is.
 
 use std::fmt::Debug;
 

@@ -233,7 +233,7 @@ fn packed_scenes_are_refused_for_what_they_are() {
         assert_eq!((info.triangle_count, info.vertex_count), (1, 1 + 3));
         prove_packed(bytes).unwrap();
 
-        // What is nothing is hit by nothing, and stays nothing.
+        // No ray hits an object that is `Nothing`, and it stays `Nothing`.
         let ray = RayF64::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
         with_packed(bytes, |opened| {
             let opened = opened.unwrap();

@@ -55,7 +55,7 @@ fn one_and_a_few_triangles() {
     }
 }
 
-/// So many triangles, all the same.
+/// A mesh of so many triangles, all the same.
 fn stack(count: usize) -> Mesh {
     let mut mesh = Mesh::default();
     for _ in 0..count {
@@ -175,8 +175,8 @@ fn dense_rows_and_a_crowded_corner() {
     agrees(&crowded);
 }
 
-/// What would need more references than a grid may have is built with a lower density, and says so:
-/// the configuration that the grid tells builds it again.
+/// A grid that would need more references than it may have is built with a lower density, and says
+/// so: the configuration that the grid tells builds it again.
 #[test]
 fn a_mesh_of_spanning_triangles_lowers_the_density() {
     let mesh = soup(300, 2.0, 23);

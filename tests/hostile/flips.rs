@@ -12,14 +12,14 @@ use hgrid_tests::copy::{CHECKSUM, Copy, MESH};
 use hgrid_tests::hostile::{Seed, agrees, ends, fixed_rays, seeds};
 use hgrid_tests::owned::{Owned, prove};
 
-/// Where the header has what a build was told: method, density, macrocell factor, what subgrids
-/// hold at least, depth. With others there may well be the same grid.
+/// The header's fields for what a build was told: method, density, macrocell factor, the ids above
+/// which a cell gets a subgrid, depth. With others there may well be the same grid.
 const TOLD: [usize; 5] = [40, 44, 92, 96, 100];
 
-/// Where the header says what a blob is built over.
+/// The header's field for what a blob is built over.
 const CONTENT: Range<usize> = 104..108;
 
-/// Where the header has the quality of a tree.
+/// The header's field for the quality of a tree.
 const QUALITY: usize = 120;
 
 /// Returns true if a valid blob with a bit of this byte flipped is one that somebody may have made.
@@ -36,7 +36,7 @@ fn is_fit(at: usize, copy: &Copy, grid: &Grid<'_>) -> bool {
     is_built && TOLD.contains(&(at & !3)) || at == MESH && copy.word(MESH) <= 2
 }
 
-/// How it ended, for how many bits.
+/// Numbers of flipped bits, by how they ended.
 #[derive(Debug, Default)]
 struct Ends {
     /// Opening refused it.

@@ -1,5 +1,5 @@
-//! What random bytes do: a fuzzer's first minute, the same every time. A little of it runs under
-//! Miri, which sees in the C entry points what a fuzzer does not.
+//! Random bytes: a fuzzer's first minute, the same every time. A little of it runs under Miri, which
+//! sees in the C entry points what a fuzzer does not.
 
 use hgrid_tests::hostile::{build_mesh, c_abi};
 use hgrid_tests::random::Random;

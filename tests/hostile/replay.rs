@@ -1,4 +1,4 @@
-//! What fuzzing found, and what it found worth keeping: both run again.
+//! The finds of fuzzing, and the inputs that it found worth keeping: both run again.
 //!
 //! The inputs worth keeping are an archive for each target, corpus/TARGET.tar. The finds are files, whose names
 //! say what they did.

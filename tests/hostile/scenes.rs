@@ -64,7 +64,7 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
             continue;
         }
         accepted += 1;
-        // What no proof can know: where the caller put an instance, which object it shows and who sees it.
+        // No proof can know where the caller put an instance, which object it shows and who sees it.
         let same = (0..25).all(|number| {
             let (one, other) = (mutant.instance(number), scene.instance(number));
             let key = |i: hgrid_core::Instance| (i.linear, i.translation, i.object, i.mask);

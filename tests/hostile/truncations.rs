@@ -6,12 +6,12 @@ use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::{Seed, ends, fixed_rays, seeds};
 use hgrid_tests::owned::prove;
 
-/// Where the header has the length of the blob, and the words of its lists or its pool.
+/// The header's fields for the length of the blob, the words of its lists or its pool, and its nodes.
 const BLOB_BYTES: usize = 16;
 const REFERENCE_COUNT: usize = 88;
 const NODE_COUNT: usize = 112;
 
-/// What the last section holds: where the header counts it, and bytes of each.
+/// Returns the header's field that counts the items of the last section, and the bytes of each.
 fn last_section(seed: &Seed) -> (usize, usize) {
     if seed.config.method() == Method::Bvh { (NODE_COUNT, 80) } else { (REFERENCE_COUNT, 4) }
 }

@@ -26,7 +26,7 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
                     else {
                         panic!("{error}");
                     };
-                    // What it asks for helps.
+                    // The size that it asks for is enough.
                     fit(&view, &config, needed_bytes as usize, scratch).unwrap()
                 }
             };
@@ -75,7 +75,7 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
             matches!(without, Err(Error::OutOfMemory { region: Region::Scratch, .. }));
         assert_eq!(is_asked_for, needs_scratch, "{config:?}: {without:?}");
 
-        // What cannot be planned in the scratch is coarser, too, and then it can.
+        // A grid that cannot be planned in the scratch becomes coarser, too, and then it can.
         let enough = sizes(&mesh.view(), &config, &mut []).unwrap().scratch_bytes;
         let mut scratch = vec![Block::ZERO; Block::count_for(enough)];
         for bytes in [enough - 64, enough / 8 * 7, enough / 2, enough / 8] {

@@ -18,12 +18,12 @@ use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
 
-/// What a thread asks of the heap.
+/// The heap of a thread, in bytes.
 #[derive(Debug, Clone, Copy)]
 struct Heap {
     current: usize,
     peak: usize,
-    /// Of what came with anything in it, or had to be cleared because of its alignment, or was moved.
+    /// Bytes that came with anything in them, or had to be cleared because of their alignment, or were moved.
     written: usize,
     /// Allocations that are left, before there is no more memory.
     left: usize,

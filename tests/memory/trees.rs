@@ -10,7 +10,7 @@ use hgrid_tests::guarded::Guarded;
 use hgrid_tests::meshes::{Mesh, soup};
 use hgrid_tests::owned::{Owned, prove};
 
-/// Where the header has the number of nodes, and that of their levels.
+/// The header's fields for the number of nodes, and that of their levels.
 const NODE_COUNT: usize = 112;
 const LEVELS: usize = 116;
 
@@ -93,8 +93,8 @@ fn one_by_one(count: usize) -> Mesh {
     mesh
 }
 
-/// As many triangles in a corner as make a bin crowded, and a triangle far away; all that in a corner
-/// of something larger, and another triangle; so often.
+/// A mesh of `count` triangles: a crowd in a corner and a triangle far away; all that in a corner of something
+/// larger, and another triangle; and so on, `depth` times.
 fn nested(count: usize, depth: i32) -> Mesh {
     let mut mesh = Mesh::default();
     for level in 0..depth {

@@ -52,7 +52,7 @@ pub fn cargo_in(target_dir: &Path, subcommand: &str) -> Command {
     cargo
 }
 
-/// What the library is built with.
+/// The features that the library is built with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flavour {
     /// Nothing: what needs no operating system.
@@ -65,7 +65,7 @@ impl Flavour {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Bare, Self::Malloc];
 
-    /// What to tell cargo.
+    /// Returns the arguments for cargo.
     #[must_use]
     pub fn features(self) -> &'static [&'static str] {
         match self {
@@ -74,7 +74,7 @@ impl Flavour {
         }
     }
 
-    /// Where `libhgrid.a` and `libhgrid.so` lie, fresh from the compiler.
+    /// Returns the folder of `libhgrid.a` and `libhgrid.so`, fresh from the compiler.
     pub fn dir(self) -> &'static Path {
         static DIRS: [OnceLock<PathBuf>; 2] = [const { OnceLock::new() }; 2];
         DIRS[self as usize].get_or_init(|| {
@@ -122,7 +122,7 @@ pub fn library_with(features: &str) -> PathBuf {
     library
 }
 
-/// Where the libraries of the usual flavour lie.
+/// Returns the folder of the libraries of the usual flavour.
 pub fn library_dir() -> &'static Path {
     Flavour::Bare.dir()
 }
@@ -149,7 +149,7 @@ fn tool(is_cpp: bool) -> &'static Tool {
     })
 }
 
-/// Where the usual C++ compiler lies, if there is one.
+/// Returns the path of the usual C++ compiler, if there is one.
 pub(crate) fn cpp_path() -> &'static Path {
     tool(true).path()
 }

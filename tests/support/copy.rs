@@ -2,10 +2,10 @@
 
 use hgrid_core::Block;
 
-/// Where the header's checksum lies, behind all that it covers.
+/// The byte of the header's checksum, behind all that it covers.
 pub const CHECKSUM: usize = 124;
 
-/// Where the header says whether the mesh lies behind the grid.
+/// The byte of the header's field that says whether the mesh lies behind the grid.
 pub const MESH: usize = 108;
 
 /// Bytes in memory that is aligned as blobs must be.

@@ -2,7 +2,7 @@
 
 use hgrid_core::Block;
 
-/// What the memory around and in the regions holds at first.
+/// The byte that the memory around and in the regions holds at first.
 pub const CANARY: u8 = 0xc7;
 
 /// A region of so many bytes with canaries before and behind.

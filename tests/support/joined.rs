@@ -49,7 +49,7 @@ impl Part {
         };
         let bytes = |vertex: u32| match index_type {
             IndexType::U32 => vertex.to_ne_bytes().to_vec(),
-            // What does not fit is out of range in either form.
+            // A vertex that does not fit is out of range in either form.
             IndexType::U16 => u16::try_from(vertex).unwrap_or(u16::MAX).to_ne_bytes().to_vec(),
         };
         let position = |p: &[f32; 3]| p.iter().flat_map(|c| c.to_ne_bytes()).collect();

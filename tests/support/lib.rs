@@ -1,4 +1,4 @@
-//! What the tests of hgrid share: the oracle, meshes to ask about, a grid that owns its memory.
+//! Code that the tests of hgrid share: the oracle, meshes to ask about, a grid that owns its memory.
 
 /// The example in the project's README runs as a test.
 #[cfg(doctest)]

@@ -85,7 +85,7 @@ pub fn brute_force(grid: &Grid<'_>, ray: &Ray) -> Option<Hit> {
     all_hits(grid, ray, Cull::None).first().copied()
 }
 
-/// What brute force says of a ray.
+/// The answers of brute force about a ray.
 struct Expected {
     ray: Ray,
     /// All hits, the nearest first, and those of them that show their front.
@@ -209,7 +209,7 @@ fn check_selection(grid: &Grid<'_>, ray: &Ray, all: &[Hit], front: &[Hit]) {
     ] {
         let is_seen = |id: u32| mask == u32::MAX || grid.mesh().mask(id) & mask != 0;
         let sees = |id: u32| id != skip && is_seen(id);
-        // What shows its front and what shows its back are all there is, and nothing is both.
+        // Every hit shows either the front or the back of its triangle.
         let shows = |hit: &&Hit| match cull {
             Cull::None => true,
             Cull::Back => front.contains(hit),

@@ -37,7 +37,7 @@ pub struct Owned {
 /// Proves that a grid is right, in scratch of just the size that it asks for, which may hold anything.
 ///
 /// # Errors
-/// Those of the proof.
+/// The errors of the proof.
 pub fn prove(grid: &Grid<'_>) -> Result<(), Error> {
     grid.validate(&mut vec![0xa5; grid.validate_bytes()])
 }
@@ -46,7 +46,7 @@ impl Owned {
     /// Builds a grid in memory of exactly the size that it takes.
     ///
     /// # Errors
-    /// Those of the build.
+    /// The errors of the build.
     pub fn build(mesh: &TriangleMesh<'_>, config: &Config) -> Result<Self, Error> {
         let bound = sizes(mesh, config, &mut [])?;
         let mut scratch = Region::new(bound.scratch_bytes);
@@ -64,7 +64,7 @@ impl Owned {
     /// The view that queries run on.
     ///
     /// # Errors
-    /// Those of opening, if the mesh is another.
+    /// The errors of opening, if the mesh is another.
     pub fn open<'a>(&'a self, mesh: &TriangleMesh<'a>) -> Result<Grid<'a>, Error> {
         Grid::open(self.index.bytes(), *mesh)
     }

@@ -1,4 +1,4 @@
-//! What a ray hits, decided without rounding and without a line of the library.
+//! The hits of a ray, decided without rounding and without a line of the library.
 //!
 //! The documentation of `Hit` and the head of core/src/triangle.rs are the rule:
 //!
@@ -23,7 +23,7 @@ use crate::dyadic::Dyadic;
 
 type Corners = [[f32; 3]; 3];
 
-/// What is known of a ray and a triangle.
+/// The rule's answer about a ray and a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
     /// A miss.
@@ -86,7 +86,7 @@ impl Line {
         [self.place(a), self.place(b), self.place(c)]
     }
 
-    /// What the rule says of a triangle.
+    /// Returns the rule's answer about a triangle.
     #[must_use]
     pub fn answer(&self, corners: &Corners) -> Answer {
         if self.passes(corners) { self.answer_of_passed(corners) } else { Answer::Miss }
@@ -131,7 +131,7 @@ impl Line {
         signs.contains(&Ordering::Greater) == (self.direction[2] > 0.0)
     }
 
-    /// How far along the ray the range and the corners are, growing, in units of the longest axis.
+    /// Returns how far along the ray the range and the corners are, growing, in units of the longest axis.
     fn along(&self, places: &[Place; 3]) -> ([f64; 2], [f64; 3]) {
         // Products of two f32 numbers: exact.
         let ends = self.range.map(|t| t * self.direction[2].abs());
@@ -196,7 +196,7 @@ impl Line {
         }
     }
 
-    /// Where the line meets the plane of the corners, compared with `t`; `None` if it does not, or not in a point.
+    /// Compares T, where the line meets the plane of the corners, with `t`; `None` if it does not, or not in a point.
     fn meets(&self, corners: &Corners, t: f64) -> Option<Ordering> {
         let exact = |v: [f64; 3]| v.map(Dyadic::new);
         let [a, b, c] = corners.map(|corner| exact(self.turned(corner)));

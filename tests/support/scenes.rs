@@ -22,7 +22,7 @@ impl Built {
     /// Builds a scene in as much memory as any of its size takes, and proves it.
     ///
     /// # Errors
-    /// Those of the build and of the proof.
+    /// The errors of the build and of the proof.
     pub fn scene(
         instances: &[Instance],
         objects: &[Object<'_>],
@@ -40,7 +40,7 @@ impl Built {
     /// Builds a tree of shapes, and proves it.
     ///
     /// # Errors
-    /// Those of the build and of the proof.
+    /// The errors of the build and of the proof.
     pub fn shapes(boxes: Boxes<'_>, config: &Config) -> Result<Self, Error> {
         let (mut index, mut scratch) = memory(Sizes::bound(boxes.count(), config))?;
         let scratch = Block::bytes_mut(&mut scratch);
@@ -52,7 +52,7 @@ impl Built {
     /// The view that queries run on.
     ///
     /// # Errors
-    /// Those of opening.
+    /// The errors of opening.
     pub fn open<'a>(&'a self, objects: &'a [Object<'a>]) -> Result<Scene<'a>, Error> {
         Scene::open(self.bytes(), objects)
     }
@@ -71,7 +71,7 @@ impl Built {
 /// A scene with all that it shows, in memory of just the size.
 ///
 /// # Errors
-/// Those of packing.
+/// The errors of packing.
 pub fn packed(scene: &Scene<'_>) -> Result<Vec<Block>, Error> {
     let bytes = usize::try_from(scene.packed_bytes()).expect("not so many");
     let mut blocks = vec![Block::ZERO; Block::count_for(bytes)];
@@ -96,7 +96,7 @@ pub fn with_packed<T>(blob: &[u8], run: impl FnOnce(Result<Scene<'_>, Error>) ->
 /// Proves a packed scene, in as much scratch as is enough.
 ///
 /// # Errors
-/// Those of opening and of the proofs.
+/// The errors of opening and of the proofs.
 pub fn prove_packed(blob: &[u8]) -> Result<(), Error> {
     let (mut members, mut objects) = room(blob);
     let mut scratch = vec![0xa5; blob.len() / 64];

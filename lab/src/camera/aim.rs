@@ -1,4 +1,4 @@
-//! What the words of `--view` name: a side of any scene, or a view of one.
+//! The views that the words of `--view` name: a side of any scene, or a view of one.
 
 use core::str::FromStr;
 
@@ -12,7 +12,7 @@ use crate::scene::Scene;
 pub enum Aim {
     /// All of a scene from a side.
     Side(View),
-    /// What a scene has under a name.
+    /// The view that a scene has under a name.
     Named(&'static str),
 }
 

@@ -1,4 +1,4 @@
-//! How much a camera sees.
+//! The field of view of a camera.
 
 use core::str::FromStr;
 

@@ -26,7 +26,7 @@ use crate::scene::Bounds;
 use crate::vector::{Vector, cross, dot, offset, round, unit};
 use view::half_extent;
 
-/// How much larger than the box the picture is.
+/// The extent of the picture, as a multiple of the box's.
 const MARGIN: f64 = 1.04;
 
 /// An eye and the directions of its picture.
@@ -91,21 +91,21 @@ impl Camera {
         self.ray_at(self.across(column, size), self.down(row, size))
     }
 
-    /// What the rays of a column of pixels have in common: forward, and to the right.
+    /// Returns the part of the rays' directions that a column of pixels shares: forward, and to the right.
     #[inline]
     pub(crate) fn across(&self, column: u16, size: u16) -> [f32; 3] {
         let x = (2.0 * f32::from(column) + 1.0 - f32::from(size)) * self.half_pixel(size);
         [0, 1, 2].map(|axis| self.forward[axis] + x * self.right[axis])
     }
 
-    /// What the rays of a row of pixels have in common: upward.
+    /// Returns the part of the rays' directions that a row of pixels shares: upward.
     #[inline]
     pub(crate) fn down(&self, row: u16, size: u16) -> [f32; 3] {
         let y = (f32::from(size) - 2.0 * f32::from(row) - 1.0) * self.half_pixel(size);
         self.up.map(|c| y * c)
     }
 
-    /// What to add to the directions of all rays to move them by a part of a pixel, right and down.
+    /// Returns the vector that moves the directions of all rays by a part of a pixel, right and down.
     #[must_use]
     pub fn shift(&self, [right, down]: [f32; 2], size: u16) -> [f32; 3] {
         let pixel = 2.0 * self.half_pixel(size);

@@ -13,7 +13,7 @@ struct Named {
     place: Place,
 }
 
-/// Where the camera stands; y is up.
+/// The place of the camera; y is up.
 enum Place {
     /// All of the scene from a side.
     Around(View),

@@ -1,4 +1,4 @@
-//! From where a scene is seen: a side of it, or two angles; and which axis is up.
+//! The direction from which a scene is seen: a side of it, or two angles; and the axis that is up.
 
 use core::str::FromStr;
 
@@ -54,7 +54,7 @@ impl Up {
     }
 }
 
-/// From which side to look; the axes are those of a scene whose y is up.
+/// The side to look from; the axes are those of a scene whose y is up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum View {
     /// From +z, where scans that stand on the xz plane face.

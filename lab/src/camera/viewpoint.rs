@@ -24,7 +24,7 @@ const AROUND: u16 = 256;
 /// Level rays that look for an open side.
 const LEVEL: u16 = 72;
 
-/// How much of a room is walls, at least.
+/// The part of all directions in which a room has walls, at least.
 const ENCLOSED: f64 = 0.75;
 
 /// The part of all level directions that an open side takes, at least.

@@ -1,13 +1,13 @@
-//! Whether two systems give the same answers.
+//! Comparison of the answers of two systems.
 
 use hgrid_core::Hit;
 
 use super::system::is_hit;
 
-/// How far apart two hits may be and still be the same, as a part of the scene's diagonal.
+/// The largest distance between hits that count as the same, as a part of the scene's diagonal.
 const TOLERANCE: f64 = 1e-4;
 
-/// How many rays of a thousand may differ before a system is marked.
+/// Rays of a thousand that may differ before a system is marked.
 const MARKED_ABOVE: u64 = 1;
 
 /// Rays whose answers differ: one hits and the other does not, or they hit at different places.

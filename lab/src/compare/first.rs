@@ -22,7 +22,7 @@ use crate::scene::Scene;
 /// The name of the command that builds once.
 pub const COMMAND: &str = "first-build";
 
-/// How long a first build took.
+/// The time of a first build, and its page faults.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FirstBuild {
     /// From the mesh to a structure that answers.

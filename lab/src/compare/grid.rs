@@ -17,7 +17,7 @@ use super::workloads::Workload;
 use crate::regions::{Regions, peak_bytes};
 use crate::tiles::TILE_RAYS;
 
-/// What the name of a tree of high quality ends with.
+/// The ending of the name of a tree of high quality.
 pub(super) const HIGH: &str = "-high";
 
 /// One method.
@@ -89,7 +89,7 @@ impl System for GridSystem {
 struct GridTracer<'a> {
     grid: Grid<'a>,
     config: &'a Config,
-    /// Where rays are sorted, kept from call to call.
+    /// Memory to sort rays in, kept from call to call.
     memory: RefCell<Vec<u8>>,
 }
 
@@ -136,7 +136,7 @@ impl Tracer for GridTracer<'_> {
     }
 }
 
-/// How batches are called.
+/// The calls that trace batches.
 pub(super) struct Call {
     /// Rays in a call, at most.
     pub(super) rays: usize,

@@ -1,4 +1,4 @@
-//! What is on the heap: an allocator that counts for Rust, and a question to the C library.
+//! Bytes on the heap: an allocator that counts for Rust, and a question to the C library.
 
 #![expect(unsafe_code, reason = "an allocator is unsafe to implement")]
 
@@ -61,7 +61,7 @@ pub(super) fn start_peak() -> usize {
     now
 }
 
-/// What was put on Rust's heap since it held `before` bytes, and the most of it at any time.
+/// Returns the bytes that were put on Rust's heap since it held `before`, and the most at any time.
 pub(super) fn since(before: usize) -> Bytes {
     Bytes {
         index: CURRENT.load(Relaxed).saturating_sub(before),

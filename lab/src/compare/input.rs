@@ -38,7 +38,7 @@ impl Input {
         Self { instances, ..Self::new(scene) }
     }
 
-    /// Where the mesh stands how often; nothing if it stands where it is.
+    /// Returns the instances of the mesh; none if it stands where it is.
     #[must_use]
     pub fn instances(&self) -> &[Instance] {
         &self.instances

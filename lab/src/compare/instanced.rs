@@ -43,7 +43,7 @@ struct SceneTracer<'a> {
     scene: Scene<'a>,
     instances: &'a [Instance],
     config: &'a Config,
-    /// Where rays are sorted, kept from call to call.
+    /// Memory to sort rays in, kept from call to call.
     memory: RefCell<Vec<u8>>,
 }
 

@@ -1,4 +1,4 @@
-//! How rays are handed to a structure.
+//! Ways to hand rays to a structure.
 
 use serde::{Serialize, Serializer};
 
@@ -20,20 +20,20 @@ pub enum Mode {
 /// Rays in a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lanes {
-    /// As many as a register of SSE holds.
+    /// The lanes of a register of SSE.
     Four,
-    /// As many as a register of AVX holds.
+    /// The lanes of a register of AVX.
     Eight,
-    /// As many as a register of AVX-512 holds.
+    /// The lanes of a register of AVX-512.
     Sixteen,
 }
 
-/// What the caller says about the rays of a call.
+/// The caller's hint about the rays of a call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hint {
     /// Nothing.
     None,
-    /// That they are coherent.
+    /// The rays are coherent.
     Coherent,
 }
 

@@ -25,9 +25,9 @@ use crate::table::display_name;
 /// All systems on all scenes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Where the numbers come from.
+    /// The origin of the numbers.
     pub machine: Machine,
-    /// What the program was compiled for.
+    /// The architecture and the vectors that the program was compiled for.
     pub target: String,
     /// Pixels on each side of the pictures.
     pub size: u16,
@@ -54,7 +54,7 @@ pub struct SceneNumbers {
 /// One system on one scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SystemNumbers {
-    /// Its name.
+    /// The system's name.
     pub system: String,
     /// The library and its version, if it tells.
     pub version: Option<String>,
@@ -81,13 +81,13 @@ pub struct SystemNumbers {
 pub struct Build {
     /// The median.
     pub seconds: f64,
-    /// What it is the median of, one for each repetition.
+    /// The times that it is the median of, one for each repetition.
     pub samples: Vec<f64>,
     /// Pages that were first touched meanwhile: the median.
     pub page_faults: Option<u64>,
 }
 
-/// Which of the two builds.
+/// One of the two builds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The first in a new process.
@@ -105,7 +105,7 @@ pub struct Run {
     pub mode: Mode,
     /// The median.
     pub seconds: f64,
-    /// What it is the median of, one for each repetition.
+    /// The times that it is the median of, one for each repetition.
     pub samples: Vec<f64>,
     /// Pages that were first touched meanwhile: the median.
     pub page_faults: Option<u64>,

@@ -7,19 +7,19 @@ use super::workloads::{Asked, narrow};
 use crate::scene::Bounds;
 use crate::vector::{Vector, length, offset, round};
 
-/// How far points near the surface are from it at most, and how far is looked, as parts of the
-/// diagonal of the scene's box.
+/// The largest distance of points near the surface from it, and the radius of their search, as parts
+/// of the diagonal of the scene's box.
 const NEAR: f64 = 0.01;
 const NEAR_RADIUS: f64 = 0.1;
 
-/// How far the others are from the middle of the box, likewise: from the least to the most.
+/// The least and the largest distance of the others from the middle of the box, and their radius, likewise.
 const FAR: [f64; 2] = [1.0, 3.0];
 const FAR_RADIUS: f64 = 4.0;
 
 /// Points, and how far hgrid says that the surface is.
 #[derive(Debug, PartialEq)]
 pub struct Points {
-    /// How far is looked.
+    /// The radius of the search.
     pub radius: f32,
     /// Points and distances, which are infinite where the surface is farther.
     pub asked: Asked<[f32; 3], f32>,
@@ -61,7 +61,7 @@ impl Points {
     }
 }
 
-/// How far a grid says that the surface is, infinite beyond the radius.
+/// Returns the distance to the surface of a grid, infinite beyond the radius.
 pub(super) fn distance(grid: &Grid<'_>, point: [f32; 3], radius: f32) -> f32 {
     let closest = grid.closest_point(point, radius, &mut QueryOptions::default());
     closest.map_or(f32::INFINITY, |closest| closest.distance)

@@ -1,4 +1,4 @@
-//! What the system tells of this process, and what it is told.
+//! Facts that the system tells of this process, and settings that it is told.
 
 use anyhow::Result;
 
@@ -51,7 +51,7 @@ pub fn give_back_heap() {
     super::heap::give_back();
 }
 
-/// What the program was compiled for: the architecture and the widest vectors that it may use.
+/// Returns what the program was compiled for: the architecture and the widest vectors that it may use.
 #[must_use]
 pub fn target() -> String {
     let vectors = [

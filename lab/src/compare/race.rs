@@ -26,12 +26,12 @@ use crate::progress::Progress;
 /// First builds of each system, at least.
 const FIRST_BUILDS: u32 = 3;
 
-/// What is measured, how often, and how much of it.
+/// The plan of a race: what is measured, how often, and how much of it.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// Repetitions that times are medians of.
     pub repeat: u32,
-    /// What is asked, in this order.
+    /// Workloads, in the order in which they are asked.
     pub workloads: Vec<Workload>,
     /// Questions of each workload.
     pub amount: Amount,

@@ -1,4 +1,4 @@
-//! What is written down while the systems take turns.
+//! Samples that are written down while the systems take turns.
 
 use std::time::Instant;
 

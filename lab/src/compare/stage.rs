@@ -15,7 +15,7 @@ use super::workloads::{Rays, Workload};
 use crate::shade::{Rgb, Shader};
 use crate::tiles::TILE_RAYS;
 
-/// What all systems share: questions, and room for answers.
+/// The questions that all systems share, and room for answers.
 pub(super) struct Stage<'a> {
     rays: &'a Rays,
     /// The shader of the mesh; none with instances, as it does not know how they turn its surface.

@@ -1,4 +1,4 @@
-//! What takes part: something that builds, and then traces slices of rays into slices of answers.
+//! Systems that take part: each builds, and then traces slices of rays into slices of answers.
 //!
 //! A new peer is one [`System`] with its [`Tracer`]; a new way to trace is one more arm in the
 //! [`Tracer`] of a system and one more word in its [`System::modes`].
@@ -20,13 +20,13 @@ pub const fn is_hit(hit: &Hit) -> bool {
 /// Bytes of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bytes {
-    /// What is kept for queries, without the mesh.
+    /// Bytes that are kept for queries, without the mesh.
     pub index: usize,
     /// The most that there was during the build.
     pub peak: usize,
 }
 
-/// What a build is handed to, once it is complete.
+/// Receives a build once it is complete.
 pub type Use<'a> = dyn FnMut(&dyn Tracer) -> Result<()> + 'a;
 
 /// Something that builds.
@@ -76,7 +76,7 @@ pub const fn one_by_one(workload: Workload) -> &'static [Mode] {
 /// A rebuild by a system that keeps no more than its heap.
 ///
 /// # Errors
-/// Those of its builds.
+/// The errors of its builds.
 pub fn rebuild_anew(
     system: &(impl System + ?Sized),
     input: &Input,
@@ -97,7 +97,7 @@ const FEW_PAGES: u64 = 16;
 /// Builds again and again, until that touches no new pages.
 ///
 /// # Errors
-/// Those of a build.
+/// The errors of a build.
 pub fn warm_up(mut build: impl FnMut() -> Result<()>) -> Result<()> {
     for _ in 0..WARM_UPS {
         let watch = Watch::start();
@@ -124,7 +124,7 @@ pub trait Tracer {
         distances.fill(f32::INFINITY);
     }
 
-    /// Its bytes, unless they are all on the heap that the program counts.
+    /// Returns its bytes, unless they are all on the heap that the program counts.
     ///
     /// # Errors
     /// If they cannot be counted.

@@ -45,7 +45,7 @@ pub(super) fn markdown(comparison: &Comparison) -> String {
 }
 
 impl Comparison {
-    /// What the numbers mean.
+    /// Says what the numbers mean.
     fn notes(&self) -> Vec<String> {
         let Self { size, repeats, .. } = self;
         let mut notes = vec![
@@ -81,7 +81,7 @@ impl Comparison {
         notes
     }
 
-    /// Which systems are of which version of a library.
+    /// Says which systems are of which version of a library.
     fn versions(&self) -> Option<String> {
         let systems = &self.scenes.first()?.systems;
         let told = |system: &SystemNumbers| {

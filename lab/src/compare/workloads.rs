@@ -1,4 +1,4 @@
-//! What every system is asked, and the answers that hgrid gives.
+//! Questions that every system is asked, and the answers that hgrid gives.
 //!
 //! Primary rays are made tile by tile while they are traced, as a renderer does. The others are
 //! made once, beforehand: they are the same for all systems and in none of the times. Nothing here
@@ -24,7 +24,7 @@ use crate::world::on_mesh;
 /// where the scene is a field of its instances.
 pub const AO_REACH: f64 = 0.1;
 
-/// How far from its surface such a ray starts, likewise: far above rounding, far below triangles.
+/// The distance of such a ray's start from its surface, likewise: far above rounding, far below triangles.
 const AO_START: f64 = 1e-5;
 
 /// The questions of a measurement.
@@ -70,7 +70,7 @@ impl Workload {
     }
 }
 
-/// How many questions there are of the workloads whose numbers do not follow from the picture.
+/// Numbers of questions, for the workloads whose numbers do not follow from the picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Amount {
     /// Rays between random points.
@@ -82,8 +82,8 @@ pub struct Amount {
 }
 
 impl Amount {
-    /// As many random rays as a picture of 1024 x 1024 has. Far points are few, because a grid looks
-    /// at much of the mesh for each.
+    /// The full amounts: as many random rays as a picture of 1024 x 1024 has. Far points are few,
+    /// because a grid looks at much of the mesh for each.
     const FULL: Self = Self { random_rays: 1 << 20, near_points: 1 << 15, far_points: 1 << 11 };
 
     /// All that the workloads ask, and nothing for the others.
@@ -103,7 +103,7 @@ impl Amount {
 pub struct Asked<Q, A> {
     /// Rays or points.
     pub questions: Vec<Q>,
-    /// What the default method says.
+    /// The answers of the default method.
     pub answers: Vec<A>,
 }
 
@@ -183,7 +183,7 @@ impl Rays {
         })
     }
 
-    /// How many rays or points a workload has.
+    /// Counts the rays or points of a workload.
     #[must_use]
     pub fn count(&self, workload: Workload) -> usize {
         match workload {

@@ -23,7 +23,7 @@ const HEIGHT: u32 = 340;
 const SCENE_PART: f64 = 0.84;
 const BAR_PART: f64 = 0.88;
 
-/// What one chart shows.
+/// The quantity that one chart shows.
 #[derive(Clone, Copy)]
 enum Quantity {
     /// A time of every method.

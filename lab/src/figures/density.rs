@@ -21,7 +21,7 @@ use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::table::{display_name, measure_diffuse, times};
 
-/// What one scene takes at every density, for every method.
+/// The measurements of one scene at every density, for every method.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Curves {
     machine: Machine,
@@ -32,7 +32,7 @@ pub(super) struct Curves {
     methods: Vec<Curve>,
 }
 
-/// What one method takes at every density.
+/// The measurements of one method at every density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Curve {
     method: Cow<'static, str>,

@@ -50,7 +50,7 @@ pub(crate) fn figure1(json: &str) -> Result<String> {
 /// Draws figure 2 from the numbers of a table, as SVG.
 ///
 /// # Errors
-/// Those of drawing.
+/// The errors of drawing.
 pub(crate) fn figure2(results: &Results) -> Result<String> {
     svg(&bars::Figure(results))
 }

@@ -6,7 +6,7 @@
 //! <!-- end of report -->
 //! ```
 //!
-//! So a number in a page is one that a file has, and measuring again is a new file and one command.
+//! A number in a page is thus one that a file has, and measuring again is a new file and one command.
 //! Paths are relative to the root of a checkout. Charts are written beside the page.
 
 mod compared;
@@ -59,7 +59,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
 /// A file as it should be.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct File {
-    /// Its path below the root.
+    /// The path below the root.
     name: String,
     text: String,
 }

@@ -61,7 +61,7 @@ impl Scale {
         Self { range: start..end, is_logarithmic: true, labelled, light }
     }
 
-    /// Where an amount lies, 0 at the start and 1 at the end.
+    /// Returns the place of an amount, 0 at the start and 1 at the end.
     fn part(&self, amount: f64) -> f64 {
         let Range { start, end } = self.range;
         if self.is_logarithmic {

@@ -1,4 +1,4 @@
-//! What all charts share: a frame with axes, a heading, a legend.
+//! The parts that all charts share: a frame with axes, a heading, a legend.
 
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::prelude::*;
@@ -16,7 +16,7 @@ pub(crate) const HEADING: u32 = 88;
 /// A frame with axes, ready for what it is about.
 pub(crate) type Chart<'a, B> = ChartContext<'a, B, Cartesian2d<Stops, Scale>>;
 
-/// What a chart shows in which unit.
+/// The words that say what a chart shows in which unit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Words<'a> {
     /// Above the chart.

@@ -47,10 +47,10 @@ pub(crate) const COLORS: [RGBColor; 6] = [
     RGBColor(0x56, 0xb4, 0xe9),
 ];
 
-/// Where a drawing goes.
+/// The area that a drawing goes to.
 pub(crate) type Area<B> = DrawingArea<B, Shift>;
 
-/// What can go wrong there.
+/// The result of drawing there.
 pub(crate) type AreaResult<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
 /// A picture of lines, areas and words.
@@ -109,7 +109,7 @@ pub(crate) fn centred(style: &TextStyle<'static>) -> TextStyle<'static> {
 /// Writes `name.svg` and `name.png` into a folder.
 ///
 /// # Errors
-/// Those of writing the files.
+/// The errors of writing the files.
 pub(crate) fn save(drawing: &impl Drawing, folder: &Path, name: &str) -> Result<()> {
     let path = folder.join(name).with_extension("svg");
     fs::write(&path, svg(drawing)?)
@@ -121,7 +121,7 @@ pub(crate) fn save(drawing: &impl Drawing, folder: &Path, name: &str) -> Result<
 /// The drawing as SVG.
 ///
 /// # Errors
-/// Those of drawing.
+/// The errors of drawing.
 pub(crate) fn svg(drawing: &impl Drawing) -> Result<String> {
     let mut text = String::new();
     {

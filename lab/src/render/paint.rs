@@ -32,7 +32,7 @@ pub(super) struct Seen<'a> {
     pub(super) sample: Sample,
 }
 
-/// What a picture took.
+/// Counts of a picture's rays.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     /// Rays from the eye and from what they hit.

@@ -24,13 +24,13 @@ const KEY: [f32; 3] = [0.92, 0.86, 0.76];
 const SKY: [f32; 3] = [0.21, 0.25, 0.31];
 const GROUND: [f32; 3] = [0.11, 0.10, 0.085];
 
-/// How much red, green and blue the geometries of a scene reflect; the sixth is like the first. The first is grey, and so
-/// is a scene of one geometry.
+/// The red, green and blue that the geometries of a scene reflect; the sixth is like the first. The first is grey, and
+/// so is a scene of one geometry.
 const TINTS: [[f32; 3]; 5] =
     [[1.0, 1.0, 1.0], [1.0, 0.74, 0.48], [0.55, 0.78, 1.0], [0.62, 0.92, 0.58], [1.0, 0.6, 0.62]];
 
-/// How far away something hides the sky: in parts of half the scene's diagonal, and in a room in
-/// parts of the distance that is seen.
+/// The distance up to which something hides the sky: in parts of half the scene's diagonal, and in a
+/// room in parts of the mean distance that is seen.
 const REACH: f64 = 0.5;
 const ROOM_REACH: f64 = 0.35;
 
@@ -42,7 +42,7 @@ const MAX_EXPOSURE: f32 = 6.0;
 /// many of them beats one that falls on a floor alone.
 const GRAZING: f32 = 0.5;
 
-/// How dark the floor gets: what is left without the lamp, and without the sky.
+/// The part of the floor's light that is left without the lamp, and without the sky.
 const FLOOR_SHADE: f32 = 0.5;
 const FLOOR_CLOSED: f32 = 0.35;
 
@@ -52,7 +52,7 @@ const FADE: [f64; 2] = [1.2, 3.5];
 /// Rays on each side of the coarse picture that the light of a room is chosen by.
 const COARSE: u16 = 48;
 
-/// What lights the surfaces of a scene, as a camera sees them.
+/// The lights on the surfaces of a scene, as a camera sees them.
 #[derive(Debug)]
 pub(super) struct Studio<'a> {
     world: World<'a>,
@@ -61,7 +61,7 @@ pub(super) struct Studio<'a> {
     around: Around,
     /// The direction to the sky.
     up: [f32; 3],
-    /// How much brighter sky and ground are than outside.
+    /// The brightness of sky and ground, 1 outside.
     exposure: f32,
     floor: Option<Floor>,
 }

@@ -30,7 +30,7 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Model> {
     let Gltf { document, blob } = Gltf::from_slice(bytes).context("it is not a valid glTF file")?;
     let buffers = buffers(&document, blob, path.parent().unwrap_or(Path::new("")))?;
     let mut model = Model::default();
-    // Where the primitives of each glTF mesh begin, and how many it has.
+    // Each glTF mesh has a range of primitives in `model.meshes`.
     let mut places = Vec::new();
     for mesh in document.meshes() {
         let first = model.meshes.len();

@@ -100,7 +100,7 @@ impl Station {
     }
 }
 
-/// How far the surface stands out at a point of the smooth tube.
+/// Returns how far the surface stands out at a point of the smooth tube.
 fn bumps(point: Vector) -> f64 {
     let (mut sum, mut frequency, mut height) = (0.0, BUMP_FREQUENCY, BUMP_HEIGHT);
     for _ in 0..BUMP_OCTAVES {

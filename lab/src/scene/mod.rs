@@ -1,4 +1,4 @@
-//! What can be rendered: a mesh from a file or from a formula, under one name.
+//! Scenes that can be rendered: a mesh from a file or from a formula, under one name.
 //!
 //! A scene is two plain arrays, the ones that the core takes. Loaders write into them directly;
 //! nothing is merged, reordered or repaired, because a measurement should see the file as it is.
@@ -65,7 +65,7 @@ impl Scene {
     /// corners of its box for vertices.
     ///
     /// # Errors
-    /// Those of [`load`](Self::load).
+    /// The errors of [`load`](Self::load).
     pub fn open(spec: &str, takes_instances: bool) -> Result<(Self, Option<Model>)> {
         let path = Path::new(spec);
         if let Some((inner, outer)) = spec.split_once('+').filter(|_| !path.exists()) {

@@ -113,7 +113,7 @@ pub(crate) fn moved(transform: &Transform, point: [f32; 3]) -> [f32; 3] {
     }))
 }
 
-/// Where an instance puts its object.
+/// Returns the transform by which an instance places its object.
 pub(crate) fn transform_of(instance: &Instance) -> Transform {
     let translation = round(instance.translation);
     [0, 1, 2].map(|axis| {

@@ -24,7 +24,7 @@ const FIRST: usize = 20;
 const COUNTS: usize = 24;
 const BOUNDS: usize = 32;
 
-/// Where things lie in a tree.
+/// The sections of a tree.
 #[derive(Debug, Clone, Copy)]
 struct Tree {
     ids: usize,
@@ -33,7 +33,7 @@ struct Tree {
     node_count: usize,
 }
 
-/// What a child of a node is: a node, or so many ids from a word on.
+/// A child of a node: another node, or a leaf of so many ids from a word on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Child {
     Node(usize),
@@ -53,17 +53,17 @@ impl Tree {
         self.nodes + NODE * node + field
     }
 
-    /// Where errors about a node point.
+    /// Returns the bytes where errors about a node point.
     const fn node(&self, node: usize) -> core::ops::Range<usize> {
         self.at(node, 0)..self.at(node + 1, 0)
     }
 
-    /// Where errors about ids point.
+    /// Returns the bytes where errors about ids point.
     const fn all_ids(&self) -> core::ops::Range<usize> {
         self.ids..self.ids + 4 * self.id_count
     }
 
-    /// Where errors about anything but the header point.
+    /// Returns the bytes where errors about anything but the header point.
     const fn all(&self) -> core::ops::Range<usize> {
         self.ids..self.at(self.node_count, 0)
     }
@@ -160,7 +160,7 @@ fn every_triangle_stands_in_one_leaf() {
             }),
             case("ids that wrap", t.all(), move |b| b.set_word(t.at(last, FIRST), u32::MAX - 1)),
             case("fewer ids than triangles", counts.clone(), move |b| {
-                // As many words as before: none moves.
+                // The ids take as many blocks as before: nothing moves.
                 assert!(t.id_count % 16 > 1);
                 b.set_word(word(t.id_count - 1), 0);
                 add(b, REFERENCE_COUNT, -1);

@@ -18,7 +18,7 @@ use super::variable::{Sub, subgrids};
 const SHARED: [usize; 4] = [1535, 11_941, 20_919, 28_447];
 const ORPHANED: [usize; 4] = [39_775, 45_454, 58_142, 63_241];
 
-/// What nobody reads.
+/// An id that nobody reads.
 const JUNK: u32 = 0xdead_beef;
 
 /// A table of slots with these lists, and the lists one behind the other.
@@ -117,7 +117,7 @@ fn forge(seed: &Seed) -> (Copy, std::ops::Range<usize>) {
     for (cell, &slot) in cells.iter().zip(&slots) {
         lists.entry(slot).or_insert_with(|| cell.ids.clone());
     }
-    // What is left over of all ids lies where no cell looks.
+    // Put as many ids as are left over where no cell looks.
     let total = (sub.end - sub.ids) / 4;
     let mut rest = total - lists.values().map(Vec::len).sum::<usize>();
     for slot in ORPHANED {

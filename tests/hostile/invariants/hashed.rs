@@ -21,7 +21,7 @@ fn sparse(method: Method) -> Seed {
     Seed::new(soup(60, 0.05, 9), parameters(method, 4.0).into())
 }
 
-/// What holds of every table, with its lists in the words behind it: so many at a place.
+/// Returns cases that break the invariants of every hash table with its lists in the pool behind it.
 pub(super) fn table(seed: &Seed) -> Vec<Case<'static>> {
     let blob = &seed.blob;
     let s = Hashed::of(blob);
@@ -73,7 +73,8 @@ pub(super) fn table(seed: &Seed) -> Vec<Case<'static>> {
     cases
 }
 
-/// What holds of every list of a cell: the words from `start` to `end` at these bytes.
+/// Returns cases that break the invariants of every list of a cell: `ids` are its bytes, `at` those where
+/// errors point.
 pub(super) fn list(
     mesh: &Mesh,
     ids: std::ops::Range<usize>,

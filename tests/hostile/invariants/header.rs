@@ -1,4 +1,4 @@
-//! What the header of every method says.
+//! Invariants of the header of every method.
 
 use hgrid_core::{Error, Grid, Method};
 use hgrid_tests::copy::{Copy, MESH};
@@ -48,7 +48,7 @@ fn fields(seed: &Seed) -> Vec<Case<'static>> {
             case("a cell more", 0..HEAD + 64, move |b| add(b, resolution, 1)),
         ]);
     }
-    // What lies behind the last known field, and fields of other methods.
+    // Set what lies behind the last known field, and fields of other methods.
     let unused = RESERVED - 20..RESERVED + 12;
     // A tree counts its nodes and their levels there (see bvh.rs), and tells its quality.
     let is_tree = method == Method::Bvh;

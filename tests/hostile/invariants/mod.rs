@@ -1,5 +1,5 @@
-//! What holds of every blob that a build writes, broken one by one: opening or `validate` refuses
-//! it, at a byte that has to do with it, and queries end whatever it is.
+//! Invariants of every blob that a build writes, broken one by one: opening or `validate` refuses the
+//! blob, at a byte that has to do with it, and queries end whatever it is.
 //!
 //! The words are found here from the format's description alone.
 
@@ -18,10 +18,10 @@ use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::{Seed, ends, fixed_rays};
 use hgrid_tests::owned::prove;
 
-/// What a table says: what is broken, where the error points, and how to break it.
+/// A row of a table: what is broken, where the error points, and how to break it.
 type Case<'c> = (&'c str, Range<usize>, Box<dyn Fn(&mut Copy) + 'c>);
 
-/// A row of a table.
+/// Makes a row of a table.
 fn case<'c>(what: &'c str, at: Range<usize>, change: impl Fn(&mut Copy) + 'c) -> Case<'c> {
     (what, at, Box::new(change))
 }

@@ -19,7 +19,7 @@ fn crowded() -> Seed {
 struct Node {
     head: usize,
     entries: usize,
-    /// Where the contents of each cell start and end, in bytes, and whether they are a grid.
+    /// Start and end of the contents of each cell, in bytes, and true if they are a grid.
     cells: Vec<(usize, usize, bool)>,
     depth: usize,
 }

@@ -1,4 +1,4 @@
-//! Where things lie in a blob, from the format's description
+//! The layout of a blob, from the format's description
 //! (core/src/one_level/mod.rs and others).
 
 use hgrid_tests::copy::Copy;
@@ -29,7 +29,7 @@ pub(super) const GRID: u32 = 1 << 31;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hashed {
     pub(super) resolution: [usize; 3],
-    /// Where each section starts.
+    /// The start of each section, then the numbers of slots and of the pool's words.
     pub(super) rows: usize,
     pub(super) bits: usize,
     pub(super) hash: usize,

@@ -54,13 +54,13 @@ pub(super) fn subgrids(seed: &Seed) -> (Hashed, Vec<(Cell, Sub)>) {
     (s, subs.collect())
 }
 
-/// What holds of a subgrid.
+/// Returns cases that break the invariants of a subgrid.
 fn inside(seed: &Seed, sub: Sub) -> Vec<Case<'static>> {
     let at = sub.head..sub.end;
     let copy = Copy::of(&seed.blob);
     let cells = sub.resolution.iter().product::<usize>();
     let mut cases = Vec::new();
-    // Its box, to 1/256 of the cell, smaller and larger where that is possible.
+    // Make its box, to 1/256 of the cell, smaller and larger where that is possible.
     for (name, byte) in (0..3).map(|k| ("low", k)).chain((4..7).map(|k| ("high", k))) {
         for by in [-1_i32, 1] {
             let before = i32::from(seed.blob[sub.head + byte]);
@@ -94,7 +94,7 @@ fn inside(seed: &Seed, sub: Sub) -> Vec<Case<'static>> {
     for bit in 0..cells.next_multiple_of(32) {
         cases.push(case("a mark", at.clone(), move |b| flip(b, sub.bits, bit)));
     }
-    // Its first list of two.
+    // Break its first list of two or more.
     let ends: Vec<usize> =
         (0..=sub.slots).map(|slot| copy.word(sub.hash + 4 * slot) as usize).collect();
     let slot = ends.windows(2).position(|ends| ends[1] - ends[0] > 1).unwrap();

@@ -83,7 +83,7 @@ pub fn ends(grid: &Grid<'_>, rays: &[Ray]) {
     for coherence in COHERENCES {
         many(grid, rays, coherence);
     }
-    // What none of the others may be: all in a few cells, so that two bundles go together.
+    // These are what none of the others may be: all in a few cells, so that two bundles go together.
     many(grid, &close(grid), Coherence::Coherent);
 }
 

@@ -16,7 +16,7 @@ use super::shape::{Shape, config};
 use crate::guarded::Guarded;
 use crate::owned::prove;
 
-/// What is larger is asked about, but not built.
+/// The most bytes of index or scratch that are built; more are only asked about.
 const MOST_BYTES: usize = 1 << 20;
 
 /// See the head of this file.
@@ -86,7 +86,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     }
     let exact = match sizes_with(&mesh, config, scratch.region(), &honest) {
         Ok(exact) => exact,
-        // What shows only when all is counted.
+        // An invalid configuration may show only when all is counted.
         Err(error) => return assert!(matches!(error, Error::InvalidConfig(_)), "{error:?}"),
     };
     // Several tasks of a tree may take as much as any mesh, and get that where it is there.

@@ -16,7 +16,7 @@ use super::caller::Loop;
 use super::memory::{Lent, Memory, Struct, array, rarely};
 use super::shape::{self, Shape};
 
-/// What is larger is not built.
+/// The most bytes of index or scratch that are built.
 const MOST_BYTES: u64 = 1 << 20;
 
 /// See the head of this file.
@@ -51,9 +51,9 @@ pub(super) struct Caller<'s> {
     pub(super) memory: Vec<Memory>,
 }
 
-/// What the program's grid is a view of.
+/// The blob and the mesh that the program's grid is a view of.
 pub(super) struct Opened {
-    /// Which of its memory, and from which byte on.
+    /// The number of its memory, and the byte at which the blob starts.
     pub(super) blob: usize,
     pub(super) from: usize,
     /// `None` for the blob's own.
@@ -62,7 +62,7 @@ pub(super) struct Opened {
     pub(super) is_right: bool,
 }
 
-/// What the program does next.
+/// The program's next call.
 #[derive(Debug, Clone, Copy, Arbitrary)]
 enum Call {
     Build,
@@ -89,10 +89,10 @@ pub(super) struct Input {
     pub(super) control: Lent<Control>,
 }
 
-/// What the callbacks of a build do; the context of the configuration.
+/// The behaviour of a build's callbacks; the context of the configuration.
 pub(super) struct Control {
     run: Loop,
-    /// How often progress says to go on.
+    /// Times that progress says to go on.
     patience: u32,
     done: Cell<u32>,
     calls: Cell<u32>,
@@ -340,7 +340,7 @@ impl Caller<'_> {
             hgrid_fit(mesh, config, budget, scratch.at(0), scratch.bytes().len(), to, report)
         });
         if status == HGRID_OK {
-            // What fits says so again.
+            // A configuration that fits says so again.
             assert!(fitted.is_sound() && input.mesh.is_sound());
             let is_told = input.report.is_sound();
             assert!(!is_told || input.report.value().index_bytes <= budget as u64);
@@ -381,7 +381,7 @@ impl Input {
         unsafe { hgrid_sizes(mesh, config, scratch, scratch_bytes, report) }
     }
 
-    /// What a build takes, if it can be asked for and is not too much.
+    /// Returns the bytes that a build takes, if they can be asked for and are not too many.
     pub(super) fn need(&mut self) -> Option<[usize; 2]> {
         if !self.report.is_sound() || self.ask(null_mut(), 0) != HGRID_OK {
             return None;

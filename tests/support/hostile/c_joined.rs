@@ -8,7 +8,7 @@ use hgrid_capi::*;
 use super::c_abi::{Caller, UNWRITTEN, known};
 use super::memory::{Memory, rarely};
 
-/// What is larger is not built.
+/// The most bytes of index or scratch that are built.
 const MOST_BYTES: u64 = 1 << 20;
 
 /// A mesh that was not filled.

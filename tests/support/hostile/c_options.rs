@@ -57,7 +57,7 @@ unsafe extern "C" fn filter(
     filter.ask(ray, c_bits(unsafe { &*hit }))
 }
 
-/// What questions in Rust came to.
+/// The hits that the filter was shown by questions in Rust, and their work.
 #[derive(Default)]
 pub(super) struct Told {
     shown: Vec<(usize, [u32; 4])>,

@@ -214,7 +214,7 @@ impl Caller<'_> {
         // A count that no memory can hold, now and then.
         let count = if rarely(u, 48)? { usize::MAX - 1 } else { rays.len() };
 
-        // What Rust says, if it is asked.
+        // Ask Rust, if there is a grid and the options are sound.
         let core = self.core();
         let is_right = self.opened.as_ref().is_some_and(|opened| opened.is_right);
         let mut told = Told::default();
@@ -297,7 +297,7 @@ impl Caller<'_> {
     }
 }
 
-/// Where the rays and the answers of a batch lie.
+/// The places of the rays and the answers of a batch.
 struct Arrays {
     rays_at: usize,
     ray_stride: usize,

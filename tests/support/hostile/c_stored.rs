@@ -241,11 +241,11 @@ fn same(one: &hgrid_mesh, other: &hgrid_mesh) -> bool {
 /// Memory for the library.
 struct Heap {
     lent: RefCell<Vec<Memory>>,
-    /// How many pieces it has.
+    /// The most pieces that it lends at once.
     patience: usize,
 }
 
-/// What a heap has in one piece.
+/// The largest piece of a heap, in bytes.
 const PIECE: usize = 1 << 22;
 
 unsafe extern "C" fn allocate(context: *mut c_void, bytes: usize, alignment: usize) -> *mut c_void {

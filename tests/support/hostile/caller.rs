@@ -3,7 +3,7 @@
 use arbitrary::Arbitrary;
 use hgrid_core::Task;
 
-/// What it does with the tasks.
+/// A way to run the tasks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Arbitrary)]
 pub(super) enum Loop {
     Forwards,

@@ -19,15 +19,15 @@ pub enum Edit {
     Add { at: u16, by: i8 },
     /// A byte.
     Byte { at: u32, byte: u8 },
-    /// What lies elsewhere.
+    /// Words from elsewhere.
     Copy { from: u16, to: u16, words: u8 },
     /// Two words in each other's place.
     Swap { a: u16, b: u16 },
     /// Many equal bytes.
     Fill { at: u16, words: u8, byte: u8 },
-    /// What lies behind moves up.
+    /// Fewer words: those behind move up.
     Remove { at: u16, words: u8 },
-    /// What lies behind moves down.
+    /// More words, all zero: those behind move down.
     Insert { at: u16, words: u8 },
     /// Fewer bytes.
     Cut { bytes: u16 },
@@ -111,7 +111,7 @@ pub(super) struct Damaged {
 }
 
 impl Damaged {
-    /// What the bytes describe: a seed with changes, or a blob of their own.
+    /// Returns what the bytes describe: a seed with changes, or a blob of their own.
     pub(super) fn new(u: &mut Unstructured<'_>) -> Result<Self> {
         let seed = seed(u8::arbitrary(u)?.into());
         let (is_own, is_signed) = (rarely(u, 16)?, !rarely(u, 16)?);

@@ -1,4 +1,4 @@
-//! How much work one ray can cost, whatever the bytes say.
+//! The most work that one ray can cost, whatever the bytes say.
 
 use hgrid_core::{Counters, Grid, Method, Parameters};
 

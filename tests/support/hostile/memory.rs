@@ -1,4 +1,4 @@
-//! What a C program lends to the library: memory to the byte, and structs of any size.
+//! Memory that a C program lends to the library, to the byte, and structs of any size.
 
 use std::alloc::{Layout, alloc, dealloc, handle_alloc_error};
 use std::ffi::c_void;
@@ -63,8 +63,8 @@ impl Drop for Memory {
     }
 }
 
-/// What a program lends to the library by its address and looks at
-/// itself, too: a box that may be moved.
+/// A value that a program lends to the library by its address and
+/// looks at itself, too: a box that may be moved.
 pub(super) struct Lent<T>(NonNull<T>);
 
 impl<T> Lent<T> {

@@ -1,8 +1,8 @@
-//! What fuzzing runs: functions of any bytes that panic where the library breaks a promise.
+//! Targets of fuzzing: functions of any bytes that panic where the library breaks a promise.
 //!
 //! `tests/fuzz` gives them the bytes that a fuzzer invents, `tests/hostile` those that were kept.
-//! What the bytes mean is said by the types of each target, through `arbitrary`: most bytes mean
-//! something, and what is missing at the end is zero.
+//! The types of each target say what the bytes mean, through `arbitrary`: most bytes mean something,
+//! and what is missing at the end is zero.
 //!
 //! A new entry point of the library belongs into `ask`, where every target that has a grid asks it,
 //! and into `c_abi`, where C does.
@@ -33,12 +33,12 @@ pub use rays::fixed_rays;
 pub use seeds::{Seed, nested, seeds};
 pub use validate::run as validate;
 
-/// What a fuzzer runs, and the folder of its bytes.
+/// A function that a fuzzer runs, and the folder of its bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct Target {
-    /// Its name, and that of its folders.
+    /// The name, and that of the folders.
     pub name: &'static str,
-    /// What it does.
+    /// The function.
     pub run: fn(&[u8]),
 }
 

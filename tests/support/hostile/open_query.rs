@@ -11,7 +11,7 @@ pub fn run(data: &[u8]) {
     let Ok(damaged) = Damaged::new(&mut u) else { return };
     let Ok(grid) = damaged.open() else { return };
     ends(&grid, &Damaged::rays(&mut u, &grid));
-    // What it says about itself is harmless, too.
+    // The grid's answers about itself are harmless, too.
     let _ = (grid.config(), grid.skipped_count(), grid.reference_count());
     let _ = (grid.scratch_bytes(), grid.packed_bytes(), grid.method());
 }

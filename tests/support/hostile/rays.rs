@@ -8,7 +8,7 @@ use crate::random::Random;
 /// No fuzzer needs more at once: a tile of two bundles and two rays.
 const MOST: usize = if cfg!(miri) { 9 } else { 130 };
 
-/// How the numbers of a ray are chosen.
+/// A way to choose the numbers of a ray.
 #[derive(Debug, Clone, Arbitrary)]
 enum Kind {
     /// Any bits.
@@ -25,7 +25,7 @@ enum Kind {
     Tile { at: [i8; 3], towards: [i8; 3], spread: u8, count: u8 },
 }
 
-/// Which part of the ray counts.
+/// The part of the ray that counts.
 #[derive(Debug, Clone, Copy, Arbitrary)]
 enum Part {
     Ahead,
@@ -170,7 +170,7 @@ pub fn fixed_rays(bounds: ([f32; 3], [f32; 3]), count: usize) -> Vec<Ray> {
         }
         rays.push(ray);
     }
-    // What is no ray, now and then.
+    // Put in what is no ray, now and then.
     let odd = [
         [f32::NAN, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0],
         [0.0, 0.0, 0.0, 0.0, 0.0, -0.0, 0.0, 1.0],

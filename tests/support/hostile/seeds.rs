@@ -12,9 +12,9 @@ use crate::owned::{Owned, prove};
 /// A grid as it was built.
 #[derive(Debug)]
 pub struct Seed {
-    /// What of.
+    /// The mesh that it was built of.
     pub mesh: Mesh,
-    /// How.
+    /// The configuration that it was built with.
     pub config: Config,
     /// The blob.
     pub blob: Vec<u8>,

@@ -13,7 +13,7 @@ use super::memory::rarely;
 const MOST: usize = if cfg!(miri) { 6 } else { 48 };
 const MOST_REPEATED: usize = if cfg!(miri) { 12 } else { 400 };
 
-/// How coordinates are chosen.
+/// A way to choose coordinates.
 #[derive(Debug, Clone, Copy, Arbitrary)]
 enum Numbers {
     /// Small whole numbers times a power of two: equal ones, planes, vertices on borders.
@@ -26,7 +26,7 @@ enum Numbers {
     Mixed,
 }
 
-/// What floats can be.
+/// Floats of every kind.
 const ODD: [f32; 24] = [
     0.0,
     -0.0,
@@ -256,7 +256,7 @@ impl Count {
     }
 }
 
-/// What C can choose: the fields of all methods.
+/// The choices of C: the fields of all methods.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Chosen {
     pub(super) method: Method,

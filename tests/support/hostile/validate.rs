@@ -19,8 +19,8 @@ pub fn run(data: &[u8]) {
     }
     agrees(&grid, &Damaged::rays(&mut u, &grid));
 
-    // Whether the mesh lies behind the grid is nothing that a build says, and why a list was not
-    // divided is not proven: see core/src/variable/validate.rs. Nor is that a tree is the one of a build.
+    // A build does not say whether the mesh lies behind the grid, and nothing proves why a list was not
+    // divided (see core/src/variable/validate.rs), or that a tree is the one of a build.
     let rebuilt = Owned::build(grid.mesh(), &grid.config()).expect("it says how it was built");
     let without = |bytes: &[u8]| {
         let mut copy = Copy::of(bytes);

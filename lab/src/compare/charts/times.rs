@@ -125,7 +125,7 @@ impl Line {
     }
 }
 
-/// Where a number of triangles lies on the axis.
+/// Returns the place of a number of triangles on the axis.
 fn triangles(count: usize) -> f64 {
     ratio(count as u64, 1).max(1.0).log10()
 }

@@ -1,6 +1,6 @@
 //! bvh: a binary tree by binned SAH over shapes that bound themselves.
 //!
-//! Its own triangle test sees front faces only, so the adapter brings one for both sides. Leaves
+//! The library's triangle test sees front faces only, so the adapter brings one for both sides. Leaves
 //! come in the order in which the ray enters their boxes; the search ends at the first one that
 //! begins behind the closest hit.
 
@@ -17,7 +17,7 @@ use crate::compare::input::Input;
 use crate::compare::mode::Mode;
 use crate::compare::system::{System, Tracer, Use, each};
 
-/// Its only builder.
+/// The library's only builder.
 pub(super) struct BvhSystem(pub(super) Peer);
 
 impl System for BvhSystem {

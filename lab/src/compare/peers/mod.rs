@@ -66,7 +66,7 @@ impl Peer {
         }
     }
 
-    /// Why this program does not have it, and how to build one that does; `None` if it has it.
+    /// Says why this program does not have it, and how to build one that does; `None` if it has it.
     #[cfg(feature = "embree")]
     fn lack(self) -> Option<&'static str> {
         match self {

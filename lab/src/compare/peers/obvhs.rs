@@ -1,7 +1,7 @@
 //! obvhs: a two-wide tree by PLOC and reinsertion, turned into a compressed eight-wide one.
 //!
-//! Its users keep triangles of their own, in the order of the leaves and in the form that its
-//! triangle test wants: they are part of the structure here.
+//! Users of the library keep triangles of their own, in the order of the leaves and in the form that
+//! its triangle test wants: they are part of the structure here.
 
 use core::time::Duration;
 

@@ -1,7 +1,7 @@
 //! parry3d: the binary tree of a collision library, over the caller's mesh.
 //!
-//! Its `TriMesh` copies the mesh and knows one builder; the tree alone takes boxes and either
-//! builder, and asks for a triangle's hit when it comes to one.
+//! The library's `TriMesh` copies the mesh and knows one builder; the tree alone takes boxes and
+//! either builder, and asks for a triangle's hit when it comes to one.
 
 use anyhow::Result;
 use hgrid_core::{Hit, Ray};
@@ -88,7 +88,7 @@ impl Tracer for Built<'_> {
     }
 }
 
-/// Its largest `t` is the largest number, and none is infinite.
+/// Returns the library's ray and the end of its range: the largest number where that is infinite.
 fn to_parry(ray: &Ray) -> (ParryRay, f32) {
     (ParryRay::new(ray.origin.into(), ray.direction.into()), ray.t_max.min(f32::MAX))
 }

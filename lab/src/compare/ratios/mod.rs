@@ -20,7 +20,7 @@ use entry::Entry;
 /// One number of hgrid against one of a peer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ratio {
-    /// What is compared.
+    /// The quantity that is compared.
     pub what: String,
     /// The method and mode of hgrid.
     pub hgrid: String,
@@ -28,7 +28,7 @@ pub struct Ratio {
     pub value: f64,
     /// The peer and its mode.
     pub peer: String,
-    /// Its number.
+    /// The peer's number.
     pub peer_value: f64,
     /// The first divided by the second in each repetition: the median.
     pub ratio: f64,

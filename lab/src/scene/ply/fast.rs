@@ -18,13 +18,13 @@ use super::{cut_off, is_corner_list};
 /// The largest record that is decoded here.
 const MAX_BYTES: usize = 512;
 
-/// Where the coordinates of a vertex are in its record.
+/// The offsets of a vertex's coordinates in its record, and the bytes of the record.
 pub(super) struct VertexLayout {
     at: [usize; 3],
     bytes: usize,
 }
 
-/// How many bytes are before and behind the list of a face.
+/// The bytes before and behind the list of a face.
 pub(super) struct FaceLayout {
     before: usize,
     behind: usize,

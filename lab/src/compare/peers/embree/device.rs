@@ -17,7 +17,7 @@ use crate::vector::round;
 /// One thread; everything else, the vector width too, is what Embree chooses.
 const CONFIG: &core::ffi::CStr = c"threads=1";
 
-/// How a scene is built.
+/// A way to build a scene.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) enum Quality {
     /// For scenes that change: Morton codes.
@@ -139,7 +139,7 @@ impl Device {
         Ok(geometry)
     }
 
-    /// What Embree says about the calls so far.
+    /// Fails if Embree reports an error of the calls so far.
     fn check(&self) -> Result<()> {
         // SAFETY: the device is a live one.
         let error = unsafe { ffi::rtcGetDeviceError(self.handle) };

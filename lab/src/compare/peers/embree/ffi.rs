@@ -153,7 +153,7 @@ pub(super) struct PointArguments {
 /// `RTCPointQueryFunction`.
 pub(super) type PointFunction = unsafe extern "C" fn(*mut PointArguments) -> bool;
 
-/// Which rays of a packet are there: -1, or 0 for those that are not.
+/// Marks of the rays of a packet: -1 for those that are there, 0 for the others.
 #[repr(C, align(64))]
 pub(super) struct Valid<const LANES: usize>(pub(super) [c_int; LANES]);
 

@@ -19,7 +19,7 @@ use crate::compare::mode::Hint;
 
 pub(super) use stream::Buffers;
 
-/// What is asked of all rays of a call.
+/// Returns the context for all rays of a call.
 fn context(hint: Hint) -> Context {
     let flags = match hint {
         Hint::None => ffi::CONTEXT_INCOHERENT,
