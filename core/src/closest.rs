@@ -121,12 +121,9 @@ impl Grid<'_> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let closest = grid.closest_point([0.5, 0.25, 3.0], 10.0, &mut QueryOptions::default());
     /// let closest = closest.expect("3 away");
     /// assert_eq!((closest.distance, closest.position), (3.0, [0.5, 0.25, 0.0]));

@@ -144,12 +144,10 @@ impl<'a> Grid<'a> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
+    /// # let mesh = *grid.mesh();
     /// // What a build wrote: from a file, say, into memory at a multiple of 64.
     /// let mut memory = vec![Block::ZERO; Block::count_for(grid.blob_bytes())];
     /// Block::bytes_mut(&mut memory)[..grid.blob_bytes()].copy_from_slice(grid.blob());
@@ -185,12 +183,9 @@ impl<'a> Grid<'a> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let mut scratch = vec![0; grid.validate_bytes()];
     /// grid.validate(&mut scratch)?;
     /// # Ok::<(), Error>(())
@@ -218,12 +213,9 @@ impl<'a> Grid<'a> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let hit = grid.intersect(&Ray::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0]));
     /// assert_eq!(hit.map(|hit| (hit.t, hit.u, hit.v, hit.primitive)), Some((1.0, 0.25, 0.5, 0)));
     /// # Ok::<(), Error>(())
@@ -242,12 +234,9 @@ impl<'a> Grid<'a> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// // Is the light at (0.25, 0.25, 1) seen from there?
     /// let to_light = Ray { t_max: 1.0, ..Ray::new([0.25, 0.25, -1.0], [0.0, 0.0, 2.0]) };
     /// assert!(grid.occluded(&to_light));

@@ -57,12 +57,9 @@ impl TriangleMesh<'_> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
     /// let hit = grid.intersect(&ray).expect("in front of the camera");
     /// let surface = grid.mesh().surface(&ray, &hit).expect("a hit");

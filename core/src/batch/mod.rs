@@ -105,12 +105,9 @@ impl<'a> StridedMut<'a> {
 /// ```
 /// # use hgrid_core::*;
 /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-/// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-/// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-/// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-/// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-/// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-/// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+/// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+/// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+/// # let grid = owned.grid();
 /// struct Shadow {
 ///     ray: Ray,
 ///     is_lit: bool,
@@ -196,12 +193,9 @@ impl Grid<'_> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let rays = [0.25, 2.0].map(|x| Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
     /// let mut hits = [Hit::MISS; 2];
     /// grid.intersect_n(&Strided::new(&rays), &mut StridedMut::new(&mut hits), Coherence::Coherent)?;
@@ -261,12 +255,9 @@ impl Grid<'_> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// struct Pixels<'a>(&'a mut [(Ray, f32)]);
     ///
     /// impl Batch<Hit> for Pixels<'_> {
@@ -304,12 +295,9 @@ impl Grid<'_> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let rays = [0.25, 2.0].map(|x| Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
     /// let mut occluded = [0_u8; 2];
     /// let answers = &mut StridedMut::new(&mut occluded);
@@ -335,12 +323,9 @@ impl Grid<'_> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let rays = [0.25, 2.0].map(|x| Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
     /// let mut occluded = [1_u8; 2];
     /// // Light comes through from the back.

@@ -63,12 +63,9 @@ impl BlobInfo {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let info = BlobInfo::peek(grid.blob())?;
     /// assert_eq!((info.method, info.triangle_count), (Method::Bvh, 1));
     /// assert!(!info.has_mesh && info.total_bytes == grid.blob_bytes() as u64);
@@ -149,12 +146,9 @@ impl<'a> Grid<'a> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let mut memory = vec![Block::ZERO; Block::count_for(grid.packed_bytes() as usize)];
     /// let packed = grid.pack(Block::bytes_mut(&mut memory))?;
     ///
@@ -210,12 +204,9 @@ impl<'a> Grid<'a> {
     /// ```
     /// # use hgrid_core::*;
     /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let sizes = sizes(&mesh, &Config::default(), &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let grid = Grid::build(mesh, &Config::default(), index, scratch)?;
+    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
+    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
+    /// # let grid = owned.grid();
     /// let mut memory = vec![Block::ZERO; Block::count_for(grid.packed_bytes() as usize)];
     /// let packed = grid.pack(Block::bytes_mut(&mut memory))?;
     /// let grid = Grid::open_packed(packed)?;
