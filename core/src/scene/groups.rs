@@ -22,7 +22,6 @@ use crate::bvh::{Bvh, GROUP, Group, Groups, Rays, Scope, SortKey, Stack, Togethe
 use crate::grid::Grid;
 use crate::options::Choice;
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
-use crate::search::Outcome;
 use crate::simd::SimdLevel;
 
 /// At most this many rays are asked for one by one.
@@ -37,8 +36,8 @@ pub(super) fn trace<A: SceneAnswer, B: Batch<A, RayF64>>(
     options: &mut SceneOptions<'_>,
 ) {
     let lent = core::mem::take(&mut options.scratch);
-    let travellers = Travellers::new(scene, Question::new(options, A::IS_ANY));
-    let mut asked = Asked { scene, batch, options, answers: PhantomData::<A>, travellers };
+    let rays = SceneRays::new(scene, Question::new(options, A::IS_ANY));
+    let mut asked = Asked { scene, batch, options, answers: PhantomData::<A>, rays };
     with_window(coherence, lent, &mut |memory| asked.groups(tree, memory));
     options.scratch = lent;
 }
@@ -49,7 +48,7 @@ struct Asked<'r, 'q, B, A> {
     batch: &'r mut B,
     options: &'r mut SceneOptions<'q>,
     answers: PhantomData<A>,
-    travellers: Travellers<'r>,
+    rays: SceneRays<'r>,
 }
 
 impl<A: SceneAnswer, B: Batch<A, RayF64>> Asked<'_, '_, B, A> {
@@ -71,15 +70,15 @@ impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for Asked<'_, '_, B, A> {
     }
 
     fn load(&mut self, lane: usize, place: usize) -> Ray {
-        self.travellers.load(lane, self.batch.ray(place))
+        self.rays.load(lane, self.batch.ray(place))
     }
 
     fn trace(&mut self, group: &mut Group<'_>, level: SimdLevel, _: bool) -> u64 {
-        self.travellers.trace(group, level)
+        self.rays.trace(group, level)
     }
 
     fn found(&mut self, place: usize, lane: usize, _: &Hit) {
-        let hit = &self.travellers.best[lane % GROUP];
+        let hit = &self.rays.best[lane % GROUP];
         let hit = (hit.path[0] != INVALID_ID).then_some(*hit);
         self.batch.answer(place, A::of(hit));
     }
@@ -99,11 +98,11 @@ impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for Asked<'_, '_, B, A> {
     fn ask(&mut self, _: usize, _: &Hit) {}
 }
 
-/// The rays of a group in a scene, and what they hit. It is not generic over the batch: all batches share its code.
-struct Travellers<'r> {
+/// The rays of a group in a scene and their closest hits. Not generic over the batch: all batches share its code.
+struct SceneRays<'r> {
     scene: &'r Scene<'r>,
     question: Question,
-    rays: [RayF64; GROUP],
+    given: [RayF64; GROUP],
     /// The largest coordinate of an origin that was rounded, or 0.
     largest: f32,
     best: [SceneHit; GROUP],
@@ -114,12 +113,12 @@ struct Travellers<'r> {
     stack: Stack,
 }
 
-impl<'r> Travellers<'r> {
+impl<'r> SceneRays<'r> {
     fn new(scene: &'r Scene<'r>, question: Question) -> Self {
         Self {
             scene,
             question,
-            rays: [RayF64::new([0.0; 3], [0.0; 3]); GROUP],
+            given: [RayF64::new([0.0; 3], [0.0; 3]); GROUP],
             largest: 0.0,
             best: [SceneHit::MISS; GROUP],
             seen: [Seen::NONE; GROUP],
@@ -139,7 +138,7 @@ impl<'r> Travellers<'r> {
             let coordinates = rounded.origin.map(f32::abs).into_iter();
             self.largest = coordinates.filter(|c| c.is_finite()).fold(self.largest, f32::max);
         }
-        self.rays[lane % GROUP] = ray;
+        self.given[lane % GROUP] = ray;
         rounded
     }
 
@@ -162,25 +161,21 @@ impl<'r> Travellers<'r> {
             return;
         }
         for lane in lanes(mask) {
-            let (ray, best) =
-                (&self.rays[lane as usize % GROUP], &mut self.best[lane as usize % GROUP]);
+            let (at, question) = (lane as usize % GROUP, self.question);
+            let ray = &self.given[at];
             let mut search = InstanceSearch {
                 scene: self.scene,
                 line: &ray.into(),
                 ray,
                 level: 0,
-                question: &self.question,
-                best: (best.path[0] != INVALID_ID).then_some(*best),
-                limit: best.t,
+                question: &question,
+                best: None,
+                limit: self.best[at].t,
                 filter: None,
                 counters: None,
             };
-            let outcome = search.offer(number);
-            *best = search.best.unwrap_or(SceneHit::MISS);
-            match outcome {
-                Outcome::Unchanged => {}
-                Outcome::EndsAt(t) => outer.end_at(lane, t),
-                Outcome::Done => outer.finish(lane),
+            if let Some(hit) = search.ask(number) {
+                self.keep(lane, &hit, outer);
             }
         }
     }
@@ -198,7 +193,7 @@ impl<'r> Travellers<'r> {
         let corners = grid.bounds();
         let mut count = 0;
         for lane in lanes(mask) {
-            let ray = &self.rays[lane as usize % GROUP];
+            let ray = &self.given[lane as usize % GROUP];
             let Some(mut seen) = Seen::new(&placed.line(&LineF64::from(ray))) else { continue };
             let limit = self.best[lane as usize % GROUP].t;
             let Some(inside) = seen.narrow(ray, limit, &corners) else { continue };
@@ -219,18 +214,22 @@ impl<'r> Travellers<'r> {
             };
             let Some(hit) = hit else { continue };
             let lane = self.lanes[at];
-            let (ray, best) =
-                (&self.rays[lane as usize % GROUP], &mut self.best[lane as usize % GROUP]);
-            let hit = outward(&self.seen[at], ray, 0, number, &hit);
-            if !hit.is_closer(best) {
-                continue;
-            }
-            *best = hit;
-            if is_any {
-                outer.finish(lane);
-            } else {
-                outer.end_at(lane, hit.t);
-            }
+            let ray = &self.given[lane as usize % GROUP];
+            self.keep(lane, &outward(&self.seen[at], ray, 0, number, &hit), outer);
+        }
+    }
+
+    /// Keeps a hit of a ray if it is the closest so far, and ends the ray there.
+    fn keep(&mut self, lane: u32, hit: &SceneHit, outer: &mut Rays) {
+        let best = &mut self.best[lane as usize % GROUP];
+        if !hit.is_closer(best) {
+            return;
+        }
+        *best = *hit;
+        if self.question.is_any {
+            outer.finish(lane);
+        } else {
+            outer.end_at(lane, hit.t);
         }
     }
 }

@@ -308,7 +308,7 @@ pub(super) struct InstanceSearch<'q, 'f> {
 
 impl InstanceSearch<'_, '_> {
     /// Asks an instance whose box the ray meets.
-    pub(super) fn offer(&mut self, number: u32) -> Outcome {
+    fn offer(&mut self, number: u32) -> Outcome {
         let Some(hit) = self.ask(number) else { return Outcome::Unchanged };
         if self.best.is_some_and(|best| !hit.is_closer(&best)) {
             return Outcome::Unchanged;
@@ -318,7 +318,7 @@ impl InstanceSearch<'_, '_> {
     }
 
     /// Finds the ray's hit in an instance, no farther than what was hit before.
-    fn ask(&mut self, number: u32) -> Option<SceneHit> {
+    pub(super) fn ask(&mut self, number: u32) -> Option<SceneHit> {
         let Self { scene, line, ray, level, question, .. } = *self;
         let is_any = question.is_any;
         let (placed, object) = scene.shown(number, question)?;
