@@ -3,10 +3,13 @@
 use std::collections::HashSet;
 
 use hgrid_core::{
-    Boxes, Config, Counters, Parameters, Quality, QueryOptions, Ray, ShapeHit, Shapes, Strided,
+    BatchField, Boxes, Coherence, Config, Counters, Error, Hit, Parameters, Quality, QueryOptions,
+    Ray, ShapeHit, Shapes, Strided, StridedMut,
 };
 use hgrid_tests::random::Random;
 use hgrid_tests::scenes::Built;
+
+use super::batches::{COHERENCES, odd_rays};
 
 /// A sphere: center and radius.
 type Sphere = [f32; 4];
@@ -100,6 +103,96 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
             }
         }
     }
+}
+
+#[test]
+fn batches_answer_as_each_ray_alone() {
+    for (count, size) in [(0, 1.0), (1, 1.0), (9, 0.3), (400, 0.1), (3000, 0.02)] {
+        let all = spheres(count, size, 3);
+        let boxes: Vec<_> = all.iter().copied().map(box_of).collect();
+        let masks: Vec<u32> = (0..count).map(|id| 1 << (id % 3)).collect();
+        let boxes = Boxes::new(&boxes).unwrap().with_masks(Strided::new(&masks)).unwrap();
+        let built = Built::shapes(boxes, &Config::default()).unwrap();
+        let shapes = Shapes::open(built.bytes(), boxes).unwrap();
+        let mut random = Random(5);
+        // A picture, row by row of eight, rays from one place, rays from anywhere, and odd ones.
+        let pixel = |at: u16| {
+            let [x, y] = [at % 8 + at / 64 % 8 * 8, at / 8 % 8 + at / 512 * 8].map(f32::from);
+            Ray::new([0.1, 0.2, 4.0], [x / 40.0 - 0.8, y / 40.0 - 0.8, -4.0])
+        };
+        let mut rays: Vec<_> = (0..4096).map(pixel).collect();
+        rays.extend((0..200).map(|_| Ray::new([0.3, 0.1, -0.2], random.point())));
+        rays.extend((0..400).map(|round| ray(&mut random, round)));
+        rays.extend(odd_rays());
+        for (mask, skip) in [(u32::MAX, u32::MAX), (6, u32::MAX), (u32::MAX, 2)] {
+            let test = &mut |id: u32, part: &Ray| meet(all[id as usize], part);
+            let expected: Vec<_> = rays
+                .iter()
+                .map(|ray| {
+                    let options = &mut QueryOptions { mask, skip, ..QueryOptions::default() };
+                    shapes.intersect_with(ray, options, test).unwrap_or(Hit::MISS)
+                })
+                .collect();
+            let blocked: Vec<_> = expected.iter().map(|hit| u8::from(hit.t.is_finite())).collect();
+            assert!(count < 9 || blocked.iter().filter(|is| **is != 0).count() > 300);
+            let mut memory = vec![0; 16 * rays.len() + 16];
+            for coherence in COHERENCES {
+                for lent in [0, 16 * rays.len() + 16] {
+                    let scratch = &mut memory[..lent];
+                    let options =
+                        &mut QueryOptions { mask, skip, scratch, ..QueryOptions::default() };
+                    let (given, mut hits) = (Strided::new(&rays), vec![Hit::MISS; rays.len()]);
+                    let answers = &mut StridedMut::new(&mut hits);
+                    shapes.intersect_n(&given, answers, coherence, options, test).unwrap();
+                    assert_eq!(hits, expected);
+                    let mut occluded = vec![7_u8; rays.len()];
+                    let answers = &mut StridedMut::new(&mut occluded);
+                    shapes.occluded_n(&given, answers, coherence, options, test).unwrap();
+                    assert_eq!(occluded, blocked);
+                }
+            }
+        }
+        // With counters the same, and the work of each ray alone.
+        let test = &mut |id: u32, part: &Ray| meet(all[id as usize], part);
+        let (mut alone, mut together) = (Counters::default(), Counters::default());
+        for ray in &rays {
+            let _ = shapes.intersect_with(ray, &mut QueryOptions::counting(&mut alone), test);
+        }
+        let mut hits = vec![Hit::MISS; rays.len()];
+        let (given, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
+        let options = &mut QueryOptions::counting(&mut together);
+        shapes.intersect_n(&given, answers, Coherence::Coherent, options, test).unwrap();
+        assert_eq!(together, alone);
+        let mut three = [0_u8; 3];
+        let answers = &mut StridedMut::new(&mut three);
+        let options = &mut QueryOptions::default();
+        let refused = shapes.occluded_n(&given, answers, Coherence::Coherent, options, test);
+        assert_eq!(refused, Err(Error::InvalidBatch(BatchField::Answers)));
+    }
+}
+
+#[test]
+fn shapes_of_a_batch_are_tested_once_for_each_ray() {
+    let all = spheres(400, 0.1, 3);
+    let boxes: Vec<_> = all.iter().copied().map(box_of).collect();
+    let boxes = Boxes::new(&boxes).unwrap();
+    let built = Built::shapes(boxes, &Config::default()).unwrap();
+    let shapes = Shapes::open(built.bytes(), boxes).unwrap();
+    let rays: Vec<_> = (0..640_u16)
+        .map(|at| {
+            Ray::new([0.0, 0.0, 4.0], [0.05 * f32::from(at % 8), 0.005 * f32::from(at / 8), -4.0])
+        })
+        .collect();
+    let mut asked = HashSet::new();
+    let mut test = |id: u32, part: &Ray| {
+        assert!(asked.insert((id, part.direction.map(f32::to_bits))), "each shape once for a ray");
+        meet(all[id as usize], part)
+    };
+    let mut hits = vec![Hit::MISS; rays.len()];
+    let (given, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
+    let options = &mut QueryOptions::default();
+    shapes.intersect_n(&given, answers, Coherence::Coherent, options, &mut test).unwrap();
+    assert!(asked.len() > 500, "{}", asked.len());
 }
 
 #[test]

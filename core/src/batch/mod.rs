@@ -395,11 +395,14 @@ pub(crate) trait Answer: Sized {
     fn stored(self) -> Self::Stored;
 }
 
-/// The answer of a grid.
-trait GridAnswer: Answer {
-    /// Makes the answer from the hit that a group found.
+/// An answer that a hit gives.
+pub(crate) trait HitAnswer: Answer {
+    /// Makes the answer from a hit or [`Hit::MISS`].
     fn of(hit: &Hit) -> Self;
+}
 
+/// The answer of a grid.
+trait GridAnswer: HitAnswer {
     /// Traces a ray alone, without options.
     fn plain(grid: &Grid<'_>, ray: &Ray) -> Self;
 
@@ -416,12 +419,14 @@ impl Answer for Hit {
     }
 }
 
-impl GridAnswer for Hit {
+impl HitAnswer for Hit {
     #[inline(always)]
     fn of(hit: &Hit) -> Self {
         *hit
     }
+}
 
+impl GridAnswer for Hit {
     fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
         grid.intersect(ray).unwrap_or(Self::MISS)
     }
@@ -440,12 +445,14 @@ impl Answer for bool {
     }
 }
 
-impl GridAnswer for bool {
+impl HitAnswer for bool {
     #[inline(always)]
     fn of(hit: &Hit) -> Self {
         hit.primitive != INVALID_ID
     }
+}
 
+impl GridAnswer for bool {
     fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
         grid.occluded(ray)
     }
@@ -464,12 +471,14 @@ impl Answer for u32 {
     }
 }
 
-impl GridAnswer for u32 {
+impl HitAnswer for u32 {
     #[inline(always)]
     fn of(hit: &Hit) -> Self {
         hit.primitive
     }
+}
 
+impl GridAnswer for u32 {
     fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
         grid.any(ray).map_or(INVALID_ID, |hit| hit.primitive)
     }

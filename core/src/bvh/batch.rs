@@ -46,13 +46,19 @@ pub(crate) trait Together {
 
     /// Returns true if [`alone`](Self::alone) and [`ask`](Self::ask) have to be called in the order of
     /// places: a filter is asked there.
-    fn keeps_order(&self) -> bool;
+    #[inline(always)]
+    fn keeps_order(&self) -> bool {
+        false
+    }
 
     /// Returns true if the filter has to be asked about the first hit of a ray.
-    fn asks(&self, hit: &Hit) -> bool;
+    #[inline(always)]
+    fn asks(&self, _hit: &Hit) -> bool {
+        false
+    }
 
     /// Asks the filter about the first hit of a ray, goes on alone if it wants another, and answers.
-    fn ask(&mut self, place: usize, hit: &Hit);
+    fn ask(&mut self, _place: usize, _hit: &Hit) {}
 }
 
 /// The rays of a batch, which go in groups.

@@ -63,7 +63,7 @@ pub(crate) use build::{bound, build, sizes};
 pub(crate) use group::{Group, Stack};
 use node::{LEAF, Node};
 pub(crate) use order::SortKey;
-pub(crate) use rays::{GROUP, Rays};
+pub(crate) use rays::{GROUP, Rays, lanes};
 pub(crate) use refit::refit;
 pub(crate) use search::Scope;
 pub(crate) use validate::proof_bytes;

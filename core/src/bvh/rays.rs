@@ -411,6 +411,27 @@ impl Rays {
         }
     }
 
+    /// Returns a ray up to its closest hit so far.
+    pub(crate) fn rest(&self, ray: u32) -> Ray {
+        let at = ray as usize % GROUP;
+        let (given, end) = (self.given[at], self.hits[at].t);
+        Ray { t_max: if end < given.t_max { end } else { given.t_max }, ..given }
+    }
+
+    /// Keeps a hit with a shape if it is the closest so far; with `is_any` it ends its ray.
+    pub(crate) fn keep(&mut self, ray: u32, hit: Hit, is_any: bool) {
+        let best = &mut self.hits[ray as usize % GROUP];
+        if !hit.is_closer(best) {
+            return;
+        }
+        *best = hit;
+        if is_any {
+            self.finish(ray);
+        } else {
+            self.end_at(ray, hit.t);
+        }
+    }
+
     /// Ends a ray: nothing else matters to it.
     pub(crate) fn finish(&mut self, ray: u32) {
         self.alive &= !(1 << (ray % u64::BITS));
@@ -424,6 +445,16 @@ impl Rays {
         let (end, tiny) = (t * scale, TINY * scale.max(1.0));
         put(&mut self.end, ray as usize % GROUP, end + (end.abs() * (WIDER - 1.0) + tiny));
     }
+}
+
+/// The lanes of a mask.
+pub(crate) fn lanes(mask: u64) -> impl Iterator<Item = u32> {
+    let mut rest = mask;
+    core::iter::from_fn(move || {
+        let lane = rest.trailing_zeros();
+        rest &= rest.wrapping_sub(1);
+        (lane < u64::BITS).then_some(lane)
+    })
 }
 
 /// The lowest bits.

@@ -3,25 +3,26 @@
 //! ```text
 //! take up to 64 rays through the tree of the scene together
 //! an instance whose box some of them meet: drop it by its mask; else
-//!     a tree of triangles: move each of them into its space, as a single query does
-//!                          take them through it together
-//!                          move the `t` of what they hit back, and end them there
-//!     all else, or a few:  ask it for each of them alone
+//!     a tree:             move each of them into its space, as a single query does
+//!                         take them through it together
+//!                         move the `t` of what they hit back, and end them there
+//!     all else, or a few: ask it for each of them alone
 //! ```
 
 use core::marker::PhantomData;
 
 use super::batch::{SceneAnswer, alone};
 use super::instance::{Seen, StoredInstance};
-use super::query::{InstanceSearch, Question, SceneHit, SceneOptions, ask_grid, outward};
+use super::query::{InstanceSearch, Question, SceneHit, SceneOptions, ask_object, outward};
 use super::{Object, Scene};
 use crate::approach::LineF64;
 use crate::batch::groups::with_window;
 use crate::batch::{Batch, Coherence};
-use crate::bvh::{Bvh, GROUP, Group, Groups, Rays, Scope, SortKey, Stack, Together};
+use crate::bvh::{Bvh, GROUP, Group, Groups, Rays, Scope, SortKey, Stack, Together, lanes};
 use crate::grid::Grid;
-use crate::options::Choice;
+use crate::options::{Choice, Selection};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
+use crate::shapes::groups::offer_shapes;
 use crate::simd::SimdLevel;
 
 /// At most this many rays are asked for one by one.
@@ -86,16 +87,6 @@ impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for Asked<'_, '_, B, A> {
     fn alone(&mut self, place: usize) {
         alone(self.scene, self.batch, place, self.options);
     }
-
-    fn keeps_order(&self) -> bool {
-        false
-    }
-
-    fn asks(&self, _: &Hit) -> bool {
-        false
-    }
-
-    fn ask(&mut self, _: usize, _: &Hit) {}
 }
 
 /// The rays of a group in a scene and their closest hits. Not generic over the batch: all batches share its code.
@@ -153,11 +144,16 @@ impl<'r> SceneRays<'r> {
     /// Asks an instance for some rays.
     fn offer(&mut self, number: u32, mask: u64, outer: &mut Rays) {
         let Some((placed, object)) = self.scene.shown(number, &self.question) else { return };
-        if let Object::Grid(grid) = object
+        let grid = match object {
+            Object::Grid(grid) => Some(*grid),
+            Object::Shapes(shapes, _) => Some(shapes.grid()),
+            Object::Scene(_) | Object::Nothing => None,
+        };
+        if let Some(grid) = grid
             && let Some(tree) = grid.tree()
             && mask.count_ones() > FEW
         {
-            self.together(number, placed, (grid, tree), mask, outer);
+            self.together(number, placed, object, (grid, tree), mask, outer);
             return;
         }
         for lane in lanes(mask) {
@@ -185,6 +181,7 @@ impl<'r> SceneRays<'r> {
         &mut self,
         number: u32,
         placed: &StoredInstance,
+        object: &Object<'_>,
         (grid, bvh): (&Grid<'_>, &Bvh<'_>),
         mask: u64,
         outer: &mut Rays,
@@ -203,14 +200,22 @@ impl<'r> SceneRays<'r> {
             count += 1;
         }
         let is_any = self.question.is_any;
+        let options = &mut self.question.options();
         let (rays, stack) = (&mut self.inside, &mut self.stack);
-        let alone = Group { bvh, mesh, bounds: &bounds, rays, stack, count }.trace(simd, is_any);
+        let mut group = Group { bvh, mesh, bounds: &bounds, rays, stack, count };
+        let alone = match object {
+            Object::Shapes(_, test) => {
+                let test = &mut |id: u32, ray: &Ray| test.test(id, ray);
+                offer_shapes(&mut group, simd, is_any, &Selection::new(mesh, options), test)
+            }
+            _ => group.trace(simd, is_any),
+        };
         for at in 0..count.min(GROUP) {
             let hit = if alone >> at & 1 == 0 {
                 let hit = self.inside.hits[at];
                 (hit.primitive != INVALID_ID).then_some(hit)
             } else {
-                ask_grid(grid, &self.inside.slots()[at], is_any, &mut self.question.options())
+                ask_object(object, &self.inside.slots()[at], is_any, options)
             };
             let Some(hit) = hit else { continue };
             let lane = self.lanes[at];
@@ -232,14 +237,4 @@ impl<'r> SceneRays<'r> {
             outer.end_at(lane, hit.t);
         }
     }
-}
-
-/// The lanes of a mask.
-fn lanes(mask: u64) -> impl Iterator<Item = u32> {
-    let mut rest = mask;
-    core::iter::from_fn(move || {
-        let lane = rest.trailing_zeros();
-        rest &= rest.wrapping_sub(1);
-        (lane < u64::BITS).then_some(lane)
-    })
 }

@@ -16,7 +16,6 @@ use super::instance::{Seen, StoredInstance};
 use super::{Object, Scene};
 use crate::approach::LineF64;
 use crate::counters::Counters;
-use crate::grid::Grid;
 use crate::limits::MAX_NESTING;
 use crate::options::{Cull, QueryOptions, Verdict};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
@@ -352,42 +351,40 @@ impl InstanceSearch<'_, '_> {
         let mut show;
         let mut options = question.options();
         options.counters = self.counters.as_deref_mut();
-        let hit = match object {
-            Object::Grid(grid) => {
-                if let Some(filter) = &mut self.filter {
-                    show = |_: usize, hit: &Hit| filter(&outward(hit));
-                    options.filter = Some(&mut show);
-                }
-                ask_grid(grid, &inside, is_any, &mut options)
-            }
-            Object::Shapes(shapes, test) => {
-                let mut test = |id: u32, ray: &Ray| test.test(id, ray);
-                if is_any {
-                    let hit = shapes.occluded_with(&inside, &mut options, &mut test);
-                    hit.then_some(Hit { t: inside.t_min, ..Hit::MISS })
-                } else {
-                    shapes.intersect_with(&inside, &mut options, &mut test)
-                }
-            }
-            Object::Scene(_) | Object::Nothing => None,
-        }?;
+        if let (Object::Grid(_), Some(filter)) = (object, &mut self.filter) {
+            show = |_: usize, hit: &Hit| filter(&outward(hit));
+            options.filter = Some(&mut show);
+        }
+        let hit = ask_object(object, &inside, is_any, &mut options)?;
         Some(outward(&hit))
     }
 }
 
-/// The closest hit of a ray in a grid; if `is_any` is true, a hit that only says that there is one.
-pub(super) fn ask_grid(
-    grid: &Grid<'_>,
+/// Returns the closest hit of a ray in a grid or in shapes; if `is_any` is true, a hit that only says that there is one.
+pub(super) fn ask_object(
+    object: &Object<'_>,
     ray: &Ray,
     is_any: bool,
     options: &mut QueryOptions<'_>,
 ) -> Option<Hit> {
-    let is_plain = options.are_plain();
-    if !is_any {
-        return if is_plain { grid.intersect(ray) } else { grid.intersect_with(ray, options) };
+    let any = |is_hit: bool| is_hit.then_some(Hit { t: ray.t_min, ..Hit::MISS });
+    match object {
+        Object::Grid(grid) => match (is_any, options.are_plain()) {
+            (false, true) => grid.intersect(ray),
+            (true, true) => any(grid.occluded(ray)),
+            (false, false) => grid.intersect_with(ray, options),
+            (true, false) => any(grid.occluded_with(ray, options)),
+        },
+        Object::Shapes(shapes, test) => {
+            let mut test = |id: u32, ray: &Ray| test.test(id, ray);
+            if is_any {
+                any(shapes.occluded_with(ray, options, &mut test))
+            } else {
+                shapes.intersect_with(ray, options, &mut test)
+            }
+        }
+        Object::Scene(_) | Object::Nothing => None,
     }
-    let is_hit = if is_plain { grid.occluded(ray) } else { grid.occluded_with(ray, options) };
-    is_hit.then_some(Hit { t: ray.t_min, ..Hit::MISS })
 }
 
 /// A hit of an object as one of the scene at a level.

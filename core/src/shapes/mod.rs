@@ -9,6 +9,10 @@
 //! The boxes stay in the caller's memory, as the triangles of a mesh do. Building, sizes, proof, refit and
 //! the format are those of a tree of triangles; the header tells them apart ([`Content`]).
 
+mod batch;
+#[cfg(feature = "bvh")]
+pub(crate) mod groups;
+
 use core::fmt;
 
 use crate::arena::Sizes;
@@ -230,6 +234,11 @@ impl<'a> Shapes<'a> {
         self.grid.bounds()
     }
 
+    /// The tree, as a grid.
+    pub(crate) const fn grid(&self) -> &Grid<'a> {
+        &self.grid
+    }
+
     /// The closest hit of a ray; where several shapes are hit at the same `t`, the one with the lowest number.
     pub fn intersect(&self, ray: &Ray, test: &mut ShapeTest<'_>) -> Option<Hit> {
         self.intersect_with(ray, &mut QueryOptions::default(), test)
@@ -316,16 +325,18 @@ impl ShapeSearch<'_, '_> {
         if !self.selection.has(id) {
             return Outcome::Unchanged;
         }
-        let Some(ShapeHit { t, u, v }) = (self.test)(id, &self.ray) else {
-            return Outcome::Unchanged;
-        };
-        let hit = Hit { t, u, v, primitive: id };
-        let is_inside = self.ray.t_min <= t && t <= self.ray.t_max;
-        if !is_inside || self.best.is_some_and(|best| !hit.is_closer(&best)) {
+        let Some(hit) = hit_of(id, &self.ray, self.test) else { return Outcome::Unchanged };
+        if self.best.is_some_and(|best| !hit.is_closer(&best)) {
             return Outcome::Unchanged;
         }
         self.best = Some(hit);
-        self.ray.t_max = t;
-        if self.is_any { Outcome::Done } else { Outcome::EndsAt(t) }
+        self.ray.t_max = hit.t;
+        if self.is_any { Outcome::Done } else { Outcome::EndsAt(hit.t) }
     }
+}
+
+/// Tests a shape; returns a hit that lies in the range of the ray.
+fn hit_of(id: u32, ray: &Ray, test: &mut ShapeTest<'_>) -> Option<Hit> {
+    let ShapeHit { t, u, v } = test(id, ray)?;
+    (ray.t_min <= t && t <= ray.t_max).then_some(Hit { t, u, v, primitive: id })
 }

@@ -1,0 +1,124 @@
+//! Many rays at once against shapes: [`Grid::intersect_n`](crate::Grid::intersect_n) and its like for shapes.
+//!
+//! A batch answers each ray as [`Shapes::intersect`] or [`Shapes::occluded`] would, bit for bit. Rays go through the tree
+//! together ([`groups`](super::groups)); with counters each is traced alone.
+
+use super::{ShapeTest, Shapes};
+use crate::batch::{Arrays, Batch, Coherence, HitAnswer, StridedMut};
+use crate::error::Error;
+use crate::mesh::Strided;
+use crate::options::QueryOptions;
+use crate::ray::{Hit, Ray};
+use crate::simd::HAS_VECTORS;
+
+impl Shapes<'_> {
+    /// The closest hit of each ray; [`Hit::MISS`] where there is none. The options are for all rays.
+    ///
+    /// # Errors
+    /// The errors of [`Grid::intersect_n`](crate::Grid::intersect_n).
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let boxes = [[-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]];
+    /// # let boxes = Boxes::new(&boxes)?;
+    /// # let config = Config::default();
+    /// # let sizes = Shapes::sizes(&boxes, &config, &mut [])?;
+    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
+    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    /// # let shapes = Shapes::build(boxes, &config, index, scratch)?;
+    /// let rays = [0.0, 3.0].map(|x| Ray::new([x, 0.0, 2.0], [0.0, 0.0, -1.0]));
+    /// let mut hits = [Hit::MISS; 2];
+    /// let (rays, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
+    /// // The middle of each box is in the way, whatever its shape.
+    /// let mut middle = |_, _: &Ray| Some(ShapeHit { t: 2.0, u: 0.0, v: 0.0 });
+    /// let options = &mut QueryOptions::default();
+    /// shapes.intersect_n(&rays, answers, Coherence::Coherent, options, &mut middle)?;
+    /// assert_eq!([hits[0].t, hits[1].t], [2.0, f32::INFINITY]);
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn intersect_n(
+        &self,
+        rays: &Strided<'_>,
+        hits: &mut StridedMut<'_>,
+        coherence: Coherence,
+        options: &mut QueryOptions<'_>,
+        test: &mut ShapeTest<'_>,
+    ) -> Result<(), Error> {
+        let mut arrays = Arrays::new::<Ray, Hit>(rays, hits)?;
+        self.intersect_batch(&mut arrays, coherence, options, test);
+        Ok(())
+    }
+
+    /// The closest hit of each ray: [`intersect_n`](Self::intersect_n), wherever rays and hits lie.
+    pub fn intersect_batch(
+        &self,
+        batch: &mut impl Batch<Hit>,
+        coherence: Coherence,
+        options: &mut QueryOptions<'_>,
+        test: &mut ShapeTest<'_>,
+    ) {
+        trace(self, batch, coherence, options, (test, false));
+    }
+
+    /// For each ray a byte: 1 if any shape is hit, 0 if not. The options are for all rays.
+    ///
+    /// # Errors
+    /// The errors of [`intersect_n`](Self::intersect_n).
+    pub fn occluded_n(
+        &self,
+        rays: &Strided<'_>,
+        occluded: &mut StridedMut<'_>,
+        coherence: Coherence,
+        options: &mut QueryOptions<'_>,
+        test: &mut ShapeTest<'_>,
+    ) -> Result<(), Error> {
+        let mut arrays = Arrays::new::<Ray, bool>(rays, occluded)?;
+        self.occluded_batch(&mut arrays, coherence, options, test);
+        Ok(())
+    }
+
+    /// Tells for each ray whether it hits any shape: [`occluded_n`](Self::occluded_n), wherever rays and answers lie.
+    pub fn occluded_batch(
+        &self,
+        batch: &mut impl Batch<bool>,
+        coherence: Coherence,
+        options: &mut QueryOptions<'_>,
+        test: &mut ShapeTest<'_>,
+    ) {
+        trace(self, batch, coherence, options, (test, true));
+    }
+}
+
+/// Answers all rays of a batch by a test; if it is `true`, any hit is an answer.
+fn trace<A: HitAnswer>(
+    shapes: &Shapes<'_>,
+    batch: &mut impl Batch<A>,
+    coherence: Coherence,
+    options: &mut QueryOptions<'_>,
+    (test, is_any): (&mut ShapeTest<'_>, bool),
+) {
+    #[cfg(feature = "bvh")]
+    if HAS_VECTORS
+        && !options.are_for_single_rays()
+        && let Some(tree) = shapes.grid.tree()
+    {
+        return super::groups::trace(shapes, tree, batch, coherence, options, (test, is_any));
+    }
+    for place in 0..batch.count() {
+        alone(shapes, batch, place, options, (test, is_any));
+    }
+}
+
+/// Answers one ray.
+#[inline(never)]
+pub(super) fn alone<A: HitAnswer>(
+    shapes: &Shapes<'_>,
+    batch: &mut impl Batch<A>,
+    place: usize,
+    options: &mut QueryOptions<'_>,
+    (test, is_any): (&mut ShapeTest<'_>, bool),
+) {
+    let hit = shapes.search(&batch.ray(place), options, test, is_any);
+    batch.answer(place, A::of(&hit.unwrap_or(Hit::MISS)));
+}
