@@ -4,7 +4,7 @@
  *     make -C c_examples && c_examples/build/instances instances.ppm
  *
  * Three objects (a mesh, another mesh, a tree with one shape) and one scene over them. The mesh of the knot is in
- * memory once, however often it is shown.
+ * memory once, however often it is shown. The rays of a tile go through the scene together.
  */
 
 #include "grid.h"
@@ -18,7 +18,7 @@
 
 const char *const program_name = "instances";
 
-enum { SIDE = 48, KNOTS = SIDE * SIDE, COUNT = KNOTS + 2, SIZE = 256 };
+enum { SIDE = 48, KNOTS = SIDE * SIDE, COUNT = KNOTS + 2, SIZE = 256, TILE = 8 };
 enum { KNOT, FLOOR, LIGHT, OBJECTS };
 
 /* The light: center and radius, in the scene. */
@@ -71,29 +71,51 @@ static void make_instances(hgrid_instance *all)
     all[KNOTS + 1].mask = 1;
 }
 
-/* The brightness of what a ray sees. */
-static double look(const hgrid_scene *field, const hgrid_ray_f64 *ray)
-{
+/* A pixel on its way: its rays and their answers lie in one struct, and batches find them there. */
+typedef struct {
+    hgrid_ray_f64 ray, to_light;
     hgrid_scene_hit hit;
+    uint8_t is_dark;
+    /* How bright it is in the shadow, and without one. */
+    double dark, lit;
+} pixel;
+
+/* Says how bright a pixel is in both cases, and with which ray to ask. A ray without a direction hits nothing. */
+static void shade(const hgrid_scene *field, pixel *p)
+{
+    const hgrid_ray_f64 none = {{0, 0, 0}, {0, 0, 0}, 0, 0, 0};
+    const bool is_light = p->hit.path[0] == KNOTS + 1;
     float normal[3];
-    if (!hgrid_intersect_scene(field, ray, NULL, &hit))
-        return 0.6;
-    if (hit.path[0] == KNOTS + 1)
-        return 1;
-    if (!hgrid_scene_normal(field, &hit, NULL, normal))
-        return 0;
-    const vector along = vector_of(ray->direction);
-    const vector from = {ray->origin[0], ray->origin[1], ray->origin[2]};
+    p->to_light = none;
+    p->dark = p->lit = p->hit.primitive == HGRID_INVALID_ID ? 0.6 : is_light ? 1 : 0;
+    if (is_light || !hgrid_scene_normal(field, &p->hit, NULL, normal))
+        return;
+    const vector along = vector_of(p->ray.direction);
+    const vector from = {p->ray.origin[0], p->ray.origin[1], p->ray.origin[2]};
     vector up = vector_of(normal);
     if (dot(up, along) > 0)
         up = scale(up, -1);
-    const vector at = offset(offset(from, (double)hit.t, along), 1e-3, up);
+    const vector at = offset(offset(from, (double)p->hit.t, along), 1e-3, up);
     const vector to = offset(vector_of(LIGHT_AT), -1, at);
     const double facing = dot(unit(to, up), up);
-    hgrid_ray_f64 to_light = {{at.x, at.y, at.z}, {(float)to.x, (float)to.y, (float)to.z}, 0, 1, 0};
+    const hgrid_ray_f64 to_light = {{at.x, at.y, at.z}, {(float)to.x, (float)to.y, (float)to.z}, 0, 1, 0};
+    p->to_light = to_light;
+    p->dark = 0.12, p->lit = facing <= 0 ? 0.12 : 0.12 + 0.8 * facing;
+}
+
+/* Finds out what the rays of a tile see, all of them at once, and what lies in the shadow. */
+static void trace(const hgrid_scene *field, pixel tile[TILE * TILE])
+{
     hgrid_scene_options options = HGRID_SCENE_OPTIONS_INIT;
     options.mask = 2;
-    return facing <= 0 || hgrid_occluded_scene(field, &to_light, &options) ? 0.12 : 0.12 + 0.8 * facing;
+    check(hgrid_intersect_scene_n(field, &tile->ray, sizeof *tile, &tile->hit, sizeof *tile, TILE * TILE,
+                                  HGRID_COHERENCE_COHERENT, NULL),
+          NULL);
+    for (int i = 0; i < TILE * TILE; i++)
+        shade(field, &tile[i]);
+    check(hgrid_occluded_scene_n(field, &tile->to_light, sizeof *tile, &tile->is_dark, sizeof *tile, TILE * TILE,
+                                 HGRID_COHERENCE_COHERENT, &options),
+          NULL);
 }
 
 int main(int count, char **words)
@@ -142,15 +164,23 @@ int main(int count, char **words)
     free(instances);
 
     unsigned char *pixels = (unsigned char *)allocate(SIZE * SIZE, 3);
-    for (int row = 0; row < SIZE; row++)
-        for (int column = 0; column < SIZE; column++) {
-            const float x = 1.4f * ((float)column + 0.5f) / SIZE - 0.7f;
-            const float y = 0.7f - 1.4f * ((float)row + 0.5f) / SIZE;
+    for (int first = 0; first < SIZE * SIZE; first += TILE * TILE) {
+        /* The corner of the tile: as many tiles lie in a row as fit. */
+        const int left = first / TILE % SIZE, top = first / (SIZE * TILE) * TILE;
+        pixel tile[TILE * TILE];
+        for (int i = 0; i < TILE * TILE; i++) {
+            const float x = 1.4f * ((float)(left + i % TILE) + 0.5f) / SIZE - 0.7f;
+            const float y = 0.7f - 1.4f * ((float)(top + i / TILE) + 0.5f) / SIZE;
             const hgrid_ray_f64 ray = {{20, 14, 18}, {x + 0.25f, y - 0.35f, -1}, 0, INFINITY, 0};
-            const unsigned char grey = (unsigned char)(255 * look(&all, &ray) + 0.5);
-            unsigned char *pixel = pixels + 3 * (SIZE * row + column);
-            pixel[0] = pixel[1] = pixel[2] = grey;
+            tile[i].ray = ray;
         }
+        trace(&all, tile);
+        for (int i = 0; i < TILE * TILE; i++) {
+            const double brightness = tile[i].is_dark ? tile[i].dark : tile[i].lit;
+            unsigned char *to = pixels + 3 * (SIZE * (top + i / TILE) + left + i % TILE);
+            to[0] = to[1] = to[2] = (unsigned char)(255 * brightness + 0.5);
+        }
+    }
     write_picture(file, path, SIZE, SIZE, pixels);
     printf("%d instances in %lu bytes, %lu triangles in memory, wrote %s\n", COUNT,
            (unsigned long)report.index_bytes, (unsigned long)knot.triangle_count + 2, path);

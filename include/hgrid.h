@@ -13,16 +13,16 @@
  *                     hgrid_occluder names one
  *
  * Many rays at once, from your structs into your structs: hgrid_intersect_n, hgrid_occluded_n,
- * hgrid_occluder_n. Every triangle along a ray: hgrid_intersect_all. The nearest point:
- * hgrid_closest_point. Masks, culling, a triangle to skip, filters and counters are options of these.
- * hgrid_bound, hgrid_sizes and hgrid_fit are about memory: enough for any mesh, for this one, and the
- * best grid for a budget. hgrid_config has the fields for a build on your threads, and for its progress.
- * hgrid_surface_at returns the normal of a hit and the origins of rays that leave it. hgrid_join joins
- * several meshes for one grid, and hgrid_locate tells which of them was hit. Trees of your own shapes
- * begin with hgrid_build_shapes, scenes of instances with hgrid_build_scene. For grids that are
- * stored there are hgrid_open, hgrid_peek, hgrid_pack, hgrid_mesh_of and hgrid_validate, for scenes
- * with all that they show hgrid_pack_scene; hgrid_inspect returns statistics of a grid. hgrid_refit
- * fits a tree to vertices that moved.
+ * hgrid_occluder_n, and in scenes hgrid_intersect_scene_n and hgrid_occluded_scene_n. Every triangle along
+ * a ray: hgrid_intersect_all. The nearest point: hgrid_closest_point. Masks, culling, a triangle to skip,
+ * filters and counters are options of these. hgrid_bound, hgrid_sizes and hgrid_fit are about memory:
+ * enough for any mesh, for this one, and the best grid for a budget. hgrid_config has the fields for a
+ * build on your threads, and for its progress. hgrid_surface_at returns the normal of a hit and the
+ * origins of rays that leave it. hgrid_join joins several meshes for one grid, and hgrid_locate tells
+ * which of them was hit. Trees of your own shapes begin with hgrid_build_shapes, scenes of instances with
+ * hgrid_build_scene. For grids that are stored there are hgrid_open, hgrid_peek, hgrid_pack,
+ * hgrid_mesh_of and hgrid_validate, for scenes with all that they show hgrid_pack_scene; hgrid_inspect
+ * returns statistics of a grid. hgrid_refit fits a tree to vertices that moved.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -128,8 +128,8 @@
  * --------
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
  * valid during the call. Positions, indices and masks, the rays and answers of hgrid_intersect_n,
- * hgrid_occluded_n and hgrid_occluder_n, and the bytes that hgrid_peek looks at need no alignment; all
- * else does.
+ * hgrid_occluded_n, hgrid_occluder_n, hgrid_intersect_scene_n and hgrid_occluded_scene_n, and the bytes
+ * that hgrid_peek looks at need no alignment; all else does.
  * Regions, blobs, positions, indices and masks point to as many bytes as the sizes next to them
  * say. Each function says which of its pointers may be NULL; any other NULL is answered with
  * HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of a
@@ -1296,7 +1296,9 @@ typedef struct hgrid_scene_hit {
 } hgrid_scene_hit;
 
 /**
- * The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`.
+ * The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`; NULL means these defaults.
+ *
+ * With a `filter` or `counters` the rays of a batch are traced one by one, in their order.
  */
 typedef struct hgrid_scene_options {
     /**
@@ -1331,6 +1333,16 @@ typedef struct hgrid_scene_options {
      * Where to add up the work, or NULL. An instance that a ray is offered counts as a test.
      */
     struct hgrid_counters *counters;
+    /**
+     * Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL: as `scratch` of
+     * `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries of
+     * one ray do not look at it.
+     */
+    void *scratch;
+    /**
+     * Bytes of `scratch`. With 16 bytes for each ray a whole batch is sorted at once.
+     */
+    size_t scratch_bytes;
 } hgrid_scene_options;
 
 #if defined(HGRID_MALLOC)
@@ -1612,7 +1624,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_TOO_DEEP -63
 
 /**
- * The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
+ * The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
  */
 #define HGRID_ERROR_INVALID_RAYS -50
 
@@ -2880,6 +2892,83 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
                         struct hgrid_instance *instance,
                         struct hgrid_grid *grid);
 
+/**
+ * Finds the closest thing in a scene that each of many rays hits: what `hgrid_intersect_scene` would find
+ * for each, bit for bit, but sooner.
+ *
+ * It is to a scene what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are
+ * the same: a ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of `hits`.
+ * A miss writes a hit, too: with `primitive` and every number of `path` equal to `HGRID_INVALID_ID`, `t`
+ * equal to `INFINITY`, `u` and `v` equal to 0. Rays that meet the same instances are traced together, so pass
+ * at least a tile of 8 x 8 pixels in one call:
+ *
+ * ```c
+ * static size_t trace_tile_of_scene(const hgrid_scene *scene, const hgrid_ray_f64 rays[64],
+ *                                   hgrid_scene_hit hits[64])
+ * {
+ *     size_t found = 0;
+ *     if (hgrid_intersect_scene_n(scene, rays, 0, hits, 0, 64, HGRID_COHERENCE_COHERENT, NULL) != HGRID_OK)
+ *         return 0;
+ *     for (size_t i = 0; i < 64; i++)
+ *         found += hits[i].primitive != HGRID_INVALID_ID;
+ *     return found;
+ * }
+ * ```
+ *
+ * For rays without any order lend `scratch` of the options, and pass as many as you have in one call. With a
+ * `filter` or `counters` the rays are traced one by one, in the order of the array: the filter is asked about all
+ * hits of one ray before those of the next. Shapes and nested scenes are asked for each ray alone, too.
+ *
+ * With `count` 0 nothing is done. Rays are read and hits are written in any order, and a ray perhaps more
+ * than once, before its hit is written.
+ *
+ * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for all rays.
+ *
+ * Returns `HGRID_OK` and has written all hits, or returns the reason and has written none:
+ * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID` for a view of zeros, `HGRID_ERROR_STRUCT_SIZE` and
+ * `HGRID_ERROR_INVALID_CULL` (the options), `HGRID_ERROR_INVALID_RAYS` and `HGRID_ERROR_INVALID_ANSWERS` (a
+ * stride, or a count that is impossible), `HGRID_ERROR_OVERLAP` (also of `scratch`),
+ * `HGRID_ERROR_INVALID_COHERENCE`. An invalid ray (a NaN, say, or no direction) is no error: it misses.
+ *
+ * The call allocates nothing. It needs at most 80 KiB of stack, and 8 KiB more for each scene inside the scene.
+ *
+ * Threads: any number of queries on the same scene at once; each thread with hits and counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_intersect_scene_n(const struct hgrid_scene *scene,
+                                     const struct hgrid_ray_f64 *rays,
+                                     size_t ray_stride,
+                                     struct hgrid_scene_hit *hits,
+                                     size_t hit_stride,
+                                     size_t count,
+                                     hgrid_coherence coherence,
+                                     const struct hgrid_scene_options *options);
+
+/**
+ * Tells for each of many rays whether it hits anything in a scene: what `hgrid_occluded_scene` would say for
+ * each, but sooner.
+ *
+ * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from
+ * `occluded` on. All else is as with `hgrid_intersect_scene_n`. `rays` and `occluded` may be NULL if `count` is
+ * 0, `options` may be NULL. Returns `HGRID_OK` and has written all bytes, or returns what
+ * `hgrid_intersect_scene_n` returns and has written none.
+ *
+ * Threads: any number of queries on the same scene at once; each thread with bytes and counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_occluded_scene_n(const struct hgrid_scene *scene,
+                                    const struct hgrid_ray_f64 *rays,
+                                    size_t ray_stride,
+                                    uint8_t *occluded,
+                                    size_t occluded_stride,
+                                    size_t count,
+                                    hgrid_coherence coherence,
+                                    const struct hgrid_scene_options *options);
+
 #if defined(HGRID_MALLOC)
 /**
  * Builds a grid in memory that the library gets itself: `hgrid_sizes`, without scratch and
@@ -3045,7 +3134,7 @@ bool hgrid_has_method(uint32_t method);
  * The default options of a query of a scene.
  */
 #define HGRID_SCENE_OPTIONS_INIT {sizeof(hgrid_scene_options), 0xffffffffu, HGRID_CULL_NONE, 0, NULL, \
-                                  NULL, NULL}
+                                  NULL, NULL, NULL, 0}
 
 /**
  * The default options of a query.

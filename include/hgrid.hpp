@@ -483,6 +483,16 @@ auto verdict_of(F &filter, std::size_t place, const hit &at, std::false_type) no
     return filter(place, at);
 }
 
+// What it says as C takes it.
+inline ::hgrid_verdict number(verdict answer) noexcept
+{
+    return static_cast<::hgrid_verdict>(answer);
+}
+inline ::hgrid_verdict number(bool counts) noexcept
+{
+    return counts ? HGRID_ACCEPT : HGRID_REJECT;
+}
+
 template <class C>
 using element_of = std::remove_pointer_t<decltype(data_of(std::declval<C &>()))>;
 
@@ -1001,7 +1011,7 @@ public:
         raw_.context = const_cast<void *>(static_cast<const void *>(std::addressof(callable)));
         raw_.filter = [](void *context, std::size_t place, const hit *at) noexcept {
             using takes_hit = detail::is_callable<F &, const hit &>;
-            return number(detail::verdict_of(*static_cast<F *>(context), place, *at, takes_hit()));
+            return detail::number(detail::verdict_of(*static_cast<F *>(context), place, *at, takes_hit()));
         };
         return *this;
     }
@@ -1010,15 +1020,6 @@ public:
     const ::hgrid_query_options &c() const noexcept { return raw_; }
 
 private:
-    static ::hgrid_verdict number(verdict answer) noexcept
-    {
-        return static_cast<::hgrid_verdict>(answer);
-    }
-    static ::hgrid_verdict number(bool counts) noexcept
-    {
-        return counts ? HGRID_ACCEPT : HGRID_REJECT;
-    }
-
     ::hgrid_query_options raw_ = HGRID_QUERY_OPTIONS_INIT;
 };
 
@@ -1608,6 +1609,41 @@ using instance = ::hgrid_instance;
 /// What instances show. See `hgrid_object`; `make_object` makes it.
 using object = ::hgrid_object;
 
+/// The options of a query of a scene: `hgrid_scene_options`. They refer to the filter, the counters and the memory
+/// that they were given.
+class scene_options {
+public:
+    /// Instances are seen whose mask has a bit in common with this one, and so are triangles and shapes in them.
+    scene_options &mask(std::uint32_t bits) noexcept { return raw_.mask = bits, *this; }
+    /// Triangles are not hit from this side.
+    scene_options &cull(culling side) noexcept { return raw_.cull = static_cast<std::uint32_t>(side), *this; }
+    /// Adds up the work of queries here. Each thread needs its own.
+    scene_options &count(counters &work) noexcept { return raw_.counters = &work, *this; }
+    /// Lends memory in which a batch of incoherent rays may be sorted, 16 bytes a ray. Each thread needs its own.
+    scene_options &sort_in(span<byte> scratch) noexcept
+    {
+        return raw_.scratch = scratch.data(), raw_.scratch_bytes = scratch.size(), *this;
+    }
+    /// Asks `callable` about hits of triangles, for each instance from near to far. It is called with the hit, and
+    /// returns a `verdict`, or a bool: whether the hit counts. In a batch one ray comes after the other.
+    template <class F>
+    scene_options &filter(F &callable) noexcept
+    {
+        static_assert(!std::is_function<F>::value, "put the function into a lambda");
+        static_assert(detail::is_callable<F &, const scene_hit &>::value, "a filter is called with a hit");
+        raw_.context = const_cast<void *>(static_cast<const void *>(std::addressof(callable)));
+        raw_.filter = [](void *context, const scene_hit *at) noexcept {
+            return detail::number((*static_cast<F *>(context))(*at));
+        };
+        return *this;
+    }
+    /// What C takes.
+    const ::hgrid_scene_options &c() const noexcept { return raw_; }
+
+private:
+    ::hgrid_scene_options raw_ = HGRID_SCENE_OPTIONS_INIT;
+};
+
 #if defined(__GNUC__)
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wold-style-cast"
@@ -1806,16 +1842,46 @@ public:
         return answer == status::ok ? result<scene>(opened) : answer;
     }
     /// The closest thing that a ray hits.
-    optional<scene_hit> intersect(const ray_f64 &along) const noexcept
+    optional<scene_hit> intersect(const ray_f64 &along) const noexcept { return intersect(along, nullptr); }
+    /// The same with options.
+    optional<scene_hit> intersect(const ray_f64 &along, const scene_options &with) const noexcept
     {
-        scene_hit found;
-        const bool is_hit = ::hgrid_intersect_scene(&raw_, &along, nullptr, &found);
-        return is_hit ? optional<scene_hit>(found) : optional<scene_hit>();
+        return intersect(along, &with.c());
     }
     /// Whether a ray hits anything.
     bool occluded(const ray_f64 &along) const noexcept
     {
         return ::hgrid_occluded_scene(&raw_, &along, nullptr);
+    }
+    /// The same with options.
+    bool occluded(const ray_f64 &along, const scene_options &with) const noexcept
+    {
+        return ::hgrid_occluded_scene(&raw_, &along, &with.c());
+    }
+
+    /// The closest hit of each ray; a miss has the primitive `invalid_id`. There are as many hits as rays, or the
+    /// answer is `invalid_answers`.
+    status intersect_n(strided<const ray_f64> rays, strided<scene_hit> hits, coherence know) const noexcept
+    {
+        return intersect_n(rays, hits, know, nullptr);
+    }
+    /// The same with options for all rays.
+    status intersect_n(strided<const ray_f64> rays, strided<scene_hit> hits, coherence know,
+                       const scene_options &with) const noexcept
+    {
+        return intersect_n(rays, hits, know, &with.c());
+    }
+    /// For each ray 1 if it hits anything, or else 0. There are as many answers as rays, or the answer is
+    /// `invalid_answers`.
+    status occluded_n(strided<const ray_f64> rays, strided<std::uint8_t> answers, coherence know) const noexcept
+    {
+        return occluded_n(rays, answers, know, nullptr);
+    }
+    /// The same with options for all rays.
+    status occluded_n(strided<const ray_f64> rays, strided<std::uint8_t> answers, coherence know,
+                      const scene_options &with) const noexcept
+    {
+        return occluded_n(rays, answers, know, &with.c());
     }
     /// The normal of the triangle that was hit, of length 1, in the scene; zeros if the hit names none.
     point normal(const scene_hit &of) const noexcept
@@ -1843,6 +1909,30 @@ public:
     const ::hgrid_scene &c() const noexcept { return raw_; }
 
 private:
+    optional<scene_hit> intersect(const ray_f64 &along, const ::hgrid_scene_options *with) const noexcept
+    {
+        scene_hit found;
+        return ::hgrid_intersect_scene(&raw_, &along, with, &found) ? optional<scene_hit>(found)
+                                                                    : optional<scene_hit>();
+    }
+    status intersect_n(strided<const ray_f64> rays, strided<scene_hit> hits, coherence know,
+                       const ::hgrid_scene_options *with) const noexcept
+    {
+        if (rays.size() != hits.size())
+            return status::invalid_answers;
+        return detail::said(::hgrid_intersect_scene_n(&raw_, rays.first(), rays.stride(), hits.first(), hits.stride(),
+                                                      rays.size(), static_cast<::hgrid_coherence>(know), with));
+    }
+    status occluded_n(strided<const ray_f64> rays, strided<std::uint8_t> answers, coherence know,
+                      const ::hgrid_scene_options *with) const noexcept
+    {
+        if (rays.size() != answers.size())
+            return status::invalid_answers;
+        return detail::said(::hgrid_occluded_scene_n(&raw_, rays.first(), rays.stride(), answers.first(),
+                                                     answers.stride(), rays.size(),
+                                                     static_cast<::hgrid_coherence>(know), with));
+    }
+
     ::hgrid_scene raw_ = HGRID_SCENE_INIT;
 };
 

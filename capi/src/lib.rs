@@ -3,8 +3,8 @@
 //! Every function checks what it was given, calls core, and writes the answer. The docs of all that
 //! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
 //! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
-//! structs and threads that they rely on. `build`, `query`, `batch`, `blob`, `shapes` and `scene` hold
-//! the functions, `types` and `query_types` the structs, and `raw` every use of a caller's pointer.
+//! structs and threads that they rely on. `build`, `query`, `batch`, `blob`, `shapes`, `scene`
+//! and `scene_batch` hold the functions, `types` and `query_types` the structs, and `raw` every use of a caller's pointer.
 //!
 //! This package allocates nothing, keeps no state, starts no thread, and has no panic that a caller could
 //! reach; a test looks in the library for the symbols of all these but the state. Core remembers in one byte
@@ -30,6 +30,8 @@ mod blob;
 mod shapes;
 
 mod scene;
+
+mod scene_batch;
 
 #[cfg(feature = "malloc")]
 mod create;
@@ -57,6 +59,7 @@ pub use crate::create::*;
 pub use crate::query::*;
 pub use crate::query_types::*;
 pub use crate::scene::*;
+pub use crate::scene_batch::*;
 pub use crate::shapes::*;
 pub use crate::status::*;
 pub use crate::types::*;

@@ -98,7 +98,9 @@ pub struct hgrid_scene_hit {
     pub path: [u32; HGRID_MAX_NESTING],
 }
 
-/// The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`.
+/// The options of a query of a scene. Initialise them with `HGRID_SCENE_OPTIONS_INIT`; NULL means these defaults.
+///
+/// With a `filter` or `counters` the rays of a batch are traced one by one, in their order.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_scene_options {
@@ -122,6 +124,12 @@ pub struct hgrid_scene_options {
     >,
     /// Where to add up the work, or NULL. An instance that a ray is offered counts as a test.
     pub counters: *mut hgrid_counters,
+    /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL: as `scratch` of
+    /// `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries of
+    /// one ray do not look at it.
+    pub scratch: *mut c_void,
+    /// Bytes of `scratch`. With 16 bytes for each ray a whole batch is sorted at once.
+    pub scratch_bytes: usize,
 }
 
 impl hgrid_scene_options {
@@ -135,6 +143,8 @@ impl hgrid_scene_options {
         context: null_mut(),
         filter: None,
         counters: null_mut(),
+        scratch: null_mut(),
+        scratch_bytes: 0,
     };
 
     /// The sides as core knows them.

@@ -145,7 +145,7 @@ pub const HGRID_ERROR_MISSING_OBJECTS: hgrid_status = -62;
 /// More scenes stand inside one another than `HGRID_MAX_NESTING`.
 pub const HGRID_ERROR_TOO_DEEP: hgrid_status = -63;
 
-/// The stride of a batch's rays is below 32 bytes, or the rays do not fit into memory.
+/// The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
 pub const HGRID_ERROR_INVALID_RAYS: hgrid_status = -50;
 
 /// The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
@@ -276,9 +276,9 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_MISSING_OBJECTS => c"too few objects: bring those that the scene was built with",
         HGRID_ERROR_TOO_DEEP => c"too many scenes inside one another: HGRID_MAX_NESTING at most",
         HGRID_ERROR_CORRUPT => c"a damaged blob, or one of another mesh: build it again",
-        HGRID_ERROR_INVALID_RAYS => c"invalid rays: check count, and ray_stride (0, or 32 and more)",
+        HGRID_ERROR_INVALID_RAYS => c"invalid rays: check count and stride (0, or at least a ray)",
         HGRID_ERROR_INVALID_ANSWERS => {
-            c"invalid answers: check count, and their stride (0, or the size of one and more)"
+            c"invalid answers: check count and stride (0, or at least one)"
         }
         HGRID_ERROR_INVALID_COHERENCE => c"unknown coherence: use one of HGRID_COHERENCE_...",
         _ => c"unknown status",

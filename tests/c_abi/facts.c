@@ -175,6 +175,8 @@ static void layout(void)
     OFFSET(hgrid_scene_options, context);
     OFFSET(hgrid_scene_options, filter);
     OFFSET(hgrid_scene_options, counters);
+    OFFSET(hgrid_scene_options, scratch);
+    OFFSET(hgrid_scene_options, scratch_bytes);
     SIZE(hgrid_allocator);
     OFFSET(hgrid_allocator, struct_size);
     OFFSET(hgrid_allocator, reserved);
@@ -286,9 +288,9 @@ static void defaults(void)
     printf("boxes %lu %lu %d %zu %zu %d %zu %d %d\n", (unsigned long)x.struct_size, (unsigned long)x.reserved,
            x.boxes != NULL, x.box_stride, x.count, x.masks != NULL, x.mask_stride, x.test != NULL,
            x.context != NULL);
-    printf("scene_options %lu %#lx %lu %lu %d %d %d\n", (unsigned long)n.struct_size, (unsigned long)n.mask,
-           (unsigned long)n.cull, (unsigned long)n.reserved, n.context != NULL, n.filter != NULL,
-           n.counters != NULL);
+    printf("scene_options %lu %#lx %lu %lu %d %d %d %d %zu\n", (unsigned long)n.struct_size,
+           (unsigned long)n.mask, (unsigned long)n.cull, (unsigned long)n.reserved, n.context != NULL,
+           n.filter != NULL, n.counters != NULL, n.scratch != NULL, n.scratch_bytes);
     printf("mesh %lu %lu %d %zu %zu %d %zu %zu %d %zu %d %zu\n", (unsigned long)m.struct_size,
            (unsigned long)m.index_type, m.positions != NULL, m.position_stride, m.vertex_count,
            m.indices != NULL, m.index_stride, m.triangle_count, m.masks != NULL, m.mask_stride,

@@ -296,7 +296,7 @@ fn initialisers_are_the_defaults() {
         ("statistics", "0 0 0xffffffff 0 0 0 0 0"),
         ("allocator", "0 0 0 0"),
         ("boxes", "0 0 0 0 0 0 0 0"),
-        ("scene_options", "0xffffffff 0 0 0 0 0"),
+        ("scene_options", "0xffffffff 0 0 0 0 0 0 0"),
     ] {
         assert_eq!(fact(name), format!("{} {fields}", fact(&format!("hgrid_{name}"))), "{name}");
     }

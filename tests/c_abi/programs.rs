@@ -20,7 +20,7 @@ use crate::header::DIALECTS;
 
 /// Programs that check for themselves and tell what they reached (see `promises`), and the
 /// flavour of the library that they need.
-const PROGRAMS: [(&str, Flavour); 22] = [
+const PROGRAMS: [(&str, Flavour); 23] = [
     ("queries", Flavour::Bare),
     ("options", Flavour::Bare),
     ("batches", Flavour::Bare),
@@ -40,6 +40,7 @@ const PROGRAMS: [(&str, Flavour); 22] = [
     ("refits", Flavour::Bare),
     ("joined", Flavour::Bare),
     ("scenes", Flavour::Bare),
+    ("scene_batches", Flavour::Bare),
     ("scene_refusals", Flavour::Bare),
     ("packed_scenes", Flavour::Bare),
     ("create", Flavour::Malloc),
@@ -268,7 +269,8 @@ fn no_thread_gets_in_the_way_of_another() {
 }
 
 /// The header promises 7 KiB for a ray or a point, 36 KiB for a batch, 18 KiB for a build, 96 KiB for one with tasks and
-/// 13 KiB for a task; for a ray in scenes 8 KiB for each of them and 7 KiB for a grid.
+/// 13 KiB for a task; for a ray in scenes 8 KiB for each of them and 7 KiB for a grid; for a batch in a scene 80 KiB, and
+/// 8 KiB for each scene inside it.
 #[test]
 fn queries_and_builds_take_little_stack() {
     takes_little_stack(&[]);
@@ -301,6 +303,11 @@ fn takes_little_stack(arguments: &[&str]) {
     for (name, scenes) in [("scene", 1), ("nested", 4)] {
         let promised = (8 * scenes + 7) << 10;
         assert!((1000..promised).contains(&most(name)), "{name}: {}", most(name));
+    }
+    // The rays of a group alone, outside and inside of an instance.
+    for (name, inside) in [("scene_many", 0), ("nested_many", 3)] {
+        let promised = (80 + 8 * inside) << 10;
+        assert!((2 * 64 * 48..promised).contains(&most(name)), "{name}: {}", most(name));
     }
     // There is room for 64 of them.
     assert!((20 << 10..96 << 10).contains(&most("tasks")), "tasks: {}", most("tasks"));

@@ -203,6 +203,116 @@ static void what_scenes_refuse(void)
     CHECK(!hgrid_scene_normal(&scene, &miss, NULL, normal));
 }
 
+/* Both calls for many rays, with one argument wrong. */
+typedef struct {
+    const hgrid_scene *scene;
+    const hgrid_ray_f64 *rays;
+    size_t ray_stride;
+    void *answers;
+    size_t hit_stride, occluded_stride, count;
+    hgrid_coherence coherence;
+    const hgrid_scene_options *options;
+} batch;
+
+enum { MANY = 10 };
+
+static hgrid_ray_f64 many_rays[MANY];
+static unsigned char many_answers[32 * MANY];
+
+static batch good_batch(void)
+{
+    const batch b = {&scene, many_rays, 0, many_answers, 0, 0, MANY, HGRID_COHERENCE_COHERENT, NULL};
+    return b;
+}
+
+/* They say so and write nothing. */
+static void no_batch(hgrid_status expected, batch b)
+{
+    memset(many_answers, 0xc7, sizeof many_answers);
+    EXPECT(expected, hgrid_intersect_scene_n(b.scene, b.rays, b.ray_stride, (hgrid_scene_hit *)b.answers, b.hit_stride,
+                                             b.count, b.coherence, b.options));
+    EXPECT(expected, hgrid_occluded_scene_n(b.scene, b.rays, b.ray_stride, (uint8_t *)b.answers, b.occluded_stride,
+                                            b.count, b.coherence, b.options));
+    CHECK(all_bytes_are(many_answers, sizeof many_answers, 0xc7));
+}
+
+static void what_batches_refuse(void)
+{
+    const hgrid_scene zeros = HGRID_SCENE_INIT;
+    hgrid_scene_options options = HGRID_SCENE_OPTIONS_INIT;
+    batch b = good_batch();
+    for (int i = 0; i < MANY; i++)
+        many_rays[i] = wide_ray(0.1 * i, 0.5, 1);
+    b.scene = &zeros;
+    no_batch(HGRID_ERROR_NOT_A_GRID, b);
+
+    const hgrid_coherence coherences[] = {2, 0x80000000u, UINT32_MAX};
+    for (int i = 0; i < 3; i++) {
+        b = good_batch(), b.coherence = coherences[i];
+        no_batch(HGRID_ERROR_INVALID_COHERENCE, b);
+        b.count = 0;
+        no_batch(HGRID_ERROR_INVALID_COHERENCE, b);
+    }
+
+    /* Rays of float are no rays of double; and no memory reaches so far. */
+    const size_t strides[] = {1, sizeof(hgrid_ray), sizeof(hgrid_ray_f64) - 1, SIZE_MAX, SIZE_MAX / 9};
+    for (int i = 0; i < 5; i++) {
+        b = good_batch(), b.ray_stride = strides[i];
+        no_batch(HGRID_ERROR_INVALID_RAYS, b);
+        if (i < 3)
+            b.count = 0, no_batch(HGRID_ERROR_INVALID_RAYS, b);
+        else
+            b = good_batch(), b.hit_stride = b.occluded_stride = strides[i], no_batch(HGRID_ERROR_INVALID_ANSWERS, b);
+    }
+    b = good_batch(), b.count = SIZE_MAX / 64 + 1;
+    no_batch(HGRID_ERROR_INVALID_RAYS, b);
+    for (size_t stride = 1; stride < sizeof(hgrid_scene_hit); stride++)
+        EXPECT(HGRID_ERROR_INVALID_ANSWERS,
+               hgrid_intersect_scene_n(&scene, many_rays, 0, (hgrid_scene_hit *)(void *)many_answers, stride, 1,
+                                       HGRID_COHERENCE_COHERENT, NULL));
+
+    b = good_batch(), b.options = &options;
+    options.struct_size--;
+    no_batch(HGRID_ERROR_STRUCT_SIZE, b);
+    options.struct_size++, options.reserved = 1;
+    no_batch(HGRID_ERROR_STRUCT_SIZE, b);
+    options.reserved = 0, options.cull = 3;
+    no_batch(HGRID_ERROR_INVALID_CULL, b);
+    options.cull = HGRID_CULL_NONE;
+
+    /* Answers in the rays. */
+    b.answers = &many_rays[MANY - 1].reserved;
+    no_batch(HGRID_ERROR_OVERLAP, b);
+
+    /* Scratch in what the call reads or writes: of the scene, of the scene that it shows, and of what that shows. */
+    hgrid_scene *const view = &inner;
+    struct {
+        void *scratch;
+        size_t bytes;
+    } cases[] = {{&many_rays[3], 1},          {many_answers + 32 * (MANY - 1), 1},
+                 {scene_blob, scene_bytes},   {objects, 1},
+                 {inner_blob, 64},            {view, sizeof *view},
+                 {shape_blob, shape_bytes},   {&spheres[7], 4},
+                 {&spheres[7].mask, 4},       {&shapes, sizeof shapes},
+                 {mesh_data.positions, 4},    {mesh_data.indices, 400},
+                 {&grid, sizeof grid}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        for (hgrid_coherence c = 0; c < 2; c++) {
+            b = good_batch(), b.coherence = c, b.options = &options;
+            b.hit_stride = sizeof(hgrid_scene_hit), b.occluded_stride = sizeof(hgrid_scene_hit);
+            options.scratch = cases[i].scratch, options.scratch_bytes = cases[i].bytes;
+            no_batch(HGRID_ERROR_OVERLAP, b);
+            /* Without a byte it lies nowhere; and queries of one ray do not look at it. */
+            CHECK(hgrid_occluded_scene(&scene, &many_rays[3], &options) ==
+                  hgrid_occluded_scene(&scene, &many_rays[3], NULL));
+            options.scratch_bytes = 0;
+            EXPECT(HGRID_OK, hgrid_occluded_scene_n(&scene, many_rays, 0, many_answers, 0, MANY, c, &options));
+        }
+    b = good_batch(), b.options = &options;
+    options.scratch = NULL, options.scratch_bytes = 16;
+    no_batch(HGRID_ERROR_NULL_ARGUMENT, b);
+}
+
 /* NULL for a parameter: refused, allowed, or a miss. */
 #define REFUSED(parameter, call) \
     do { \
@@ -290,6 +400,21 @@ static void no_pointers(void)
     puts("null hgrid_occluded_scene.options");
     MISSED(hgrid_occluded_scene.scene, hgrid_occluded_scene(NULL, &wide, NULL));
     MISSED(hgrid_occluded_scene.ray, hgrid_occluded_scene(&inner, NULL, NULL));
+    const size_t all = MANY;
+    const hgrid_coherence how = HGRID_COHERENCE_COHERENT;
+    const hgrid_ray_f64 *const from = many_rays;
+    hgrid_scene_hit hits[MANY];
+    uint8_t dark[MANY];
+    REFUSED(hgrid_intersect_scene_n.scene, hgrid_intersect_scene_n(NULL, from, 0, hits, 0, all, how, NULL));
+    REFUSED(hgrid_intersect_scene_n.rays, hgrid_intersect_scene_n(&inner, NULL, 0, hits, 0, all, how, NULL));
+    REFUSED(hgrid_intersect_scene_n.hits, hgrid_intersect_scene_n(&inner, from, 0, NULL, 0, all, how, NULL));
+    ALLOWED(hgrid_intersect_scene_n.rays, hgrid_intersect_scene_n(&inner, NULL, 0, NULL, 0, 0, how, NULL));
+    ALLOWED(hgrid_intersect_scene_n.options, hgrid_intersect_scene_n(&inner, from, 0, hits, 0, all, how, NULL));
+    REFUSED(hgrid_occluded_scene_n.scene, hgrid_occluded_scene_n(NULL, from, 0, dark, 0, all, how, NULL));
+    REFUSED(hgrid_occluded_scene_n.rays, hgrid_occluded_scene_n(&inner, NULL, 0, dark, 0, all, how, NULL));
+    REFUSED(hgrid_occluded_scene_n.occluded, hgrid_occluded_scene_n(&inner, from, 0, NULL, 0, all, how, NULL));
+    ALLOWED(hgrid_occluded_scene_n.rays, hgrid_occluded_scene_n(&inner, NULL, 0, NULL, 0, 0, how, NULL));
+    ALLOWED(hgrid_occluded_scene_n.options, hgrid_occluded_scene_n(&inner, from, 0, dark, 0, all, how, NULL));
     MISSED(hgrid_scene_normal.scene, hgrid_scene_normal(NULL, &scene_hit, NULL, normal));
     MISSED(hgrid_scene_normal.hit, hgrid_scene_normal(&inner, NULL, NULL, normal));
     MISSED(hgrid_scene_normal.normal, hgrid_scene_normal(&inner, &scene_hit, NULL, NULL));
@@ -345,6 +470,12 @@ static void structs_of_other_versions(void)
                    found(hgrid_intersect_scene(&inner, &wide, it, &scene_hit)));
     CHECK_VERSIONS(hgrid_occluded_scene.options, hgrid_scene_options, scene_options,
                    found(hgrid_occluded_scene(&inner, &wide, it)));
+    const hgrid_coherence how = HGRID_COHERENCE_INCOHERENT;
+    uint8_t dark;
+    CHECK_VERSIONS(hgrid_intersect_scene_n.options, hgrid_scene_options, scene_options,
+                   hgrid_intersect_scene_n(&inner, &wide, 0, &scene_hit, 0, 1, how, it));
+    CHECK_VERSIONS(hgrid_occluded_scene_n.options, hgrid_scene_options, scene_options,
+                   hgrid_occluded_scene_n(&inner, &wide, 0, &dark, 0, 1, how, it));
 }
 
 int main(void)
@@ -355,6 +486,7 @@ int main(void)
     build_outer();
     what_shapes_refuse();
     what_scenes_refuse();
+    what_batches_refuse();
     no_pointers();
     structs_of_other_versions();
     return 0;

@@ -1,6 +1,6 @@
 /* Prints how much stack queries and builds take, in bytes, one "name most" a line: the most of all methods and
  * meshes, on a stack that was filled before: a sheet, then one with a crowd of small triangles on it, and for trees (with an
- * argument for all) one with a crowd in the crowd. Trees also stand in scenes, and their triangles are shapes. */
+ * argument for all) one with a crowd in the crowd. Grids also stand in scenes, and their triangles are shapes. */
 
 #include "check.h"
 
@@ -111,7 +111,10 @@ enum { SHOWN = 12, SHOWN_SCENES = 2 };
 static hgrid_object shown[HGRID_MAX_NESTING];
 static hgrid_scene around[HGRID_MAX_NESTING];
 static hgrid_shapes corners;
+/* One that shows all kinds of objects, nested as deep as scenes may be. */
+static hgrid_scene all_kinds;
 HGRID_ALIGNED static unsigned char scene_blobs[HGRID_MAX_NESTING][HGRID_SCENE_BOUND(SHOWN)];
+HGRID_ALIGNED static unsigned char all_kinds_blob[HGRID_SCENE_BOUND(SHOWN)];
 HGRID_ALIGNED static unsigned char small_scratch[HGRID_SCRATCH_BOUND(TRIANGLES)];
 HGRID_ALIGNED static unsigned char shape_blob[HGRID_INDEX_BOUND(TRIANGLES)];
 static float corner_boxes[TRIANGLES][6];
@@ -137,9 +140,49 @@ static void ask_scene(const hgrid_scene *scene)
     }
 }
 
+/* Many rays at once: tiles, and rays to be sorted. */
+static void ask_scene_together(const hgrid_scene *scene)
+{
+    static hgrid_ray_f64 wide[RAYS];
+    static hgrid_scene_hit found[RAYS];
+    static unsigned char sorted[16 * RAYS];
+    const hgrid_ray *each[] = {mixed, rays};
+    for (int order = 0; order < 2; order++) {
+        for (int i = 0; i < RAYS; i++) {
+            const hgrid_ray *from = &each[order][i];
+            hgrid_ray_f64 ray = {{0, 0, 0}, {0, 0, 0}, from->t_min, from->t_max, 0};
+            /* Origins that float does not have are rounded in the tree of the scene. */
+            for (int axis = 0; axis < 3; axis++)
+                ray.origin[axis] = (double)from->origin[axis] + 1e-12, ray.direction[axis] = from->direction[axis];
+            wide[i] = ray;
+        }
+        hgrid_scene_options all = HGRID_SCENE_OPTIONS_INIT, masked = HGRID_SCENE_OPTIONS_INIT;
+        all.filter = reject_in_scene, all.context = &grid, all.counters = &counters;
+        masked.mask = 1, masked.cull = HGRID_CULL_BACK, masked.scratch = sorted, masked.scratch_bytes = sizeof sorted;
+        for (hgrid_coherence c = 0; c < 2; c++) {
+            CHECK(hgrid_intersect_scene_n(scene, wide, 0, found, 0, RAYS, c, NULL) == HGRID_OK);
+            CHECK(hgrid_occluded_scene_n(scene, wide, 0, occluded, 0, RAYS, c, NULL) == HGRID_OK);
+            CHECK(hgrid_intersect_scene_n(scene, wide, 0, found, 0, RAYS, c, &masked) == HGRID_OK);
+            CHECK(hgrid_occluded_scene_n(scene, wide, 0, occluded, 0, RAYS, c, &masked) == HGRID_OK);
+            CHECK(hgrid_intersect_scene_n(scene, wide, 0, found, 0, 64, c, &all) == HGRID_OK);
+            CHECK(hgrid_occluded_scene_n(scene, wide, 0, occluded, 0, 64, c, &all) == HGRID_OK);
+        }
+    }
+}
+
 static void flat_scene(void)
 {
     ask_scene(&around[0]);
+}
+
+static void flat_scene_together(void)
+{
+    ask_scene_together(&around[0]);
+}
+
+static void nested_scenes_together(void)
+{
+    ask_scene_together(&all_kinds);
 }
 
 static void nested_scenes(void)
@@ -192,6 +235,16 @@ static void build_scenes(void)
     boxes.boxes = corner_boxes, boxes.count = TRIANGLES, boxes.test = meet_middle;
     CHECK(hgrid_build_shapes(&boxes, NULL, shape_blob, sizeof shape_blob, small_scratch, sizeof small_scratch, &corners,
                              NULL) == HGRID_OK);
+    static hgrid_object kinds[3];
+    hgrid_instance instances[3];
+    for (uint32_t i = 0; i < 3; i++) {
+        const hgrid_instance fresh = HGRID_INSTANCE_INIT;
+        instances[i] = fresh, instances[i].object = i;
+    }
+    CHECK(hgrid_object_grid(&grid, &kinds[0]) == HGRID_OK && hgrid_object_shapes(&corners, &kinds[1]) == HGRID_OK);
+    CHECK(hgrid_object_scene(&around[HGRID_MAX_NESTING - 2], &kinds[2]) == HGRID_OK);
+    CHECK(hgrid_build_scene(instances, 3, kinds, 3, NULL, all_kinds_blob, sizeof all_kinds_blob, small_scratch,
+                            sizeof small_scratch, &all_kinds, NULL) == HGRID_OK);
 }
 
 /* Bytes of stack that a call takes: of two stacks the second where a call on the first asks. */
@@ -351,6 +404,7 @@ int main(int argc, char **argv)
     } calls[] = {{"build", build, 0}, {"tasks", tasks, 0}, {"one", one, 0},
                  {"options", with_options, 0}, {"closest", closest, 0}, {"many", many, 0},
                  {"scenes", build_scenes, 0}, {"scene", flat_scene, 0}, {"nested", nested_scenes, 0},
+                 {"scene_many", flat_scene_together, 0}, {"nested_many", nested_scenes_together, 0},
                  {"shapes", boxes_of_triangles, 0}};
     enum { CALLS = sizeof calls / sizeof *calls };
     for (uint32_t crowds = 0; crowds <= CROWDS; crowds++)

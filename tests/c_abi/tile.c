@@ -100,6 +100,15 @@ int main(void)
     if (put_twice(&grid, scene_index, sizeof scene_index, both_scratch, sizeof both_scratch, &object, &scene) ||
         !hgrid_occluded_scene(&scene, &wide, NULL))
         return 12;
+    /* The tile sees the first of the two triangles at both places. */
+    hgrid_ray_f64 wide_rays[64];
+    hgrid_scene_hit wide_hits[64];
+    for (int i = 0; i < 64; i++) {
+        const hgrid_ray_f64 ray = {{(i % 8) + 0.25, (i / 8) + 0.25, 1}, {0, 0, -1}, 0, INFINITY, 0};
+        wide_rays[i] = ray;
+    }
+    if (trace_tile_of_scene(&scene, wide_rays, wide_hits) != 36 || wide_hits[0].t != depth[0] || wide_hits[0].path[0] != 0)
+        return 17;
     static disc discs[1] = {{1, 1, 0, 0.5f}};
     static const float box[6] = {0.5f, 0.5f, 0, 1.5f, 1.5f, 0};
     hgrid_boxes boxes = HGRID_BOXES_INIT;

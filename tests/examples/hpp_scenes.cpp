@@ -1,6 +1,9 @@
 // Shapes and scenes through hgrid.hpp.
 #include "hpp.h"
 
+#include <algorithm>
+#include <iterator>
+
 namespace {
 
 struct ball {
@@ -12,6 +15,78 @@ alignas(64) unsigned char shape_index[hgrid::index_bound(64) / 64 * 64 + 64];
 alignas(64) unsigned char scene_index[hgrid::scene_bound(8) / 64 * 64 + 64];
 alignas(64) unsigned char grid_index[hgrid::index_bound(1) / 64 * 64 + 64];
 alignas(64) unsigned char scratch[hgrid::scratch_bound(64) / 64 * 64 + 64];
+
+// A ray with room for its answers.
+struct pixel {
+    hgrid::ray_f64 ray;
+    hgrid::scene_hit hit;
+    std::uint8_t is_dark;
+};
+
+bool is_same(const hgrid::scene_hit &one, const hgrid::scene_hit &other)
+{
+    const bool is_same_place = one.t == other.t && one.u == other.u && one.v == other.v;
+    return is_same_place && one.primitive == other.primitive &&
+           std::equal(std::begin(one.path), std::end(one.path), std::begin(other.path));
+}
+
+// Many rays at once answer as single ones do.
+void check_batches(const hgrid::scene &scene)
+{
+    using hgrid::status;
+    std::vector<pixel> pixels(200);
+    for (std::size_t i = 0; i < pixels.size(); i++) {
+        const double x = -1.5 + 0.0625 * static_cast<double>(i % 50), y = i < 100 ? 0.25 : 10.5;
+        pixels[i].ray = {{x, y, 3}, {0, 0, -1}, 0, 100, 0};
+    }
+    const auto rays = hgrid::field(pixels, &pixel::ray);
+    const auto hits = hgrid::field(pixels, &pixel::hit);
+    const auto dark = hgrid::field(pixels, &pixel::is_dark);
+    std::size_t count = 0;
+    for (const auto know : {hgrid::coherence::incoherent, hgrid::coherence::coherent}) {
+        CHECK(scene.intersect_n(rays, hits, know) == status::ok);
+        CHECK(scene.occluded_n(rays, dark, know) == status::ok);
+        for (const pixel &p : pixels) {
+            const auto alone = scene.intersect(p.ray);
+            CHECK(alone ? is_same(*alone, p.hit) : p.hit.primitive == hgrid::invalid_id);
+            CHECK(alone.has_value() == (p.is_dark == 1) && scene.occluded(p.ray) == (p.is_dark == 1));
+            count += p.is_dark;
+        }
+    }
+    CHECK(count > 40 && count < 360);
+
+    // With options: sorted in memory of ours, of one instance, and by a filter.
+    std::vector<hgrid::byte> memory(16 * pixels.size());
+    CHECK(scene.intersect_n(rays, hits, hgrid::coherence::incoherent, hgrid::scene_options().sort_in(memory)) ==
+          status::ok);
+    std::vector<std::uint32_t> shown;
+    hgrid::counters work{};
+    auto second = [&](const hgrid::scene_hit &hit) {
+        shown.push_back(hit.path[0]);
+        return hit.path[0] == 1;
+    };
+    hgrid::scene_options asking;
+    asking.filter(second).count(work).cull(hgrid::culling::none).mask(0xffffffffu);
+    std::vector<hgrid::scene_hit> filtered(pixels.size());
+    CHECK(scene.intersect_n(rays, filtered, hgrid::coherence::coherent, asking) == status::ok);
+    CHECK(!shown.empty() && work.primitive_tests > 0);
+    CHECK(scene.occluded_n(rays, dark, hgrid::coherence::coherent, asking) == status::ok);
+    for (std::size_t i = 0; i < pixels.size(); i++) {
+        const auto alone = scene.intersect(pixels[i].ray, asking);
+        CHECK(alone ? is_same(*alone, filtered[i]) : filtered[i].primitive == hgrid::invalid_id);
+        CHECK(scene.occluded(pixels[i].ray, asking) == (pixels[i].is_dark == 1));
+    }
+    auto none = [](const hgrid::scene_hit &) { return hgrid::verdict::reject; };
+    CHECK(!scene.occluded({{0.25, 0.25, 3}, {0, 0, -1}, 0, 100, 0}, hgrid::scene_options().filter(none)));
+
+    // Of different numbers, none, and of a view of nothing.
+    filtered.resize(2);
+    std::array<std::uint8_t, 4> bytes{};
+    CHECK(scene.intersect_n(rays, filtered, hgrid::coherence::coherent) == status::invalid_answers);
+    CHECK(scene.occluded_n(rays, bytes, hgrid::coherence::coherent) == status::invalid_answers);
+    CHECK(scene.intersect_n({}, {}, hgrid::coherence::coherent) == status::ok);
+    CHECK(hgrid::scene().occluded_n(rays, dark, hgrid::coherence::coherent) == status::not_a_grid);
+}
 
 } // namespace
 
@@ -64,6 +139,7 @@ void check_scenes()
     CHECK(scene->occluded({{10.25, 10.5, 3}, {0, 0, -1}, 0, 100, 0}));
     CHECK(hgrid::scene::open(hgrid::as_bytes(scene_index), objects));
     CHECK(!hgrid::scene().occluded(left));
+    check_batches(*scene);
     instances[1].translation[2] = -7;
     const auto moved = hgrid::scene::refit(instances, objects, hgrid::as_writable_bytes(scene_index));
     CHECK(moved && moved->intersect(left)->t == 8);

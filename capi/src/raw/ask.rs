@@ -8,7 +8,7 @@ use hgrid_core::{
     ClosestPoint, Counters, Cull, Grid, Hit, QueryOptions, Ray, Surface, TriangleMesh, Verdict,
 };
 
-use super::batch_arrays::BatchArrays;
+use super::batch_arrays::{Arrays, BatchArrays};
 use super::{bytes_beside, bytes_mut, grid, read, read_sized, write};
 use crate::query_types::{
     hgrid_counters, hgrid_hit, hgrid_point_query, hgrid_query_options, hgrid_ray, verdict,
@@ -251,15 +251,16 @@ pub(crate) unsafe fn locate(
 /// That of [`grid`]; and the elements of both arrays are the caller's to be read and written.
 pub(crate) unsafe fn batch<T>(
     view: *const hgrid_grid,
-    batch: &BatchArrays<T>,
+    batch: &BatchArrays<hgrid_ray, T>,
     asked: *const hgrid_query_options,
-    trace: impl FnOnce(&Grid<'static>, &mut Arrays<'_, T>, &mut QueryOptions<'_>),
+    trace: impl FnOnce(&Grid<'static>, &mut Arrays<'_, hgrid_ray, T>, &mut QueryOptions<'_>),
 ) -> Result<(), hgrid_status> {
     // SAFETY: this function's contract.
     let grid = unsafe { grid(view) }?;
     // SAFETY: the caller's promise.
     let asked = unsafe { all_options(asked) }?;
-    let mut arrays = Arrays(batch);
+    // SAFETY: this function's contract, and any bytes are a ray.
+    let mut arrays = unsafe { Arrays::new(batch) };
     let Some(asked) = asked else {
         trace(grid, &mut arrays, &mut QueryOptions::default());
         return Ok(());
@@ -278,29 +279,6 @@ pub(crate) unsafe fn batch<T>(
     // SAFETY: the caller's promise.
     unsafe { asked.ask(trace) };
     Ok(())
-}
-
-/// The arrays of a batch while it runs: by [`batch`]'s contract rays may be read and answers written.
-pub(crate) struct Arrays<'b, T>(&'b BatchArrays<T>);
-
-impl<A, T: From<A>> hgrid_core::Batch<A> for Arrays<'_, T> {
-    #[inline(always)]
-    fn count(&self) -> usize {
-        self.0.count
-    }
-
-    #[inline(always)]
-    fn ray(&self, place: usize) -> Ray {
-        // SAFETY: within the array by its place, readable by the contract above, and any bytes are
-        // a ray.
-        unsafe { self.0.ray(place).read_unaligned() }.into()
-    }
-
-    #[inline(always)]
-    fn answer(&mut self, place: usize, answer: A) {
-        // SAFETY: within the array by its place, writable by the contract above.
-        unsafe { self.0.answer(place).write_unaligned(answer.into()) };
-    }
 }
 
 /// Adds the work of queries to the caller's.

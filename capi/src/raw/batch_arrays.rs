@@ -7,7 +7,8 @@
 
 use core::ffi::c_void;
 
-use crate::query_types::hgrid_ray;
+use hgrid_core::Batch;
+
 use crate::span::Span;
 use crate::status::{
     HGRID_ERROR_INVALID_ANSWERS, HGRID_ERROR_INVALID_RAYS, HGRID_ERROR_NULL_ARGUMENT,
@@ -18,10 +19,10 @@ use crate::types::Elements;
 /// An array of the caller's, as it is passed: where it starts, and its stride.
 pub(crate) type Array<T> = (T, usize);
 
-/// As many answers as rays, no byte of them in a ray.
+/// As many answers `T` as rays `R`, no byte of them in a ray.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct BatchArrays<T> {
-    rays: *const hgrid_ray,
+pub(crate) struct BatchArrays<R, T> {
+    rays: *const R,
     ray_stride: usize,
     answers: *mut T,
     answer_stride: usize,
@@ -30,21 +31,21 @@ pub(crate) struct BatchArrays<T> {
     spans: [Span; 2],
 }
 
-impl<T> BatchArrays<T> {
+impl<R, T> BatchArrays<R, T> {
     /// Checks the arrays. A stride of 0 means that elements lie side by side.
     pub(crate) fn new(
-        (rays, ray_stride): Array<*const hgrid_ray>,
+        (rays, ray_stride): Array<*const R>,
         (answers, answer_stride): Array<*mut T>,
         count: usize,
     ) -> Result<Self, hgrid_status> {
-        let ray_elements = elements::<hgrid_ray>(rays.cast(), ray_stride, count);
+        let ray_elements = elements::<R>(rays.cast(), ray_stride, count);
         let ray_elements = ray_elements.ok_or(HGRID_ERROR_INVALID_RAYS)?;
         let answer_elements = elements::<T>(answers.cast(), answer_stride, count);
         let answer_elements = answer_elements.ok_or(HGRID_ERROR_INVALID_ANSWERS)?;
         if count > 0 && (rays.is_null() || answers.is_null()) {
             return Err(HGRID_ERROR_NULL_ARGUMENT);
         }
-        if overlap(&ray_elements, &answer_elements, size_of::<T>()) {
+        if overlap((&ray_elements, size_of::<R>()), (&answer_elements, size_of::<T>())) {
             return Err(HGRID_ERROR_OVERLAP);
         }
         let (ray_stride, answer_stride) = (ray_elements.stride, answer_elements.stride);
@@ -58,13 +59,43 @@ impl<T> BatchArrays<T> {
     }
 
     /// The address of a ray, of any alignment.
-    pub(crate) const fn ray(&self, index: usize) -> *const hgrid_ray {
+    pub(crate) const fn ray(&self, index: usize) -> *const R {
         self.rays.wrapping_byte_add(index.wrapping_mul(self.ray_stride))
     }
 
     /// The address of an answer, of any alignment.
     pub(crate) const fn answer(&self, index: usize) -> *mut T {
         self.answers.wrapping_byte_add(index.wrapping_mul(self.answer_stride))
+    }
+}
+
+/// The arrays of a batch while it runs, as core asks for them.
+pub(crate) struct Arrays<'b, R, T>(&'b BatchArrays<R, T>);
+
+impl<'b, R, T> Arrays<'b, R, T> {
+    /// # Safety
+    /// Until it is dropped, the elements of both arrays are the caller's to be read and written, and any bytes are an `R`.
+    pub(super) const unsafe fn new(batch: &'b BatchArrays<R, T>) -> Self {
+        Self(batch)
+    }
+}
+
+impl<A, T: From<A>, Q: From<R>, R> Batch<A, Q> for Arrays<'_, R, T> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.0.count
+    }
+
+    #[inline(always)]
+    fn ray(&self, place: usize) -> Q {
+        // SAFETY: within the array by its place, readable and a ray by the contract of `new`.
+        unsafe { self.0.ray(place).read_unaligned() }.into()
+    }
+
+    #[inline(always)]
+    fn answer(&mut self, place: usize, answer: A) {
+        // SAFETY: within the array by its place, writable by the contract of `new`.
+        unsafe { self.0.answer(place).write_unaligned(answer.into()) };
     }
 }
 
@@ -83,14 +114,17 @@ fn span(elements: &Elements) -> Span {
 ///
 /// With one stride for both, the distance from a ray's start to the start of the next answer is the
 /// same everywhere: the answer lies between two rays, or all of them are hit.
-fn overlap(rays: &Elements, answers: &Elements, answer_bytes: usize) -> bool {
+fn overlap(
+    (rays, ray_bytes): (&Elements, usize),
+    (answers, answer_bytes): (&Elements, usize),
+) -> bool {
     if !span(rays).overlaps(span(answers)) {
         return false;
     }
     let distance = answers.start.addr().wrapping_sub(rays.start.addr()).cast_signed();
     let distance = distance.checked_rem_euclid(rays.stride.cast_signed());
     let is_between = distance.map(isize::cast_unsigned).is_some_and(|distance| {
-        distance >= size_of::<hgrid_ray>() && distance.saturating_add(answer_bytes) <= rays.stride
+        distance >= ray_bytes && distance.saturating_add(answer_bytes) <= rays.stride
     });
     rays.stride != answers.stride || !is_between
 }

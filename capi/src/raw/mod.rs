@@ -1,6 +1,6 @@
 //! The only place where a caller's pointer becomes a reference or a value: here for builds
 //! and blobs, in `ask` for queries, in `join` for arrays of meshes, in `shapes` and `scene` for those.
-//! `batch_arrays` checks the addresses of a batch before `ask` reads them.
+//! `batch_arrays` checks the addresses of a batch before it reads them.
 //!
 //! # The contract with C
 //!
@@ -37,12 +37,12 @@ use core::slice;
 
 use hgrid_core::{BlobInfo, Config, Grid, Strided, Task, TriangleMesh};
 
-pub(crate) use ask::{Arrays, batch, closest, locate, query, query_all, surface};
-pub(crate) use batch_arrays::BatchArrays;
+pub(crate) use ask::{batch, closest, locate, query, query_all, surface};
+pub(crate) use batch_arrays::{Arrays, BatchArrays};
 pub(crate) use join::{join, parts_of};
 pub(crate) use scene::{
     build_scene, open_packed_scene, open_scene, pack_scene, query_scene, refit_scene, scene,
-    scene_locate, scene_normal, validate_scene, write_object,
+    scene_batch, scene_locate, scene_normal, validate_scene, write_object,
 };
 pub(crate) use shapes::{
     build_shapes, open_shapes, query_shapes, refit_shapes, shapes, validate_shapes,

@@ -4,7 +4,7 @@
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
-use core::ptr::NonNull;
+use core::ptr::{NonNull, from_ref};
 use core::slice;
 
 use hgrid_core::{
@@ -13,6 +13,7 @@ use hgrid_core::{
 };
 
 use super::ask::add;
+use super::batch_arrays::{Arrays, BatchArrays};
 use super::{
     apart, bytes, bytes_mut, config, read, read_sized, shares, span_of, write, write_grid,
 };
@@ -208,14 +209,28 @@ pub(crate) unsafe fn validate_scene(
     scene.validate(scratch).map_err(status_of)
 }
 
+/// Where a view lies.
+fn view_of<T>(view: &T) -> Span {
+    Span::new(from_ref(view).cast(), size_of::<T>())
+}
+
 /// Returns true if a scene reads something that lies in a span.
 fn reads(scene: &Scene<'_>, span: Span) -> bool {
     let objects = scene.objects();
     let array = Span::new(objects.as_ptr().cast(), size_of_val(objects));
     let has = |object: &Object<'_>| match object {
-        Object::Grid(grid) => span_of(grid.blob()).overlaps(span) || shares(grid.mesh(), span),
-        Object::Scene(inner) => reads(inner, span),
-        Object::Shapes(..) | Object::Nothing => false,
+        Object::Grid(grid) => {
+            view_of(*grid).overlaps(span)
+                || span_of(grid.blob()).overlaps(span)
+                || shares(grid.mesh(), span)
+        }
+        Object::Scene(inner) => view_of(*inner).overlaps(span) || reads(inner, span),
+        Object::Shapes(shapes, _) => {
+            let boxes = shapes.boxes();
+            let arrays = [shapes.blob(), boxes.corners().bytes, boxes.masks().bytes];
+            view_of(*shapes).overlaps(span) || arrays.iter().any(|a| span_of(a).overlaps(span))
+        }
+        Object::Nothing => false,
     };
     span_of(scene.blob()).overlaps(span) || array.overlaps(span) || objects.iter().any(has)
 }
@@ -321,6 +336,59 @@ unsafe fn room_of<T: Copy>(start: *mut c_void, count: usize, empty: T) -> &'stat
 const _: () = assert!(align_of::<Member<'_>>() <= ALIGNMENT);
 const _: () = assert!(align_of::<Object<'_>>() <= align_of::<Member<'_>>());
 
+/// What a caller told a query of a scene.
+struct Asked {
+    options: hgrid_scene_options,
+    cull: Cull,
+}
+
+impl Asked {
+    /// Reads the options of a query of a scene; NULL means the defaults.
+    ///
+    /// # Safety
+    /// The caller's promise.
+    unsafe fn read(asked: *const hgrid_scene_options) -> Result<Self, hgrid_status> {
+        let options = if asked.is_null() {
+            hgrid_scene_options::DEFAULT
+        } else {
+            // SAFETY: the caller's promise.
+            unsafe { read_sized(asked) }?
+        };
+        if options.reserved != 0 {
+            return Err(HGRID_ERROR_STRUCT_SIZE);
+        }
+        Ok(Self { options, cull: options.cull()? })
+    }
+
+    /// Asks a question with the options as core knows them, and adds the work to the caller's.
+    ///
+    /// # Safety
+    /// The caller's promise.
+    unsafe fn ask<T>(&self, ask: impl FnOnce(&mut SceneOptions<'_>) -> T) -> T {
+        let hgrid_scene_options { mask, context, filter, counters, .. } = self.options;
+        let mut offer = |_: usize, hit: &SceneHit| {
+            let hit = hgrid_scene_hit::from(*hit);
+            let Some(filter) = filter else { return Verdict::Accept };
+            // SAFETY: a function of this type by the caller's promise; the hit lives until it returns.
+            verdict(unsafe { filter(context, &raw const hit) })
+        };
+        let mut work = Counters::default();
+        let mut options = SceneOptions { mask, cull: self.cull, ..SceneOptions::default() };
+        if filter.is_some() {
+            options.filter = Some(&mut offer);
+        }
+        if !counters.is_null() {
+            options.counters = Some(&mut work);
+        }
+        let answer = ask(&mut options);
+        if let Some(counters) = NonNull::<hgrid_counters>::new(counters) {
+            // SAFETY: the caller's promise.
+            unsafe { add(counters, &work) }
+        }
+        answer
+    }
+}
+
 /// Asks a scene for the closest hit or any.
 ///
 /// # Safety
@@ -335,41 +403,50 @@ pub(crate) unsafe fn query_scene(
     let scene = unsafe { scene(view) }?;
     // SAFETY: the caller's promise.
     let ray = unsafe { read(ray) }?.into();
-    let given = if asked.is_null() {
-        hgrid_scene_options::DEFAULT
-    } else {
-        // SAFETY: the caller's promise.
-        unsafe { read_sized(asked) }?
+    // SAFETY: the caller's promise.
+    let asked = unsafe { Asked::read(asked) }?;
+    let find = |options: &mut SceneOptions<'_>| {
+        if is_any {
+            scene.occluded_with(&ray, options).then_some(SceneHit::MISS)
+        } else {
+            scene.intersect_with(&ray, options)
+        }
     };
-    if given.reserved != 0 {
-        return Err(HGRID_ERROR_STRUCT_SIZE);
+    // SAFETY: the caller's promise.
+    Ok(unsafe { asked.ask(find) })
+}
+
+/// Asks a scene for many rays: `trace` gets them as core asks for them, and what the caller told.
+///
+/// # Safety
+/// The contract of [`scene`]; and the elements of both arrays are the caller's to be read and written.
+pub(crate) unsafe fn scene_batch<T>(
+    view: *const hgrid_scene,
+    batch: &BatchArrays<hgrid_ray_f64, T>,
+    asked: *const hgrid_scene_options,
+    trace: impl FnOnce(&Scene<'static>, &mut Arrays<'_, hgrid_ray_f64, T>, &mut SceneOptions<'_>),
+) -> Result<(), hgrid_status> {
+    // SAFETY: this function's contract.
+    let scene = unsafe { scene(view) }?;
+    // SAFETY: the caller's promise.
+    let asked = unsafe { Asked::read(asked) }?;
+    let hgrid_scene_options { scratch, scratch_bytes, .. } = asked.options;
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let span = scratch.span();
+    if batch.overlaps(span) || !span.is_empty() && reads(scene, span) {
+        return Err(HGRID_ERROR_OVERLAP);
     }
-    let hgrid_scene_options { mask, context, filter, counters, .. } = given;
-    let cull: Cull = given.cull()?;
-    let mut offer = |_: usize, hit: &SceneHit| {
-        let hit = hgrid_scene_hit::from(*hit);
-        let Some(filter) = filter else { return Verdict::Accept };
-        // SAFETY: a function of this type by the caller's promise; the hit lives until it returns.
-        verdict(unsafe { filter(context, &raw const hit) })
+    // SAFETY: the caller's promise; nothing else that this call reads or writes lies there.
+    let scratch = unsafe { bytes_mut(scratch.start, scratch.bytes) }?;
+    // SAFETY: this function's contract, and any bytes are a ray.
+    let mut arrays = unsafe { Arrays::new(batch) };
+    let trace = |options: &mut SceneOptions<'_>| {
+        options.scratch = scratch;
+        trace(scene, &mut arrays, options);
     };
-    let mut work = Counters::default();
-    let mut options = SceneOptions { mask, cull, ..SceneOptions::default() };
-    if filter.is_some() {
-        options.filter = Some(&mut offer);
-    }
-    if !counters.is_null() {
-        options.counters = Some(&mut work);
-    }
-    let answer = if is_any {
-        scene.occluded_with(&ray, &mut options).then_some(SceneHit::MISS)
-    } else {
-        scene.intersect_with(&ray, &mut options)
-    };
-    if let Some(counters) = NonNull::<hgrid_counters>::new(counters) {
-        // SAFETY: the caller's promise.
-        unsafe { add(counters, &work) }
-    }
-    Ok(answer)
+    // SAFETY: the caller's promise.
+    unsafe { asked.ask(trace) };
+    Ok(())
 }
 
 /// A normal in the space of a scene.

@@ -20,7 +20,7 @@ use crate::batch::groups::with_window;
 use crate::batch::{Batch, Coherence};
 use crate::bvh::{Bvh, GROUP, Group, Groups, Rays, Scope, SortKey, Stack, Together, lanes};
 use crate::grid::Grid;
-use crate::options::{Choice, Selection};
+use crate::options::{QueryOptions, Selection};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
 use crate::shapes::groups::offer_shapes;
 use crate::simd::SimdLevel;
@@ -57,7 +57,9 @@ impl<A: SceneAnswer, B: Batch<A, RayF64>> Asked<'_, '_, B, A> {
     #[inline(never)]
     fn groups(&mut self, bvh: &Bvh<'_>, memory: &mut [SortKey]) {
         let Scope { mesh, bounds, simd } = self.scene.tree.scope();
-        Groups { bvh, mesh, bounds, choice: Choice::ALL, memory, batch: self }.trace(simd, false);
+        // All instances: `shown` leaves out those that the mask does not see.
+        let choice = QueryOptions::default().choice();
+        Groups { bvh, mesh, bounds, choice, memory, batch: self }.trace(simd, false);
     }
 }
 

@@ -12,7 +12,7 @@ use super::{ShapeTest, Shapes, hit_of};
 use crate::batch::groups::with_window;
 use crate::batch::{Batch, Coherence, HitAnswer};
 use crate::bvh::{Bvh, Group, Groups, Scope, SortKey, Together, lanes};
-use crate::options::{Choice, QueryOptions, Selection};
+use crate::options::{QueryOptions, Selection};
 use crate::ray::{Hit, Ray};
 use crate::simd::SimdLevel;
 
@@ -46,7 +46,7 @@ impl<A: HitAnswer, B: Batch<A>> Asked<'_, '_, '_, B, A> {
     #[inline(never)]
     fn groups(&mut self, bvh: &Bvh<'_>, memory: &mut [SortKey]) {
         let Scope { mesh, bounds, simd } = self.shapes.grid.scope();
-        let (choice, is_any) = (Choice::ALL, self.is_any);
+        let (choice, is_any) = (QueryOptions::default().choice(), self.is_any);
         Groups { bvh, mesh, bounds, choice, memory, batch: self }.trace(simd, is_any);
     }
 }

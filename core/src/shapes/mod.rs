@@ -77,6 +77,18 @@ impl<'a> Boxes<'a> {
     pub const fn count(&self) -> u32 {
         self.0.triangle_count()
     }
+
+    /// The corners of the boxes, where the caller keeps them.
+    #[must_use]
+    pub const fn corners(&self) -> Strided<'a> {
+        self.0.positions()
+    }
+
+    /// The masks, where the caller keeps them; none if the boxes have no masks.
+    #[must_use]
+    pub const fn masks(&self) -> Strided<'a> {
+        self.0.masks()
+    }
 }
 
 /// The hit of a ray on a shape, as the caller's test says.
@@ -208,6 +220,12 @@ impl<'a> Shapes<'a> {
     /// The errors of [`refit`](crate::refit).
     pub fn refit(index: &mut [u8], boxes: &Boxes<'_>) -> Result<Refit, Error> {
         refit_content(index, &boxes.0)
+    }
+
+    /// The boxes that the tree was built or opened with.
+    #[must_use]
+    pub const fn boxes(&self) -> Boxes<'a> {
+        Boxes(*self.grid.mesh())
     }
 
     /// Number of shapes, those included that were left out.
