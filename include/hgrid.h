@@ -13,16 +13,17 @@
  *                     hgrid_occluder names one
  *
  * Many rays at once, from your structs into your structs: hgrid_intersect_n, hgrid_occluded_n,
- * hgrid_occluder_n, and in scenes hgrid_intersect_scene_n and hgrid_occluded_scene_n. Every triangle along
- * a ray: hgrid_intersect_all. The nearest point: hgrid_closest_point. Masks, culling, a triangle to skip,
- * filters and counters are options of these. hgrid_bound, hgrid_sizes and hgrid_fit are about memory:
- * enough for any mesh, for this one, and the best grid for a budget. hgrid_config has the fields for a
- * build on your threads, and for its progress. hgrid_surface_at returns the normal of a hit and the
- * origins of rays that leave it. hgrid_join joins several meshes for one grid, and hgrid_locate tells
- * which of them was hit. Trees of your own shapes begin with hgrid_build_shapes, scenes of instances with
- * hgrid_build_scene. For grids that are stored there are hgrid_open, hgrid_peek, hgrid_pack,
- * hgrid_mesh_of and hgrid_validate, for scenes with all that they show hgrid_pack_scene; hgrid_inspect
- * returns statistics of a grid. hgrid_refit fits a tree to vertices that moved.
+ * hgrid_occluder_n; against shapes and in scenes hgrid_intersect_shapes_n, hgrid_occluded_shapes_n,
+ * hgrid_intersect_scene_n and hgrid_occluded_scene_n. Every triangle along a ray: hgrid_intersect_all.
+ * The nearest point: hgrid_closest_point. Masks, culling, a triangle to skip, filters and counters are
+ * options of these. hgrid_bound, hgrid_sizes and hgrid_fit are about memory: enough for any mesh, for
+ * this one, and the best grid for a budget. hgrid_config has the fields for a build on your threads, and
+ * for its progress. hgrid_surface_at returns the normal of a hit and the origins of rays that leave it.
+ * hgrid_join joins several meshes for one grid, and hgrid_locate tells which of them was hit. Trees of
+ * your own shapes begin with hgrid_build_shapes, scenes of instances with hgrid_build_scene. For grids
+ * that are stored there are hgrid_open, hgrid_peek, hgrid_pack, hgrid_mesh_of and hgrid_validate, for
+ * scenes with all that they show hgrid_pack_scene; hgrid_inspect returns statistics of a grid.
+ * hgrid_refit fits a tree to vertices that moved.
  *
  *   #include <hgrid.h>
  *   #include <math.h>
@@ -128,8 +129,8 @@
  * --------
  * A pointer is NULL, or it points to what its type says, aligned as C aligns that type, and stays
  * valid during the call. Positions, indices and masks, the rays and answers of hgrid_intersect_n,
- * hgrid_occluded_n, hgrid_occluder_n, hgrid_intersect_scene_n and hgrid_occluded_scene_n, and the bytes
- * that hgrid_peek looks at need no alignment; all else does.
+ * hgrid_occluded_n, hgrid_occluder_n and their like for shapes and scenes, and the bytes that hgrid_peek
+ * looks at need no alignment; all else does.
  * Regions, blobs, positions, indices and masks point to as many bytes as the sizes next to them
  * say. Each function says which of its pointers may be NULL; any other NULL is answered with
  * HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of a
@@ -2601,6 +2602,71 @@ bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
                            const struct hgrid_query_options *options);
 
 /**
+ * Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for bit, but
+ * sooner.
+ *
+ * It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the same. A
+ * miss writes a hit, too. The test is called ray by ray, for a ray and a shape at most once, on the thread that calls.
+ *
+ * ```c
+ * static size_t trace_tile_of_shapes(const hgrid_shapes *shapes, const hgrid_ray rays[64], hgrid_hit hits[64])
+ * {
+ *     size_t found = 0;
+ *     if (hgrid_intersect_shapes_n(shapes, rays, 0, hits, 0, 64, HGRID_COHERENCE_COHERENT, NULL) != HGRID_OK)
+ *         return 0;
+ *     for (size_t i = 0; i < 64; i++)
+ *         found += hits[i].primitive != HGRID_INVALID_ID;
+ *     return found;
+ * }
+ * ```
+ *
+ * Of the options `mask`, `skip`, `counters` and `scratch` are looked at; with counters the rays are traced one by one.
+ *
+ * With `count` 0 nothing is done. Rays are read and hits are written in any order, and a ray perhaps more than once,
+ * before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are
+ * for all rays.
+ *
+ * Returns `HGRID_OK` and has written all hits, or returns what `hgrid_intersect_n` returns and has written none;
+ * `HGRID_ERROR_OVERLAP` also for `scratch` in the view, the blob or the boxes. A tree without a test hits nothing.
+ *
+ * The call allocates nothing and needs at most 36 KiB of stack, and what the test needs.
+ *
+ * Threads: any number of queries on the same tree at once; each thread with hits and counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_intersect_shapes_n(const struct hgrid_shapes *shapes,
+                                      const struct hgrid_ray *rays,
+                                      size_t ray_stride,
+                                      struct hgrid_hit *hits,
+                                      size_t hit_stride,
+                                      size_t count,
+                                      hgrid_coherence coherence,
+                                      const struct hgrid_query_options *options);
+
+/**
+ * Tells for each of many rays whether it hits any shape: what `hgrid_occluded_shapes` would say for each, but sooner.
+ *
+ * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from `occluded` on. All
+ * else is as with `hgrid_intersect_shapes_n`. `rays` and `occluded` may be NULL if `count` is 0, `options` may be NULL.
+ * Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_shapes_n` returns and has written none.
+ *
+ * Threads: any number of queries on the same tree at once; each thread with bytes and counters of its own.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+hgrid_status hgrid_occluded_shapes_n(const struct hgrid_shapes *shapes,
+                                     const struct hgrid_ray *rays,
+                                     size_t ray_stride,
+                                     uint8_t *occluded,
+                                     size_t occluded_stride,
+                                     size_t count,
+                                     hgrid_coherence coherence,
+                                     const struct hgrid_query_options *options);
+
+/**
  * Makes an object of a grid.
  *
  * Neither argument may be NULL. Returns `HGRID_OK`, `HGRID_ERROR_NULL_ARGUMENT`, or `HGRID_ERROR_NOT_A_GRID` for a view
@@ -2917,7 +2983,7 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
  *
  * For rays without any order lend `scratch` of the options, and pass as many as you have in one call. With a
  * `filter` or `counters` the rays are traced one by one, in the order of the array: the filter is asked about all
- * hits of one ray before those of the next. Shapes and nested scenes are asked for each ray alone, too.
+ * hits of one ray before those of the next. Nested scenes are asked for each ray alone, too.
  *
  * With `count` 0 nothing is done. Rays are read and hits are written in any order, and a ray perhaps more
  * than once, before its hit is written.

@@ -1746,10 +1746,53 @@ public:
     {
         return ::hgrid_occluded_shapes(&raw_, &along, nullptr);
     }
+    /// The closest shape that each ray hits; a miss has the primitive `invalid_id`. There are as many hits as rays, or the
+    /// answer is `invalid_answers`.
+    status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know) const noexcept
+    {
+        return intersect_n(rays, hits, know, nullptr);
+    }
+    /// The same with options for all rays.
+    status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
+                       const options &with) const noexcept
+    {
+        return intersect_n(rays, hits, know, &with.c());
+    }
+    /// For each ray 1 if it hits any shape, or else 0. There are as many answers as rays, or the answer is
+    /// `invalid_answers`.
+    status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know) const noexcept
+    {
+        return occluded_n(rays, answers, know, nullptr);
+    }
+    /// The same with options for all rays.
+    status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
+                      const options &with) const noexcept
+    {
+        return occluded_n(rays, answers, know, &with.c());
+    }
     /// What C takes.
     const ::hgrid_shapes &c() const noexcept { return raw_; }
 
 private:
+    status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
+                       const ::hgrid_query_options *with) const noexcept
+    {
+        if (rays.size() != hits.size())
+            return status::invalid_answers;
+        return detail::said(::hgrid_intersect_shapes_n(&raw_, rays.first(), rays.stride(), hits.first(),
+                                                       hits.stride(), rays.size(),
+                                                       static_cast<::hgrid_coherence>(know), with));
+    }
+    status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
+                      const ::hgrid_query_options *with) const noexcept
+    {
+        if (rays.size() != answers.size())
+            return status::invalid_answers;
+        return detail::said(::hgrid_occluded_shapes_n(&raw_, rays.first(), rays.stride(), answers.first(),
+                                                      answers.stride(), rays.size(),
+                                                      static_cast<::hgrid_coherence>(know), with));
+    }
+
     ::hgrid_shapes raw_ = HGRID_SHAPES_INIT;
 };
 

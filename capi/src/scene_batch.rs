@@ -32,7 +32,7 @@ use crate::status::{HGRID_OK, hgrid_status};
 ///
 /// For rays without any order lend `scratch` of the options, and pass as many as you have in one call. With a
 /// `filter` or `counters` the rays are traced one by one, in the order of the array: the filter is asked about all
-/// hits of one ray before those of the next. Shapes and nested scenes are asked for each ray alone, too.
+/// hits of one ray before those of the next. Nested scenes are asked for each ray alone, too.
 ///
 /// With `count` 0 nothing is done. Rays are read and hits are written in any order, and a ray perhaps more
 /// than once, before its hit is written.

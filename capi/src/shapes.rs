@@ -4,10 +4,14 @@ use core::ffi::c_void;
 use core::mem::MaybeUninit;
 use core::ptr::NonNull;
 
-use hgrid_core::ShapeHit;
+use hgrid_core::{QueryOptions, ShapeHit, ShapeTest, Shapes};
 
-use crate::query_types::{hgrid_hit, hgrid_query_options, hgrid_ray, hgrid_refit_report};
+use crate::query_types::{
+    coherence as known, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray,
+    hgrid_refit_report,
+};
 use crate::raw;
+use crate::raw::BatchArrays;
 use crate::span::Region;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};
 use crate::types::{hgrid_config, hgrid_report};
@@ -261,4 +265,99 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
 ) -> bool {
     // SAFETY: the caller's promise.
     matches!(unsafe { raw::query_shapes(shapes, ray, options, true) }, Ok(Some(_)))
+}
+
+/// Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for bit, but
+/// sooner.
+///
+/// It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the same. A
+/// miss writes a hit, too. The test is called ray by ray, for a ray and a shape at most once, on the thread that calls.
+///
+/// ```c
+/// static size_t trace_tile_of_shapes(const hgrid_shapes *shapes, const hgrid_ray rays[64], hgrid_hit hits[64])
+/// {
+///     size_t found = 0;
+///     if (hgrid_intersect_shapes_n(shapes, rays, 0, hits, 0, 64, HGRID_COHERENCE_COHERENT, NULL) != HGRID_OK)
+///         return 0;
+///     for (size_t i = 0; i < 64; i++)
+///         found += hits[i].primitive != HGRID_INVALID_ID;
+///     return found;
+/// }
+/// ```
+///
+/// Of the options `mask`, `skip`, `counters` and `scratch` are looked at; with counters the rays are traced one by one.
+///
+/// With `count` 0 nothing is done. Rays are read and hits are written in any order, and a ray perhaps more than once,
+/// before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are
+/// for all rays.
+///
+/// Returns `HGRID_OK` and has written all hits, or returns what `hgrid_intersect_n` returns and has written none;
+/// `HGRID_ERROR_OVERLAP` also for `scratch` in the view, the blob or the boxes. A tree without a test hits nothing.
+///
+/// The call allocates nothing and needs at most 36 KiB of stack, and what the test needs.
+///
+/// Threads: any number of queries on the same tree at once; each thread with hits and counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_intersect_shapes_n(
+    shapes: *const hgrid_shapes,
+    rays: *const hgrid_ray,
+    ray_stride: usize,
+    hits: *mut hgrid_hit,
+    hit_stride: usize,
+    count: usize,
+    coherence: hgrid_coherence,
+    options: *const hgrid_query_options,
+) -> hgrid_status {
+    let call = || {
+        let batch = BatchArrays::new((rays, ray_stride), (hits, hit_stride), count)?;
+        let coherence = known(coherence)?;
+        let trace = |shapes: &Shapes<'_>,
+                     rays: &mut raw::Arrays<'_, hgrid_ray, hgrid_hit>,
+                     options: &mut QueryOptions<'_>,
+                     test: &mut ShapeTest<'_>| {
+            shapes.intersect_batch(rays, coherence, options, test);
+        };
+        // SAFETY: the caller's promise.
+        unsafe { raw::shapes_batch(shapes, &batch, options, trace) }
+    };
+    call().err().unwrap_or(HGRID_OK)
+}
+
+/// Tells for each of many rays whether it hits any shape: what `hgrid_occluded_shapes` would say for each, but sooner.
+///
+/// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from `occluded` on. All
+/// else is as with `hgrid_intersect_shapes_n`. `rays` and `occluded` may be NULL if `count` is 0, `options` may be NULL.
+/// Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_shapes_n` returns and has written none.
+///
+/// Threads: any number of queries on the same tree at once; each thread with bytes and counters of its own.
+///
+/// # Safety
+/// Pointers are as the head of this file says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hgrid_occluded_shapes_n(
+    shapes: *const hgrid_shapes,
+    rays: *const hgrid_ray,
+    ray_stride: usize,
+    occluded: *mut u8,
+    occluded_stride: usize,
+    count: usize,
+    coherence: hgrid_coherence,
+    options: *const hgrid_query_options,
+) -> hgrid_status {
+    let call = || {
+        let batch = BatchArrays::new((rays, ray_stride), (occluded, occluded_stride), count)?;
+        let coherence = known(coherence)?;
+        let trace = |shapes: &Shapes<'_>,
+                     rays: &mut raw::Arrays<'_, hgrid_ray, u8>,
+                     options: &mut QueryOptions<'_>,
+                     test: &mut ShapeTest<'_>| {
+            shapes.occluded_batch(rays, coherence, options, test);
+        };
+        // SAFETY: the caller's promise.
+        unsafe { raw::shapes_batch(shapes, &batch, options, trace) }
+    };
+    call().err().unwrap_or(HGRID_OK)
 }

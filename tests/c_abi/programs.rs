@@ -295,7 +295,9 @@ fn takes_little_stack(arguments: &[&str]) {
         assert!((500..7 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
     // The buffers alone are 128 rays and 128 hits.
-    assert!((128 * 48..36 << 10).contains(&most("many")), "many: {}", most("many"));
+    for name in ["many", "shapes_many"] {
+        assert!((128 * 48..36 << 10).contains(&most(name)), "{name}: {}", most(name));
+    }
     for name in ["build", "scenes"] {
         assert!((2000..18 << 10).contains(&most(name)), "{name}: {}", most(name));
     }

@@ -224,6 +224,58 @@ static void filters_and_counters_see_one_ray_after_the_other(void)
     }
 }
 
+/* The same for shapes: rays of float, options of grids. */
+static void shapes_answer_as_single_queries(void)
+{
+    static hgrid_ray narrow[RAYS];
+    static hgrid_hit one[RAYS], many[RAYS];
+    static unsigned char sorted[16 * RAYS];
+    const hgrid_query_options usual = HGRID_QUERY_OPTIONS_INIT;
+    for (int i = 0; i < RAYS; i++) {
+        hgrid_ray ray = {{0, 0, 0}, rays[i].t_min, {0, 0, 0}, rays[i].t_max};
+        for (int k = 0; k < 3; k++)
+            ray.origin[k] = (float)rays[i].origin[k], ray.direction[k] = rays[i].direction[k];
+        narrow[i] = ray;
+    }
+    for (int kind = 0; kind < 4; kind++) {
+        hgrid_counters work = {0, 0, 0}, sum = {0, 0, 0};
+        hgrid_query_options options = usual;
+        options.mask = kind == 1 ? 2 : UINT32_MAX, options.skip = kind == 2 ? 3 : HGRID_INVALID_ID;
+        options.counters = kind == 3 ? &work : NULL;
+        size_t count = 0;
+        for (int i = 0; i < RAYS; i++) {
+            const hgrid_hit miss = {INFINITY, 0, 0, HGRID_INVALID_ID};
+            one[i] = miss;
+            expected_occluded[i] = hgrid_intersect_shapes(&shapes, &narrow[i], &options, &one[i]);
+            count += expected_occluded[i];
+        }
+        CHECK(count > RAYS / 20 && count < RAYS * 9 / 10);
+        for (size_t c = 0; c < 4; c++) {
+            memset(many, 0xc7, sizeof many);
+            memset(occluded, 0xc7, sizeof occluded);
+            if (c >= 2)
+                options.scratch = sorted, options.scratch_bytes = sizeof sorted;
+            options.counters = kind == 3 ? &sum : NULL;
+            sum.primitive_tests = 0;
+            EXPECT(HGRID_OK, hgrid_intersect_shapes_n(&shapes, narrow, 0, many, 0, RAYS, COHERENCES[c % 2], &options));
+            CHECK(memcmp(many, one, sizeof many) == 0 && sum.primitive_tests == work.primitive_tests);
+            EXPECT(HGRID_OK,
+                   hgrid_occluded_shapes_n(&shapes, narrow, 0, occluded, 0, RAYS, COHERENCES[c % 2], &options));
+            CHECK(memcmp(occluded, expected_occluded, sizeof occluded) == 0);
+        }
+    }
+    EXPECT(HGRID_OK, hgrid_intersect_shapes_n(&shapes, narrow, 0, many, 0, RAYS, HGRID_COHERENCE_COHERENT, NULL));
+    CHECK(memcmp(many, one, sizeof many) == 0);
+    EXPECT(HGRID_OK, hgrid_intersect_shapes_n(&shapes, NULL, 0, NULL, 0, 0, HGRID_COHERENCE_COHERENT, NULL));
+    /* Without a test nothing is hit. */
+    hgrid_boxes silent = boxes;
+    hgrid_shapes view;
+    silent.test = NULL;
+    EXPECT(HGRID_OK, hgrid_open_shapes(shape_blob, shape_bytes, &silent, &view));
+    EXPECT(HGRID_OK, hgrid_occluded_shapes_n(&view, narrow, 0, occluded, 0, RAYS, HGRID_COHERENCE_COHERENT, NULL));
+    CHECK(all_bytes_are(occluded, sizeof occluded, 0));
+}
+
 static void no_rays_are_no_error(void)
 {
     const hgrid_coherence coherence = HGRID_COHERENCE_INCOHERENT;
@@ -259,6 +311,7 @@ int main(void)
         rays_and_answers_in_one_struct(COHERENCES[c]);
     }
     filters_and_counters_see_one_ray_after_the_other();
+    shapes_answer_as_single_queries();
     no_rays_are_no_error();
     return 0;
 }

@@ -313,6 +313,45 @@ static void what_batches_refuse(void)
     no_batch(HGRID_ERROR_NULL_ARGUMENT, b);
 }
 
+/* Both calls for shapes say so and write nothing. */
+static void no_shape_batch(hgrid_status expected, const hgrid_shapes *of, size_t ray_stride, size_t hit_stride,
+                           hgrid_coherence how, const hgrid_query_options *options)
+{
+    static hgrid_ray from[MANY];
+    memset(many_answers, 0xc7, sizeof many_answers);
+    EXPECT(expected, hgrid_intersect_shapes_n(of, from, ray_stride, (hgrid_hit *)(void *)many_answers, hit_stride, MANY,
+                                              how, options));
+    EXPECT(expected,
+           hgrid_occluded_shapes_n(of, from, ray_stride, many_answers, hit_stride == 1 ? SIZE_MAX : hit_stride, MANY, how,
+                                   options));
+    CHECK(all_bytes_are(many_answers, sizeof many_answers, 0xc7));
+}
+
+static void what_batches_of_shapes_refuse(void)
+{
+    const hgrid_coherence how = HGRID_COHERENCE_INCOHERENT;
+    const hgrid_shapes zeros = HGRID_SHAPES_INIT;
+    hgrid_query_options options = HGRID_QUERY_OPTIONS_INIT;
+    no_shape_batch(HGRID_ERROR_NOT_A_GRID, &zeros, 0, 0, how, NULL);
+    no_shape_batch(HGRID_ERROR_INVALID_COHERENCE, &shapes, 0, 0, 2, NULL);
+    no_shape_batch(HGRID_ERROR_INVALID_RAYS, &shapes, sizeof(hgrid_ray) - 1, 0, how, NULL);
+    no_shape_batch(HGRID_ERROR_INVALID_ANSWERS, &shapes, 0, 1, how, NULL);
+    options.struct_size--;
+    no_shape_batch(HGRID_ERROR_STRUCT_SIZE, &shapes, 0, 0, how, &options);
+    options.struct_size++;
+    /* Scratch in what the call reads or writes. */
+    struct {
+        void *scratch;
+        size_t bytes;
+    } cases[] = {{many_answers, 1}, {shape_blob, 64}, {&spheres[7], 4}, {&spheres[7].mask, 4}, {&shapes, sizeof shapes}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        options.scratch = cases[i].scratch, options.scratch_bytes = cases[i].bytes;
+        no_shape_batch(HGRID_ERROR_OVERLAP, &shapes, 0, 0, how, &options);
+    }
+    options.scratch = NULL, options.scratch_bytes = 16;
+    no_shape_batch(HGRID_ERROR_NULL_ARGUMENT, &shapes, 0, 0, how, &options);
+}
+
 /* NULL for a parameter: refused, allowed, or a miss. */
 #define REFUSED(parameter, call) \
     do { \
@@ -368,6 +407,19 @@ static void no_pointers(void)
     puts("null hgrid_occluded_shapes.options");
     MISSED(hgrid_occluded_shapes.shapes, hgrid_occluded_shapes(NULL, &ray, NULL));
     MISSED(hgrid_occluded_shapes.ray, hgrid_occluded_shapes(&shapes, NULL, NULL));
+    const size_t each = 1;
+    const hgrid_coherence taken = HGRID_COHERENCE_COHERENT;
+    uint8_t is_dark;
+    REFUSED(hgrid_intersect_shapes_n.shapes, hgrid_intersect_shapes_n(NULL, &ray, 0, &hit, 0, each, taken, NULL));
+    REFUSED(hgrid_intersect_shapes_n.rays, hgrid_intersect_shapes_n(&shapes, NULL, 0, &hit, 0, each, taken, NULL));
+    REFUSED(hgrid_intersect_shapes_n.hits, hgrid_intersect_shapes_n(&shapes, &ray, 0, NULL, 0, each, taken, NULL));
+    ALLOWED(hgrid_intersect_shapes_n.rays, hgrid_intersect_shapes_n(&shapes, NULL, 0, NULL, 0, 0, taken, NULL));
+    ALLOWED(hgrid_intersect_shapes_n.options, hgrid_intersect_shapes_n(&shapes, &ray, 0, &hit, 0, each, taken, NULL));
+    REFUSED(hgrid_occluded_shapes_n.shapes, hgrid_occluded_shapes_n(NULL, &ray, 0, &is_dark, 0, each, taken, NULL));
+    REFUSED(hgrid_occluded_shapes_n.rays, hgrid_occluded_shapes_n(&shapes, NULL, 0, &is_dark, 0, each, taken, NULL));
+    REFUSED(hgrid_occluded_shapes_n.occluded, hgrid_occluded_shapes_n(&shapes, &ray, 0, NULL, 0, each, taken, NULL));
+    ALLOWED(hgrid_occluded_shapes_n.rays, hgrid_occluded_shapes_n(&shapes, NULL, 0, NULL, 0, 0, taken, NULL));
+    ALLOWED(hgrid_occluded_shapes_n.options, hgrid_occluded_shapes_n(&shapes, &ray, 0, &is_dark, 0, each, taken, NULL));
     REFUSED(hgrid_object_grid.grid, hgrid_object_grid(NULL, &object));
     REFUSED(hgrid_object_grid.object, hgrid_object_grid(&grid, NULL));
     REFUSED(hgrid_object_shapes.shapes, hgrid_object_shapes(NULL, &object));
@@ -476,6 +528,10 @@ static void structs_of_other_versions(void)
                    hgrid_intersect_scene_n(&inner, &wide, 0, &scene_hit, 0, 1, how, it));
     CHECK_VERSIONS(hgrid_occluded_scene_n.options, hgrid_scene_options, scene_options,
                    hgrid_occluded_scene_n(&inner, &wide, 0, &dark, 0, 1, how, it));
+    CHECK_VERSIONS(hgrid_intersect_shapes_n.options, hgrid_query_options, options,
+                   hgrid_intersect_shapes_n(&shapes, &ray, 0, &hit, 0, 1, how, it));
+    CHECK_VERSIONS(hgrid_occluded_shapes_n.options, hgrid_query_options, options,
+                   hgrid_occluded_shapes_n(&shapes, &ray, 0, &dark, 0, 1, how, it));
 }
 
 int main(void)
@@ -487,6 +543,7 @@ int main(void)
     what_shapes_refuse();
     what_scenes_refuse();
     what_batches_refuse();
+    what_batches_of_shapes_refuse();
     no_pointers();
     structs_of_other_versions();
     return 0;

@@ -208,6 +208,22 @@ static void boxes_of_triangles(void)
     }
 }
 
+static void boxes_of_triangles_together(void)
+{
+    static unsigned char sorted[16 * RAYS];
+    hgrid_query_options masked = HGRID_QUERY_OPTIONS_INIT;
+    const hgrid_query_options all = options();
+    const hgrid_ray *each[] = {mixed, rays};
+    masked.mask = 1, masked.scratch = sorted, masked.scratch_bytes = sizeof sorted;
+    for (int order = 0; order < 2; order++)
+        for (hgrid_coherence c = 0; c < 2; c++) {
+            CHECK(hgrid_intersect_shapes_n(&corners, each[order], 0, hits, 0, RAYS, c, NULL) == HGRID_OK);
+            CHECK(hgrid_occluded_shapes_n(&corners, each[order], 0, occluded, 0, RAYS, c, NULL) == HGRID_OK);
+            CHECK(hgrid_intersect_shapes_n(&corners, each[order], 0, hits, 0, RAYS, c, &masked) == HGRID_OK);
+            CHECK(hgrid_occluded_shapes_n(&corners, each[order], 0, occluded, 0, RAYS, c, &all) == HGRID_OK);
+        }
+}
+
 /* Scenes of instances that overlap, and shapes as large as the triangles of the sheet. */
 static void build_scenes(void)
 {
@@ -405,7 +421,7 @@ int main(int argc, char **argv)
                  {"options", with_options, 0}, {"closest", closest, 0}, {"many", many, 0},
                  {"scenes", build_scenes, 0}, {"scene", flat_scene, 0}, {"nested", nested_scenes, 0},
                  {"scene_many", flat_scene_together, 0}, {"nested_many", nested_scenes_together, 0},
-                 {"shapes", boxes_of_triangles, 0}};
+                 {"shapes", boxes_of_triangles, 0}, {"shapes_many", boxes_of_triangles_together, 0}};
     enum { CALLS = sizeof calls / sizeof *calls };
     for (uint32_t crowds = 0; crowds <= CROWDS; crowds++)
         for (int method = 0; method <= METHODS; method++) {

@@ -118,6 +118,15 @@ int main(void)
                            NULL) ||
         !hgrid_occluded_shapes(&shapes, &rays[9], NULL) || hgrid_occluded_shapes(&shapes, &rays[0], NULL))
         return 13;
+    hgrid_ray discs_seen[64];
+    hgrid_hit disc_hits[64];
+    for (int i = 0; i < 64; i++) {
+        const hgrid_ray ray = {{(float)(i % 8) * 0.25f, (float)(i / 8) * 0.25f, 1}, 0, {0, 0, -1}, INFINITY};
+        discs_seen[i] = ray;
+    }
+    /* Radius 0.5 around (1, 1): 13 points of a lattice of quarters. */
+    if (trace_tile_of_shapes(&shapes, discs_seen, disc_hits) != 13 || disc_hits[4 * 8 + 4].t != 1)
+        return 18;
 
     /* Two meshes of a triangle each in one grid, and what the second is made of. */
     hgrid_mesh halves[2];

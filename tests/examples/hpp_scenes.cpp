@@ -113,6 +113,24 @@ void check_scenes()
     const auto again = hgrid::shapes::open(hgrid::as_bytes(shape_index), boxes);
     CHECK(again && again->occluded(hgrid::make_ray({0.5f, 0.5f, 3}, {0, 0, -1})));
     CHECK(!hgrid::shapes().occluded(hgrid::make_ray({0.5f, 0.5f, 3}, {0, 0, -1})));
+    // Many at once: every second one between the cubes.
+    std::vector<hgrid::ray> many;
+    for (int i = 0; i < 64; i++)
+        many.push_back(hgrid::make_ray({0.5f + static_cast<float>(i), 0.5f, 3}, {0, 0, -1}));
+    std::vector<hgrid::hit> many_hits(many.size());
+    std::vector<std::uint8_t> dark(many.size());
+    hgrid::options without;
+    without.skip(0);
+    CHECK(shapes->intersect_n(many, many_hits, hgrid::coherence::coherent) == hgrid::status::ok);
+    CHECK(shapes->occluded_n(many, dark, hgrid::coherence::incoherent, without) == hgrid::status::ok);
+    for (std::uint32_t i = 0; i < 64; i++) {
+        CHECK(many_hits[i].primitive == (i % 2 == 0 ? i / 2 : hgrid::invalid_id));
+        CHECK(dark[i] == (i % 2 == 0 && i > 0 ? 1 : 0));
+    }
+    CHECK(shapes->intersect_n(many, many_hits, hgrid::coherence::coherent, without) == hgrid::status::ok);
+    CHECK(many_hits[0].primitive == hgrid::invalid_id && many_hits[2].primitive == 1);
+    dark.pop_back();
+    CHECK(shapes->occluded_n(many, dark, hgrid::coherence::coherent) == hgrid::status::invalid_answers);
 
     // Twice a triangle, and the cubes.
     const std::vector<std::array<float, 3>> corners = {{{0, 0, 0}}, {{1, 0, 0}}, {{0, 1, 0}}};

@@ -52,7 +52,7 @@ pub(super) unsafe fn all_options(
 
 /// What a caller told a query.
 pub(super) struct Asked {
-    options: hgrid_query_options,
+    pub(super) options: hgrid_query_options,
     cull: Cull,
 }
 

@@ -45,7 +45,7 @@ pub(crate) use scene::{
     scene_batch, scene_locate, scene_normal, validate_scene, write_object,
 };
 pub(crate) use shapes::{
-    build_shapes, open_shapes, query_shapes, refit_shapes, shapes, validate_shapes,
+    build_shapes, open_shapes, query_shapes, refit_shapes, shapes, shapes_batch, validate_shapes,
 };
 
 use crate::input::Input;
@@ -439,6 +439,11 @@ pub(crate) unsafe fn validate(grid: &Grid<'_>, scratch: Region) -> Result<(), hg
 /// Where some bytes lie.
 fn span_of(bytes: &[u8]) -> Span {
     Span::new(bytes.as_ptr().cast(), bytes.len())
+}
+
+/// Where a view lies.
+fn view_of<T>(view: &T) -> Span {
+    Span::new(core::ptr::from_ref(view).cast(), size_of::<T>())
 }
 
 /// Returns true if a mesh reads something that lies in a span.

@@ -4,7 +4,7 @@
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
-use core::ptr::{NonNull, from_ref};
+use core::ptr::NonNull;
 use core::slice;
 
 use hgrid_core::{
@@ -14,8 +14,9 @@ use hgrid_core::{
 
 use super::ask::add;
 use super::batch_arrays::{Arrays, BatchArrays};
+use super::shapes::shapes_read;
 use super::{
-    apart, bytes, bytes_mut, config, read, read_sized, shares, span_of, write, write_grid,
+    apart, bytes, bytes_mut, config, read, read_sized, shares, span_of, view_of, write, write_grid,
 };
 use crate::input::controlled;
 use crate::query_types::{hgrid_counters, hgrid_refit_report, verdict};
@@ -209,11 +210,6 @@ pub(crate) unsafe fn validate_scene(
     scene.validate(scratch).map_err(status_of)
 }
 
-/// Where a view lies.
-fn view_of<T>(view: &T) -> Span {
-    Span::new(from_ref(view).cast(), size_of::<T>())
-}
-
 /// Returns true if a scene reads something that lies in a span.
 fn reads(scene: &Scene<'_>, span: Span) -> bool {
     let objects = scene.objects();
@@ -225,11 +221,7 @@ fn reads(scene: &Scene<'_>, span: Span) -> bool {
                 || shares(grid.mesh(), span)
         }
         Object::Scene(inner) => view_of(*inner).overlaps(span) || reads(inner, span),
-        Object::Shapes(shapes, _) => {
-            let boxes = shapes.boxes();
-            let arrays = [shapes.blob(), boxes.corners().bytes, boxes.masks().bytes];
-            view_of(*shapes).overlaps(span) || arrays.iter().any(|a| span_of(a).overlaps(span))
-        }
+        Object::Shapes(shapes, _) => shapes_read(shapes, span),
         Object::Nothing => false,
     };
     span_of(scene.blob()).overlaps(span) || array.overlaps(span) || objects.iter().any(has)

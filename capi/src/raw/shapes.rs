@@ -8,7 +8,8 @@ use core::ptr::NonNull;
 use hgrid_core::{Boxes, Hit, ObjectTest, QueryOptions, Ray, ShapeHit, Shapes, Sizes};
 
 use super::ask::all_options;
-use super::{apart, bytes, bytes_mut, config, read, read_sized, span_of, strided, write};
+use super::batch_arrays::{Arrays, BatchArrays};
+use super::{apart, bytes, bytes_mut, config, read, read_sized, span_of, strided, view_of, write};
 use crate::input::controlled;
 use crate::query_types::{hgrid_query_options, hgrid_ray, hgrid_refit_report};
 use crate::shapes::{hgrid_boxes, hgrid_shape_hit, hgrid_shapes};
@@ -236,4 +237,54 @@ pub(crate) unsafe fn query_shapes(
         // SAFETY: the caller's promise.
         Some(asked) => Ok(unsafe { asked.ask(find) }),
     }
+}
+
+/// Returns true if a tree of shapes reads something that lies in a span.
+pub(super) fn shapes_read(shapes: &Shapes<'_>, span: Span) -> bool {
+    let boxes = shapes.boxes();
+    let arrays = [shapes.blob(), boxes.corners().bytes, boxes.masks().bytes];
+    view_of(shapes).overlaps(span) || arrays.iter().any(|array| span_of(array).overlaps(span))
+}
+
+/// Asks a tree of shapes for many rays: `trace` gets them as core asks for them, what the caller told, and the test.
+///
+/// # Safety
+/// The contract of [`shapes`]; and the elements of both arrays are the caller's to be read and written.
+pub(crate) unsafe fn shapes_batch<T>(
+    view: *const hgrid_shapes,
+    batch: &BatchArrays<hgrid_ray, T>,
+    asked: *const hgrid_query_options,
+    trace: impl FnOnce(
+        &Shapes<'static>,
+        &mut Arrays<'_, hgrid_ray, T>,
+        &mut QueryOptions<'_>,
+        &mut hgrid_core::ShapeTest<'_>,
+    ),
+) -> Result<(), hgrid_status> {
+    // SAFETY: this function's contract.
+    let tested = unsafe { shapes(view) }?;
+    // SAFETY: the caller's promise.
+    let asked = unsafe { all_options(asked) }?;
+    // SAFETY: this function's contract, and any bytes are a ray.
+    let mut arrays = unsafe { Arrays::new(batch) };
+    let mut test = |id: u32, ray: &Ray| tested.test(id, ray);
+    let Some(asked) = asked else {
+        trace(&tested.shapes, &mut arrays, &mut QueryOptions::default(), &mut test);
+        return Ok(());
+    };
+    let hgrid_query_options { scratch, scratch_bytes, .. } = asked.options;
+    let scratch = Region { start: scratch, bytes: scratch_bytes };
+    let span = scratch.span();
+    if batch.overlaps(span) || !span.is_empty() && shapes_read(&tested.shapes, span) {
+        return Err(HGRID_ERROR_OVERLAP);
+    }
+    // SAFETY: the caller's promise; nothing else that this call reads or writes lies there.
+    let scratch = unsafe { bytes_mut(scratch.start, scratch.bytes) }?;
+    let trace = |options: &mut QueryOptions<'_>| {
+        options.scratch = scratch;
+        trace(&tested.shapes, &mut arrays, options, &mut test);
+    };
+    // SAFETY: the caller's promise.
+    unsafe { asked.ask(trace) };
+    Ok(())
 }

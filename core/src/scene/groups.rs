@@ -37,22 +37,22 @@ pub(super) fn trace<A: SceneAnswer, B: Batch<A, RayF64>>(
     options: &mut SceneOptions<'_>,
 ) {
     let lent = core::mem::take(&mut options.scratch);
-    let rays = SceneRays::new(scene, Question::new(options, A::IS_ANY));
+    let rays = &mut SceneRays::new(scene, Question::new(options, A::IS_ANY));
     let mut asked = Asked { scene, batch, options, answers: PhantomData::<A>, rays };
     with_window(coherence, lent, &mut |memory| asked.groups(tree, memory));
     options.scratch = lent;
 }
 
 /// A batch with its scene and its options.
-struct Asked<'r, 'q, B, A> {
-    scene: &'r Scene<'r>,
+struct Asked<'r, 's, 'q, B, A> {
+    scene: &'r Scene<'s>,
     batch: &'r mut B,
     options: &'r mut SceneOptions<'q>,
     answers: PhantomData<A>,
-    rays: SceneRays<'r>,
+    rays: &'r mut SceneRays<'s>,
 }
 
-impl<A: SceneAnswer, B: Batch<A, RayF64>> Asked<'_, '_, B, A> {
+impl<A: SceneAnswer, B: Batch<A, RayF64>> Asked<'_, '_, '_, B, A> {
     /// Traces rays in groups, in windows that are sorted in memory or as given.
     #[inline(never)]
     fn groups(&mut self, bvh: &Bvh<'_>, memory: &mut [SortKey]) {
@@ -63,7 +63,7 @@ impl<A: SceneAnswer, B: Batch<A, RayF64>> Asked<'_, '_, B, A> {
     }
 }
 
-impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for Asked<'_, '_, B, A> {
+impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for Asked<'_, '_, '_, B, A> {
     fn count(&self) -> usize {
         self.batch.count()
     }
