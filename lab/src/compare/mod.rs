@@ -292,8 +292,9 @@ mod tests {
         let mut systems = methods(&[Method::Bvh]);
         let embree = [Peer::EmbreeLow, Peer::EmbreeDynamic, Peer::EmbreeMedium];
         systems.extend(peers::systems(&embree).unwrap());
-        // Two builds, bytes kept and at most; single primary rays, ao, bounces, and random rays beside both qualities.
-        check_instances(&systems, 9);
+        // Two builds, bytes kept and at most; coherent and single primary rays, ao, bounces, and random rays beside
+        // both qualities.
+        check_instances(&systems, 10);
     }
 
     #[cfg(not(feature = "embree"))]
