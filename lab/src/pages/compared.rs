@@ -22,6 +22,9 @@ struct Scene {
     /// Results from before there were instances have none.
     #[serde(default)]
     instances: usize,
+    /// Likewise of spheres in place of the triangles.
+    #[serde(default)]
+    spheres: bool,
     systems: Vec<System>,
     ratios: Vec<Ratio>,
 }
@@ -81,9 +84,10 @@ fn scenes(files: &[Comparison]) -> impl Iterator<Item = (String, &Scene)> {
 }
 
 impl Scene {
-    /// The number of triangles, and that of instances if there are any.
+    /// The number of triangles or spheres, and that of instances if there are any.
     fn size(&self) -> String {
         match self.instances {
+            0 if self.spheres => format!("{} spheres", count(self.triangles)),
             0 => count(self.triangles),
             instances => format!("{} instances of {}", count(instances), count(self.triangles)),
         }

@@ -20,6 +20,7 @@ use hgrid_core::{Hit, Ray};
 use super::Peer;
 use crate::compare::input::Input;
 use crate::compare::mode::{Hint, Lanes, Mode};
+use crate::compare::shown::Shown;
 use crate::compare::system::{Bytes, System, Tracer, Use, warm_up};
 use crate::compare::workloads::Workload;
 pub(super) use device::Quality;
@@ -71,12 +72,13 @@ impl System for Embree {
         Some(format!("Embree {}", self.device.version()))
     }
 
-    fn modes(&self, workload: Workload, of_instances: bool) -> &'static [Mode] {
-        match (workload.asks_points(), of_instances) {
-            (true, true) => &[],
-            (true, false) => &[Mode::Single],
-            (false, true) => UNHINTED,
-            (false, false) => ALL,
+    fn modes(&self, workload: Workload, shown: Shown) -> &'static [Mode] {
+        match shown {
+            Shown::Mesh if workload.asks_points() => &[Mode::Single],
+            Shown::Mesh => ALL,
+            _ if workload.asks_points() => &[],
+            Shown::Instances(_) => UNHINTED,
+            Shown::Spheres => &[],
         }
     }
 
