@@ -342,6 +342,16 @@ mod tests {
         check_instances(&systems, 10);
     }
 
+    #[cfg(feature = "embree")]
+    #[test]
+    fn embree_agrees_with_hgrid_on_spheres() {
+        let mut systems = methods(&[Method::Bvh]);
+        let embree = [Peer::EmbreeLow, Peer::EmbreeDynamic, Peer::EmbreeMedium];
+        systems.extend(peers::systems(&embree).unwrap());
+        // The same rows as on instances.
+        check_spheres(&systems, 10);
+    }
+
     #[cfg(not(feature = "embree"))]
     #[test]
     fn without_the_peers_nothing_is_measured() {

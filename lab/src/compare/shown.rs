@@ -96,7 +96,10 @@ impl Serialize for Shown {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser as _;
+
     use super::*;
+    use crate::cli::FirstBuildArgs;
 
     #[test]
     fn options_say_what_is_shown_and_results_keep_it() {
@@ -107,6 +110,9 @@ mod tests {
         ] {
             assert_eq!((Shown::of(options.0, options.1), shown.items(70)), (shown, items));
             assert_eq!(serde_json::to_string(&shown).unwrap(), json);
+            let words = ["hgrid", "a.ply", "bvh"].map(str::to_owned).into_iter();
+            let args = FirstBuildArgs::parse_from(words.chain(shown.words()));
+            assert_eq!(args.shown(), shown);
         }
     }
 }

@@ -186,3 +186,22 @@ fn table(title: &str, columns: impl IntoIterator<Item = String>) -> Table {
     }
     table
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_tell_what_is_shown() {
+        let size = |fields: &str| {
+            let json = format!(
+                r#"{{"scene": "a.ply", "triangles": 2000, {fields} "systems": [], "ratios": []}}"#
+            );
+            serde_json::from_str::<Scene>(&json).unwrap().size()
+        };
+        // Results from before there were instances and spheres have neither field.
+        assert_eq!(size(""), "2.00K");
+        assert_eq!(size(r#""instances": 40,"#), "40 instances of 2.00K");
+        assert_eq!(size(r#""instances": 0, "spheres": true,"#), "2.00K spheres");
+    }
+}

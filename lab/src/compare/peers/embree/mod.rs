@@ -1,5 +1,5 @@
-//! Embree 3: a device with one thread, the mesh's own arrays as shared buffers, and a geometry for each
-//! instance of it.
+//! Embree 3: a device with one thread, the mesh's own arrays as shared buffers, a geometry for each instance of it,
+//! and one of the caller's own for spheres.
 //!
 //! ```text
 //! mod     System and Tracer: which query for which mode
@@ -75,27 +75,31 @@ impl System for Embree {
     fn modes(&self, workload: Workload, shown: Shown) -> &'static [Mode] {
         match shown {
             Shown::Mesh if workload.asks_points() => &[Mode::Single],
-            Shown::Mesh => ALL,
             _ if workload.asks_points() => &[],
+            Shown::Mesh | Shown::Spheres => ALL,
             Shown::Instances(_) => UNHINTED,
-            Shown::Spheres => &[],
         }
     }
 
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
-        let mesh = self.device.build(input, self.quality)?;
-        if input.instances().is_empty() {
-            return then(&mesh);
+        let Self { device, quality, .. } = self;
+        match input.shown() {
+            Shown::Mesh => then(&device.build(input, *quality)?),
+            Shown::Instances(_) => {
+                let mesh = device.build(input, *quality)?;
+                then(&device.build_instances(&mesh, *quality)?)
+            }
+            Shown::Spheres => then(&device.build_spheres(input, *quality)?),
         }
-        then(&self.device.build_instances(&mesh, self.quality)?)
     }
 
     fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
         let Self { device, quality, .. } = self;
-        let of_instances = !input.instances().is_empty();
+        let of_instances = input.shown().instances() > 0;
         let mesh = of_instances.then(|| device.build(input, *quality)).transpose()?;
         let build = || match &mesh {
             Some(mesh) => device.build_instances(mesh, *quality),
+            None if input.shown() == Shown::Spheres => device.build_spheres(input, *quality),
             None => device.build(input, *quality),
         };
         if matches!(quality, Quality::Dynamic) {
