@@ -24,6 +24,7 @@ pub use self::tuning::Tuning;
 use self::tuning::{method_parser, quality_parser, thread_parser};
 use crate::compare::first::COMMAND as FIRST_BUILD;
 use crate::compare::peers::Peer;
+use crate::compare::shown::Shown;
 use crate::compare::workloads::Workload;
 
 /// The picture that is written by default.
@@ -196,6 +197,9 @@ pub struct CompareArgs {
     #[arg(long, value_name = "NUMBER", default_value_t = 0, conflicts_with = "output",
           value_parser = clap::value_parser!(u32).range(..=10_000_000))]
     pub instances: u32,
+    /// Compare trees over spheres, a shape of the caller's own, in place of triangles (`bvh` and Embree only)
+    #[arg(long, conflicts_with_all = ["instances", "output"])]
+    pub spheres: bool,
     /// Build and trace so many times, taking turns, and report the medians
     #[arg(long, value_name = "TIMES", default_value_t = 5,
           value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -212,6 +216,14 @@ pub struct CompareArgs {
     /// Draw charts into this folder, as SVG and PNG; it is made if it is missing
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+}
+
+impl CompareArgs {
+    /// The content of the scenes.
+    #[must_use]
+    pub const fn shown(&self) -> Shown {
+        Shown::of(self.instances, self.spheres)
+    }
 }
 
 /// Which pages to write.
@@ -235,6 +247,17 @@ pub struct FirstBuildArgs {
     /// Build a scene of so many instances over it, too
     #[arg(long, default_value_t = 0)]
     pub instances: u32,
+    /// Build over a sphere in place of each triangle
+    #[arg(long, conflicts_with = "instances")]
+    pub spheres: bool,
+}
+
+impl FirstBuildArgs {
+    /// The content of the scene.
+    #[must_use]
+    pub const fn shown(&self) -> Shown {
+        Shown::of(self.instances, self.spheres)
+    }
 }
 
 /// Which methods compete, and how often.

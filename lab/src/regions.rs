@@ -128,7 +128,7 @@ const MANY_BYTES: usize = 16 << 20;
 /// Pages that the system provides when they are first written, large ones if it has them: a build
 /// of a million triangles is sooner done with those, and Embree asks for them, too. A small build
 /// would write little of each, and wait until the system has cleared all of it.
-fn memory(bytes: usize) -> Result<MmapMut> {
+pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
     let memory = map(bytes)?;
     // A system that has no large pages gives small ones.
     #[cfg(target_os = "linux")]

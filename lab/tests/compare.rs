@@ -13,6 +13,10 @@ fn a_first_build_prints_its_time() {
     let first: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(output.status.success() && first["seconds"].as_f64() > Some(0.0), "{first}");
 
+    let output = hgrid("first-build procedural:knot:500 bvh --spheres").unwrap();
+    let first: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(output.status.success() && first["seconds"].as_f64() > Some(0.0), "{first}");
+
     let output = hgrid("first-build procedural:knot:500 nothing").unwrap();
     assert!(!output.status.success() && output.stdout.is_empty());
 }
@@ -68,6 +72,35 @@ fn instances_are_for_trees_and_embree() {
     let systems = scene["systems"].as_array().unwrap();
     let names: Vec<_> = systems.iter().filter_map(|system| system["system"].as_str()).collect();
     assert_eq!((&scene["instances"], &*names), (&30.into(), &["bvh", "embree-medium"][..]));
+}
+
+#[cfg(feature = "embree")]
+#[test]
+fn spheres_are_for_trees_and_embree() {
+    let file = std::env::temp_dir().join(format!("hgrid-spheres-{}.json", std::process::id()));
+    let words = format!(
+        "compare procedural:knot:500 --spheres --size 32 --repeat 1 --methods one-level,bvh \
+         --peers embree-low,embree-medium --workloads primary,ao,far --json {}",
+        file.display()
+    );
+    let output = hgrid(&words).unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    assert!(error.contains("left out, because they have no spheres: far, one-level"), "{error}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("knot:500: 500 spheres, hits: primary "), "{text}");
+    assert!(text.contains("index bytes per sphere / best peer"), "{text}");
+    assert!(text.contains("first in a new process"), "{text}");
+
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    std::fs::remove_file(&file).unwrap();
+    let scene = &json["scenes"][0];
+    assert_eq!((&scene["spheres"], &scene["instances"]), (&true.into(), &0.into()));
+    for system in scene["systems"].as_array().unwrap() {
+        for run in system["runs"].as_array().unwrap() {
+            assert!(run["hits"].as_u64() > Some(0) && run["differing"] == 0, "{system}");
+        }
+    }
 }
 
 #[cfg(feature = "peers")]

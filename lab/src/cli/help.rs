@@ -84,6 +84,7 @@ Examples:
   hgrid compare dragon.ply --peers embree-low,embree-medium --workloads primary,ao,bounce
   hgrid compare sponza.ply --view inside
   hgrid compare bunny.ply --instances 10000  scenes over a field of instances
+  hgrid compare bunny.ply --spheres          trees over a sphere in place of each triangle
   hgrid compare bunny.ply dragon.ply --markdown --json compare.json -o pictures
 
 This needs a program with the peers in it; docs/performance.md tells how they are set up and measured:

@@ -31,6 +31,8 @@ fn bad_values_are_refused() {
         "compare a.ply --peers optix",
         "compare a.ply --instances 9 -o charts",
         "compare a.ply --instances many",
+        "compare a.ply --spheres --instances 9",
+        "compare a.ply --spheres -o charts",
         "render --samples 0",
         "pack a.ply",
         "validate",

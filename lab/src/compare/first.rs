@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::input::Input;
 use super::process::give_back_heap;
 use super::samples::Watch;
+use super::shown::Shown;
 use super::system::System;
 use super::system_named;
 use crate::cli::FirstBuildArgs;
@@ -40,19 +41,18 @@ pub type FirstBuilds<'a> = dyn Fn(&dyn System) -> Result<FirstBuild> + 'a;
 /// If there is no such scene or system, or it cannot be built.
 pub fn run(args: &FirstBuildArgs) -> Result<()> {
     let system = system_named(&args.system)?;
-    let first = in_this_process(&args.scene, args.instances, system.as_ref())?;
+    let first = in_this_process(&args.scene, args.shown(), system.as_ref())?;
     Ok(writeln!(io::stdout(), "{}", serde_json::to_string(&first)?)?)
 }
 
-/// Loads a scene, puts so many instances of it into a field, and builds once, whatever this process
-/// has done before.
+/// Loads a scene and builds once over what it shows, whatever this process has done before.
 ///
 /// # Errors
 /// If the scene cannot be loaded, or the structure not be built.
-pub fn in_this_process(scene: &str, instances: u32, system: &dyn System) -> Result<FirstBuild> {
+pub fn in_this_process(scene: &str, shown: Shown, system: &dyn System) -> Result<FirstBuild> {
     let scene = Scene::load(scene)?;
-    let field = Field::over(&scene, instances);
-    let input = Input::of_field(scene, field.as_ref());
+    let field = Field::over(&scene, shown.instances());
+    let input = Input::of(scene, shown, field.as_ref());
     // Free what loading has left behind.
     give_back_heap();
     let watch = Watch::start();
@@ -69,11 +69,11 @@ pub fn in_this_process(scene: &str, instances: u32, system: &dyn System) -> Resu
 ///
 /// # Errors
 /// If that process fails.
-pub fn in_new_process(scene: &str, instances: u32, system: &dyn System) -> Result<FirstBuild> {
+pub fn in_new_process(scene: &str, shown: Shown, system: &dyn System) -> Result<FirstBuild> {
     let program = env::current_exe().context("this program has no file")?;
     let mut command = Command::new(program);
     command.args([COMMAND, scene, &system.name()]);
-    command.args(["--instances", &instances.to_string()]).stderr(Stdio::inherit());
+    command.args(shown.words()).stderr(Stdio::inherit());
     let output = command.output().context("cannot start a process for a first build")?;
     ensure!(output.status.success(), "the process for a first build failed");
     serde_json::from_slice(&output.stdout).context("a first build printed no time")
@@ -86,14 +86,17 @@ mod tests {
     #[test]
     fn a_first_build_takes_time_and_names_what_is_missing() {
         let system = system_named("one-level").unwrap();
-        let first = in_this_process("procedural:knot:500", 0, system.as_ref()).unwrap();
+        let first = in_this_process("procedural:knot:500", Shown::Mesh, system.as_ref()).unwrap();
         assert!(first.seconds > 0.0);
         let system = system_named("bvh").unwrap();
-        let field = in_this_process("procedural:knot:500", 9, system.as_ref()).unwrap();
+        let field =
+            in_this_process("procedural:knot:500", Shown::Instances(9), system.as_ref()).unwrap();
         assert!(field.seconds > 0.0);
+        let spheres = in_this_process("procedural:knot:500", Shown::Spheres, system.as_ref());
+        assert!(spheres.unwrap().seconds > 0.0);
         let json = serde_json::to_string(&first).unwrap();
         assert_eq!(serde_json::from_str::<FirstBuild>(&json).unwrap(), first);
-        assert!(in_this_process("no/such.ply", 0, system.as_ref()).is_err());
+        assert!(in_this_process("no/such.ply", Shown::Mesh, system.as_ref()).is_err());
         let error = system_named("nothing").map(drop).unwrap_err();
         assert!(error.to_string().contains("nothing"), "{error}");
     }

@@ -12,6 +12,8 @@ use super::input::Input;
 use super::instanced;
 use super::mode::Mode;
 use super::points::distance;
+use super::shown::Shown;
+use super::spheres;
 use super::system::{Bytes, System, Tracer, Use, each, one_by_one};
 use super::workloads::Workload;
 use crate::regions::{Regions, peak_bytes};
@@ -47,12 +49,12 @@ impl System for GridSystem {
         false
     }
 
-    fn modes(&self, workload: Workload, of_instances: bool) -> &'static [Mode] {
+    fn modes(&self, workload: Workload, shown: Shown) -> &'static [Mode] {
         let method = self.config.method();
         match workload {
-            // Scenes are trees, and have no points.
-            _ if of_instances && method != Method::Bvh => &[],
-            Workload::Near | Workload::Far if of_instances => &[],
+            // Scenes and shapes are trees, and have no points.
+            _ if shown != Shown::Mesh && method != Method::Bvh => &[],
+            Workload::Near | Workload::Far if shown != Shown::Mesh => &[],
             // Far from the mesh, a point can take another method as long as a picture.
             Workload::Near | Workload::Far if method == Method::default() => &[Mode::Single],
             Workload::Near | Workload::Far => &[],
@@ -64,8 +66,10 @@ impl System for GridSystem {
     }
 
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
-        if !input.instances().is_empty() {
-            return instanced::build(input, &self.config, None, then);
+        match input.shown() {
+            Shown::Mesh => {}
+            Shown::Instances(_) => return instanced::build(input, &self.config, None, then),
+            Shown::Spheres => return spheres::build(input, &self.config, None, then),
         }
         let mesh = input.mesh()?;
         let regions = Regions::build(mesh, &self.config)?;
@@ -74,8 +78,10 @@ impl System for GridSystem {
     }
 
     fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
-        if !input.instances().is_empty() {
-            return instanced::build(input, &self.config, Some(start), then);
+        match input.shown() {
+            Shown::Mesh => {}
+            Shown::Instances(_) => return instanced::build(input, &self.config, Some(start), then),
+            Shown::Spheres => return spheres::build(input, &self.config, Some(start), then),
         }
         let mesh = input.mesh()?;
         let mut regions = Regions::build(mesh, &self.config)?;

@@ -1,8 +1,10 @@
-//! The mesh, and its instances if there are any, as every system gets them.
+//! The mesh, and the instances or spheres that are shown in its place, as every system gets them.
 
 use anyhow::Result;
 use hgrid_core::{Instance, TriangleMesh};
 
+use super::shown::Shown;
+use super::spheres::Sphere;
 use crate::field::Field;
 use crate::scene::Scene;
 use crate::vector::round;
@@ -15,7 +17,9 @@ use crate::vector::round;
 pub struct Input {
     padded: Vec<[f32; 3]>,
     indices: Vec<[u32; 3]>,
+    shown: Shown,
     instances: Vec<Instance>,
+    spheres: Vec<Sphere>,
 }
 
 impl Input {
@@ -24,24 +28,42 @@ impl Input {
     pub fn new(scene: Scene) -> Self {
         let Scene { positions: mut padded, indices, .. } = scene;
         padded.push([0.0; 3]);
-        Self { padded, indices, instances: Vec::new() }
+        let (shown, instances, spheres) = (Shown::Mesh, Vec::new(), Vec::new());
+        Self { padded, indices, shown, instances, spheres }
     }
 
-    /// Takes the arrays of a scene that a field shows many times, or once and as it is without a field.
+    /// Takes the arrays of a scene, and makes its spheres or takes the places of its instances from a field if it
+    /// shows them.
     #[must_use]
-    pub fn of_field(scene: Scene, field: Option<&Field>) -> Self {
+    pub fn of(scene: Scene, shown: Shown, field: Option<&Field>) -> Self {
         let mut instances = field.map_or_else(Vec::new, |field| field.instances(0.0));
         for instance in &mut instances {
             // Embree takes places in f32: all systems get the same.
             instance.translation = round(instance.translation).map(f64::from);
         }
-        Self { instances, ..Self::new(scene) }
+        let mut input = Self { shown, instances, ..Self::new(scene) };
+        if shown == Shown::Spheres {
+            input.spheres = input.triangles().map(|triangle| Sphere::of(&triangle)).collect();
+        }
+        input
+    }
+
+    /// Returns what the scene shows.
+    #[must_use]
+    pub const fn shown(&self) -> Shown {
+        self.shown
     }
 
     /// Returns the instances of the mesh; none if it stands where it is.
     #[must_use]
     pub fn instances(&self) -> &[Instance] {
         &self.instances
+    }
+
+    /// Returns a sphere for each triangle; none unless they are shown.
+    #[must_use]
+    pub fn spheres(&self) -> &[Sphere] {
+        &self.spheres
     }
 
     /// The vertices. Four bytes behind the last one may be read.

@@ -30,6 +30,8 @@ pub mod race;
 mod random;
 pub mod ratios;
 mod samples;
+pub mod shown;
+pub mod spheres;
 mod stage;
 pub mod system;
 mod tables;
@@ -47,6 +49,7 @@ use grid::{GridSystem, HIGH};
 use numbers::Comparison;
 use peers::Peer;
 use race::Plan;
+use shown::Shown;
 use system::System;
 use workloads::{Amount, Workload};
 
@@ -69,12 +72,10 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let asked =
         |workload: &Workload| args.workloads.is_empty() || args.workloads.contains(workload);
     let mut workloads: Vec<_> = Workload::ALL.into_iter().filter(asked).collect();
-    if args.instances > 0 {
-        leave_out(&mut systems, &mut workloads)?;
-    }
+    let shown = args.shown();
+    leave_out(&mut systems, &mut workloads, shown)?;
     let amount = Amount::of(&workloads);
-    let (repeat, instances) = (args.repeat, args.instances);
-    let plan = Plan { repeat, workloads, amount, instances, first };
+    let plan = Plan { repeat: args.repeat, workloads, amount, shown, first };
     let comparison = Comparison::measure(&args.scenes, &systems, &args.picture, &plan)?;
     let text = if args.markdown { comparison.markdown() } else { comparison.text() };
     writeln!(io::stdout(), "{text}")?;
@@ -88,9 +89,14 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     Ok(())
 }
 
-/// Removes systems and workloads without instances, and prints their names.
-fn leave_out(systems: &mut Vec<Box<dyn System>>, workloads: &mut Vec<Workload>) -> Result<()> {
-    let answers = |system: &dyn System, workload| !system.modes(workload, true).is_empty();
+/// Removes systems and workloads without instances or spheres if these are shown, and prints their names.
+fn leave_out(
+    systems: &mut Vec<Box<dyn System>>,
+    workloads: &mut Vec<Workload>,
+    shown: Shown,
+) -> Result<()> {
+    let Some((option, items)) = shown.option() else { return Ok(()) };
+    let answers = |system: &dyn System, workload| !system.modes(workload, shown).is_empty();
     let mut names = Vec::new();
     workloads.retain(|&workload| {
         let is_kept = systems.iter().any(|system| answers(system.as_ref(), workload));
@@ -109,11 +115,11 @@ fn leave_out(systems: &mut Vec<Box<dyn System>>, workloads: &mut Vec<Workload>) 
     let names = names.join(", ");
     ensure!(
         !systems.is_empty(),
-        "nothing to measure: --instances is for bvh and Embree, and for the workloads primary, ao, bounce and \
+        "nothing to measure: {option} is for bvh and Embree, and for the workloads primary, ao, bounce and \
          random; left out were {names}"
     );
     if !names.is_empty() {
-        writeln!(io::stderr(), "left out, because they have no instances: {names}")?;
+        writeln!(io::stderr(), "left out, because they have no {items}: {names}")?;
     }
     Ok(())
 }
@@ -164,14 +170,10 @@ mod tests {
     }
 
     fn compare_on(workloads: &[Workload], systems: &[Box<dyn System>]) -> Comparison {
-        compare_of(0, workloads, systems)
+        compare_of(Shown::Mesh, workloads, systems)
     }
 
-    fn compare_of(
-        instances: u32,
-        workloads: &[Workload],
-        systems: &[Box<dyn System>],
-    ) -> Comparison {
+    fn compare_of(shown: Shown, workloads: &[Workload], systems: &[Box<dyn System>]) -> Comparison {
         let words = ["hgrid", "procedural:knot:2000", "procedural:soup:500", "--size", "48"];
         let args = CompareArgs::parse_from(words);
         let amount = Amount { random_rays: 2000, near_points: 500, far_points: 50 };
@@ -179,7 +181,7 @@ mod tests {
             repeat: 2,
             workloads: workloads.to_vec(),
             amount,
-            instances,
+            shown,
             first: first::in_this_process,
         };
         Comparison::measure(&args.scenes, systems, &args.picture, &plan).unwrap()
@@ -239,21 +241,26 @@ mod tests {
     fn what_has_no_instances_is_left_out() {
         let [mut systems, mut others] = [methods(&[]), methods(&[Method::Fixed])];
         let mut workloads = Workload::ALL.to_vec();
-        leave_out(&mut systems, &mut workloads).unwrap();
+        let shown = Shown::Instances(9);
+        leave_out(&mut systems, &mut workloads, shown).unwrap();
         let names: Vec<_> = systems.iter().map(|system| system.name()).collect();
         assert_eq!(names, [Method::Bvh.name()]);
         assert_eq!(workloads, Workload::ALL[..4]);
-        let error = leave_out(&mut others, &mut workloads).unwrap_err().to_string();
+        let error = leave_out(&mut others, &mut workloads, shown).unwrap_err().to_string();
         assert!(error.contains("fixed") && error.contains("random"), "{error}");
+        let error = leave_out(&mut methods(&[Method::Fixed]), &mut workloads, Shown::Spheres);
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains("--spheres is for bvh and Embree"), "{error}");
     }
 
     /// Checks a comparison on fields of instances, all of whose systems have some.
     fn check_instances(systems: &[Box<dyn System>], ratios: usize) {
         const COUNT: u32 = 40;
         let workloads = &Workload::ALL[..4];
-        let comparison = compare_of(COUNT, workloads, systems);
+        let comparison = compare_of(Shown::Instances(COUNT), workloads, systems);
         for scene in &comparison.scenes {
-            assert_eq!((scene.instances, scene.systems.len()), (COUNT, systems.len()));
+            assert_eq!(scene.shown, Shown::Instances(COUNT));
+            assert_eq!(scene.systems.len(), systems.len());
             for system in &scene.systems {
                 let name = &system.system;
                 assert_eq!(system.items(), u64::from(COUNT));
@@ -281,6 +288,44 @@ mod tests {
         assert!(text.contains("rebuilds of the scene alone"), "{text}");
     }
 
+    /// Checks a comparison on spheres, all of whose systems have some.
+    fn check_spheres(systems: &[Box<dyn System>], ratios: usize) {
+        let workloads = &Workload::ALL[..4];
+        let comparison = compare_of(Shown::Spheres, workloads, systems);
+        for scene in &comparison.scenes {
+            assert_eq!((scene.shown, scene.systems.len()), (Shown::Spheres, systems.len()));
+            for system in &scene.systems {
+                let name = &system.system;
+                assert_eq!(system.items(), scene.facts.triangles as u64);
+                let each = system.index_bytes_per_item();
+                assert!((24.0..2000.0).contains(&each), "{name}: {each}");
+                assert!(system.peak_bytes >= system.index_bytes, "{name}");
+                assert!(system.first_build.seconds > 0.0 && system.rebuild.seconds > 0.0);
+                assert!(system.time_to_image(Kind::Rebuild).is_none());
+                for workload in workloads {
+                    assert!(system.best(*workload).is_some(), "{name}: {workload:?}");
+                }
+                for run in &system.runs {
+                    let is_some = run.hits > 0 && run.hits < run.rays;
+                    assert!(is_some && !run.is_off(), "{name}: {run:?}");
+                }
+            }
+            assert_eq!(scene.ratios.len(), ratios, "{:#?}", scene.ratios);
+        }
+        let text = comparison.text();
+        assert!(text.contains("knot:2000: 2.00K spheres, hits: primary "), "{text}");
+        assert!(text.contains("rebuild (ns/sph)") && text.contains("index (B/sph)"), "{text}");
+        assert!(text.contains("without the spheres"), "{text}");
+        let json = serde_json::to_value(&comparison).unwrap();
+        let scene = &json["scenes"][0];
+        assert_eq!((&scene["instances"], &scene["spheres"]), (&0.into(), &true.into()));
+    }
+
+    #[test]
+    fn spheres_are_compared_in_trees() {
+        check_spheres(&methods(&[Method::Bvh]), 0);
+    }
+
     #[test]
     fn instances_are_compared_in_scenes() {
         check_instances(&methods(&[Method::Bvh]), 0);
@@ -292,8 +337,19 @@ mod tests {
         let mut systems = methods(&[Method::Bvh]);
         let embree = [Peer::EmbreeLow, Peer::EmbreeDynamic, Peer::EmbreeMedium];
         systems.extend(peers::systems(&embree).unwrap());
-        // Two builds, bytes kept and at most; single primary rays, ao, bounces, and random rays beside both qualities.
-        check_instances(&systems, 9);
+        // Two builds, bytes kept and at most; coherent and single primary rays, ao, bounces, and random rays beside
+        // both qualities.
+        check_instances(&systems, 10);
+    }
+
+    #[cfg(feature = "embree")]
+    #[test]
+    fn embree_agrees_with_hgrid_on_spheres() {
+        let mut systems = methods(&[Method::Bvh]);
+        let embree = [Peer::EmbreeLow, Peer::EmbreeDynamic, Peer::EmbreeMedium];
+        systems.extend(peers::systems(&embree).unwrap());
+        // The same rows as on instances.
+        check_spheres(&systems, 10);
     }
 
     #[cfg(not(feature = "embree"))]

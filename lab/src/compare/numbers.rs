@@ -11,6 +11,7 @@ use super::mode::Mode;
 use super::process::target;
 use super::race::{Plan, race};
 use super::ratios::Ratio;
+use super::shown::Shown;
 use super::system::System;
 use super::workloads::{Rays, Workload};
 use super::{charts, tables};
@@ -43,8 +44,9 @@ pub struct SceneNumbers {
     /// The scene.
     #[serde(flatten)]
     pub facts: SceneFacts,
-    /// Instances of it that the systems built a scene over; 0 if they built the mesh alone.
-    pub instances: u32,
+    /// The content of it that the systems built over.
+    #[serde(flatten)]
+    pub shown: Shown,
     /// The methods of hgrid, then the peers.
     pub systems: Vec<SystemNumbers>,
     /// hgrid divided by a peer.
@@ -66,9 +68,11 @@ pub struct SystemNumbers {
     pub rebuild: Build,
     /// Triangles of the mesh.
     pub triangles: u64,
-    /// Instances of it, if there are any.
-    pub instances: u64,
-    /// Bytes that are kept for queries, without the mesh. With instances, without the structure of the mesh, too.
+    /// The content of the scene.
+    #[serde(flatten)]
+    pub shown: Shown,
+    /// Bytes that are kept for queries, without the mesh. With instances, without the structure of the mesh, too; with
+    /// spheres, without these.
     pub index_bytes: u64,
     /// The most bytes that there were during the build, likewise.
     pub peak_bytes: u64,
@@ -148,20 +152,20 @@ impl SystemNumbers {
         }
     }
 
-    /// Build and primary rays: from a mesh in memory to a picture. Instances get no colours, so none.
+    /// Build and primary rays: from a mesh in memory to a picture. Instances and spheres get no colours, so none.
     #[must_use]
     pub fn time_to_image(&self, kind: Kind) -> Option<f64> {
-        let run = self.best(Workload::Primary).filter(|_| self.instances == 0)?;
+        let run = self.best(Workload::Primary).filter(|_| self.shown == Shown::Mesh)?;
         Some(self.build(kind).seconds + run.seconds)
     }
 
-    /// The number of triangles or instances that the structure is built over.
+    /// The number of triangles, instances or spheres that the structure is built over.
     #[must_use]
     pub const fn items(&self) -> u64 {
-        if self.instances > 0 { self.instances } else { self.triangles }
+        self.shown.items(self.triangles)
     }
 
-    /// Bytes kept for each triangle or instance.
+    /// Bytes kept for each triangle, instance or sphere.
     #[must_use]
     pub fn index_bytes_per_item(&self) -> f64 {
         ratio(self.index_bytes, self.items())
@@ -231,18 +235,18 @@ impl SceneNumbers {
         ensure!(!scene.indices.is_empty(), "no triangles: nothing to measure");
         let bounds = scene.bounds().context("no vertex with finite coordinates")?;
         let facts = SceneFacts::of(&scene);
-        let instances = plan.instances;
-        let field = Field::over(&scene, instances);
+        let shown = plan.shown;
+        let field = Field::over(&scene, shown.instances());
         if let Some(field) = &field {
             field.frame(&mut scene);
         }
         let bounds = field.as_ref().map_or(bounds, Field::bounds);
         let tiles = picture.tiles(&scene)?;
-        let input = Input::of_field(scene, field.as_ref());
+        let input = Input::of(scene, shown, field.as_ref());
         let rays = Rays::new(&input, bounds, tiles, plan.amount)?;
-        let first = |system: &dyn System| (plan.first)(spec, instances, system);
+        let first = |system: &dyn System| (plan.first)(spec, shown, system);
         let systems = race(&input, &rays, systems, plan, &first, progress)?;
         let ratios = Ratio::all(&systems);
-        Ok(Self { facts, instances, systems, ratios })
+        Ok(Self { facts, shown, systems, ratios })
     }
 }

@@ -18,6 +18,7 @@ use super::first::{FirstBuild, FirstBuilds};
 use super::input::Input;
 use super::numbers::SystemNumbers;
 use super::samples::{Record, RunRecord, Watch};
+use super::shown::Shown;
 use super::stage::Stage;
 use super::system::{Bytes, System};
 use super::workloads::{Amount, Rays, Workload};
@@ -35,10 +36,10 @@ pub struct Plan {
     pub workloads: Vec<Workload>,
     /// Questions of each workload.
     pub amount: Amount,
-    /// Instances of each mesh, in a field; 0 for the mesh as it is.
-    pub instances: u32,
-    /// Builds a scene for the first time, with so many instances.
-    pub first: fn(&str, u32, &dyn System) -> Result<FirstBuild>,
+    /// The content of each scene.
+    pub shown: Shown,
+    /// Builds for the first time over what a scene shows.
+    pub first: fn(&str, Shown, &dyn System) -> Result<FirstBuild>,
 }
 
 /// Builds and traces with every system.
@@ -55,9 +56,8 @@ pub fn race(
 ) -> Result<Vec<SystemNumbers>> {
     let Plan { repeat, ref workloads, .. } = *plan;
     let mut stage = Stage::new(input, rays)?;
-    let of_instances = !input.instances().is_empty();
-    let records =
-        systems.iter().map(|system| Record::new(system.as_ref(), workloads, of_instances));
+    let shown = input.shown();
+    let records = systems.iter().map(|system| Record::new(system.as_ref(), workloads, shown));
     let mut records: Vec<_> = records.collect();
     for repetition in 1..=repeat {
         for (system, record) in systems.iter().zip(&mut records) {
@@ -154,10 +154,10 @@ mod tests {
             repeat,
             workloads: Workload::ALL.to_vec(),
             amount,
-            instances: 0,
+            shown: Shown::Mesh,
             first: |_, _, _| Ok(FirstBuild { seconds: 1.0, page_faults: None }),
         };
-        let first = |system: &dyn System| (plan.first)("", 0, system);
+        let first = |system: &dyn System| (plan.first)("", plan.shown, system);
         race(&input, &rays, systems, &plan, &first, &mut Progress::new("", 0))
     }
 

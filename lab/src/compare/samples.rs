@@ -6,6 +6,7 @@ use super::input::Input;
 use super::mode::Mode;
 use super::numbers::{Build, Run, SystemNumbers};
 use super::process::page_faults;
+use super::shown::Shown;
 use super::system::{Bytes, System};
 use super::workloads::{Rays, Workload};
 use crate::measure::median;
@@ -77,9 +78,9 @@ impl Watch {
 
 impl Record {
     /// Nothing yet, for the workloads in every mode of the system.
-    pub(super) fn new(system: &dyn System, workloads: &[Workload], of_instances: bool) -> Self {
+    pub(super) fn new(system: &dyn System, workloads: &[Workload], shown: Shown) -> Self {
         let runs = workloads.iter().flat_map(|&workload| {
-            system.modes(workload, of_instances).iter().map(move |&mode| RunRecord {
+            system.modes(workload, shown).iter().map(move |&mode| RunRecord {
                 workload,
                 mode,
                 samples: Samples::default(),
@@ -117,7 +118,7 @@ impl Record {
             first_build: self.first_build.build(),
             rebuild: self.rebuild.build(),
             triangles: input.indices().len() as u64,
-            instances: input.instances().len() as u64,
+            shown: input.shown(),
             index_bytes: self.bytes.index as u64,
             peak_bytes: self.bytes.peak as u64,
             runs: runs.collect(),

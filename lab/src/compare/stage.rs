@@ -10,6 +10,7 @@ use super::input::Input;
 use super::mode::Mode;
 use super::points::Points;
 use super::samples::{RunRecord, Watch};
+use super::shown::Shown;
 use super::system::Tracer;
 use super::workloads::{Rays, Workload};
 use crate::shade::{Rgb, Shader};
@@ -18,7 +19,7 @@ use crate::tiles::TILE_RAYS;
 /// The questions that all systems share, and room for answers.
 pub(super) struct Stage<'a> {
     rays: &'a Rays,
-    /// The shader of the mesh; none with instances, as it does not know how they turn its surface.
+    /// The shader of the mesh; none for others, whose surfaces it does not know.
     shader: Option<Shader<'a>>,
     pixels: Vec<Rgb>,
     hits: Vec<Hit>,
@@ -30,7 +31,7 @@ impl<'a> Stage<'a> {
     pub(super) fn new(input: &'a Input, rays: &'a Rays) -> Result<Self> {
         let pixels = rays.primary_hits.len();
         let shader = Shader::new(input.mesh()?, &rays.tiles.camera);
-        let shader = input.instances().is_empty().then_some(shader);
+        let shader = (input.shown() == Shown::Mesh).then_some(shader);
         Ok(Self {
             rays,
             shader,

@@ -9,6 +9,7 @@ use hgrid_core::{Hit, INVALID_ID, Ray};
 use super::input::Input;
 use super::mode::Mode;
 use super::samples::Watch;
+use super::shown::Shown;
 use super::workloads::Workload;
 
 /// Returns true if an answer is a hit.
@@ -44,10 +45,10 @@ pub trait System {
         None
     }
 
-    /// The ways to ask for a workload that make sense, on a mesh or on instances of it; none if the
+    /// The ways to ask for a workload that make sense, on what is shown; none if the
     /// system does not answer it.
-    fn modes(&self, workload: Workload, of_instances: bool) -> &'static [Mode] {
-        if of_instances { &[] } else { one_by_one(workload) }
+    fn modes(&self, workload: Workload, shown: Shown) -> &'static [Mode] {
+        if shown == Shown::Mesh { one_by_one(workload) } else { &[] }
     }
 
     /// Builds and calls `then` with the structure. What happens before that call is the build.

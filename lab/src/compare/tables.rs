@@ -5,6 +5,7 @@ use comfy_table::{Cell, CellAlignment, Table, presets};
 use super::mode::Mode;
 use super::numbers::{Comparison, Kind, Run, SceneNumbers, SystemNumbers};
 use super::ratios::Ratio;
+use super::shown::Shown;
 use super::workloads::{AO_REACH, Workload};
 use crate::measure::ratio;
 use crate::table::{count, display_name, markdown as as_markdown, seconds, times};
@@ -70,12 +71,20 @@ impl Comparison {
              beside it."
                 .to_owned(),
         ];
-        if self.scenes.iter().any(|scene| scene.instances > 0) {
+        if self.scenes.iter().any(|scene| scene.shown.instances() > 0) {
             notes.push(format!(
                 "Instances: first builds are of the mesh's structure and the scene over it, rebuilds of the \
                  scene alone; bytes are those of the scene alone. Primary rays are not shaded, and ao is \
                  {AO_REACH} of the mesh's diagonal long."
             ));
+        }
+        if self.scenes.iter().any(|scene| scene.shown == Shown::Spheres) {
+            notes.push(
+                "Spheres: one in place of each triangle, tested by the same function of the caller's for all. Bytes \
+                 per sphere are without the spheres, and of hgrid with the boxes that it keeps. Primary rays are \
+                 not shaded."
+                    .to_owned(),
+            );
         }
         notes.extend(self.versions());
         notes
@@ -104,11 +113,14 @@ impl SceneNumbers {
         };
         let hits: Vec<_> = Workload::ALL.into_iter().filter_map(hits).collect();
         let (name, triangles) = (display_name(&self.facts.scene), count(self.facts.triangles));
-        let instances = match self.instances {
-            0 => String::new(),
-            instances => format!("{} instances of ", count(instances as usize)),
+        let shown = match self.shown {
+            Shown::Mesh => format!("{triangles} triangles"),
+            Shown::Instances(instances) => {
+                format!("{} instances of {triangles} triangles", count(instances as usize))
+            }
+            Shown::Spheres => format!("{triangles} spheres"),
         };
-        format!("{name}: {instances}{triangles} triangles, hits: {}", hits.join(", "))
+        format!("{name}: {shown}, hits: {}", hits.join(", "))
     }
 
     fn tables(&self) -> impl Iterator<Item = Table> + '_ {
@@ -119,15 +131,14 @@ impl SceneNumbers {
         core::iter::once(self.builds()).chain(queries).chain(ratios)
     }
 
-    /// Builds, first images and memory. With instances, the build time of each in place of images.
+    /// Builds, first images and memory. With instances or spheres, the build time of each in place of images.
     fn builds(&self) -> Table {
-        let of_instances = self.instances > 0;
-        let item = if of_instances { "inst" } else { "tri" };
+        let (has_images, item) = (self.shown == Shown::Mesh, self.shown.short_item());
         let images = ["first image (s)", "image, rebuilt (s)"].map(str::to_owned).to_vec();
         let header = ["structure", "primary rays", "first build (s)", "rebuild (s)"];
         let header = header.map(str::to_owned).into_iter();
         let header = header
-            .chain(if of_instances { vec![format!("rebuild (ns/{item})")] } else { images })
+            .chain(if has_images { images } else { vec![format!("rebuild (ns/{item})")] })
             .chain([format!("index (B/{item})"), format!("peak (B/{item})")])
             .chain(["first faults", "rebuild faults"].map(str::to_owned));
         let mut table = table(header);
@@ -135,10 +146,10 @@ impl SceneNumbers {
         for system in &self.systems {
             let image = |kind| system.time_to_image(kind).map(seconds).unwrap_or_default();
             let each = 1e9 * system.rebuild.seconds / ratio(system.items(), 1);
-            let times = if of_instances {
-                vec![format!("{each:.1}")]
-            } else {
+            let times = if has_images {
                 vec![image(Kind::First), image(Kind::Rebuild)]
+            } else {
+                vec![format!("{each:.1}")]
             };
             let mode = system.best(Workload::Primary).map(|run| run.mode.name());
             let SystemNumbers { first_build, rebuild, .. } = system;

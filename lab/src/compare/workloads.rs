@@ -6,12 +6,14 @@
 
 use anyhow::{Context as _, Result};
 use clap::ValueEnum;
-use hgrid_core::{Config, Control, Grid, Hit, Object, Ray, Scene};
+use hgrid_core::{Config, Control, Grid, Hit, Object, Ray, Scene, Shapes};
 use serde::Serialize;
 
 use super::input::Input;
 use super::points::Points;
 use super::random::Random;
+use super::shown::Shown;
+use super::spheres::{self, Sphere};
 use crate::field::Memory;
 use crate::regions::Regions;
 use crate::scene::Bounds;
@@ -149,9 +151,16 @@ impl Rays {
         let count = u32::try_from(input.instances().len())?;
         let (config, control) = (Config::default(), Control::default());
         let mut memory = Memory::new(count, &config, 1)?;
-        let asked = match input.instances() {
-            [] => Asks::Mesh(grid),
-            instances => Asks::Field(memory.build(instances, &objects, &config, &control)?),
+        let mut of_spheres = spheres::Memory::new(input.spheres(), &config)?;
+        let asked = match input.shown() {
+            Shown::Mesh => Asks::Mesh(grid),
+            Shown::Instances(_) => {
+                Asks::Field(memory.build(input.instances(), &objects, &config, &control)?)
+            }
+            Shown::Spheres => {
+                let spheres = input.spheres();
+                Asks::Spheres(of_spheres.build(spheres, &config)?, spheres)
+            }
         };
         let closest = |ray: &Ray| asked.closest(ray).0;
 
@@ -197,14 +206,16 @@ impl Rays {
     }
 }
 
-/// The structure that gives the answers: the default method on the mesh, or a scene of its instances.
+/// The structure that gives the answers: the default method on the mesh, a scene of its instances, or a tree over
+/// spheres.
 enum Asks<'a> {
     Mesh(Grid<'a>),
     Field(Scene<'a>),
+    Spheres(Shapes<'a>, &'a [Sphere]),
 }
 
 impl Asks<'_> {
-    /// The closest hit, and the normal of the triangle if there is one with an area.
+    /// The closest hit, and the normal there unless it is on a triangle without an area.
     fn closest(&self, ray: &Ray) -> (Hit, Option<Vector>) {
         match self {
             Self::Mesh(grid) => {
@@ -217,6 +228,11 @@ impl Asks<'_> {
                 let normal = found.and_then(|hit| scene.triangle_normal(&hit));
                 (found.map_or(Hit::MISS, on_mesh), normal.map(|normal| normal.map(f64::from)))
             }
+            Self::Spheres(shapes, spheres) => {
+                let hit = shapes.intersect(ray, &mut spheres::test(spheres)).unwrap_or(Hit::MISS);
+                let sphere = spheres.get(hit.primitive as usize);
+                (hit, sphere.and_then(|sphere| sphere.normal_at(ray, hit.t)))
+            }
         }
     }
 
@@ -224,6 +240,7 @@ impl Asks<'_> {
         match self {
             Self::Mesh(grid) => grid.occluded(ray),
             Self::Field(scene) => scene.occluded(&ray.into()),
+            Self::Spheres(shapes, spheres) => shapes.occluded(ray, &mut spheres::test(spheres)),
         }
     }
 }

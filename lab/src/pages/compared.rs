@@ -22,6 +22,9 @@ struct Scene {
     /// Results from before there were instances have none.
     #[serde(default)]
     instances: usize,
+    /// Likewise of spheres in place of the triangles.
+    #[serde(default)]
+    spheres: bool,
     systems: Vec<System>,
     ratios: Vec<Ratio>,
 }
@@ -81,9 +84,10 @@ fn scenes(files: &[Comparison]) -> impl Iterator<Item = (String, &Scene)> {
 }
 
 impl Scene {
-    /// The number of triangles, and that of instances if there are any.
+    /// The number of triangles or spheres, and that of instances if there are any.
     fn size(&self) -> String {
         match self.instances {
+            0 if self.spheres => format!("{} spheres", count(self.triangles)),
             0 => count(self.triangles),
             instances => format!("{} instances of {}", count(instances), count(self.triangles)),
         }
@@ -181,4 +185,23 @@ fn table(title: &str, columns: impl IntoIterator<Item = String>) -> Table {
         column.set_cell_alignment(CellAlignment::Right);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_tell_what_is_shown() {
+        let size = |fields: &str| {
+            let json = format!(
+                r#"{{"scene": "a.ply", "triangles": 2000, {fields} "systems": [], "ratios": []}}"#
+            );
+            serde_json::from_str::<Scene>(&json).unwrap().size()
+        };
+        // Results from before there were instances and spheres have neither field.
+        assert_eq!(size(""), "2.00K");
+        assert_eq!(size(r#""instances": 40,"#), "40 instances of 2.00K");
+        assert_eq!(size(r#""instances": 0, "spheres": true,"#), "2.00K spheres");
+    }
 }

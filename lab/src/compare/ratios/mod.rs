@@ -24,7 +24,7 @@ pub struct Ratio {
     pub what: String,
     /// The method and mode of hgrid.
     pub hgrid: String,
-    /// Median seconds of hgrid, or its bytes for each triangle or instance.
+    /// Median seconds of hgrid, or its bytes for each triangle, instance or sphere.
     pub value: f64,
     /// The peer and its mode.
     pub peer: String,
@@ -86,8 +86,7 @@ fn builds(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>>
     let bytes = |what: &str, of: fn(&SystemNumbers) -> f64| {
         let entries = peers.iter().map(|peer| Entry::number(peer, of));
         let theirs = least(entries.filter(|entry| entry.value > 0.0))?;
-        let item = if hgrid.instances > 0 { "instance" } else { "triangle" };
-        let what = format!("{what} per {item} / best peer");
+        let what = format!("{what} per {} / best peer", hgrid.shown.item());
         Ratio::new(what, &Entry::number(hgrid, of), &theirs)
     };
     vec![
@@ -166,6 +165,7 @@ fn library(peer: &SystemNumbers) -> &str {
 mod tests {
     use super::super::mode::{Hint, Lanes};
     use super::super::numbers::{Build, Run};
+    use super::super::shown::Shown;
     use super::*;
 
     /// Workload, mode, seconds in each repetition, rays that differ.
@@ -195,7 +195,7 @@ mod tests {
             first_build: build(2.0),
             rebuild: build(1.0),
             triangles: 100,
-            instances: 0,
+            shown: Shown::Mesh,
             index_bytes: match name {
                 "tinybvh2" => 4000,
                 _ if is_peer => 8000,

@@ -8,9 +8,10 @@ use anyhow::{Result, ensure};
 use hgrid_core::Instance;
 
 use super::ffi;
-use super::query::Buffers;
+use super::query::{Buffers, bounds, intersect, occluded};
 use crate::compare::heap;
 use crate::compare::input::Input;
+use crate::compare::shown::Shown;
 use crate::compare::system::Bytes;
 use crate::vector::round;
 
@@ -94,6 +95,33 @@ impl Device {
         unsafe { ffi::rtcSetGeometryBuildQuality(geometry, quality.number()) };
         share(geometry, ffi::BUFFER_TYPE_VERTEX, ffi::FORMAT_FLOAT3, input.positions());
         share(geometry, ffi::BUFFER_TYPE_INDEX, ffi::FORMAT_UINT3, input.indices());
+        scene.attach(geometry);
+        scene.commit()?;
+        Ok(scene)
+    }
+
+    /// Builds a scene of one geometry whose primitives are spheres.
+    pub(super) fn build_spheres<'a>(
+        &'a self,
+        input: &'a Input,
+        quality: Quality,
+    ) -> Result<Scene<'a>> {
+        let scene = self.start(input, None, quality)?;
+        let geometry = self.geometry(ffi::GEOMETRY_TYPE_USER)?;
+        let count = u32::try_from(input.spheres().len())?;
+        let user = ptr::from_ref(input).cast_mut().cast();
+        // SAFETY: the geometry is a live one, here and below.
+        unsafe { ffi::rtcSetGeometryBuildQuality(geometry, quality.number()) };
+        // SAFETY: as above.
+        unsafe { ffi::rtcSetGeometryUserPrimitiveCount(geometry, count) };
+        // SAFETY: as above; the input outlives the scene, which borrows it, and is only read.
+        unsafe { ffi::rtcSetGeometryUserData(geometry, user) };
+        // SAFETY: as above; the function takes the arguments of the header and this user data.
+        unsafe { ffi::rtcSetGeometryBoundsFunction(geometry, bounds, ptr::null_mut()) };
+        // SAFETY: as above.
+        unsafe { ffi::rtcSetGeometryIntersectFunction(geometry, intersect) };
+        // SAFETY: as above.
+        unsafe { ffi::rtcSetGeometryOccludedFunction(geometry, occluded) };
         scene.attach(geometry);
         scene.commit()?;
         Ok(scene)
@@ -232,7 +260,7 @@ impl Scene<'_> {
         self.device.check()
     }
 
-    /// Builds again, as if all vertices, or all instances, had moved.
+    /// Builds again, as if all vertices, spheres or instances had moved.
     pub(super) fn rebuild(&self) -> Result<()> {
         // SAFETY: the scene is a live one and holds the geometries that were attached to it, numbered
         // from 0 on.
@@ -246,8 +274,10 @@ impl Scene<'_> {
             }
         } else {
             let geometry = geometry(0);
-            // SAFETY: as above.
-            unsafe { ffi::rtcUpdateGeometryBuffer(geometry, ffi::BUFFER_TYPE_VERTEX, 0) };
+            if self.input.shown() == Shown::Mesh {
+                // SAFETY: as above.
+                unsafe { ffi::rtcUpdateGeometryBuffer(geometry, ffi::BUFFER_TYPE_VERTEX, 0) };
+            }
             // SAFETY: as above.
             unsafe { ffi::rtcCommitGeometry(geometry) };
         }

@@ -15,9 +15,10 @@ pub(super) const FORMAT_FLOAT3: c_uint = 0x9003;
 /// `RTC_FORMAT_FLOAT3X4_ROW_MAJOR`.
 pub(super) const FORMAT_FLOAT3X4: c_uint = 0x9134;
 
-/// `RTC_GEOMETRY_TYPE_TRIANGLE`, `RTC_GEOMETRY_TYPE_INSTANCE`, `RTC_BUFFER_TYPE_INDEX` and
-/// `RTC_BUFFER_TYPE_VERTEX`.
+/// `RTC_GEOMETRY_TYPE_TRIANGLE`, `RTC_GEOMETRY_TYPE_USER`, `RTC_GEOMETRY_TYPE_INSTANCE`, `RTC_BUFFER_TYPE_INDEX`
+/// and `RTC_BUFFER_TYPE_VERTEX`.
 pub(super) const GEOMETRY_TYPE_TRIANGLE: c_uint = 0;
+pub(super) const GEOMETRY_TYPE_USER: c_uint = 120;
 pub(super) const GEOMETRY_TYPE_INSTANCE: c_uint = 121;
 pub(super) const BUFFER_TYPE_INDEX: c_uint = 0;
 pub(super) const BUFFER_TYPE_VERTEX: c_uint = 1;
@@ -153,6 +154,43 @@ pub(super) struct PointArguments {
 /// `RTCPointQueryFunction`.
 pub(super) type PointFunction = unsafe extern "C" fn(*mut PointArguments) -> bool;
 
+/// `RTCBounds`.
+#[repr(C, align(16))]
+pub(super) struct Bounds {
+    pub(super) lower: [f32; 3],
+    pub(super) align0: f32,
+    pub(super) upper: [f32; 3],
+    pub(super) align1: f32,
+}
+
+/// `RTCBoundsFunctionArguments`.
+#[repr(C)]
+pub(super) struct BoundsArguments {
+    pub(super) user: *mut c_void,
+    pub(super) primitive: c_uint,
+    pub(super) time_step: c_uint,
+    pub(super) bounds: *mut Bounds,
+}
+
+/// `RTCIntersectFunctionNArguments` and `RTCOccludedFunctionNArguments`, which differ in what `rays` points to:
+/// twelve numbers of each ray, and eight more of its hit in the first.
+#[repr(C)]
+pub(super) struct ShapeArguments {
+    pub(super) valid: *const c_int,
+    pub(super) user: *mut c_void,
+    pub(super) primitive: c_uint,
+    pub(super) context: *mut Context,
+    pub(super) rays: *mut c_void,
+    pub(super) lanes: c_uint,
+    pub(super) geometry: c_uint,
+}
+
+/// `RTCBoundsFunction`.
+pub(super) type BoundsFunction = unsafe extern "C" fn(*const BoundsArguments);
+
+/// `RTCIntersectFunctionN` and `RTCOccludedFunctionN`.
+pub(super) type ShapeFunction = unsafe extern "C" fn(*const ShapeArguments);
+
 /// Marks of the rays of a packet: -1 for those that are there, 0 for the others.
 #[repr(C, align(64))]
 pub(super) struct Valid<const LANES: usize>(pub(super) [c_int; LANES]);
@@ -169,6 +207,8 @@ pub(super) type OccludedPacket<const LANES: usize> =
 const _: () = assert!(size_of::<Context>() == 24 && size_of::<RayHit1>() == 80);
 const _: () = assert!(size_of::<PointQuery>() == 32 && size_of::<PointContext>() == 144);
 const _: () = assert!(size_of::<PointArguments>() == 48);
+const _: () = assert!(size_of::<Bounds>() == 32 && size_of::<BoundsArguments>() == 24);
+const _: () = assert!(size_of::<ShapeArguments>() == 48);
 const _: () = assert!(size_of::<Rays<4>>() == 12 * 16 && size_of::<RayHits<4>>() == 20 * 16);
 const _: () = assert!(size_of::<Rays<8>>() == 12 * 32 && size_of::<RayHits<8>>() == 20 * 32);
 const _: () = assert!(size_of::<Rays<16>>() == 12 * 64 && size_of::<RayHits<16>>() == 20 * 64);
@@ -196,6 +236,15 @@ unsafe extern "C" {
         byte_stride: usize,
         item_count: usize,
     );
+    pub(super) fn rtcSetGeometryUserPrimitiveCount(geometry: Geometry, count: c_uint);
+    pub(super) fn rtcSetGeometryUserData(geometry: Geometry, user: *mut c_void);
+    pub(super) fn rtcSetGeometryBoundsFunction(
+        geometry: Geometry,
+        bounds: BoundsFunction,
+        user: *mut c_void,
+    );
+    pub(super) fn rtcSetGeometryIntersectFunction(geometry: Geometry, intersect: ShapeFunction);
+    pub(super) fn rtcSetGeometryOccludedFunction(geometry: Geometry, occluded: ShapeFunction);
     pub(super) fn rtcSetGeometryInstancedScene(geometry: Geometry, scene: Scene);
     pub(super) fn rtcSetGeometryTransform(
         geometry: Geometry,

@@ -1,5 +1,5 @@
-//! Embree 3: a device with one thread, the mesh's own arrays as shared buffers, and a geometry for each
-//! instance of it.
+//! Embree 3: a device with one thread, the mesh's own arrays as shared buffers, a geometry for each instance of it,
+//! and one of the caller's own for spheres.
 //!
 //! ```text
 //! mod     System and Tracer: which query for which mode
@@ -20,6 +20,7 @@ use hgrid_core::{Hit, Ray};
 use super::Peer;
 use crate::compare::input::Input;
 use crate::compare::mode::{Hint, Lanes, Mode};
+use crate::compare::shown::Shown;
 use crate::compare::system::{Bytes, System, Tracer, Use, warm_up};
 use crate::compare::workloads::Workload;
 pub(super) use device::Quality;
@@ -71,29 +72,34 @@ impl System for Embree {
         Some(format!("Embree {}", self.device.version()))
     }
 
-    fn modes(&self, workload: Workload, of_instances: bool) -> &'static [Mode] {
-        match (workload.asks_points(), of_instances) {
-            (true, true) => &[],
-            (true, false) => &[Mode::Single],
-            (false, true) => UNHINTED,
-            (false, false) => ALL,
+    fn modes(&self, workload: Workload, shown: Shown) -> &'static [Mode] {
+        match shown {
+            Shown::Mesh if workload.asks_points() => &[Mode::Single],
+            _ if workload.asks_points() => &[],
+            Shown::Mesh | Shown::Spheres => ALL,
+            Shown::Instances(_) => UNHINTED,
         }
     }
 
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
-        let mesh = self.device.build(input, self.quality)?;
-        if input.instances().is_empty() {
-            return then(&mesh);
+        let Self { device, quality, .. } = self;
+        match input.shown() {
+            Shown::Mesh => then(&device.build(input, *quality)?),
+            Shown::Instances(_) => {
+                let mesh = device.build(input, *quality)?;
+                then(&device.build_instances(&mesh, *quality)?)
+            }
+            Shown::Spheres => then(&device.build_spheres(input, *quality)?),
         }
-        then(&self.device.build_instances(&mesh, self.quality)?)
     }
 
     fn rebuild(&self, input: &Input, start: &mut dyn FnMut(), then: &mut Use<'_>) -> Result<()> {
         let Self { device, quality, .. } = self;
-        let of_instances = !input.instances().is_empty();
+        let of_instances = input.shown().instances() > 0;
         let mesh = of_instances.then(|| device.build(input, *quality)).transpose()?;
         let build = || match &mesh {
             Some(mesh) => device.build_instances(mesh, *quality),
+            None if input.shown() == Shown::Spheres => device.build_spheres(input, *quality),
             None => device.build(input, *quality),
         };
         if matches!(quality, Quality::Dynamic) {

@@ -5,11 +5,13 @@
 //! packet   rtcIntersect4, 8 and 16, rtcOccluded4, 8 and 16
 //! stream   rtcIntersect1M, rtcOccluded1M
 //! point    rtcPointQuery
+//! sphere   the functions that Embree calls for spheres
 //! ```
 
 mod packet;
 mod point;
 mod single;
+mod sphere;
 mod stream;
 
 use hgrid_core::{Hit, Ray};
@@ -17,6 +19,7 @@ use hgrid_core::{Hit, Ray};
 use super::ffi::{self, Context, Hit1, Ray1, RayHit1};
 use crate::compare::mode::Hint;
 
+pub(super) use sphere::{bounds, intersect, occluded};
 pub(super) use stream::Buffers;
 
 /// Returns the context for all rays of a call.
