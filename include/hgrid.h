@@ -881,8 +881,9 @@ typedef struct hgrid_query_options {
     struct hgrid_counters *counters;
     /**
      * Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. It may have
-     * any alignment and hold anything. It may overlap neither rays, answers, mesh nor blob, and each
-     * thread needs its own. Queries of one ray or point do not look at it.
+     * any alignment and hold anything. It may overlap neither rays, answers, mesh nor blob, for shapes neither
+     * boxes nor view. Each thread needs its own, and a filter or test may not lend it again while the call
+     * runs. Queries of one ray or point do not look at it.
      */
     void *scratch;
     /**
@@ -2602,11 +2603,12 @@ bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
                            const struct hgrid_query_options *options);
 
 /**
- * Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for bit, but
- * sooner.
+ * Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for bit, and
+ * sooner for rays near each other.
  *
  * It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the same. A
- * miss writes a hit, too. The test is called ray by ray, for a ray and a shape at most once, on the thread that calls.
+ * miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; rays of a batch take turns. It
+ * runs on the thread that calls.
  *
  * ```c
  * static size_t trace_tile_of_shapes(const hgrid_shapes *shapes, const hgrid_ray rays[64], hgrid_hit hits[64])
@@ -2960,7 +2962,7 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
 
 /**
  * Finds the closest thing in a scene that each of many rays hits: what `hgrid_intersect_scene` would find
- * for each, bit for bit, but sooner.
+ * for each, bit for bit, and sooner for rays near each other.
  *
  * It is to a scene what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are
  * the same: a ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of `hits`.
@@ -2996,7 +2998,8 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
  * stride, or a count that is impossible), `HGRID_ERROR_OVERLAP` (also of `scratch`),
  * `HGRID_ERROR_INVALID_COHERENCE`. An invalid ray (a NaN, say, or no direction) is no error: it misses.
  *
- * The call allocates nothing. It needs at most 80 KiB of stack, and 8 KiB more for each scene inside the scene.
+ * The call allocates nothing. It needs at most 80 KiB of stack, and 8 KiB more for each scene inside the
+ * scene, and what the tests of shapes need.
  *
  * Threads: any number of queries on the same scene at once; each thread with hits and counters of its own.
  *

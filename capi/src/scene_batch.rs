@@ -2,14 +2,14 @@
 
 use hgrid_core::{Scene, SceneOptions};
 
-use crate::query_types::{coherence as known, hgrid_coherence};
+use crate::query_types::{self, hgrid_coherence};
 use crate::raw;
 use crate::raw::BatchArrays;
 use crate::scene::{hgrid_ray_f64, hgrid_scene, hgrid_scene_hit, hgrid_scene_options};
 use crate::status::{HGRID_OK, hgrid_status};
 
 /// Finds the closest thing in a scene that each of many rays hits: what `hgrid_intersect_scene` would find
-/// for each, bit for bit, but sooner.
+/// for each, bit for bit, and sooner for rays near each other.
 ///
 /// It is to a scene what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are
 /// the same: a ray lies every `ray_stride` bytes from `rays` on, and its hit goes to the same place of `hits`.
@@ -45,7 +45,8 @@ use crate::status::{HGRID_OK, hgrid_status};
 /// stride, or a count that is impossible), `HGRID_ERROR_OVERLAP` (also of `scratch`),
 /// `HGRID_ERROR_INVALID_COHERENCE`. An invalid ray (a NaN, say, or no direction) is no error: it misses.
 ///
-/// The call allocates nothing. It needs at most 80 KiB of stack, and 8 KiB more for each scene inside the scene.
+/// The call allocates nothing. It needs at most 80 KiB of stack, and 8 KiB more for each scene inside the
+/// scene, and what the tests of shapes need.
 ///
 /// Threads: any number of queries on the same scene at once; each thread with hits and counters of its own.
 ///
@@ -64,7 +65,7 @@ pub unsafe extern "C" fn hgrid_intersect_scene_n(
 ) -> hgrid_status {
     let call = || {
         let batch = BatchArrays::new((rays, ray_stride), (hits, hit_stride), count)?;
-        let coherence = known(coherence)?;
+        let coherence = query_types::coherence(coherence)?;
         let trace = |scene: &Scene<'_>,
                      rays: &mut raw::Arrays<'_, hgrid_ray_f64, hgrid_scene_hit>,
                      options: &mut SceneOptions<'_>| {
@@ -101,7 +102,7 @@ pub unsafe extern "C" fn hgrid_occluded_scene_n(
 ) -> hgrid_status {
     let call = || {
         let batch = BatchArrays::new((rays, ray_stride), (occluded, occluded_stride), count)?;
-        let coherence = known(coherence)?;
+        let coherence = query_types::coherence(coherence)?;
         let trace = |scene: &Scene<'_>,
                      rays: &mut raw::Arrays<'_, hgrid_ray_f64, u8>,
                      options: &mut SceneOptions<'_>| {

@@ -7,8 +7,7 @@ use core::ptr::NonNull;
 use hgrid_core::{QueryOptions, ShapeHit, ShapeTest, Shapes};
 
 use crate::query_types::{
-    coherence as known, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray,
-    hgrid_refit_report,
+    self, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray, hgrid_refit_report,
 };
 use crate::raw;
 use crate::raw::BatchArrays;
@@ -267,11 +266,12 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
     matches!(unsafe { raw::query_shapes(shapes, ray, options, true) }, Ok(Some(_)))
 }
 
-/// Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for bit, but
-/// sooner.
+/// Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for bit, and
+/// sooner for rays near each other.
 ///
 /// It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the same. A
-/// miss writes a hit, too. The test is called ray by ray, for a ray and a shape at most once, on the thread that calls.
+/// miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; rays of a batch take turns. It
+/// runs on the thread that calls.
 ///
 /// ```c
 /// static size_t trace_tile_of_shapes(const hgrid_shapes *shapes, const hgrid_ray rays[64], hgrid_hit hits[64])
@@ -313,7 +313,7 @@ pub unsafe extern "C" fn hgrid_intersect_shapes_n(
 ) -> hgrid_status {
     let call = || {
         let batch = BatchArrays::new((rays, ray_stride), (hits, hit_stride), count)?;
-        let coherence = known(coherence)?;
+        let coherence = query_types::coherence(coherence)?;
         let trace = |shapes: &Shapes<'_>,
                      rays: &mut raw::Arrays<'_, hgrid_ray, hgrid_hit>,
                      options: &mut QueryOptions<'_>,
@@ -349,7 +349,7 @@ pub unsafe extern "C" fn hgrid_occluded_shapes_n(
 ) -> hgrid_status {
     let call = || {
         let batch = BatchArrays::new((rays, ray_stride), (occluded, occluded_stride), count)?;
-        let coherence = known(coherence)?;
+        let coherence = query_types::coherence(coherence)?;
         let trace = |shapes: &Shapes<'_>,
                      rays: &mut raw::Arrays<'_, hgrid_ray, u8>,
                      options: &mut QueryOptions<'_>,

@@ -70,7 +70,7 @@ pub(crate) struct Header {
     pub(crate) subdivide_above: u32,
     /// Levels of grids; 0 for a method without nested grids.
     pub(crate) depth: u32,
-    /// The content, as [`Content`] numbers it.
+    /// The primitives that it is built over, as [`Content`] numbers them.
     content: u32,
     /// True if the mesh lies behind the grid: see [`HasMesh`]. Above these two bits the number of parts that
     /// the mesh was joined from, 0 if it was not.

@@ -9,7 +9,7 @@ use core::fmt;
 use crate::limits;
 use crate::method::{Content, Method};
 
-/// The one of the caller's two memory regions that an error speaks of.
+/// A memory region of the caller, which an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Region {
     /// The region that keeps the built grid.

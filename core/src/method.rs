@@ -113,7 +113,7 @@ impl Quality {
     }
 }
 
-/// The content of a blob.
+/// The primitives that a blob is built over.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Content {

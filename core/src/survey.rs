@@ -60,7 +60,7 @@ pub(crate) fn boxes<'m>(mesh: &'m TriangleMesh<'_>) -> impl Iterator<Item = (u32
 pub(crate) const fn reference_limit(triangles: u32) -> u32 {
     /// Several times what any scan needs, and what a scene of walls and floors needs.
     const PER_TRIANGLE: u32 = 16;
-    /// An addition, so that a handful of triangles is not denied the few cells it asks for.
+    /// Added so that a handful of triangles is not denied the few cells it asks for.
     const AT_LEAST: u32 = 64;
     triangles.saturating_mul(PER_TRIANGLE).saturating_add(AT_LEAST)
 }

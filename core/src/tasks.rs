@@ -98,9 +98,9 @@ mod with_atomics {
 
     use super::Control;
 
-    /// Values that tasks take along and bring back.
+    /// Implemented by values that tasks take along and bring back.
     pub(crate) use core::marker::Send as Portable;
-    /// Values that all tasks look at.
+    /// Implemented by values that all tasks look at.
     pub(crate) use core::marker::Sync as Lendable;
 
     /// A place from which one of several threads takes something.
@@ -154,12 +154,12 @@ mod without_atomics {
 
     use super::Control;
 
-    /// Values that tasks take along and bring back: on one core anything.
+    /// Implemented by values that tasks take along and bring back: on one core anything.
     pub(crate) trait Portable {}
 
     impl<T> Portable for T {}
 
-    /// Values that all tasks look at: on one core anything.
+    /// Implemented by values that all tasks look at: on one core anything.
     pub(crate) trait Lendable {}
 
     impl<T> Lendable for T {}

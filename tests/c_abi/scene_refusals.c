@@ -295,7 +295,7 @@ static void what_batches_refuse(void)
                  {shape_blob, shape_bytes},   {&spheres[7], 4},
                  {&spheres[7].mask, 4},       {&shapes, sizeof shapes},
                  {mesh_data.positions, 4},    {mesh_data.indices, 400},
-                 {&grid, sizeof grid}};
+                 {&grid, sizeof grid},         {&scene, sizeof scene}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         for (hgrid_coherence c = 0; c < 2; c++) {
             b = good_batch(), b.coherence = c, b.options = &options;

@@ -442,8 +442,8 @@ fn span_of(bytes: &[u8]) -> Span {
 }
 
 /// Where a view lies.
-fn view_of<T>(view: &T) -> Span {
-    Span::new(core::ptr::from_ref(view).cast(), size_of::<T>())
+fn view_of<T: ?Sized>(view: &T) -> Span {
+    Span::new(core::ptr::from_ref(view).cast(), size_of_val(view))
 }
 
 /// Returns true if a mesh reads something that lies in a span.

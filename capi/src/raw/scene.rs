@@ -220,11 +220,14 @@ fn reads(scene: &Scene<'_>, span: Span) -> bool {
                 || span_of(grid.blob()).overlaps(span)
                 || shares(grid.mesh(), span)
         }
-        Object::Scene(inner) => view_of(*inner).overlaps(span) || reads(inner, span),
-        Object::Shapes(shapes, _) => shapes_read(shapes, span),
+        Object::Scene(inner) => reads(inner, span),
+        Object::Shapes(shapes, test) => view_of(*test).overlaps(span) || shapes_read(shapes, span),
         Object::Nothing => false,
     };
-    span_of(scene.blob()).overlaps(span) || array.overlaps(span) || objects.iter().any(has)
+    view_of(scene).overlaps(span)
+        || span_of(scene.blob()).overlaps(span)
+        || array.overlaps(span)
+        || objects.iter().any(has)
 }
 
 /// Writes a scene and all that it shows.

@@ -239,11 +239,11 @@ pub(crate) unsafe fn query_shapes(
     }
 }
 
-/// Returns true if a tree of shapes reads something that lies in a span.
+/// Returns true if blob or boxes of a tree of shapes lie in a span.
 pub(super) fn shapes_read(shapes: &Shapes<'_>, span: Span) -> bool {
     let boxes = shapes.boxes();
     let arrays = [shapes.blob(), boxes.corners().bytes, boxes.masks().bytes];
-    view_of(shapes).overlaps(span) || arrays.iter().any(|array| span_of(array).overlaps(span))
+    arrays.iter().any(|array| span_of(array).overlaps(span))
 }
 
 /// Asks a tree of shapes for many rays: `trace` gets them as core asks for them, what the caller told, and the test.
@@ -275,7 +275,9 @@ pub(crate) unsafe fn shapes_batch<T>(
     let hgrid_query_options { scratch, scratch_bytes, .. } = asked.options;
     let scratch = Region { start: scratch, bytes: scratch_bytes };
     let span = scratch.span();
-    if batch.overlaps(span) || !span.is_empty() && shapes_read(&tested.shapes, span) {
+    if batch.overlaps(span)
+        || !span.is_empty() && (view_of(tested).overlaps(span) || shapes_read(&tested.shapes, span))
+    {
         return Err(HGRID_ERROR_OVERLAP);
     }
     // SAFETY: the caller's promise; nothing else that this call reads or writes lies there.

@@ -26,7 +26,7 @@ pub(crate) trait Together {
     /// The ray at a place.
     fn ray(&self, place: usize) -> Ray;
 
-    /// The ray at a place, which becomes that of a lane of the next group. Lanes are filled one after the other.
+    /// Loads the ray at a place into a lane of the next group, and returns it. Lanes are filled one after the other.
     #[inline(always)]
     fn load(&mut self, _lane: usize, place: usize) -> Ray {
         self.ray(place)

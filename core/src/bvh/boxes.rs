@@ -1,10 +1,10 @@
-//! The boxes of a node as numbers, and the slab tests of rays and beams against them.
+//! The boxes of a node or a leaf as numbers, and the slab tests of rays and beams against them.
 //!
 //! ```text
 //! decode      side = byte * step + node's origin - origin of the group
 //! beam        the interval of all rays against eight boxes: which are met by none, which by all
 //! one ray     against eight boxes
-//! eight rays  against one box
+//! more rays   sixteen against one box
 //! ```
 
 use fearless_simd::prelude::*;

@@ -30,7 +30,7 @@ pub(super) struct Leaf<'r> {
 
 /// The content of the leaves of a tree.
 pub(super) trait Leaves {
-    /// True if the first hit of a ray ends it, so that no order matters.
+    /// True if children may come in any order: the first hit of each ray ends it.
     const IS_ANY: bool;
 
     /// Returns true if rays that start far apart go together, too: in any order, they still share the first nodes, and
@@ -118,11 +118,12 @@ pub(crate) type Offer<'o> = dyn FnMut(u32, u64, &mut Rays) + 'o;
 /// Boxes, which are offered.
 pub(super) struct Boxes<'o, 'f> {
     pub(super) offer: &'o mut Offer<'f>,
-    /// True if what is offered ends a ray at its first hit.
+    /// True if the first hit of a ray ends it.
     pub(super) is_any: bool,
 }
 
 impl Leaves for Boxes<'_, '_> {
+    // Near to far for any hit, too: one kernel serves both.
     const IS_ANY: bool = false;
 
     #[inline(always)]

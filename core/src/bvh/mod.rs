@@ -18,7 +18,7 @@
 //! format         node, layout, validate
 //! build          build: census (key), bins, units, crowd, sort, roots (subtree), top; high/ for quality `high`
 //! one ray        search, walk (slab; shape_leaf for shapes)
-//! batches        batch: order, rays, group (boxes)
+//! batches        batch: order, rays, group (boxes, group_leaf)
 //! points         nearest
 //! moved meshes   refit
 //! ```

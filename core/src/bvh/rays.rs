@@ -40,6 +40,8 @@ pub(crate) struct Rays {
     pub(crate) alive: u64,
     /// The triangles that they see.
     choice: Choice,
+    /// True if nothing lies behind the origins: those of rays with a negative `t_min` were moved to the box of the tree.
+    pub(crate) start_outside: bool,
     /// The most that origins may be off, in scene units: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) off: f32,
     /// The point that boxes and origins are relative to.
@@ -86,6 +88,7 @@ impl Rays {
             alive: 0,
             choice,
             center: [0.0; 3],
+            start_outside: false,
             off: 0.0,
             spread: 0.0,
             growth: 0.0,
@@ -143,8 +146,9 @@ impl Rays {
             let is_valid = is_finite & longest.simd_gt(zero) & t_min.simd_le(t_max);
             let [a, b, c] = [(a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs()];
             // Boxes behind the start have margins that groups do not: see `Slab`.
+            let start = if self.start_outside { t_min.greater(zero) } else { t_min };
             let is_near = a.greater(b).greater(c).simd_le(near)
-                & t_min.simd_ge(zero)
+                & start.simd_ge(zero)
                 & longest.simd_gt(f32x8::splat(simd, NEARBY_SHORT))
                 & longest.simd_lt(f32x8::splat(simd, NEARBY_LONG));
             let of_count = bits_below(count - 8 * octet);
@@ -170,7 +174,7 @@ impl Rays {
                 self.anchor[axis][octet] = origin[axis].into();
             }
             let most = f32x8::splat(simd, f32::MAX);
-            let (start, end) = ((t_min * scale).lesser(most), t_max * scale);
+            let (start, end) = ((start * scale).lesser(most), t_max * scale);
             let tiny = scale.greater(f32x8::splat(simd, 1.0)) * TINY;
             self.start[octet] = (start - (start.abs() * EARLIER + tiny)).into();
             self.end[octet] = (end + (end.abs() * (WIDER - 1.0) + tiny)).into();

@@ -62,7 +62,7 @@ pub(crate) struct Subtree {
 /// The rule by which ranges are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cut {
-    /// At the change of the highest bit in which keys differ.
+    /// Cuts where the highest bit changes in which keys differ.
     Keys,
     /// In halves of whole leaves, the largest first: fewer nodes, worse boxes.
     Halves,

@@ -35,7 +35,7 @@ pub use scene::Member;
 pub struct BlobInfo {
     /// The version of the format.
     pub version: u32,
-    /// The content of the blob.
+    /// The primitives that it is built over.
     pub content: Content,
     /// The method that built it.
     pub method: Method,

@@ -108,6 +108,8 @@ struct SceneRays<'r> {
 
 impl<'r> SceneRays<'r> {
     fn new(scene: &'r Scene<'r>, question: Question) -> Self {
+        let mut inside = Rays::new(question.options().choice());
+        inside.start_outside = true;
         Self {
             scene,
             question,
@@ -116,7 +118,7 @@ impl<'r> SceneRays<'r> {
             best: [SceneHit::MISS; GROUP],
             seen: [Seen::NONE; GROUP],
             lanes: [0; GROUP],
-            inside: Rays::new(question.options().choice()),
+            inside,
             stack: Stack::new(),
         }
     }
@@ -200,6 +202,9 @@ impl<'r> SceneRays<'r> {
             self.seen[count % GROUP] = seen;
             self.lanes[count % GROUP] = lane;
             count += 1;
+        }
+        if count == 0 {
+            return;
         }
         let is_any = self.question.is_any;
         let options = &mut self.question.options();

@@ -199,7 +199,7 @@ pub(super) struct Seen {
 const FAR_EXTENTS: f64 = 4.0;
 
 impl Seen {
-    /// A place for a ray.
+    /// No ray: fills the places of a group.
     pub(super) const NONE: Self = {
         let line = LineF64 { origin: [0.0; 3], direction: [0.0; 3] };
         Self { line, scale: 1.0, shift: 0.0 }

@@ -107,7 +107,10 @@ pub struct ShapeHit {
 ///
 /// An answer outside the range, or NaN, is no hit. The test may be asked about a shape that the ray does not
 /// meet; it is asked about each shape at most once for a ray, about from near to far, but not exactly. It may
-/// query this tree and others.
+/// query this tree and others. Of the rays of a batch it is asked in turns.
+///
+/// All queries find the same hits if every hit lies inside the box of its shape, rounding included, and if the answer
+/// depends on the range in no other way.
 pub type ShapeTest<'q> = dyn FnMut(u32, &Ray) -> Option<ShapeHit> + 'q;
 
 /// A tree over the boxes of the caller's shapes, ready for queries.

@@ -149,7 +149,7 @@ impl Inside<'_> {
         Some((self.lattice.range(&bounds), self.lattice.reach(&bounds)))
     }
 
-    /// Returns the reaches of the triangles in it, each once: where its cells begin.
+    /// Returns the reaches of the triangles in it, each once: in the list of the first cell that it covers.
     fn reaches(&self) -> impl Iterator<Item = Aabb> {
         self.lists().flat_map(|(sub, ids)| ids.iter().map(move |&id| (sub, id))).filter_map(
             |(sub, id)| {
