@@ -91,7 +91,7 @@ inline namespace cpp14 {
 
 /// A ray, or the part of it from `t_min` to `t_max`. See `hgrid_ray`.
 using ray = ::hgrid_ray;
-/// Where a ray meets a triangle. See `hgrid_hit`.
+/// The hit of a ray on a triangle. See `hgrid_hit`.
 using hit = ::hgrid_hit;
 /// The nearest point of a mesh. See `hgrid_closest`.
 using closest = ::hgrid_closest;
@@ -99,20 +99,20 @@ using closest = ::hgrid_closest;
 using counters = ::hgrid_counters;
 /// Memory for one of the meshes that `mesh::join` joins. See `hgrid_part`.
 using part = ::hgrid_part;
-/// Where a ray met the mesh. See `hgrid_surface`.
+/// A point of a mesh where a ray met it. See `hgrid_surface`.
 using surface = ::hgrid_surface;
-/// What a build found out. See `hgrid_report`.
+/// The report of a build. See `hgrid_report`.
 struct report : ::hgrid_report {
     /// One before its call.
     report() noexcept : ::hgrid_report HGRID_REPORT_INIT {}
     /// One that a call in C has filled.
     report(const ::hgrid_report &raw) noexcept : ::hgrid_report(raw) {}
 };
-/// What a look at a whole grid found out. See `hgrid_statistics`.
+/// The statistics of a grid and its mesh. See `hgrid_statistics`.
 using statistics = ::hgrid_statistics;
-/// What a refit did. See `hgrid_refit_report`.
+/// The report of a refit. See `hgrid_refit_report`.
 using refit_report = ::hgrid_refit_report;
-/// What the first bytes of a blob say. See `hgrid_blob_info`.
+/// The contents of a blob's header. See `hgrid_blob_info`.
 using blob_info = ::hgrid_blob_info;
 /// A point or a direction: x, y, z.
 using point = std::array<float, 3>;
@@ -161,7 +161,7 @@ inline constexpr std::size_t validate_bound(std::size_t triangles) noexcept
 #pragma GCC diagnostic pop
 #endif
 
-/// What a call answers: `ok`, or why not. The numbers are those of `hgrid_status`, and a later library
+/// The answer of a call: `ok`, or why not. The numbers are those of `hgrid_status`, and a later library
 /// may return others than these.
 enum class HGRID_NODISCARD status : std::int32_t {
     /// `HGRID_OK`
@@ -279,7 +279,7 @@ enum class method : std::uint32_t {
     bvh = HGRID_METHOD_BVH,
 };
 
-/// What is known about the rays of a batch, and so in which order they are traced. It changes how
+/// Says what you know about the rays of a batch, and so in which order they are traced. It changes how
 /// fast the answers come, never the answers.
 enum class coherence : std::uint32_t {
     /// Nothing, they may be sorted: `HGRID_COHERENCE_INCOHERENT`
@@ -288,7 +288,7 @@ enum class coherence : std::uint32_t {
     coherent = HGRID_COHERENCE_COHERENT,
 };
 
-/// How much time a build of `method::bvh` takes for rays that are faster.
+/// The time that a build of `method::bvh` takes for rays that are faster.
 enum class quality : std::uint32_t {
     /// The shortest build: `HGRID_QUALITY_FAST`
     fast = HGRID_QUALITY_FAST,
@@ -306,7 +306,7 @@ enum class culling : std::uint32_t {
     front = HGRID_CULL_FRONT,
 };
 
-/// What a filter answers.
+/// The answer of a filter about a hit.
 enum class verdict : ::hgrid_verdict {
     /// As if the triangle were not there: `HGRID_REJECT`
     reject = HGRID_REJECT,
@@ -326,13 +326,13 @@ inline constexpr ray make_ray(const point &origin, const point &direction, float
             t_max};
 }
 
-/// Whether the library that is linked has the version of this header, but for repairs.
+/// Returns true if the library that is linked has the version of this header, but for repairs.
 inline bool is_compatible() noexcept
 {
     return ::hgrid_version() >> 8 == HGRID_VERSION >> 8;
 }
 
-/// Whether the library that is linked has a method: it may have been built with fewer, to be smaller.
+/// Returns true if the library that is linked has a method: it may have been built with fewer, to be smaller.
 inline bool has_method(method which) noexcept
 {
     return ::hgrid_has_method(static_cast<std::uint32_t>(which));
@@ -356,9 +356,9 @@ public:
     /// A value.
     constexpr optional(T value) noexcept : value_(std::move(value)), has_value_(true) {}
 
-    /// Whether there is a value.
+    /// Returns true if there is a value.
     constexpr bool has_value() const noexcept { return has_value_; }
-    /// Whether there is a value.
+    /// Returns true if there is a value.
     constexpr explicit operator bool() const noexcept { return has_value_; }
     /// The value, which must be there.
     constexpr T &operator*() & noexcept { return assert(has_value_), value_; }
@@ -391,11 +391,11 @@ public:
     /// Without one; the status is not `ok`.
     constexpr result(status error) noexcept : error_(error) { assert(error != status::ok); }
 
-    /// Whether there is a value.
+    /// Returns true if there is a value.
     constexpr bool has_value() const noexcept { return value_.has_value(); }
-    /// Whether there is a value.
+    /// Returns true if there is a value.
     constexpr explicit operator bool() const noexcept { return value_.has_value(); }
-    /// Why there is no value, or `ok` if there is one.
+    /// The reason why there is no value, or `ok` if there is one.
     constexpr status error() const noexcept { return error_; }
 
     /// The value, which must be there.
@@ -418,7 +418,7 @@ private:
 
 namespace detail {
 
-// What std::void_t is.
+// The same as std::void_t.
 template <class...>
 struct make_void {
     using type = void;
@@ -426,7 +426,7 @@ struct make_void {
 template <class... T>
 using void_t = typename make_void<T...>::type;
 
-// Whether a callable takes these arguments, and what it returns.
+// Tells whether a callable takes these arguments, and what it returns.
 template <class Void, class F, class... Arguments>
 struct calls : std::false_type {};
 template <class F, class... Arguments>
@@ -437,7 +437,7 @@ using is_callable = calls<void, F, Arguments...>;
 template <class F, class... Arguments>
 using answer_of = decltype(std::declval<F>()(std::declval<Arguments>()...));
 
-// What std::data and std::size are.
+// The same as std::data and std::size.
 template <class C>
 constexpr auto data_of(C &container) noexcept -> decltype(container.data())
 {
@@ -459,7 +459,7 @@ constexpr std::size_t size_of(const T (&)[N]) noexcept
     return N;
 }
 
-// Whether a build goes on after its progress was told.
+// Returns true if a build goes on after its progress was told.
 template <class F>
 bool goes_on(F &progress, float done, std::true_type) noexcept
 {
@@ -471,7 +471,7 @@ bool goes_on(F &progress, float done, std::false_type) noexcept
     return static_cast<bool>(progress(done));
 }
 
-// What a filter that takes a hit alone, or also its ray's place, says of it.
+// Returns the answer of a filter that takes a hit alone, or also its ray's place.
 template <class F>
 auto verdict_of(F &filter, std::size_t, const hit &at, std::true_type) noexcept
 {
@@ -483,7 +483,7 @@ auto verdict_of(F &filter, std::size_t place, const hit &at, std::false_type) no
     return filter(place, at);
 }
 
-// What it says as C takes it.
+// Returns the answer as C takes it.
 inline ::hgrid_verdict number(verdict answer) noexcept
 {
     return static_cast<::hgrid_verdict>(answer);
@@ -496,7 +496,7 @@ inline ::hgrid_verdict number(bool counts) noexcept
 template <class C>
 using element_of = std::remove_pointer_t<decltype(data_of(std::declval<C &>()))>;
 
-// Whether the elements of a container are T, but for const.
+// Tells whether the elements of a container are T, but for const.
 template <class C, class T, class = void>
 struct holds : std::false_type {};
 template <class C, class T>
@@ -512,9 +512,9 @@ class span {
 public:
     /// No elements.
     constexpr span() noexcept = default;
-    /// So many elements from an address on.
+    /// `size` elements from an address on.
     constexpr span(T *data, std::size_t size) noexcept : data_(data), size_(size) {}
-    /// The elements of a container or an array. What is to be written must not be a temporary.
+    /// The elements of a container or an array. One that is to be written must not be a temporary.
     template <class C,
               std::enable_if_t<detail::holds<std::remove_reference_t<C>, T>::value &&
                                    (std::is_lvalue_reference<C>::value || std::is_const<T>::value ||
@@ -527,9 +527,9 @@ public:
 
     /// The first element; may be null if there is none.
     constexpr T *data() const noexcept { return data_; }
-    /// How many elements there are.
+    /// The number of elements.
     constexpr std::size_t size() const noexcept { return size_; }
-    /// Whether there is no element.
+    /// Returns true if there is no element.
     constexpr bool empty() const noexcept { return size_ == 0; }
     /// The first element, for loops.
     constexpr T *begin() const noexcept { return data_; }
@@ -537,7 +537,7 @@ public:
     constexpr T *end() const noexcept { return data_ + size_; }
     /// An element; there must be one.
     constexpr T &operator[](std::size_t i) const noexcept { return assert(i < size_), data_[i]; }
-    /// So many elements from the i-th on; they must be there.
+    /// `count` elements from the i-th on; they must be there.
     constexpr span subspan(std::size_t i, std::size_t count) const noexcept
     {
         assert(i <= size_ && count <= size_ - i);
@@ -572,7 +572,7 @@ class strided {
 public:
     /// No elements.
     constexpr strided() noexcept = default;
-    /// So many elements, each so many bytes behind the one before.
+    /// `size` elements, each `stride_bytes` bytes behind the one before.
     constexpr strided(T *first, std::size_t stride_bytes, std::size_t size) noexcept
         : first_(first), stride_(stride_bytes), size_(size)
     {
@@ -595,7 +595,7 @@ public:
     constexpr T *first() const noexcept { return first_; }
     /// Bytes from one element to the next.
     constexpr std::size_t stride() const noexcept { return stride_; }
-    /// How many elements there are.
+    /// The number of elements.
     constexpr std::size_t size() const noexcept { return size_; }
     /// An element; there must be one.
     T &operator[](std::size_t i) const noexcept
@@ -644,7 +644,7 @@ struct is_strided : std::false_type {};
 template <class T>
 struct is_strided<strided<T>> : std::true_type {};
 
-// What a vertex or a triangle is made of: T itself if it is a number, the element type of an array
+// The type that a vertex or a triangle is made of: T itself if it is a number, the element type of an array
 // or of anything with value_type, or else void.
 template <class T, class = void>
 struct scalar {
@@ -673,7 +673,7 @@ struct only_float {
 #pragma GCC diagnostic ignored "-Wmissing-braces"
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 #endif
-// Whether an aggregate begins with three floats, in members of its own or in arrays and structs that it
+// Tells whether an aggregate begins with three floats, in members of its own or in arrays and structs that it
 // begins with.
 template <class T, class = void>
 struct begins_with_floats : std::false_type {};
@@ -685,7 +685,7 @@ struct begins_with_floats<T,
 #pragma GCC diagnostic pop
 #endif
 
-// Whether a class, which may have constructors, begins with floats x, y and z.
+// Tells whether a class, which may have constructors, begins with floats x, y and z.
 template <class T, class = void>
 struct has_xyz : std::false_type {};
 template <class T>
@@ -712,7 +712,7 @@ constexpr strided<const element_of<const C>> elements(const C &container) noexce
     return container;
 }
 
-// Whether what is referred to is there later.
+// Tells whether what is referred to is there later.
 template <class C>
 struct stays
     : std::integral_constant<bool, std::is_lvalue_reference<C>::value ||
@@ -721,7 +721,7 @@ struct stays
 
 } // namespace detail
 
-/// Where the vertices and triangles are: `hgrid_mesh`. It refers to them; they stay where they are,
+/// A description of vertices and triangles: `hgrid_mesh`. It refers to them; they stay where they are,
 /// unchanged, for as long as a grid of this mesh is queried.
 class mesh {
 public:
@@ -773,9 +773,9 @@ public:
     template <class Masks, std::enable_if_t<!detail::stays<Masks &&>::value, int> = 0>
     mesh &masks(Masks &&) = delete;
 
-    /// How many vertices there are.
+    /// The number of vertices.
     std::size_t vertex_count() const noexcept { return raw_.vertex_count; }
-    /// How many triangles there are.
+    /// The number of triangles.
     std::size_t triangle_count() const noexcept { return raw_.triangle_count; }
     /// The same for a call in C.
     const ::hgrid_mesh &c() const noexcept { return raw_; }
@@ -836,7 +836,7 @@ struct location {
     std::uint32_t triangle;
 };
 
-// --- how to build ---------------------------------------------------------------------------------
+// --- builds ---------------------------------------------------------------------------------------
 
 /// A part of a build: call it with the numbers that `parallel_for` asks for.
 class task {
@@ -851,7 +851,7 @@ private:
     void *context_;
 };
 
-/// What a build may be told: `hgrid_config`. Each method has its usual numbers.
+/// The configuration of a build: `hgrid_config`. Each method has its usual numbers.
 class config {
 public:
     /// The usual numbers of a method.
@@ -885,12 +885,12 @@ public:
     }
     /// Levels of grids. For recursive.
     config &depth(std::uint32_t levels) noexcept { return raw_.depth = levels, *this; }
-    /// How much time the build takes for rays that are faster. For bvh.
+    /// The time that the build takes for rays that are faster. For bvh.
     config &quality(hgrid::quality of) noexcept
     {
         return raw_.quality = static_cast<std::uint32_t>(of), *this;
     }
-    /// Whether triangles that are not finite are an error, or left out.
+    /// Makes triangles that are not finite an error, or leaves them out.
     config &strict(bool is_strict) noexcept
     {
         return raw_.flags = is_strict ? HGRID_BUILD_STRICT : 0u, *this;
@@ -966,9 +966,9 @@ private:
     void (*run_)(void *, std::uint32_t, task) noexcept = nullptr;
 };
 
-// --- what a query may be told ---------------------------------------------------------------------
+// --- options of queries ---------------------------------------------------------------------------
 
-/// What a query may be told: `hgrid_query_options`. Made once, for any number of queries.
+/// The options of a query: `hgrid_query_options`. Made once, for any number of queries.
 class options {
 public:
     /// Triangles are seen whose mask has a bit in common with this one.
@@ -1030,7 +1030,7 @@ class memory {
 public:
     /// No bytes.
     memory() noexcept = default;
-    /// So many bytes, or `out_of_memory`. They may hold anything.
+    /// Allocates so many bytes, or returns `out_of_memory`. They may hold anything.
     static result<memory> allocate(std::uint64_t bytes) noexcept
     {
         memory region;
@@ -1057,7 +1057,7 @@ public:
 
     /// The first byte, or null.
     byte *data() const noexcept { return bytes_.get(); }
-    /// How many bytes there are.
+    /// The number of bytes.
     std::size_t size() const noexcept { return size_; }
 
 private:
@@ -1080,7 +1080,7 @@ private:
         return ::operator new(bytes, std::align_val_t{alignment}, std::nothrow);
     }
 #else
-    // What `operator new` gave is noted in front.
+    // The address that `operator new` gave is noted in front.
     static void *aligned(std::size_t bytes) noexcept
     {
         void *const start = ::operator new(bytes + alignment + sizeof(void *), std::nothrow);
@@ -1166,12 +1166,12 @@ public:
         return intersect(along, &with.c());
     }
 
-    /// Whether a ray hits anything.
+    /// Returns true if a ray hits anything.
     bool occluded(const ray &along) const noexcept
     {
         return ::hgrid_occluded(&raw_, &along, nullptr);
     }
-    /// Whether a ray hits anything that the options let count.
+    /// Returns true if a ray hits anything that the options let count.
     bool occluded(const ray &along, const options &with) const noexcept
     {
         return ::hgrid_occluded(&raw_, &along, &with.c());
@@ -1257,7 +1257,7 @@ public:
         return closest_point(from, max_distance, &with.c());
     }
 
-    /// Where a ray met the mesh, which way it faces there, and where rays start that leave it; `hit` is
+    /// The point where a ray met the mesh, its normal there, and starts for rays that leave it; `at` is
     /// what a query has found for the ray.
     optional<surface> surface_at(const ray &along, const hit &at) const noexcept
     {
@@ -1305,7 +1305,7 @@ public:
         return answer == status::ok ? std::move(packed) : answer;
     }
 
-    /// What there is to know about the whole grid; looks at all of it.
+    /// The statistics of the whole grid; looks at all of it.
     result<statistics> inspect() const noexcept
     {
         statistics found = HGRID_STATISTICS_INIT;
@@ -1425,7 +1425,7 @@ public:
     ///         return hgrid::mesh(kept.vertices, hgrid::field(kept.faces, &face::corners));
     ///     });
     ///
-    /// What others use, too, is shared: let the data be a `std::shared_ptr` of them.
+    /// Data that others use, too, is shared: let the data be a `std::shared_ptr` of it.
     template <class Data, class Describe,
               std::enable_if_t<detail::is_callable<const Describe &, const Data &>::value, int> = 0>
     static result<grid> keep(Data &&data, const Describe &describe, const config &how = {},
@@ -1510,7 +1510,7 @@ private:
     }
 
     memory blob_;
-    // What the mesh refers to, if the grid keeps it.
+    // The data that the mesh refers to, if the grid keeps it.
     std::unique_ptr<void, void (*)(void *)> kept_{nullptr, [](void *) {}};
 };
 
@@ -1598,15 +1598,15 @@ inline result<grid> grid::build(const mesh &of, const config &how, report *detai
 
 // --- shapes and scenes ---------------------------------------------------------------------------
 
-/// Where a ray hits a shape. See `hgrid_shape_hit`.
+/// The hit of a ray on a shape. See `hgrid_shape_hit`.
 using shape_hit = ::hgrid_shape_hit;
 /// A ray whose origin is in double. See `hgrid_ray_f64`.
 using ray_f64 = ::hgrid_ray_f64;
-/// Where a ray meets a scene. See `hgrid_scene_hit`.
+/// The hit of a ray in a scene. See `hgrid_scene_hit`.
 using scene_hit = ::hgrid_scene_hit;
 /// An object at a place in a scene. See `hgrid_instance`: `instance one = HGRID_INSTANCE_INIT;`
 using instance = ::hgrid_instance;
-/// What instances show. See `hgrid_object`; `make_object` makes it.
+/// An object that instances show. See `hgrid_object`; `make_object` makes it.
 using object = ::hgrid_object;
 
 /// The options of a query of a scene: `hgrid_scene_options`. They refer to the filter, the counters and the memory
@@ -1637,7 +1637,7 @@ public:
         };
         return *this;
     }
-    /// What C takes.
+    /// The struct that C takes.
     const ::hgrid_scene_options &c() const noexcept { return raw_; }
 
 private:
@@ -1682,9 +1682,9 @@ public:
         has_masks_ = all.size() == raw_.count;
         return *this;
     }
-    /// What C takes.
+    /// The struct that C takes.
     const ::hgrid_boxes &c() const noexcept { return raw_; }
-    /// Whether there are as many masks as boxes.
+    /// Returns true if there are as many masks as boxes.
     bool is_sound() const noexcept { return has_masks_; }
 
 private:
@@ -1741,7 +1741,7 @@ public:
         hit found;
         return ::hgrid_intersect_shapes(&raw_, &along, nullptr, &found) ? optional<hit>(found) : optional<hit>();
     }
-    /// Whether a ray hits any shape.
+    /// Returns true if a ray hits any shape.
     bool occluded(const ray &along) const noexcept
     {
         return ::hgrid_occluded_shapes(&raw_, &along, nullptr);
@@ -1770,7 +1770,7 @@ public:
     {
         return occluded_n(rays, answers, know, &with.c());
     }
-    /// What C takes.
+    /// The struct that C takes.
     const ::hgrid_shapes &c() const noexcept { return raw_; }
 
 private:
@@ -1891,7 +1891,7 @@ public:
     {
         return intersect(along, &with.c());
     }
-    /// Whether a ray hits anything.
+    /// Returns true if a ray hits anything.
     bool occluded(const ray_f64 &along) const noexcept
     {
         return ::hgrid_occluded_scene(&raw_, &along, nullptr);
@@ -1948,7 +1948,7 @@ public:
         static_cast<void>(::hgrid_scene_locate(&raw_, &of, nullptr, &found));
         return view(found);
     }
-    /// What C takes.
+    /// The struct that C takes.
     const ::hgrid_scene &c() const noexcept { return raw_; }
 
 private:

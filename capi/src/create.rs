@@ -28,7 +28,7 @@ use crate::status::{
 use crate::system;
 use crate::types::{HGRID_ALIGNMENT, hgrid_config, hgrid_grid, hgrid_mesh, hgrid_report};
 
-/// Where `hgrid_create` gets its memory from. Initialise it with
+/// The source of memory for `hgrid_create`. Initialise it with
 /// `HGRID_ALLOCATOR_INIT` and set both functions.
 ///
 /// The struct itself is only read during the call, but `hgrid_destroy` calls `release` with the
@@ -142,7 +142,7 @@ pub unsafe extern "C" fn hgrid_destroy(grid: *mut hgrid_grid) {
     drop(unsafe { grid.cast::<Owned>().read() }.memory);
 }
 
-/// What a created grid keeps in front of its index: the view, where C looks for it, and the memory
+/// The head of a created grid, in front of its index: the view, where C looks for it, and the memory
 /// that both lie in.
 #[repr(C, align(64))]
 struct Owned {
@@ -164,7 +164,7 @@ unsafe fn create(
     report: &mut hgrid_report,
 ) -> Result<NonNull<hgrid_grid>, hgrid_status> {
     let none = Region { start: null_mut(), bytes: 0 };
-    // How much scratch is enough, and with it how much index the grid takes, to the byte.
+    // Finds how much scratch is enough, and with it how much index the grid takes, to the byte.
     // SAFETY: the caller's promise.
     unsafe { raw::input(mesh, config, [none, none]) }?.measure(report)?;
     let scratch = Memory::new(allocator, 0, report.scratch_bytes)?;

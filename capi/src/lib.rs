@@ -15,7 +15,7 @@
 //! allocator or the system's, and keeps the pointers to it.
 #![no_std]
 
-// What C sees, in the order of the header.
+// The modules that C sees, in the order of the header.
 mod types;
 
 mod query_types;
@@ -41,7 +41,7 @@ mod status;
 
 mod version;
 
-// What it is made of.
+// The modules behind them.
 #[cfg(all(target_arch = "arm", target_endian = "little", unix))]
 mod division;
 mod input;

@@ -36,7 +36,7 @@ pub const HGRID_COHERENCE_COHERENT: hgrid_coherence = 1;
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_ray {
-    /// Where `t` is 0, in scene units.
+    /// The point at which `t` is 0, in scene units.
     pub origin: [f32; 3],
     /// The smallest `t` that is accepted, usually 0; negative reaches behind the origin.
     pub t_min: f32,
@@ -46,7 +46,7 @@ pub struct hgrid_ray {
     pub t_max: f32,
 }
 
-/// Where a ray meets a triangle: 16 bytes.
+/// The hit of a ray on a triangle: 16 bytes.
 ///
 /// The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
 /// triangle's vertices `a`, `b`, `c`, up to rounding. A hit is a function of the ray and the triangle
@@ -87,12 +87,11 @@ pub struct hgrid_counters {
     pub primitive_tests: u64,
     /// Cells and macrocells entered, empty ones included; leaves of a tree.
     pub cell_steps: u64,
-    /// How often a ray went down a level, into a macrocell, a subgrid or a node; 0 for a
-    /// grid of one level.
+    /// Steps down a level, into a macrocell, a subgrid or a node; 0 for a grid of one level.
     pub grid_steps: u64,
 }
 
-/// What a filter says of a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`.
+/// The answer of a filter about a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`.
 /// Anything else counts as `HGRID_REJECT`.
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_verdict = u32;
@@ -133,7 +132,7 @@ pub struct hgrid_query_options {
     /// A triangle is seen if its mask and this have a bit in common; see `masks` of `hgrid_mesh`.
     /// With all bits, the default, every triangle is seen, even one whose mask is 0.
     pub mask: u32,
-    /// Which sides are not hit: one of `HGRID_CULL_...`.
+    /// The sides that are not hit: one of `HGRID_CULL_...`.
     pub cull: u32,
     /// A triangle that is not hit, usually the one that the ray leaves, or `HGRID_INVALID_ID`. It needs no
     /// epsilon, but a neighbour across an edge may still be hit if rounding put the origin below it. All
@@ -182,7 +181,7 @@ pub struct hgrid_query_options {
             hit: *const hgrid_hit,
         ) -> hgrid_verdict,
     >,
-    /// Where to add up the work, or NULL. Each thread needs its own. The rays of a batch are traced one
+    /// The counters that the work is added to, or NULL. Each thread needs its own. The rays of a batch are traced one
     /// by one to be counted.
     pub counters: *mut hgrid_counters,
     /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL. It may have
@@ -223,7 +222,7 @@ pub struct hgrid_query_options {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_point_query {
-    /// Where to look from, in scene units.
+    /// The point to look from, in scene units.
     pub point: [f32; 3],
     /// The largest distance that is accepted, 0 or more; `INFINITY` and `FLT_MAX` are both fine.
     pub max_distance: f32,
@@ -235,7 +234,7 @@ pub struct hgrid_point_query {
 pub struct hgrid_closest {
     /// The point, in scene units.
     pub position: [f32; 3],
-    /// How far it is.
+    /// Distance from the given point, in scene units.
     pub distance: f32,
     /// Weight of the triangle's second vertex, 0 to 1.
     pub u: f32,
@@ -253,9 +252,9 @@ pub struct hgrid_surface {
     pub position: [f32; 3],
     /// The triangle's normal, of length 1, on the side that the ray came from.
     pub normal: [f32; 3],
-    /// Where rays start that leave on that side: reflections, and rays to lights.
+    /// Start for rays that leave on that side: reflections, and rays to lights.
     pub above: [f32; 3],
-    /// Where rays start that go on through the triangle.
+    /// Start for rays that go on through the triangle.
     pub below: [f32; 3],
     /// 1 if the ray met the front, from which the vertices appear counter-clockwise; 0 if the back.
     pub is_front: u32,
@@ -290,7 +289,7 @@ pub const HGRID_CONTENT_INSTANCES: u32 = 2;
 /// A scene with all that it shows: `hgrid_open_packed_scene`.
 pub const HGRID_CONTENT_PACKED_SCENE: u32 = 3;
 
-/// What the header of a blob says. Initialise it with `HGRID_BLOB_INFO_INIT`.
+/// The contents of a blob's header. Initialise it with `HGRID_BLOB_INFO_INIT`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_blob_info {
@@ -298,7 +297,7 @@ pub struct hgrid_blob_info {
     pub struct_size: u32,
     /// The version of the format.
     pub version: u32,
-    /// What built it: one of `HGRID_METHOD_...`.
+    /// The method that built it: one of `HGRID_METHOD_...`.
     pub method: u32,
     /// 1 if the mesh is in it, as `hgrid_pack` writes it, or all that a scene shows; 0 if not.
     pub has_mesh: u32,
@@ -310,7 +309,7 @@ pub struct hgrid_blob_info {
     pub grid_bytes: u64,
     /// Bytes of all of it: of the grid, and of what is packed with it.
     pub total_bytes: u64,
-    /// What it is built over: one of `HGRID_CONTENT_...`.
+    /// The kind of its content: one of `HGRID_CONTENT_...`.
     pub content: u32,
     /// 0.
     pub reserved: u32,
@@ -473,7 +472,7 @@ impl hgrid_refit_report {
 }
 
 impl hgrid_blob_info {
-    /// What a blob says.
+    /// Notes what a blob says.
     pub(crate) fn note(&mut self, info: &BlobInfo) {
         let BlobInfo { version, method, has_mesh, vertex_count, triangle_count, .. } = *info;
         let (has_mesh, triangle_count) = (has_mesh.into(), triangle_count.into());
@@ -495,7 +494,7 @@ impl hgrid_blob_info {
 }
 
 impl hgrid_statistics {
-    /// What a look found.
+    /// Notes what a look found.
     pub(crate) fn note(&mut self, found: &Statistics) {
         *self = Self {
             struct_size: self.struct_size,

@@ -1,4 +1,4 @@
-//! What compiled code asks of a language's runtime, so that the static library links alone.
+//! The functions that compiled code asks of a language's runtime, so that the static library links alone.
 //!
 //! Where the processor cannot divide, the compiler calls functions that come with the library. Those of
 //! Rust were compiled for programs that unwind, and ask for `rust_eh_personality`, which is in std. Those

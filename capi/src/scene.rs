@@ -26,10 +26,10 @@ pub struct hgrid_instance {
     /// Rotations, mirrors, shears and scales of any kind, as long as the matrix times its inverse in `float` is the
     /// identity to 2^-10: with any scales along the axes, turned ones up to a condition of about 10 000.
     pub linear: [[f32; 3]; 3],
-    /// Which of the scene's objects, from 0.
+    /// The object's number in the scene, from 0.
     pub object: u32,
-    /// Where the object's origin lies in the scene. Places are computed in double: far from the scene's origin rays are
-    /// traced as exactly as near it.
+    /// The place of the object's origin in the scene. Places are computed in double: far from the scene's origin rays
+    /// are traced as exactly as near it.
     pub translation: [f64; 3],
     /// Queries see the instance if their mask has a bit of it.
     pub mask: u32,
@@ -70,7 +70,7 @@ impl hgrid_scene {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_ray_f64 {
-    /// Where `t` is 0, in scene units.
+    /// The point at which `t` is 0, in scene units.
     pub origin: [f64; 3],
     /// The direction, any length but zero.
     pub direction: [f32; 3],
@@ -82,7 +82,7 @@ pub struct hgrid_ray_f64 {
     pub reserved: u32,
 }
 
-/// Where a ray meets a scene: 32 bytes.
+/// The hit of a ray in a scene: 32 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_scene_hit {
@@ -109,8 +109,8 @@ pub struct hgrid_scene_options {
     /// An instance is seen if its mask and this have a bit in common, and so are triangles and shapes in it. With all bits,
     /// the default, everything is seen.
     pub mask: u32,
-    /// Which sides of triangles are not hit: one of `HGRID_CULL_...`. The front is that of the triangle in its own mesh: an
-    /// instance that mirrors does not turn it round.
+    /// The sides of triangles that are not hit: one of `HGRID_CULL_...`. The front is that of the triangle in its own
+    /// mesh: an instance that mirrors does not turn it round.
     pub cull: u32,
     /// 0.
     pub reserved: u32,
@@ -122,7 +122,7 @@ pub struct hgrid_scene_options {
     pub filter: Option<
         unsafe extern "C" fn(context: *mut c_void, hit: *const hgrid_scene_hit) -> hgrid_verdict,
     >,
-    /// Where to add up the work, or NULL. An instance that a ray is offered counts as a test.
+    /// The counters that the work is added to, or NULL. An instance that a ray is offered counts as a test.
     pub counters: *mut hgrid_counters,
     /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL: as `scratch` of
     /// `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries of
@@ -133,7 +133,7 @@ pub struct hgrid_scene_options {
 }
 
 impl hgrid_scene_options {
-    /// What NULL means.
+    /// The defaults, which NULL means.
     #[expect(clippy::cast_possible_truncation, reason = "a few words")]
     pub(crate) const DEFAULT: Self = Self {
         struct_size: size_of::<Self>() as u32,

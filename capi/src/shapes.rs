@@ -15,7 +15,7 @@ use crate::span::Region;
 use crate::status::{HGRID_ERROR_NULL_ARGUMENT, HGRID_OK, hgrid_status};
 use crate::types::{hgrid_config, hgrid_report};
 
-/// Where a ray hits a shape, as the caller's test says: 12 bytes.
+/// The hit of a ray on a shape, as the caller's test says: 12 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_shape_hit {
@@ -76,7 +76,7 @@ pub struct hgrid_shapes {
 }
 
 impl hgrid_shapes {
-    /// What means nothing.
+    /// The view of no shapes.
     pub const NONE: Self = Self { opaque: [MaybeUninit::zeroed(); 64] };
 }
 

@@ -1,4 +1,4 @@
-//! What a call answers: one pinned number for each cause, and what to do about it in words.
+//! The answers of calls: one pinned number for each cause, and what to do about it in words.
 //!
 //! The numbers are ABI. They have gaps between the groups and are never used for anything else.
 
@@ -198,7 +198,7 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
     }
 }
 
-/// What a status means and what to do.
+/// Returns what a status means and what to do.
 pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
     match status {
         HGRID_OK => c"success",

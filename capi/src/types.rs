@@ -1,5 +1,4 @@
-//! What builds work on and what they make: the structs that cross the boundary, as C sees them, and
-//! what they mean to core.
+//! The C structs of builds (meshes, configurations, reports, grids), and their conversion to the types of core.
 //!
 //! The docs here are the text of `hgrid.h`: they are written for C readers.
 
@@ -313,12 +312,12 @@ pub struct hgrid_grid {
 }
 
 impl hgrid_grid {
-    /// What means nothing.
+    /// The view of no grid.
     pub const NONE: Self = Self { opaque: [MaybeUninit::zeroed(); 64] };
 }
 
 impl hgrid_config {
-    /// What NULL means.
+    /// The defaults, which NULL means.
     #[expect(clippy::cast_possible_truncation, reason = "64 bytes")]
     pub(crate) const DEFAULT: Self = Self {
         struct_size: size_of::<Self>() as u32,
@@ -369,7 +368,7 @@ impl hgrid_config {
         Ok(())
     }
 
-    /// How many tasks may run at once; more than one need someone who runs them. The other methods
+    /// Returns the number of tasks that may run at once; more than one need `run`. The other methods
     /// have none, and a field of another method is not looked at.
     pub(crate) const fn task_count(&self) -> Result<u32, hgrid_status> {
         match (self.method, self.tasks, self.run) {
@@ -464,7 +463,7 @@ impl hgrid_report {
     }
 }
 
-/// Where the elements of one of the caller's arrays lie: numbers, nothing is read yet.
+/// The place of the elements of one of the caller's arrays: numbers, nothing is read yet.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Elements {
     pub(crate) start: *const c_void,

@@ -50,7 +50,7 @@ pub(super) unsafe fn all_options(
     Ok(Some(Asked { options, cull: options.cull()? }))
 }
 
-/// What a caller told a query.
+/// The options that a caller gave a query.
 pub(super) struct Asked {
     pub(super) options: hgrid_query_options,
     cull: Cull,
@@ -121,7 +121,7 @@ impl Asked {
 /// Runs a query, with options if there are any. An error if there is nothing to ask.
 ///
 /// # Safety
-/// That of [`grid`].
+/// The contract of [`grid`].
 #[inline(always)]
 pub(crate) unsafe fn query<T>(
     view: *const hgrid_grid,
@@ -145,7 +145,7 @@ pub(crate) unsafe fn query<T>(
 /// All hits of a ray, into memory for some of them; returns how many there are.
 ///
 /// # Safety
-/// That of [`grid`].
+/// The contract of [`grid`].
 pub(crate) unsafe fn query_all(
     view: *const hgrid_grid,
     ray: *const hgrid_ray,
@@ -194,7 +194,7 @@ pub(crate) unsafe fn query_all(
 /// The closest point, as core finds it.
 ///
 /// # Safety
-/// That of [`grid`].
+/// The contract of [`grid`].
 pub(crate) unsafe fn closest(
     view: *const hgrid_grid,
     query: *const hgrid_point_query,
@@ -213,10 +213,10 @@ pub(crate) unsafe fn closest(
     }
 }
 
-/// Where a ray met a grid's mesh.
+/// Returns the point where a ray met a grid's mesh.
 ///
 /// # Safety
-/// That of [`grid`].
+/// The contract of [`grid`].
 pub(crate) unsafe fn surface(
     view: *const hgrid_grid,
     ray: *const hgrid_ray,
@@ -234,7 +234,7 @@ pub(crate) unsafe fn surface(
 /// The part of a grid's mesh that a triangle lies in, and the triangle's number there.
 ///
 /// # Safety
-/// That of [`grid`].
+/// The contract of [`grid`].
 #[inline(always)]
 pub(crate) unsafe fn locate(
     view: *const hgrid_grid,
@@ -248,7 +248,7 @@ pub(crate) unsafe fn locate(
 /// Runs a batch: `trace` gets the rays as core asks for them, and what the caller told.
 ///
 /// # Safety
-/// That of [`grid`]; and the elements of both arrays are the caller's to be read and written.
+/// The contract of [`grid`]; and the elements of both arrays are the caller's to be read and written.
 pub(crate) unsafe fn batch<T>(
     view: *const hgrid_grid,
     batch: &BatchArrays<hgrid_ray, T>,

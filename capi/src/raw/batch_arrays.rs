@@ -19,7 +19,7 @@ use crate::types::Elements;
 /// An array of the caller's, as it is passed: where it starts, and its stride.
 pub(crate) type Array<T> = (T, usize);
 
-/// As many answers `T` as rays `R`, no byte of them in a ray.
+/// Rays `R` and as many answers `T`, no byte of them in a ray.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BatchArrays<R, T> {
     rays: *const R,

@@ -21,7 +21,7 @@ use crate::status::{
 };
 use crate::types::{Elements, hgrid_mesh, hgrid_part};
 
-/// What memory for parts begins with.
+/// The head of memory for parts.
 #[repr(C)]
 #[derive(Clone, Copy)]
 struct Head {
@@ -37,12 +37,12 @@ const _: () = assert!(size_of::<Head>().is_multiple_of(align_of::<MeshPart<'_>>(
 const _: () = assert!(align_of::<Head>() <= align_of::<hgrid_part>());
 const _: () = assert!(align_of::<MeshPart<'_>>() <= align_of::<hgrid_part>());
 
-/// Where the first part lies behind a head.
+/// Returns the address of the first part, behind a head.
 const fn first_part(parts: *const hgrid_part) -> *const MeshPart<'static> {
     parts.wrapping_byte_add(size_of::<Head>()).cast()
 }
 
-/// Where the memory for the parts of a mesh begins; NULL if it was not joined here.
+/// Returns the address of the memory for the parts of a mesh; NULL if it was not joined here.
 pub(crate) fn parts_of(mesh: &TriangleMesh<'_>) -> *const hgrid_part {
     if mesh.parts().is_empty() {
         return core::ptr::null();

@@ -65,7 +65,7 @@ const MAX_BYTES: usize = isize::MAX.unsigned_abs();
 /// A larger `struct_size` is no struct of any version: it was never set.
 const MAX_STRUCT_SIZE: usize = 4096;
 
-/// What a [`hgrid_grid`] holds.
+/// The content of a [`hgrid_grid`].
 #[repr(C)]
 struct View {
     tag: u64,
@@ -212,7 +212,7 @@ unsafe fn strided(elements: Elements) -> Result<Strided<'static>, hgrid_status> 
     Ok(Strided { bytes, stride, count })
 }
 
-/// What a build may be told, as the caller says it; NULL means the defaults.
+/// Reads the configuration of a build, as the caller says it; NULL means the defaults.
 ///
 /// # Safety
 /// The caller's promise.
@@ -224,7 +224,7 @@ pub(crate) unsafe fn settings(config: *const hgrid_config) -> Result<hgrid_confi
     unsafe { read_sized(config) }
 }
 
-/// What a build may be told, and whom it asks on the way; NULL means the defaults and nobody.
+/// Reads the configuration of a build, and its callbacks; NULL means the defaults and none.
 ///
 /// # Safety
 /// The caller's promise.
@@ -237,7 +237,7 @@ unsafe fn config(config: *const hgrid_config) -> Result<(Config, Caller), hgrid_
     Ok((config.to_core()?, Caller { tasks, context, run, progress }))
 }
 
-/// What a caller has for a build: a loop over tasks, and an eye on how far it is.
+/// The callbacks of a build: a loop over tasks, and an eye on how far it is.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Caller {
     /// 2 or more if there is a loop.
@@ -283,7 +283,7 @@ impl Caller {
     }
 }
 
-/// What C gets for a task: calls the one whose address is the context.
+/// Calls the task whose address is the context: C gets this function for a task.
 ///
 /// # Safety
 /// The context is NULL, or it came with this function and the [`Caller::run`] that passed it on has
@@ -315,7 +315,7 @@ unsafe fn regions(
     Ok([index, scratch])
 }
 
-/// What a build works on.
+/// Reads the input of a build.
 ///
 /// # Safety
 /// The caller's promise.
@@ -404,7 +404,7 @@ pub(crate) unsafe fn reporting_refit(
     result.err().unwrap_or(HGRID_OK)
 }
 
-/// What the header of a blob says.
+/// Reads the header of a blob.
 ///
 /// # Safety
 /// The caller's promise.
@@ -419,7 +419,7 @@ pub(crate) unsafe fn peek(
 /// Writes a grid with its mesh, once it is sure that they lie elsewhere.
 ///
 /// # Safety
-/// That of [`grid`].
+/// The contract of [`grid`].
 pub(crate) unsafe fn pack(grid: &Grid<'_>, to: Region) -> Result<(), hgrid_status> {
     // SAFETY: the caller's promise.
     let to = unsafe { bytes_beside(grid, to) }?;
@@ -429,19 +429,19 @@ pub(crate) unsafe fn pack(grid: &Grid<'_>, to: Region) -> Result<(), hgrid_statu
 /// Proves that a grid is right, in scratch, once it is sure that this lies elsewhere.
 ///
 /// # Safety
-/// That of [`grid`].
+/// The contract of [`grid`].
 pub(crate) unsafe fn validate(grid: &Grid<'_>, scratch: Region) -> Result<(), hgrid_status> {
     // SAFETY: the caller's promise.
     let scratch = unsafe { bytes_beside(grid, scratch) }?;
     grid.validate(scratch).map_err(status_of)
 }
 
-/// Where some bytes lie.
+/// Returns the span of some bytes.
 fn span_of(bytes: &[u8]) -> Span {
     Span::new(bytes.as_ptr().cast(), bytes.len())
 }
 
-/// Where a view lies.
+/// Returns the span of a view.
 fn view_of<T: ?Sized>(view: &T) -> Span {
     Span::new(core::ptr::from_ref(view).cast(), size_of_val(view))
 }
@@ -463,7 +463,7 @@ fn shares(mesh: &TriangleMesh<'_>, span: Span) -> bool {
 /// Bytes to write that lie in neither blob nor mesh.
 ///
 /// # Safety
-/// That of [`grid`].
+/// The contract of [`grid`].
 unsafe fn bytes_beside(grid: &Grid<'_>, to: Region) -> Result<&'static mut [u8], hgrid_status> {
     let is_shared = span_of(grid.blob()).overlaps(to.span()) || shares(grid.mesh(), to.span());
     if is_shared {

@@ -331,7 +331,7 @@ unsafe fn room_of<T: Copy>(start: *mut c_void, count: usize, empty: T) -> &'stat
 const _: () = assert!(align_of::<Member<'_>>() <= ALIGNMENT);
 const _: () = assert!(align_of::<Object<'_>>() <= align_of::<Member<'_>>());
 
-/// What a caller told a query of a scene.
+/// The options that a caller gave a query of a scene.
 struct Asked {
     options: hgrid_scene_options,
     cull: Cull,
