@@ -720,7 +720,7 @@ typedef struct hgrid_grid {
  */
 typedef struct hgrid_ray {
     /**
-     * Where `t` is 0, in scene units.
+     * The point at which `t` is 0, in scene units.
      */
     float origin[3];
     /**
@@ -738,13 +738,13 @@ typedef struct hgrid_ray {
 } hgrid_ray;
 
 /**
- * What a filter says of a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`.
+ * The answer of a filter about a hit: one of `HGRID_REJECT`, `HGRID_ACCEPT` and `HGRID_ACCEPT_AND_STOP`.
  * Anything else counts as `HGRID_REJECT`.
  */
 typedef uint32_t hgrid_verdict;
 
 /**
- * Where a ray meets a triangle: 16 bytes.
+ * The hit of a ray on a triangle: 16 bytes.
  *
  * The point is `origin + t * direction`, and also `(1 - u - v) * a + u * b + v * c` for the
  * triangle's vertices `a`, `b`, `c`, up to rounding. A hit is a function of the ray and the triangle
@@ -797,8 +797,7 @@ typedef struct hgrid_counters {
      */
     uint64_t cell_steps;
     /**
-     * How often a ray went down a level, into a macrocell, a subgrid or a node; 0 for a
-     * grid of one level.
+     * Steps down a level, into a macrocell, a subgrid or a node; 0 for a grid of one level.
      */
     uint64_t grid_steps;
 } hgrid_counters;
@@ -824,7 +823,7 @@ typedef struct hgrid_query_options {
      */
     uint32_t mask;
     /**
-     * Which sides are not hit: one of `HGRID_CULL_...`.
+     * The sides that are not hit: one of `HGRID_CULL_...`.
      */
     uint32_t cull;
     /**
@@ -875,7 +874,7 @@ typedef struct hgrid_query_options {
      */
     hgrid_verdict (*filter)(void *context, size_t ray, const struct hgrid_hit *hit);
     /**
-     * Where to add up the work, or NULL. Each thread needs its own. The rays of a batch are traced one
+     * The counters that the work is added to, or NULL. Each thread needs its own. The rays of a batch are traced one
      * by one to be counted.
      */
     struct hgrid_counters *counters;
@@ -926,7 +925,7 @@ typedef struct hgrid_query_options {
  */
 typedef struct hgrid_point_query {
     /**
-     * Where to look from, in scene units.
+     * The point to look from, in scene units.
      */
     float point[3];
     /**
@@ -944,7 +943,7 @@ typedef struct hgrid_closest {
      */
     float position[3];
     /**
-     * How far it is.
+     * Distance from the given point, in scene units.
      */
     float distance;
     /**
@@ -974,11 +973,11 @@ typedef struct hgrid_surface {
      */
     float normal[3];
     /**
-     * Where rays start that leave on that side: reflections, and rays to lights.
+     * Start for rays that leave on that side: reflections, and rays to lights.
      */
     float above[3];
     /**
-     * Where rays start that go on through the triangle.
+     * Start for rays that go on through the triangle.
      */
     float below[3];
     /**
@@ -1019,7 +1018,7 @@ typedef struct hgrid_refit_report {
 } hgrid_refit_report;
 
 /**
- * What the header of a blob says. Initialise it with `HGRID_BLOB_INFO_INIT`.
+ * The contents of a blob's header. Initialise it with `HGRID_BLOB_INFO_INIT`.
  */
 typedef struct hgrid_blob_info {
     /**
@@ -1031,7 +1030,7 @@ typedef struct hgrid_blob_info {
      */
     uint32_t version;
     /**
-     * What built it: one of `HGRID_METHOD_...`.
+     * The method that built it: one of `HGRID_METHOD_...`.
      */
     uint32_t method;
     /**
@@ -1055,7 +1054,7 @@ typedef struct hgrid_blob_info {
      */
     uint64_t total_bytes;
     /**
-     * What it is built over: one of `HGRID_CONTENT_...`.
+     * The kind of its content: one of `HGRID_CONTENT_...`.
      */
     uint32_t content;
     /**
@@ -1110,7 +1109,7 @@ typedef struct hgrid_statistics {
 } hgrid_statistics;
 
 /**
- * Where a ray hits a shape, as the caller's test says: 12 bytes.
+ * The hit of a ray on a shape, as the caller's test says: 12 bytes.
  */
 typedef struct hgrid_shape_hit {
     /**
@@ -1226,12 +1225,12 @@ typedef struct hgrid_instance {
      */
     float linear[3][3];
     /**
-     * Which of the scene's objects, from 0.
+     * The object's number in the scene, from 0.
      */
     uint32_t object;
     /**
-     * Where the object's origin lies in the scene. Places are computed in double: far from the scene's origin rays are
-     * traced as exactly as near it.
+     * The place of the object's origin in the scene. Places are computed in double: far from the scene's origin rays
+     * are traced as exactly as near it.
      */
     double translation[3];
     /**
@@ -1250,7 +1249,7 @@ typedef struct hgrid_instance {
  */
 typedef struct hgrid_ray_f64 {
     /**
-     * Where `t` is 0, in scene units.
+     * The point at which `t` is 0, in scene units.
      */
     double origin[3];
     /**
@@ -1272,7 +1271,7 @@ typedef struct hgrid_ray_f64 {
 } hgrid_ray_f64;
 
 /**
- * Where a ray meets a scene: 32 bytes.
+ * The hit of a ray in a scene: 32 bytes.
  */
 typedef struct hgrid_scene_hit {
     /**
@@ -1313,8 +1312,8 @@ typedef struct hgrid_scene_options {
      */
     uint32_t mask;
     /**
-     * Which sides of triangles are not hit: one of `HGRID_CULL_...`. The front is that of the triangle in its own mesh: an
-     * instance that mirrors does not turn it round.
+     * The sides of triangles that are not hit: one of `HGRID_CULL_...`. The front is that of the triangle in its own
+     * mesh: an instance that mirrors does not turn it round.
      */
     uint32_t cull;
     /**
@@ -1332,7 +1331,7 @@ typedef struct hgrid_scene_options {
      */
     hgrid_verdict (*filter)(void *context, const struct hgrid_scene_hit *hit);
     /**
-     * Where to add up the work, or NULL. An instance that a ray is offered counts as a test.
+     * The counters that the work is added to, or NULL. An instance that a ray is offered counts as a test.
      */
     struct hgrid_counters *counters;
     /**
@@ -1349,7 +1348,7 @@ typedef struct hgrid_scene_options {
 
 #if defined(HGRID_MALLOC)
 /**
- * Where `hgrid_create` gets its memory from. Initialise it with
+ * The source of memory for `hgrid_create`. Initialise it with
  * `HGRID_ALLOCATOR_INIT` and set both functions.
  *
  * The struct itself is only read during the call, but `hgrid_destroy` calls `release` with the
