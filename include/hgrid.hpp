@@ -7,10 +7,10 @@
  *
  *   hgrid::grid       a built grid that owns its memory, and its mesh if it is moved in; moves, frees
  *                     itself
- *   hgrid::view       a grid in memory of yours: an arena, a mapped file; what hgrid_grid is in C
- *   hgrid::mesh       where your vertices and indices are, whatever structs they lie in
- *   hgrid::config     how to build; progress and parallel_for are callables of yours
- *   hgrid::options    what a query may be told; a filter is any callable, without allocation
+ *   hgrid::view       a grid in memory of yours: an arena, a mapped file; hgrid_grid in C
+ *   hgrid::mesh       your vertices and indices, in structs of any kind
+ *   hgrid::config     the settings of a build; progress and parallel_for are callables of yours
+ *   hgrid::options    the options of a query; a filter is any callable, without allocation
  *   hgrid::result     a value, or the status that says why there is none
  *   hgrid::strided    rays and hits inside your structs: hgrid::field(pixels, &pixel::ray)
  *

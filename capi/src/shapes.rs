@@ -270,8 +270,8 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
 /// sooner for rays near each other.
 ///
 /// It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the same. A
-/// miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; rays of a batch take turns. It
-/// runs on the thread that calls.
+/// miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; rays of a batch take
+/// turns. It runs on the thread that calls.
 ///
 /// ```c
 /// static size_t trace_tile_of_shapes(const hgrid_shapes *shapes, const hgrid_ray rays[64], hgrid_hit hits[64])

@@ -96,7 +96,8 @@ impl Object<'_> {
 ///
 /// The view is small and can be copied; it borrows the blob and the objects, and any number of threads may
 /// query it at once. A query takes 8 KiB of stack for the scene and for each scene inside it,
-/// and what the query of the object takes. A batch takes 80 KiB, and 8 KiB for each scene inside the scene.
+/// and what the query of the object takes. A batch takes 80 KiB, 8 KiB for each scene inside the scene, and what the
+/// tests of shapes take.
 ///
 /// ```
 /// use hgrid_core::{Block, Config, Grid, Instance, Object, RayF64, Scene, TriangleMesh, sizes};
