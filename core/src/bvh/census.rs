@@ -156,7 +156,8 @@ impl Kernel for KeysTask<'_> {
                             high[2].greater(max[2]),
                         ];
                         // Write the keys, and count the bin of each.
-                        *keys = self.rule.of_eight(simd, min, max).into();
+                        let twice = [min[0] + max[0], min[1] + max[1], min[2] + max[2]];
+                        *keys = self.rule.of_eight(simd, twice).into();
                         for key in &*keys {
                             self.add(*key);
                         }

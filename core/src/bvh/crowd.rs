@@ -1,10 +1,18 @@
-//! Reads the triangles of a crowded unit: first the box around their centres, then their keys in that box.
+//! Gives the triangles of a crowded unit new keys, in the box around their centres.
+//!
+//! ```text
+//! centers     read each triangle once: note twice its centre, find the box around all centres
+//! new keys    for eight triangles: keys of their centres in that box; count the bin of each
+//!
+//! the notes   | entry: z, id | and in spare, for every eight entries | 8 x | 8 y |
+//! ```
 
-use fearless_simd::{Simd, f32x4, f32x8};
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, u32x8};
+use glam::Vec3A;
 
 use crate::aabb::Aabb;
-use crate::eight::{LANES, corner, join, load};
-use crate::extremes::Extremes;
+use crate::eight::LANES;
 use crate::invariant::OrBug;
 use crate::mesh::{TriangleMesh, WideMesh, vector};
 use crate::simd::{HAS_VECTORS, Kernel};
@@ -13,23 +21,31 @@ use super::key::Keys;
 use super::layout::Entry;
 use super::subtree::slow_bounds;
 
-/// Finds the box around the centres of the triangles' boxes.
-pub(crate) fn centers(mesh: &TriangleMesh<'_>, entries: &[Entry]) -> Aabb {
+/// Finds the box around the centres of the triangles' boxes. Notes twice the centre of each: x and y in `spare`, z in
+/// place of the key. Out of line: few units are crowded, and all others are slower with this in their midst.
+#[inline(never)]
+pub(crate) fn centers(mesh: &TriangleMesh<'_>, entries: &mut [Entry], spare: &mut [Entry]) -> Aabb {
+    debug_assert!(spare.len() >= entries.len(), "too little room for the centres of a unit");
     let wide = mesh.wide();
     let mut centers = Aabb::EMPTY;
-    for entry in entries {
-        let Aabb { min, max } = bounds(mesh, &wide, entry[1]);
-        let center = (min + max) * 0.5;
-        centers.min = centers.min.min(center);
-        centers.max = centers.max.max(center);
+    for (entries, room) in entries.chunks_mut(LANES).zip(spare.chunks_mut(LANES)) {
+        let (xs, ys) = room.as_flattened_mut().split_at_mut(entries.len());
+        for ((entry, x), y) in entries.iter_mut().zip(xs).zip(ys) {
+            let Aabb { min, max } = bounds(mesh, &wide, entry[1]);
+            let twice = min + max;
+            [*x, *y, entry[0]] = twice.to_array().map(f32::to_bits);
+            let center = twice * 0.5;
+            centers.min = centers.min.min(center);
+            centers.max = centers.max.max(center);
+        }
     }
     centers
 }
 
-/// Gives entries new keys, and counts those of each bin.
+/// Gives entries new keys, from the centres that [`centers`] noted, and counts those of each bin.
 pub(crate) struct NewKeys<'w> {
-    pub(crate) mesh: &'w TriangleMesh<'w>,
     pub(crate) entries: &'w mut [Entry],
+    pub(crate) spare: &'w [Entry],
     pub(crate) rule: &'w Keys,
     /// Lower bits of a key, which do not choose a bin.
     pub(crate) shift: u32,
@@ -41,16 +57,19 @@ impl Kernel for NewKeys<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { mesh, entries, rule, shift, counts } = self;
-        let wide = mesh.wide();
-        for entries in entries.chunks_mut(LANES) {
-            if let Some([min, max]) = eight(simd, &wide, entries) {
-                let keys: [u32; LANES] = rule.of_eight(simd, min, max).into();
-                for (entry, key) in entries.iter_mut().zip(keys) {
-                    entry[0] = key;
+        let Self { entries, spare, rule, shift, counts } = self;
+        for (entries, notes) in entries.chunks_mut(LANES).zip(spare.chunks(LANES)) {
+            let (xs, ys) = notes.as_flattened().split_at(entries.len());
+            match (entries.first_chunk(), xs.first_chunk(), ys.first_chunk()) {
+                (Some(&[a, b, c, d, e, f, g, h]), Some(xs), Some(ys)) if HAS_VECTORS => {
+                    let zs = [a[0], b[0], c[0], d[0], e[0], f[0], g[0], h[0]];
+                    let twice = [numbers(simd, *xs), numbers(simd, *ys), numbers(simd, zs)];
+                    let keys: [u32; LANES] = rule.of_eight(simd, twice).into();
+                    for (entry, key) in entries.iter_mut().zip(keys) {
+                        entry[0] = key;
+                    }
                 }
-            } else {
-                one_by_one(mesh, entries, rule);
+                _ => one_by_one(entries, [xs, ys], rule),
             }
             for entry in entries {
                 let count = counts.get_mut((entry[0] >> shift) as usize);
@@ -62,37 +81,18 @@ impl Kernel for NewKeys<'_> {
     }
 }
 
-/// Gives new keys to entries that are fewer than eight, or cannot be read fast.
+#[inline(always)]
+fn numbers<S: Simd>(simd: S, bits: [u32; LANES]) -> f32x8<S> {
+    u32x8::simd_from(simd, bits).bitcast()
+}
+
+/// Gives new keys to fewer than eight entries, or to those of machines without vectors.
 #[inline(never)]
-fn one_by_one(mesh: &TriangleMesh<'_>, entries: &mut [Entry], rule: &Keys) {
-    for entry in entries {
-        entry[0] = rule.of(&slow_bounds(mesh, entry[1]));
+fn one_by_one(entries: &mut [Entry], [xs, ys]: [&[u32]; 2], rule: &Keys) {
+    for ((entry, &x), &y) in entries.iter_mut().zip(xs).zip(ys) {
+        let twice = [x, y, entry[0]].map(f32::from_bits);
+        entry[0] = rule.of_twice(Vec3A::from_array(twice));
     }
-}
-
-/// The least and the greatest corners of the boxes of eight triangles; `None` if there are fewer, or if some cannot
-/// be read fast.
-#[inline(always)]
-fn eight<S: Simd>(simd: S, wide: &WideMesh<'_>, entries: &[Entry]) -> Option<[[f32x8<S>; 3]; 2]> {
-    if !HAS_VECTORS {
-        return None;
-    }
-    let [a, b, c, d, e, f, g, h] = entries.first_chunk::<LANES>()?;
-    let (a, b) = (one(simd, wide, a)?, one(simd, wide, b)?);
-    let (c, d) = (one(simd, wide, c)?, one(simd, wide, d)?);
-    let (e, f) = (one(simd, wide, e)?, one(simd, wide, f)?);
-    let (g, h) = (one(simd, wide, g)?, one(simd, wide, h)?);
-    let min = join(corner([a[0], b[0], c[0], d[0]]), corner([e[0], f[0], g[0], h[0]]));
-    let max = join(corner([a[1], b[1], c[1], d[1]]), corner([e[1], f[1], g[1], h[1]]));
-    Some([min, max])
-}
-
-/// The least and the greatest corner of the box of a triangle.
-#[inline(always)]
-fn one<S: Simd>(simd: S, wide: &WideMesh<'_>, entry: &Entry) -> Option<[f32x4<S>; 2]> {
-    let [a, b, c] = wide.corners(entry[1])?;
-    let (a, b, c) = (load(simd, a), load(simd, b), load(simd, c));
-    Some([a.lesser(b).lesser(c), a.greater(b).greater(c)])
 }
 
 /// The box of a triangle, which is known to be finite.
@@ -123,16 +123,18 @@ mod tests {
     fn check(mesh: &TriangleMesh<'_>, ids: &[u32]) {
         let shift = 24;
         let entries: Vec<Entry> = ids.iter().map(|&id| [7, id]).collect();
-        let rule = Keys::new(&centers(mesh, &entries));
+        let (mut noted, mut spare) = (entries.clone(), entries.clone());
+        let rule = Keys::new(&centers(mesh, &mut noted, &mut spare));
         let (mut expected, mut expected_counts) = (entries.clone(), [0; 64]);
         for [key, id] in &mut expected {
             *key = rule.of(&Aabb::of(mesh.corners(*id).unwrap()).unwrap());
             expected_counts[(*key >> shift) as usize] += 1;
         }
         for level in SimdLevel::available() {
-            let (mut entries, mut counts) = (entries.clone(), [0; 64]);
+            let (mut entries, mut counts) = (noted.clone(), [0; 64]);
             let (all, counts_of) = (&mut *entries, &mut counts[..]);
-            let keys = NewKeys { mesh, entries: all, rule: &rule, shift, counts: counts_of };
+            let keys =
+                NewKeys { entries: all, spare: &spare, rule: &rule, shift, counts: counts_of };
             dispatch(level, keys);
             assert_eq!((entries, counts), (expected.clone(), expected_counts), "{level:?}");
         }

@@ -46,7 +46,13 @@ impl Keys {
     /// The key of a box.
     #[inline(always)]
     pub(crate) fn of(&self, bounds: &Aabb) -> u32 {
-        let cell = ((bounds.min + bounds.max) - self.origin) * self.scale;
+        self.of_twice(bounds.min + bounds.max)
+    }
+
+    /// The key of a centre, of which twice is given: the sum of the corners of its box.
+    #[inline(always)]
+    pub(crate) fn of_twice(&self, center: Vec3A) -> u32 {
+        let cell = (center - self.origin) * self.scale;
         let cell = cell.max(Vec3A::ZERO).min(Vec3A::splat(END));
         let [x, y, z] = ((cell - Vec3A::splat(0.5)) + Vec3A::splat(SHIFT))
             .to_array()
@@ -54,24 +60,19 @@ impl Keys {
         x << 2 | y << 1 | z
     }
 
-    /// The keys of eight boxes: of each the same as [`of`](Self::of).
+    /// The keys of eight centres: of each the same as [`of_twice`](Self::of_twice).
     #[inline(always)]
-    pub(crate) fn of_eight<S: Simd>(
-        &self,
-        simd: S,
-        min: [f32x8<S>; 3],
-        max: [f32x8<S>; 3],
-    ) -> u32x8<S> {
-        let x = self.axis(simd, 0, min[0], max[0]);
-        let y = self.axis(simd, 1, min[1], max[1]);
-        let z = self.axis(simd, 2, min[2], max[2]);
+    pub(crate) fn of_eight<S: Simd>(&self, simd: S, twice: [f32x8<S>; 3]) -> u32x8<S> {
+        let x = self.axis(simd, 0, twice[0]);
+        let y = self.axis(simd, 1, twice[1]);
+        let z = self.axis(simd, 2, twice[2]);
         (x << 2) | (y << 1) | z
     }
 
     #[inline(always)]
-    fn axis<S: Simd>(&self, simd: S, axis: usize, min: f32x8<S>, max: f32x8<S>) -> u32x8<S> {
+    fn axis<S: Simd>(&self, simd: S, axis: usize, twice: f32x8<S>) -> u32x8<S> {
         let origin = f32x8::splat(simd, self.origin[axis]);
-        let cell = ((min + max) - origin) * f32x8::splat(simd, self.scale);
+        let cell = (twice - origin) * f32x8::splat(simd, self.scale);
         let cell = cell.greater(f32x8::splat(simd, 0.0)).lesser(f32x8::splat(simd, END));
         let mut bits = ((cell - 0.5) + SHIFT).bitcast::<u32x8<S>>() & CELL_BITS;
         bits = (bits | bits << 16) & 0x0300_00ff;
@@ -114,7 +115,8 @@ mod tests {
             let lanes = |side: fn(&Aabb) -> Vec3A| {
                 [0, 1, 2].map(|axis| f32x8::simd_from(simd, self.boxes.map(|b| side(&b)[axis])))
             };
-            self.keys.of_eight(simd, lanes(|b| b.min), lanes(|b| b.max)).into()
+            let (min, max) = (lanes(|b| b.min), lanes(|b| b.max));
+            self.keys.of_eight(simd, [min[0] + max[0], min[1] + max[1], min[2] + max[2]]).into()
         }
     }
 

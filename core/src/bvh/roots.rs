@@ -137,11 +137,16 @@ impl<'w> Roots<'w> {
         debug_assert!(range.end <= self.entries.len(), "a unit behind the entries");
         let Some(entries) = self.entries.get_mut(range.clone()) else { return };
         if entries.len() > MOST_UNIT {
-            let centers = crowd::centers(self.mesh, entries);
-            // Equal centres have no order but that of their ids.
-            if depth < DIVISIONS && centers.size().max_element() > 0.0 {
-                self.divide(range, &centers, depth);
-                return;
+            if depth < DIVISIONS {
+                let centers = crowd::centers(self.mesh, entries, self.spare);
+                if centers.size().max_element() > 0.0 {
+                    self.divide(range, &centers, depth);
+                    return;
+                }
+                // Equal centres have no order but that of their ids.
+                for entry in entries {
+                    entry[0] = 0;
+                }
             }
         } else if let Some(spare) = self.spare.get_mut(..entries.len()).or_bug("no room to sort") {
             // The keys of one bin differ only in their lowest `shift` bits.
@@ -245,7 +250,7 @@ impl<'w> Roots<'w> {
         let counts = self.counts.get_mut(..1 << bits).or_bug("more bins than the tree has");
         let (Some(entries), Some(counts)) = (entries, counts) else { return };
         counts.fill(0);
-        dispatch(self.level, NewKeys { mesh: self.mesh, entries, rule, shift, counts });
+        dispatch(self.level, NewKeys { entries, spare: self.spare, rule, shift, counts });
 
         // Copy the entries to `spare` in the order of their bins, crowded bins first. Then copy them back in that order.
         let mut next = starts(counts);
