@@ -85,20 +85,15 @@ static void shade(const hgrid_scene *field, pixel *p)
 {
     const hgrid_ray_f64 none = {{0, 0, 0}, {0, 0, 0}, 0, 0, 0};
     const bool is_light = p->hit.path[0] == KNOTS + 1;
-    float normal[3];
+    hgrid_scene_surface at;
     p->to_light = none;
     p->dark = p->lit = p->hit.primitive == HGRID_INVALID_ID ? 0.6 : is_light ? 1 : 0;
-    if (is_light || !hgrid_scene_normal(field, &p->hit, NULL, normal))
+    if (is_light || !hgrid_scene_surface_at(field, &p->ray, &p->hit, &at))
         return;
-    const vector along = vector_of(p->ray.direction);
-    const vector from = {p->ray.origin[0], p->ray.origin[1], p->ray.origin[2]};
-    vector up = vector_of(normal);
-    if (dot(up, along) > 0)
-        up = scale(up, -1);
-    const vector at = offset(offset(from, (double)p->hit.t, along), 1e-3, up);
-    const vector to = offset(vector_of(LIGHT_AT), -1, at);
+    const vector up = vector_of(at.normal), from = {at.above[0], at.above[1], at.above[2]};
+    const vector to = offset(vector_of(LIGHT_AT), -1, from);
     const double facing = dot(unit(to, up), up);
-    const hgrid_ray_f64 to_light = {{at.x, at.y, at.z}, {(float)to.x, (float)to.y, (float)to.z}, 0, 1, 0};
+    const hgrid_ray_f64 to_light = {{from.x, from.y, from.z}, {(float)to.x, (float)to.y, (float)to.z}, 0, 1, 0};
     p->to_light = to_light;
     p->dark = 0.12, p->lit = facing <= 0 ? 0.12 : 0.12 + 0.8 * facing;
 }

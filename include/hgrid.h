@@ -1346,6 +1346,32 @@ typedef struct hgrid_scene_options {
     size_t scratch_bytes;
 } hgrid_scene_options;
 
+/**
+ * A point of a scene where a ray met a triangle: 88 bytes. `hgrid_scene_surface_at` fills it.
+ */
+typedef struct hgrid_scene_surface {
+    /**
+     * The point, in the scene.
+     */
+    double position[3];
+    /**
+     * Start for rays that leave on the side that the ray came from: reflections, and rays to lights.
+     */
+    double above[3];
+    /**
+     * Start for rays that go on through the triangle.
+     */
+    double below[3];
+    /**
+     * The triangle's normal in the scene, of length 1, on the side that the ray came from.
+     */
+    float normal[3];
+    /**
+     * 1 if the ray met the front, which the triangle has in its mesh: mirroring does not turn it; 0 if the back.
+     */
+    uint32_t is_front;
+} hgrid_scene_surface;
+
 #if defined(HGRID_MALLOC)
 /**
  * The source of memory for `hgrid_create`. Initialise it with
@@ -2925,23 +2951,6 @@ bool hgrid_occluded_scene(const struct hgrid_scene *scene,
                           const struct hgrid_scene_options *options);
 
 /**
- * Takes a normal from the space of the object that a hit names to the scene's, of length 1.
- *
- * `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit, cross(b - a,
- * c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing: the hit names nothing in
- * the scene, or the normal is null, or it is NULL and the hit names no triangle.
- *
- * Threads: any number of calls and queries on the same scene at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
- */
-bool hgrid_scene_normal(const struct hgrid_scene *scene,
-                        const struct hgrid_scene_hit *hit,
-                        const float *object_normal,
-                        float *normal);
-
-/**
  * Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid that it shows.
  *
  * For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob. The
@@ -2958,6 +2967,60 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
                         const struct hgrid_scene_hit *hit,
                         struct hgrid_instance *instance,
                         struct hgrid_grid *grid);
+
+/**
+ * Tells where a ray met a triangle of a scene, which way the triangle faces there, and where rays start that leave it.
+ *
+ * It is to a scene what `hgrid_surface_at` is to a grid. `hit` is what a query has found for `ray`, of which the direction
+ * tells the side. Returns true and writes `surface`; or returns false and writes nothing: the hit names no triangle (but a
+ * shape, or nothing), the ray has no direction, `double` is too coarse at this distance from the scene's origin to tell
+ * the sides of the triangle apart, the view is one of zeros, or a pointer is NULL, which none may be.
+ *
+ * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the other
+ * side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane may, as normal and
+ * direction are rounded. Pass the start as it is: rounded to `float` it may lie below the plane.
+ *
+ * ```c
+ * static bool sees_light_in_scene(const hgrid_scene *scene, const hgrid_ray_f64 *ray, const hgrid_scene_hit *hit,
+ *                                 const float toward[3])
+ * {
+ *     hgrid_scene_surface at;
+ *     if (!hgrid_scene_surface_at(scene, ray, hit, &at))
+ *         return false;
+ *     const float height =
+ *         at.normal[0] * toward[0] + at.normal[1] * toward[1] + at.normal[2] * toward[2];
+ *     const hgrid_ray_f64 to_light = {{at.above[0], at.above[1], at.above[2]},
+ *                                     {toward[0], toward[1], toward[2]}, 0, INFINITY, 0};
+ *     return height > 0 && !hgrid_occluded_scene(scene, &to_light, NULL);
+ * }
+ * ```
+ *
+ * Threads: any number of calls and queries on the same scene at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_scene_surface_at(const struct hgrid_scene *scene,
+                            const struct hgrid_ray_f64 *ray,
+                            const struct hgrid_scene_hit *hit,
+                            struct hgrid_scene_surface *surface);
+
+/**
+ * Takes a normal from the space of the object that a hit names to the scene's, of length 1.
+ *
+ * `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit, cross(b - a,
+ * c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing: the hit names nothing in
+ * the scene, or the normal is null, or it is NULL and the hit names no triangle.
+ *
+ * Threads: any number of calls and queries on the same scene at once.
+ *
+ * # Safety
+ * Pointers are as the head of this file says.
+ */
+bool hgrid_scene_normal(const struct hgrid_scene *scene,
+                        const struct hgrid_scene_hit *hit,
+                        const float *object_normal,
+                        float *normal);
 
 /**
  * Finds the closest thing in a scene that each of many rays hits: what `hgrid_intersect_scene` would find

@@ -101,6 +101,8 @@ using counters = ::hgrid_counters;
 using part = ::hgrid_part;
 /// A point of a mesh where a ray met it. See `hgrid_surface`.
 using surface = ::hgrid_surface;
+/// A point of a scene where a ray met a triangle. See `hgrid_scene_surface`.
+using scene_surface = ::hgrid_scene_surface;
 /// The report of a build. See `hgrid_report`.
 struct report : ::hgrid_report {
     /// One before its call.
@@ -1925,6 +1927,14 @@ public:
                       const scene_options &with) const noexcept
     {
         return occluded_n(rays, answers, know, &with.c());
+    }
+    /// The point where a ray met a triangle, its normal there, and starts for rays that leave it; `at` is
+    /// what a query has found for the ray.
+    optional<scene_surface> surface_at(const ray_f64 &along, const scene_hit &at) const noexcept
+    {
+        scene_surface found;
+        return ::hgrid_scene_surface_at(&raw_, &along, &at, &found) ? optional<scene_surface>(found)
+                                                                    : optional<scene_surface>();
     }
     /// The normal of the triangle that was hit, of length 1, in the scene; zeros if the hit names none.
     point normal(const scene_hit &of) const noexcept

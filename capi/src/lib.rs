@@ -32,6 +32,8 @@ mod shapes;
 
 mod scene;
 
+mod scene_surface;
+
 mod scene_batch;
 
 #[cfg(feature = "malloc")]
@@ -61,6 +63,7 @@ pub use crate::query::*;
 pub use crate::query_types::*;
 pub use crate::scene::*;
 pub use crate::scene_batch::*;
+pub use crate::scene_surface::*;
 pub use crate::shapes::*;
 pub use crate::status::*;
 pub use crate::types::*;

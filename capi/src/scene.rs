@@ -541,33 +541,6 @@ pub unsafe extern "C" fn hgrid_occluded_scene(
     matches!(unsafe { raw::query_scene(scene, ray, options, true) }, Ok(Some(_)))
 }
 
-/// Takes a normal from the space of the object that a hit names to the scene's, of length 1.
-///
-/// `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit, cross(b - a,
-/// c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing: the hit names nothing in
-/// the scene, or the normal is null, or it is NULL and the hit names no triangle.
-///
-/// Threads: any number of calls and queries on the same scene at once.
-///
-/// # Safety
-/// Pointers are as the head of this file says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hgrid_scene_normal(
-    scene: *const hgrid_scene,
-    hit: *const hgrid_scene_hit,
-    object_normal: *const f32,
-    normal: *mut f32,
-) -> bool {
-    let Some(to) = NonNull::new(normal.cast::<[f32; 3]>()) else { return false };
-    // SAFETY: the caller's promise.
-    let Ok(Some(found)) = (unsafe { raw::scene_normal(scene, hit, object_normal) }) else {
-        return false;
-    };
-    // SAFETY: the caller's promise.
-    unsafe { raw::write(to, found) };
-    true
-}
-
 /// Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid that it shows.
 ///
 /// For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob. The

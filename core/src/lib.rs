@@ -161,7 +161,9 @@ pub use owned::{OwnedGrid, OwnedMesh, OwnedStrided};
 pub use packed::{BlobInfo, Member};
 pub use ray::{Hit, INVALID_ID, Ray, RayF64};
 pub use refit::{Refit, refit};
-pub use scene::{Instance, Object, ObjectTest, Scene, SceneFilter, SceneHit, SceneOptions};
+pub use scene::{
+    Instance, Object, ObjectTest, Scene, SceneFilter, SceneHit, SceneOptions, SceneSurface,
+};
 pub use shapes::{Boxes, ShapeHit, ShapeTest, Shapes};
 pub use simd::SimdLevel;
 pub use sizes::{fit, sizes, sizes_with};

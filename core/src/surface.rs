@@ -36,7 +36,7 @@ pub struct Surface {
     pub is_front: u32,
 }
 
-/// The amount by which a start is lifted, in parts of the distance to the farthest corner.
+/// The amount by which a start is lifted, in parts of the largest coordinate of a corner, measured from the point.
 const LIFT: f64 = 1.0 / (1 << 20) as f64;
 
 /// A few times the resolution of f32 near zero.
@@ -71,11 +71,39 @@ impl TriangleMesh<'_> {
     /// ```
     #[must_use]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
-        let [a, b, c] = self.triangle(hit.primitive)?.map(wide);
+        let Facet { point, normal, lift, is_front } = Facet::new(self, wide(ray.direction), hit)?;
+        let start = |lift: DVec3| {
+            let ([x, y, z], [u, v, w]) = (point.to_array(), lift.to_array());
+            [lifted(x, u), lifted(y, v), lifted(z, w)]
+        };
+        Some(Surface {
+            position: point.to_array().map(round),
+            normal: normal.to_array().map(round),
+            above: start(normal * lift),
+            below: start(normal * -lift),
+            is_front: is_front.into(),
+        })
+    }
+}
+
+/// The triangle of a hit.
+pub(crate) struct Facet {
+    /// The point where the ray met it.
+    pub(crate) point: DVec3,
+    /// Of length 1, on the side that the ray came from.
+    pub(crate) normal: DVec3,
+    /// The distance of starts from the plane.
+    pub(crate) lift: f64,
+    pub(crate) is_front: bool,
+}
+
+impl Facet {
+    /// `along` is the direction of the ray.
+    pub(crate) fn new(mesh: &TriangleMesh<'_>, along: DVec3, hit: &Hit) -> Option<Self> {
+        let [a, b, c] = mesh.triangle(hit.primitive)?.map(wide);
         let (ab, ac) = (b - a, c - a);
+        // In f64 no area of an f32 triangle underflows.
         let cross = ab.cross(ac);
-        // The square of the smallest triangle's area is a number, still.
-        let along = wide(ray.direction);
         let facing = -along.try_normalize()?;
         let front = cross.try_normalize().unwrap_or(facing);
         let is_front = front.dot(along) <= 0.0;
@@ -84,18 +112,7 @@ impl TriangleMesh<'_> {
         let point = a + ab * f64::from(hit.u) + ac * f64::from(hit.v);
         let farthest = [a, b, c].map(|corner| (corner - point).abs().max_element());
         let farthest = farthest.into_iter().fold(0.0, f64::max);
-        let lift = normal * (farthest * LIFT + LEAST);
-        let start = |lift: DVec3| {
-            let ([x, y, z], [u, v, w]) = (point.to_array(), lift.to_array());
-            [lifted(x, u), lifted(y, v), lifted(z, w)]
-        };
-        Some(Surface {
-            position: point.to_array().map(round),
-            normal: normal.to_array().map(round),
-            above: start(lift),
-            below: start(-lift),
-            is_front: is_front.into(),
-        })
+        Some(Self { point, normal, lift: farthest * LIFT + LEAST, is_front })
     }
 }
 

@@ -13,6 +13,7 @@ mod range;
 mod refit;
 mod scans;
 mod scene_batches;
+mod scene_surfaces;
 mod scenes;
 mod snapped;
 mod surfaces;

@@ -7,9 +7,9 @@ use hgrid_tests::meshes::{Mesh, ball};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 
-type Vector = [f64; 3];
+pub(crate) type Vector = [f64; 3];
 
-fn dot(a: Vector, b: Vector) -> f64 {
+pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
@@ -22,7 +22,7 @@ fn normal_of(triangle: &[[f32; 3]; 3]) -> Vector {
 }
 
 /// A direction on one side of a plane, every other one nearly along it.
-fn leaving(random: &mut Random, normal: Vector, side: f64) -> [f32; 3] {
+pub(crate) fn leaving(random: &mut Random, normal: Vector, side: f64) -> [f32; 3] {
     loop {
         let mut direction = random.point();
         if random.bits().is_multiple_of(2) {

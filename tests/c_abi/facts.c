@@ -167,6 +167,12 @@ static void layout(void)
     OFFSET(hgrid_scene_hit, v);
     OFFSET(hgrid_scene_hit, primitive);
     OFFSET(hgrid_scene_hit, path);
+    SIZE(hgrid_scene_surface);
+    OFFSET(hgrid_scene_surface, position);
+    OFFSET(hgrid_scene_surface, above);
+    OFFSET(hgrid_scene_surface, below);
+    OFFSET(hgrid_scene_surface, normal);
+    OFFSET(hgrid_scene_surface, is_front);
     SIZE(hgrid_scene_options);
     OFFSET(hgrid_scene_options, struct_size);
     OFFSET(hgrid_scene_options, mask);

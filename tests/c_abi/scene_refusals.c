@@ -201,6 +201,9 @@ static void what_scenes_refuse(void)
     CHECK(!hgrid_scene_normal(&zeros, &hit, NULL, normal));
     hgrid_scene_hit miss = {INFINITY, 0, 0, HGRID_INVALID_ID, {99, 0, 0, 0}};
     CHECK(!hgrid_scene_normal(&scene, &miss, NULL, normal));
+    hgrid_scene_surface surface;
+    CHECK(!hgrid_scene_surface_at(&zeros, &ray, &hit, &surface));
+    CHECK(!hgrid_scene_surface_at(&scene, &ray, &miss, &surface));
 }
 
 /* Both calls for many rays, with one argument wrong. */
@@ -467,6 +470,12 @@ static void no_pointers(void)
     REFUSED(hgrid_occluded_scene_n.occluded, hgrid_occluded_scene_n(&inner, from, 0, NULL, 0, all, how, NULL));
     ALLOWED(hgrid_occluded_scene_n.rays, hgrid_occluded_scene_n(&inner, NULL, 0, NULL, 0, 0, how, NULL));
     ALLOWED(hgrid_occluded_scene_n.options, hgrid_occluded_scene_n(&inner, from, 0, dark, 0, all, how, NULL));
+    hgrid_scene_surface at;
+    MISSED(hgrid_scene_surface_at.scene, hgrid_scene_surface_at(NULL, &wide, &scene_hit, &at));
+    MISSED(hgrid_scene_surface_at.ray, hgrid_scene_surface_at(&inner, NULL, &scene_hit, &at));
+    MISSED(hgrid_scene_surface_at.hit, hgrid_scene_surface_at(&inner, &wide, NULL, &at));
+    MISSED(hgrid_scene_surface_at.surface, hgrid_scene_surface_at(&inner, &wide, &scene_hit, NULL));
+    CHECK(hgrid_scene_surface_at(&inner, &wide, &scene_hit, &at));
     MISSED(hgrid_scene_normal.scene, hgrid_scene_normal(NULL, &scene_hit, NULL, normal));
     MISSED(hgrid_scene_normal.hit, hgrid_scene_normal(&inner, NULL, NULL, normal));
     MISSED(hgrid_scene_normal.normal, hgrid_scene_normal(&inner, &scene_hit, NULL, NULL));

@@ -86,6 +86,16 @@ static void scenes_show_grids_shapes_and_scenes(void)
         float normal[3], given[3] = {0, 0, 5};
         CHECK(hgrid_scene_normal(&inner, &hit, NULL, normal) && normal[2] < -0.5f);
         CHECK(hgrid_scene_normal(&inner, &hit, given, normal) && fabsf(normal[2] + 1) < 1e-6f);
+        hgrid_scene_surface at;
+        CHECK(hgrid_scene_surface_at(&inner, &up, &hit, &at) && at.is_front && at.normal[2] < -0.5f);
+        CHECK(fabs(at.position[2] - (up.origin[2] + (double)hit.t)) < 1e-5);
+        CHECK(at.above[2] < at.position[2] && at.position[2] < at.below[2]);
+        /* A ray that goes on through the triangle misses it, and so does one that turns back. */
+        hgrid_ray_f64 on = up, back = up;
+        memcpy(on.origin, at.below, sizeof on.origin);
+        memcpy(back.origin, at.above, sizeof back.origin);
+        back.direction[2] = -1;
+        CHECK(!hgrid_occluded_scene(&inner, &on, NULL) && !hgrid_occluded_scene(&inner, &back, NULL));
 
         hgrid_scene_options options = HGRID_SCENE_OPTIONS_INIT;
         hgrid_counters counters = {0, 0, 0};

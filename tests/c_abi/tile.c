@@ -109,6 +109,9 @@ int main(void)
     }
     if (trace_tile_of_scene(&scene, wide_rays, wide_hits) != 36 || wide_hits[0].t != depth[0] || wide_hits[0].path[0] != 0)
         return 17;
+    if (!sees_light_in_scene(&scene, &wide_rays[0], &wide_hits[0], up) ||
+        sees_light_in_scene(&scene, &wide_rays[0], &wide_hits[0], down))
+        return 18;
     static disc discs[1] = {{1, 1, 0, 0.5f}};
     static const float box[6] = {0.5f, 0.5f, 0, 1.5f, 1.5f, 0};
     hgrid_boxes boxes = HGRID_BOXES_INIT;
@@ -126,7 +129,7 @@ int main(void)
     }
     /* Radius 0.5 around (1, 1): 13 points of a lattice of quarters. */
     if (trace_tile_of_shapes(&shapes, discs_seen, disc_hits) != 13 || disc_hits[4 * 8 + 4].t != 1)
-        return 18;
+        return 19;
 
     /* Two meshes of a triangle each in one grid, and what the second is made of. */
     hgrid_mesh halves[2];

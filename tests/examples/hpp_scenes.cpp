@@ -154,6 +154,9 @@ void check_scenes()
     CHECK(found && found->path[0] == 1 && found->t == 6);
     const hgrid::point normal = scene->normal(*found);
     CHECK(normal[2] == 1 || normal[2] == -1);
+    const auto at = scene->surface_at(left, *found);
+    CHECK(at && at->normal[2] == 1 && at->position[2] == -5 && at->above[2] > -5 && at->below[2] < -5);
+    CHECK(!scene->surface_at(left, {1, 0, 0, hgrid::invalid_id, {0, 0, 0, 0}}));
     CHECK(scene->occluded({{10.25, 10.5, 3}, {0, 0, -1}, 0, 100, 0}));
     CHECK(hgrid::scene::open(hgrid::as_bytes(scene_index), objects));
     CHECK(!hgrid::scene().occluded(left));

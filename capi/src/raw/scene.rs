@@ -9,7 +9,7 @@ use core::slice;
 
 use hgrid_core::{
     ALIGNMENT, BlobInfo, Content, Counters, Cull, Instance, Member, Object, Scene, SceneHit,
-    SceneOptions, Verdict,
+    SceneOptions, SceneSurface, Verdict,
 };
 
 use super::ask::add;
@@ -442,6 +442,24 @@ pub(crate) unsafe fn scene_batch<T>(
     // SAFETY: the caller's promise.
     unsafe { asked.ask(trace) };
     Ok(())
+}
+
+/// Returns the point of a scene where a ray met a triangle.
+///
+/// # Safety
+/// The contract of [`scene`].
+pub(crate) unsafe fn scene_surface(
+    view: *const hgrid_scene,
+    ray: *const hgrid_ray_f64,
+    hit: *const hgrid_scene_hit,
+) -> Result<Option<SceneSurface>, hgrid_status> {
+    // SAFETY: this function's contract.
+    let scene = unsafe { scene(view) }?;
+    // SAFETY: the caller's promise.
+    let ray = unsafe { read(ray) }?;
+    // SAFETY: the caller's promise.
+    let hit = unsafe { read(hit) }?;
+    Ok(scene.surface(&ray.into(), &hit.into()))
 }
 
 /// A normal in the space of a scene.

@@ -29,7 +29,8 @@ pub(crate) fn centers(mesh: &TriangleMesh<'_>, entries: &mut [Entry], spare: &mu
     let wide = mesh.wide();
     let mut centers = Aabb::EMPTY;
     for (entries, room) in entries.chunks_mut(LANES).zip(spare.chunks_mut(LANES)) {
-        let (xs, ys) = room.as_flattened_mut().split_at_mut(entries.len());
+        let (xs, ys) =
+            room.as_flattened_mut().split_at_mut_checked(entries.len()).unwrap_or_default();
         for ((entry, x), y) in entries.iter_mut().zip(xs).zip(ys) {
             let Aabb { min, max } = bounds(mesh, &wide, entry[1]);
             let twice = min + max;
@@ -59,7 +60,7 @@ impl Kernel for NewKeys<'_> {
     fn run<S: Simd>(self, simd: S) {
         let Self { entries, spare, rule, shift, counts } = self;
         for (entries, notes) in entries.chunks_mut(LANES).zip(spare.chunks(LANES)) {
-            let (xs, ys) = notes.as_flattened().split_at(entries.len());
+            let (xs, ys) = notes.as_flattened().split_at_checked(entries.len()).unwrap_or_default();
             match (entries.first_chunk(), xs.first_chunk(), ys.first_chunk()) {
                 (Some(&[a, b, c, d, e, f, g, h]), Some(xs), Some(ys)) if HAS_VECTORS => {
                     let zs = [a[0], b[0], c[0], d[0], e[0], f[0], g[0], h[0]];

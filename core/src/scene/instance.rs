@@ -18,6 +18,7 @@
 //! The `t` of a ray in a scene inside another is that of the outermost scene. The object's ray is a function of
 //! that ray, the instances on the path and the object's box alone, so every query asks the object the same.
 
+use glam::DVec3;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use crate::aabb::{greater, lesser};
@@ -147,9 +148,16 @@ impl StoredInstance {
     }
 
     /// A direction that is across the object, as a normal, in the scene.
-    pub(super) fn normal(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    pub(super) fn normal(&self, normal: DVec3) -> DVec3 {
         let [a, b, c] = self.inverse();
-        [0, 1, 2].map(|axis| a[axis] * x + b[axis] * y + c[axis] * z)
+        let along = |axis: usize| normal.dot(DVec3::new(a[axis], b[axis], c[axis]));
+        DVec3::new(along(0), along(1), along(2))
+    }
+
+    /// A point of the object in the scene.
+    pub(super) fn point(&self, point: DVec3) -> Option<DVec3> {
+        let [a, b, c] = inverse_of(&self.inverse())?.map(|row| point.dot(DVec3::from_array(row)));
+        Some(DVec3::new(a, b, c) + DVec3::from_array(self.0.translation))
     }
 
     /// The line that the object sees, with the `t` of this one.

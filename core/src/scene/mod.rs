@@ -16,20 +16,23 @@ mod groups;
 mod instance;
 mod query;
 mod store;
+mod surface;
 
 use core::fmt;
 
+use glam::DVec3;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use crate::grid::Grid;
 use crate::limits::MAX_NESTING;
-use crate::ray::Ray;
+use crate::ray::{Ray, round};
 use crate::shapes::{ShapeHit, Shapes};
 use crate::simd::SimdLevel;
 pub use instance::Instance;
 use instance::StoredInstance;
 pub use query::{SceneFilter, SceneHit, SceneOptions};
 pub(crate) use store::ends_of;
+pub use surface::SceneSurface;
 
 /// Tests the shapes of an object in a scene, from any number of threads at once. Every function like a
 /// [`ShapeTest`](crate::ShapeTest) that needs no `&mut` is one.
@@ -196,15 +199,16 @@ impl<'a> Scene<'a> {
         self.blob
     }
 
-    /// The object that a hit names, and the scene and number of the instance that shows it.
-    fn holder(&self, hit: &SceneHit) -> Option<(Scene<'a>, usize)> {
+    /// The place of the object that a hit names.
+    fn place(&self, hit: &SceneHit) -> Option<Place<'a>> {
+        let mut instances = [None; MAX_NESTING];
         let mut scene = *self;
-        for level in 0..MAX_NESTING {
-            let number = *hit.path.get(level)? as usize;
-            let object = scene.objects.get(scene.instances.get(number)?.object() as usize)?;
-            match object {
+        for (instance, &number) in instances.iter_mut().zip(&hit.path) {
+            let placed = scene.instances.get(number as usize)?;
+            *instance = Some(placed);
+            match scene.objects.get(placed.object() as usize)? {
                 Object::Scene(inner) => scene = **inner,
-                _ => return Some((scene, number)),
+                object => return Some(Place { instances, object }),
             }
         }
         None
@@ -213,33 +217,21 @@ impl<'a> Scene<'a> {
     /// The instance that shows the object that a hit names, the innermost one, as [`instance`](Self::instance) gives it.
     #[must_use]
     pub fn instance_of(&self, hit: &SceneHit) -> Option<Instance> {
-        let (scene, number) = self.holder(hit)?;
-        scene.instances.get(number)?.instance()
+        self.place(hit)?.instances().next_back()?.instance()
     }
 
     /// The object that a hit names: the grid or the shapes at the end of its path.
     #[must_use]
     pub fn object_of(&self, hit: &SceneHit) -> Option<Object<'a>> {
-        let (scene, number) = self.holder(hit)?;
-        scene.objects.get(scene.instances.get(number)?.object() as usize).copied()
+        Some(*self.place(hit)?.object)
     }
 
     /// Takes a normal from the space of the object that a hit names to the scene's; of length 1. `None` if the hit
     /// names none, or the normal is null.
     #[must_use]
     pub fn normal_of(&self, hit: &SceneHit, normal: [f32; 3]) -> Option<[f32; 3]> {
-        fn turn(scene: &Scene<'_>, path: &[u32], normal: [f64; 3]) -> Option<[f64; 3]> {
-            let (&number, rest) = path.split_first()?;
-            let placed = scene.instances.get(number as usize)?;
-            let normal = match scene.objects.get(placed.object() as usize)? {
-                Object::Scene(inner) => turn(inner, rest, normal)?,
-                _ => normal,
-            };
-            // Of length 1 on the way, or scales would add up.
-            let turned = placed.normal(normal);
-            glam::DVec3::from_array(turned).try_normalize().map(|normal| normal.to_array())
-        }
-        Some(turn(self, &hit.path, normal.map(f64::from))?.map(crate::ray::round))
+        let normal = DVec3::from_array(normal.map(f64::from));
+        Some(self.place(hit)?.normal(normal)?.to_array().map(round))
     }
 
     /// The normal of the triangle that was hit, of length 1, in the scene's space, on the side that the triangle has
@@ -248,8 +240,21 @@ impl<'a> Scene<'a> {
     pub fn triangle_normal(&self, hit: &SceneHit) -> Option<[f32; 3]> {
         let Object::Grid(grid) = self.object_of(hit)? else { return None };
         let [a, b, c] =
-            grid.mesh().triangle(hit.primitive)?.map(|p| glam::DVec3::from_array(p.map(f64::from)));
+            grid.mesh().triangle(hit.primitive)?.map(|p| DVec3::from_array(p.map(f64::from)));
         let normal = (b - a).cross(c - a).try_normalize()?;
-        self.normal_of(hit, normal.to_array().map(crate::ray::round))
+        self.normal_of(hit, normal.to_array().map(round))
+    }
+}
+
+/// An object, and the instances on the way to it.
+struct Place<'a> {
+    instances: [Option<&'a StoredInstance>; MAX_NESTING],
+    object: &'a Object<'a>,
+}
+
+impl<'a> Place<'a> {
+    /// From the outermost scene on.
+    fn instances(&self) -> impl DoubleEndedIterator<Item = &'a StoredInstance> {
+        self.instances.into_iter().flatten()
     }
 }

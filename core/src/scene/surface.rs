@@ -1,0 +1,125 @@
+//! The point where a ray met a triangle of an instance, and the starts of the next rays.
+//!
+//! As in a single mesh ([`surface`](crate::surface)), a start lies above the triangle's plane, in the space of its object.
+//! But the query of the next ray moves the start there from the scene and rounds it to f32, which may take it below the
+//! plane. So each start makes this way beforehand, and is lifted twice as far until it stays above:
+//!
+//! ```text
+//! lift = that of a start in the mesh
+//! loop: start = point + lift * normal, moved to the scene
+//!       seen  = start, moved to the object as a query does
+//!       done if seen is less than half the lift from where it should be; else lift = 2 * lift
+//! ```
+
+use glam::DVec3;
+
+use super::instance::StoredInstance;
+use super::{Object, Place, Scene, SceneHit};
+use crate::approach::LineF64;
+use crate::ray::{Hit, RayF64, round};
+use crate::surface::Facet;
+
+/// A point of a scene where a ray met a triangle: 88 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SceneSurface {
+    /// The point, in the scene.
+    pub position: [f64; 3],
+    /// Start for rays that leave on the side that the ray came from: reflections, and rays to lights.
+    pub above: [f64; 3],
+    /// Start for rays that go on through the triangle.
+    pub below: [f64; 3],
+    /// The triangle's normal in the scene, of length 1, on the side that the ray came from.
+    pub normal: [f32; 3],
+    /// 1 if the ray met the front, which the triangle has in its mesh, else 0.
+    pub is_front: u32,
+}
+
+impl Scene<'_> {
+    /// The point where a ray met a triangle of this scene, with starts for the rays that leave it. `None` if the hit names no
+    /// triangle, if the ray has no direction, or if f64 is too coarse at this distance from the scene's origin to tell the
+    /// sides of the triangle apart.
+    ///
+    /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the other
+    /// side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the plane may, as
+    /// normal and direction are rounded. What [`TriangleMesh::surface`](crate::TriangleMesh::surface) says about triangles
+    /// without area holds here, too.
+    ///
+    /// ```
+    /// # use hgrid_core::*;
+    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// # let config = Config::default();
+    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
+    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
+    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
+    /// # let scratch = Block::bytes_mut(&mut scratch);
+    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
+    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
+    /// # let objects = [Object::Grid(&grid)];
+    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    /// let ray = RayF64::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
+    /// let hit = scene.intersect(&ray).expect("in front of the camera");
+    /// let surface = scene.surface(&ray, &hit).expect("a triangle");
+    /// assert_eq!((surface.normal, surface.is_front), ([0.0, 0.0, 1.0], 1));
+    ///
+    /// let to_light = RayF64::new(surface.above, [0.5, 0.0, 0.1]);
+    /// assert!(!scene.occluded(&to_light));
+    /// # Ok::<(), Error>(())
+    /// ```
+    #[must_use]
+    pub fn surface(&self, ray: &RayF64, hit: &SceneHit) -> Option<SceneSurface> {
+        let place = self.place(hit)?;
+        let Object::Grid(grid) = place.object else { return None };
+        let along = DVec3::from_array(place.line(&LineF64::from(ray)).direction);
+        let SceneHit { t, u, v, primitive, .. } = *hit;
+        let facet = Facet::new(grid.mesh(), along, &Hit { t, u, v, primitive })?;
+        let (min, max) = grid.bounds();
+        let extent = (0..3).map(|axis| f64::from(max[axis] - min[axis])).fold(0.0, f64::max);
+        Some(SceneSurface {
+            position: place.outward(facet.point)?.to_array(),
+            above: place.start(&facet, 1.0, extent)?.to_array(),
+            below: place.start(&facet, -1.0, extent)?.to_array(),
+            normal: place.normal(facet.normal)?.to_array().map(round),
+            is_front: facet.is_front.into(),
+        })
+    }
+}
+
+impl Place<'_> {
+    /// A line of the scene as the object sees it.
+    fn line(&self, line: &LineF64) -> LineF64 {
+        self.instances().fold(*line, |line, instance| instance.line(&line))
+    }
+
+    /// A point of the object in the scene.
+    fn outward(&self, point: DVec3) -> Option<DVec3> {
+        self.instances().rev().try_fold(point, |point, instance| instance.point(point))
+    }
+
+    /// A normal of the object in the scene, of length 1.
+    pub(super) fn normal(&self, normal: DVec3) -> Option<DVec3> {
+        // Of length 1 on the way, or scales would add up.
+        let turned = |normal, instance: &StoredInstance| instance.normal(normal).try_normalize();
+        self.instances().rev().try_fold(normal, turned)
+    }
+
+    /// The start on a side of a facet, 1 above and -1 below.
+    fn start(&self, facet: &Facet, side: f64, extent: f64) -> Option<DVec3> {
+        let mut lift = facet.lift;
+        // An object that is smaller than a step of f64 in the scene has no sides.
+        while lift <= extent {
+            let wanted = facet.point + facet.normal * (side * lift);
+            let start = self.outward(wanted)?;
+            let line = LineF64 { origin: start.to_array(), direction: [0.0; 3] };
+            let seen = self.line(&line).origin.map(|c| f64::from(round(c)));
+            if DVec3::from_array(seen).distance(wanted) < 0.5 * lift {
+                return Some(start);
+            }
+            lift *= 2.0;
+        }
+        None
+    }
+}
+
+const _: () = assert!(size_of::<SceneSurface>() == 88);
