@@ -1,4 +1,4 @@
-//! What do bytes do that somebody chose to do harm?
+//! Bytes that somebody chose to do harm.
 
 mod flips;
 mod invariants;
