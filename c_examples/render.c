@@ -21,7 +21,7 @@ static const double SKY_REACH = 0.5;
 typedef struct {
     hgrid_ray ray;
     hgrid_hit hit;
-    /* Its place in the whole picture and in the job's rows. */
+    /* The pixel's place in the whole picture and in the job's rows. */
     uint32_t number;
     size_t place;
     hgrid_surface at;

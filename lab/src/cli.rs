@@ -40,7 +40,7 @@ pub const DEFAULT_SCENE: &str = "procedural:knot:500K";
 #[derive(Debug, Parser)]
 #[command(name = "hgrid", version, after_help = EXAMPLES, override_usage = "hgrid [FILE] [OPTIONS]\n       hgrid COMMAND ...")]
 pub struct Cli {
-    /// What to do.
+    /// The command to run.
     #[command(subcommand)]
     pub command: Command,
 }

@@ -5,7 +5,7 @@
 //! bound; `exact sizes` builds as far as is needed to know the bytes. The regions are written once before the
 //! clock starts, so that first touches of fresh pages are not measured.
 
-#![expect(clippy::expect_used, reason = "a bench that cannot start has nobody to answer to")]
+#![expect(clippy::expect_used, reason = "a bench that cannot start can only panic")]
 
 use core::hint::black_box;
 

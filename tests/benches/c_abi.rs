@@ -3,7 +3,7 @@
 //! Analysis: the C side checks a tag, three pointers and the ray's bytes, and cannot be inlined; that is a
 //! few nanoseconds on a query of some hundred. The library is the `libhgrid.so` that C programs link.
 
-#![expect(clippy::expect_used, reason = "a bench that cannot start has nobody to answer to")]
+#![expect(clippy::expect_used, reason = "a bench that cannot start can only panic")]
 
 use core::ffi::c_void;
 use core::hint::black_box;

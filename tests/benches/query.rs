@@ -4,7 +4,7 @@
 //! triangles into the cache; incoherent rays go from one random point of the box to another, so on a mesh
 //! larger than the cache each one waits for memory. The difference between the two is that wait.
 
-#![expect(clippy::expect_used, reason = "a bench that cannot start has nobody to answer to")]
+#![expect(clippy::expect_used, reason = "a bench that cannot start can only panic")]
 
 use core::hint::black_box;
 

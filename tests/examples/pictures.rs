@@ -114,7 +114,7 @@ fn a_picture_of_any_size_is_complete() {
     }
 }
 
-/// Vertices of a house without a floor: four walls as one square each, a roof of two.
+/// The vertices of a house without a floor: two gable walls, two side walls, a roof of two quads.
 const VERTICES: [[f32; 3]; 10] = [
     [0.0, 0.0, 0.0],
     [2.0, 0.0, 0.0],
@@ -128,7 +128,7 @@ const VERTICES: [[f32; 3]; 10] = [
     [1.0, 2.25, 3.0],
 ];
 
-/// Its faces: pentagons, squares, a triangle twice.
+/// The faces of the house: pentagons, quads, and a triangle that is also a part of the first pentagon.
 const FACES: [&[u8]; 7] = [
     &[0, 1, 5, 8, 4],
     &[3, 2, 6, 9, 7],

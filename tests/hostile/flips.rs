@@ -22,7 +22,7 @@ const CONTENT: Range<usize> = 104..108;
 /// The header's field for the quality of a tree.
 const QUALITY: usize = 120;
 
-/// Returns true if a valid blob with a flipped bit in this byte is one that somebody may have made.
+/// Returns true if a blob may be valid in spite of a flipped bit in this byte, because a builder could have made it.
 fn is_fit(at: usize, copy: &Copy, grid: &Grid<'_>) -> bool {
     let rebuilt = Owned::build(grid.mesh(), &grid.config()).unwrap();
     // `validate` does not check why a list was not subdivided: see core/src/variable/validate.rs.
@@ -31,7 +31,7 @@ fn is_fit(at: usize, copy: &Copy, grid: &Grid<'_>) -> bool {
     if grid.method() == Method::Bvh && (at > CHECKSUM || at == QUALITY) {
         return true;
     }
-    // The field for the mesh after the grid may have two values, since nobody reads it who brings the mesh.
+    // The field for the mesh after the grid may have more than one value: it is not read if the caller has the mesh.
     is_built && TOLD.contains(&(at & !3)) || at == MESH && copy.word(MESH) <= 2
 }
 

@@ -1,4 +1,4 @@
-//! Bytes that somebody chose to do harm.
+//! Damaged, random and forged bytes.
 
 mod flips;
 mod invariants;

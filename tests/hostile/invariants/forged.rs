@@ -1,4 +1,4 @@
-//! Blobs forged by somebody who knows the proof and chose slot numbers with equal scrambled sums.
+//! Blobs forged with knowledge of the proof: their slot numbers have equal scrambled sums.
 
 use std::collections::BTreeMap;
 
