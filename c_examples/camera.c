@@ -4,11 +4,11 @@
 
 #include <stdbool.h>
 
-/* The tangent of half the field of view, and how much larger than the box the picture is. */
+/* The tangent of half the field of view, and the size of the picture as a multiple of the box's. */
 static const float HALF_VIEW_TANGENT = 0.364f;
 static const double MARGIN = 1.04;
 
-/* The box around all finite vertices; without any, the origin. */
+/* Finds the box around all finite vertices, or the origin if there are none. */
 static void find_bounds(const scene *s, float min[3], float max[3])
 {
     bool is_empty = true;
@@ -26,8 +26,8 @@ static void find_bounds(const scene *s, float min[3], float max[3])
     }
 }
 
-/* Stands where all eight corners of the scene's box just fit: in front of it, or above if the scene
- * is flat. */
+/* Places the camera where all eight corners of the scene's box just fit: in front of it, or above it if the
+ * scene is flat. */
 camera frame(const scene *s)
 {
     float min[3], max[3];
@@ -38,7 +38,7 @@ camera frame(const scene *s)
         half[axis] = 0.5 * max[axis] - 0.5 * min[axis];
     }
 
-    /* The picture's axes, as seen from the scene. */
+    /* The picture's axes, in scene space. */
     const vector front = {0, 0, 1}, above = {2, 1.5, 3}, level = {1, 0, 0};
     const bool is_flat = half[1] < 0.25 * larger(half[0], half[2]);
     const vector toward_eye = unit(is_flat ? above : front, front);

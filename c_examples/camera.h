@@ -1,4 +1,4 @@
-/* Where the picture is taken from. */
+/* The camera: its place and its picture's axes. */
 #ifndef CAMERA_H
 #define CAMERA_H
 
@@ -12,10 +12,10 @@ typedef struct {
     double scene_radius;
 } camera;
 
-/* Stands where all of the scene just fits. */
+/* Places the camera where all of the scene just fits. */
 camera frame(const scene *s);
 
-/* The ray through the middle of a pixel, counted from the upper left, of a square picture. */
+/* Returns the ray through the middle of a pixel of a square picture, counted from the upper left. */
 hgrid_ray ray_of(const camera *c, int column, int row, int size);
 
 #endif

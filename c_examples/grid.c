@@ -32,18 +32,17 @@ hgrid_mesh mesh_of(const scene *s)
     return mesh;
 }
 
-/* Whether a method knows the size of its index before it writes it. */
+/* Returns true if a method knows the size of its index before it writes it. */
 static bool is_planned(const hgrid_config *config)
 {
     return config->method == HGRID_METHOD_ONE_LEVEL || config->method == HGRID_METHOD_FIXED;
 }
 
-/* Asks how much memory the grid takes, and allocates it; returns the scratch.
+/* Computes and allocates the memory of the grid; returns the scratch.
  *
- * The question without scratch says enough for the index, not exactly what it takes: where memory
- * comes in pages, those that are never touched cost nothing. With the methods that find their size
- * while they write, enough is far more than that, so they are asked again, with scratch, for up to
- * the time of a build. */
+ * Without scratch, hgrid_sizes returns a bound of the index, not its exact size; pages that are never
+ * touched cost nothing. For methods that find their size while they write, the bound is far too large.
+ * So hgrid_sizes is called again for them, with scratch, for up to the time of a build. */
 static region allocate_grid(const hgrid_mesh *mesh, const hgrid_config *config, region *index)
 {
     hgrid_report report = HGRID_REPORT_INIT;
@@ -55,7 +54,7 @@ static region allocate_grid(const hgrid_mesh *mesh, const hgrid_config *config, 
     return scratch;
 }
 
-/* Told by hgrid how far it is; to return false would end the build. */
+/* Shows the progress that hgrid reports; returning false would end the build. */
 static bool go_on(void *context, uint32_t done)
 {
     show_progress((progress *)context, (double)done / HGRID_PROGRESS_END);

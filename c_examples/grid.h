@@ -1,4 +1,4 @@
-/* A grid, in memory that malloc gave. */
+/* A grid in memory from malloc. */
 #ifndef GRID_H
 #define GRID_H
 
@@ -8,7 +8,7 @@
 
 #include <hgrid.h>
 
-/* The methods by their names, with their usual numbers. */
+/* The methods by their names, with their default parameters. */
 typedef struct {
     const char *name;
     hgrid_config config;
@@ -17,26 +17,26 @@ typedef struct {
 enum { METHOD_COUNT = 5 };
 extern const method METHODS[METHOD_COUNT];
 
-/* A grid and what there is to know about it. */
+/* A grid, with the facts about its build. */
 typedef struct {
     hgrid_grid grid;
-    /* Where it lies. */
+    /* The memory of the grid. */
     region index;
     hgrid_report report;
     size_t scratch_bytes;
-    /* The time of asking for sizes and of malloc, and that of the build alone. */
+    /* The time of hgrid_sizes and of malloc, and that of the build alone. */
     double sizes_seconds, build_seconds;
 } built_grid;
 
-/* The mesh as hgrid wants to know it: it will be read where it is, at every query. */
+/* Returns the mesh for hgrid, which reads its arrays in place at every query. */
 hgrid_mesh mesh_of(const scene *s);
 
-/* Builds on so many threads, as far as the method can use them, or ends the program with the reason.
- * The progress may be NULL: then none is reported. */
+/* Builds on up to so many threads, or ends the program with the reason. The progress may be NULL: then none
+ * is reported. */
 built_grid build_grid(const hgrid_mesh *mesh, const hgrid_config *config, uint32_t threads,
                       progress *p);
 
-/* Ends the program unless all is well. The report may be NULL. */
+/* Ends the program if the status is an error. The report may be NULL. */
 void check(hgrid_status status, const hgrid_report *report);
 
 #endif

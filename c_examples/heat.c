@@ -9,8 +9,8 @@
 
 /* --- colours --------------------------------------------------------------------------------- */
 
-/* From no work to much; between these, colours are mixed. The order of their brightness is that of
- * the work, so that it shows on paper, too. */
+/* Colours from no work to much; those between are mixed. Their brightness rises with the work, so that the
+ * order shows on paper, too. */
 static const unsigned char RAMP[][3] = {
     {8, 8, 24}, {52, 16, 110}, {140, 34, 122}, {214, 70, 76}, {250, 150, 40}, {252, 252, 170},
 };
@@ -34,7 +34,7 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The end of the scale: 1, 2, 4, 6, 8, 10, 20, ... It is even, so its half is a number, too. */
+/* Returns the end of the scale: 2, 4, 6, 8, 10, 20, 40, ... Its half is the middle label. */
 static uint32_t top_of(const uint32_t *work, size_t count)
 {
     uint32_t *sorted = (uint32_t *)allocate(count, sizeof *sorted);
@@ -72,7 +72,7 @@ static unsigned rows_of(char letter)
     return 0;
 }
 
-/* A picture that grew a bar. A dot of its letters is `dot` pixels wide. */
+/* A picture with room for a bar. A dot of its letters is `dot` pixels wide. */
 typedef struct {
     unsigned char *pixels;
     int width, dot;

@@ -1,11 +1,11 @@
-/* Pictures of work: a colour for each pixel, and a bar that says what the colours mean. */
+/* Heat pictures: the work of each pixel as a colour, with a labelled colour bar. */
 #ifndef HEAT_H
 #define HEAT_H
 
 #include <stdint.h>
 #include <stdio.h>
 
-/* Writes and closes the file. Below pictures that are wide enough for its numbers there is a bar:
+/* Writes and closes the file. A bar is drawn below pictures that are wide enough for its numbers:
  *
  *     +-----------------------+
  *     |        picture        |   The scale ends at a round number no less than what 99 of 100

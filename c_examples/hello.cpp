@@ -25,7 +25,7 @@ struct triangle {
 
 enum : std::uint16_t { WOOD, LEAF };
 
-/* A pixel on its way: ray and hit lie in the same struct. */
+/* A pixel with its ray and its hit in one struct. */
 struct pixel {
     hgrid::ray ray;
     hgrid::hit hit;
@@ -44,7 +44,7 @@ int main()
         {{0, 1, 2}, WOOD}, {{0, 2, 3}, WOOD}, {{4, 5, 6}, LEAF},
     };
 
-    /* Build. The grid frees its memory by itself. */
+    /* Build. The grid frees its memory in its destructor. */
     const hgrid::mesh mesh(vertices, hgrid::field(triangles, &triangle::corners));
     const auto grid = hgrid::grid::build(mesh, hgrid::method::bvh);
     if (!grid)
@@ -56,7 +56,7 @@ int main()
         std::printf("triangle %u at t = %g\n", static_cast<unsigned>(hit->primitive),
                     static_cast<double>(hit->t));
 
-    /* The leaf has a hole where both weights are below 0.3: there the ray goes on. */
+    /* The leaf has a hole where both weights are below 0.3: a ray passes through it. */
     auto is_solid = [&](const hgrid::hit &hit) {
         return triangles[hit.primitive].material != LEAF || hit.u > 0.3f || hit.v > 0.3f;
     };
@@ -66,7 +66,7 @@ int main()
         std::printf("through the hole: triangle %u at t = %g\n",
                     static_cast<unsigned>(hit->primitive), static_cast<double>(hit->t));
 
-    /* Many rays with one call, from your structs into your structs. */
+    /* Many rays with one call, from and into your structs. */
     std::vector<pixel> pixels(12 * 24);
     for (std::size_t i = 0; i < pixels.size(); i++) {
         const float x = static_cast<float>(i % 24) / 5 - 0.3f;

@@ -21,7 +21,7 @@ const char *const program_name = "instances";
 enum { SIDE = 48, KNOTS = SIDE * SIDE, COUNT = KNOTS + 2, SIZE = 256, TILE = 8 };
 enum { KNOT, FLOOR, LIGHT, OBJECTS };
 
-/* The light: center and radius, in the scene. */
+/* The light: its centre and its radius, in the scene. */
 static const float LIGHT_AT[3] = {30, 22, 10};
 static const float LIGHT_RADIUS = 3;
 
@@ -32,7 +32,7 @@ static float next_random(void)
     return (float)(state >> 8) / 16777216.0f;
 }
 
-/* Where a ray enters the unit sphere. */
+/* Finds the place where a ray enters the unit sphere. */
 static bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
 {
     const vector from = vector_of(ray->origin), along = vector_of(ray->direction);
@@ -43,7 +43,7 @@ static bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shap
     return inside >= 0;
 }
 
-/* Knots on a lattice, each turned about the vertical by some angle and scaled. */
+/* Makes knots on a lattice, each turned about the vertical by some angle and scaled. */
 static void make_instances(hgrid_instance *all)
 {
     const hgrid_instance usual = HGRID_INSTANCE_INIT;
@@ -51,7 +51,7 @@ static void make_instances(hgrid_instance *all)
         hgrid_instance *one = &all[i];
         *one = usual;
         one->object = KNOT;
-        /* A rational turn: the same bits on every machine. */
+        /* A rational rotation, which has the same bits on every machine. */
         const float half = 4 * next_random() - 2, size = 0.5f + 0.4f * next_random();
         const float cosine = (1 - half * half) / (1 + half * half), sine = 2 * half / (1 + half * half);
         one->linear[0][0] = one->linear[2][2] = size * cosine;
@@ -71,16 +71,16 @@ static void make_instances(hgrid_instance *all)
     all[KNOTS + 1].mask = 1;
 }
 
-/* A pixel on its way: its rays and their answers lie in one struct, and batches find them there. */
+/* A pixel with its rays and their answers in one struct, which batches read and write. */
 typedef struct {
     hgrid_ray_f64 ray, to_light;
     hgrid_scene_hit hit;
     uint8_t is_dark;
-    /* How bright it is in the shadow, and without one. */
+    /* The brightness in the shadow, and without a shadow. */
     double dark, lit;
 } pixel;
 
-/* Says how bright a pixel is in both cases, and with which ray to ask. A ray without a direction hits nothing. */
+/* Computes a pixel's brightness in both cases, and its shadow ray. A ray without a direction hits nothing. */
 static void shade(const hgrid_scene *field, pixel *p)
 {
     const hgrid_ray_f64 none = {{0, 0, 0}, {0, 0, 0}, 0, 0, 0};
@@ -98,7 +98,7 @@ static void shade(const hgrid_scene *field, pixel *p)
     p->dark = 0.12, p->lit = facing <= 0 ? 0.12 : 0.12 + 0.8 * facing;
 }
 
-/* Finds out what the rays of a tile see, all of them at once, and what lies in the shadow. */
+/* Traces the rays of a tile together, and then their shadow rays. */
 static void trace(const hgrid_scene *field, pixel tile[TILE * TILE])
 {
     hgrid_scene_options options = HGRID_SCENE_OPTIONS_INIT;
@@ -141,7 +141,7 @@ int main(int count, char **words)
     hgrid_shapes light;
     check(hgrid_build_shapes(&boxes, NULL, light_index, sizeof light_index, small, sizeof small, &light, NULL), NULL);
 
-    /* All of it as a scene. Objects and views stay where they are. */
+    /* All of it as a scene, which reads objects and views in place. */
     hgrid_object objects[OBJECTS];
     check(hgrid_object_grid(&grid.grid, &objects[KNOT]), NULL);
     check(hgrid_object_grid(&floor_grid, &objects[FLOOR]), NULL);
@@ -160,7 +160,7 @@ int main(int count, char **words)
 
     unsigned char *pixels = (unsigned char *)allocate(SIZE * SIZE, 3);
     for (int first = 0; first < SIZE * SIZE; first += TILE * TILE) {
-        /* The corner of the tile: as many tiles lie in a row as fit. */
+        /* The corner of the tile: a row of tiles fills the width. */
         const int left = first / TILE % SIZE, top = first / (SIZE * TILE) * TILE;
         pixel tile[TILE * TILE];
         for (int i = 0; i < TILE * TILE; i++) {

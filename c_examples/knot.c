@@ -1,7 +1,7 @@
 /*
  * The built-in scene: a closed, finely bumped tube along a trefoil, half a million triangles.
  *
- * It is lab/src/scene/knot.rs and noise.rs line by line. Only IEEE + - * / and square roots in
+ * It is lab/src/scene/knot.rs and noise.rs, line by line. It uses only IEEE + - * / and square roots in
  * double, rounded to float once, so both make the same bits; a test compares them.
  */
 
@@ -10,14 +10,14 @@
 
 #include <math.h>
 
-/* Rows along the curve, columns around the tube; both wrap. */
+/* Rows along the curve, columns around the tube; both are cyclic. */
 enum { ROWS = 2000, COLUMNS = 125 };
 
 /* The torus, the distance of the curve from the torus' core, and the tube around the curve. */
 static const double TORUS_RADIUS = 1, STRAND_RADIUS = 0.45, TUBE_RADIUS = 0.26;
 
-/* The frequency and the height of the coarsest bumps, how many octaves there are, and the height of
- * each as a part of the one before. */
+/* The frequency and the height of the coarsest bumps, the number of octaves, and the height of each as a part
+ * of the one before. */
 static const double BUMP_FREQUENCY = 3, BUMP_HEIGHT = 0.08, BUMP_GAIN = 0.45;
 enum { BUMP_OCTAVES = 6 };
 
@@ -26,7 +26,7 @@ typedef struct {
     double centre[3], normal[3], binormal[3];
 } station;
 
-/* Every bit of the result depends on every bit of z. */
+/* Mixes bits: every bit of the result depends on every bit of z. */
 static uint64_t mix(uint64_t z)
 {
     z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
@@ -34,7 +34,7 @@ static uint64_t mix(uint64_t z)
     return z ^ (z >> 31);
 }
 
-/* The value at a lattice point, -1 to 1. */
+/* Returns the value at a lattice point, -1 to 1. */
 static double value(uint64_t x, uint64_t y, uint64_t z)
 {
     const uint64_t key = x * UINT64_C(0x9e3779b97f4a7c15) + y * UINT64_C(0xc2b2ae3d27d4eb4f) +
@@ -47,7 +47,7 @@ static double lerp(double from, double to, double t)
     return from + (to - from) * t;
 }
 
-/* Random values at the points of the integer lattice, smooth in between; -1 to 1. */
+/* Returns noise: random values at the points of the integer lattice, smooth in between; -1 to 1. */
 static double noise(const double point[3])
 {
     uint64_t cell[3];
@@ -65,7 +65,7 @@ static double noise(const double point[3])
     return lerp(lerp(rows[0], rows[1], f[1]), lerp(rows[2], rows[3], f[1]), f[2]);
 }
 
-/* How far the surface stands out at a point of the smooth tube. */
+/* Returns the height of the bumps at a point of the smooth tube. */
 static double bumps(const double point[3])
 {
     double sum = 0, frequency = BUMP_FREQUENCY, height = BUMP_HEIGHT;
@@ -79,8 +79,8 @@ static double bumps(const double point[3])
     return sum;
 }
 
-/* Point i of n on the unit circle, almost equally spaced: cosine and sine. In each quadrant a
- * polynomial stands in for the tangent of half the angle. */
+/* Returns point i of n on the unit circle, almost equally spaced: cosine and sine. In each quadrant a
+ * polynomial approximates the tangent of half the angle. */
 static void circle(uint32_t i, uint32_t n, double point[2])
 {
     const uint32_t quadrant = 4 * i / n;
@@ -93,7 +93,7 @@ static void circle(uint32_t i, uint32_t n, double point[2])
     point[1] = quadrant == 0 ? sine : quadrant == 1 ? cosine : quadrant == 2 ? -sine : -cosine;
 }
 
-/* The sum of two angles, each given as cosine and sine. */
+/* Adds two angles, each given as cosine and sine. */
 static void turn(const double a[2], const double b[2], double sum[2])
 {
     const double cosine = a[0] * b[0] - a[1] * b[1], sine = a[0] * b[1] + a[1] * b[0];
@@ -101,7 +101,7 @@ static void turn(const double a[2], const double b[2], double sum[2])
     sum[1] = sine;
 }
 
-/* The station at an angle that goes once around while the curve closes. */
+/* Returns the station at an angle that goes once around while the curve closes. */
 static station station_at(const double angle[2])
 {
     double two[2], three[2];
@@ -125,7 +125,7 @@ static station station_at(const double angle[2])
     return result;
 }
 
-/* The point of the surface at an angle around the tube. */
+/* Computes the point of the surface at an angle around the tube. */
 static void surface(const station *s, const double angle[2], float point[3])
 {
     double outward[3], smooth[3];

@@ -1,7 +1,7 @@
 #include "light.h"
 
-/* A lamp's light, the sky's and the ground's; the background at the picture's upper and lower edge.
- * All linear red, green, blue. */
+/* The light of the lamp, the sky and the ground; the background at the picture's upper and lower edge. All
+ * are linear red, green, blue. */
 static const double LAMP[3] = {0.62, 0.60, 0.56};
 static const double SKY[3] = {0.09, 0.11, 0.14}, GROUND[3] = {0.03, 0.027, 0.024};
 static const double ZENITH[3] = {0.008, 0.018, 0.055}, HORIZON[3] = {0.22, 0.31, 0.44};
@@ -24,7 +24,7 @@ static double clamp(double x)
     return x < 0 ? 0 : x > 1 ? 1 : x;
 }
 
-/* Linear light as a screen wants it; a square root is close to its curve. */
+/* Converts linear light to a screen's value; a square root is close to a screen's curve. */
 static unsigned char display(double light)
 {
     return (unsigned char)(clamp(sqrt(larger(light, 0))) * 255 + 0.5);
@@ -46,9 +46,9 @@ void paint_background(const lights *l, const hgrid_ray *ray, unsigned char pixel
         pixel[i] = display(HORIZON[i] + (ZENITH[i] - HORIZON[i]) * t);
 }
 
-/* --- directions that look random ------------------------------------------------------------- */
+/* --- pseudorandom directions ----------------------------------------------------------------- */
 
-/* A number from 0 to 1 that looks random: every bit of it depends on every bit of x. */
+/* Returns a pseudorandom number from 0 to 1: every bit of it depends on every bit of x. */
 static double hash(uint32_t x)
 {
     x = (x ^ (x >> 16)) * UINT32_C(0x7feb352d);
@@ -56,8 +56,8 @@ static double hash(uint32_t x)
     return (x ^ (x >> 16)) / 4294967296.0;
 }
 
-/* The point of the unit circle after a part of a turn. In each quadrant a polynomial stands in for
- * the tangent of half the angle: cos and sin have other bits on other machines. */
+/* Returns the point of the unit circle after a part of a turn. In each quadrant a polynomial approximates the
+ * tangent of half the angle, because cos and sin differ between machines. */
 static void circle(double turn, double *x, double *y)
 {
     const int quadrant = (int)(4 * turn);
@@ -68,8 +68,8 @@ static void circle(double turn, double *x, double *y)
     *y = quadrant == 0 ? sine : quadrant == 1 ? cosine : quadrant == 2 ? -sine : -cosine;
 }
 
-/* Points on a disk, lifted to the hemisphere above it, have the cosine in them. On the disk they
- * lie like the seeds of a sunflower, turned by another angle for each pixel. */
+/* Points on a disk, lifted to the hemisphere above it, have a cosine distribution. On the disk they lie like
+ * the seeds of a sunflower, rotated by a different angle for each pixel. */
 vector scatter(vector normal, uint32_t pixel, int i, int count)
 {
     static const double golden = 0.6180339887498949;

@@ -5,16 +5,16 @@
  *     mapped GRID_FILE bunny.ply -o bunny.ppm
  *     mapped GRID_FILE --size 256
  *
- * The first process builds and writes GRID_FILE, which must not exist and is removed in the end. Two
- * more processes map it, read-only, so that both see the same pages and none is copied; each draws
- * half of the picture into the picture's file. The first one then draws all of it from its own
- * memory, compares, and says whether it is the same.
+ * The first process builds and writes GRID_FILE, which must not exist and is removed at the end. Two more
+ * processes map it read-only, so that both share the same pages and none is copied; each draws half of the
+ * picture into the picture's file. The first process then draws all of it from its own memory, compares, and
+ * prints the result.
  *
- * What to look at: store and map. A packed blob is grid and mesh without pointers, so it can lie
- * anywhere, and opening it takes no time.
+ * Functions to read: store and map. A packed blob is grid and mesh without pointers, so it works at any
+ * aligned address, and opening it takes next to no time.
  */
 
-/* mmap, fork and their like are POSIX, not C. */
+/* mmap, fork and the like are POSIX, not C. */
 #define _POSIX_C_SOURCE 200809L
 
 #include "camera.h"
@@ -76,7 +76,7 @@ static mapped_options parse(int count, char **words)
 
 /* --- the grid's file ------------------------------------------------------------------------- */
 
-/* What is to be removed when this process ends, unless a signal ends it. */
+/* The file that this process removes when it ends, unless a signal ends it. */
 static const char *stored;
 static pid_t owner;
 
@@ -86,7 +86,7 @@ static void remove_stored(void)
         remove(stored);
 }
 
-/* Writes all of it, or ends the program. */
+/* Writes all bytes, or ends the program. */
 static void write_at(int file, const char *path, size_t offset, const void *from, size_t bytes)
 {
     const unsigned char *at = (const unsigned char *)from;
@@ -109,7 +109,7 @@ static size_t store(const char *path, const hgrid_grid *grid)
     const region packed = allocate_region(bytes);
     check(hgrid_pack(grid, packed.start, packed.bytes, &bytes), NULL);
 
-    /* O_EXCL: a file that is there already is nothing to overwrite, and nothing to remove. */
+    /* O_EXCL: an existing file must be neither overwritten nor removed. */
     const int file = open(path, O_WRONLY | O_CREAT | O_EXCL, 0600);
     if (file < 0 && errno == EEXIST)
         fail("%s: exists already: name a file that may be made, and removed in the end", path);
@@ -124,8 +124,7 @@ static size_t store(const char *path, const hgrid_grid *grid)
     return packed.bytes;
 }
 
-/* Where the camera stands follows from the mesh, which is in the blob, too: tight, with indices of 32
- * bits. */
+/* Computes the camera from the mesh, which the blob contains: tight arrays, with indices of 32 bits. */
 static camera camera_of(const hgrid_grid *grid)
 {
     hgrid_mesh mesh = HGRID_MESH_INIT;
@@ -135,10 +134,10 @@ static camera camera_of(const hgrid_grid *grid)
     return frame(&s);
 }
 
-/* Maps the file and opens the grid in it: nothing is read and nothing is copied until a ray comes by.
+/* Maps the file and opens the grid in it: pages are read only when a ray needs them.
  *
- * A process that we trust has just written this file, and no other changes it. A file that
- * others may write is not for mapping; and hgrid_validate would prove that it is sound. */
+ * A trusted process has just written this file, and no other process changes it. Do not map a file that
+ * others may write. hgrid_validate would prove that the blob is sound. */
 static hgrid_grid map(const char *path)
 {
     struct stat status;
@@ -158,7 +157,7 @@ static hgrid_grid map(const char *path)
 
 /* --- the picture ----------------------------------------------------------------------------- */
 
-/* The rows from one to before another, three bytes for each pixel; to be freed. */
+/* Returns the rows from `first` to before `end`, three bytes for each pixel; the caller frees them. */
 static unsigned char *draw_rows(const hgrid_grid *grid, int size, int first, int end)
 {
     const camera c = camera_of(grid);
@@ -173,8 +172,8 @@ static unsigned char *draw_rows(const hgrid_grid *grid, int size, int first, int
     return job.pixels;
 }
 
-/* What another process does: from the grid's file to rows in the picture's file. It knows nothing of
- * the first process but the names of the two, and could as well be another program. */
+/* Draws a part in another process: from the grid's file to rows in the picture's file. It only needs the
+ * names of the two, so it could be another program. */
 static void draw_part(const mapped_options *o, size_t header_bytes, int part)
 {
     const int first = o->size * part / PROCESSES, end = o->size * (part + 1) / PROCESSES;

@@ -8,7 +8,7 @@
 
 void fail(const char *format, ...)
 {
-    /* Written in one piece: other processes may write to the same terminal. */
+    /* Written in one call, because other processes may write to the same terminal. */
     static char message[8192];
     va_list arguments;
     va_start(arguments, format);
@@ -27,7 +27,7 @@ void *allocate(size_t count, size_t size)
     return memory;
 }
 
-/* C99 has no aligned allocation: ask for a little more, start at the next multiple. */
+/* C99 has no aligned allocation: allocate a little more, and start at the next multiple. */
 region allocate_region(uint64_t bytes)
 {
     if (bytes > SIZE_MAX - HGRID_ALIGNMENT)

@@ -1,20 +1,20 @@
-/* Memory, or the end of the program. */
+/* Allocations that end the program if they fail. */
 #ifndef MEMORY_H
 #define MEMORY_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* What messages begin with: each program defines it. */
+/* The beginning of messages; each program defines it. */
 extern const char *const program_name;
 
 /* Ends the program with a message. */
 void fail(const char *format, ...);
 
-/* Memory for so many elements. */
+/* Allocates memory for so many elements. */
 void *allocate(size_t count, size_t size);
 
-/* Memory that starts at a multiple of HGRID_ALIGNMENT, and what to free. */
+/* Memory that starts at a multiple of HGRID_ALIGNMENT, with the pointer to free. */
 typedef struct {
     void *start;
     size_t bytes;

@@ -1,5 +1,5 @@
 /*
- * The smallest use of hgrid: one triangle, one ray, and not a byte from malloc.
+ * The smallest use of hgrid: one triangle, one ray, and no malloc.
  *
  *     cargo build --release -p hgrid-capi
  *     cc -std=c99 -Iinclude c_examples/minimal.c target/release/libhgrid.a -o minimal
@@ -10,32 +10,32 @@
 #include <math.h>
 #include <stdio.h>
 
-/* The mesh stays where it is: hgrid reads it there, at every query. */
+/* hgrid reads the mesh in place at every query. */
 static const float positions[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
 static const uint32_t indices[1][3] = {{0, 1, 2}};
 
-/* The grid's memory. The bounds are enough for any mesh with so many triangles; hgrid_sizes would
- * look at the mesh and ask for less. The index keeps the grid, the scratch is only for the build. */
+/* The grid's memory. The bounds are enough for any mesh with so many triangles; hgrid_sizes would read the
+ * mesh and return less. The index keeps the grid; only the build needs the scratch. */
 HGRID_ALIGNED static unsigned char index_region[HGRID_INDEX_BOUND(1)];
 HGRID_ALIGNED static unsigned char scratch_region[HGRID_SCRATCH_BOUND(1)];
 
 int main(void)
 {
-    /* A header of another version than the library, but for repairs: better to know it now. */
+    /* The header must have the library's version, except for its patch number. */
     if (hgrid_version() >> 8 != HGRID_VERSION >> 8) {
         fprintf(stderr, "compiled for hgrid %s, linked with %s\n", HGRID_VERSION_STRING,
                 hgrid_version_string());
         return 1;
     }
 
-    /* Say where the triangles are. Strides of 0 mean tight arrays. */
+    /* The mesh: where its triangles are. Strides of 0 mean tight arrays. */
     hgrid_mesh mesh = HGRID_MESH_INIT;
     mesh.positions = positions;
     mesh.vertex_count = 3;
     mesh.indices = indices;
     mesh.triangle_count = 1;
 
-    /* Build. NULL is the default configuration; the report is optional, too. */
+    /* Build. NULL means the default configuration; the report is optional, too. */
     hgrid_grid grid;
     hgrid_report report = HGRID_REPORT_INIT;
     hgrid_status status =
@@ -47,7 +47,7 @@ int main(void)
     }
     printf("built a grid of %lu bytes\n", (unsigned long)report.index_bytes);
 
-    /* Shoot: from one unit above, straight down, as far as it goes. */
+    /* Trace a ray: from one unit above, straight down, without an end. */
     const hgrid_ray ray = {{0.25f, 0.5f, 1}, 0, {0, 0, -1}, INFINITY};
     hgrid_hit hit;
     if (!hgrid_intersect(&grid, &ray, NULL, &hit)) {
@@ -57,6 +57,6 @@ int main(void)
     printf("hit triangle %u at t = %g, u = %g, v = %g\n", (unsigned)hit.primitive, hit.t, hit.u,
            hit.v);
 
-    /* There is nothing to close and nothing to free. */
+    /* Nothing needs to be closed or freed. */
     return 0;
 }

@@ -5,12 +5,12 @@
  *     mpirun -n 4 mpi bunny.ply -o bunny.ppm
  *     mpirun -n 4 mpi --size 256
  *
- * Rank 0 loads the scene and builds. Blob and mesh are broadcast, and every rank opens the blob where
- * it received it. The rows are dealt out like cards, the parts are put together at rank 0, which
- * then draws all of it by itself, compares, and says whether it is the same.
+ * Rank 0 loads the scene and builds. It broadcasts blob and mesh, and every rank opens the blob where it
+ * received it. The ranks draw the rows in turn, and rank 0 collects the parts. It then draws all of the
+ * picture by itself, compares, and prints the result.
  *
- * What to look at: share_grid. The blob is bytes without pointers, and for ranks of the same byte
- * order it is the same grid everywhere.
+ * Function to read: share_grid. The blob is bytes without pointers, and ranks of the same byte order all open
+ * the same grid.
  */
 
 #include "camera.h"
@@ -29,8 +29,8 @@
 
 const char *const program_name = "mpi";
 
-/* Rows are dealt out in bands as high as a tile of render.c. MPI counts with int, so what is larger
- * goes in pieces. */
+/* Ranks take turns in bands of rows, as high as half a tile of render.c. MPI counts with int, so larger data
+ * go in pieces. */
 enum { BAND = 8, PIECE = 1 << 20, DEFAULT_SIZE = 512 };
 
 static const char USAGE[] = "mpirun -n RANKS mpi [SCENE.ply] [--size PIXELS] [-o FILE.ppm]\n";
@@ -59,7 +59,7 @@ static mpi_options parse(int count, char **words)
     return o;
 }
 
-/* Who ends early takes the others along: they would wait for ever. */
+/* Ends all ranks if this one ends early: the others would wait for ever. */
 static void end_all(void)
 {
     int is_over = 0;
@@ -79,14 +79,14 @@ static void broadcast(void *from, size_t bytes)
     }
 }
 
-/* What every rank has in the end. */
+/* The data that every rank has at the end. */
 typedef struct {
     scene scene;
     region blob;
     hgrid_grid grid;
 } shared_grid;
 
-/* Fills what rank 0 has, and others want: sizes first, then memory for them, then the bytes. */
+/* Sends the data of rank 0 to the others: first sizes, for which they allocate memory, then the bytes. */
 static void share_grid(int rank, shared_grid *g)
 {
     uint64_t sizes[3] = {g->blob.bytes, g->scene.vertex_count, g->scene.triangle_count};
@@ -126,7 +126,7 @@ static void draw_bands(const shared_grid *g, int size, int first, int step, unsi
     }
 }
 
-/* Puts the parts together at rank 0: what a rank did not draw is 0, so the parts can be or-ed. */
+/* Combines the parts at rank 0 by or: rows that a rank did not draw are 0. */
 static void gather(int rank, unsigned char *pixels, size_t bytes)
 {
     for (size_t done = 0; done < bytes; done += PIECE) {
@@ -145,7 +145,7 @@ static unsigned char *allocate_picture(size_t bytes)
 
 /* --- the program ----------------------------------------------------------------------------- */
 
-/* What rank 0 does before the others have anything to do. */
+/* Loads and builds at rank 0, before the other ranks have work. */
 static shared_grid build(const mpi_options *o)
 {
     shared_grid g;

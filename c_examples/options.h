@@ -1,4 +1,4 @@
-/* What the command line says. */
+/* The command line. */
 #ifndef OPTIONS_H
 #define OPTIONS_H
 
@@ -7,7 +7,7 @@
 typedef enum { NO_HEAT, HEAT_TESTS, HEAT_STEPS } heat_kind;
 
 typedef struct {
-    /* NULL: the built-in scene. */
+    /* The mesh file, or NULL for the built-in scene. */
     const char *input;
     const char *output;
     int size, threads;
@@ -15,18 +15,18 @@ typedef struct {
     /* Ambient occlusion: rays at each hit. */
     int sky_rays;
     heat_kind heat;
-    /* An index of METHODS, and the density if it is not the usual one. */
+    /* An index into METHODS, and the density if it is not the default. */
     int method;
     float density;
 } options;
 
-/* Reads the ray tracer's words; answers --help itself. */
+/* Parses the ray tracer's arguments; prints the help for --help. */
 options parse_options(int count, char **words);
 
-/* Pieces for other programs. `*i` is the place of an option; steps on to its value. */
+/* Parts for other programs: returns the value of the option at `*i`, and advances `*i` to it. */
 const char *value_of(int count, char **words, int *i);
 
-/* The value of an option as a whole number from `least` to `most`, or the end of the program. */
+/* Parses the value of an option: a whole number from `least` to `most`, or ends the program. */
 int parse_count(const char *option, const char *value, int least, int most);
 
 #endif

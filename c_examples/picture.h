@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-/* Opened before the work, so that a wrong name is known at once. */
+/* Opens the file before the work starts, so that a wrong name fails at once. */
 FILE *open_picture(const char *path);
 
 /* Writes and closes the file. */

@@ -1,8 +1,8 @@
 /*
- * PLY files: ascii and binary little endian, any number types, any further properties, polygons cut
- * into fans. Elements and properties may come in any order.
+ * PLY files: ascii and binary little endian, any number types, any other properties. Polygons are cut into
+ * fans. Elements and properties may come in any order.
  *
- * Every number is read as a double, which holds all of PLY's types exactly: one path for all.
+ * Every number is read as a double, which holds all of PLY's types exactly: one code path for all.
  */
 
 #include "memory.h"
@@ -18,7 +18,7 @@ typedef enum { NO_TYPE, INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOA
 enum { WORD = 32, LINE = 1024, MAX_PROPERTIES = 64, MAX_ELEMENTS = 16 };
 
 typedef struct {
-    type count; /* NO_TYPE if it is no list */
+    type count; /* NO_TYPE if it is not a list */
     type item;
     char name[WORD];
 } property;
@@ -116,7 +116,7 @@ static void read_header(ply *p)
     fail("%s: %s", p->path, is_first ? "not a PLY file: it is empty" : "no end_header line");
 }
 
-/* The next number of the file, or false where the file ends or has none. */
+/* Reads the next number of the file; returns false if it ends or has none. */
 static bool next_number(const ply *p, type t, double *number)
 {
     static const unsigned char sizes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
@@ -151,7 +151,7 @@ static double read_number(const ply *p, type t, const element *e, size_t index)
     return number;
 }
 
-/* How many numbers a property has here. */
+/* Returns the count of numbers that a property has here. */
 static size_t read_count(const ply *p, const property *from, const element *e, size_t index)
 {
     if (from->count == NO_TYPE)
@@ -175,7 +175,7 @@ static void skip_element(const ply *p, const element *e)
             skip(p, &e->properties[i], e, index);
 }
 
-/* 0, 1, 2 for a coordinate, -1 for anything else. */
+/* Returns 0, 1, 2 for a coordinate, -1 for anything else. */
 static int axis_of(const property *from)
 {
     static const char *const names[] = {"x", "y", "z"};
@@ -230,7 +230,7 @@ static void read_polygon(const ply *p, const property *from, const element *e, s
     uint32_t first = 0, last = 0;
     for (size_t i = 0; i < corners; i++) {
         const double number = read_number(p, from->item, e, index);
-        /* What is no vertex number at all becomes one that hgrid will refuse, by its triangle. */
+        /* An invalid number becomes an index that hgrid refuses, with its triangle. */
         const bool is_number = number >= 0 && number < UINT32_MAX;
         const uint32_t corner = is_number ? (uint32_t)number : UINT32_MAX;
         if (i == 0)

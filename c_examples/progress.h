@@ -1,4 +1,4 @@
-/* How far something is, and what time it is, for people who wait. */
+/* Progress and time, for people who wait. */
 #ifndef PROGRESS_H
 #define PROGRESS_H
 
@@ -7,18 +7,18 @@
 typedef struct {
     const char *what;
     bool is_shown, is_terminal;
-    /* What was shown last, in per cent. */
+    /* The last shown value, in per cent. */
     int percent;
 } progress;
 
-/* A line on stderr that changes in place, if that is a terminal. Elsewhere, if it is to be shown
- * anyway, a line for each tenth. */
+/* Starts a line on stderr that changes in place, if stderr is a terminal. Otherwise it writes a line for each
+ * tenth, if `is_shown_anyway`. */
 progress start_progress(const char *what, bool is_shown_anyway);
 
-/* `done` is from 0 to 1. One thread at a time. */
+/* Shows that a part `done`, from 0 to 1, is complete. One thread at a time may call it. */
 void show_progress(progress *p, double done);
 
-/* Seconds since some moment. */
+/* Returns the seconds since some fixed moment. */
 double now(void);
 
 #endif

@@ -1,18 +1,16 @@
 /*
- * A ray tracer for triangle meshes: shadows, ambient occlusion, threads, and pictures of what each
- * pixel costs.
+ * A ray tracer for triangle meshes: shadows, ambient occlusion, threads, and pictures of each pixel's cost.
  *
  *     raytracer                          the built-in scene, to raytracer.ppm
  *     raytracer bunny.ply -o bunny.ppm   a mesh of yours
  *     raytracer --help                   all the rest
  *
- * What to look at: build_grid in grid.c (sizes, memory, build), and render.c (all queries of a tile
- * in one call, and tiles on threads). light.c has nothing to do with hgrid. Camera and light are
- * those of the project's own renderer in lab/: without shadows and occlusion the two draw the same
- * picture, byte by byte.
+ * Functions to read: build_grid in grid.c (sizes, memory, build), and render.c (all queries of a tile in one
+ * call, and tiles on threads). light.c does not use hgrid. Camera and light are those of the project's own
+ * renderer in lab/: without shadows and occlusion the two draw the same picture, byte for byte.
  *
- * What it prints: `sizes` is the time of asking hgrid_sizes and of malloc, `build` is that of
- * hgrid_build alone, `time to image` is all from the mesh to the last pixel.
+ * Output: `sizes` is the time of hgrid_sizes and of malloc, `build` is that of hgrid_build alone, `time to
+ * image` is the time from the mesh to the last pixel.
  */
 
 #include "camera.h"

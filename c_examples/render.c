@@ -7,35 +7,35 @@
 #include <pthread.h>
 #include <string.h>
 
-/* Rays are traced by tiles of 16 x 16 pixels, all rays of a tile in one call; of those that look for
- * the sky no more than so many at once. */
+/* Rays are traced in tiles of 16 x 16 pixels, all rays of a tile in one call. Rays toward the sky go in calls
+ * of at most MOST_PROBES. */
 enum { TILE = 16, TILE_PIXELS = TILE * TILE, MOST_PROBES = 4 * TILE_PIXELS };
 
-/* Skies that are partly hidden are brighter, so that one can see what is hidden. */
+/* With occlusion the sky is brighter, because part of it is hidden. */
 static const double OPEN_SKY_GAIN = 2.2;
 
-/* How far away something may hide the sky, in parts of the scene's radius. */
+/* The distance within which surfaces hide the sky, in parts of the scene's radius. */
 static const double SKY_REACH = 0.5;
 
-/* A pixel on its way: ray and hit lie in one struct, and hgrid_intersect_n finds them there. */
+/* A pixel with its ray and its hit in one struct, where hgrid_intersect_n finds them. */
 typedef struct {
     hgrid_ray ray;
     hgrid_hit hit;
-    /* Its place in the whole picture and in the job's rows. */
+    /* The pixel's place in the whole picture and in the job's rows. */
     uint32_t number;
     size_t place;
     hgrid_surface at;
     double lit, open;
 } sample;
 
-/* A ray from a hit towards light, and whether something is in the way. */
+/* A ray from a hit towards light, and its answer: 1 if something is in the way. */
 typedef struct {
     hgrid_ray ray;
     uint8_t is_occluded;
     sample *of;
 } probe;
 
-/* What the threads share: the number of the next tile, how many are done, and what they found. */
+/* The data of all threads: the number of the next tile, the tiles done, and the counts. */
 typedef struct {
     const picture_job *job;
     lights lights;
@@ -46,7 +46,7 @@ typedef struct {
 
 /* --- the steps of a tile --------------------------------------------------------------------- */
 
-/* Finds what the rays of a tile hit, all with one call: neighbours share most of their way. */
+/* Traces the rays of a tile with one call: neighbours share most of their way. */
 static void trace(const shared *s, sample *tile, size_t count, const hgrid_query_options *options)
 {
     check(hgrid_intersect_n(s->job->grid, &tile->ray, sizeof *tile, &tile->hit, sizeof *tile, count,
@@ -67,8 +67,8 @@ static probe probe_of(sample *of, vector toward, float reach)
     return p;
 }
 
-/* Asks for all probes with one call whether they get through. Where they go does not matter: they come
- * in the order of the tile's pixels, so those that follow one another start near each other. */
+/* Traces all probes with one call. Their directions may differ: they come in the order of the tile's pixels,
+ * so successive probes start near each other. */
 static void send(const shared *s, probe *probes, size_t count, const hgrid_query_options *options)
 {
     if (count == 0)
@@ -78,7 +78,7 @@ static void send(const shared *s, probe *probes, size_t count, const hgrid_query
           NULL);
 }
 
-/* Shadow rays, from where the lamp could shine. */
+/* Traces shadow rays, from hits that face the lamp. */
 static void look_for_lamp(const shared *s, sample *tile, size_t count,
                           const hgrid_query_options *options)
 {
@@ -92,7 +92,7 @@ static void look_for_lamp(const shared *s, sample *tile, size_t count,
         p->of->lit = !p->is_occluded;
 }
 
-/* Sends some of the rays of a tile toward the sky, and adds up what gets there. */
+/* Sends some of the rays of a tile toward the sky, and adds up the light. */
 static void send_to_sky(const shared *s, probe *probes, size_t count,
                         const hgrid_query_options *options)
 {
@@ -101,7 +101,7 @@ static void send_to_sky(const shared *s, probe *probes, size_t count,
         p->of->open += p->is_occluded ? 0 : 1.0 / s->job->sky_rays;
 }
 
-/* Ambient occlusion: the part of the sky and the ground that a hit sees. */
+/* Computes ambient occlusion: the part of the sky and the ground that a hit sees. */
 static void look_for_sky(const shared *s, sample *tile, size_t count,
                          const hgrid_query_options *options)
 {
@@ -123,7 +123,7 @@ static void look_for_sky(const shared *s, sample *tile, size_t count,
     send_to_sky(s, probes, probe_count, options);
 }
 
-/* Paints the pixels of a tile; returns how many rays hit. */
+/* Paints the pixels of a tile; returns the number of rays that hit. */
 static size_t paint(const shared *s, const sample *tile, size_t count)
 {
     size_t hits = 0;
@@ -139,7 +139,7 @@ static size_t paint(const shared *s, const sample *tile, size_t count)
     return hits;
 }
 
-/* Draws the pixels of a tile, or some of them; returns how many rays from the camera hit. */
+/* Draws the pixels of a tile, or some of them; returns the number of camera rays that hit. */
 static size_t draw(const shared *s, sample *tile, size_t count, const hgrid_query_options *options)
 {
     trace(s, tile, count, options);
@@ -153,7 +153,7 @@ static size_t draw(const shared *s, sample *tile, size_t count, const hgrid_quer
     return paint(s, tile, count);
 }
 
-/* Draws the pixels of a tile one by one, to tell what each of them costs. */
+/* Draws the pixels of a tile one by one, to count the cost of each. */
 static size_t draw_and_count(const shared *s, sample *tile, size_t count)
 {
     const picture_job *job = s->job;
@@ -173,7 +173,7 @@ static size_t draw_and_count(const shared *s, sample *tile, size_t count)
 
 /* --- tiles ----------------------------------------------------------------------------------- */
 
-/* Every other bit of a number. */
+/* Packs every other bit of a number. */
 static int even_bits(int number)
 {
     return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4) | (number >> 3 & 8);
@@ -199,7 +199,7 @@ static size_t aim(const shared *s, size_t number, sample *tile)
     return count;
 }
 
-/* Hands in what a thread found in a tile, if it had one, and takes the number of the next. */
+/* Adds the hits of a thread's tile, if it had one, and takes the number of the next. */
 static size_t take(shared *s, bool had_tile, size_t hits)
 {
     pthread_mutex_lock(&s->lock);
@@ -213,8 +213,8 @@ static size_t take(shared *s, bool had_tile, size_t hits)
     return number;
 }
 
-/* A thread: draws tiles until there are none. Each pixel is written by one thread, and what it looks
- * like depends on nothing but its place, so the picture is the same however the tiles fall. */
+/* Draws tiles in a thread until none is left. One thread writes each pixel, and its colour depends only on
+ * its place, so the picture does not depend on the threads. */
 static void draw_tiles(void *context, uint32_t thread)
 {
     shared *s = (shared *)context;

@@ -11,27 +11,27 @@
 
 enum { MAX_SIZE = 16384 };
 
-/* What is to be drawn. Initialise it with zeros and set what you need. */
+/* A picture to draw. Initialise it with zeros and set the fields that you need. */
 typedef struct {
     const hgrid_grid *grid;
     const camera *camera;
-    /* Pixels on each side of the whole picture, and the rows that are drawn. */
+    /* Pixels on each side of the whole picture, and the rows to draw. */
     int size, first_row, row_count;
-    /* Whether the lamp casts shadows, and how many rays look for the sky at each hit; with none all
-     * of it is seen. */
+    /* True if the lamp casts shadows, and the number of rays toward the sky at each hit; 0 for no ambient
+     * occlusion. */
     bool has_shadows;
     int sky_rays;
-    /* Red, green, blue of each pixel of these rows. */
+    /* The colours to write: red, green, blue of each pixel of these rows. */
     unsigned char *pixels;
-    /* The work for each pixel of these rows, with all its rays; or NULL, which is faster. */
+    /* The work to write for each pixel of these rows, with all its rays; NULL, which is faster, for none. */
     uint32_t *tests, *steps;
-    /* How many threads draw, at least 1. The picture does not depend on it. */
+    /* The number of threads that draw, at least 1. The picture does not depend on it. */
     uint32_t threads;
     /* NULL: no progress is reported. */
     progress *progress;
 } picture_job;
 
-/* Draws; returns how many rays from the camera hit. */
+/* Draws; returns the number of camera rays that hit. */
 size_t render(const picture_job *job);
 
 #endif

@@ -12,13 +12,13 @@ typedef struct {
     size_t triangle_count;
 } scene;
 
-/* The built-in scene (knot.c). */
+/* Makes the built-in scene (knot.c). */
 scene make_knot(void);
 
-/* A mesh file (ply.c). Ends the program if it cannot be read. */
+/* Loads a mesh file (ply.c). Ends the program if it cannot be read. */
 scene load_ply(const char *path);
 
-/* The file, or the built-in scene if there is none. */
+/* Loads the file, or makes the built-in scene if there is none. */
 static inline scene load_scene(const char *path)
 {
     return path != NULL ? load_ply(path) : make_knot();

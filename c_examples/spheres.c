@@ -1,11 +1,11 @@
 /*
- * Shapes of one's own: thousands of spheres in one tree, with a light and shadows.
+ * User-defined shapes: thousands of spheres in one tree, with a light and shadows.
  *
  *     cc -std=c99 -Iinclude c_examples/spheres.c c_examples/memory.c c_examples/picture.c \
  *         target/release/libhgrid.a -lm -o spheres
  *     ./spheres spheres.ppm
  *
- * hgrid knows the boxes of the spheres and asks meet() where a ray hits one of them.
+ * hgrid reads the boxes of the spheres, and calls meet() for the hit of a ray on a sphere.
  */
 
 #include "memory.h"
@@ -21,7 +21,7 @@ const char *const program_name = "spheres";
 
 enum { COUNT = 4000, SIZE = 256 };
 
-/* A sphere and its box, side by side: strides say where the next one is. */
+/* A sphere and its box in one struct, which hgrid reads with a stride. */
 typedef struct {
     float box[6];
     float center[3], radius;
@@ -34,7 +34,7 @@ static float next_random(void)
     return (float)(state >> 8) / 16777216.0f;
 }
 
-/* Spheres all over a ball of radius 1, larger in the middle. */
+/* Makes spheres all over a ball of radius 1, larger in the middle. */
 static void make_spheres(sphere *all)
 {
     for (size_t i = 0; i < COUNT;) {
@@ -48,7 +48,7 @@ static void make_spheres(sphere *all)
             continue;
         s->radius = 0.01f + 0.05f * (1 - (float)away) * next_random();
         for (int k = 0; k < 3; k++) {
-            /* A little more than the sphere: what float rounds must not cut it. */
+            /* A little larger than the sphere, so that float rounding never cuts it. */
             s->box[k] = s->center[k] - 1.0001f * s->radius - 1e-6f;
             s->box[k + 3] = s->center[k] + 1.0001f * s->radius + 1e-6f;
         }
@@ -56,7 +56,7 @@ static void make_spheres(sphere *all)
     }
 }
 
-/* Where a ray enters a sphere, or leaves it if it starts inside. */
+/* Finds the place where a ray enters a sphere, or leaves it if it starts inside. */
 static bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
 {
     const sphere *s = (const sphere *)context + shape;
@@ -75,7 +75,7 @@ static bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shap
     return true;
 }
 
-/* The brightness of what a ray sees. */
+/* Returns the brightness along a ray. */
 static double look(const hgrid_shapes *shapes, const sphere *all, const hgrid_ray *ray)
 {
     const vector light = unit((vector){1, 2, 2}, (vector){0, 1, 0});

@@ -22,7 +22,7 @@ void run_on_threads(void *context, uint32_t count, hgrid_task task, void *task_c
 {
     (void)context;
     one_task all[MAX_THREADS];
-    /* The last one runs here, and so does every one that gets no thread. */
+    /* The last task runs here, and so does every task for which no thread starts. */
     for (uint32_t i = 0; i < count; i++) {
         all[i].task = task, all[i].task_context = task_context, all[i].index = i;
         all[i].has_thread =

@@ -6,11 +6,11 @@
 
 enum { MAX_THREADS = 256 };
 
-/* Calls task(task_context, 0) to task(task_context, count - 1), each on a thread of its own, and
- * returns when all have returned. At most MAX_THREADS.
+/* Calls task(task_context, 0) to task(task_context, count - 1), each on its own thread, and returns
+ * when all have returned. At most MAX_THREADS.
  *
- * This is also what hgrid wants to build on threads: hgrid itself starts none. A program that has a
- * pool of threads would use that. */
+ * hgrid takes a function of this type for builds on threads, because it starts none itself. A program
+ * with a pool of threads would pass one that uses the pool. */
 void run_on_threads(void *context, uint32_t count, hgrid_task task, void *task_context);
 
 #endif

@@ -36,7 +36,7 @@ static inline vector scale(vector v, double amount)
     return result;
 }
 
-/* from + amount * along */
+/* Returns from + amount * along. */
 static inline vector offset(vector from, double amount, vector along)
 {
     const vector v = {from.x + amount * along.x, from.y + amount * along.y,
@@ -44,7 +44,7 @@ static inline vector offset(vector from, double amount, vector along)
     return v;
 }
 
-/* The vector at length 1, or another one if it has no length. */
+/* Returns the vector at length 1, or another one if it has no length. */
 static inline vector unit(vector v, vector otherwise)
 {
     const double length = sqrt(dot(v, v));

@@ -1,4 +1,5 @@
-# add_subdirectory or FetchContent of this archive gives hgrid::hgrid and hgrid::static, which are built.
+# Defines hgrid::hgrid and hgrid::static with the built libraries, for add_subdirectory or FetchContent of
+# this archive.
 cmake_minimum_required(VERSION 3.16...3.31)
 
 set(hgrid_FOUND TRUE)

@@ -1,6 +1,6 @@
 /*
- * Does this copy of hgrid work here? Builds a cube by every method that the library has, and compares
- * what rays hit with what they must.
+ * Checks that this copy of hgrid works here: builds a cube by every method of the library, and compares the
+ * hits of rays with the expected ones.
  *
  *     cc -Iinclude check/check.c lib/libhgrid.a -o check && ./check
  */
@@ -16,18 +16,18 @@ static const float corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
 static const uint32_t sides[12][3] = {{0, 2, 4}, {2, 6, 4}, {1, 5, 3}, {3, 5, 7}, {0, 4, 1}, {1, 4, 5},
                                       {2, 3, 6}, {3, 7, 6}, {0, 1, 2}, {1, 3, 2}, {4, 6, 5}, {5, 6, 7}};
 
-/* Grids of all methods fit: each is asked for its size before. */
+/* Room for the grids of all methods: each one's size is computed first. */
 HGRID_ALIGNED static unsigned char memory[1 << 20], scratch[1 << 20];
 
-/* Complains, and counts complaints. */
+/* Prints a complaint, and returns 1 to count it. */
 static int wrong(const char *method, const char *what)
 {
     fprintf(stderr, "%s: %s\n", method, what);
     return 1;
 }
 
-/* Rays at both triangles of every side: from outside they hit at 2, from the middle at 0.5, at the
- * same triangle; and none goes by. */
+/* Traces rays at both triangles of every side: from outside they must hit at 2, from the middle at 0.5, at
+ * the same triangle. */
 static int trace(const char *method, const hgrid_grid *grid)
 {
     int found = 0;

@@ -1,7 +1,7 @@
-# What `cmake --install` puts where. capi/cmake finds it again from where it lies itself.
+# Chooses the files and places of `cmake --install`. capi/cmake finds them relative to itself.
 include(GNUInstallDirs)
 
-# hgrid.pc says where things are as seen from its own folder, so that the prefix can be moved.
+# hgrid.pc gives places relative to its own folder, so that the prefix can be moved.
 set(prefix "${CMAKE_INSTALL_PREFIX}")
 if(NOT IS_ABSOLUTE "${CMAKE_INSTALL_LIBDIR}")
   file(RELATIVE_PATH up "/prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig" /prefix)

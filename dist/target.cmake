@@ -1,6 +1,6 @@
-# Rust's name of the target that CMake compiles for.
+# Rust's name of CMake's target.
 
-# Sets the variable to the name. It stays empty where CMake does not know enough: a bare machine, say.
+# Sets the variable to the name. It stays empty if CMake does not know enough, as for a bare machine.
 function(hgrid_rust_target variable host)
   string(TOLOWER "${CMAKE_SYSTEM_PROCESSOR}" processor)
   if(APPLE AND CMAKE_OSX_ARCHITECTURES)
@@ -28,7 +28,7 @@ function(hgrid_rust_target variable host)
   set(target "")
   if(NOT CMAKE_CROSSCOMPILING AND UNIX AND NOT APPLE
       AND NOT (CMAKE_SIZEOF_VOID_P EQUAL 4 AND host MATCHES "^x86_64"))
-    # Rust knows its own machine better: which C library it has, say.
+    # Rust knows its own machine better, for example its C library.
     set(target "${host}")
   elseif(NOT processor)
   elseif(CMAKE_SYSTEM_NAME STREQUAL "Linux")

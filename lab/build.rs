@@ -1,4 +1,4 @@
-//! Links Embree, and only where its adapter is compiled.
+//! Links Embree if its adapter is compiled.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -1,4 +1,4 @@
-/* Builds a tree over 2000 triangles in static RAM, and traces it there: all within 128 KB. */
+/* Builds a tree over 2000 triangles in static RAM, and traces rays in it: all within 128 KB. */
 
 #include "measure.h"
 #include "scene.h"

@@ -3,7 +3,7 @@
 #include "scene.h"
 #include "start.h"
 
-/* The Makefile says how many instructions QEMU runs in a tick; on a board a tick is a cycle. */
+/* The Makefile sets the instructions that QEMU runs in a tick; on a board a tick is a cycle. */
 #ifdef INSTRUCTIONS_PER_TICK
 #define WORK " instructions"
 #else
@@ -19,7 +19,7 @@ void tell(const char *name, const char *unit, uint32_t ticks_before, uint32_t co
     print_number(stack), print(" bytes of stack\n");
 }
 
-/* FNV-1a over the words of a hit. */
+/* Adds the words of a hit to an FNV-1a sum. */
 static uint64_t add(uint64_t sum, const hgrid_hit *hit)
 {
     const uint32_t *word = (const uint32_t *)(const void *)hit;

@@ -1,10 +1,10 @@
-/* Opens a blob in flash, which pack.c made on the PC, and traces it: no RAM but the stack. */
+/* Opens a blob in flash, which pack.c made on the PC, and traces rays in it: no RAM but the stack. */
 
 #include "measure.h"
 #include "scene.h"
 #include "start.h"
 
-/* Where blob.S puts it: at a multiple of HGRID_ALIGNMENT. */
+/* The blob, which blob.S places at a multiple of HGRID_ALIGNMENT. */
 extern const unsigned char blob[], blob_end[];
 
 int run(void)

@@ -1,4 +1,4 @@
-/* On the PC: packs grid and mesh of the scene into a file. */
+/* Packs grid and mesh of the scene into a file, on the PC. */
 
 #include "scene.h"
 

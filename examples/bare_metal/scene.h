@@ -1,5 +1,5 @@
-/* What the programs of this folder look at: a hilly field of 2000 triangles, and a camera above it. All
- * of it is made of whole numbers, so that every compiler makes the same bits. */
+/* The scene of the programs in this folder: a hilly field of 2000 triangles, and a camera above it. It is
+ * made of whole numbers, so that every compiler makes the same bits. */
 #ifndef SCENE_H
 #define SCENE_H
 
@@ -38,7 +38,7 @@ static inline hgrid_mesh mesh_of(const scene *s)
     return mesh;
 }
 
-/* One of 16 x 16 rays from above one end of the field. */
+/* The camera: 16 x 16 rays from above one end of the field. */
 enum { RAYS = 256 };
 
 static inline hgrid_ray camera_ray(int i)

@@ -9,7 +9,7 @@ void start(void);
 static void fault(void);
 static void overflow(void);
 
-/* What the processor reads first: where the stack begins, then what to call at exceptions 1 to 15. */
+/* The start of flash: the initial stack pointer, then the handlers of exceptions 1 to 15. */
 struct vectors {
     uint32_t *stack;
     void (*handlers[15])(void);
@@ -29,7 +29,7 @@ __attribute__((section(".vectors"), used)) static const struct vectors vectors =
 #define COPROCESSORS REGISTER(0xe000ed88)
 enum { SYSTICK_TICKS = 0x1000000 };
 
-/* Semihosting: an operation in r0, its parameter in r1. */
+/* Calls the debugger by semihosting: an operation in r0, its parameter in r1. */
 static uint32_t ask_debugger(uint32_t operation, const void *parameter)
 {
     register uint32_t r0 __asm__("r0") = operation;
@@ -62,7 +62,7 @@ void print_sum(uint64_t sum)
     print(text);
 }
 
-/* Ends QEMU with a status. */
+/* Ends QEMU with an exit status. */
 static void leave(uint32_t status)
 {
     const uint32_t block[2] = {0x20026, status};
@@ -78,13 +78,13 @@ static void fault(void)
     leave(2);
 }
 
-/* What an untouched word of the stack holds. */
+/* The value of an untouched word of the stack. */
 enum { UNTOUCHED = 0x5aa5c33c };
 
 __attribute__((noinline)) void paint_stack(void)
 {
     uint32_t here;
-    /* This function's own frame is small, and so is what lies between. */
+    /* Leaves out 64 bytes, which this function's own frame may use. */
     uint32_t *const end = (uint32_t *)(((uintptr_t)&here & ~(uintptr_t)3) - 64);
     for (volatile uint32_t *at = stack_bottom; at < end; at++)
         *at = UNTOUCHED;
@@ -118,14 +118,14 @@ uint32_t ticks(void)
 
 __attribute__((noreturn, used)) void start(void)
 {
-    /* `volatile`, or the compiler would call memcpy before there is any data for it. */
+    /* `volatile`, because the compiler would otherwise call memcpy before its data exist. */
     const volatile uint32_t *from = data_image;
     for (volatile uint32_t *to = data_start; to < data_end;)
         *to++ = *from++;
     for (volatile uint32_t *to = bss_start; to < bss_end;)
         *to++ = 0;
 #ifdef __ARM_FP
-    /* Without access to the coprocessors 10 and 11, which are the floats, the first one is a fault. */
+    /* Enables the coprocessors 10 and 11, the floating-point unit: without them its first instruction is a fault. */
     COPROCESSORS |= 0xfu << 20;
     __asm__ volatile("dsb\n\tisb" ::: "memory");
 #endif

@@ -1,10 +1,10 @@
 //! A moving mesh, built anew or refitted for every frame: the `animate` command.
 //!
-//! Every vertex swings along its normal, as far as a wave says that travels through the mesh and is
-//! back where it was after the last frame. Each frame is what a game does: move the vertices, build
-//! into the same memory, trace all rays in tiles. What a frame of the mesh needs is asked once,
-//! before the first one, and once more only if a later frame needs more. A field of instances is a scene over
-//! the grid, which is built, or refitted, after it.
+//! Every vertex swings along its normal. A wave that travels through the mesh gives the phase, and all
+//! vertices are back in place after the last frame. Each frame does what a game does: it moves the vertices,
+//! builds into the same memory and traces all rays in tiles. The sizes are computed once, before the first
+//! frame, and again only if a later frame needs more. A field of instances is a scene over the mesh's grid,
+//! and is built or refitted after it.
 
 use core::f64::consts::TAU;
 use core::fmt;
@@ -100,9 +100,9 @@ struct Plan<'a> {
 /// The times of a frame in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Frame {
-    /// Building the mesh's grid, or refitting it, in memory that is there.
+    /// Building or refitting the mesh's grid, in memory that is already allocated.
     pub build_ms: f64,
-    /// The same for the scene of its instances; 0 without.
+    /// Building or refitting the scene of its instances; 0 without instances.
     pub scene_ms: f64,
     /// Tracing and shading every pixel.
     pub render_ms: f64,
@@ -117,7 +117,7 @@ pub struct Report {
     pub scene: String,
     /// Triangles of the scene.
     pub triangles: usize,
-    /// Moving instances of it; 0 if it is shown where it is.
+    /// Moving instances of it; 0 if the mesh itself is shown.
     pub instances: u32,
     /// True if later frames are refitted, not built.
     pub is_refitted: bool,
@@ -127,14 +127,14 @@ pub struct Report {
     pub threads: u32,
     /// Pixels on each side.
     pub size: u16,
-    /// Times that the memory did not do for a frame and had to grow.
+    /// Frames for which the memory was too small and had to grow.
     pub grown: u32,
     /// Bytes of the largest grid.
     pub index_bytes: usize,
     /// The middle values of all frames.
     pub median: Frame,
-    /// One for each frame. The first is the slowest: the system gives
-    /// its pages as they are written.
+    /// One for each frame. The first is the slowest, because the system provides the pages when they are
+    /// first written.
     pub frames: Vec<Frame>,
 }
 
@@ -315,7 +315,7 @@ impl Wave {
         }
     }
 
-    /// Moves the vertices to where they are at a time between 0 and 1.
+    /// Moves the vertices to their positions at a time between 0 and 1.
     fn at(&self, scene: &Scene, time: f64, positions: &mut [[f32; 3]]) {
         for ((to, from), normal) in positions.iter_mut().zip(&scene.positions).zip(&self.normals) {
             let place = from.map(f64::from);

@@ -1,4 +1,4 @@
-//! Blobs in files: grids as they are in memory, with or without their mesh.
+//! Blobs in files: packed grids, with or without their mesh.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{BlobInfo, Block};
 
-/// The bytes of a file, where a grid can be opened.
+/// The bytes of a file, aligned so that a grid can be opened in them.
 #[derive(Debug)]
 pub struct Blob {
     memory: Vec<Block>,
@@ -40,13 +40,13 @@ impl Blob {
         Self { memory: vec![Block::ZERO; Block::count_for(length)], length }
     }
 
-    /// The bytes, at an address where a grid can be opened.
+    /// Returns the bytes, aligned so that a grid can be opened in them.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &Block::bytes(&self.memory)[..self.length]
     }
 
-    /// The bytes, to be written.
+    /// Returns the bytes for writing.
     #[must_use]
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         &mut Block::bytes_mut(&mut self.memory)[..self.length]

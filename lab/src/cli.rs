@@ -1,4 +1,4 @@
-//! The words of the command line. What they do is in the other modules.
+//! The arguments of the command line. The other modules do the work.
 
 pub mod blob;
 mod help;
@@ -40,13 +40,13 @@ pub const DEFAULT_SCENE: &str = "procedural:knot:500K";
 #[derive(Debug, Parser)]
 #[command(name = "hgrid", version, after_help = EXAMPLES, override_usage = "hgrid [FILE] [OPTIONS]\n       hgrid COMMAND ...")]
 pub struct Cli {
-    /// What to do.
+    /// The command to run.
     #[command(subcommand)]
     pub command: Command,
 }
 
 impl Cli {
-    /// Reads the words behind the program's name; without a command they are those of `render`.
+    /// Parses the words after the program's name; without a command they are those of `render`.
     ///
     /// # Errors
     /// If the words are not understood, and if they ask for help or the version.
@@ -64,7 +64,7 @@ impl Cli {
     }
 }
 
-/// What the program can do.
+/// The commands of the program.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Renders a scene, with shadows and ambient occlusion; the command may be left out
@@ -99,7 +99,7 @@ pub enum Command {
     FirstBuild(FirstBuildArgs),
 }
 
-/// What to measure and how to print it.
+/// The arguments of `hgrid table`.
 #[derive(Debug, Parser)]
 pub struct TableArgs {
     /// Mesh files or procedural:NAME:TRIANGLES, one column each
@@ -116,7 +116,7 @@ pub struct TableArgs {
     pub json: bool,
 }
 
-/// What to draw and where to.
+/// The arguments of `hgrid figures`.
 #[derive(Debug, Parser)]
 pub struct FiguresArgs {
     /// Mesh files or procedural:NAME:TRIANGLES, one group of bars each
@@ -137,7 +137,7 @@ pub struct FiguresArgs {
     pub race: Race,
 }
 
-/// What to animate and how.
+/// The arguments of `hgrid animate`.
 #[derive(Debug, Parser)]
 pub struct AnimateArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
@@ -174,7 +174,7 @@ pub struct AnimateArgs {
     pub output: Option<PathBuf>,
 }
 
-/// What to measure against what.
+/// The arguments of `hgrid compare`.
 #[derive(Debug, Parser)]
 pub struct CompareArgs {
     /// Mesh files or procedural:NAME:TRIANGLES
@@ -219,14 +219,14 @@ pub struct CompareArgs {
 }
 
 impl CompareArgs {
-    /// The content of the scenes.
+    /// Returns the content of the scenes.
     #[must_use]
     pub const fn shown(&self) -> Shown {
         Shown::of(self.instances, self.spheres)
     }
 }
 
-/// Which pages to write.
+/// The arguments of `hgrid report`.
 #[derive(Debug, Parser)]
 pub struct ReportArgs {
     /// The root of a checkout
@@ -237,7 +237,7 @@ pub struct ReportArgs {
     pub check: bool,
 }
 
-/// What to build once.
+/// The arguments of `hgrid first-build`.
 #[derive(Debug, Parser)]
 pub struct FirstBuildArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
@@ -253,14 +253,14 @@ pub struct FirstBuildArgs {
 }
 
 impl FirstBuildArgs {
-    /// The content of the scene.
+    /// Returns the content of the scene.
     #[must_use]
     pub const fn shown(&self) -> Shown {
         Shown::of(self.instances, self.spheres)
     }
 }
 
-/// Which methods compete, and how often.
+/// The methods of a race, and its repetitions.
 #[derive(Debug, Clone, Args)]
 pub struct Race {
     /// The structures to build, between commas [default: all]
@@ -285,13 +285,13 @@ impl Race {
     /// Refuses parameters of methods that do not compete.
     ///
     /// # Errors
-    /// The first such parameter, and the method that it is for.
+    /// If there is one; the message names the parameter and its method.
     pub fn check(&self) -> anyhow::Result<()> {
         let methods: Vec<_> = self.configs().iter().map(Config::method).collect();
         self.tuning.check(&methods)
     }
 
-    /// A configuration for each method, at the paper's density.
+    /// Returns a configuration for each method, at the paper's density.
     #[must_use]
     pub fn configs(&self) -> Vec<Config> {
         let methods = if self.methods.is_empty() { Method::ALL } else { &self.methods };
@@ -299,7 +299,7 @@ impl Race {
     }
 }
 
-/// Who builds.
+/// The threads of builds.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Builders {
     /// Threads that build, for `bvh`; the other methods, and all rays, have one

@@ -1,7 +1,7 @@
 //! Many instances of a mesh on a square field: what `animate` moves and `compare` traces.
 //!
-//! Each instance turns about its own axis on a small circle, is larger or smaller than the mesh, and is back where it was
-//! after a time of 1. Nothing depends on a clock.
+//! Each instance turns about its own axis on a small circle, is larger or smaller than the mesh, and is back
+//! in place after a time of 1. Nothing depends on a clock.
 
 use core::f64::consts::TAU;
 
@@ -29,7 +29,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// A field of so many instances of a mesh in this box.
+    /// Makes a field of so many instances of a mesh in this box.
     #[must_use]
     pub fn new((min, max): Bounds, count: u32, up: Up) -> Self {
         let along = |f: fn(f64, f64) -> f64| {
@@ -40,13 +40,13 @@ impl Field {
         Self { count, up, middle, extent: if extent > 0.0 { extent } else { 1.0 } }
     }
 
-    /// A field of so many instances of a scene, along its own ground; none for 0.
+    /// Makes a field of so many instances of a scene, on its ground plane; none for 0.
     #[must_use]
     pub fn over(scene: &Model, count: u32) -> Option<Self> {
         (count > 0).then(|| Self::new(scene.framed_bounds(), count, Up::of(scene)))
     }
 
-    /// Has pictures of the scene show the field.
+    /// Sets the part of the scene that pictures show to the field.
     pub fn frame(&self, scene: &mut Model) {
         scene.is_z_up = Some(self.up == Up::Z);
         scene.focus = Some(self.bounds());
@@ -62,17 +62,17 @@ impl Field {
         f64::from(self.count).sqrt().ceil().max(1.0)
     }
 
-    /// The box around all instances at any time.
+    /// Returns the box around all instances at any time.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         let reach = 0.5 * self.side() * STEP * self.extent;
-        // The largest instance, however it is turned.
+        // The largest instance, at any rotation.
         let height = 1.3 * 0.5 * self.extent;
         let corner = self.up.turned_back([reach, height, reach]).map(f64::abs);
         (round(offset(self.middle, -1.0, corner)), round(offset(self.middle, 1.0, corner)))
     }
 
-    /// The instances at a time between 0 and 1, all of object 0.
+    /// Returns the instances at a time between 0 and 1, all of object 0.
     #[must_use]
     pub fn instances(&self, time: f64) -> Vec<Instance> {
         let side = self.side();
@@ -132,7 +132,7 @@ impl Memory {
         Ok(Scene::build_with(instances, objects, config, index, scratch, control)?)
     }
 
-    /// Gives the scene that was built other instances.
+    /// Refits the scene to other instances.
     pub(crate) fn refit<'a>(
         &'a mut self,
         instances: &[Instance],
@@ -144,7 +144,7 @@ impl Memory {
     }
 }
 
-/// Three vertices of its own for each ray of a tile.
+/// The vertices of each ray of a tile: three of its own.
 #[expect(clippy::cast_possible_truncation, reason = "a tile has few rays")]
 static CORNERS: [[u32; 3]; TILE_RAYS] = {
     let mut corners = [[0; 3]; TILE_RAYS];
@@ -156,8 +156,8 @@ static CORNERS: [[u32; 3]; TILE_RAYS] = {
     corners
 };
 
-/// Traces the rays of a tile through a scene and shades what they hit, as a mesh of its own: each ray brings its triangle,
-/// turned as its instance is.
+/// Traces the rays of a tile through a scene and shades the hits as a mesh of its own: each ray brings the
+/// triangle that it hits, transformed as its instance is.
 pub(crate) fn shade(scene: &Scene<'_>, camera: &Camera, rays: &[Ray], colors: &mut [Rgb]) {
     let mut corners = [[0.0; 3]; 3 * TILE_RAYS];
     let mut hits = [Hit::MISS; TILE_RAYS];

@@ -1,4 +1,4 @@
-//! Heat pictures: the work of every ray as a colour, and a bar that says what the colours mean.
+//! Heat pictures: the work of every ray as a colour, with a labelled colour bar.
 //!
 //! ```text
 //! +-----------------------+
@@ -21,10 +21,10 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use crate::plot::{Area, AreaResult, INK, Pen, Raster};
 use crate::shade::Rgb;
 
-/// Pictures narrower than this have no room for words.
+/// The least width of a picture whose colour bar has words.
 const LEGIBLE: u16 = 224;
 
-/// What of a ray's work is shown.
+/// The counter that a heat picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Counter {
     /// Tests and steps together
@@ -38,7 +38,7 @@ pub enum Counter {
 }
 
 impl Counter {
-    /// The number of a ray.
+    /// Returns this counter's number for a ray.
     #[must_use]
     pub const fn of(self, work: &Counters) -> u64 {
         match self {
@@ -49,7 +49,7 @@ impl Counter {
         }
     }
 
-    /// Names what is counted, in words.
+    /// Returns the name of the counter in words.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
@@ -70,10 +70,9 @@ pub struct Picture {
     pub pixels: Vec<Rgb>,
 }
 
-/// The costs of the rays of a square picture as colours, with a colour bar if there is room.
-///
-/// The colours end at `top` or the next round number; without it, at what 99 of 100 rays take. The
-/// number at the end comes with the picture.
+/// Makes a picture of the costs of the rays of a square picture, with a colour bar if there is room. The
+/// colours end at `top` or the next round number, or by default at the cost that 99 of 100 rays stay below.
+/// The number at the end is returned with the picture.
 ///
 /// # Errors
 /// If the bar's font cannot be read.
@@ -103,14 +102,14 @@ struct Scale {
 }
 
 impl Scale {
-    /// The scale on which 99 of 100 costs are below the end.
+    /// Returns the scale whose end 99 of 100 costs do not exceed.
     fn of(costs: &[u32]) -> Self {
         let mut costs = costs.to_vec();
         let rank = costs.len().saturating_sub(1) * 99 / 100;
         Self::up_to(if costs.is_empty() { 0 } else { *costs.select_nth_unstable(rank).1 })
     }
 
-    /// The scale to a number, or to the next round one.
+    /// Returns the scale up to a number, or up to the next round one.
     fn up_to(most: u32) -> Self {
         let powers = core::iter::successors(Some(1u32), |power| power.checked_mul(10));
         let steps = powers.flat_map(|power| [1, 2, 5].map(|digit| power.saturating_mul(digit)));
@@ -125,7 +124,7 @@ impl Scale {
     }
 }
 
-/// The colour bar under a picture; `font` is the size of its words and the unit of the rest.
+/// The colour bar under a picture; `font` is the size of its words and the unit of its other lengths.
 struct Bar {
     font: u32,
     width: u32,
@@ -164,7 +163,7 @@ impl Bar {
         (2 * self.font, self.width - 4 * self.font)
     }
 
-    /// Draws all but the colours.
+    /// Draws everything but the colours.
     fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> AreaResult<B> {
         let Self { font, scale: Scale { step, top }, counter, .. } = *self;
         let (left, length) = self.span();

@@ -1,7 +1,7 @@
 //! Pictures as PNG files.
 //!
-//! A check before the work tells whether the file can be written, and leaves no empty file behind; the
-//! file itself is written in one go when the picture is complete.
+//! A check before the work tests that the file can be written, and leaves no empty file behind. The file
+//! itself is written at once when the picture is complete.
 
 use std::fs::{self, OpenOptions};
 use std::io::{Cursor, ErrorKind};
@@ -14,7 +14,7 @@ use crate::shade::Rgb;
 /// Refuses a path where no PNG can be written, or whose name promises another format.
 ///
 /// # Errors
-/// The errors of [`check_writable`], and one if the name promises another format.
+/// Those of [`check_writable`], and one if the name is that of another format.
 pub fn check_picture(path: &Path) -> Result<()> {
     let is_png = path.extension().is_none_or(|ending| ending.eq_ignore_ascii_case("png"));
     ensure!(

@@ -15,7 +15,7 @@ use crate::scene::format::Format;
 use crate::scene::{Scene, read_model};
 use crate::shade::normal_of;
 
-/// Looks and prints.
+/// Prints the facts of a file.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -34,7 +34,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
     Ok(())
 }
 
-/// A name and a value, as they are printed.
+/// A name and a value, as printed.
 type Row = (&'static str, String);
 
 fn count(count: impl TryInto<u64>) -> String {
@@ -54,41 +54,41 @@ enum Facts {
     Blob(BlobFacts),
 }
 
-/// A mesh.
+/// The facts of a mesh file.
 #[derive(Debug, PartialEq, Serialize)]
 struct MeshFacts {
     file: String,
     format: &'static str,
-    /// Meshes of the file, and places where they stand.
+    /// Meshes of the file, and their instances.
     meshes: usize,
     instances: usize,
-    /// Counts of all instances together.
+    /// Triangles and vertices of all instances together.
     triangles: usize,
     vertices: usize,
     /// The lowest and the highest corner of the box around it.
     bounds: Option<[[f32; 3]; 2]>,
     up: &'static str,
-    /// Triangles that name a vertex that is not there: such a mesh cannot be built.
+    /// Triangles with a vertex index out of range: such a mesh cannot be built.
     triangles_without_vertex: usize,
     triangles_not_finite: usize,
     triangles_without_area: usize,
 }
 
-/// A blob.
+/// The facts of a blob.
 #[derive(Debug, PartialEq, Serialize)]
 struct BlobFacts {
     file: String,
     format: &'static str,
     version: u32,
     method: &'static str,
-    /// The number of things that it is built over: one of these four.
+    /// The count of the things that it is built over, in one of these four.
     #[serde(skip_serializing_if = "Option::is_none")]
     triangles: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     shapes: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     instances: Option<u32>,
-    /// Of a packed scene.
+    /// Grids and scenes in a packed scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     grids_and_scenes: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]

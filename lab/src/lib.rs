@@ -1,7 +1,7 @@
-//! Everything about hgrid that needs an operating system: scenes, pictures, measurements.
+//! The parts of hgrid that need an operating system: scenes, pictures, measurements.
 //!
-//! The binary `hgrid` is a thin layer over these modules; tests and benches use the same scenes
-//! and the same camera, so that a number and a picture always speak of the same rays.
+//! The binary `hgrid` is a thin layer over these modules. Tests and benches use the same scenes and the same
+//! camera, so that numbers and pictures are always about the same rays.
 //!
 //! ```text
 //! scene -> render: a picture, by all threads

@@ -1,12 +1,12 @@
-//! Things in the way of light: shadows of the lamp, and ambient occlusion.
+//! Occlusion of light: shadows of the lamp, and ambient occlusion.
 //!
 //! ```text
 //! spots of a tile -> rays toward the lamp                    -> one call for any hit -> lit
 //!                 -> some rays of each toward sky and ground -> one call for any hit -> open
 //! ```
 //!
-//! The rays of a call are in the order of the tile's pixels, those of a pixel side by side: rays that
-//! follow one another start near each other, so that a tree takes them in groups, wherever they go.
+//! The rays of a call are in the order of the tile's pixels, those of a pixel side by side. So successive
+//! rays start near each other, and a tree can trace them in groups whatever their directions.
 
 use hgrid_core::Ray;
 
@@ -14,38 +14,38 @@ use crate::tiles::TILE_RAYS;
 use crate::vector::{Vector, cross, dot, offset, round, unit};
 use crate::world::World;
 
-/// The lights that something may be in the way of.
+/// The kinds of occlusion in a picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Lights {
     /// The lamp casts shadows.
     pub has_shadows: bool,
-    /// Rays from each sample that look for sky and ground; without any, all of these is seen.
+    /// Rays from each sample toward sky and ground; 0 for no ambient occlusion.
     pub sky_rays: u16,
 }
 
 /// A point of a surface that a pixel shows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Spot {
-    /// The pixel, counted in its tile.
+    /// The pixel's number in its tile.
     pub(crate) at: usize,
     /// The unit normal on the viewer's side.
     pub(crate) normal: [f32; 3],
-    /// The start of rays that leave on that side.
+    /// The start of rays that leave the surface on that side.
     pub(crate) start: [f32; 3],
     /// Two numbers from 0 to 1 that differ from pixel to pixel.
     pub(crate) noise: [f64; 2],
 }
 
-/// The direction of the lamp, and the distance up to which something may hide the sky.
+/// The direction of the lamp, and the distance within which surfaces hide the sky.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Around {
     /// The direction toward the lamp.
     pub(crate) lamp: [f32; 3],
-    /// Rays toward the sky end here.
+    /// The length of rays toward the sky.
     pub(crate) reach: f32,
 }
 
-/// One sample of several that a pixel gets.
+/// One of the samples of a pixel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
     pub(crate) number: u16,
@@ -59,18 +59,18 @@ pub(crate) struct Reached {
     pub(crate) lit: [f32; TILE_RAYS],
     /// The light of sky and ground.
     pub(crate) open: [f32; TILE_RAYS],
-    /// Rays that were sent to find out.
+    /// The number of rays that this took.
     pub(crate) rays: u64,
 }
 
 impl Lights {
-    /// Returns true if nothing is in the way anywhere.
+    /// Returns true if there is no occlusion.
     #[must_use]
     pub const fn are_everywhere(&self) -> bool {
         !self.has_shadows && self.sky_rays == 0
     }
 
-    /// Asks what reaches the spots of a tile.
+    /// Computes the light that reaches the spots of a tile.
     pub(crate) fn reach(
         self,
         world: World<'_>,
@@ -104,7 +104,7 @@ impl Lights {
     }
 }
 
-/// Traces all rays with one call and shows `hidden` the pixels of those that do not get through.
+/// Traces all rays with one call, calls `hidden` with the pixel of each occluded ray, and counts the rays.
 fn send(
     world: World<'_>,
     probes: impl Iterator<Item = (usize, Ray)>,
@@ -119,10 +119,9 @@ fn send(
     rays.len() as u64
 }
 
-/// Returns two numbers from 0 to 1 for a pixel, unlike those of the pixels around it.
-///
-/// Interleaved gradient noise (Jimenez 2014): any 3 x 3 pixels have numbers that are spread over
-/// the whole range, so that what is noise in each is even over a few.
+/// Returns two numbers from 0 to 1 for a pixel, unlike those of the pixels around it. Interleaved gradient
+/// noise (Jimenez 2014): the numbers of any 3 x 3 pixels are spread over the whole range, so that the noise
+/// averages out over a few pixels.
 pub(crate) fn noise([column, row]: [f32; 2]) -> [f64; 2] {
     let of =
         |x: f64, y: f64| (52.982_918_9 * (0.067_110_56 * x + 0.005_837_15 * y).fract()).fract();
@@ -134,10 +133,9 @@ fn wide(vector: [f32; 3]) -> Vector {
     vector.map(f64::from)
 }
 
-/// One of the directions from a surface to the sky above it.
-///
-/// Points on a disk, lifted to the hemisphere above it, have the cosine in them. On the disk they
-/// lie like the seeds of a sunflower, turned by another angle for each pixel.
+/// Returns one of the directions from a surface to the sky above it. Points on a disk, lifted to the
+/// hemisphere above it, have a cosine distribution. On the disk they lie like the seeds of a sunflower,
+/// rotated by a different angle for each pixel.
 fn scatter(normal: Vector, [turn, part]: [f64; 2], number: u32, count: u32) -> Vector {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let area = (f64::from(number) + part) / f64::from(count);

@@ -1,4 +1,4 @@
-//! The origin of numbers: what a reader needs in order to measure them again.
+//! The origin of numbers: the facts that a reader needs to measure them again.
 
 use std::env;
 use std::fs;
@@ -8,29 +8,28 @@ use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
-/// The machine, the compiler, the day and the words that a measurement was started with.
+/// The machine, the compiler, the day and the command line of a measurement.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
-    /// The processor's name, if the system tells, and on x86 its family and model: a virtual
-    /// machine may say no more than whose it is.
+    /// The processor's name, if known, and on x86 its family and model: a virtual machine may tell only the vendor.
     pub cpu: Option<String>,
     /// Operating system and architecture.
     pub system: String,
-    /// The system's setting for large pages, if it tells: a build of much memory asks for them.
+    /// The system's setting for large pages, if known: large builds request them.
     pub large_pages: Option<String>,
     /// The compiler that this program was built with.
     pub rustc: String,
-    /// The commit of the checkout that the command was started in, `-dirty` if files differ from it.
+    /// The commit of the checkout that the command ran in, `-dirty` if files differ from it.
     #[serde(default)]
     pub commit: Option<String>,
     /// The day, in UTC, as YYYY-MM-DD.
     pub date: String,
-    /// The words of the command line; of the program's own path only the name.
+    /// The command line, with only the file name of the program.
     pub command: String,
 }
 
 impl Machine {
-    /// The facts of here and now.
+    /// Returns the facts of this machine and process.
     #[must_use]
     pub fn here() -> Self {
         let cpu = fs::read_to_string("/proc/cpuinfo").ok();
@@ -49,7 +48,7 @@ impl Machine {
         }
     }
 
-    /// All but the command, as one line.
+    /// Formats everything but the command and the commit, as one line.
     #[must_use]
     pub fn summary(&self) -> String {
         let cpu = self.cpu.as_deref().unwrap_or("unknown processor");
@@ -60,7 +59,7 @@ impl Machine {
     }
 }
 
-/// The commit that the current folder is a checkout of, if it is one of hgrid.
+/// Returns the commit of the checkout around the current folder, if it is one of hgrid.
 fn commit() -> Option<String> {
     let git = |arguments: &[&str]| {
         let output = Command::new("git").args(arguments).output().ok()?;
@@ -72,13 +71,13 @@ fn commit() -> Option<String> {
     is_hgrid.then(|| git(&["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]))?
 }
 
-/// The word in brackets among those of a kernel's setting.
+/// Returns the word in brackets, which is the chosen one, in the text of a kernel's setting.
 fn chosen(text: &str) -> Option<String> {
     let (_, rest) = text.split_once('[')?;
     rest.split_once(']').map(|(word, _)| word.to_owned())
 }
 
-/// The name in the text of /proc/cpuinfo.
+/// Returns the processor's name in the text of /proc/cpuinfo.
 fn cpu_name(text: &str) -> Option<String> {
     let value = |keys: &[&str]| {
         let mut lines = text.lines().filter_map(|line| line.split_once(':'));
@@ -91,7 +90,7 @@ fn cpu_name(text: &str) -> Option<String> {
     Some(format!("{name}, family {family}, model {model}"))
 }
 
-/// The words of a command line, in quotes where a shell needs them.
+/// Returns the words of a command line, quoted for a shell where necessary.
 fn command(mut words: impl Iterator<Item = String>) -> String {
     let program = words.next().unwrap_or_default();
     let name = Path::new(&program).file_stem().unwrap_or_default().to_string_lossy();

@@ -6,19 +6,18 @@
 //! last one:      build A, render A, count A | build B, ...
 //! ```
 //!
-//! Taking turns lets a machine that warms up or that others use disturb all methods alike; threads
-//! are awake before a clock starts. Each build gets memory of its own from the system, which a page
-//! costs when it is first written: every method pays for the pages that it writes, in every build,
-//! and not for what it asked for and left alone. Asking for the sizes, getting the memory and
-//! building are all in the build time, because a first picture needs all of them. (A heap would
-//! hand pages of the build before to some methods and not to others, depending on their sizes, and
-//! would fill with zeros what the sizes only allow for.) Pages are large where a build asks for
-//! many and the system has such; how much memory a build writes is counted in one more build, in
-//! small ones.
+//! Methods take turns, so that warming up and other load on the machine disturb all alike; threads are awake
+//! before a clock starts. Each build gets its own memory from the system, whose pages cost time when they are
+//! first written. So every method pays for the pages that it writes, in every build, and not for memory that
+//! it reserved and left alone. The build time includes computing the sizes, allocating and building, because
+//! a first picture needs all of them. (A heap would hand pages of an earlier build to some methods and not to
+//! others, depending on their sizes, and would zero memory that is only reserved.) Pages are large if a build
+//! requests many bytes and the system has such pages. One more build, in small pages, counts the memory that
+//! a build writes.
 //!
-//! Rendering is one thread, one ray per pixel, tile by tile: the timed pass hands the rays of a tile
-//! to the grid, as a renderer does, shades them, and moves the progress bar. Trees trace them
-//! together, the others one by one. The work is counted in a pass of its own, ray by ray.
+//! Rendering is one thread, one ray per pixel, tile by tile: the timed pass hands the rays of a tile to the
+//! grid, as a renderer does, shades them, and advances the progress bar. Trees trace the rays of a tile
+//! together, the others one by one. A separate pass counts the work, ray by ray.
 
 use alloc::borrow::Cow;
 use std::time::Instant;
@@ -49,7 +48,7 @@ pub struct SceneFacts {
 }
 
 impl SceneFacts {
-    /// The facts of a scene.
+    /// Returns the facts of a scene.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         Self {
@@ -60,8 +59,8 @@ impl SceneFacts {
         }
     }
 
-    /// The facts of meshes that instances show: triangles and vertices are those that are shown, bytes those
-    /// of the meshes, each once.
+    /// Returns the facts of meshes that instances show: the triangles and vertices of all instances, and the
+    /// bytes of each mesh once.
     #[must_use]
     pub fn of_model(name: &str, model: &Model) -> Self {
         let (mut triangles, mut vertices, mut scene_bytes) = (0, 0, 0);
@@ -81,9 +80,9 @@ impl SceneFacts {
 pub struct Measurement {
     /// The structure.
     pub method: Cow<'static, str>,
-    /// Cells per triangle that were asked for, where the method has such a number.
+    /// The requested cells per triangle, if the method has such a number.
     pub configured_density: Option<f32>,
-    /// Cells per triangle that the grid was built for: fewer where it would hold too many ids.
+    /// Cells per triangle of the built grid: fewer if it would hold too many ids.
     pub density: Option<f32>,
     /// Cells per axis.
     pub resolution: [u32; 3],
@@ -93,18 +92,18 @@ pub struct Measurement {
     pub skipped_triangles: u32,
     /// Bytes of the built grid, without the mesh.
     pub index_bytes: usize,
-    /// The same for each triangle.
+    /// Bytes of the built grid for each triangle.
     pub index_bytes_per_triangle: f64,
-    /// Bytes that only the build was given.
+    /// Bytes of scratch that the build was given.
     pub scratch_bytes: usize,
-    /// Bytes for the grid that were asked for, because its size is known only after the build.
+    /// Bytes that were allocated for the grid, whose size is known only after the build.
     pub allocated_index_bytes: usize,
-    /// Bytes of index and scratch that the build wrote, in whole small pages; where the system does
-    /// not tell, the bytes of the grid and of all scratch.
+    /// Bytes of index and scratch that the build wrote, in whole small pages; if the system does not tell,
+    /// the bytes of the grid and of all scratch.
     pub peak_bytes: usize,
     /// Pixels on each side of the picture.
     pub size: u16,
-    /// One for each pixel.
+    /// Rays of the picture: one for each pixel.
     pub rays: u64,
     /// Rays that hit something.
     pub hits: u64,
@@ -116,32 +115,32 @@ pub struct Measurement {
     pub grid_steps_per_ray: f64,
     /// The most tests and steps that one ray took.
     pub largest_ray_cost: u64,
-    /// Asking for sizes, getting memory and building.
+    /// The time of computing the sizes, allocating and building.
     pub build_seconds: f64,
-    /// Tracing and shading every pixel.
+    /// The time of tracing and shading every pixel.
     pub render_seconds: f64,
-    /// Build and render: from a mesh in memory to a picture.
+    /// The time of both, from a mesh in memory to a picture.
     pub time_to_image_seconds: f64,
-    /// The builds that the time is the median of, one after the other.
+    /// The times of single builds, of which the time above is the median.
     pub build_samples: Vec<f64>,
     /// The renderings, likewise.
     pub render_samples: Vec<f64>,
 }
 
 impl Measurement {
-    /// The method and what was asked for: its density, or the size of its cells.
+    /// Returns the method and its requested density, if it has one.
     #[must_use]
     pub fn title(&self) -> String {
         self.titled(self.configured_density)
     }
 
-    /// The method and what was built.
+    /// Returns the method and the density that was built.
     #[must_use]
     pub fn built_title(&self) -> String {
         self.titled(self.density)
     }
 
-    /// Returns true if the time is that of tiles whose rays were traced together; the work never is.
+    /// Returns true if the timed pass traced the rays of a tile together; the counting pass never does.
     #[must_use]
     pub fn is_in_tiles(&self) -> bool {
         self.method == Method::Bvh.name()
@@ -171,13 +170,13 @@ pub struct Subject<'a> {
 pub struct Outcome {
     /// The numbers of every configuration.
     pub measurements: Vec<Measurement>,
-    /// The picture that all of them gave, row by row from the upper left.
+    /// The picture of all of them, row by row from the upper left.
     pub pixels: Vec<Rgb>,
     /// The cost of each pixel's ray with the last configuration.
     pub costs: Vec<u32>,
 }
 
-/// Rows that [`measure`] reports to its progress.
+/// Returns the number of rows that [`measure`] reports to its progress.
 #[must_use]
 pub fn rows(size: u16, methods: usize, repeat: u32) -> u64 {
     u64::from(size) * methods as u64 * (u64::from(repeat) + 1)
@@ -185,7 +184,7 @@ pub fn rows(size: u16, methods: usize, repeat: u32) -> u64 {
 
 /// Builds and renders with every configuration in turn, `repeat` times, and counts once.
 ///
-/// `cost` tells what of a ray's counters is its cost.
+/// The function `cost` selects a ray's cost among its counters.
 ///
 /// # Errors
 /// If a grid cannot be built, or if two methods do not give the same picture.
@@ -249,7 +248,7 @@ pub fn measure(
     Ok(outcome)
 }
 
-/// Bytes that a build asked for, and the most that it used.
+/// Bytes that a build requested, and the most that it used.
 #[derive(Clone, Copy)]
 struct Memory {
     index: usize,
@@ -257,12 +256,12 @@ struct Memory {
     peak: usize,
 }
 
-/// Returns true if a method's count of references is one: the others keep ids and grids in one pool.
+/// Returns true if a method counts its references: the others keep ids and grids in one pool.
 const fn has_references(method: Method) -> bool {
     matches!(method, Method::OneLevel | Method::Fixed)
 }
 
-/// Returns what `tile` makes of the rays of all pixels, row by row; the progress moves on.
+/// Returns the values that `tile` computes for the rays of all pixels, row by row, and advances the progress.
 fn trace<T: Copy>(
     tiles: &Tiles,
     progress: &mut Progress,
@@ -287,7 +286,7 @@ pub(crate) struct Work {
     pub(crate) costs: Vec<u32>,
 }
 
-/// Traces a picture, ray by ray, and counts.
+/// Traces a picture ray by ray, and counts the work.
 pub(crate) fn count(
     grid: &Grid<'_>,
     tiles: &Tiles,
@@ -349,14 +348,14 @@ fn numbers(
     }
 }
 
-/// `a / b`, or 0 where there is nothing to divide by.
+/// Returns `a / b`, or 0 if `b` is 0.
 #[expect(clippy::cast_precision_loss, reason = "numbers for people: 15 digits are enough")]
 #[must_use]
 pub fn ratio(a: u64, b: u64) -> f64 {
     if b == 0 { 0.0 } else { a as f64 / b as f64 }
 }
 
-/// The middle value, the mean of the two if there are two.
+/// Returns the median: the mean of the two middle values if their number is even.
 pub(crate) fn median(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     values.sort_by(f64::total_cmp);

@@ -1,7 +1,7 @@
 //! Grid and mesh in one file: the `pack` command.
 //!
-//! The file is a blob as core/src/packed/mod.rs describes it, or C source with its bytes: an array that
-//! a program for a microcontroller has in flash and opens there.
+//! The file is a blob as in core/src/packed/mod.rs, or C source with its bytes: an array that a program for a
+//! microcontroller keeps in flash and opens there.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -21,7 +21,7 @@ use crate::scene::format::Format;
 /// Bytes in a line of C.
 const IN_LINE: usize = 24;
 
-/// Builds, packs and writes.
+/// Builds, packs and writes the file.
 ///
 /// # Errors
 /// If the scene cannot be loaded or built, or the file cannot be written.
@@ -53,7 +53,7 @@ pub fn run(args: &PackArgs) -> Result<()> {
     Ok(())
 }
 
-/// Refuses words that would be ignored, and files that are no blob's.
+/// Refuses options without effect, and output names that are those of other formats.
 fn check(args: &PackArgs) -> Result<()> {
     let (method, output) = (args.method, args.output.display());
     ensure!(
@@ -107,13 +107,13 @@ fn write_c(
     bytes: &[u8],
 ) -> io::Result<()> {
     let order = if cfg!(target_endian = "little") { "little" } else { "big" };
-    // A comment ends where its end stands in a file's name.
+    // A file's name may contain the end of a comment.
     let scene = scene.replace("*/", "* /");
     writeln!(out, "/* {scene}, packed by `hgrid pack` for machines of {order}-endian order:")?;
     writeln!(out, " *   hgrid_open({name}, sizeof {name}, NULL, &grid) */")?;
     writeln!(out, "#include <hgrid.h>\n")?;
     if !is_header {
-        // Other files of a C++ program see no constant that is not declared first.
+        // In C++ a constant has internal linkage unless it is declared `extern` first.
         writeln!(out, "extern const unsigned char {name}[{}];", bytes.len())?;
     }
     let linkage = if is_header { "static " } else { "" };

@@ -1,8 +1,8 @@
-//! A progress bar that stays away from short work.
+//! A progress bar for long work only.
 //!
-//! It appears on standard error after a second, only if that is a terminal, and disappears when
-//! the work is done: standard output belongs to the results, and a bar that flashes by says
-//! nothing. Generating, loading and measuring share it.
+//! The bar appears on standard error after a second, only if that is a terminal, and disappears when the work
+//! is done. Standard output belongs to the results, and a bar that flashes by is of no use. Generating,
+//! loading and measuring share it.
 
 use core::fmt;
 use core::time::Duration;
@@ -10,7 +10,7 @@ use std::io::{self, Read};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// The time that work may take before it owes an explanation.
+/// The time that work may take before the bar appears.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The progress of one piece of work.
@@ -42,17 +42,17 @@ impl Progress {
         }
     }
 
-    /// Says what is being worked on.
+    /// Sets the message: the present piece of work.
     pub fn set_message(&self, what: &str) {
         self.bar.set_message(format!("{}{what}", self.scope));
     }
 
-    /// Says what the messages to come are about.
+    /// Sets the words that come before all further messages.
     pub fn set_scope(&mut self, scope: &str) {
         self.scope = format!("{scope}: ");
     }
 
-    /// A reader whose bytes are counted.
+    /// Returns a reader that counts the bytes it reads.
     pub fn reader<R: Read>(self, inner: R) -> impl Read {
         CountedReader { inner, progress: self }
     }

@@ -1,5 +1,5 @@
-//! The two regions of a grid, and builds in them: the first one, in pages that the system has just
-//! given, or another one in regions that are kept.
+//! The two regions of a grid, and builds in them: first builds in new pages of the system, and rebuilds in
+//! regions that are kept.
 
 use anyhow::{Context as _, Result};
 use hgrid_core::{Config, Control, Error, Grid, Method, Region, Sizes, TriangleMesh, sizes_with};
@@ -10,19 +10,19 @@ use memmap2::{MmapMut, MmapOptions};
 use crate::resident::resident_bytes;
 use crate::threads::Threads;
 
-/// Index and scratch of a grid.
+/// The index and the scratch of a grid.
 pub(crate) struct Regions {
     pub(crate) index: MmapMut,
     pub(crate) scratch: MmapMut,
 }
 
 impl Regions {
-    /// Builds as a user does who has nothing but the mesh: ask for sizes, get memory, build.
+    /// Builds on one thread as a user does: computes the sizes, allocates, builds.
     pub(crate) fn build(mesh: TriangleMesh<'_>, config: &Config) -> Result<Self> {
         Threads::new(1)?.parallel(|parallel| Self::fresh(mesh, config, parallel))
     }
 
-    /// The same on threads.
+    /// Builds the same way, with a control for threads.
     pub(crate) fn fresh(
         mesh: TriangleMesh<'_>,
         config: &Config,
@@ -31,15 +31,14 @@ impl Regions {
         Self::built(mesh, config, parallel, memory)
     }
 
-    /// The same in memory from where the caller says.
+    /// Builds the same way, in memory from `pages`.
     fn built(
         mesh: TriangleMesh<'_>,
         config: &Config,
         parallel: &Control<'_>,
         pages: fn(usize) -> Result<MmapMut>,
     ) -> Result<Self> {
-        // A tree's bound follows from the number of triangles, and
-        // what is not written costs nothing.
+        // A tree's bound only needs the number of triangles, and memory that is not written costs nothing.
         let bound = match config.method() {
             Method::Bvh => Sizes::bound_parallel(mesh.triangle_count(), config, parallel.tasks),
             _ => None,
@@ -57,18 +56,18 @@ impl Regions {
         Ok(Self { index: pages(sizes.index_bytes)?, scratch: pages(sizes.scratch_bytes)? })
     }
 
-    /// Maps as many bytes as these.
+    /// Maps as many bytes as `sizes` says.
     pub(crate) fn of(sizes: Sizes) -> Result<Self> {
         Self::mapped(sizes, memory)
     }
 
-    /// The same in small pages, of which [`written_bytes`](Self::written_bytes) tells how many a build writes.
+    /// Maps them in small pages, so that [`written_bytes`](Self::written_bytes) counts closely.
     pub(crate) fn counted(sizes: Sizes) -> Result<Self> {
         Self::mapped(sizes, small_pages)
     }
 
-    /// Bytes that were written, in whole pages; where the system does not tell, those of the index that
-    /// are used and all of the scratch.
+    /// Returns the bytes that were written, in whole pages; if the system does not tell, the used bytes of
+    /// the index and all of the scratch.
     pub(crate) fn written_bytes(&self, index_bytes: usize) -> usize {
         let Self { index, scratch } = self;
         match resident_bytes(index).zip(resident_bytes(scratch)) {
@@ -77,7 +76,7 @@ impl Regions {
         }
     }
 
-    /// Maps as much as the mesh needs as it is now.
+    /// Maps as much as the mesh needs at present.
     pub(crate) fn empty(
         mesh: &TriangleMesh<'_>,
         config: &Config,
@@ -86,7 +85,7 @@ impl Regions {
         Self::of(sizes_with(mesh, config, &mut [], parallel)?)
     }
 
-    /// Builds in these regions, in larger ones if the mesh needs it; returns how often they grew.
+    /// Builds in these regions, and replaces those that are too small; returns the number of replacements.
     pub(crate) fn rebuild(
         &mut self,
         mesh: TriangleMesh<'_>,
@@ -109,7 +108,7 @@ impl Regions {
     }
 }
 
-/// Bytes of index and scratch that a build writes, in whole small pages; where the system does not
+/// Returns the bytes of index and scratch that a build writes, in whole small pages; if the system does not
 /// tell, the bytes of the grid and of all scratch.
 pub(crate) fn peak_bytes(
     mesh: TriangleMesh<'_>,
@@ -121,16 +120,16 @@ pub(crate) fn peak_bytes(
     Ok(regions.written_bytes(index_bytes))
 }
 
-/// From here on large pages are asked for: eight of 2 MiB.
+/// The least number of bytes for which large pages are requested: eight pages of 2 MiB.
 #[cfg(target_os = "linux")]
 const MANY_BYTES: usize = 16 << 20;
 
-/// Pages that the system provides when they are first written, large ones if it has them: a build
-/// of a million triangles is sooner done with those, and Embree asks for them, too. A small build
-/// would write little of each, and wait until the system has cleared all of it.
+/// Maps memory whose pages the system provides when they are first written, large ones if it has them. They
+/// make a build of a million triangles faster, and Embree requests them, too. A small build would write
+/// little of each, and wait until the system has cleared all of it.
 pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
     let memory = map(bytes)?;
-    // A system that has no large pages gives small ones.
+    // A system without large pages provides small ones.
     #[cfg(target_os = "linux")]
     if bytes >= MANY_BYTES {
         let _ = memory.advise(Advice::HugePage);
@@ -138,7 +137,7 @@ pub(crate) fn memory(bytes: usize) -> Result<MmapMut> {
     Ok(memory)
 }
 
-/// The same in pages of the usual size: as many bytes as are written, and few more.
+/// Maps memory in small pages, so that little more than the written bytes is counted.
 fn small_pages(bytes: usize) -> Result<MmapMut> {
     let memory = map(bytes)?;
     #[cfg(target_os = "linux")]

@@ -1,16 +1,16 @@
-//! The part of a region that was really used: its pages that the system has given.
+//! The used part of a memory region: its pages that the system has provided.
 //!
-//! Linux tells it in /proc/self/pagemap, eight bytes for each page of the address space. Builders
-//! that cannot know their needs ask for much more scratch than they write, and what was never
-//! written was never given by the system.
+//! Linux reports it in /proc/self/pagemap, eight bytes for each page of the address space. Builders that
+//! cannot know their needs request much more scratch than they write, and the system never provides pages
+//! that are not written.
 
 use std::fs::{self, File};
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 
-/// The bits of a page that is in memory, or was moved out of it.
+/// The bits of a page in memory or in swap.
 const PRESENT_OR_SWAPPED: u64 = 0b11 << 62;
 
-/// Bytes of the region's pages that hold something, if the system tells.
+/// Returns the bytes of the region's pages that hold something, if the system tells.
 ///
 /// The region must start at a page, as a memory map does.
 #[must_use]
@@ -30,7 +30,7 @@ pub fn resident_bytes(region: &[u8]) -> Option<usize> {
     Some((resident * page).min(region.len()))
 }
 
-/// The size of a page in the text of /proc/self/smaps.
+/// Returns the size of a page from the text of /proc/self/smaps.
 fn page_bytes(text: &str) -> Option<usize> {
     let line = text.lines().find_map(|line| line.strip_prefix("KernelPageSize:"))?;
     let kibibytes = line.trim().strip_suffix("kB")?.trim().parse::<usize>().ok()?;

@@ -1,11 +1,11 @@
-//! From hits to colours: a grey solid, or its normals.
+//! Colours of hits: a grey solid, or its normals.
 //!
-//! Normals come from the triangle alone, in `f64` until they are unit vectors, so that they are the
-//! same at every scene size; colours are `f32`. Every surface has two sides, because many files
-//! disagree with themselves about the front.
+//! Normals depend only on the triangle. They are computed in `f64` until they are unit vectors, so that they
+//! are the same at every scene size; colours are `f32`. Every surface has two sides, because many files are
+//! inconsistent about the front.
 //!
-//! Pixels are shaded 64 at a time, number by number instead of vector by vector, which the
-//! compiler turns into vectors of several pixels: tracing should be what a picture takes.
+//! Pixels are shaded 64 at a time in loops over numbers, which the compiler vectorises: tracing should
+//! dominate the time of a picture.
 
 use hgrid_core::{Hit, INVALID_ID, Ray, Triangle, TriangleMesh};
 
@@ -27,16 +27,16 @@ const GROUND: [f32; 3] = [0.03, 0.027, 0.024];
 const ZENITH: [f32; 3] = [0.008, 0.018, 0.055];
 const HORIZON: [f32; 3] = [0.22, 0.31, 0.44];
 
-/// A way to give rays with their hits colours.
+/// A function that computes the colours of rays with their hits.
 pub type Shade = fn(&Shader<'_>, &[Ray], &[Hit], &mut [Rgb]);
 
-/// Pixels that are shaded at once.
+/// Pixels that are shaded together.
 const GROUP: usize = 64;
 
-/// A number of each pixel of a group.
+/// One number for each pixel of a group.
 type Lanes<T> = [T; GROUP];
 
-/// The look of surfaces in a picture that a camera takes.
+/// A shader of a mesh for the pictures of one camera.
 #[derive(Debug, Clone, Copy)]
 pub struct Shader<'a> {
     mesh: TriangleMesh<'a>,
@@ -46,14 +46,14 @@ pub struct Shader<'a> {
 }
 
 impl<'a> Shader<'a> {
-    /// A shader for the hits that the camera's rays have on a mesh.
+    /// Makes a shader for hits of the camera's rays on a mesh.
     #[must_use]
     pub fn new(mesh: TriangleMesh<'a>, camera: &Camera) -> Self {
         Self { mesh, axes: camera.axes(), light: lamp(camera) }
     }
 
-    /// A grey solid in a lit room: the colours of rays with these hits, [`Hit::MISS`] for none. All
-    /// three are equally long.
+    /// Shades a grey solid in a lit room: writes the colours of rays with these hits, [`Hit::MISS`] for none.
+    /// All three slices are equally long.
     pub fn diffuse(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
         let [_, up, _] = self.axes;
         self.shade(rays, hits, colors, |_, normal| {
@@ -63,7 +63,7 @@ impl<'a> Shader<'a> {
         });
     }
 
-    /// The normals as colours: red to the right, green up, blue toward the viewer.
+    /// Shades normals as colours: red to the right, green up, blue toward the viewer.
     pub fn normals(&self, rays: &[Ray], hits: &[Hit], colors: &mut [Rgb]) {
         self.shade(rays, hits, colors, |_, normal| {
             let along = self.axes.map(|axis| 0.5 + 0.5 * dot(normal, axis));
@@ -72,7 +72,7 @@ impl<'a> Shader<'a> {
         });
     }
 
-    /// Shades by the light that the surface of a pixel with a normal on the viewer's side sends there.
+    /// Shades pixels with the light that `surface` returns for the normal on the viewer's side.
     #[inline(always)]
     fn shade(
         &self,
@@ -92,7 +92,7 @@ impl<'a> Shader<'a> {
             for lane in 0..GROUP {
                 put(&mut light, lane, self.background(at(&directions, lane)));
             }
-            // Many groups see nothing else.
+            // Many groups see only the background.
             if hits.iter().any(|hit| hit.primitive != INVALID_ID) {
                 let seen = Seen::by(&self.mesh, hits);
                 let normals = seen.normals(self.axes[2]);
@@ -108,14 +108,14 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The light from where there is nothing.
+    /// Returns the light of the background.
     #[inline(always)]
     fn background(&self, direction: [f32; 3]) -> [f32; 3] {
         background(self.axes[1], direction)
     }
 }
 
-/// The direction toward the lamp of a camera, a unit vector.
+/// Returns the direction toward the lamp of a camera, a unit vector.
 #[must_use]
 pub fn lamp(camera: &Camera) -> [f32; 3] {
     let [right, up, toward] = camera.axes();
@@ -125,7 +125,7 @@ pub fn lamp(camera: &Camera) -> [f32; 3] {
     light.map(|c| c / length)
 }
 
-/// The light from where there is nothing, in a picture with this direction upward.
+/// Returns the light of the background in a direction, in a picture whose upward direction is `up`.
 #[inline(always)]
 pub(crate) fn background(up: [f32; 3], direction: [f32; 3]) -> [f32; 3] {
     // The picture's edges are at about a third of the direction's length.
@@ -156,14 +156,14 @@ impl Seen {
         seen
     }
 
-    /// The unit normals on either side, or another vector where a triangle has no area.
+    /// Returns the unit normals on either side, or `instead` for a triangle without an area.
     fn normals(&self, instead: [f32; 3]) -> [Lanes<f32>; 3] {
         let mut normals = [[0.0; GROUP]; 3];
         for lane in 0..GROUP {
             let triangle = self.corners.each_ref().map(|corners| at(corners, lane));
             let along = cross_of(&triangle);
             let length = length(along);
-            // One division, not three: an ulp of f64, of which f32 sees next to nothing.
+            // One division instead of three: an error of an ulp of f64, which hardly ever shows in f32.
             let inverse = 1.0 / length;
             let normal = round(along.map(|c| c * inverse));
             put(&mut normals, lane, if length > 0.0 { normal } else { instead });
@@ -172,7 +172,7 @@ impl Seen {
     }
 }
 
-/// A vector of a pixel.
+/// Returns the vector of a pixel.
 #[inline(always)]
 fn at(lanes: &[Lanes<f32>; 3], lane: usize) -> [f32; 3] {
     lanes.each_ref().map(|numbers| numbers[lane])
@@ -190,10 +190,11 @@ pub(crate) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Linear light as a screen wants it, which may be beyond black and white; a square root is close
-/// to a screen's curve.
+/// Converts linear light, which may be out of range, to a screen's values; a square root is close to a
+/// screen's curve.
 fn display(light: &[Lanes<f32>; 3], colors: &mut [Rgb]) {
-    /// From here on a float has no bits for fractions, and ends with those of its integer.
+    /// The number at which floats have no bits for fractions: adding it rounds, and leaves the integer in the
+    /// low bits.
     const INTEGERS: f32 = 8_388_608.0; // 2^23
     let mut bytes = [[0; GROUP]; 3];
     for (byte, light) in bytes.as_flattened_mut().iter_mut().zip(light.as_flattened()) {
@@ -205,12 +206,12 @@ fn display(light: &[Lanes<f32>; 3], colors: &mut [Rgb]) {
     }
 }
 
-/// The unit normal of a triangle, unless it has no area.
+/// Returns the unit normal of a triangle, unless it has no area.
 pub(crate) fn normal_of(triangle: &Triangle) -> Option<Vector> {
     unit(cross_of(triangle))
 }
 
-/// The cross product of two edges, in `f64`: no area is too small or too large.
+/// Returns the cross product of two edges, in `f64`: no area is too small or too large.
 fn cross_of(triangle: &Triangle) -> Vector {
     let [a, b, c] = triangle.map(|corner| corner.map(f64::from));
     cross(offset(b, -1.0, a), offset(c, -1.0, a))

@@ -1,7 +1,7 @@
 //! The paper's Table 1: every method on every scene, side by side.
 //!
-//! Rows come in groups, one for each method, and scenes are columns, as in the paper. Below the
-//! paper's six rows of a method stand its bytes, which the paper only draws.
+//! Rows come in groups, one for each method, and scenes are columns, as in the paper. Below the paper's six
+//! rows of a method are its bytes, which the paper shows only in a chart.
 
 use std::io::{self, Write as _};
 
@@ -18,10 +18,10 @@ use crate::scene::Scene;
 use crate::shade::Shade;
 use crate::threads::Threads;
 
-/// Measures and prints.
+/// Measures and prints the table.
 ///
 /// # Errors
-/// If a scene cannot be loaded or built, or a method draws another picture than the first one.
+/// If a scene cannot be loaded or built, or the pictures of two methods differ.
 pub fn run(args: &TableArgs) -> Result<()> {
     let results = Results::measure(&args.scenes, &args.race)?;
     let mut out = io::stdout();
@@ -35,16 +35,16 @@ pub fn run(args: &TableArgs) -> Result<()> {
     Ok(())
 }
 
-/// Every number of a race over some scenes, and where they come from.
+/// Every number of a race over some scenes, with the machine and the settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     /// The origin of the numbers.
     pub machine: Machine,
     /// Pixels on each side of the pictures.
     pub size: u16,
-    /// Builds and renderings that times are medians of.
+    /// Builds and renderings whose medians are the times.
     pub repeats: u32,
-    /// Threads that built, where the method can use them.
+    /// Threads that built, if the method can use them.
     pub threads: u32,
     /// In the order of the command line.
     pub scenes: Vec<SceneResults>,
@@ -61,7 +61,7 @@ pub struct SceneResults {
 }
 
 impl Results {
-    /// Runs the race on one scene after the other.
+    /// Runs the race on each scene in turn.
     ///
     /// # Errors
     /// The errors of [`run`].
@@ -84,7 +84,7 @@ impl Results {
         Ok(Self { machine: Machine::here(), size, repeats, threads, scenes })
     }
 
-    /// The table as aligned text, then what its numbers mean and where they come from.
+    /// Formats the table as aligned text, with notes and the origin of the numbers.
     #[must_use]
     pub fn text(&self) -> String {
         let mut table = self.table(|title| format!("\n{title}"), "  ");
@@ -93,24 +93,24 @@ impl Results {
         [table.trim_fmt(), notes, self.machine.summary()].join("\n\n")
     }
 
-    /// The same as Markdown.
+    /// Formats the same as Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
         let source = format!("{}. Command: `{}`.", self.machine.summary(), self.machine.command);
         [self.markdown_table(), source].join("\n\n")
     }
 
-    /// The same as Markdown, without where the numbers come from.
+    /// Formats the table and the notes as Markdown, without the origin of the numbers.
     #[must_use]
     pub(crate) fn markdown_table(&self) -> String {
         let mut table = self.table(|title| format!("**{title}**"), "");
         [markdown(&mut table, 1), self.notes().join(" ")].join("\n\n")
     }
 
-    /// Joins the scenes of races that were run one by one.
+    /// Joins the scenes of separate races.
     ///
     /// # Errors
-    /// If there is none, or one has another size of pictures, other methods, or other repetitions.
+    /// If there is none, or they differ in picture size, methods, repetitions or threads.
     pub(crate) fn merged(races: Vec<Self>) -> Result<Self> {
         let mut races = races.into_iter();
         let mut merged = races.next().context("no results")?;
@@ -130,7 +130,7 @@ impl Results {
         Ok(merged)
     }
 
-    /// The rows; `titled` makes a heading of the title of a group, and the others are indented.
+    /// Makes the rows; `titled` formats the title of a group, and `indent` indents the others.
     fn table(&self, titled: impl Fn(&str) -> String, indent: &str) -> Table {
         let mut table = Table::new();
         let names = self.scenes.iter().map(|scene| display_name(&scene.facts.scene));
@@ -169,7 +169,7 @@ impl Results {
         table
     }
 
-    /// Says what the numbers mean, and where a grid is not what its heading says.
+    /// Returns notes that explain the numbers, and name grids that differ from their headings.
     fn notes(&self) -> Vec<String> {
         let Self { size, repeats, .. } = self;
         let mut notes = vec![
@@ -212,12 +212,12 @@ pub(crate) fn measure_diffuse(
     Ok(measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements)
 }
 
-/// A table as Markdown, its first columns of so many words aligned to the left.
+/// Formats a table as Markdown, with its first columns of words aligned to the left.
 pub(crate) fn markdown(table: &mut Table, words: usize) -> String {
     table.load_style(presets::ASCII_MARKDOWN);
     let mut lines: Vec<_> = table.trim_fmt().lines().map(str::to_owned).collect();
     if let Some(rule) = lines.get_mut(1) {
-        // Markdown aligns a column to the right where its rule ends in a colon.
+        // Markdown aligns a column to the right if its rule ends in a colon.
         *rule = rule.replace("-|", ":|").replacen(":|", "-|", words);
     }
     lines.join("\n")
@@ -227,7 +227,7 @@ pub(crate) fn markdown(table: &mut Table, words: usize) -> String {
 pub(crate) const IN_TILES: &str =
     "trace tiles of 8 x 8 rays together; their tests and steps are those of each ray alone";
 
-/// Says what times are, as part of a sentence.
+/// Returns the meaning of times, as part of a sentence.
 pub(crate) fn times(repeats: u32) -> String {
     match repeats {
         1 => "times of one run".to_owned(),
@@ -235,7 +235,7 @@ pub(crate) fn times(repeats: u32) -> String {
     }
 }
 
-/// A scene's name for people: without the ending of a mesh file.
+/// Returns a scene's name for people: without the ending of a PLY or OBJ file.
 pub(crate) fn display_name(name: &str) -> String {
     let is_mesh = |ending: &str| matches!(ending, "ply" | "obj" | "PLY" | "OBJ");
     let stem = name.rsplit_once('.').filter(|(_, ending)| is_mesh(ending));
@@ -243,7 +243,7 @@ pub(crate) fn display_name(name: &str) -> String {
     name.strip_prefix("procedural:").unwrap_or(name).to_owned()
 }
 
-/// A count as the paper writes it: 69.45K, 1.09M.
+/// Formats a count like the paper: 69.45K, 1.09M.
 pub(crate) fn count(count: usize) -> String {
     let count = count as u64;
     match count {
@@ -253,12 +253,12 @@ pub(crate) fn count(count: usize) -> String {
     }
 }
 
-/// Bytes in units of 2^20.
+/// Returns bytes in units of 2^20.
 pub(crate) fn mebibytes(bytes: usize) -> f64 {
     ratio(bytes as u64, 1 << 20)
 }
 
-/// A time in seconds with three digits that count, but no more than milliseconds have.
+/// Formats a time in seconds with three significant digits, but at most four decimal places.
 pub(crate) fn seconds(seconds: f64) -> String {
     match seconds {
         s if s >= 100.0 => format!("{s:.0}"),

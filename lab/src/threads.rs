@@ -1,11 +1,11 @@
-//! Threads for the work that can use them.
+//! Threads for parallel work.
 
 use anyhow::{Context as _, Result};
 use hgrid_core::Control;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// A number of threads, or only the one that calls.
+/// A number of threads, or only the calling one.
 #[derive(Debug)]
 pub struct Threads {
     pool: Option<ThreadPool>,
@@ -13,10 +13,10 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Starts threads; one is there already.
+    /// Starts threads; for a count of one it starts none.
     ///
     /// # Errors
-    /// If the system gives no threads.
+    /// If the system cannot start the threads.
     pub fn new(count: u32) -> Result<Self> {
         let pool = match usize::try_from(count) {
             Ok(0 | 1) => None,
@@ -34,21 +34,21 @@ impl Threads {
         self.count
     }
 
-    /// Shows them to a build.
+    /// Calls `build` with a control that runs tasks on these threads.
     pub fn parallel<R>(&self, build: impl FnOnce(&Control<'_>) -> R) -> R {
         let run = |count: u32, task: &(dyn Fn(u32) + Sync)| self.each(count, task);
         build(&Control { tasks: self.count, run: &run, progress: None })
     }
 
-    /// Returns when all of them are awake. A processor that has slept for a while may take
-    /// milliseconds, on a virtual machine above all: as long as a build.
+    /// Waits until all of them are awake. A processor that was asleep may need milliseconds, especially in a
+    /// virtual machine: as long as a build.
     pub fn wake(&self) {
         if let Some(pool) = &self.pool {
             pool.broadcast(|_| ());
         }
     }
 
-    /// Does a task for every number below a count.
+    /// Runs a task for every number below a count.
     pub fn each(&self, count: u32, task: impl Fn(u32) + Sync) {
         let task = &task;
         match &self.pool {

@@ -1,4 +1,4 @@
-//! A square picture in tiles of 16 x 16 pixels: all that the lab renders.
+//! A square picture in tiles of 16 x 16 pixels, as all renderings of the lab.
 //!
 //! ```text
 //! +-------------+---   Tiles come row by row from the upper left. The rays of one are in Morton
@@ -7,9 +7,9 @@
 //! |  8  9 12 .. |
 //! ```
 //!
-//! The packets of other structures and [`Grid::intersect_n`] like this order best: a call has two of
-//! the tiles that a grid traces together. The rays of a tile are made when it is its turn, as a
-//! renderer does.
+//! This order suits the packets of other structures and [`Grid::intersect_n`], for which a call has four of
+//! the groups of 64 rays that a tree traces together. The rays of a tile are made just before it is traced,
+//! as in a renderer.
 
 use hgrid_core::{Coherence, Grid, Hit, Ray, Strided, StridedMut};
 
@@ -18,7 +18,7 @@ use crate::camera::Camera;
 /// Pixels on each side of a tile.
 const TILE: u16 = 16;
 
-/// The columns of a tile, and its rows.
+/// The numbers of a tile's columns, and of its rows.
 const ALONG: [u16; TILE as usize] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Rays in a tile.
@@ -35,7 +35,7 @@ static MORTON: [[u16; 2]; TILE_RAYS] = {
     places
 };
 
-/// The four lowest bits in even places, side by side.
+/// Packs the bits in even places side by side: the four lowest of them.
 const fn even_bits(at: u16) -> u16 {
     at & 1 | at >> 1 & 2 | at >> 2 & 4 | at >> 3 & 8
 }
@@ -58,13 +58,13 @@ pub struct Band<'p, T> {
 }
 
 impl Tiles {
-    /// Pixels of the picture.
+    /// Returns the number of pixels of the picture.
     #[must_use]
     pub const fn pixels(&self) -> usize {
         self.size as usize * self.size as usize
     }
 
-    /// The bands of a picture's pixels, which lie row by row.
+    /// Returns the bands of a picture's pixels, which lie row by row.
     pub fn bands<'p, T>(&self, pixels: &'p mut [T]) -> impl Iterator<Item = Band<'p, T>> {
         debug_assert_eq!(pixels.len(), self.pixels(), "another picture");
         let tiles = *self;
@@ -78,16 +78,16 @@ impl Tiles {
         self.bands(pixels).for_each(|mut band| band.fill(&mut tile));
     }
 
-    /// Shows the rays of tile after tile and the places of their pixels.
+    /// Calls `tile` for each tile, with its rays and the places of their pixels.
     pub fn each(&self, mut tile: impl FnMut(&[Ray], &[usize])) {
         (0..self.size).step_by(TILE.into()).for_each(|row| self.each_in(row, &mut tile));
     }
 
-    /// The same for the tiles from a row of pixels on.
+    /// Does the same for the row of tiles that starts at a row of pixels.
     fn each_in(&self, top: u16, mut tile: impl FnMut(&[Ray], &[usize])) {
         let Self { camera, size } = *self;
         let in_row = usize::from(size);
-        // Known for all tiles of a band.
+        // The same offsets for all tiles of a band.
         let offsets = MORTON.map(|[column, row]| usize::from(row) * in_row + usize::from(column));
         let down = ALONG.map(|row| camera.down(top + row, size));
         let mut rays = [Ray::new([0.0; 3], [0.0; 3]); TILE_RAYS];
@@ -95,7 +95,7 @@ impl Tiles {
         for left in (0..size).step_by(TILE.into()) {
             let across = ALONG.map(|column| camera.across(left + column, size));
             for (ray, [column, row]) in rays.iter_mut().zip(&MORTON) {
-                // Less than a tile: said so that nothing is checked.
+                // Always less than a tile; the remainder tells the compiler, which then drops bounds checks.
                 let [column, row] = [column, row].map(|at| usize::from(at % TILE));
                 *ray = camera.ray_at(across[column], down[row]);
             }
@@ -103,7 +103,7 @@ impl Tiles {
             for (place, offset) in places.iter_mut().zip(&offsets) {
                 *place = first + offset;
             }
-            // Some pixels of a tile at an edge are outside.
+            // In a tile at an edge, drop the pixels outside.
             let (width, height) = (size - left, size - top);
             let mut count = TILE_RAYS;
             if width.min(height) < TILE {
@@ -117,21 +117,21 @@ impl Tiles {
         }
     }
 
-    /// Pixels of a whole band.
+    /// Returns the number of pixels of a whole band.
     const fn band_pixels(&self) -> usize {
         self.size as usize * TILE as usize
     }
 }
 
 impl<T: Copy> Band<'_, T> {
-    /// Pixels from its upper to its lower edge.
+    /// Returns the number of pixel rows of the band.
     #[must_use]
     pub fn height(&self) -> u16 {
         (self.tiles.size - self.row).min(TILE)
     }
 
-    /// Fills the band: `tile` gets the rays of one tile after the other and writes what becomes of
-    /// each, over what it wrote for the tile before.
+    /// Fills the band: for each tile, `tile` gets the rays and writes their values. It finds the values of
+    /// the tile before, and overwrites them.
     pub fn fill(&mut self, mut tile: impl FnMut(&[Ray], &mut [T])) {
         let Some(&blank) = self.pixels.first() else { return };
         let mut values = [blank; TILE_RAYS];
@@ -146,7 +146,7 @@ impl<T: Copy> Band<'_, T> {
     }
 }
 
-/// The closest hits of the rays of a tile, as many as there are rays: together where the grid can.
+/// Finds the closest hits of the rays of a tile, as many as there are rays: together if the grid can.
 pub fn intersect(grid: &Grid<'_>, rays: &[Ray], hits: &mut [Hit]) {
     debug_assert_eq!(rays.len(), hits.len());
     let answers = &mut StridedMut::new(&mut *hits);

@@ -13,10 +13,10 @@ use crate::cli::blob::ValidateArgs;
 use crate::render::seconds;
 use crate::scene::Scene;
 
-/// Proves and prints.
+/// Proves a blob and prints the result.
 ///
 /// # Errors
-/// If the file cannot be read, or is no grid of its mesh: the message says where.
+/// If the file cannot be read, or is no grid of its mesh; the message says where.
 pub fn run(args: &ValidateArgs) -> Result<()> {
     let path = &args.blob;
     let file = path.display();
@@ -54,7 +54,7 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
     Ok(())
 }
 
-/// Proves a scene with all that it shows.
+/// Proves a packed scene with all grids and scenes that it shows.
 fn prove_scene(path: &Path, blob: &Blob, info: &BlobInfo) -> Result<()> {
     let file = path.display();
     let bytes = blob.bytes();

@@ -1,10 +1,10 @@
-//! The structure that the rays of a picture query: a grid of one mesh, or a scene of instances of several.
+//! The structure that a picture queries: a grid of one mesh, or a scene of instances of several.
 //!
 //! ```text
 //! World      closest hits       any hit               surface
 //! mesh       a tile together    all rays together     the mesh's
-//! instances  a tile together    all rays together     that of the triangle where its instance puts it, with starts
-//!                                                     as far off as rays of instances need
+//! instances  a tile together    all rays together     that of the triangle, placed by its instance, with starts
+//!                                                     as far off as rays at instances need
 //! ```
 
 use hgrid_core::{
@@ -16,7 +16,7 @@ use crate::scene::Bounds;
 use crate::scene::model::{determinant, moved, transform_of};
 use crate::tiles::{TILE_RAYS, intersect};
 
-/// Rays in f32 that are asked of a scene together, the places for their answers, and what is written there.
+/// A batch of f32 rays for a scene, with places for their answers and a conversion of each.
 pub(crate) struct SceneBatch<'r, A, T> {
     pub(crate) rays: &'r [Ray],
     pub(crate) answers: &'r mut [T],
@@ -40,21 +40,21 @@ impl<A, T> Batch<A, RayF64> for SceneBatch<'_, A, T> {
 /// A built structure, with the queries of a picture.
 #[derive(Debug, Clone, Copy)]
 pub enum World<'a> {
-    /// A mesh where it is.
+    /// A mesh without instances.
     Mesh(&'a Grid<'a>),
-    /// Meshes where instances put them.
+    /// Meshes placed by instances.
     Instances(&'a Scene<'a>),
 }
 
-/// The lift of a ray's start beyond that of a mesh, relative to the extent and the coordinates of the object: twice the
-/// error that docs/renderers.md gives.
+/// The lift of a ray's start beyond that of a mesh, in parts of the extent and the coordinates of the object:
+/// twice the error that docs/renderers.md gives.
 const LIFT: f32 = 32.0 * f32::EPSILON; // 2^-18
 
-/// The same for the rounding of corners that are moved, in parts of their coordinates in the scene.
+/// The further lift for the rounding of transformed corners, in parts of their coordinates in the scene.
 const CORNERS: f32 = 2.0 * f32::EPSILON; // 2^-22
 
 impl World<'_> {
-    /// The closest hits of rays, as many as there are rays.
+    /// Finds the closest hits of rays, as many as there are rays.
     pub fn intersect(&self, rays: &[Ray], hits: &mut [SceneHit]) {
         match self {
             Self::Mesh(grid) => {
@@ -75,7 +75,7 @@ impl World<'_> {
         }
     }
 
-    /// The closest hit of a ray.
+    /// Returns the closest hit of a ray.
     #[must_use]
     pub fn closest(&self, ray: &Ray) -> Option<SceneHit> {
         match self {
@@ -93,7 +93,7 @@ impl World<'_> {
         }
     }
 
-    /// The same for many rays: 1 for each that hits anything, 0 for the others.
+    /// Writes 1 for each of many rays that hits anything, 0 for the others.
     pub fn occluded_all(&self, rays: &[Ray], occluded: &mut [u8]) {
         match self {
             Self::Mesh(grid) => {
@@ -109,7 +109,7 @@ impl World<'_> {
         }
     }
 
-    /// The number of the geometry that was hit; 0 for instances.
+    /// Returns the number of the geometry of a hit; 0 for instances.
     #[must_use]
     pub fn geometry(&self, hit: &SceneHit) -> u32 {
         match self {
@@ -120,7 +120,7 @@ impl World<'_> {
         }
     }
 
-    /// The point where a ray met a triangle, with starts for rays that leave it.
+    /// Returns the point where a ray met a triangle, with starts for rays that leave it.
     #[must_use]
     pub fn surface(&self, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
         match self {
@@ -130,12 +130,12 @@ impl World<'_> {
     }
 }
 
-/// A hit of a mesh that no instance shows.
+/// Converts a hit on a mesh without instances.
 fn of_mesh(&Hit { t, u, v, primitive }: &Hit) -> SceneHit {
     SceneHit { t, u, v, primitive, path: [INVALID_ID; MAX_NESTING] }
 }
 
-/// A hit without its instance.
+/// Converts a hit, without its instance.
 pub(crate) const fn on_mesh(SceneHit { t, u, v, primitive, .. }: SceneHit) -> Hit {
     Hit { t, u, v, primitive }
 }
@@ -146,7 +146,7 @@ fn surface(scene: &Scene<'_>, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
     let transform = transform_of(&instance);
     let [a, b, c] = grid.mesh().triangle(hit.primitive)?.map(|corner| moved(&transform, corner));
     let SceneHit { t, u, v, .. } = *hit;
-    // The front stays the front, as where instances are triangles.
+    // The front stays the front, as when instances become triangles.
     let (corners, [u, v]) =
         if determinant(&transform) < 0.0 { ([a, c, b], [v, u]) } else { ([a, b, c], [u, v]) };
     let mesh = TriangleMesh::new(&corners, &[[0, 1, 2]]).ok()?;
@@ -161,7 +161,7 @@ fn surface(scene: &Scene<'_>, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
     Some(Surface { above, below, ..surface })
 }
 
-/// The extent of an object plus its largest coordinate, scaled as its instance scales it.
+/// Returns the extent of an object plus its largest coordinate, scaled by its instance.
 fn size(instance: &Instance, (min, max): Bounds) -> f32 {
     let along = |axis: usize| max[axis] - min[axis] + min[axis].abs().max(max[axis].abs());
     let scale = instance.linear.as_flattened().iter().map(|c| c * c).sum::<f32>().sqrt();
@@ -180,7 +180,7 @@ mod tests {
     use crate::shade::dot;
     use crate::tiles::Tiles;
 
-    /// Turned by a quarter, larger and elsewhere; and mirrored, far from its own origin and the scene's.
+    /// Rotated by a quarter turn, scaled and moved; and mirrored, far from its own origin and the scene's.
     const PLACES: [Transform; 3] = [
         IDENTITY,
         [[0.0, -2.0, 0.0, 7.0], [2.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0, -3.0]],

@@ -1,11 +1,11 @@
-//! `hgrid` as a program: words, files and exit statuses, as a shell sees them.
+//! `hgrid` as a program: its arguments, files and exit statuses, run as by a shell.
 
 use std::fs;
 use std::io;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-/// A folder of its own, with a mesh in it.
+/// A temporary folder with a mesh in it.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -20,13 +20,13 @@ impl Folder {
         Ok(Self(folder))
     }
 
-    /// Runs the command there.
+    /// Runs the command in the folder.
     fn hgrid(&self, words: &str) -> io::Result<Output> {
         let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
         command.current_dir(&self.0).args(words.split_whitespace()).output()
     }
 
-    /// Returns what it prints.
+    /// Returns the output of a command that succeeds.
     fn says(&self, words: &str) -> io::Result<String> {
         let output = self.hgrid(words)?;
         let error = String::from_utf8_lossy(&output.stderr);
@@ -34,7 +34,7 @@ impl Folder {
         Ok(String::from_utf8_lossy(&output.stdout).into_owned())
     }
 
-    /// Returns the message that it fails with.
+    /// Returns the message of a command that fails.
     fn fails(&self, words: &str) -> io::Result<String> {
         let output = self.hgrid(words)?;
         assert!(!output.status.success() && output.stdout.is_empty(), "{words}");
@@ -94,7 +94,7 @@ fn packed_files_are_described_proved_and_rendered() {
     let blob = fs::read(folder.0.join("a.hgrid")).unwrap();
     fs::write(folder.0.join("cut.hgrid"), &blob[..blob.len() - 64]).unwrap();
     assert!(folder.fails("validate cut.hgrid").unwrap().contains("it is cut off"));
-    // A damaged bit in the boxes or the ids of the tree.
+    // Flip a bit in the boxes or the ids of the tree.
     let mut damaged = blob;
     damaged[128 + 20] ^= 0x40;
     fs::write(folder.0.join("damaged.hgrid"), damaged).unwrap();
@@ -156,13 +156,13 @@ fn meshes_that_stand_more_than_once_are_instances() {
     fs::write(folder.0.join("two.gltf"), scene(r#""translation": [1, 0.5, 0]"#)).unwrap();
     let (triangles, instances, hits) = is("two.gltf", "--view front");
     assert!((triangles, instances) == (2, 2) && hits > 100, "{hits}");
-    // A grid has no instances, and sees the same.
+    // A grid takes no instances, and sees the same.
     let as_mesh = is("two.gltf", "--view front --method fixed --samples 4");
     assert_eq!(as_mesh, (2, 0, hits));
     assert_eq!(is("two.gltf", "--view front --shading heat").1, 0);
     let text = folder.says("two.gltf --size 16").unwrap();
     assert!(text.contains("2 triangles, 6 vertices in 2 instances"), "{text}");
-    // What is made flat has no inverse: it becomes triangles.
+    // A flattened instance has no inverse, and becomes triangles.
     fs::write(folder.0.join("flat.gltf"), scene(r#""scale": [1, 1, 0]"#)).unwrap();
     assert_eq!(is("flat.gltf", "--view front").1, 0);
 }

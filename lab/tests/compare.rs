@@ -1,4 +1,4 @@
-//! `hgrid compare` as a program: it starts itself for first builds, which no unit test can see.
+//! `hgrid compare` as a program: it starts itself for first builds, which a unit test cannot check.
 
 use std::io;
 use std::process::{Command, Output};

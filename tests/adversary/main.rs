@@ -1,11 +1,11 @@
-//! Does every query hold against a reference that shares nothing with the library?
+//! Compares every query with a reference that shares nothing with the library.
 //!
-//! A pair is one ray put to one method. For each ray the reference decides about every triangle, without
-//! rounding (`hgrid_tests::reference`), and every entry point of every method has to agree, with every kind of
-//! vectors, masks, culling, the triangle to skip and filters ([`run`]).
+//! A pair is one ray put to one method. For each ray the reference decides every triangle without rounding
+//! (`hgrid_tests::reference`). Every entry point of every method must agree with it, at every SIMD level and
+//! with masks, culling, a triangle to skip and filters ([`run`]).
 //!
-//! `HGRID_PAIRS` says how many, `HGRID_SEED` which, `HGRID_FIRST` from which mesh on. A long run prints
-//! what it did as JSON; record.json has such runs.
+//! `HGRID_PAIRS` sets the number of pairs, `HGRID_SEED` the seed, and `HGRID_FIRST` the number of the first
+//! mesh. Each run prints its record as JSON; record.json holds the records of long runs.
 
 mod meshes;
 mod rays;
@@ -15,11 +15,11 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use hgrid_tests::setting;
 
-/// The time in UTC, to the second.
+/// Returns the time in UTC, to the second.
 fn now() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs();
     let (days, second) = (seconds / 86_400, seconds % 86_400);
-    // Years that begin in March, so that a leap day is the last (Hinnant 2013).
+    // Count years from March, so that a leap day is the last day of its year (Hinnant 2013).
     let z = days + 719_468;
     let (era, day) = (z / 146_097, z % 146_097);
     let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
@@ -31,7 +31,7 @@ fn now() -> String {
     format!("{year}-{month:02}-{day:02}T{h:02}:{m:02}:{s:02}Z")
 }
 
-/// Returns the processor's name, where the system tells it, and the architecture and the system.
+/// Returns the processor's name, where the system tells it, with the architecture and the system.
 fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let line = text.lines().find(|line| line.starts_with("model name"));
@@ -62,6 +62,6 @@ fn every_method_answers_as_exact_arithmetic_does() {
     });
     println!("{record:#}");
     assert!(done.differences.is_empty(), "{}", done.differences.join("\n"));
-    // Rays that hit nothing prove little, and the rule leaves little open, or it would be no rule.
+    // Rays that hit nothing prove little, and a rule that leaves many pairs open would be no rule.
     assert!(done.hits > done.rays / 2 && done.open < done.ray_triangles / 500, "{record:#}");
 }

@@ -5,7 +5,7 @@ use hgrid_tests::random::Random;
 
 type Point = [f32; 3];
 
-/// A mesh by the number of its kind.
+/// A function that makes a random mesh of one kind.
 type Make = fn(&mut Random) -> Mesh;
 
 const KINDS: [(&str, Make); 12] = [
@@ -23,7 +23,7 @@ const KINDS: [(&str, Make); 12] = [
     ("needles", needles),
 ];
 
-/// A mesh and what it is called.
+/// Returns a random mesh and its name.
 pub(crate) fn any(random: &mut Random) -> (String, Mesh) {
     let (name, make) = KINDS[random.below(KINDS.len())];
     let mut mesh = make(random);
@@ -38,11 +38,11 @@ pub(crate) fn any(random: &mut Random) -> (String, Mesh) {
         let power = match random.below(4) {
             0 => random.below(40) as i32 - 20,
             1 => random.below(200) as i32 - 100,
-            // Into denormal numbers, and up to where triangles are left out.
+            // Into denormal numbers, and up to coordinates at which triangles are left out.
             2 => -120 - random.below(28) as i32,
             _ => 100 + random.below(26) as i32,
         };
-        // In two steps: powers of two so large or small are no f32.
+        // Scale in two steps: f32 does not hold such large and small powers of two.
         let (first, second) = (power / 2, power - power / 2);
         mesh = mesh.scaled(2_f32.powi(first)).scaled(2_f32.powi(second));
         name += &format!(", times 2^{power}");
@@ -62,7 +62,7 @@ pub(crate) fn any(random: &mut Random) -> (String, Mesh) {
         name += ", unused vertices";
     }
     if random.below(4) == 0 {
-        // Other orders of triangles: other ids, other builds.
+        // Another order of triangles gives other ids and another build.
         for i in (1..mesh.indices.len()).rev() {
             mesh.indices.swap(i, random.below(i + 1));
         }
@@ -79,7 +79,7 @@ fn any_soup(random: &mut Random) -> Mesh {
     soup(few(random), size, random.bits())
 }
 
-/// A corner near the line between two others, down to the last bit.
+/// Triangles with one corner near the line through the other two, down to the last bit.
 fn slivers(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     for _ in 0..few(random) {
@@ -92,14 +92,14 @@ fn slivers(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// Triangles around one vertex, seldom thousands of them.
+/// Triangles around one vertex, on rare occasions thousands of them.
 fn fan(random: &mut Random) -> Mesh {
     let count = if random.below(250) == 0 { 2000 + random.below(2000) } else { few(random) };
     let mut mesh = Mesh::default();
     mesh.positions.push(random.point());
     let bend = [0.0, 0.1, 1.0][random.below(3)];
     for i in 0..count {
-        // Around a square that stands on a corner: the same bits everywhere.
+        // Go around a square that stands on a corner: this gives the same bits on every machine.
         let turn = 4.0 * i as f32 / count as f32;
         let (side, part) = (turn as u32, turn.fract());
         let [x, y] = [1.0 - part, part];
@@ -127,7 +127,7 @@ fn planes(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// The same triangles many times, their corners in any order.
+/// A few triangles, each repeated many times with its corners in any order.
 fn duplicates(random: &mut Random) -> Mesh {
     let mut mesh = soup(1 + random.below(3), 0.8, random.bits());
     let count = mesh.indices.len();
@@ -155,13 +155,13 @@ fn closed(random: &mut Random) -> Mesh {
     let shake = [0.0, 0.1][random.below(2)];
     let seed = random.bits();
     ball(cells, roundness).map(|p| {
-        // Equal corners stay equal.
+        // Move equal corners alike, so that the surface stays closed.
         let key = p.iter().fold(seed, |key, c| key.rotate_left(20) ^ u64::from(c.to_bits()));
         plus(p, Random(key).point(), shake)
     })
 }
 
-/// The same about a point again and again, smaller each time.
+/// Copies of a small soup around one point, each smaller than the one before.
 fn nested(random: &mut Random) -> Mesh {
     let center = random.point().map(|c| c * 0.3);
     let shrink = [0.5, 0.1, 0.01, 1e-3][random.below(4)];
@@ -175,7 +175,7 @@ fn nested(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// No triangles, and numbers that are none.
+/// Triangles without area, and vertices with NaN, infinite or extreme coordinates.
 fn odd(random: &mut Random) -> Mesh {
     let mut mesh = soup(few(random), 0.5, random.bits());
     let numbers = [f32::NAN, f32::INFINITY, 0.0, -0.0, 1e-45, f32::MIN_POSITIVE, 1e30, -1e36, 3e38];
@@ -188,7 +188,7 @@ fn odd(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// A band of triangles along an axis, which share edges.
+/// A strip of triangles along an axis; neighbours share edges.
 fn strip(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     let bend = [0.0, 0.01, 0.3][random.below(3)];
@@ -201,7 +201,7 @@ fn strip(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// Triangles of all sizes from one another's 2^-30 on.
+/// Triangles whose sizes differ by up to 2^30.
 fn sizes(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     for _ in 0..few(random) {

@@ -30,7 +30,7 @@ impl<'m> Aims<'m> {
         Self { mesh, low, high }
     }
 
-    /// A point in the box, made larger by a factor about its centre.
+    /// Returns a point in the box, after scaling the box by `factor` about its centre.
     fn inside(&self, random: &mut Random, factor: f32) -> Point {
         std::array::from_fn(|k| {
             let (center, half) =
@@ -52,7 +52,7 @@ impl<'m> Aims<'m> {
         }
     }
 
-    /// A point of a triangle: a corner, on an edge, or anywhere on it, as f32 can say it.
+    /// Returns a point of a triangle as f32 rounds it: a corner, on an edge, or anywhere on it.
     fn on_surface(&self, random: &mut Random) -> Point {
         let [a, b, c] = self.triangle(random);
         match random.below(4) {
@@ -63,7 +63,7 @@ impl<'m> Aims<'m> {
         }
     }
 
-    /// A ray. `last` is another one with its closest hit.
+    /// Returns a random ray. `last` is an earlier ray with its closest hit.
     pub(crate) fn ray(&self, random: &mut Random, last: Option<&(Ray, Hit)>) -> Ray {
         let mut ray = match random.below(16) {
             0 | 1 => towards(self.inside(random, 2.0), self.inside(random, 1.0)),
@@ -89,7 +89,7 @@ impl<'m> Aims<'m> {
         ray
     }
 
-    /// Along the line of an edge, from outside, from a corner or from between.
+    /// Returns a ray along the line of an edge, which starts outside the edge, at a corner or between the corners.
     fn along_edge(&self, random: &mut Random) -> Ray {
         let [a, b, _] = self.triangle(random);
         let before = [1.0, 0.0, -0.5, 16.0][random.below(4)];
@@ -97,7 +97,7 @@ impl<'m> Aims<'m> {
         Ray::new(std::array::from_fn(|k| a[k] - before * direction[k]), direction)
     }
 
-    /// In the plane of a triangle, as well as f32 can say it.
+    /// Returns a ray in the plane of a triangle, as far as f32 can express it.
     fn in_plane(&self, random: &mut Random) -> Ray {
         let [a, b, c] = self.triangle(random);
         let [s, t] = [0, 1].map(|_| (random.below(9) as f32 - 4.0) / 2.0);
@@ -105,7 +105,7 @@ impl<'m> Aims<'m> {
         towards(origin, between(b, c, [0.0, 0.5, 1.0][random.below(3)]))
     }
 
-    /// Along one or two axes, zeros of both signs, through coordinates that corners have.
+    /// Returns a ray along one or two axes through a point of the surface, with zeros of both signs.
     fn along_axis(&self, random: &mut Random) -> Ray {
         let (target, axis) = (self.on_surface(random), random.below(3));
         let mut origin = target;
@@ -120,7 +120,7 @@ impl<'m> Aims<'m> {
         Ray::new(origin, direction)
     }
 
-    /// From up to 2^60 extents away.
+    /// Returns a ray from up to 2^60 extents away.
     fn far_off(&self, random: &mut Random) -> Ray {
         let target = self.on_surface(random);
         let far = self.extent() * 2_f32.powi(random.below(60) as i32);
@@ -139,7 +139,7 @@ impl<'m> Aims<'m> {
         })
     }
 
-    /// Returns a ray that a renderer traces after a hit, or this one with a range that ends at it or next to it.
+    /// Returns a ray that a renderer traces after a hit, or this one with a range that ends at the hit or next to it.
     fn next(&self, random: &mut Random, ray: &Ray, hit: &Hit) -> Ray {
         let (t, before, behind) = (hit.t, hit.t.next_down(), hit.t.next_up());
         let (t_min, t_max) = match random.below(9) {
@@ -163,7 +163,7 @@ impl<'m> Aims<'m> {
         Ray { t_min, t_max, ..*ray }
     }
 
-    /// Directions of other lengths: the same line, almost.
+    /// Changes the length of the direction; the line stays almost the same.
     fn stretch(&self, random: &mut Random, ray: &mut Ray) {
         let by = match random.below(8) {
             0 => 2_f32.powi(random.below(200) as i32 - 100),

@@ -13,44 +13,44 @@ use hgrid_tests::reference::{Answer, Line};
 use super::meshes;
 use super::rays::Aims;
 
-/// Rays of a batch: a few more than go down together.
+/// Rays in a batch: a few more than are traversed together.
 const BATCH: usize = 72;
 
-/// Differences that are enough to look at.
+/// Differences after which a run stops.
 const MOST: usize = 20;
 
-/// The record of a run: what was asked, and what came of it.
+/// The record of a run: the counts of its queries and the differences it found.
 #[derive(Debug, Default)]
 pub(crate) struct Done {
     pub(crate) meshes: u64,
     pub(crate) rays: u64,
     pub(crate) pairs: u64,
-    /// Rays and triangles that the reference decided about.
+    /// Pairs of a ray and a triangle that the reference decided.
     pub(crate) ray_triangles: u64,
     pub(crate) hits: u64,
-    /// Rays and triangles that the rule leaves open.
+    /// Pairs among them that the rule leaves open.
     pub(crate) open: u64,
     pub(crate) levels: Vec<&'static str>,
     pub(crate) differences: Vec<String>,
 }
 
-/// A ray with what the reference knows of it.
+/// A ray with the answers of the reference.
 struct Asked {
     ray: Ray,
     /// All hits, the nearest first.
     hits: Vec<Hit>,
-    /// True if each of them shows its front.
+    /// For each hit, true if the ray meets the triangle's front.
     fronts: Vec<bool>,
 }
 
-/// A mesh with its triangles as the reference reads them.
+/// A mesh with its triangles in the form that the reference reads.
 struct Scene<'m> {
     name: String,
     triangles: Vec<[[f32; 3]; 3]>,
     masks: &'m [u32],
 }
 
-/// Meshes from the one numbered `first` on, until so many pairs are done.
+/// Takes meshes from number `first` on until `pairs` pairs are done.
 pub(crate) fn run(seed: u64, first: u64, pairs: u64) -> Done {
     let levels: Vec<SimdLevel> = SimdLevel::available().collect();
     let mut done =
@@ -75,7 +75,7 @@ fn one_mesh(random: &mut Random, name: String, mesh: &Mesh, levels: &[SimdLevel]
     let triangles: Vec<_> = mesh.indices.iter().map(corners).collect();
     let scene = Scene { name, triangles, masks: &masks };
 
-    // The grids of all methods, as they are by default or with many levels.
+    // Build grids of all methods, with default settings or with many levels.
     let configs: Vec<Config> = match random.below(3) {
         0 => Method::ALL.iter().map(|&method| Config::new(method)).collect(),
         1 => configs().collect(),
@@ -95,11 +95,11 @@ fn one_mesh(random: &mut Random, name: String, mesh: &Mesh, levels: &[SimdLevel]
 
     let aims = Aims::new(mesh);
     let mut last = None;
-    // Few rays where each costs thousands of triangles.
+    // Send few rays where each one tests many triangles.
     let batches = if mesh.indices.len() > 500 { 1 } else { 4 + random.below(20) };
     for _ in 0..batches {
         let mut asked: Vec<Asked> = Vec::with_capacity(BATCH);
-        // Sometimes all start at one point, so that they go down together.
+        // Let some batches start at one point, so that their rays are traversed together.
         let start = (random.below(3) == 0).then(|| aims.ray(random, None).origin);
         for _ in 0..BATCH {
             let mut ray = aims.ray(random, last.as_ref());
@@ -122,7 +122,7 @@ fn one_mesh(random: &mut Random, name: String, mesh: &Mesh, levels: &[SimdLevel]
     }
 }
 
-/// All hits of one method, held against the reference: the answer that all others must give.
+/// Returns all hits of one method after comparing them with the reference: the answer that all others must give.
 fn ask(
     random: &mut Random,
     scene: &Scene<'_>,
@@ -174,7 +174,7 @@ fn ask(
     Asked { ray, hits, fronts }
 }
 
-/// All hits of a ray, in the order in which they come.
+/// Returns all hits of a ray, in the order in which the library reports them.
 fn all_hits(grid: &Grid<'_>, ray: &Ray, most: usize) -> Vec<Hit> {
     let mut hits = vec![Hit::MISS; most.min(100)];
     let count = grid.intersect_all(ray, &mut QueryOptions::default(), &mut hits);
@@ -186,7 +186,7 @@ fn all_hits(grid: &Grid<'_>, ray: &Ray, most: usize) -> Vec<Hit> {
     hits
 }
 
-/// Bits: -0.0 is not 0.0.
+/// Returns the bits of a hit, which tell -0.0 from 0.0.
 fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
 }
@@ -198,7 +198,7 @@ fn are_same<'h>(
     one.into_iter().map(bits).eq(other.into_iter().map(bits))
 }
 
-/// One method with one kind of vectors.
+/// Compares one grid at one SIMD level with the known hits.
 struct Compare<'c> {
     scene: &'c Scene<'c>,
     grid: &'c Grid<'c>,
@@ -240,7 +240,7 @@ impl Compare<'_> {
         }
     }
 
-    /// Masks, culling and the triangle to skip.
+    /// Checks queries with a mask, culling and a triangle to skip.
     fn selected(&mut self, random: &mut Random, asked: &Asked) {
         let Asked { ray, hits, fronts } = asked;
         let mask = [u32::MAX, 1, 6, 0][random.below(4)];
@@ -275,7 +275,7 @@ impl Compare<'_> {
         }
     }
 
-    /// Filters that reject the first hits, and such that stop.
+    /// Checks filters that reject the first hits, and filters that stop the query.
     fn filtered(&mut self, random: &mut Random, asked: &Asked) {
         let Asked { ray, hits, .. } = asked;
         let passed = random.below(hits.len() + 2);
@@ -311,7 +311,7 @@ impl Compare<'_> {
         }
     }
 
-    /// All hits, with room for some of them.
+    /// Checks a query for all hits with room for only some of them.
     fn with_room(&mut self, random: &mut Random, asked: &Asked) {
         let Asked { ray, hits, .. } = asked;
         let room = random.below(hits.len() + 3);
@@ -326,7 +326,7 @@ impl Compare<'_> {
         }
     }
 
-    /// Both batches, sorted and as they are.
+    /// Checks both batch queries, coherent and incoherent.
     fn batches(&mut self, asked: &[&Asked]) {
         let rays: Vec<Ray> = asked.iter().map(|one| one.ray).collect();
         let rays = Strided::new(&rays);

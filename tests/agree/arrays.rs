@@ -1,5 +1,5 @@
-//! The arrays of a batch: wherever rays and answers lie in memory, the answers are the same, and no byte
-//! beside them is written.
+//! The arrays of a batch: answers do not depend on where rays and answers lie in memory, and no byte beside
+//! the answers is written.
 
 use hgrid_core::{BatchField, Coherence, Config, Error, Hit, Method, Ray, Strided, StridedMut};
 use hgrid_tests::meshes::ball;
@@ -8,7 +8,7 @@ use hgrid_tests::owned::Owned;
 
 use crate::batches::{CLOSE, COHERENCES, alone, bits, rays, scene};
 
-/// The bytes of elements, one every `stride` bytes, junk between them and nothing behind the last.
+/// Returns elements as bytes, one every `stride` bytes, with junk between them and nothing after the last.
 fn scatter<const N: usize>(elements: impl Iterator<Item = [u8; N]>, stride: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (i, element) in elements.enumerate() {

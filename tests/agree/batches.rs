@@ -1,5 +1,5 @@
-//! Many rays at once answer as each of them alone, bit for bit: whatever the caller says of them, with every
-//! kind of vectors.
+//! A batch answers as each of its rays alone, bit for bit, whatever coherence the caller declares and at
+//! every SIMD level.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use hgrid_tests::{methods, oracle};
 
 pub(crate) const COHERENCES: [Coherence; 2] = [Coherence::Coherent, Coherence::Incoherent];
 
-/// A ball in a soup of small and large triangles, with a crowd on it.
+/// Returns a ball in a soup of small and large triangles, with a crowd of tiny ones on it.
 pub(crate) fn scene() -> Mesh {
     let mut mesh = ball(12, 1.0);
     mesh.append(&soup(300, 0.1, 5));
@@ -24,27 +24,27 @@ pub(crate) fn scene() -> Mesh {
     mesh
 }
 
-/// A tile of a camera's pixels, 64 rays in rows of 8.
+/// Returns an 8 x 8 tile of camera rays.
 fn tile(bounds: ([f32; 3], [f32; 3]), view: View, [left, top]: [u16; 2]) -> Vec<Ray> {
     let camera = Camera::framing(bounds, view, Up::Y);
     let ray = |i: u16| camera.ray(left + i % 8, top + i / 8, 64);
     (0..64).map(ray).collect()
 }
 
-/// A piece of a large picture, 128 rays, half of them beside the others: all in a few cells.
+/// Returns two adjacent 8 x 8 tiles of a large picture, whose rays all pass through a few cells.
 fn close(bounds: ([f32; 3], [f32; 3]), view: View, size: u16, [left, top]: [u16; 2]) -> Vec<Ray> {
     let camera = Camera::framing(bounds, view, Up::Y);
     let ray = |i: u16| camera.ray(left + i % 8 + i / 64 * 8, top + i / 8 % 8, size);
     (0..128).map(ray).collect()
 }
 
-/// Rays in the pieces of large pictures, which come first.
+/// The number of rays from tiles of large pictures; `rays` returns them first.
 pub(crate) const CLOSE: usize = 40 * 128;
 
-/// The rays among them in pieces of which one half has ends of its own.
+/// The rays among them that lie in pairs of tiles of which one has other ray ends than the other.
 const LIMITED: Range<usize> = 28 * 128..36 * 128;
 
-/// Returns rays that no kernel for many rays may stumble over.
+/// Returns valid and invalid rays with special values, which every kernel for many rays must handle.
 pub(crate) fn odd_rays() -> Vec<Ray> {
     let sound = Ray::new([0.1, 0.2, 3.0], [0.01, 0.02, -1.0]);
     let mut rays = vec![
@@ -78,18 +78,19 @@ pub(crate) fn odd_rays() -> Vec<Ray> {
     rays
 }
 
-/// Rays of every kind: tiles, tiles with strangers in them, random ones, odd ones alone and mixed.
+/// Returns rays of every kind: tiles, tiles with unrelated rays in them, random rays, and odd rays alone and mixed.
 pub(crate) fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
     let mut random = Random(73);
     let mut rays = Vec::new();
-    // First, so that those of each go together. Across the ball, its edges and the crowd.
+    // Put these first, so that both tiles of a pair are traversed together. They cross the ball, its edges
+    // and the crowd.
     for size in [256, 512, 1024, 2048] {
         for at in 1..8 {
             let view = if at % 2 == 0 { View::Front } else { View::ThreeQuarter };
             rays.extend(close(bounds, view, size, [at * size / 8, size / 2 - 24]));
         }
     }
-    // One half ends before the other, or starts behind its end.
+    // One tile ends before the other, or the other starts where it ends.
     assert_eq!(rays.len(), LIMITED.start);
     for at in 1..9_u16 {
         let mut piece = close(bounds, View::Front, 512, [40 * at + 70, 230]);
@@ -101,7 +102,7 @@ pub(crate) fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
         rays.extend(piece);
     }
     assert_eq!(rays.len(), LIMITED.end);
-    // Rays that start and end anywhere, and strangers among them.
+    // Rays that start and end anywhere, and unrelated directions among them.
     for at in [700, 900, 1100, 1300] {
         let mut piece = close(bounds, View::Front, 2048, [at, 1000]);
         for ray in &mut piece {
@@ -119,13 +120,13 @@ pub(crate) fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
             rays.extend(tile(bounds, view, corner));
         }
     }
-    // Behind a tile that hits one that meets nothing, with a ray that is none.
+    // After a tile that hits, a tile that misses and contains an invalid ray.
     rays.extend(tile(bounds, View::Front, [24, 24]));
     rays.extend(tile(bounds, View::Front, [0, 0]));
     if let Some(last) = rays.last_mut() {
         last.direction = [0.0; 3];
     }
-    // One origin and all directions; one direction and all origins; ends before and behind.
+    // One origin and all directions; one direction and many origins; ends before and behind the surface.
     rays.extend((0..64).map(|_| Ray::new([0.1, 0.2, 0.3], random.point())));
     rays.extend((0..64).map(|_| Ray::new(random.point().map(|c| 2.0 * c), [0.3, -0.5, 0.7])));
     rays.extend(
@@ -141,7 +142,7 @@ pub(crate) fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
     }
     rays.extend((0..100).map(|_| Ray::new(random.point().map(|c| 3.0 * c), random.point())));
     rays.extend(odd_rays());
-    // Strangers among neighbours: other octants, other axes, and no rays at all.
+    // Unrelated rays among neighbours: other octants, other axes, invalid rays.
     let odd = odd_rays();
     for corner in [[16, 24], [24, 32], [32, 32]] {
         let mut mixed = tile(bounds, View::Front, corner);
@@ -161,7 +162,7 @@ pub(crate) fn rays(bounds: ([f32; 3], [f32; 3])) -> Vec<Ray> {
     rays
 }
 
-/// A hit, or none, in bits: -0.0 is not 0.0.
+/// Returns the bits of a hit or a miss, which tell -0.0 from 0.0.
 pub(crate) fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
 }
@@ -188,7 +189,7 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
         }
         let hits = expected.iter().filter(|hit| **hit != Hit::MISS).count();
         assert!(hits > 200 && hits < rays.len() - 200, "{hits} of {}", rays.len());
-        // Ends that one half alone has lie among the triangles.
+        // Ends that only one tile of a pair has lie among the triangles.
         let limited = LIMITED.filter(|&i| {
             let whole = Ray::new(rays[i].origin, rays[i].direction);
             grid.intersect(&whole).unwrap_or(Hit::MISS) != expected[i]
@@ -196,12 +197,12 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
         let limited = limited.count();
         let met = expected[LIMITED].iter().filter(|hit| **hit != Hit::MISS).count();
         assert!(limited > 100 && met > 200, "{limited} {met}");
-        // Other methods have no vectors in them.
+        // Only trees have SIMD kernels.
         let levels = levels_of(config.method());
         for (level, coherence) in levels.into_iter().flat_map(|l| COHERENCES.map(|c| (l, c))) {
             let grid = grid.with_simd(level);
             for n in [0, 1, 7, 63, 64, 65, 128, 1000, rays.len() - 37] {
-                // From another ray on, so that tiles are cut at other places.
+                // Start at another ray too, so that tiles are cut at other places.
                 for from in [0, rays.len() - n] {
                     let what = format!("{:?} {level:?} {coherence:?} {n} {from}", config.method());
                     let rays = &rays[from..from + n];
@@ -223,7 +224,7 @@ fn every_method_coherence_level_and_number_of_rays_agrees() {
     }
 }
 
-/// The length of a ray's direction may be far from the width of a cell.
+/// Rays whose direction is much shorter or longer than a cell is wide.
 #[test]
 fn rays_of_any_speed_agree_at_any_scale() {
     for scale in [1e-30_f32, 1e-20, 1e-10, 1.0, 1e10, 1e20, 1e30] {
@@ -254,7 +255,7 @@ fn rays_of_any_speed_agree_at_any_scale() {
     }
 }
 
-/// The one cell of a flat scene on an axis is thicker than its box.
+/// Tiles through a flat scene: its only cell along the flat axis is thicker than the box.
 #[test]
 fn tiles_through_a_flat_scene_agree() {
     for (axis, thick) in [(0, 0.0), (1, 0.0), (2, 0.0), (2, 1e-3)] {
@@ -291,7 +292,7 @@ fn tiles_through_a_flat_scene_agree() {
     }
 }
 
-/// One ray at a time, too, gives the same bits with all vectors.
+/// Single rays, too, give the same bits at every SIMD level.
 #[test]
 fn single_rays_agree_at_every_level() {
     let mesh = scene();
@@ -309,12 +310,12 @@ fn single_rays_agree_at_every_level() {
     }
 }
 
-/// Levels that a method has something to do with.
+/// Returns the SIMD levels that make a difference for a method.
 pub(crate) fn levels_of(method: Method) -> Vec<SimdLevel> {
     if method == Method::Bvh { levels() } else { vec![SimdLevel::detect()] }
 }
 
-/// Masks for some bits in turn.
+/// Returns a mask for each triangle: one of three bits, in turn.
 fn masks(mesh: &Mesh) -> Vec<u32> {
     (0..mesh.view().triangle_count()).map(|id| 1 << (id % 3)).collect()
 }
@@ -327,7 +328,7 @@ fn masks_culling_and_a_triangle_to_skip_agree() {
     for config in methods::configs() {
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
-        // Tiles, strangers and odd rays.
+        // Tiles, unrelated rays and odd rays.
         let rays = &rays(grid.bounds())[CLOSE - 256..];
         let hit = alone(&grid, rays).into_iter().find(|hit| *hit != Hit::MISS);
         let skip = hit.expect("some hit").primitive;
@@ -370,7 +371,7 @@ fn masks_culling_and_a_triangle_to_skip_agree() {
     }
 }
 
-/// Rays that start around some points in turn and go anywhere; among many points odd ones, too.
+/// Returns rays that start near a few points in turn and go anywhere; with more than two points, some odd rays too.
 pub(crate) fn scattered(count: usize, points: usize) -> Vec<Ray> {
     let mut random = Random(91);
     let points: Vec<_> = (0..points).map(|_| random.point()).collect();
@@ -386,7 +387,7 @@ pub(crate) fn scattered(count: usize, points: usize) -> Vec<Ray> {
     (0..count).map(ray).collect()
 }
 
-/// Rays are sorted in memory of any size and place, and no byte beside it is written.
+/// Incoherent rays are sorted in scratch of any size and address, and no byte beside it is written.
 #[test]
 fn rays_in_any_order_agree_with_any_scratch() {
     let mesh = scene();
@@ -394,7 +395,8 @@ fn rays_in_any_order_agree_with_any_scratch() {
     for config in [Config::new(Method::Bvh), Config::new(Method::OneLevel)] {
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
-        // Few points are enough for windows on the stack, many are not; and all kinds of rays.
+        // For a few points the windows on the stack are enough, for many they are not. The third set has rays
+        // of all kinds.
         for rays in [scattered(3000, 2), scattered(9000, 40), rays(grid.bounds())] {
             let expected = alone(&grid, &rays);
             let all = 16 * rays.len();
@@ -440,7 +442,7 @@ fn rays_in_any_order_agree_with_any_scratch() {
     }
 }
 
-/// Filters see each ray's place and the rays in order; counters count as single rays do.
+/// Filters see the index of each ray, and rays in order; counters add up to those of single rays.
 #[test]
 fn filters_and_counters_are_those_of_single_rays() {
     let mesh = scene();

@@ -1,4 +1,4 @@
-//! The closest point, as a loop over all triangles finds it, and as a search by halving does.
+//! The closest point, compared with a loop over all triangles and with a search by bisection.
 
 use hgrid_core::{
     ClosestPoint, Config, Counters, Grid, INVALID_ID, Method, QueryOptions, SimdLevel, Strided,
@@ -8,7 +8,7 @@ use hgrid_tests::methods::configs;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 
-/// The closest of all triangles that count.
+/// Returns the closest point of all triangles for which `counts` is true.
 fn brute_force(
     grid: &Grid<'_>,
     point: [f32; 3],
@@ -18,7 +18,7 @@ fn brute_force(
     let all = (0..grid.mesh().triangle_count()).filter(|&id| counts(id));
     let found = all
         .filter_map(|id| ClosestPoint::on_triangle(&grid.mesh().triangle(id).unwrap(), id, point));
-    // The first of equals, so the lowest id.
+    // Of equals, keep the first, which has the lowest id.
     let closest = found.reduce(|a, b| if b.distance < a.distance { b } else { a });
     closest.filter(|closest| closest.distance <= max)
 }
@@ -28,7 +28,7 @@ fn check(grid: &Grid<'_>, point: [f32; 3], max: f32) {
     let ask = |options: &mut QueryOptions<'_>| grid.closest_point(point, max, options);
     assert_eq!(ask(&mut QueryOptions::default()), expected, "{point:?} within {max}");
 
-    // A point just as far as allowed counts, and none farther.
+    // A point exactly at the limit counts; one beyond it does not.
     if let Some(closest) = expected {
         let mut options = QueryOptions::default();
         let exactly = grid.closest_point(point, closest.distance, &mut options);
@@ -39,7 +39,7 @@ fn check(grid: &Grid<'_>, point: [f32; 3], max: f32) {
         }
     }
 
-    // Without the closest one, and of those with a certain mask.
+    // Leave out the closest triangle, and take only those with a certain mask.
     let skip = expected.map_or(INVALID_ID, |closest| closest.primitive);
     let mut counters = Counters::default();
     let mut options = QueryOptions { skip, mask: 2, ..QueryOptions::counting(&mut counters) };
@@ -93,7 +93,7 @@ fn every_method_finds_what_a_loop_finds() {
     }
 }
 
-/// Asks a tree at every level of vectors: the same answer, and the same work.
+/// Asks a tree at every SIMD level: the answer and the work are the same.
 fn check_levels(grid: &Grid<'_>, point: [f32; 3], within: f32) {
     let expected = brute_force(grid, point, within, |_| true);
     let mut work = None;
@@ -108,16 +108,16 @@ fn check_levels(grid: &Grid<'_>, point: [f32; 3], within: f32) {
 
 #[test]
 fn trees_find_it_with_all_vectors_wherever_the_point_is() {
-    // Each triangle three times: the lowest id of equals counts, not the first that is met.
+    // Each triangle three times: of equals, the lowest id must win, not the first one visited.
     let mut thrice = ball(10, 1.0);
     let once = thrice.indices.clone();
     (0..2).for_each(|_| thrice.indices.extend(once.iter().rev()));
     // Tiny triangles among some that are far larger.
     let mut mixed = soup(300, 0.1, 5).scaled(1e-12);
     mixed.append(&soup(20, 1.0, 6).scaled(1e12));
-    // Slivers, which have no normal to speak of.
+    // Slivers, whose normals are ill-defined.
     let slivers = soup(500, 0.2, 8).map(|[x, y, z]| [x, y * 1e-7, z * 1e-7]);
-    // Triangles that are not finite are in no leaf.
+    // Triangles that are not finite, which are in no leaf.
     let mut holed = soup(200, 0.1, 9);
     for (at, value) in [(0, f32::NAN), (100, f32::INFINITY), (200, -1e37)] {
         holed.positions[at][1] = value;
@@ -180,7 +180,7 @@ fn a_tree_looks_at_little_near_the_surface_and_far_outside() {
             let mut options = QueryOptions::counting(&mut counters);
             assert!(grid.closest_point(point, f32::INFINITY, &mut options).is_some());
         }
-        // Each of a hundred questions could ask about 43 200 triangles.
+        // Each of the hundred queries could test 43 200 triangles.
         assert!(counters.primitive_tests < 100 * 600, "{width} {counters:?}");
         assert!(counters.grid_steps + counters.cell_steps < 100 * 300, "{width} {counters:?}");
     }
@@ -212,9 +212,8 @@ fn a_question_that_is_none_finds_nothing() {
     }
 }
 
-/// The point of a triangle that is closest, found without looking at corners and
-/// edges: on a line through a triangle the distance falls and then rises, so does the
-/// least distance of parallel lines.
+/// The closest point of a triangle, found without a look at corners and edges: along a line through a
+/// triangle the distance falls and then rises, and so does the least distance along parallel lines.
 #[test]
 fn the_point_of_a_triangle_is_the_closest_one() {
     fn least(distance: impl Fn(f64) -> f64) -> f64 {
@@ -245,7 +244,7 @@ fn the_point_of_a_triangle_is_the_closest_one() {
         let expected = least(|v| least(|part| distance(at(v, (1.0 - v) * part))));
         assert!((f64::from(found.distance) - expected).abs() < 1e-6, "{triangle:?} {point:?}");
 
-        // It is where it says.
+        // The point lies where its coordinates say.
         let (u, v) = (f64::from(found.u), f64::from(found.v));
         assert!(u >= 0.0 && v >= 0.0 && u + v < 1.0 + 1e-6, "{found:?}");
         let position = found.position.map(f64::from);

@@ -1,6 +1,5 @@
-//! The ray-triangle test against integers: where exact arithmetic says "clearly inside" the test
-//! must hit with the right numbers, where it says "clearly outside" it must miss, and what is
-//! exactly on an edge must hit at least one of the two triangles there.
+//! The ray-triangle test compared with integers. Where exact arithmetic says "clearly inside", the test must
+//! hit with the right numbers; where it says "clearly outside", it must miss.
 
 use hgrid_core::{Ray, TriangleTest};
 use hgrid_tests::random::Random;
@@ -19,8 +18,8 @@ fn dot(a: Point, b: Point) -> i128 {
     (0..3).map(|k| a[k] * b[k]).sum()
 }
 
-/// The three signed volumes between ray and edges (weights of the vertices times `determinant`),
-/// the determinant, and `t` times the determinant: all exact.
+/// Returns the three signed volumes between ray and edges (weights of the vertices times `determinant`), the
+/// determinant, and `t` times the determinant: all exact.
 fn volumes(origin: Point, direction: Point, [a, b, c]: [Point; 3]) -> ([i128; 3], i128, i128) {
     let [a, b, c] = [a, b, c].map(|p| sub(p, origin));
     let weights =
@@ -28,7 +27,7 @@ fn volumes(origin: Point, direction: Point, [a, b, c]: [Point; 3]) -> ([i128; 3]
     (weights, weights.iter().sum(), dot(a, cross(b, c)))
 }
 
-/// Returns how many multiples of the direction a triangle spans, at most.
+/// Returns an upper bound of the number of multiples of the direction that a triangle spans.
 fn reach_along(direction: Point, corners: [Point; 3]) -> f64 {
     let axis = (0..3).max_by_key(|&k| direction[k].abs()).unwrap();
     let (from, to) = (corners.iter().map(|p| p[axis]).min(), corners.iter().map(|p| p[axis]).max());
@@ -53,7 +52,7 @@ fn clear_cases_are_right_and_exact() {
         let width = [4, 40, 4000][round % 3];
         let corners: [Point; 3] = std::array::from_fn(|_| random_point(&mut random, width));
         let origin = random_point(&mut random, width);
-        // Half of the rays aim at the triangle: at its centre times six, a vertex or an edge.
+        // Aim half of the rays at the triangle: at a vertex, on an edge or inside.
         let direction = if round % 2 == 0 {
             random_point(&mut random, width)
         } else {
@@ -73,8 +72,8 @@ fn clear_cases_are_right_and_exact() {
         let [a, b, c] = weights.map(|w| w as f64 / determinant as f64);
         let t = distance as f64 / determinant as f64;
         let least = a.min(b).min(c);
-        // The shear moves the triangle's shadow by a few roundings in f64 of the corners' distance;
-        // the smaller the shadow, the more that moves the weights.
+        // The shear moves the projected triangle by a few f64 roundings of the corners' distance; the smaller
+        // the projection, the more that moves the weights.
         let reach = corners.iter().flat_map(|&p| sub(p, origin)).map(i128::abs).max().unwrap();
         let along = direction.map(i128::abs).into_iter().max().unwrap();
         let error = 32.0 * f64::EPSILON * (reach * reach * along) as f64 / determinant.abs() as f64;

@@ -1,6 +1,6 @@
-//! Filters are asked about the triangles that `filter_mask` names and no others, alone and in batches,
-//! in the order that the docs promise; and what is said to block a ray blocks it. The reference is a
-//! loop over all hits of each ray.
+//! Filters are asked only about the triangles that `filter_mask` selects, alone and in batches, in the
+//! documented order; and each reported occluder does block its ray. The reference is a loop over all hits of
+//! each ray.
 
 use hgrid_core::{
     Coherence, Config, Counters, Cull, Grid, Hit, INVALID_ID, Method, QueryOptions, Ray, Strided,
@@ -20,7 +20,7 @@ fn verdict(hit: &Hit) -> Verdict {
     }
 }
 
-/// A choice of triangles, and of those among them that a filter is asked about.
+/// Options that select triangles, and those among them that the filter is asked about.
 #[derive(Debug, Clone, Copy)]
 struct Asked {
     mask: u32,
@@ -35,7 +35,7 @@ impl Asked {
         QueryOptions { mask, cull, skip, filter_mask, ..QueryOptions::default() }
     }
 
-    /// A bit in common, or all bits.
+    /// Returns true if the filter is asked about a triangle: they share a bit, or the filter mask has all bits.
     fn is_asked(self, mesh: &TriangleMesh<'_>, id: u32) -> bool {
         self.filter_mask == u32::MAX || mesh.mask(id) & self.filter_mask != 0
     }
@@ -45,7 +45,7 @@ impl Asked {
     }
 }
 
-/// Brute force gives all hits of each ray, for each way to cull.
+/// The hits of each ray by brute force, for each way to cull.
 struct Truth(Vec<[Vec<Hit>; 3]>);
 
 impl Truth {
@@ -62,7 +62,7 @@ impl Truth {
         hits.collect()
     }
 
-    /// Of each ray the hits that are there, whatever the filter says.
+    /// Returns the hits of each ray that mask, culling and `skip` leave, whatever the filter says.
     fn there(&self, mesh: &TriangleMesh<'_>, asked: Asked) -> Vec<Vec<Hit>> {
         let is_seen = |id| asked.mask == u32::MAX || mesh.mask(id) & asked.mask != 0;
         let is_there = |hit: &&Hit| hit.primitive != asked.skip && is_seen(hit.primitive);
@@ -71,7 +71,7 @@ impl Truth {
     }
 }
 
-/// The hits that a filter is shown until one counts, and that one.
+/// Returns the hits that a filter is shown until one counts, and the hit that counts.
 fn walk(grid: &Grid<'_>, hits: &[Hit], asked: Asked) -> (Vec<Hit>, Hit) {
     let mesh = grid.mesh();
     let first = hits.iter().position(|hit| asked.counts(mesh, hit));
@@ -86,7 +86,7 @@ fn of(shown: &[(usize, Hit)], place: usize) -> Vec<Hit> {
     shown[start..].iter().take_while(|(at, _)| *at == place).map(|(_, hit)| *hit).collect()
 }
 
-/// One ray at a time: everything is asked near to far.
+/// Checks all queries of one ray; the filter sees hits from near to far.
 fn check_single(grid: &Grid<'_>, ray: &Ray, hits: &[Hit], asked: Asked) {
     let (expected_shown, expected) = walk(grid, hits, asked);
     let expected = (expected != Hit::MISS).then_some(expected);
@@ -106,7 +106,7 @@ fn check_single(grid: &Grid<'_>, ray: &Ray, hits: &[Hit], asked: Asked) {
     check_occluder(grid, hits, asked, occluder.unwrap_or(INVALID_ID), "alone");
     assert_eq!(shown[..expected_shown.len()], expected_shown, "{asked:?} {ray:?}");
 
-    // All hits: those that count, up to one that is the last.
+    // All hits: those that count, up to one that stops the query.
     let is_last = |hit: &Hit| {
         asked.is_asked(grid.mesh(), hit.primitive) && verdict(hit) == Verdict::AcceptAndStop
     };
@@ -115,7 +115,7 @@ fn check_single(grid: &Grid<'_>, ray: &Ray, hits: &[Hit], asked: Asked) {
     assert!(all[..count].iter().eq(counts), "{asked:?} {ray:?}");
 }
 
-/// Fails unless a triangle is one of those that block a ray, or none is named where none blocks.
+/// Fails unless the named triangle blocks the ray, or no triangle is named and none blocks.
 fn check_occluder(grid: &Grid<'_>, hits: &[Hit], asked: Asked, named: u32, what: &str) {
     let mut blocking = hits.iter().filter(|hit| asked.counts(grid.mesh(), hit)).peekable();
     if named == INVALID_ID {
@@ -125,7 +125,7 @@ fn check_occluder(grid: &Grid<'_>, hits: &[Hit], asked: Asked, named: u32, what:
     }
 }
 
-/// A batch of each kind, with memory to sort in.
+/// Checks a batch of each query, with scratch to sort in.
 fn check_batches(
     grid: &Grid<'_>,
     rays: &[Ray],
@@ -156,8 +156,8 @@ fn check_batches(
         .flat_map(|(at, (shown, _))| shown.iter().map(move |hit| (at, *hit)));
     assert!(shown.iter().copied().eq(in_order), "{what}: the filter saw something else");
 
-    // Ask whether something blocks, and what: the filter is asked all about one ray before the next. It may
-    // be shown fewer hits of a ray that an opaque triangle blocks.
+    // For the occlusion queries, the filter is asked everything about one ray before the next. It may be
+    // shown fewer hits of a ray that an opaque triangle blocks.
     for names in [false, true] {
         shown.clear();
         let mut filter = |place: usize, hit: &Hit| {
@@ -191,7 +191,7 @@ fn check_batches(
     }
 }
 
-/// Every choice of triangles, and of those that are asked about.
+/// Returns combinations of options that select triangles and those that the filter is asked about.
 fn choices(skip: u32) -> [Asked; 9] {
     let asked = |mask, cull, skip, filter_mask| Asked { mask, cull, skip, filter_mask };
     [
@@ -207,7 +207,7 @@ fn choices(skip: u32) -> [Asked; 9] {
     ]
 }
 
-/// One bit in turn, and none: that triangle is asked about by all bits alone.
+/// Returns masks with one of three bits in turn; some have none, so only a filter mask with all bits selects these.
 fn masks(count: u32) -> Vec<u32> {
     (0..count).map(|id| if id % 20 == 19 { 0 } else { 1 << (id % 3) }).collect()
 }
@@ -217,13 +217,13 @@ fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
     let mesh = scene();
     let masks = masks(mesh.view().triangle_count());
     let with_masks = mesh.view().with_masks(Strided::new(&masks)).unwrap();
-    // Without masks every triangle is asked about, or none: enough to ask of trees.
+    // Without masks the filter is asked about every triangle or none, so trees are enough here.
     let trees = methods::configs().filter(|config| config.method() == Method::Bvh);
     let plain = trees.map(|config| (config, mesh.view()));
     for (config, view) in methods::configs().map(|config| (config, with_masks)).chain(plain) {
         let owned = Owned::build(&view, &config).unwrap();
         let grid = owned.open(&view).unwrap();
-        // Tiles, strangers and odd rays; and rays without order, enough of them to be sorted.
+        // Tiles, unrelated rays and odd rays; then rays without order, enough of them to be sorted.
         let tiles = rays(grid.bounds())[CLOSE - 64..].to_vec();
         for rays in [tiles, scattered(1200, 2)] {
             let truth = Truth::of(&grid, &rays);
@@ -245,7 +245,7 @@ fn a_filter_is_asked_about_the_triangles_of_its_mask_in_order() {
     }
 }
 
-/// A batch counts as much work as single rays, and less than with a filter that is asked about everything.
+/// A batch does as much work as single rays, and less than with a filter that is asked about every triangle.
 #[test]
 fn opaque_triangles_cost_no_walk() {
     let mesh = scene();
@@ -277,13 +277,13 @@ fn opaque_triangles_cost_no_walk() {
         for ray in rays {
             let _ = grid.intersect_with(ray, &mut QueryOptions::counting(&mut plain));
         }
-        // A mask that no triangle has: no more work than without a filter.
+        // No triangle has this mask: the work is that without a filter.
         assert_eq!(tests(8), plain.primitive_tests, "{:?}", config.method());
         assert!(tests(1) < tests(u32::MAX), "{:?}", config.method());
     }
 }
 
-/// Without a filter, too, and through every entry point.
+/// Occluders without a filter, through every entry point.
 #[test]
 fn what_is_named_blocks_the_ray() {
     let mesh = scene();
@@ -325,7 +325,7 @@ fn what_is_named_blocks_the_ray() {
     }
 }
 
-/// Answers are four bytes each: less is refused.
+/// Occluder answers take four bytes each: smaller strides and shorter arrays are refused.
 #[test]
 fn places_for_names_are_checked() {
     let mesh = scene();

@@ -6,8 +6,8 @@ use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
 
-/// Elements as bytes, one every `stride` bytes from an odd address, junk between them and nothing
-/// behind the last.
+/// Returns elements as bytes, one every `stride` bytes from an odd address, with junk between them and
+/// nothing after the last.
 fn scatter<const N: usize>(elements: &[[u8; N]], stride: usize) -> Vec<u8> {
     let mut bytes = vec![0xa5];
     for (i, element) in elements.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! A hit is a function of the ray and the triangle: not of the mesh around it, the grid's box, the
-//! method or the way a ray is asked about.
+//! A hit depends on the ray and the triangle only, not on the other triangles, the grid's box, the method or
+//! the entry point.
 
 use hgrid_core::{Coherence, Config, Cull, Grid, Hit, QueryOptions, Ray, Strided, StridedMut};
 use hgrid_tests::meshes::{Mesh, ball, soup};
@@ -11,7 +11,7 @@ fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
 }
 
-/// The hits of a ray with the first triangles, one by one.
+/// Returns the hits of a ray with the first `count` triangles, found one by one.
 fn expected(mesh: &Mesh, count: usize, ray: &Ray) -> Vec<Hit> {
     let first = Mesh { indices: mesh.indices[..count].to_vec(), ..mesh.clone() };
     oracle::hits_of(&first.view(), ray, Cull::None)
@@ -25,8 +25,8 @@ fn check_all(grid: &Grid<'_>, ray: &Ray, count: usize, expected: &[Hit]) {
     assert_eq!(found, expected.iter().map(bits).collect::<Vec<_>>(), "{ray:?}");
 }
 
-/// Rays from inside, from the border, from four extents away, where origins begin to be moved,
-/// from farther; into corners and anywhere.
+/// Returns rays that start inside, at the border, near four extents away, where origins begin to be moved,
+/// and farther; they aim at vertices or beside them.
 fn rays(random: &mut Random, mesh: &Mesh, count: usize) -> Vec<Ray> {
     (0..count)
         .map(|i| {
@@ -90,7 +90,7 @@ fn other_triangles_and_other_boxes_do_not_change_a_bit() {
     assert!(count > 700, "{count}");
 }
 
-/// One ray, many, coherent or not, with options and without.
+/// Checks single rays and batches, coherent or not, with options and without.
 fn check_entry_points(grid: &Grid<'_>, mesh: &Mesh, rays: &[Ray]) {
     let closest = |ray: &Ray| {
         let hits = expected(mesh, mesh.indices.len(), ray);
@@ -115,7 +115,7 @@ fn check_entry_points(grid: &Grid<'_>, mesh: &Mesh, rays: &[Ray]) {
     }
 }
 
-/// Walks that begin at a hit that was dealt with find the rest of them, as they were.
+/// With little room a query may walk again from the last hit that it reported; it must find the other hits unchanged.
 #[test]
 fn hits_are_the_same_however_many_are_asked_for_at_once() {
     let mesh = soup(300, 1.5, 7);

@@ -1,4 +1,4 @@
-//! Several meshes in one grid answer as one mesh with the same triangles does, bit for bit.
+//! Several meshes in one grid answer as one mesh with the same triangles, bit for bit.
 
 use hgrid_core::{
     Block, Coherence, Config, Control, Cull, Grid, Hit, INVALID_ID, Method, QueryOptions, Ray,
@@ -11,8 +11,8 @@ use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
 
-/// Meshes of every size, of which two are the same triangles in the same place: some leaves lie in one part
-/// and some in several.
+/// Returns meshes of every size, two of them with the same triangles in the same place: some leaves lie in
+/// one part and some in several.
 fn scene() -> Vec<Mesh> {
     let mut odd = soup(40, 0.5, 3);
     odd.positions[7] = [f32::NAN; 3];
@@ -34,7 +34,7 @@ fn scene() -> Vec<Mesh> {
     ]
 }
 
-/// Many small meshes, so that most leaves lie in several.
+/// Returns many small meshes, so that most leaves lie in several parts.
 fn crumbs() -> Vec<Mesh> {
     (0..150).map(|i| soup(i % 4, 0.3, i as u64)).collect()
 }
@@ -49,7 +49,7 @@ fn rays(count: usize) -> Vec<Ray> {
     (0..count).map(ray).collect()
 }
 
-/// Asks both grids all that can be asked.
+/// Puts every query to both grids and compares the answers.
 fn answers_the_same(joined: &Grid<'_>, one: &Grid<'_>) {
     let all = rays(300);
     for ray in &all {
@@ -226,7 +226,7 @@ fn a_packed_grid_still_knows_the_parts() {
             answers_the_same(&opened, &grid);
             assert!(pack(&opened).bytes() == packed.bytes(), "packed again");
 
-            // Before the parts it is what the one mesh gives, but for what its header says of them.
+            // Before the table of parts the bytes are those of the one mesh, except in the header.
             if stored.parts().iter().any(|part| !part.mesh().masks().bytes.is_empty()) {
                 let plain = pack(&built.open(&one).unwrap());
                 let table = (4 * meshes.len()).next_multiple_of(64);

@@ -1,4 +1,4 @@
-//! Does every query agree with brute force, at the boundaries above all?
+//! Compares every query with brute force, above all at boundaries.
 
 mod arrays;
 mod batches;

@@ -1,4 +1,4 @@
-//! Shapes of the caller's own: every query agrees with a loop over all of them.
+//! Shapes of the caller: every query agrees with a loop over all of them.
 
 use std::collections::HashSet;
 
@@ -29,7 +29,7 @@ fn box_of([x, y, z, r]: Sphere) -> [f32; 6] {
     [out(x, -r), out(y, -r), out(z, -r), out(x, r), out(y, r), out(z, r)]
 }
 
-/// The first of the two places where a ray meets a sphere that lies in its range.
+/// Returns the first point in range where a ray meets a sphere.
 fn meet([x, y, z, r]: Sphere, ray: &Ray) -> Option<ShapeHit> {
     let at = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - f64::from([x, y, z][k]));
     let d = ray.direction.map(f64::from);
@@ -115,7 +115,7 @@ fn batches_answer_as_each_ray_alone() {
         let built = Built::shapes(boxes, &Config::default()).unwrap();
         let shapes = Shapes::open(built.bytes(), boxes).unwrap();
         let mut random = Random(5);
-        // A picture, row by row of eight, rays from one place, rays from anywhere, and odd ones.
+        // A picture in tiles of 8 x 8, rays from one point, rays from anywhere, and odd ones.
         let pixel = |at: u16| {
             let [x, y] = [at % 8 + at / 64 % 8 * 8, at / 8 % 8 + at / 512 * 8].map(f32::from);
             Ray::new([0.1, 0.2, 4.0], [x / 40.0 - 0.8, y / 40.0 - 0.8, -4.0])
@@ -152,7 +152,7 @@ fn batches_answer_as_each_ray_alone() {
                 }
             }
         }
-        // With counters the same, and the work of each ray alone.
+        // With counters, a batch counts the work of each ray alone.
         let test = &mut |id: u32, part: &Ray| meet(all[id as usize], part);
         let (mut alone, mut together) = (Counters::default(), Counters::default());
         for ray in &rays {
@@ -197,14 +197,14 @@ fn shapes_of_a_batch_are_tested_once_for_each_ray() {
 
 #[test]
 fn shapes_whose_boxes_a_ray_touches_are_offered() {
-    // Boxes on a lattice of quarters, some flat: rays run along their faces, edges and corners.
+    // Boxes on a lattice of quarters, some flat, so that rays run along their faces, edges and corners.
     let mut random = Random(11);
     let mut quarter = || (random.below(9) as f32 - 4.0) * 0.25;
     let boxes: Vec<[f32; 6]> = (0..500)
         .map(|_| {
             let [x, y, z] = [quarter(), quarter(), quarter()];
             let [a, b, c] = [quarter(), quarter(), quarter()].map(|side| side.abs() * 0.5);
-            // Corners in any order.
+            // Opposite corners in either order.
             if a < 0.2 { [x, y, z, x + a, y + b, z + c] } else { [x + a, y, z + c, x, y + b, z] }
         })
         .collect();
@@ -232,7 +232,7 @@ fn shapes_whose_boxes_a_ray_touches_are_offered() {
         };
         assert!(shapes.intersect(&ray, &mut test).is_none());
         for (id, sides) in boxes.iter().enumerate() {
-            // Quarters and their quotients by these directions: exact but for thirds, which f64 tells apart.
+            // Sums of quarters are exact, and so are their quotients except for thirds, which f64 tells apart.
             let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
             for k in 0..3 {
                 let (low, high) = (sides[k].min(sides[k + 3]), sides[k].max(sides[k + 3]));

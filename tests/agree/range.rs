@@ -1,5 +1,5 @@
-//! The range of t against exact fractions: a hit is in if the point where the line meets the plane is,
-//! whatever t is rounded to.
+//! The range of t compared with exact fractions: a hit counts if the point where the line meets the plane is
+//! in range, whatever t is rounded to.
 
 use std::cmp::Ordering;
 
@@ -30,7 +30,7 @@ fn dot(a: &Vector, b: &Vector) -> BigRational {
     &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2]
 }
 
-/// Returns the t at which the line meets the plane; `None` if it runs along it or there is none.
+/// Returns the t at which the line meets the plane, or `None` if it runs along the plane or the triangle has no area.
 fn plane(ray: &Ray, triangle: &[[f32; 3]; 3]) -> Option<BigRational> {
     let [a, b, c] = triangle.map(vector);
     let normal = cross(&minus(&b, &a), &minus(&c, &a));
@@ -39,7 +39,7 @@ fn plane(ray: &Ray, triangle: &[[f32; 3]; 3]) -> Option<BigRational> {
     (slope != number(0.0)).then(|| height / slope)
 }
 
-/// The t of each corner, along the ray's longest axis: exact.
+/// Returns the exact t of each corner, along the ray's longest axis.
 fn corners(ray: &Ray, triangle: &[[f32; 3]; 3]) -> [BigRational; 3] {
     let [x, y, z] = ray.direction.map(f32::abs);
     let axis = if x > y && x > z { 0 } else { 2 - usize::from(y > z) };
@@ -51,11 +51,11 @@ struct Seen {
     hits: usize,
     before: usize,
     behind: usize,
-    /// Ends of ranges that lie within an ulp of t.
+    /// Range ends within an ulp of t.
     close: usize,
 }
 
-/// Holds one answer against what is exact.
+/// Compares one answer with the exact one.
 fn check(ray: &Ray, triangle: &[[f32; 3]; 3], seen: &mut Seen) {
     let whole = Ray { t_min: f32::NEG_INFINITY, t_max: f32::INFINITY, ..*ray };
     let line = TriangleTest::new(&whole).and_then(|test| test.test(triangle));
@@ -80,7 +80,7 @@ fn check(ray: &Ray, triangle: &[[f32; 3]; 3], seen: &mut Seen) {
     } else if hit.is_some() {
         assert!(expected, "{hit:?} is at {t}: {ray:?} {triangle:?}");
     } else if expected {
-        // Only a triangle that the ray grazes may be left out: its t is not the plane's.
+        // The test may leave out a triangle only if the ray grazes it: then its t is not the plane's.
         let (first, last) = (ends.iter().min().unwrap(), ends.iter().max().unwrap());
         let off = if number(line.t) > t { number(line.t) - &t } else { &t - number(line.t) };
         let rounding = number(line.t.abs()) * number(f32::EPSILON);
@@ -100,7 +100,7 @@ fn check(ray: &Ray, triangle: &[[f32; 3]; 3], seen: &mut Seen) {
 fn triangle(random: &mut Random, round: usize) -> [[f32; 3]; 3] {
     let [a, b, c] = [random.point(), random.point(), random.point()];
     match round % 4 {
-        // Few digits; small; slivers; any.
+        // Coordinates of few digits; small triangles; slivers; any triangles.
         0 => [a, b, c].map(|p| p.map(|x| (x * 4.0).round() / 4.0)),
         1 => [
             a,
@@ -112,9 +112,9 @@ fn triangle(random: &mut Random, round: usize) -> [[f32; 3]; 3] {
     }
 }
 
-/// Three numbers in a row around a fraction.
+/// Returns three consecutive numbers around a fraction.
 fn around(t: &BigRational) -> [f32; 3] {
-    // Bisect the numbers in their order.
+    // Bisect over the floats in their order.
     let mirrored = |bits: i32| if bits < 0 { i32::MIN.wrapping_sub(bits) } else { bits };
     let place = |x: f32| mirrored(x.to_bits().cast_signed());
     let at = |place: i32| f32::from_bits(mirrored(place).cast_unsigned());
@@ -167,8 +167,8 @@ fn ends_next_to_the_plane_are_decided_exactly_at_every_scale() {
     );
 }
 
-/// A renderer that offsets origins along the normal by a proven bound of the point's error, as pbrt
-/// does, and accepts every t above 0.
+/// Rays of a renderer that, like pbrt, offsets origins along the normal by a proven bound of the point's
+/// error and accepts every t above 0.
 #[test]
 fn rays_that_leave_by_a_proven_bound_do_not_come_back() {
     let mut random = Random(19);
@@ -180,7 +180,7 @@ fn rays_that_leave_by_a_proven_bound_do_not_come_back() {
             let [a, b, c] = triangle;
             let (u, v) = (random.unit(), random.unit());
             let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-            // The point in f32, gamma(7) times its terms' magnitudes as its error.
+            // The point in f32; its error is at most gamma(7) times the magnitudes of its terms.
             let gamma = 7.0 * f32::EPSILON / 2.0 * 1.01;
             let weights = [1.0 - u - v, u, v];
             let point: [f32; 3] =
@@ -211,7 +211,7 @@ fn rays_that_leave_by_a_proven_bound_do_not_come_back() {
             let d: f32 = (0..3).map(|k| n[k].abs() * error[k]).sum();
             let origin: [f32; 3] = std::array::from_fn(|k| {
                 let moved = point[k] + d * n[k];
-                // Rounded away, as pbrt does.
+                // Round away from the plane, as pbrt does.
                 if n[k] > 0.0 {
                     moved.next_up()
                 } else if n[k] < 0.0 {
@@ -222,7 +222,7 @@ fn rays_that_leave_by_a_proven_bound_do_not_come_back() {
             });
             let ray = Ray::new(origin, direction);
             check(&ray, &triangle, &mut seen);
-            // Above the plane and away from it.
+            // The ray starts above the plane and leads away from it.
             let leaves = plane(&ray, &triangle).is_some_and(|t| t < number(0.0));
             if leaves && round % 4 != 2 {
                 left += 1;

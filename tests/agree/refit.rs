@@ -1,4 +1,4 @@
-//! A tree whose vertices moved answers as brute force does on the mesh that it has now.
+//! A tree that was refitted to moved vertices answers as brute force does on the moved mesh.
 
 use hgrid_core::{
     Block, BuildFlags, ClosestPoint, Config, Error, Grid, MAX_COORDINATE, Method, QueryOptions,
@@ -11,12 +11,12 @@ use hgrid_tests::oracle;
 use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 
-/// The blob of a tree, to be changed.
+/// Builds a tree and returns a copy of its blob.
 fn tree(mesh: &TriangleMesh<'_>) -> Copy {
     Copy::of(Owned::build(mesh, &Config::new(Method::Bvh)).unwrap().bytes())
 }
 
-/// Asks a tree about rays and points all around.
+/// Compares rays and closest points all around with brute force.
 fn agrees(grid: &Grid<'_>) {
     let mut random = Random(41);
     let (min, max) = grid.bounds();
@@ -72,7 +72,7 @@ fn a_refitted_tree_answers_as_brute_force_and_is_valid() {
             let grid = Grid::open(copy.bytes(), view).unwrap();
             prove(&grid).unwrap_or_else(|error| panic!("{which} {error}"));
             agrees(&grid);
-            // The box is that of a build.
+            // The box is that of a new build.
             let built = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
             assert_eq!(grid.bounds(), built.open(&view).unwrap().bounds(), "{which}");
         }
@@ -97,7 +97,7 @@ fn the_cost_tells_when_to_build_again() {
     assert_eq!(back.cost_after.to_bits(), little.cost_before.to_bits());
 }
 
-/// Refits, expects an error and the bytes as they were.
+/// Expects a refit to fail and to leave the bytes unchanged.
 fn refused(copy: &mut Copy, mesh: &TriangleMesh<'_>, expected: Error) {
     let before = copy.bytes().to_vec();
     assert_eq!(refit(copy.bytes_mut(), mesh), Err(expected));
@@ -141,14 +141,14 @@ fn what_cannot_be_refitted_is_left_as_it_was() {
         prove(&grid).unwrap();
         agrees(&grid);
         refused(&mut without, &mesh.view(), Error::MeshMismatch);
-        // Another triangle instead of it, and one more.
+        // A bad coordinate in another triangle instead, then in both.
         let mut other = mesh.clone();
         other.positions[3 * 7][0] = bad;
         refused(&mut without, &other.view(), Error::NonFiniteTriangle { triangle: 7 });
         other.positions[3 * 40][0] = bad;
         refused(&mut without, &other.view(), Error::NonFiniteTriangle { triangle: 7 });
     }
-    // A vertex that no triangle has may be anything.
+    // A vertex that no triangle uses may have any value.
     let mut loose = mesh.clone();
     loose.positions.push([f32::NAN; 3]);
     let config = Config { flags: BuildFlags::STRICT, ..Config::new(Method::Bvh) };

@@ -13,7 +13,7 @@ use hgrid_tests::{methods, oracle, rounds, scans};
 
 use crate::watertight;
 
-/// Pixels on a side: brute force looks at every triangle for every pixel.
+/// Pixels along a side; brute force tests every triangle for every pixel.
 const SIZE: u16 = 64;
 
 fn agrees_on_a_picture(mesh: &Mesh, frame: Bounds) {
@@ -43,9 +43,8 @@ fn agrees_on_a_picture(mesh: &Mesh, frame: Bounds) {
     assert!(upper + lower > 200, "the picture shows the scan: {upper} + {lower} pixels");
 }
 
-/// Aims rays at points of edges whose two triangles face the eye the same way, and not too
-/// flat, and at vertices all of whose edges are such: the surface covers them on all sides, so
-/// each ray must hit there or before.
+/// Aims rays at edges whose two triangles face the eye from the same side and not too flatly, and at vertices
+/// with only such edges. The surface covers these points on all sides, so each ray must hit there or before.
 fn has_no_holes(mesh: &Mesh, rays: usize) {
     let view = mesh.view();
     let owned: Vec<Owned> =
@@ -60,19 +59,18 @@ fn has_no_holes(mesh: &Mesh, rays: usize) {
     let mut holes = 0;
     for i in 0..rays {
         let [a, b] = edges[random.below(edges.len())].map(|vertex| mesh.positions[vertex as usize]);
-        // Stay away from vertices by more than rounding moves the ray: there it may pass by the surface.
+        // Stay farther from vertices than rounding moves the ray: beyond a vertex it may pass by the surface.
         let along = 0.001 + 0.998 * random.unit();
         let mut target: [f32; 3] = std::array::from_fn(|k| a[k] + (b[k] - a[k]) * along);
         if random.below(4) == 0 {
             target = mesh.positions[vertices[random.below(vertices.len())] as usize];
         }
-        // From the eye and from points between.
+        // Start at the eye or at a point between.
         let scale = [1.0, 0.5, 0.1][random.below(3)];
         let direction: [f32; 3] = std::array::from_fn(|k| (target[k] - eye[k]) * scale);
         let origin = std::array::from_fn(|k| target[k] - direction[k]);
         let hit = grids[i % grids.len()].intersect(&Ray::new(origin, direction));
-        // Rounding may carry a grazing ray a little behind its target,
-        // not to the scan's other side.
+        // Rounding may carry a grazing ray a little behind its target, but not to the scan's other side.
         holes += usize::from(!hit.is_some_and(|hit| hit.t <= 1.0 + 2e-3));
     }
     assert_eq!(holes, 0, "holes among {rays} rays at {} edges", edges.len());
@@ -87,7 +85,7 @@ fn covered_edges(mesh: &Mesh, eye: [f32; 3]) -> Vec<[u32; 2]> {
         let dot = |p: [f64; 3], q: [f64; 3]| (0..3).map(|k| p[k] * q[k]).sum::<f64>();
         dot(n, d) / (dot(n, n) * dot(d, d)).sqrt()
     };
-    // An edge counts if exactly two triangles pass it, in opposite directions.
+    // An edge counts if exactly two triangles share it and run along it in opposite directions.
     let mut sides: HashMap<[u32; 2], Vec<(bool, f64)>> = HashMap::new();
     for triangle in &mesh.indices {
         let cosine = facing(triangle);
@@ -116,7 +114,7 @@ fn covered_vertices(mesh: &Mesh, edges: &[[u32; 2]]) -> Vec<u32> {
     met.into_iter().filter(|&vertex| balance[vertex as usize] == 0).collect()
 }
 
-/// Returns true if every edge is passed once in each direction.
+/// Returns true if triangles run along every edge once in each direction.
 fn is_closed(mesh: &Mesh) -> bool {
     let mut passes: HashMap<[u32; 2], i32> = HashMap::new();
     for triangle in &mesh.indices {
@@ -127,7 +125,7 @@ fn is_closed(mesh: &Mesh) -> bool {
     passes.iter().all(|(&[a, b], &count)| count == 1 && passes.get(&[b, a]) == Some(&1))
 }
 
-/// From inside a closed scan, rays aimed at any vertex and any edge hit something.
+/// Asserts that rays from inside a closed scan, aimed at its vertices and edges, all hit something.
 fn has_no_leaks(mesh: &Mesh, rays: usize) {
     let view = mesh.view();
     let owned = Owned::build(&view, &Config::default()).unwrap();

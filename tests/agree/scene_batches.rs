@@ -1,5 +1,5 @@
-//! Many rays at once in a scene answer as each of them alone, bit for bit: whatever the scene shows, however far from zero
-//! it lies, with every kind of vectors.
+//! A batch in a scene answers as each of its rays alone, bit for bit, whatever the scene shows, however far
+//! from zero it lies, and at every SIMD level.
 
 use hgrid_core::{
     BatchField, Boxes, Coherence, Config, Counters, Cull, Error, Instance, Object, Ray, RayF64,
@@ -12,7 +12,7 @@ use hgrid_tests::scenes::{Built, scattered};
 use super::batches::{COHERENCES, odd_rays};
 use super::scenes::{enter, ray, with_grids};
 
-/// Rays of every kind: tiles of cameras near and far, rays from one place, rays from anywhere, and odd ones.
+/// Returns rays of every kind: tiles of cameras near and far, rays from one place, rays from anywhere, and odd ones.
 fn rays(scene: &Scene<'_>, width: f64) -> Vec<RayF64> {
     let mut rays: Vec<RayF64> = Vec::new();
     let bounds = scene.bounds();
@@ -21,7 +21,7 @@ fn rays(scene: &Scene<'_>, width: f64) -> Vec<RayF64> {
         let at = |i: u16| (i % 16, i / 16);
         rays.extend((0..256).map(|i| RayF64::from(&camera.ray(at(i).0, at(i).1, size))));
     }
-    // As from a surface: origins that f32 does not have, side by side, and ends.
+    // Rays as from a surface: neighbouring origins that f32 cannot represent, half of them with an end.
     let mut random = Random(11);
     for _ in 0..4 {
         let from = random.point().map(|c| f64::from(c) * width);
@@ -41,7 +41,7 @@ fn bits(hit: &SceneHit) -> ([u32; 4], [u32; 4]) {
     ([hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive], hit.path)
 }
 
-/// Asks for all rays together in every way, and compares with each alone. Returns the number of hits.
+/// Compares all batch queries with each ray alone, and returns the number of hits.
 fn compare(scene: &Scene<'_>, rays: &[RayF64]) -> usize {
     let mut hits = 0;
     for (mask, cull) in [(u32::MAX, Cull::None), (6, Cull::None), (u32::MAX, Cull::Back)] {
@@ -86,7 +86,7 @@ fn batches_in_scenes_of_grids_answer_as_each_ray_alone() {
         for (count, width) in [(0, 1.0), (1, 1.0), (7, 3.0), (60, 6.0), (150, 200.0)] {
             let mut instances = scattered(count, 3, width, 8);
             instances.iter_mut().for_each(|instance| instance.mask = 1 << (instance.id % 3));
-            // Places that two instances share: the first of them is reported.
+            // Let pairs of instances share a place: the first of each pair is reported.
             for second in count / 2..count {
                 let Instance { id, mask, .. } = instances[second];
                 instances[second] = Instance { id, mask, ..instances[second - count / 2] };
@@ -136,7 +136,7 @@ fn batches_meet_what_is_smaller_than_the_rounding_of_their_origins() {
         instances.extend(&specks);
         let built = Built::scene(&instances, objects, &Config::default()).unwrap();
         let scene = built.open(objects).unwrap();
-        // Through each of them, from a place that f64 has and f32 has not.
+        // A ray through a speck, from an origin that f64 can represent and f32 cannot.
         let ray = |speck: &Instance| {
             let direction = random.point().map(|c| 1.0 + 1e-3 * c);
             let origin = std::array::from_fn(|k| speck.translation[k] - f64::from(direction[k]));
@@ -228,7 +228,7 @@ fn arrays_that_do_not_fit_are_refused() {
         };
         let refused = |field| Err(Error::InvalidBatch(field));
         assert_eq!(ask(&Strided::new(&rays), 3), refused(BatchField::Answers));
-        // Rays of 32 bytes are no rays of 48.
+        // A stride of 32 bytes is too small for rays of 48.
         assert_eq!(ask(&Strided::new(&narrow), 4), refused(BatchField::Rays));
         assert!(hits.iter().all(|hit| hit == &marked));
         let mut occluded = [7_u8; 5];

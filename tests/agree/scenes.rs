@@ -9,7 +9,7 @@ use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use hgrid_tests::scenes::{Built, packed, prove_packed, scattered, with_packed};
 
-/// Objects to show: grids of some methods.
+/// Calls `run` with objects to show: grids of two methods.
 pub(crate) fn with_grids(run: impl FnOnce(&[Object<'_>], &[Mesh])) {
     let meshes = [ball(6, 1.0), soup(200, 0.2, 5), soup(60, 0.5, 6).scaled(0.1)];
     let methods = [Method::Bvh, Method::OneLevel, Method::Bvh];
@@ -39,7 +39,7 @@ pub(crate) fn ray(random: &mut Random, round: usize, width: f32) -> RayF64 {
     }
     let mut ray = RayF64::from(&ray);
     if round % 2 == 1 {
-        // An origin that f32 does not have.
+        // An origin that f32 cannot represent.
         ray.origin = ray.origin.map(|c| c * (1.0 + 1e-9) + 1e-9);
     }
     ray
@@ -56,7 +56,7 @@ impl Alone {
         Self(instances.iter().map(alone).collect())
     }
 
-    /// The closest hit of all.
+    /// Returns the closest hit among the answers of all instances.
     fn closest<'o>(
         &self,
         objects: &'o [Object<'o>],
@@ -78,7 +78,7 @@ fn a_scene_answers_as_each_of_its_instances_alone() {
         for (count, width) in [(0, 1.0), (1, 1.0), (7, 3.0), (60, 6.0), (150, 200.0)] {
             let mut instances = scattered(count, 3, width, 8);
             instances.iter_mut().for_each(|instance| instance.mask = 1 << (instance.id % 3));
-            // The same place twice: the first of them is reported.
+            // Put two instances in the same place: the first of them is reported.
             if let [first, .., last] = &mut instances[..] {
                 *last = Instance { id: last.id, ..*first };
             }
@@ -163,7 +163,7 @@ enum Shown<'o> {
     Scene(&'o [Instance], &'o [Object<'o>]),
 }
 
-/// A triangle where it stands in the outermost scene.
+/// A triangle in the coordinates of the outermost scene.
 struct Moved {
     path: [u32; 4],
     id: u32,
@@ -172,7 +172,7 @@ struct Moved {
     normal: [f64; 3],
 }
 
-/// All triangles of some instances, moved in f64.
+/// Returns all triangles of some instances, moved in f64.
 fn flattened<'o>(
     instances: &[Instance],
     objects: &[Object<'o>],
@@ -188,7 +188,7 @@ fn flattened<'o>(
                 let p = turn(p);
                 std::array::from_fn(|k| p[k] + instance.translation[k])
             });
-            // The normal of the moved corners, turned round where the matrix mirrors.
+            // Take the normal of the moved corners, and flip it where the matrix mirrors.
             let [p, q, r] = &corners;
             let flat = cross(minus(q, p), minus(r, p));
             let before = cross(turn(across(normal)[0]), turn(across(normal)[1]));
@@ -210,7 +210,7 @@ fn flattened<'o>(
     all
 }
 
-/// Two directions with this normal.
+/// Returns two directions that span the plane with this normal.
 fn across(normal: [f64; 3]) -> [[f64; 3]; 2] {
     let [x, y, z] = normal.map(f64::abs);
     let axis = if x <= y && x <= z {
@@ -236,8 +236,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Returns the t at which a line meets the plane of a triangle, and how far inside, as the least weight of a
-/// corner; `None` if it nearly runs along the plane.
+/// Returns the t at which a line meets the plane of a triangle, and the least weight of a corner there;
+/// `None` if the line nearly runs along the plane.
 fn meet([a, b, c]: &[[f64; 3]; 3], ray: &RayF64) -> Option<(f64, f64)> {
     let d = ray.direction.map(f64::from);
     let (ab, ac, from) = (minus(b, a), minus(c, a), minus(&ray.origin, a));
@@ -254,7 +254,7 @@ fn meet([a, b, c]: &[[f64; 3]; 3], ray: &RayF64) -> Option<(f64, f64)> {
 #[test]
 fn far_from_the_origin_a_scene_answers_as_at_the_origin() {
     with_grids(|objects, _| {
-        // Places that f64 holds with any of these offsets.
+        // Translations that stay exact in f64 after any of these offsets is added.
         let rounded = |c: f64| (c * 1024.0).round() / 1024.0;
         let mut instances = scattered(50, 3, 5.0, 4);
         for instance in &mut instances {
@@ -320,7 +320,7 @@ fn scenes_in_scenes_name_the_way_to_the_hit() {
         }
         assert!(depths[1..].iter().all(|&hits| hits > 2), "{depths:?}");
 
-        // All of it in one blob, elsewhere and with something behind it: three grids and two scenes, each once.
+        // Pack three grids and two scenes, each once, into one blob, and open it elsewhere with bytes after it.
         let mut file = packed(&scene).unwrap();
         file.extend([Block::ZERO; 2]);
         let file = Block::bytes(&file);
@@ -339,12 +339,12 @@ fn scenes_in_scenes_name_the_way_to_the_hit() {
                 let normal = |scene: &Scene<'_>| scene.triangle_normal(&hit?);
                 assert_eq!(normal(&opened), normal(&scene));
             }
-            // Packed again, it has the same bytes.
+            // Packing the opened scene again gives the same bytes.
             let again = packed(&opened).unwrap();
             assert!(Block::bytes(&again) == &file[..file.len() - 128]);
         });
 
-        // One more around it is allowed, two are not.
+        // One more scene around it is allowed; two are not.
         let once = [Object::Scene(&scene)];
         let built = Built::scene(&[Instance::new(0)], &once, &Config::default()).unwrap();
         let scene = built.open(&once).unwrap();
@@ -383,7 +383,7 @@ fn rays_from_afar_hit_what_stands_in_scenes_in_scenes() {
         for distance in [1.0, 1e2, 1e4, 1e6, 1e8] {
             let mut depths = [0; 4];
             for round in 0..120 {
-                // Towards one of the triangles, from so many units away.
+                // Aim at the middle of a triangle from a distance of so many units.
                 let near = &by_depth[round / 3 % 3];
                 let aim = near[random.below(near.len())];
                 let [a, b, c] = aim.corners;
@@ -396,7 +396,7 @@ fn rays_from_afar_hit_what_stands_in_scenes_in_scenes() {
                     origin: std::array::from_fn(|k| middle[k] - f64::from(direction[k]) * back),
                     ..RayF64::new([0.0; 3], direction)
                 };
-                // The rounding of t, and of where the ray is.
+                // Allow for the rounding of t and of the ray's position.
                 let slack = 1e-6 * back + 1e-4 * back / distance;
                 let hit = scene.intersect(&ray);
                 assert_eq!(scene.occluded(&ray), hit.is_some());
@@ -460,7 +460,7 @@ fn filters_see_the_hits_of_the_scene() {
     });
 }
 
-/// A box as a shape: where a ray enters it, in f64.
+/// Returns the point where a ray enters a box that stands for a shape, computed in f64.
 pub(crate) fn enter(sides: &[f32; 6], ray: &Ray) -> Option<ShapeHit> {
     let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
     for k in 0..3 {
@@ -531,7 +531,7 @@ fn tasks_and_places_in_memory_do_not_change_a_scene() {
         let config = Config::default();
         let one = Built::scene(&instances, objects, &config).unwrap();
         let scene = one.open(objects).unwrap();
-        // As much memory as it takes, and no more.
+        // Exactly as much memory as is needed.
         let mut exact = vec![Block::ZERO; Block::count_for(scene.blob().len())];
         let sizes = Scene::bound(300, &config).unwrap();
         let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];

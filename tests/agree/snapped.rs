@@ -7,14 +7,14 @@ use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::{oracle, rounds, setting};
 use proptest::prelude::*;
 
-/// The scene is 4 units wide; at the densities below a cell is 1 unit, half of one, or two.
+/// The width of the scene in quarters: 4 units. At the densities below, a cell is 1 unit, half of one, or two.
 const WIDTH: i32 = 16;
 
 fn snapped() -> impl Strategy<Value = [f32; 3]> {
     [0..=WIDTH, 0..=WIDTH, 0..=WIDTH].prop_map(|p| p.map(|c| c as f32 / 4.0))
 }
 
-/// Triangles with corners anywhere, small ones, and repeated ones.
+/// Triangles with corners anywhere, and small triangles.
 fn triangles() -> impl Strategy<Value = Vec<[[f32; 3]; 3]>> {
     let anywhere = [snapped(), snapped(), snapped()];
     let small = (snapped(), prop::array::uniform6(-2..=2_i32)).prop_map(|(a, d)| {
@@ -24,7 +24,7 @@ fn triangles() -> impl Strategy<Value = Vec<[[f32; 3]; 3]>> {
     prop::collection::vec(prop_oneof![anywhere, small], 1..40)
 }
 
-/// From a snapped point, inside or out, near or far, towards a snapped point or along an axis.
+/// Rays from a snapped point or far behind it, towards a snapped point or along an axis.
 fn rays() -> impl Strategy<Value = Vec<Ray>> {
     let axis = (0..3_usize, prop::bool::ANY).prop_map(|(axis, up)| {
         let mut direction = [0.0, -0.0, 0.0];
@@ -53,7 +53,7 @@ fn rays() -> impl Strategy<Value = Vec<Ray>> {
     prop::collection::vec(ray, 1..30)
 }
 
-/// Returns the number of cases: `PROPTEST_CASES`, or what takes some seconds.
+/// Returns the number of cases: `PROPTEST_CASES`, or as many as take some seconds.
 fn cases() -> u32 {
     setting("PROPTEST_CASES", rounds(1500) as u64).try_into().expect("not that many")
 }

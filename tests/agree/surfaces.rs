@@ -1,5 +1,4 @@
-//! Rays that leave a surface do not hit it: none of them the triangle where it starts, and on a convex
-//! mesh none of them anything.
+//! Rays that leave a surface do not hit the triangle where they start, and on a convex mesh they hit nothing.
 
 use hgrid_core::{Coherence, Config, Grid, Hit, Method, QueryOptions, Ray, Strided, StridedMut};
 use hgrid_core::{Surface, TriangleTest};
@@ -13,7 +12,7 @@ pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The triangle's normal, of any length.
+/// Returns the triangle's normal, of any length.
 fn normal_of(triangle: &[[f32; 3]; 3]) -> Vector {
     let [a, b, c] = triangle.map(|corner| corner.map(f64::from));
     let (u, v): (Vector, Vector) =
@@ -21,12 +20,12 @@ fn normal_of(triangle: &[[f32; 3]; 3]) -> Vector {
     std::array::from_fn(|i| u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3])
 }
 
-/// A direction on one side of a plane, every other one nearly along it.
+/// Returns a direction on one side of a plane; half of them run nearly along it.
 pub(crate) fn leaving(random: &mut Random, normal: Vector, side: f64) -> [f32; 3] {
     loop {
         let mut direction = random.point();
         if random.bits().is_multiple_of(2) {
-            // The part along the normal becomes a thousandth or a millionth of what it was.
+            // Reduce the part along the normal to a thousandth or a millionth.
             let share = 1.0 - 0.001_f64.powi(1 + random.below(2) as i32);
             let part = dot(direction.map(f64::from), normal) / dot(normal, normal) * share;
             let along: [f64; 3] = std::array::from_fn(|i| part * normal[i]);
@@ -40,14 +39,14 @@ pub(crate) fn leaving(random: &mut Random, normal: Vector, side: f64) -> [f32; 3
     }
 }
 
-/// Triangles of all shapes, some far from the origin: soups, slivers and needles.
+/// Returns triangles of all shapes, some far from the origin: soups, slivers and needles.
 fn triangle(random: &mut Random, scale: f32) -> [[f32; 3]; 3] {
     let place = if random.bits().is_multiple_of(2) { [0.0; 3] } else { random.point() };
     let size = [1.0, 1e-2, 1e-4][random.below(3)];
     let flat = [1.0, 1e-3][random.below(2)];
     let [a, b, c] = [random.point(), random.point(), random.point()];
     if random.below(4) == 0 {
-        // Across an axis, and far out on it: down to 2^-40 of the distance.
+        // A triangle across an axis and far out on it: its size is down to 2^-40 of the distance.
         let (axis, size) = (random.below(3), 0.5_f32.powi(random.below(41) as i32));
         return [a, b, c].map(|p| {
             std::array::from_fn(|i| if i == axis { place[axis] } else { p[i] * size } * scale)
@@ -57,11 +56,11 @@ fn triangle(random: &mut Random, scale: f32) -> [[f32; 3]; 3] {
     [a, b, c].map(|p| std::array::from_fn(|i| (place[i] + p[i] * size) * scale))
 }
 
-/// A hit somewhere on a triangle, and the surface there.
+/// Returns a hit somewhere on a triangle, a ray, and the surface at the hit.
 fn surface_on(random: &mut Random, mesh: &Mesh, primitive: u32) -> Option<(Hit, Ray, Surface)> {
     let (u, v) = (random.unit(), random.unit());
     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-    // Corners and edges now and then.
+    // Take a corner or a point on an edge now and then.
     let (u, v) = [(u, v), (0.0, v), (u, 0.0), (0.0, 0.0)][random.below(8).saturating_sub(4)];
     let hit = Hit { t: 1.0, u, v, primitive };
     let ray = Ray::new([0.0; 3], random.point());
@@ -126,7 +125,7 @@ fn icosahedron() -> Mesh {
     mesh
 }
 
-/// Counts the rays that leave a convex mesh and hit it, which none should.
+/// Counts the rays that leave a convex mesh and still hit it; none should.
 fn blocked(mesh: &Mesh, method: Method, coherence: Coherence) -> usize {
     let mut owned = None;
     let grid = grid_of(&mut owned, mesh, method);
@@ -135,7 +134,7 @@ fn blocked(mesh: &Mesh, method: Method, coherence: Coherence) -> usize {
     for _ in 0..20_000 {
         let primitive = random.below(mesh.indices.len()) as u32;
         let Some((.., surface)) = surface_on(&mut random, mesh, primitive) else { continue };
-        // Fronts are outside.
+        // Fronts face outwards.
         let start = if surface.is_front == 1 { surface.above } else { surface.below };
         let normal = normal_of(&grid.mesh().triangle(primitive).unwrap());
         rays.push(Ray::new(start, leaving(&mut random, normal, 1.0)));
@@ -146,7 +145,7 @@ fn blocked(mesh: &Mesh, method: Method, coherence: Coherence) -> usize {
     hits.iter().filter(|hit| hit.t < f32::INFINITY).count()
 }
 
-/// Neither the triangles beside the one that a ray leaves, in the same plane or behind an edge.
+/// Leaving rays also miss the neighbours of their triangle, in the same plane or behind an edge.
 #[test]
 fn a_convex_mesh_hides_nothing_from_itself() {
     for mesh in [ball(24, 0.0), icosahedron()] {
@@ -169,9 +168,9 @@ fn a_miss_has_no_surface_and_a_triangle_without_area_one_that_faces_the_ray() {
     let ray = Ray::new([0.5, 0.0, 1.0], [0.0, 0.0, -1.0]);
     let on = |primitive| mesh.view().surface(&ray, &Hit { t: 1.0, u: 0.5, v: 0.0, primitive });
     assert_eq!([on(1), mesh.view().surface(&ray, &Hit::MISS)], [None; 2]);
-    // Without area any normal is as good, if it faces the ray.
+    // Without area any normal that faces the ray is valid.
     assert_eq!(on(0).map(|surface| surface.normal), Some([0.0, 0.0, 1.0]));
-    // With area or without, a ray that goes nowhere meets none.
+    // A ray with an invalid direction has no surface, on triangles with area or without.
     mesh.push([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
     for direction in [[0.0; 3], [f32::NAN, 0.0, 1.0], [0.0, f32::INFINITY, 0.0]] {
         let ray = Ray { direction, ..ray };
@@ -180,7 +179,7 @@ fn a_miss_has_no_surface_and_a_triangle_without_area_one_that_faces_the_ray() {
     }
 }
 
-/// Through a ball: the hit where a ray goes in, and from below it the one where it leaves.
+/// Through a ball: a ray from `below` the first hit meets the other side where the whole ray leaves it.
 #[test]
 fn a_ray_that_goes_on_meets_the_other_side() {
     let mesh = ball(24, 1.0);

@@ -1,5 +1,5 @@
-//! No ray slips out of a closed mesh: from inside, every direction hits, those aimed at edges and
-//! vertices above all.
+//! No ray leaves a closed mesh without a hit: from inside, every direction hits, above all those aimed at
+//! edges and vertices.
 
 use hgrid_core::{Grid, Ray};
 use hgrid_lab::scene::Scene;
@@ -8,8 +8,8 @@ use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, rounds};
 
-/// Aims rays from `origin`, which the closed mesh surrounds, at random edges and vertices. Returns
-/// how many hit nothing.
+/// Aims rays from `origin`, which the closed mesh surrounds, at random edges and vertices. Returns the number
+/// of rays that hit nothing.
 pub(crate) fn leaks(
     grid: &Grid<'_>,
     mesh: &Mesh,
@@ -23,7 +23,7 @@ pub(crate) fn leaks(
             let triangle = mesh.indices[random.below(mesh.indices.len())];
             let [a, b] =
                 [random.below(3), random.below(3)].map(|k| mesh.positions[triangle[k] as usize]);
-            // Every second ray aims exactly at a vertex.
+            // Aim every second ray exactly at a vertex.
             let along = if i % 2 == 0 { 0.0 } else { random.unit() };
             let target: [f32; 3] = std::array::from_fn(|k| a[k] + (b[k] - a[k]) * along);
             let direction: [f32; 3] = std::array::from_fn(|k| target[k] - origin[k]);
@@ -79,7 +79,7 @@ fn a_surface_like_a_scan_has_no_leaks() {
     }
 }
 
-/// A point inside a closed surface: halfway between where a line enters and where it leaves it.
+/// Returns a point inside a closed surface: halfway between the points where a line enters and leaves it.
 pub(crate) fn inside(grid: &Grid<'_>) -> Option<[f32; 3]> {
     let (min, max) = grid.bounds();
     let mut random = Random(17);

@@ -1,11 +1,11 @@
-//! The time of a build, for each triangle.
+//! Build times per triangle.
 //!
-//! Analysis: the times per element should be flat from the smallest mesh to the largest; a bend
-//! upwards is the cache, or something that is not linear. `sizes` is two of the build's five passes
-//! without memory, `exact sizes` what a build does before it writes the index. The regions are
-//! written once before the clock starts, so that no first touch of fresh pages is in the numbers.
+//! Analysis: the time per element should be flat from the smallest mesh to the largest; a bend upwards comes
+//! from the cache or from something that is not linear. For a tree, `sizes` without scratch only computes a
+//! bound; `exact sizes` builds as far as is needed to know the bytes. The regions are written once before the
+//! clock starts, so that first touches of fresh pages are not measured.
 
-#![expect(clippy::expect_used, reason = "a bench that cannot start has nobody to answer to")]
+#![expect(clippy::expect_used, reason = "a bench that cannot start can only panic")]
 
 use core::hint::black_box;
 

@@ -1,11 +1,9 @@
-//! The cost of a call through the C ABI over the Rust call: the same
-//! grid, the same rays, one process.
+//! The time of a query through the C ABI over that of the Rust call, with the same grid and rays in one process.
 //!
-//! Analysis: the C side checks a tag, three pointers and the ray's bytes, and cannot be
-//! inlined; that is a few nanoseconds on a query of some hundred. The library is
-//! `libhgrid.so` as C programs get it.
+//! Analysis: the C side checks a tag, three pointers and the ray's bytes, and cannot be inlined; that is a
+//! few nanoseconds on a query of some hundred. The library is the `libhgrid.so` that C programs link.
 
-#![expect(clippy::expect_used, reason = "a bench that cannot start has nobody to answer to")]
+#![expect(clippy::expect_used, reason = "a bench that cannot start can only panic")]
 
 use core::ffi::c_void;
 use core::hint::black_box;
@@ -25,10 +23,10 @@ use libloading::{Library, Symbol};
 /// Rays on a side of the picture.
 const SIZE: u16 = 256;
 
-/// Pairs of timed runs, one of each side.
+/// Timed pairs of runs, one run of each side.
 const PAIRS: usize = 201;
 
-/// `hgrid_mesh`.
+/// The C struct `hgrid_mesh`.
 #[repr(C)]
 struct CMesh {
     struct_size: u32,
@@ -45,15 +43,15 @@ struct CMesh {
     part_count: usize,
 }
 
-/// `hgrid_grid`.
+/// The C struct `hgrid_grid`.
 #[repr(C)]
 struct CGrid([u64; 64]);
 
 type Open = unsafe extern "C" fn(*const u8, usize, *const CMesh, *mut CGrid) -> i32;
 type Intersect = unsafe extern "C" fn(*const CGrid, *const Ray, *const c_void, *mut Hit) -> bool;
 
-/// Returns how many times as long one thing takes as another: the median of pairs one after the
-/// other, which other work of the machine slows down alike.
+/// Returns the time of `one` over that of `other`: the median over pairs of consecutive runs, which other
+/// load on the machine slows down alike.
 fn ratio(one: impl Fn() -> usize, other: impl Fn() -> usize) -> f64 {
     let time = |what: &dyn Fn() -> usize| {
         let start = Instant::now();
@@ -72,9 +70,9 @@ fn c_abi(criterion: &mut Criterion) {
     });
     // SAFETY: the library was built by this project, and loading it runs nothing.
     let library = unsafe { Library::new(shared_library()) }.expect("libhgrid.so");
-    // SAFETY: the function has this type: include/hgrid.h.
+    // SAFETY: include/hgrid.h declares the function with this type.
     let open: Symbol<'_, Open> = unsafe { library.get(b"hgrid_open") }.expect("hgrid_open");
-    // SAFETY: the same.
+    // SAFETY: as above.
     let intersect: Symbol<'_, Intersect> =
         unsafe { library.get(b"hgrid_intersect") }.expect("hgrid_intersect");
 
@@ -102,7 +100,7 @@ fn c_abi(criterion: &mut Criterion) {
         };
         let mut c_grid = CGrid([0; 64]);
         let (blob, bytes) = (grid.blob().as_ptr(), grid.blob().len());
-        // SAFETY: the blob and the mesh outlive the view, which has room for one.
+        // SAFETY: the blob and the mesh outlive the view, and `c_grid` has room for it.
         let status = unsafe { open(blob, bytes, &raw const c_mesh, &raw mut c_grid) };
         assert_eq!(status, 0, "hgrid_open");
 
@@ -111,7 +109,7 @@ fn c_abi(criterion: &mut Criterion) {
             let mut hit = Hit::MISS;
             let call = |ray: &&Ray| {
                 let ray: *const Ray = black_box(*ray);
-                // SAFETY: a view that was opened, a ray, no options, a hit.
+                // SAFETY: an opened view, a ray, no options, room for a hit.
                 unsafe { intersect(&raw const c_grid, ray, null(), &raw mut hit) }
             };
             rays.iter().filter(call).count()

@@ -1,10 +1,10 @@
 //! The time of a ray.
 //!
-//! Analysis: coherent rays are those of a picture, row by row, so cells and triangles are warm from
-//! the ray before; incoherent rays go from one random point of the box to another, so on a mesh
-//! larger than the cache each one waits for memory. The distance between the two is that wait.
+//! Analysis: coherent rays are those of a picture, row by row, so the ray before has loaded the cells and
+//! triangles into the cache; incoherent rays go from one random point of the box to another, so on a mesh
+//! larger than the cache each one waits for memory. The difference between the two is that wait.
 
-#![expect(clippy::expect_used, reason = "a bench that cannot start has nobody to answer to")]
+#![expect(clippy::expect_used, reason = "a bench that cannot start can only panic")]
 
 use core::hint::black_box;
 
@@ -13,7 +13,7 @@ use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_lab::scene::Scene;
 
-/// Rays on a side of the picture, and as many incoherent ones.
+/// Rays along a side of the picture; the incoherent rays are as many as its pixels.
 const SIZE: u16 = 128;
 
 fn coherent(scene: &Scene) -> Vec<Ray> {

@@ -1,4 +1,4 @@
-/* Asks the questions of the table in C (and as C++, which C is, too). */
+/* Answers the queries of the table through the C functions, compiled as C and as C++. */
 
 #include <hgrid.h>
 
@@ -11,7 +11,7 @@ static hgrid_verdict filter(void *context, size_t ray, const hgrid_hit *hit)
     return offer((offers *)context, ray, hit);
 }
 
-/* The options of a group, or NULL. */
+/* Returns the options of a group, or NULL. */
 static const hgrid_query_options *options_of(const asked *how, hgrid_query_options *options)
 {
     const hgrid_query_options defaults = HGRID_QUERY_OPTIONS_INIT;

@@ -1,4 +1,4 @@
-// Asks the questions of the table through hgrid.hpp.
+// Answers the queries of the table through hgrid.hpp.
 
 #include <hgrid.hpp>
 
@@ -10,7 +10,7 @@ using grid_view = hgrid::view;
 
 namespace {
 
-// The options of a group, and the filter they refer to.
+// The options of a group, with the filter that they refer to.
 class told {
 public:
     explicit told(const asked &how) : filter_{how.seen}
@@ -35,7 +35,7 @@ private:
     hgrid::options options_;
 };
 
-// Grids and blobs that views refer to.
+// Owners of the grids and blobs that the views refer to.
 std::vector<hgrid::grid> grids;
 std::vector<hgrid::memory> blobs;
 
@@ -50,7 +50,7 @@ hgrid::config config_of(const hgrid_config &c)
         .strict(c.flags == HGRID_BUILD_STRICT);
 }
 
-// From containers, where the mesh is one of those.
+// Makes the mesh from spans where its arrays are contiguous.
 hgrid::mesh mesh_from(const hgrid_mesh &m)
 {
     if (m.position_stride != 0)

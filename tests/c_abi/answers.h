@@ -1,6 +1,6 @@
-/* Reads the table of questions (cases.rs writes it), asks them all, and compares: for answers.c and
- * answers.cpp, which know how to ask. They define `grid_view` before they include this, and behind it
- * the functions that are declared here. */
+/* Reads the table of queries that cases.rs writes, runs all of them, and compares the answers. answers.c and
+ * answers.cpp include this: before it they define `grid_view`, and after it the functions that are declared
+ * here. */
 #ifndef ANSWERS_H
 #define ANSWERS_H
 
@@ -8,21 +8,21 @@
 
 enum { RAYS_AT_MOST = 160, HITS_AT_MOST = 256, GROUPS_AT_MOST = 8 };
 
-/* Options, and what they offer a filter of each ray. */
+/* Options, and for each ray the hits that they offer to a filter. */
 typedef struct {
     uint32_t mask, cull, skip, rule;
     const hgrid_hit *offered[RAYS_AT_MOST];
     uint32_t counts[RAYS_AT_MOST];
 } group;
 
-/* A point, and the closest one. */
+/* A point query with its answer. */
 typedef struct {
     float point[3], max;
     uint32_t mask, skip, is_found;
     hgrid_closest closest;
 } point_question;
 
-/* A mesh, and what is asked about it. */
+/* A mesh with its queries. */
 typedef struct {
     hgrid_mesh mesh;
     uint32_t ray_count, group_count, point_count, config_count;
@@ -31,10 +31,10 @@ typedef struct {
     const point_question *points;
 } test_case;
 
-/* The same grid three times: built, opened from its bytes elsewhere, and from a packed blob. */
+/* Three views of the same grid: built, opened from a copy of its bytes, and from a packed blob. */
 enum { VIEWS = 3 };
 
-/* What was offered to a filter so far: for one ray, or for each of a batch. */
+/* The number of hits that a filter was offered so far: for one ray, or for each ray of a batch. */
 typedef struct {
     const group *of;
     bool is_batch;
@@ -42,7 +42,7 @@ typedef struct {
     uint32_t offered[RAYS_AT_MOST];
 } offers;
 
-/* How a query is asked: without any options, or with those of a group. */
+/* The options of a query: none, or those of a group. */
 typedef struct {
     const group *of;
     offers *seen;
@@ -65,7 +65,7 @@ static void ask_any_hits(const grid_view *view, const asked *how, const hgrid_ra
 static bool ask_closest_point(const grid_view *view, const asked *how, const float point[3],
                               float max, hgrid_closest *closest);
 
-/* Answers that were compared. */
+/* The number of answers compared. */
 static size_t answer_count;
 
 #define CHECK_ANSWER(condition) \
@@ -74,7 +74,7 @@ static size_t answer_count;
         answer_count++; \
     } while (0)
 
-/* What the filter of a rule says, as cases.rs has it. */
+/* Returns the verdict of a rule's filter, as cases.rs defines it. */
 static hgrid_verdict verdict_of(uint32_t rule, uint32_t primitive)
 {
     if (rule == 2 && primitive % 5 == 0)
@@ -83,13 +83,13 @@ static hgrid_verdict verdict_of(uint32_t rule, uint32_t primitive)
         return HGRID_REJECT;
     if (rule == 1 && primitive % 2 == 0)
         return HGRID_REJECT;
-    /* No verdict at all counts as that. */
+    /* An unknown verdict counts as a rejection. */
     if (rule == 3 && primitive % 2 == 0)
         return primitive + 3;
     return HGRID_ACCEPT;
 }
 
-/* A filter: hits come in order, none twice, with the place of their ray. */
+/* Checks what a filter is offered: hits in order, none twice, with the index of their ray. */
 static hgrid_verdict offer(offers *seen, size_t place, const hgrid_hit *hit)
 {
     CHECK(seen->is_batch || place == 0);
@@ -100,8 +100,8 @@ static hgrid_verdict offer(offers *seen, size_t place, const hgrid_hit *hit)
     return verdict_of(seen->of->rule, hit->primitive);
 }
 
-/* Of the hits of a ray that are offered, those that count, and how many are offered until there is one
- * and until there are all. */
+/* The offered hits of a ray that count, the number of offers until one counts, and the number of offers of a
+ * query for all hits. */
 typedef struct {
     hgrid_hit hits[HITS_AT_MOST];
     uint32_t count, until_first, until_all;
@@ -135,7 +135,7 @@ static void start(offers *seen, const group *g, bool is_batch, size_t ray)
     seen->of = g, seen->is_batch = is_batch, seen->ray = ray;
 }
 
-/* One ray in every query that there is for one. */
+/* Checks every query of one ray. */
 static void check_ray(const grid_view *view, const test_case *c, const group *g, size_t ray,
                       hgrid_counters work[2])
 {
@@ -186,7 +186,7 @@ typedef struct {
     uint32_t pixel;
 } path;
 
-/* All rays at once, from arrays side by side and from structs. */
+/* Checks batches of all rays, in contiguous arrays and in structs. */
 static void check_batches(const grid_view *view, const test_case *c, const group *g)
 {
     static const hgrid_hit miss = {INFINITY, 0, 0, HGRID_INVALID_ID};
@@ -243,7 +243,7 @@ static void check_points(const grid_view *view, const test_case *c)
     }
 }
 
-/* Reads on in the table. */
+/* A position in the table. */
 typedef struct {
     const unsigned char *at;
 } table;
@@ -262,7 +262,7 @@ static uint32_t next_word(table *t)
     return word;
 }
 
-/* The same mesh as structs without alignment, and with indices of 16 bits. */
+/* Returns the same mesh in elements without alignment, with indices of 16 bits. */
 static hgrid_mesh scattered(const hgrid_mesh *mesh)
 {
     const size_t strides[] = {13, 7, 5};

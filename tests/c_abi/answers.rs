@@ -1,4 +1,4 @@
-//! Do Rust, C and C++ get the same answers, those of brute force? One table of questions for all.
+//! Rust, C and C++ get the same answers, which are those of brute force, from one table of queries.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use crate::cases::{Built, Case, Group, Point, accepted, bytes, cases, verdict};
 use crate::programs::SANITIZERS;
 
-/// Asks a grid all of its case's questions in Rust; returns the work that each group took.
+/// Runs all queries of a case in Rust; returns the work of each group.
 fn check_in_rust(case: &Case, grid: &Grid<'_>) -> Vec<u64> {
     let mut all_work = Vec::new();
     for group in &case.groups {
@@ -31,7 +31,7 @@ fn check_in_rust(case: &Case, grid: &Grid<'_>) -> Vec<u64> {
     all_work
 }
 
-/// Asks with a group's options, and looks what is offered to its filter.
+/// Checks the queries with a group's options, and the hits that its filter is offered.
 fn with_options(
     &Group { mask, cull, skip, rule, .. }: &Group,
     offered: &[Hit],
@@ -51,7 +51,7 @@ fn with_options(
     ask(&mut options);
 }
 
-/// One ray in every query that there is for one.
+/// Checks every query of one ray.
 fn check_ray(
     grid: &Grid<'_>,
     group: &Group,
@@ -76,7 +76,7 @@ fn check_ray(
     }
 }
 
-/// All rays at once, without options.
+/// Checks batches of all rays, without options.
 fn check_batches(grid: &Grid<'_>, rays: &[Ray], group: &Group) {
     for coherence in [Coherence::Incoherent, Coherence::Coherent] {
         let mut hits = vec![Hit::MISS; rays.len()];
@@ -94,7 +94,7 @@ fn check_batches(grid: &Grid<'_>, rays: &[Ray], group: &Group) {
     }
 }
 
-/// Builds in Rust, asks everything, and returns what C and C++ have to build and do.
+/// Builds in Rust and runs all queries; returns the blob and the work that C and C++ must reproduce.
 fn built(case: &Case, config: &Config) -> Built {
     let owned = Owned::build(&case.view(), config).expect("a sound mesh");
     let grid = owned.open(&case.view()).expect("its own mesh");
@@ -102,7 +102,7 @@ fn built(case: &Case, config: &Config) -> Built {
     Built { blob: grid.blob().to_vec(), counters }
 }
 
-/// Compiles a program that asks all questions, and runs it; returns how many answers it compared.
+/// Compiles a program that runs all queries, and runs it; returns the number of answers it compared.
 fn ask(mut compiler: Command, source: &str, flags: &[&str], table: &Path) -> usize {
     let program = table.with_extension("program");
     let language = if source.ends_with(".cpp") { "c++" } else { "c" };
@@ -138,7 +138,7 @@ fn other_compilers_answer_as_brute_force_does() {
     ]);
 }
 
-/// Compiles programs that ask all questions, and runs those for which there is a compiler.
+/// Compiles and runs the programs for which there is a compiler.
 fn all_answer<const N: usize>(askers: [Asker<'_>; N]) {
     let cases = cases();
     let dir = TempDir::new().expect("a folder");
@@ -149,8 +149,8 @@ fn all_answer<const N: usize>(askers: [Asker<'_>; N]) {
         .into_iter()
         .filter_map(|(compiler, source, flags)| Some(ask(compiler?, source, flags, &table)));
     let counts: Vec<_> = askers.collect();
-    // There are no counts where no other compiler is installed.
+    // Without another compiler there are no counts.
     let Some(&all) = counts.first() else { return };
-    // Every program asked everything.
+    // Every program compared all answers.
     assert!(all > 500_000 && counts.iter().all(|&count| count == all), "{counts:?}");
 }

@@ -1,22 +1,22 @@
-/* Do batches answer as single queries do, wherever rays and answers lie, and touch nothing else? */
+/* Batches answer as single queries do, wherever rays and answers lie, and touch nothing else. */
 
 #include "check.h"
 
 static const hgrid_coherence COHERENCES[] = {HGRID_COHERENCE_INCOHERENT, HGRID_COHERENCE_COHERENT};
 
-/* More than a chunk, less than two, and many chunks with a rest. */
+/* RAYS fills many chunks of a batch and a part of one; SOME is more than one chunk and less than two. */
 enum { RAYS = 1000, SOME = 100 };
 
 static sheet mesh_data;
 static hgrid_mesh mesh;
 static hgrid_grid grid;
 static hgrid_ray rays[RAYS];
-/* What single queries say: a hit as a batch writes it, and whether there is one. */
+/* The answers of single queries: hits as a batch writes them, and whether there is one. */
 static hgrid_hit expected[RAYS];
 static uint8_t expected_occluded[RAYS];
 static hgrid_counters expected_work, expected_occluded_work;
 
-/* Tiles of 8 x 8 pixels, a fan of rays, and every odd ray that there is. */
+/* Makes tiles of 8 x 8 pixels whose rays fan out, with every kind of odd ray among them. */
 static void make_rays(void)
 {
     for (int i = 0; i < RAYS; i++) {
@@ -75,7 +75,7 @@ static void check_occluded(const void *from, size_t ray_stride, void *occluded, 
         CHECK(((uint8_t *)occluded)[i * stride] == expected_occluded[i]);
 }
 
-/* Every count around a chunk, and all of them. The arrays end where nobody may touch. */
+/* Tries every count around the size of a chunk, and all rays. The arrays end at a protected page. */
 static void tight_arrays(hgrid_coherence coherence)
 {
     const size_t counts[] = {1, 2, 7, 63, 64, 65, 127, 128, 129, RAYS};
@@ -86,7 +86,7 @@ static void tight_arrays(hgrid_coherence coherence)
                     coherence);
         check_occluded(from, sizeof *rays, guarded(count), 1, count, coherence);
     }
-    /* 0 means side by side. */
+    /* A stride of 0 means contiguous elements. */
     hgrid_hit hits[SOME];
     uint8_t occluded[SOME];
     EXPECT(HGRID_OK, hgrid_intersect_n(&grid, rays, 0, hits, 0, SOME, coherence, NULL));
@@ -95,7 +95,7 @@ static void tight_arrays(hgrid_coherence coherence)
     CHECK(memcmp(occluded, expected_occluded, sizeof occluded) == 0);
 }
 
-/* At odd addresses and strides, cut off behind the last element's own bytes. */
+/* Uses odd addresses and strides, in memory that ends with the last element's own bytes. */
 static void gaps_are_not_touched(hgrid_coherence coherence)
 {
     for (size_t extra = 1; extra < 20; extra += 3) {
@@ -116,7 +116,7 @@ static void gaps_are_not_touched(hgrid_coherence coherence)
     }
 }
 
-/* What renderers have: all of a ray in one struct. */
+/* All of a ray in one struct, as renderers keep it. */
 typedef struct {
     uint8_t is_occluded;
     uint32_t pixel;
@@ -134,14 +134,14 @@ static void rays_and_answers_in_one_struct(hgrid_coherence coherence)
     path *before = (path *)guarded_copy(paths, SOME * sizeof *paths);
     check_batch(&paths->ray, sizeof *paths, &paths->hit, sizeof *paths, SOME, coherence);
     check_occluded(&paths->ray, sizeof *paths, &paths->is_occluded, sizeof *paths, SOME, coherence);
-    /* Only the answers are new. */
+    /* Nothing but the answers has changed. */
     for (size_t i = 0; i < SOME; i++) {
         before[i].hit = paths[i].hit;
         before[i].is_occluded = paths[i].is_occluded;
     }
     CHECK(memcmp(before, paths, SOME * sizeof *paths) == 0);
 
-    /* The hit of one in the struct of the next, or of the one before. */
+    /* Write each hit into the struct before that of its ray, and the other way round. */
     path *shifted = (path *)guarded_copy(paths, SOME * sizeof *paths);
     check_batch(&shifted->ray, sizeof *paths, &shifted[1].hit, sizeof *paths, SOME - 1, coherence);
     memcpy(shifted, paths, SOME * sizeof *paths);
@@ -150,7 +150,7 @@ static void rays_and_answers_in_one_struct(hgrid_coherence coherence)
     check_batch(&shifted[1].ray, sizeof *paths, &shifted->hit, sizeof *paths, SOME - 1, coherence);
 }
 
-/* Without a byte between ray and answer, and without any alignment. */
+/* Puts rays and answers side by side without padding, at any address. */
 static void packed_pairs(hgrid_coherence coherence)
 {
     for (size_t off = 0; off < 4; off++) {
@@ -159,7 +159,7 @@ static void packed_pairs(hgrid_coherence coherence)
         for (size_t i = 0; i < SOME; i++)
             memcpy(pairs + i * pair, &rays[i], sizeof *rays);
         check_batch(pairs, pair, pairs + sizeof *rays, pair, SOME, coherence);
-        /* The answer first. */
+        /* Put the answer before the ray. */
         for (size_t i = 0; i < SOME; i++)
             memcpy(pairs + i * pair + sizeof *expected, &rays[i], sizeof *rays);
         check_batch(pairs + sizeof *expected, pair, pairs, pair, SOME, coherence);
@@ -193,7 +193,7 @@ static void counters_add_up(hgrid_coherence coherence)
     CHECK(memcmp(hits, expected, sizeof hits) == 0);
 }
 
-/* Rays that start near two corners in turn, and go anywhere. */
+/* Makes rays that start near two points in turn, and go anywhere. */
 static void scatter(hgrid_ray *mixed, size_t count)
 {
     uint32_t state = 1;
@@ -210,7 +210,7 @@ static void scatter(hgrid_ray *mixed, size_t count)
     }
 }
 
-/* Of any size and alignment, with nothing around it touched; it changes no answer. */
+/* Scratch of any size and alignment changes no answer, and nothing around it is touched. */
 static void scratch_may_be_anything(void)
 {
     enum { MIXED = 3000 };
@@ -231,7 +231,7 @@ static void scratch_may_be_anything(void)
         }
         for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
             for (size_t off = 0; off < 4; off += 3) {
-                /* Ends where nobody may touch. */
+                /* Let the scratch end at a protected page. */
                 unsigned char *room = (unsigned char *)guarded(sizes[s] + off);
                 options.scratch = room + off, options.scratch_bytes = sizes[s];
                 EXPECT(HGRID_OK, hgrid_intersect_n(&grid, mixed, 0, hits, 0, MIXED,
@@ -246,7 +246,7 @@ static void scratch_may_be_anything(void)
     }
 }
 
-/* A triangle is named where something blocks, one that the ray hits; gaps stay as they are. */
+/* Checks that each occluded ray gets the id of a triangle that it hits, and that gaps stay as they are. */
 static void check_occluders(const uint8_t occluded[RAYS], const hgrid_query_options *options,
                             hgrid_coherence coherence)
 {
@@ -275,7 +275,7 @@ static void check_occluders(const uint8_t occluded[RAYS], const hgrid_query_opti
     }
 }
 
-/* Masks, culling and a triangle to skip: as in single queries. */
+/* Masks, culling and a triangle to skip work as in single queries. */
 static void options_are_for_all_rays(hgrid_coherence coherence)
 {
     const uint32_t culls[] = {HGRID_CULL_NONE, HGRID_CULL_BACK, HGRID_CULL_FRONT};
@@ -296,7 +296,7 @@ static void options_are_for_all_rays(hgrid_coherence coherence)
     }
 }
 
-/* Scratch lies apart from all else that the call uses. */
+/* Scratch may overlap nothing else that the call uses. */
 static void scratch_is_nobody_elses(void)
 {
     enum { COUNT = 10 };
@@ -332,12 +332,12 @@ static void scratch_is_nobody_elses(void)
                    hgrid_intersect_n(&grid, all.rays, 0, all.hits, 0, COUNT, c, &options));
             CHECK((cases[i].status == HGRID_OK) !=
                   all_bytes_are(all.hits, sizeof all.hits, 0xc7));
-            /* Queries of one ray do not look at it. */
+            /* Queries of one ray do not read the scratch fields. */
             CHECK(hgrid_occluded(&grid, &rays[0], &options) == expected_occluded[0]);
         }
 }
 
-/* Both calls with one argument wrong must say so and write nothing. */
+/* The arguments of the three batch functions. */
 typedef struct {
     const hgrid_grid *grid;
     const hgrid_ray *rays;
@@ -412,7 +412,7 @@ static void impossible_strides_are_refused(void)
         c.count = 0;
         refuse(HGRID_ERROR_INVALID_RAYS, c);
     }
-    /* The last element would lie behind the end of memory. */
+    /* The last element would lie past the end of memory. */
     const size_t long_strides[] = {SIZE_MAX, SIZE_MAX / 9, SIZE_MAX / 18 + 1};
     for (size_t i = 0; i < sizeof long_strides / sizeof *long_strides; i++) {
         call c = good_call();
@@ -436,11 +436,11 @@ static void impossible_strides_are_refused(void)
     CHECK(all_bytes_are(memory, sizeof memory, 0xc7));
 }
 
-/* Rays in the middle of memory, and answers so many bytes from the first of them. */
+/* Puts rays in the middle of the memory, and answers `distance` bytes after the first of them. */
 static void check_overlap(bool is_refused, ptrdiff_t answer_bytes, size_t ray_stride,
                           size_t answer_stride, ptrdiff_t distance, size_t count)
 {
-    /* All zero bytes: rays that miss. */
+    /* All bytes are zero: invalid rays, which miss. */
     memset(memory, 0, sizeof memory);
     hgrid_ray *from = (hgrid_ray *)(void *)(memory + sizeof memory / 2);
     void *to = (unsigned char *)from + distance;
@@ -457,7 +457,7 @@ static void check_overlap(bool is_refused, ptrdiff_t answer_bytes, size_t ray_st
         CHECK(all_bytes_are(memory, sizeof memory, 0));
 }
 
-/* Compares with what every pair of elements says. */
+/* Compares the refusals with a test of every pair of elements. */
 static void overlaps_are_refused(void)
 {
     enum { COUNT = 5 };
@@ -480,14 +480,14 @@ static void overlaps_are_refused(void)
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_occluder_n(&grid, rays, 0, (uint32_t *)(void *)rays, 0, 1,
                                                  HGRID_COHERENCE_COHERENT, NULL));
 
-    /* Other strides must lie apart, even if no element meets another. */
+    /* With different strides the arrays may not interleave, even if no elements overlap. */
     check_overlap(true, 16, 64, 16, 0, COUNT);
     check_overlap(true, 16, 64, 128, 32, COUNT);
     check_overlap(true, 16, 128, 64, 32, COUNT);
     check_overlap(false, 16, 64, 16, 4 * 64 + 32, COUNT);
     check_overlap(false, 16, 64, 16, -5 * 16, COUNT);
     check_overlap(true, 16, 64, 16, -5 * 16 + 1, COUNT);
-    /* With one ray there is no next one, whatever the strides. */
+    /* With one ray, strides have no meaning. */
     check_overlap(false, 16, 32, 16, 32, 1);
     check_overlap(true, 16, 32, 16, 31, 1);
     check_overlap(false, 16, 4096, 16, -16, 1);
@@ -506,7 +506,7 @@ static void no_rays_are_no_error(void)
     EXPECT(HGRID_OK, hgrid_occluded_n(&grid, NULL, 0, NULL, 0, 0, coherence, NULL));
     EXPECT(HGRID_OK, hgrid_occluded_n(&grid, NULL, 64, NULL, 64, 0, coherence, &options));
     CHECK(work.primitive_tests == 1 && work.cell_steps == 2 && work.grid_steps == 3);
-    /* The same array for both: no byte of it is used. */
+    /* With no rays, both arrays may be the same: no byte of them is used. */
     EXPECT(HGRID_OK, hgrid_intersect_n(&grid, rays, 0, (hgrid_hit *)(void *)rays, 0, 0, coherence,
                                        NULL));
     EXPECT(HGRID_ERROR_NULL_ARGUMENT,

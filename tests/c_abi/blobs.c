@@ -1,8 +1,8 @@
-/* What happens to blobs that are not what they were? Each lies at a page that nobody may touch. */
+/* Damaged and foreign blobs. Each copy ends at a protected page. */
 
 #include "check.h"
 
-/* Where the header of a blob has its fields (core/src/blob.rs). */
+/* The offsets of fields in the header of a blob (core/src/blob.rs). */
 enum { BYTE_ORDER_AT = 8, VERSION_AT = 12, SIZE_AT = 16, TRIANGLES_AT = 32, METHOD_AT = 40,
        RESOLUTION_AT = 72, CHECKSUM_AT = 124 };
 
@@ -24,7 +24,7 @@ static void build(const hgrid_config *config)
                                  NULL));
 }
 
-/* Opening once some bytes are others; the view stays untouched. */
+/* Checks that opening fails after some bytes are replaced, and leaves the view untouched. */
 static void refuse(hgrid_status expected, size_t at, const void *bytes, size_t count)
 {
     unsigned char *changed = (unsigned char *)guarded_copy(blob, blob_bytes);
@@ -47,14 +47,14 @@ static void headers_are_checked(void)
     refuse(HGRID_ERROR_WRONG_BYTE_ORDER, BYTE_ORDER_AT, swapped, sizeof swapped);
     refuse(HGRID_ERROR_NOT_A_GRID, BYTE_ORDER_AT, &zero, sizeof zero);
     refuse(HGRID_ERROR_UNSUPPORTED_VERSION, VERSION_AT, &next_version, sizeof next_version);
-    /* The rest of the header has a checksum. */
+    /* A checksum covers the rest of the header. */
     refuse(HGRID_ERROR_CORRUPT, SIZE_AT, &larger, sizeof larger);
     refuse(HGRID_ERROR_CORRUPT, SIZE_AT, &smaller, sizeof smaller);
     refuse(HGRID_ERROR_CORRUPT, TRIANGLES_AT, &zero, sizeof zero);
     refuse(HGRID_ERROR_CORRUPT, RESOLUTION_AT, &zero, sizeof zero);
 }
 
-/* A grid of the method that is no more, with the checksum that its header would have. */
+/* A header with the number of the removed method and a correct checksum. */
 static void a_removed_method_is_refused_by_name(void)
 {
     unsigned char *old = (unsigned char *)guarded_copy(blob, blob_bytes);
@@ -78,7 +78,7 @@ static void a_removed_method_is_refused_by_name(void)
 static void every_shorter_blob_is_refused(void)
 {
     for (size_t bytes = 0; bytes < blob_bytes; bytes += bytes < 200 ? 1 : 64) {
-        /* A region starts at a multiple of 64, so only these sizes can end at the page. */
+        /* A region starts at a multiple of 64, so only these sizes can end at a protected page. */
         const void *start = bytes % 64 == 0 ? guarded_copy(blob, bytes) : blob;
         hgrid_grid grid;
         const hgrid_status status = hgrid_open(start, bytes, &mesh, &grid);
@@ -100,7 +100,7 @@ static void another_mesh_is_refused(void)
     EXPECT(HGRID_ERROR_MESH_MISMATCH, hgrid_open(blob, blob_bytes, &other, &grid));
 }
 
-/* The counts agree, so opening does; only validation looks at the triangles. */
+/* The counts agree, so the blob opens; only validation looks at the triangles. */
 static void a_changed_mesh_is_found(void)
 {
     static sheet changed;
@@ -125,8 +125,8 @@ static void answers(const hgrid_grid *grid, hgrid_hit hits[64])
     }
 }
 
-/* One bit of every byte at a time: queries end and stay inside, and what validation lets pass
- * answers as the whole blob does. No more bytes than `most` pass. */
+/* Flips one bit of each byte in turn: queries end and stay inside, and a blob that validates answers as the
+ * original. Fewer than `most` flips validate. */
 static void damage_is_harmless_and_found(size_t most)
 {
     unsigned char *damaged = (unsigned char *)guarded_copy(blob, blob_bytes);
@@ -161,7 +161,7 @@ int main(void)
     every_shorter_blob_is_refused();
     another_mesh_is_refused();
     a_changed_mesh_is_found();
-    /* In a tree a larger box is no error: it costs work, not hits. */
+    /* A box of a tree that is too large is no error: it costs work, not hits. */
     damage_is_harmless_and_found(blob_bytes / 4);
     const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
     build(&one_level);

@@ -1,4 +1,4 @@
-/* How much memory: enough for any mesh, for this one, and the best grid for a budget. */
+/* Memory sizes: enough for any mesh, enough for this one, and the finest grid for a budget. */
 
 #include "check.h"
 
@@ -95,7 +95,7 @@ static void macros_are_no_less_than_the_function(void)
     }
 }
 
-/* Too little scratch is no error: it is not used. */
+/* Too little scratch for sizes is no error: it is not used. */
 static void sizes_are_told_with_any_scratch(void)
 {
     for (int method = 0; method < METHODS; method++) {
@@ -125,7 +125,7 @@ static void check_fit(const hgrid_config *config, size_t budget, void *scratch, 
     CHECK(memcmp(&fitted, &in_place, sizeof fitted) == 0);
     CHECK(memcmp(&report, &again, sizeof report) == 0);
     if (status == HGRID_ERROR_INDEX_TOO_SMALL) {
-        /* Nothing was written, and what it asks for helps. */
+        /* Nothing was written, and the size that it asks for is enough. */
         EXPECT(status, hgrid_fit(&mesh, config, budget, scratch, bytes, &fitted, NULL));
         CHECK(memcmp(&fitted, config, sizeof fitted) == 0 && report.index_bytes > budget);
         CHECK(report.triangle == HGRID_INVALID_ID);
@@ -137,7 +137,7 @@ static void check_fit(const hgrid_config *config, size_t budget, void *scratch, 
     EXPECT(HGRID_OK, status);
     CHECK(report.index_bytes <= budget && report.is_exact == (scratch != NULL));
 
-    /* The rest is the caller's. */
+    /* All fields but the density stay as the caller set them. */
     const double cells = fitted.density;
     CHECK(fitted.density <= config->density);
     CHECK(cells <= *finest * 1.0001);
@@ -146,7 +146,7 @@ static void check_fit(const hgrid_config *config, size_t budget, void *scratch, 
     rest.density = config->density;
     CHECK(memcmp(&rest, config, sizeof rest) == 0);
 
-    /* It is built in the budget, and what is a step finer needs more. */
+    /* The grid fits the budget, and a grid with one step more density needs more. */
     fitted.progress = NULL;
     EXPECT(HGRID_OK, hgrid_sizes(&mesh, &fitted, scratch, bytes, &again));
     void *index = guarded((budget + 63) / 64 * 64), *enough = guarded(again.scratch_bytes);
@@ -181,7 +181,7 @@ static void the_finest_grid_that_fits_is_found(void)
             const bool is_planned = config.method == HGRID_METHOD_ONE_LEVEL
                                     || config.method == HGRID_METHOD_FIXED;
             if (!with && !is_planned) {
-                /* Their bounds say nothing of what a mesh takes. */
+                /* Without scratch these methods have only bounds, which say nothing about this mesh. */
                 EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL,
                        hgrid_fit(&mesh, &config, SIZE_MAX, scratch, bytes, &fitted, &report));
                 CHECK(report.scratch_bytes > 0);

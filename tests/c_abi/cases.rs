@@ -1,5 +1,5 @@
-//! One table of questions with answers by brute force, for every language that asks them: meshes,
-//! and for each of them configurations, rays under options, and points.
+//! One table of queries with answers by brute force, for every language: meshes, and for each of them
+//! configurations, rays under options, and points.
 
 use hgrid_core::{
     ClosestPoint, Config, Cull, Grid, Hit, INVALID_ID, Method, Parameters, Ray, Strided,
@@ -11,7 +11,7 @@ use hgrid_tests::oracle::all_hits;
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 
-/// A mesh, and what is asked about it.
+/// A mesh with its queries.
 pub(crate) struct Case {
     mesh: Mesh,
     masks: Vec<u32>,
@@ -21,13 +21,13 @@ pub(crate) struct Case {
     pub(crate) points: Vec<Point>,
 }
 
-/// Options, and for each ray the hits that a filter is offered: from near to far, all that are not
-/// masked, culled or skipped.
+/// Options, and for each ray the hits that a filter is offered: from near to far, all that are not masked,
+/// culled or skipped.
 pub(crate) struct Group {
     pub(crate) mask: u32,
     pub(crate) cull: Cull,
     pub(crate) skip: u32,
-    /// What the filter says, see [`verdict`]. The first rule is no filter at all.
+    /// The rule of the filter, see [`verdict`]. Rule 0 is no filter at all.
     pub(crate) rule: u32,
     pub(crate) offered: Vec<Vec<Hit>>,
 }
@@ -41,18 +41,18 @@ pub(crate) struct Point {
     pub(crate) answer: Option<ClosestPoint>,
 }
 
-/// What the filter of a rule says of a triangle. `answers.h` says the same in C.
+/// Returns the verdict of a rule's filter about a triangle. `answers.h` has the same in C.
 pub(crate) fn verdict(rule: u32, primitive: u32) -> Verdict {
     match (rule, primitive) {
         (2, p) if p.is_multiple_of(5) => Verdict::AcceptAndStop,
         (2, p) if p.is_multiple_of(4) => Verdict::Reject,
-        // The third says something unknown, which counts as this.
+        // Rule 3 returns an unknown value in C, which counts as a rejection.
         (1 | 3, p) if p.is_multiple_of(2) => Verdict::Reject,
         _ => Verdict::Accept,
     }
 }
 
-/// Of the hits that are offered, those that count.
+/// Returns the offered hits that count.
 pub(crate) fn accepted(rule: u32, offered: &[Hit]) -> Vec<Hit> {
     let mut hits = Vec::new();
     for hit in offered {
@@ -68,7 +68,7 @@ pub(crate) fn accepted(rule: u32, offered: &[Hit]) -> Vec<Hit> {
 }
 
 impl Case {
-    /// The mesh as the library takes it.
+    /// Returns the mesh in the library's form.
     pub(crate) fn view(&self) -> TriangleMesh<'_> {
         let view = self.mesh.view();
         if self.masks.is_empty() {
@@ -77,7 +77,7 @@ impl Case {
         view.with_masks(Strided::new(&self.masks)).expect("as many masks as triangles")
     }
 
-    /// Puts questions about a mesh and answers them.
+    /// Makes the queries of a mesh and answers them.
     fn new(mesh: Mesh, has_masks: bool, seed: u64) -> Self {
         let mut random = Random(seed);
         let masks = if has_masks { (0..).take(mesh.indices.len()).collect() } else { Vec::new() };
@@ -85,7 +85,7 @@ impl Case {
         let configs = Method::ALL.iter().copied().map(Config::new).chain(configs()).collect();
         let mut case = Self { mesh, masks, configs, rays, groups: Vec::new(), points: Vec::new() };
 
-        // The grid only says how large the mesh is, and skips what is not finite.
+        // The grid only tells the mesh's bounds, and skips triangles that are not finite.
         let owned = Owned::build(&case.view(), &Config::default()).expect("a sound mesh");
         let grid = owned.open(&case.view()).expect("its own mesh");
         let some = random.below(case.mesh.indices.len().max(1)) as u32;
@@ -121,7 +121,7 @@ impl Case {
     }
 }
 
-/// The closest point, by a loop over all triangles.
+/// Returns the closest point, by a loop over all triangles.
 fn closest(
     grid: &Grid<'_>,
     point: [f32; 3],
@@ -132,13 +132,13 @@ fn closest(
     let sees = |&id: &u32| id != skip && (mask == u32::MAX || grid.mesh().mask(id) & mask != 0);
     let ids = (0..grid.mesh().triangle_count()).filter(sees);
     let all = ids.filter_map(|id| ClosestPoint::on_triangle(&grid.mesh().triangle(id)?, id, point));
-    // The first of equals, so the lowest id.
+    // Of equals, keep the first, which has the lowest id.
     let closest = all.reduce(|a, b| if b.distance < a.distance { b } else { a });
     closest.filter(|closest| closest.distance <= max)
 }
 
-/// Rays from around a mesh into it, through its corners and along the axes, some short, some from
-/// inside, and some that are none.
+/// Returns rays from around a mesh into it, through its corners and along the axes, some short, some from
+/// inside, and some invalid.
 fn rays(mesh: &Mesh, random: &mut Random) -> Vec<Ray> {
     let corner = |random: &mut Random| match mesh.positions.len() {
         0 => [0.0; 3],
@@ -167,7 +167,7 @@ fn rays(mesh: &Mesh, random: &mut Random) -> Vec<Ray> {
     (0..150).map(&mut ray).collect()
 }
 
-/// Points around a mesh, in it, and on its corners, and how far to look.
+/// Returns points around a mesh, in it, and on its corners, each with a search distance.
 fn points(mesh: &Mesh, random: &mut Random) -> Vec<([f32; 3], f32)> {
     let point = |number: usize| {
         let max = [f32::INFINITY, 1.0, 0.1, 0.0][number % 4];
@@ -182,8 +182,8 @@ fn points(mesh: &Mesh, random: &mut Random) -> Vec<([f32; 3], f32)> {
     (0..40).map(point).collect()
 }
 
-/// Sheets behind each other, each of them twice: more hits on a ray than a walk collects at
-/// once, two by two at the same `t`.
+/// Returns sheets one behind the other, each of them twice: more hits on a ray than one walk collects, in
+/// pairs with the same `t`.
 fn stack() -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..40 {
@@ -194,7 +194,7 @@ fn stack() -> Mesh {
     mesh
 }
 
-/// A ball with corners that are nowhere, and triangles without area.
+/// Returns a ball with corners that are not finite, and triangles without area.
 fn damaged() -> Mesh {
     let mut mesh = ball(6, 1.0);
     mesh.positions[3][1] = f32::NAN;
@@ -204,7 +204,7 @@ fn damaged() -> Mesh {
     mesh
 }
 
-/// The table.
+/// Returns the table.
 pub(crate) fn cases() -> Vec<Case> {
     vec![
         Case::new(Mesh::default(), false, 1),
@@ -217,7 +217,7 @@ pub(crate) fn cases() -> Vec<Case> {
     ]
 }
 
-/// The table as bytes for programs in C and C++, which `answers.h` reads.
+/// Returns the table as bytes for programs in C and C++, which `answers.h` reads.
 pub(crate) fn bytes(cases: &[Case], grid: impl Fn(&Case, &Config) -> Built) -> Vec<u8> {
     let mut out = Bytes::default();
     out.count(cases.len());
@@ -264,7 +264,7 @@ pub(crate) fn bytes(cases: &[Case], grid: impl Fn(&Case, &Config) -> Built) -> V
     out.0
 }
 
-/// The fields of `hgrid_config` from `method` to `quality`, but for `tasks`; those of other methods are 0.
+/// Returns the fields of `hgrid_config` from `method` to `quality`, except `tasks`; those of other methods are 0.
 fn fields(config: &Config) -> [u32; 8] {
     let (method, density) = (config.method() as u32, config.parameters.density().unwrap_or(0.0));
     let [factor, above, depth, quality] = match config.parameters {
@@ -277,14 +277,13 @@ fn fields(config: &Config) -> [u32; 8] {
     [method, density.to_bits(), factor, above, depth, 0, config.flags.bits(), quality]
 }
 
-/// A grid's bytes, and the work of finding the closest hits and any
-/// hits of all rays, for each group.
+/// A grid's bytes, and for each group the work of the closest-hit and any-hit queries of all rays.
 pub(crate) struct Built {
     pub(crate) blob: Vec<u8>,
     pub(crate) counters: Vec<u64>,
 }
 
-/// Bytes in the order of this machine.
+/// Bytes in the byte order of this machine.
 #[derive(Default)]
 struct Bytes(Vec<u8>);
 

@@ -1,4 +1,4 @@
-/* What the C programs of this folder share. All of them also compile as C++. */
+/* Helpers of the C programs of this folder. All programs also compile as C++. */
 #ifndef CHECK_H
 #define CHECK_H
 
@@ -21,10 +21,10 @@
         } \
     } while (0)
 
-/* Checks what a call returns, and tells the test which function reached which status. */
+/* Checks the status of a call, and prints which function returned which status. */
 #define EXPECT(expected, call) EXPECT_OF(#call, expected, call)
 
-/* The same for a proof. */
+/* The same for a validation. */
 #define EXPECT_PROOF(expected, grid) \
     EXPECT_OF("hgrid_validate(" #grid ", scratch, bytes)", expected, proof(grid))
 
@@ -39,7 +39,7 @@
         reached(text, status_); \
     } while (0)
 
-/* Proves a grid in scratch of just the size that it asks for. */
+/* Validates a grid in scratch of exactly the size that it asks for. */
 static inline hgrid_status proof(const hgrid_grid *grid)
 {
     const size_t bytes = hgrid_validate_bytes(grid);
@@ -49,7 +49,7 @@ static inline hgrid_status proof(const hgrid_grid *grid)
     return status;
 }
 
-/* Tells it of a call like "hgrid_open(...)", each pair once. */
+/* Prints the name of a function and the status that it returned, each pair once. */
 static inline void reached(const char *call, hgrid_status status)
 {
     static char told[64][256];
@@ -64,9 +64,9 @@ static inline void reached(const char *call, hgrid_status status)
     puts(line);
 }
 
-/* Memory that ends where a page ends that nobody may touch, so that reading or writing one byte
- * behind it stops the program, also inside a library that no sanitizer watches. Filled with a
- * pattern that is no sensible float, index or count. Never freed. */
+/* Returns memory that ends at a protected page, so that reading or writing one byte past it stops the
+ * program, even inside a library without sanitizers. It is filled with a pattern that is no sensible float,
+ * index or count, and never freed. */
 static inline void *guarded(size_t bytes)
 {
     const size_t page = (size_t)sysconf(_SC_PAGESIZE);
@@ -80,7 +80,7 @@ static inline void *guarded(size_t bytes)
     return all + (pages - 1) * page - bytes;
 }
 
-/* A copy in such memory. */
+/* Returns a copy in such memory. */
 static inline void *guarded_copy(const void *from, size_t bytes)
 {
     void *copy = guarded(bytes);
@@ -98,7 +98,7 @@ static inline bool all_bytes_are(const void *memory, size_t bytes, unsigned char
     return true;
 }
 
-/* A wavy sheet of SIDE * SIDE squares over the unit square, seen from above without a hole. */
+/* A wavy sheet of SIDE * SIDE squares over the unit square, without holes when seen from above. */
 enum { SIDE = 12, VERTICES = (SIDE + 1) * (SIDE + 1), TRIANGLES = 2 * SIDE * SIDE };
 
 typedef struct {
@@ -144,21 +144,21 @@ static inline hgrid_config usual(int method)
     return all[method];
 }
 
-/* The closest point to a point, however far it is. */
+/* Returns a query for the closest point at any distance. */
 static inline hgrid_point_query anywhere(const float point[3])
 {
     const hgrid_point_query query = {{point[0], point[1], point[2]}, INFINITY};
     return query;
 }
 
-/* A ray straight down onto the sheet. */
+/* Returns a ray straight down onto the sheet. */
 static inline hgrid_ray ray_down(float x, float y)
 {
     const hgrid_ray ray = {{x, y, 1}, 0, {0, 0, -1}, INFINITY};
     return ray;
 }
 
-/* Exact sizes, by both questions. */
+/* Returns the exact sizes, and compares them with the sizes without scratch. */
 static inline hgrid_report exact_sizes(const hgrid_mesh *mesh, const hgrid_config *config)
 {
     hgrid_report enough = HGRID_REPORT_INIT, exact = HGRID_REPORT_INIT;
@@ -174,7 +174,7 @@ static inline hgrid_report exact_sizes(const hgrid_mesh *mesh, const hgrid_confi
     return exact;
 }
 
-/* A grid in memory of exactly its size. `blob`, `blob_bytes`: where it lies; may be NULL. */
+/* Builds a grid in memory of exactly its size. Stores the address and size in `blob` and `blob_bytes` unless NULL. */
 static inline hgrid_grid build_exactly(const hgrid_mesh *mesh, const hgrid_config *config,
                                        void **blob, size_t *blob_bytes)
 {

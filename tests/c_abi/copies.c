@@ -1,5 +1,5 @@
-/* A program with two copies of the library, one of them under names that start with other_: a grid
- * of the one answers in the other. */
+/* A program with two copies of the library, one of them under names that start with other_: a grid of one
+ * copy answers in the other. */
 
 #include "check.h"
 

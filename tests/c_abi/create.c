@@ -1,5 +1,5 @@
-/* Does hgrid_create build what hgrid_build builds, in memory that it gives back to the byte, whatever
- * goes wrong? For libraries with the feature malloc. */
+/* hgrid_create builds what hgrid_build builds, and gives back every byte of its memory, whatever fails. For
+ * libraries with the feature malloc. */
 
 #ifndef HGRID_MALLOC
 #define HGRID_MALLOC
@@ -9,15 +9,15 @@
 static sheet mesh_data;
 static hgrid_mesh mesh;
 
-/* Takes a note of every block that is out, and runs out of memory on demand. */
+/* An allocator that records every live block, and fails on demand. */
 typedef struct {
     struct {
         void *start;
         size_t bytes, alignment;
     } blocks[8];
     size_t live, calls, bytes;
-    size_t fail_at;  /* the call, from 1, that gets nothing; 0: none */
-    size_t shift;    /* what is given starts so many bytes too late */
+    size_t fail_at;  /* the number of the call, from 1, that fails; 0: none */
+    size_t shift;    /* the bytes by which the address is off */
 } arena;
 
 static arena new_arena(void)
@@ -67,10 +67,10 @@ static hgrid_allocator allocator_of(arena *a)
     return allocator;
 }
 
-/* A view that no call may have touched. */
+/* A view that no call may touch. */
 static hgrid_grid untouched;
 
-/* A call that is refused: the address of the view is as it was, nothing is out. */
+/* Checks a refused call: the view pointer is unchanged, and no memory is held. */
 static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
                            const hgrid_config *config, arena *a)
 {
@@ -83,7 +83,7 @@ static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
     return report;
 }
 
-/* A grid that was created answers as one that was built, and tells the same about itself. */
+/* Checks that a created grid answers as a built one, with the same report. */
 static void compare_with_a_build(const hgrid_grid *grid, const hgrid_report *report,
                                  const hgrid_config *config)
 {
@@ -127,14 +127,14 @@ static void all_memory_is_given_back_as_it_was_asked_for(void)
         hgrid_grid *grid = NULL;
         hgrid_report report = HGRID_REPORT_INIT;
         {
-            /* The struct itself is gone when the grid is destroyed. */
+            /* The allocator struct no longer exists when the grid is destroyed. */
             hgrid_allocator allocator = allocator_of(&a);
             EXPECT(HGRID_OK, hgrid_create(&mesh, &config, &allocator, &grid, &report));
             memset(&allocator, 0xc7, sizeof allocator);
         }
         compare_with_a_build(grid, &report, &config);
 
-        /* The grid is all that is out: the exact index and a little for the view. */
+        /* Only the grid's block is live: the exact index and a little for the view. */
         const hgrid_report need = exact_sizes(&mesh, &config);
         CHECK(a.live == 1 && a.calls == 2);
         CHECK(a.bytes > need.index_bytes && a.bytes < need.index_bytes + 1024);
@@ -183,8 +183,8 @@ static void memory_that_is_not_aligned_is_given_back(void)
     }
 }
 
-/* A build that fails when both regions are there gives both back. It takes an allocator that gives the
- * same memory twice, which is refused as regions that overlap. */
+/* Memory of an allocator that returns the same block twice, which a build refuses as overlapping regions: the
+ * build fails with both regions allocated, and must give both back. */
 static HGRID_ALIGNED unsigned char only_region[1 << 17];
 static size_t times_released;
 
@@ -235,7 +235,7 @@ static void null_is_refused_where_it_is_not_allowed(void)
     refuse(HGRID_ERROR_NULL_ARGUMENT, &input, NULL, &a);
     CHECK(grid == &untouched && a.calls == 0);
 
-    /* Config, allocator and report may be NULL, and so may what is destroyed. */
+    /* Config, allocator and report may be NULL, and so may the argument of hgrid_destroy. */
     EXPECT(HGRID_OK, hgrid_create(&mesh, NULL, NULL, &grid, NULL));
     EXPECT_PROOF(HGRID_OK, grid);
     puts("null hgrid_create.config\nnull hgrid_create.allocator\nnull hgrid_create.report");
@@ -244,7 +244,7 @@ static void null_is_refused_where_it_is_not_allowed(void)
     puts("null hgrid_destroy.grid");
 }
 
-/* Creates and destroys, all in one. */
+/* Creates a grid and destroys it. */
 static hgrid_status create(const hgrid_mesh *input, const hgrid_config *config,
                            const hgrid_allocator *allocator, hgrid_report *report)
 {
@@ -282,7 +282,7 @@ static void what_a_build_refuses_is_refused(void)
     broken = mesh_data;
     broken.indices[77][1] = VERTICES;
     hgrid_mesh input = mesh_of(&broken);
-    /* A grid asks for no memory before it has read the mesh; a tree needs some to read it. */
+    /* A grid takes no memory before it has read the mesh; a tree needs some to read it. */
     CHECK(refuse(HGRID_ERROR_INDEX_OUT_OF_RANGE, &input, &grids, &a).triangle == 77);
     CHECK(a.calls == 0);
     CHECK(refuse(HGRID_ERROR_INDEX_OUT_OF_RANGE, &input, NULL, &a).triangle == 77);

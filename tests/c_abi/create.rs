@@ -1,5 +1,4 @@
-//! `hgrid_create`, which only one flavour of the library has: what
-//! `programs` does not ask about it.
+//! `hgrid_create`, which only one flavour of the library has: the tests that `programs` does not have.
 
 use std::fs;
 use std::process::Command;

@@ -1,4 +1,4 @@
-/* The example in the header of hgrid_create, put in place of FUNCTIONS and run: three rays, two hits. */
+/* Runs the example in the header of hgrid_create, which replaces FUNCTIONS: three rays, two hits. */
 
 #define HGRID_MALLOC
 #include <hgrid.h>

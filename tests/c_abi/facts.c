@@ -1,4 +1,4 @@
-/* Prints what the header says as numbers, one "name value" a line, for the test to compare. */
+/* Prints the header's numbers, one "name value" a line, for the test to compare. */
 
 #define HGRID_MALLOC
 #include <hgrid.h>
@@ -276,7 +276,7 @@ static void versions(void)
     printf("function_text %s\n", hgrid_version_string());
 }
 
-/* What an _INIT macro sets, one "name struct_size and the other fields" a line. */
+/* Prints the values that each _INIT macro sets, one "name struct_size and the other fields" a line. */
 static void defaults(void)
 {
     const hgrid_mesh m = HGRID_MESH_INIT;

@@ -1,4 +1,4 @@
-//! The header: is it current, and does it hold what it promises without any help?
+//! The header is current, and complete without any other file.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,15 +9,15 @@ use hgrid_core::{Config, Method, Parameters, Quality, Scene, Sizes};
 use hgrid_tests::artefact::{Flavour, compiler, compilers, is_cpp, root, run, static_library};
 use tempfile::TempDir;
 
-/// The dialects that renderers are written in.
+/// The C and C++ dialects that renderers are written in.
 pub(crate) const DIALECTS: [&str; 7] = ["c99", "c11", "c17", "c++11", "c++14", "c++17", "c++20"];
 
-/// The committed header.
+/// Returns the committed header.
 pub(crate) fn committed() -> String {
     fs::read_to_string(root().join("include/hgrid.h")).expect("include/hgrid.h")
 }
 
-/// Returns the header as a program for a flavour sees it: without `HGRID_MALLOC`, the lines that need it are not there.
+/// Returns the header as a program for a flavour sees it: without `HGRID_MALLOC`, the lines that need it are missing.
 pub(crate) fn seen_by(flavour: Flavour) -> String {
     let (mut header, mut rest) = (String::new(), committed());
     while let Some((before, behind)) = rest.split_once("\n#if defined(HGRID_MALLOC)\n") {
@@ -33,7 +33,7 @@ pub(crate) fn seen_by(flavour: Flavour) -> String {
     header + &rest
 }
 
-/// The functions that the header declares.
+/// Returns the functions that the header declares.
 pub(crate) fn functions(flavour: Flavour) -> Vec<String> {
     let header = seen_by(flavour);
     let is_code = |line: &&str| !line.starts_with([' ', '#', '/']) && !line.starts_with("typedef");
@@ -42,7 +42,7 @@ pub(crate) fn functions(flavour: Flavour) -> Vec<String> {
     names.map(str::to_owned).collect()
 }
 
-/// What the header says of a function, each paragraph in one line.
+/// Returns the header's comment on a function, each paragraph in one line.
 pub(crate) fn documentation(function: &str) -> String {
     let header = committed();
     let is_text = |line: &&str| !line.contains(&format!("{function}(")) || line.starts_with(' ');
@@ -52,15 +52,15 @@ pub(crate) fn documentation(function: &str) -> String {
     text.replace("\n * ", " ")
 }
 
-/// What a function takes.
+/// A parameter of a function.
 pub(crate) struct Parameter {
     pub(crate) name: String,
-    /// Its type without `const`, `struct` and `*`.
+    /// The type without `const`, `struct` and `*`.
     pub(crate) kind: String,
     pub(crate) is_pointer: bool,
 }
 
-/// What a function takes, in order.
+/// Returns the parameters of a function, in order.
 pub(crate) fn parameters(function: &str) -> Vec<Parameter> {
     let header = committed();
     let is_declared =
@@ -81,7 +81,7 @@ pub(crate) fn parameters(function: &str) -> Vec<Parameter> {
     parameters.map(parameter).collect()
 }
 
-/// The functions in C between the comments.
+/// Returns the C functions in the header's comments.
 pub(crate) fn examples(header: &str) -> Vec<String> {
     let blocks = header.split("```").skip(1).step_by(2);
     let blocks = blocks.filter_map(|block| block.strip_prefix("c\n"));
@@ -93,7 +93,7 @@ pub(crate) fn examples(header: &str) -> Vec<String> {
     blocks.map(|block| block.lines().map(code).collect()).collect()
 }
 
-/// The statuses that the header defines.
+/// Returns the statuses that the header defines.
 pub(crate) fn statuses() -> BTreeMap<String, i32> {
     let header = committed();
     let lines = header.lines().filter_map(|line| line.strip_prefix("#define "));
@@ -104,7 +104,7 @@ pub(crate) fn statuses() -> BTreeMap<String, i32> {
         .collect()
 }
 
-/// What `facts.c` prints.
+/// Returns the output of `facts.c`.
 fn facts() -> &'static str {
     static FACTS: OnceLock<String> = OnceLock::new();
     FACTS.get_or_init(|| {
@@ -116,7 +116,7 @@ fn facts() -> &'static str {
     })
 }
 
-/// The value of a fact.
+/// Returns the value of a fact.
 fn fact(name: &str) -> &'static str {
     let value = facts().lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
     value.unwrap_or_else(|| panic!("no {name} in facts.c"))
@@ -130,13 +130,13 @@ fn it_is_current() {
     let mut generated = Vec::new();
     builder.generate().expect("cbindgen understands the sources").write(&mut generated);
     let generated = String::from_utf8(generated).expect("text");
-    // What C of 1989 takes for a comment; cbindgen writes these two lines itself.
+    // C89 has no other comments; cbindgen writes these two lines itself.
     let generated = generated
         .replace("// extern \"C\"", "/* extern \"C\" */")
         .replace("// __cplusplus", "/* __cplusplus */");
 
     if std::env::var_os("HGRID_BLESS").is_some() {
-        // In one step: the other tests are reading it.
+        // Replace the file in one step: other tests read it meanwhile.
         let fresh = root().join("include/hgrid.h.fresh");
         fs::write(&fresh, &generated).expect("include/ can be written");
         fs::rename(fresh, root().join("include/hgrid.h")).expect("include/ can be written");
@@ -163,14 +163,14 @@ fn it_compiles_in_the_oldest_dialect_with_all_that_it_defines() {
     let source = dir.path().join("old.c");
     fs::write(&source, "#define HGRID_MALLOC\n#include <hgrid.h>\n").expect("a file");
     for mut compiler in compilers("c89") {
-        // The compiler's own <stdbool.h> needs the one: _Bool is younger.
+        // The compiler's own <stdbool.h> needs one of them, because `_Bool` is younger.
         let named = ["-Wno-long-long", "-Wno-unknown-warning-option", "-Wno-c99-extensions"];
         run(compiler.arg("-pedantic-errors").args(named).arg("-fsyntax-only").arg(&source));
     }
 }
 
-/// Programs that are compiled without the processor's registers for floats, such as kernels, pass a
-/// float elsewhere than the library does.
+/// Programs that are compiled without floating-point registers, such as kernels, pass floats elsewhere than
+/// the library does.
 #[test]
 fn no_function_takes_or_returns_a_float_by_value() {
     let declarations = declarations(&committed());
@@ -184,8 +184,7 @@ fn no_function_takes_or_returns_a_float_by_value() {
     }
 }
 
-/// What is called, by C or by the library: functions, types of functions and pointers to them, each in
-/// one line.
+/// Returns all functions, function types and function pointers of the header, each in one line.
 fn declarations(header: &str) -> Vec<String> {
     let is_text = |line: &&str| !line.trim_start().starts_with(['*', '/', '#']);
     let code: Vec<_> = header.lines().filter(is_text).map(str::trim).collect();
@@ -211,7 +210,7 @@ fn its_macros_give_no_warning_in_any_dialect() {
     });
 }
 
-/// Shows `visit` each compiler in each dialect with the language's name.
+/// Shows `visit` each compiler in each dialect, with the language's name.
 fn for_every_compiler(mut visit: impl FnMut(&mut Command, &str)) {
     for dialect in DIALECTS {
         let language = if is_cpp(dialect) { "c++" } else { "c" };
@@ -241,7 +240,7 @@ fn sizes_offsets_and_numbers_never_change() {
     assert!(count > 70);
 }
 
-/// The structs of the header, and their fields.
+/// Returns the structs of the header, and their fields.
 pub(crate) fn structs() -> Vec<(String, Vec<String>)> {
     let mut structs: Vec<(String, Vec<String>)> = Vec::new();
     let mut is_inside = false;
@@ -286,7 +285,7 @@ fn versions_are_those_of_the_package() {
 
 #[test]
 fn initialisers_are_the_defaults() {
-    // All else is 0 or NULL.
+    // All other fields are 0 or NULL.
     for (name, fields) in [
         ("mesh", "0 0 0 0 0 0 0 0 0 0 0"),
         ("query_options", "0xffffffff 0 0xffffffff 0 0 0 0 0 0 0"),
@@ -301,7 +300,7 @@ fn initialisers_are_the_defaults() {
         assert_eq!(fact(name), format!("{} {fields}", fact(&format!("hgrid_{name}"))), "{name}");
     }
     for parameters in Method::ALL.iter().copied().map(Parameters::new) {
-        // Each macro sets what is the paper's for other methods, too.
+        // Each macro also sets the paper's values for other methods.
         let (mut factor, mut above, mut levels) = (6, 16, 3);
         match parameters {
             Parameters::Fixed { macrocell_factor, .. } => factor = macrocell_factor,
@@ -310,7 +309,7 @@ fn initialisers_are_the_defaults() {
             _ => {}
         }
         let (size, density) = (fact("hgrid_config"), parameters.density().unwrap_or(4.0));
-        // One task, and nobody is asked on the way.
+        // One task, and no progress callback.
         let fields = format!("{size} {density} {factor} {above} {levels} 0 0 1 0 0 0 0");
         let method = parameters.method();
         assert_eq!(fact(&format!("config_{}", method as u32)), fields, "{method:?}");
@@ -324,7 +323,7 @@ fn bounds_are_no_less_than_those_of_core() {
     for line in facts().lines().filter_map(|line| line.strip_prefix("bounds ")) {
         let numbers: Vec<usize> = line.split(' ').map(|word| word.parse().unwrap()).collect();
         let [triangles, proof, scene, all @ ..] = &numbers[..] else { panic!("{line}") };
-        // Whole words of a bit for each triangle.
+        // The proof takes one bit for each triangle, in whole words.
         let least = triangles.div_ceil(32) * 4;
         assert!((least..=least + 4).contains(proof), "{line}");
         let triangles = u32::try_from(*triangles).unwrap();
@@ -343,7 +342,7 @@ fn bounds_are_no_less_than_those_of_core() {
             let Some(bound) = bound else { continue };
             let bounds = [bound.index_bytes, bound.scratch_bytes];
             assert!(macros.iter().zip(bounds).all(|(&given, bound)| given >= bound), "{line}");
-            // Nobody is asked for much more than what a static array in Rust takes.
+            // The macros ask for little more than the exact bound of core.
             let slack = bound.index_bytes / 16 + 1280;
             let is_close = macros[0] <= bound.index_bytes + slack;
             assert!(triangles > 1_000_000 || is_close, "{line}: {bound:?}");
@@ -381,7 +380,7 @@ fn its_example_runs() {
 #[test]
 fn its_functions_examples_run() {
     let examples = examples(&seen_by(Flavour::Bare));
-    // A new one that the program does not call is an unused function: a warning, so an error.
+    // A new example that the program does not call is an unused function: a warning, so an error.
     assert!(examples.len() >= 5);
     let source = include_str!("tile.c").replace("FUNCTIONS", &examples.join("\n"));
 

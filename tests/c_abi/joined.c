@@ -1,9 +1,9 @@
-/* Meshes that are joined: a grid of them is that of one mesh with the same triangles, and each triangle knows
- * where it comes from. */
+/* Joined meshes: their grid is that of one mesh with the same triangles, and each triangle can be located in
+ * its own mesh. */
 
 #include "check.h"
 
-/* The first triangles of a sheet, an empty mesh, and the others in structs of their owner. */
+/* The first triangles of a sheet, an empty mesh, and the other triangles in structs of the caller. */
 enum { MESHES = 3, LOW = 100, HIGH = TRIANGLES - LOW };
 
 typedef struct {
@@ -85,7 +85,7 @@ static bool is_proven(const hgrid_grid *grid)
     return hgrid_validate(grid, guarded(bytes), bytes) == HGRID_OK;
 }
 
-/* Asks both grids the same. */
+/* Puts the same queries to both grids. */
 static void answers_are_the_same(const hgrid_grid *one, const hgrid_grid *other)
 {
     enum { RAYS = 64 };
@@ -141,7 +141,7 @@ static void a_grid_of_them_is_that_of_one(int method)
     uint32_t geometry, number;
     CHECK(hgrid_locate(&one, LOW, &geometry, &number) && geometry == 0 && number == LOW);
 
-    /* It knows its mesh, which opens the blob again. */
+    /* The grid knows its mesh, which opens the blob again. */
     hgrid_mesh found = HGRID_MESH_INIT;
     EXPECT(HGRID_OK, hgrid_mesh_of(&grid, &found));
     CHECK(memcmp(&found, &joined, sizeof found) == 0);
@@ -149,7 +149,7 @@ static void a_grid_of_them_is_that_of_one(int method)
     EXPECT(HGRID_OK, hgrid_open(blobs[1], bytes[1], &found, &again));
     answers_are_the_same(&again, &one);
 
-    /* Packed it is one mesh, and still knows whose triangles they are. */
+    /* The packed blob has one mesh, and still knows the parts. */
     uint64_t packed_bytes;
     EXPECT(HGRID_ERROR_INDEX_TOO_SMALL, hgrid_pack(&grid, NULL, 0, &packed_bytes));
     void *packed = guarded((size_t)packed_bytes);
@@ -205,7 +205,7 @@ static void bad_triangles_are_named(void)
     prepare();
 }
 
-/* A joined mesh with something changed. */
+/* Checks that a changed joined mesh is refused. */
 static void refuse(hgrid_status expected, const hgrid_mesh *mesh)
 {
     static unsigned char *index, *scratch;
@@ -254,7 +254,7 @@ static void parts_are_as_the_call_wrote_them(void)
     refuse(HGRID_ERROR_INVALID_PARTS, &wrong);
 }
 
-/* A join with something changed: nothing is written. */
+/* Checks that a changed join is refused and writes nothing. */
 static void refuse_join(hgrid_status expected, const hgrid_mesh *given, size_t count)
 {
     static hgrid_part to[MESHES];
@@ -296,7 +296,7 @@ static void what_cannot_be_joined(void)
     prepare();
 }
 
-/* Meshes, parts, regions: none of them over another. */
+/* Meshes, parts and regions may not overlap. */
 static void memory_lies_apart(void)
 {
     static union {
@@ -314,7 +314,7 @@ static void memory_lies_apart(void)
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_join(some, MESHES, shared.parts, &all));
     CHECK(memcmp(shared.positions, low.positions, sizeof low.positions) == 0);
 
-    /* Regions over the parts and over an array of one of them. */
+    /* Regions over the parts, and over an array of one of them. */
     hgrid_report need = HGRID_REPORT_INIT;
     EXPECT(HGRID_OK, hgrid_sizes(&joined, NULL, NULL, 0, &need));
     const size_t index_bytes = (size_t)need.index_bytes, at = sizeof parts + sizeof triangles;

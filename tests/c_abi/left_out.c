@@ -1,12 +1,12 @@
-/* Libraries that were built with fewer methods: are those they have the same, and do they say of the
- * others that they are left out? `left_out write DIR` stores the grid of every method and what it
- * answers, `left_out read DIR METHOD...` compares, with a library that has only these methods. */
+/* Libraries that were built with fewer methods: those that they have work the same, and the others are
+ * refused as left out. `left_out write DIR` stores the grid of every method and its answers; `left_out read
+ * DIR METHOD...` compares them in a library that has only these methods. */
 
 #include "check.h"
 
 enum { MOST_BYTES = 1 << 20, RAYS = 100 };
 
-/* All that a method is asked. */
+/* The answers of all queries of a method. */
 typedef struct {
     hgrid_report bound, fit;
     hgrid_statistics statistics;
@@ -18,7 +18,7 @@ static sheet mesh_data;
 static hgrid_mesh mesh;
 HGRID_ALIGNED static unsigned char index_memory[MOST_BYTES], scratch[MOST_BYTES];
 
-/* Asks all of them about a grid that lies in a blob. */
+/* Runs all queries on a grid that lies in a blob. */
 static void ask(const hgrid_config *config, const void *blob, size_t bytes, answers *a)
 {
     const hgrid_report report = HGRID_REPORT_INIT;
@@ -49,7 +49,7 @@ static void ask(const hgrid_config *config, const void *blob, size_t bytes, answ
     CHECK(memcmp(a->single, a->tiles, sizeof a->single) == 0);
 }
 
-/* The files of a method: its blob, and the answers. */
+/* Opens a file of a method: its blob or its answers. */
 static FILE *file_of(const char *dir, int method, const char *kind, const char *mode)
 {
     char path[4096];
@@ -76,7 +76,7 @@ static void write_all(const char *dir)
     }
 }
 
-/* A method that the library has builds the same grid as in one that has all, and answers the same. */
+/* Checks that a method builds the same grid and answers as in a library with all methods. */
 static void is_there(const hgrid_config *config, const void *stored, size_t stored_bytes,
                      const answers *expected)
 {
@@ -96,7 +96,7 @@ static bool is_never_called(void *context, uint32_t done)
     return false;
 }
 
-/* Calls what needs the method, with a configuration or NULL, and sees that nothing is written. */
+/* Checks that calls that need the method fail and write nothing, with a configuration or NULL. */
 static void is_refused(const hgrid_config *config, const void *stored, size_t stored_bytes)
 {
     const hgrid_report untouched = HGRID_REPORT_INIT;
@@ -131,13 +131,13 @@ static void is_left_out(const hgrid_config *config, const void *stored, size_t s
     hgrid_config told = *config;
     told.progress = is_never_called;
     is_refused(&told, stored, stored_bytes);
-    /* There is nothing to repair in it. */
+    /* Wrong parameters do not change the status. */
     told.density = -1;
     told.depth = told.macrocell_factor = 0;
     is_refused(&told, stored, stored_bytes);
     if (config->method == HGRID_METHOD_BVH)
         is_refused(NULL, stored, stored_bytes);
-    /* What a blob is can be told by any library. */
+    /* Any library can describe a blob. */
     hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
     EXPECT(HGRID_OK, hgrid_peek(stored, stored_bytes, &info));
     CHECK(info.method == config->method && info.grid_bytes == stored_bytes);

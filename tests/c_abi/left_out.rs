@@ -1,4 +1,4 @@
-//! Libraries with fewer methods, for little flash.
+//! Libraries with fewer methods, for devices with little flash.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use crate::programs::{SANITIZERS, compile};
 
-/// Features, and the methods that they bring.
+/// Cargo features, and the methods that they bring.
 const ONE: (&str, &[Method]) = ("fixed", &[Method::OneLevel, Method::Fixed]);
 const OTHERS: [(&str, &[Method]); 3] = [
     ("variable", &[Method::OneLevel, Method::Variable]),
@@ -19,7 +19,7 @@ const OTHERS: [(&str, &[Method]); 3] = [
     ("bvh", &[Method::Bvh]),
 ];
 
-/// What `left_out.c` prints with these libraries, about grids of a library that has all methods.
+/// Returns the output of `left_out.c` with these libraries, about grids of a library that has all methods.
 fn print(libraries: &[(&str, &[Method])]) -> String {
     let dir = TempDir::new().expect("a folder");
     let program = |name: &str, library: &Path| {
@@ -37,7 +37,7 @@ fn print(libraries: &[(&str, &[Method])]) -> String {
     outputs.collect()
 }
 
-/// The same with one library, made once.
+/// Returns the output with one of the libraries, computed once.
 pub(crate) fn printed() -> &'static str {
     static PRINTED: OnceLock<String> = OnceLock::new();
     PRINTED.get_or_init(|| print(&[ONE]))

@@ -1,4 +1,4 @@
-/* Uses every macro the way a program does, in every dialect, without a warning. */
+/* Uses every macro as a program does, in every dialect, without a warning. */
 
 #define HGRID_MALLOC
 #include <hgrid.h>

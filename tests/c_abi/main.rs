@@ -1,8 +1,8 @@
-//! Is the C library what its header says?
+//! The C library is what its header says.
 //!
-//! The header is made from the sources and compared; it is compiled alone in every dialect; its
-//! numbers are pinned; C programs, which are also C++, use the library as a stranger would; and the
-//! libraries' symbols show that there is nothing else in them.
+//! The tests generate the header from the sources and compare it; they compile it alone in every dialect;
+//! they pin its numbers; C programs, which are also C++, use the library by its header alone; and the
+//! libraries' symbols show that nothing else is in them.
 
 mod answers;
 mod cases;

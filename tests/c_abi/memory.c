@@ -1,5 +1,5 @@
-/* Is all memory touched that was said, and none beside it? Every array ends at a page that nobody
- * may touch (see guarded in check.h). */
+/* The library reads all the memory it was given, and none beside it. Every array ends at a protected page
+ * (see guarded in check.h). */
 
 #include "check.h"
 
@@ -10,7 +10,7 @@ static hgrid_report need;
 static unsigned char *expected_blob;
 static size_t blob_bytes;
 
-/* Asks everything about rays onto all of the sheet, in memory that ends with each argument. */
+/* Runs all queries with rays onto the whole sheet; each argument ends with its memory. */
 static void ask_everything(const hgrid_grid *view, const hgrid_mesh *mesh)
 {
     enum { RAYS = 66 };
@@ -61,7 +61,7 @@ static void ask_everything(const hgrid_grid *view, const hgrid_mesh *mesh)
     CHECK(options->counters->primitive_tests > RAYS);
 }
 
-/* Builds a mesh that is the sheet in another form: the blob must be the same, byte by byte. */
+/* Builds the sheet in another form: the blob must be the same, byte by byte. */
 static void check_form(const hgrid_mesh *mesh)
 {
     void *index = guarded(need.index_bytes), *scratch = guarded(need.scratch_bytes);
@@ -94,7 +94,7 @@ static void tight_arrays_are_read_to_their_last_byte_and_no_further(void)
     check_form(&mesh);
 }
 
-/* One for each triangle, at any address. */
+/* Masks lie at any address and end with the mask of the last triangle. */
 static void masks_are_read_to_their_last_byte_and_no_further(void)
 {
     for (size_t stride = 4; stride < 8; stride++) {
@@ -110,7 +110,7 @@ static void masks_are_read_to_their_last_byte_and_no_further(void)
     }
 }
 
-/* The caller's own structs, at an odd address, cut off behind the last element's own bytes. */
+/* Elements lie in the caller's structs at odd addresses, and memory ends with the last element's own bytes. */
 static void strides_need_no_alignment_and_no_padding_at_the_end(void)
 {
     for (size_t extra = 1; extra < 9; extra += extra < 3 ? 1 : 5) {
@@ -148,7 +148,7 @@ static void indices_of_16_bits_are_read_as_such(void)
     }
 }
 
-/* What plans every byte before it writes one. */
+/* A method that plans every byte before it writes one. */
 static const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
 
 static void one_byte_less_is_refused_and_nothing_is_touched(void)
@@ -174,7 +174,7 @@ static void one_byte_less_is_refused_and_nothing_is_touched(void)
     CHECK(report.index_bytes >= need.index_bytes && report.is_exact == 0);
     CHECK(scratch[less] == 0xc7);
 
-    /* With nothing at all, the report names enough of both. */
+    /* Without any memory, the report gives enough of both. */
     EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL,
            hgrid_build(&tight, &one_level, NULL, 0, NULL, 0, &grid, &report));
     CHECK(report.scratch_bytes == need.scratch_bytes && report.index_bytes >= need.index_bytes);
@@ -202,7 +202,7 @@ static void what_is_more_than_needed_is_not_touched(void)
     CHECK(all_bytes_are(scratch + need.scratch_bytes, more, 0xc7));
 }
 
-/* Straight from malloc, as most programs do it. A tool that tracks uninitialised memory watches. */
+/* Regions straight from malloc, as in most programs, for a tool that tracks uninitialised memory. */
 static void regions_may_hold_anything(void)
 {
     for (int fill = 0; fill < 3; fill++) {
@@ -248,7 +248,7 @@ int main(void)
         indices_of_16_bits_are_read_as_such();
         masks_are_read_to_their_last_byte_and_no_further();
     }
-    /* The others are asked in methods.c: these are the promises to the byte. */
+    /* methods.c checks the other methods: these promises hold to the byte. */
     CHECK(config.method == HGRID_METHOD_ONE_LEVEL);
     one_byte_less_is_refused_and_nothing_is_touched();
     what_is_more_than_needed_is_not_touched();

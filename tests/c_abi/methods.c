@@ -1,5 +1,5 @@
-/* Is every method what the header says: same answers, exact memory, safe if it is too little? With an argument, a
- * quarter of the sizes that are too little, and a third of the damage. */
+/* Every method gives the same answers in exactly the memory it asks for, and fails safely with less. With an
+ * argument, a quarter of the sizes that are too small, and a third of the damage. */
 
 #include "check.h"
 
@@ -9,7 +9,7 @@ static bool is_part;
 
 enum { RAYS = 200 };
 
-/* Numbers with which the small sheet has several levels, and subgrids in most cells. */
+/* Returns parameters with which the small sheet has several levels, and subgrids in most cells. */
 static hgrid_config deep(hgrid_config config)
 {
     config.density = config.method == HGRID_METHOD_RECURSIVE ? 8.0f : 0.5f;
@@ -24,19 +24,19 @@ static bool is_deep(const hgrid_config *config)
     return config->subdivide_above == 3;
 }
 
-/* Whether the size of the index is known before the index is written. */
+/* Returns true if the size of the index is known before the index is written. */
 static bool is_planned(const hgrid_config *config)
 {
     return config->method == HGRID_METHOD_ONE_LEVEL || config->method == HGRID_METHOD_FIXED;
 }
 
-/* A tree learns how many nodes it has while it writes the index. */
+/* Returns true for a tree, whose number of nodes is known only after the index is written. */
 static bool is_tree(const hgrid_config *config)
 {
     return config->method == HGRID_METHOD_BVH;
 }
 
-/* A grid in memory of exactly its size, and that memory. */
+/* A grid in memory of exactly its size, with that memory. */
 typedef struct {
     hgrid_config config;
     hgrid_report need;
@@ -78,7 +78,7 @@ static hgrid_ray ray_number(int i)
     return ray;
 }
 
-/* All hits, and the work of finding them. */
+/* Traces all rays, and returns the work. */
 static hgrid_counters ask(const hgrid_grid *grid, hgrid_hit hits[RAYS])
 {
     hgrid_counters counters = {0, 0, 0};
@@ -106,7 +106,7 @@ static void answers_are_those_of_one_level(const built *b)
     else if (is_deep(&b->config))
         CHECK(work.grid_steps > RAYS / 2);
 
-    /* Also in another place. */
+    /* A copy at another address answers the same. */
     const void *elsewhere = guarded_copy(b->index, b->blob_bytes);
     hgrid_grid opened;
     EXPECT(HGRID_OK, hgrid_open(elsewhere, b->blob_bytes, &mesh, &opened));
@@ -115,7 +115,7 @@ static void answers_are_those_of_one_level(const built *b)
     CHECK(memcmp(expected, found, sizeof found) == 0);
 }
 
-/* Builds in the first bytes of a region; what is behind them must stay. */
+/* Builds in the first bytes of a region; the bytes after them must stay. */
 static void refuse_index(const built *b, unsigned char *region, size_t region_bytes, size_t bytes)
 {
     hgrid_grid grid;
@@ -135,7 +135,7 @@ static void refuse_index(const built *b, unsigned char *region, size_t region_by
     CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
     const size_t touched = is_planned(&b->config) ? 0 : bytes;
     CHECK(all_bytes_are(region + touched, region_bytes - touched, 0xc7));
-    /* What was written is not mistaken for a grid. */
+    /* The bytes that were written do not open as a grid. */
     CHECK(hgrid_open(region, bytes, &mesh, &grid) != HGRID_OK);
     CHECK(hgrid_open(region, region_bytes, &mesh, &grid) != HGRID_OK);
     CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
@@ -151,10 +151,10 @@ static void too_small_an_index_is_refused_and_used_again(const built *b)
     refuse_index(b, region, need, 127);
     refuse_index(b, region, need, 128);
     for (size_t i = 0; i < SIZES; i += is_part ? 4 : 1) {
-        /* Ends anywhere, also within a word. */
+        /* A size that ends anywhere, even within a word. */
         const size_t bytes = half + (need - half) * i / SIZES;
         refuse_index(b, region, need, bytes);
-        /* Ends at a page that nobody may touch. */
+        /* The whole blocks of it, up to a protected page. */
         const size_t whole = bytes / 64 * 64;
         refuse_index(b, (unsigned char *)guarded(whole), whole, whole);
     }
@@ -181,7 +181,7 @@ static void too_small_a_scratch_is_refused(const built *b)
         const hgrid_status status = hgrid_build(&mesh, &b->config, index, b->need.index_bytes,
                                                 b->scratch, bytes, &grid, &report);
         CHECK(all_bytes_are(b->scratch + bytes, need - bytes, 0xc7));
-        /* What a variable grid asks for is enough, and may be more than it takes. */
+        /* A variable grid may take less scratch than it asks for. */
         if (b->config.method == HGRID_METHOD_VARIABLE && part > 0 && status == HGRID_OK)
             return;
         EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL, status);
@@ -207,7 +207,7 @@ static void what_is_more_than_needed_is_not_touched(const built *b)
     CHECK(all_bytes_are(scratch + scratch_need, more, 0xc7));
 }
 
-/* Straight from malloc. A tool that tracks uninitialised memory watches. */
+/* Regions straight from malloc, for a tool that tracks uninitialised memory. */
 static void regions_may_hold_anything(const built *b)
 {
     const size_t index_bytes = (size_t)b->need.index_bytes;
@@ -223,7 +223,7 @@ static void regions_may_hold_anything(const built *b)
     free(memory);
 }
 
-/* The counts agree, so opening does; only validation looks at the triangles. */
+/* The counts agree, so the blob opens; only validation looks at the triangles. */
 static void a_changed_mesh_is_found(const built *b)
 {
     static sheet changed;
@@ -235,8 +235,8 @@ static void a_changed_mesh_is_found(const built *b)
     EXPECT_PROOF(HGRID_ERROR_CORRUPT, &grid);
 }
 
-/* Bits here and there: queries end and stay inside, and what validation lets pass answers as the
- * whole blob does. */
+/* Flips bits here and there: queries end and stay inside, and a blob that validates answers as the original.
+ * */
 static void damage_is_harmless_and_found(const built *b)
 {
     enum { FLIPS = 100 };
@@ -267,12 +267,12 @@ static void damage_is_harmless_and_found(const built *b)
         damaged[at] ^= bit;
     }
     CHECK(opened > flips / 2);
-    /* A bit that changes nothing is no damage: the end of a list that is a grid, or a box of a tree that
-     * is larger. */
+    /* Some flips are harmless and validate: the end of a list that is a subgrid, or a larger box in a tree.
+     * */
     CHECK(passed < (is_tree(&b->config) ? flips / 2 : flips / 5));
 }
 
-/* At any address, and no more of it than was asked for. */
+/* Validation works at any address, and uses no more scratch than it asks for. */
 static void a_proof_takes_the_scratch_that_it_asks_for(const built *b)
 {
     const size_t need = hgrid_validate_bytes(&b->grid);
@@ -301,7 +301,7 @@ static void check_method(const hgrid_config *config)
     regions_may_hold_anything(&b);
     a_changed_mesh_is_found(&b);
     a_proof_takes_the_scratch_that_it_asks_for(&b);
-    /* It takes a while. */
+    /* This takes a while. */
     if (!is_deep(config))
         damage_is_harmless_and_found(&b);
 }
@@ -314,7 +314,7 @@ int main(int argc, char **argv)
     mesh = mesh_of(&mesh_data);
     for (int i = 0; i < METHODS; i++) {
         const hgrid_config config = usual(i);
-        /* 5 was a method that is no more. */
+        /* Number 5 belonged to a removed method. */
         CHECK(config.method == (uint32_t)(i < 4 ? i + 1 : 6));
         check_method(&config);
     }

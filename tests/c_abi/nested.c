@@ -1,4 +1,4 @@
-/* Do filters, progress and loops over tasks that ask and build disturb the call that calls them? */
+/* Filters, progress callbacks and loops over tasks may themselves query and build. */
 
 #include "check.h"
 
@@ -9,13 +9,13 @@ static hgrid_mesh mesh;
 static hgrid_ray rays[RAYS];
 static hgrid_hit expected[RAYS];
 
-/* Another grid, which callbacks ask, and regions to build it anew. */
+/* Another grid that callbacks query, and regions to build it again. */
 typedef struct {
     const hgrid_grid *asked;
     hgrid_config config;
     void *index, *scratch, *blob;
     size_t index_bytes, scratch_bytes, blob_bytes;
-    /* How often it was built, and whether that is all done: what is nested in it builds nothing. */
+    /* The number of builds, and whether one is under way: callbacks of it build nothing. */
     size_t builds;
     bool is_busy;
 } other;
@@ -39,7 +39,7 @@ static other other_of(int method)
     return o;
 }
 
-/* Every question, of a grid that may be the one that is asked right now. */
+/* Runs every query on a grid, which may be in use by the call that calls back. */
 static void ask(const hgrid_grid *grid)
 {
     hgrid_hit hits[RAYS], hit;
@@ -60,7 +60,7 @@ static void ask(const hgrid_grid *grid)
     CHECK(hgrid_closest_point(grid, &query, NULL, &closest));
 }
 
-/* Builds the other grid anew and asks it. */
+/* Builds the other grid again and queries it. */
 static void build(other *o)
 {
     if (o->is_busy)
@@ -71,7 +71,7 @@ static void build(other *o)
     EXPECT(HGRID_OK, hgrid_build(&mesh, &o->config, o->index, o->index_bytes, o->scratch,
                                  o->scratch_bytes, &grid, NULL));
     CHECK(memcmp(o->index, o->blob, o->blob_bytes) == 0);
-    /* The bytes are those that were proven before. */
+    /* Validate now and then: the bytes are those of a grid that was validated. */
     if (o->builds % 8 == 0)
         EXPECT_PROOF(HGRID_OK, &grid);
     ask(&grid);
@@ -118,7 +118,7 @@ static bool progress(void *context, uint32_t done)
     return true;
 }
 
-/* Builds between tasks, and before and behind them all. */
+/* Builds between tasks, and before and after all of them. */
 static void run(void *context, uint32_t count, hgrid_task task, void *task_context)
 {
     build((other *)context);

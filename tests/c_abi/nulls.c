@@ -1,5 +1,5 @@
-/* NULL in each pointer argument of each function: refused with nothing written, or allowed. The test
- * looks that no argument is missing here. */
+/* NULL in each pointer argument of each function: refused with nothing written, or allowed. The test checks
+ * that no argument is missing here. */
 
 #include "check.h"
 
@@ -20,7 +20,7 @@ static const hgrid_point_query query = {{0.5f, 0.5f, 1}, INFINITY};
 static hgrid_report report = HGRID_REPORT_INIT;
 static hgrid_refit_report refit_report = HGRID_REFIT_REPORT_INIT;
 
-/* All that calls write but the reports, which are written in any case. */
+/* Everything that calls write except reports, which are always written. */
 typedef struct {
     hgrid_grid grid;
     hgrid_hit hits[RAYS];
@@ -47,7 +47,7 @@ static void reset(outputs *o)
     o->statistics.struct_size = sizeof o->statistics;
 }
 
-/* Calls with NULL for a parameter, which is refused: nothing is written. */
+/* Checks a call with NULL for a parameter that must not be NULL: nothing is written. */
 #define REFUSED(parameter, status, call) \
     do { \
         reset(&out); \
@@ -56,7 +56,7 @@ static void reset(outputs *o)
         puts("null " #parameter); \
     } while (0)
 
-/* The same for a query of one ray, which answers false. */
+/* The same for a query of one ray, which returns false. */
 #define MISSED(parameter, call) \
     do { \
         reset(&out); \
@@ -65,7 +65,7 @@ static void reset(outputs *o)
         puts("null " #parameter); \
     } while (0)
 
-/* Calls with NULL for a parameter, which is allowed. */
+/* Checks a call with NULL for a parameter that may be NULL. */
 #define ALLOWED(parameter, call) \
     do { \
         reset(&out); \
@@ -82,7 +82,7 @@ static void prepare(void)
     const hgrid_query_options defaults = HGRID_QUERY_OPTIONS_INIT;
     options = defaults;
     grid = build_exactly(&mesh, &config, &blob, &blob_bytes);
-    /* Fitting takes as much scratch as is said without any. */
+    /* Fitting takes as much scratch as hgrid_sizes reports without scratch. */
     EXPECT(HGRID_OK, hgrid_sizes(&mesh, &config, NULL, 0, &report));
     index_bytes = (size_t)exact_sizes(&mesh, &config).index_bytes;
     scratch_bytes = (size_t)report.scratch_bytes;
@@ -119,7 +119,7 @@ static void questions_for_sizes(void)
     ALLOWED(hgrid_fit.config,
             hgrid_fit(&mesh, NULL, index_bytes, scratch, scratch_bytes, &out.fitted, &report));
     CHECK(memcmp(&out.fitted, &config, sizeof config) == 0);
-    /* With bvh, the default, fitting takes scratch. */
+    /* The default method, bvh, needs scratch for fitting. */
     const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
     ALLOWED(hgrid_fit.scratch,
             hgrid_fit(&mesh, &one_level, index_bytes, NULL, 0, &out.fitted, &report));
@@ -140,7 +140,7 @@ static void builds(void)
     REFUSED(hgrid_build.index, HGRID_ERROR_NULL_ARGUMENT,
             hgrid_build(&mesh, &config, NULL, index_bytes, scratch, scratch_bytes, &out.grid,
                         &report));
-    /* Without a byte it is only too small. */
+    /* NULL with a size of 0 is only too small. */
     REFUSED(hgrid_build.index, HGRID_ERROR_INDEX_TOO_SMALL,
             hgrid_build(&mesh, &config, NULL, 0, scratch, scratch_bytes, &out.grid, &report));
     REFUSED(hgrid_build.scratch, HGRID_ERROR_NULL_ARGUMENT,
@@ -194,7 +194,7 @@ static void joined_meshes(void)
     CHECK(hgrid_locate(&grid, 5, &geometry, &triangle) && geometry == 0 && triangle == 5);
 }
 
-/* More than one task needs someone who runs them. */
+/* More than one task needs a loop that runs them. */
 static void callbacks(void)
 {
     hgrid_config parallel = usual(4);

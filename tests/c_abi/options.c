@@ -1,5 +1,5 @@
-/* What a query may be told, all hits of a ray, the closest point: what each refuses, what it leaves
- * alone, and what a filter may do. That the answers are right is asked in answers.c. */
+/* Query options, all hits of a ray, and the closest point: which values are refused, what stays untouched,
+ * and what a filter may do. answers.c checks that the answers are right. */
 
 #include "check.h"
 
@@ -21,7 +21,7 @@ static void build(int method)
     grid = build_exactly(&mesh, &config, NULL, NULL);
 }
 
-/* The options that count nothing and find nothing, in each query. */
+/* Checks that every query refuses the options, counts nothing and finds nothing. */
 static void refuse(hgrid_status expected, const hgrid_query_options *options)
 {
     const hgrid_point_query query = {{0.4f, 0.3f, 1}, INFINITY};
@@ -75,7 +75,7 @@ static void sides_are_those_of_the_header(void)
     CHECK(!hgrid_occluded(&grid, &ray, &options) && hgrid_occluded(&grid, &below, &options));
 }
 
-/* The mask of all bits sees even what has no bit; others see what they share a bit with. */
+/* The mask of all bits selects even triangles without a bit; other masks select those that share a bit. */
 static void masks_are_those_of_the_header(void)
 {
     for (uint32_t id = 0; id < TRIANGLES; id++) {
@@ -100,7 +100,7 @@ static void masks_are_those_of_the_header(void)
     }
 }
 
-/* Asks the same grid another question, and says what it was told to say. */
+/* A filter that queries the same grid, and returns a given verdict. */
 typedef struct {
     hgrid_verdict verdict;
     int calls;
@@ -137,7 +137,7 @@ static void a_filter_may_ask_and_say_anything(void)
     }
 }
 
-/* Rejects everything, and counts how often it was asked about triangles with a mask and without. */
+/* Rejects everything, and counts the calls about triangles with a mask and without. */
 static hgrid_verdict reject(void *context, size_t place, const hgrid_hit *hit)
 {
     int *calls = (int *)context;
@@ -146,8 +146,8 @@ static hgrid_verdict reject(void *context, size_t place, const hgrid_hit *hit)
     return HGRID_REJECT;
 }
 
-/* 0 and all bits ask about every triangle, one whose mask is 0 among them; other bits about those that
- * have one of them; the others count unasked. */
+/* Filter masks 0 and all bits ask about every triangle, even one whose mask is 0; other values ask about
+ * triangles that share a bit, and all others count without a call. */
 static void filter_masks_are_those_of_the_header(void)
 {
     const hgrid_ray along = {{-1, 0.43f, 0.04f}, 0, {1, 0.01f, 0}, INFINITY};
@@ -165,7 +165,7 @@ static void filter_masks_are_those_of_the_header(void)
         int calls[2] = {0, 0};
         hgrid_query_options options = defaults;
         options.filter = reject, options.context = calls, options.filter_mask = masks[m];
-        /* All hits: those that are opaque are left, in their order. */
+        /* All hits: the opaque ones are left, in their order. */
         size_t left = 0, found;
         EXPECT(HGRID_OK, hgrid_intersect_all(&grid, &along, &options, some, TRIANGLES, &found));
         for (size_t i = 0; i < count; i++) {
@@ -177,7 +177,7 @@ static void filter_masks_are_those_of_the_header(void)
         CHECK(found == left);
         CHECK(calls[0] == (m < 2 ? expected[0] : 0) && calls[1] == (m < 4 ? expected[1] : 0));
 
-        /* The others: the first that is opaque, or nothing. */
+        /* Other queries: the first opaque hit, or nothing. */
         uint8_t occluded;
         uint32_t occluder;
         CHECK(hgrid_intersect(&grid, &along, &options, &hit) == (left > 0));
@@ -195,7 +195,7 @@ static void filter_masks_are_those_of_the_header(void)
 
 static void all_hits_are_written_to_their_place(void)
 {
-    /* Through the sheet along its plane: many triangles. */
+    /* A ray along the plane of the sheet hits many triangles. */
     const hgrid_ray along = {{-1, 0.43f, 0.04f}, 0, {1, 0.01f, 0}, INFINITY};
     hgrid_hit all[TRIANGLES];
     size_t count;
@@ -212,7 +212,7 @@ static void all_hits_are_written_to_their_place(void)
         CHECK(again == count && memcmp(some, all, written * sizeof *all) == 0);
         CHECK(all_bytes_are(some + written, (capacity - written) * sizeof *some, 0xc7));
     }
-    /* More than memory has. */
+    /* More hits than memory can hold. */
     const size_t impossible[] = {SIZE_MAX, SIZE_MAX / 16 + 1, SIZE_MAX / 32 + 1};
     for (size_t i = 0; i < sizeof impossible / sizeof *impossible; i++) {
         count = 77;
@@ -220,7 +220,7 @@ static void all_hits_are_written_to_their_place(void)
                hgrid_intersect_all(&grid, &along, NULL, all, impossible[i], &count));
         CHECK(count == 77);
     }
-    /* A ray that is none hits nothing, and a view of nothing is none. */
+    /* An invalid ray hits nothing, and a view of zeros is no grid. */
     hgrid_ray none = along;
     none.direction[0] = NAN;
     EXPECT(HGRID_OK, hgrid_intersect_all(&grid, &none, NULL, all, TRIANGLES, &count));
@@ -266,13 +266,13 @@ static void the_closest_point_is_where_it_says(void)
     }
     CHECK(fabsf(sum - closest.distance * closest.distance) < 1e-5f);
 
-    /* Exactly as far is near enough; nothing is nearer. */
+    /* A point exactly at the limit counts; nothing is nearer. */
     CHECK(find(above, closest.distance, NULL, &other));
     CHECK(memcmp(&closest, &other, sizeof other) == 0);
     CHECK(!find(above, closest.distance * 0.999f, NULL, &other));
     CHECK(!find(above, 0, NULL, &other));
 
-    /* Culling and filters mean nothing here. */
+    /* Culling and filters do not apply to closest points. */
     hgrid_counters counters = {0, 0, 0};
     hgrid_query_options options = defaults;
     options.cull = HGRID_CULL_FRONT, options.filter = never, options.counters = &counters;
@@ -284,7 +284,7 @@ static void the_closest_point_is_where_it_says(void)
     options.mask = 2;
     CHECK(!find(above, INFINITY, &options, &other));
 
-    /* Questions that are none. */
+    /* Invalid points and distances. */
     const float odd[][4] = {{NAN, 0, 0, 1},       {0, INFINITY, 0, INFINITY}, {0, 0, -INFINITY, 1},
                             {0.4f, 0.3f, 2, NAN}, {0.4f, 0.3f, 2, -1},        {0, 0, 0, -INFINITY}};
     for (size_t i = 0; i < sizeof odd / sizeof *odd; i++)

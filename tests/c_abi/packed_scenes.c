@@ -1,4 +1,4 @@
-/* Scenes with all that they show in one blob: the same answers elsewhere, what is refused, NULL in every pointer. */
+/* Scenes packed with all that they show in one blob: the same answers elsewhere, refusals, NULL in every pointer. */
 
 #include "check.h"
 
@@ -10,7 +10,7 @@ static hgrid_scene inner, scene, opened;
 
 enum { INDEX_BYTES = 4096, SCRATCH_BYTES = 4096 };
 
-/* The blob, memory for its views, scratch for its proof, and the bytes that each takes. */
+/* The blob, memory for its views, and scratch for its validation, with their sizes. */
 static void *file, *views, *scratch;
 static size_t file_bytes, view_bytes;
 
@@ -21,7 +21,7 @@ static hgrid_ray_f64 ray_of(int i)
     return ray;
 }
 
-/* Two scenes, of which both show the grid. */
+/* Builds two scenes that both show the grid, one of them also inside the other. */
 static void prepare(void)
 {
     hgrid_instance two[2] = {HGRID_INSTANCE_INIT, HGRID_INSTANCE_INIT};
@@ -56,15 +56,15 @@ static void a_packed_scene_needs_nothing_else(void)
     hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
     EXPECT(HGRID_OK, hgrid_peek(file, 128, &info));
     CHECK(info.content == HGRID_CONTENT_PACKED_SCENE && info.has_mesh == 1 && info.total_bytes == bytes);
-    /* The grid is there once. */
+    /* The blob has the grid once. */
     CHECK(info.triangle_count == 2);
 
-    /* Elsewhere, with memory of just the size. */
+    /* Open it elsewhere, in memory of exactly the size. */
     file = guarded_copy(file, file_bytes);
     EXPECT(HGRID_ERROR_INDEX_TOO_SMALL,
            hgrid_open_packed_scene(file, file_bytes, NULL, 0, NULL, 0, &bytes, &opened));
     view_bytes = (size_t)bytes;
-    /* A page of guarded memory ends where it is told: round up, so that it starts at a multiple of 64. */
+    /* Guarded memory ends at a page, so round up for a start at a multiple of 64. */
     views = guarded((view_bytes + 63) / 64 * 64);
     EXPECT(HGRID_OK,
            hgrid_open_packed_scene(file, file_bytes, views, view_bytes, NULL, 0, &bytes, &opened));
@@ -93,7 +93,7 @@ static void a_packed_scene_needs_nothing_else(void)
     }
     CHECK(hits > 40);
 
-    /* Packed again, it is the same. */
+    /* Packing it again gives the same bytes. */
     void *copy = guarded(file_bytes);
     EXPECT(HGRID_OK, hgrid_pack_scene(&opened, copy, file_bytes, &bytes));
     CHECK(memcmp(copy, file, file_bytes) == 0);
@@ -105,7 +105,7 @@ static bool nowhere(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_s
     return false;
 }
 
-/* Opens what cannot be opened. */
+/* Checks that a blob does not open. */
 static void no_scene(hgrid_status expected, const void *blob, size_t blob_bytes, void *room, size_t room_bytes,
                      void *proof_room, size_t proof_bytes)
 {
@@ -133,7 +133,7 @@ static void what_is_refused(void)
     no_scene(HGRID_ERROR_TRUNCATED, at, n - 1, room, m, NULL, 0);
     no_scene(HGRID_ERROR_TRUNCATED, at, 127, room, m, NULL, 0);
 
-    /* A header that is damaged, a reference to nothing, and a box that is not that of its instance. */
+    /* A damaged header, a reference to nothing, and a box that is not that of its instance. */
     char *copy = (char *)guarded_copy(file, n);
     copy[33] ^= 1;
     no_scene(HGRID_ERROR_CORRUPT, copy, n, room, m, NULL, 0);
@@ -144,7 +144,7 @@ static void what_is_refused(void)
     copy[n - 72 * 3 - 40] ^= 0x40;
     no_scene(HGRID_ERROR_CORRUPT, copy, n, room, m, scratch, SCRATCH_BYTES);
 
-    /* Blobs of something else. */
+    /* Blobs of other content. */
     uint64_t bytes;
     hgrid_scene view;
     hgrid_grid none;
@@ -155,7 +155,8 @@ static void what_is_refused(void)
     EXPECT(HGRID_ERROR_OTHER_CONTENT, hgrid_open(file, n, NULL, &none));
     EXPECT(HGRID_ERROR_OTHER_CONTENT, hgrid_open_scene(file, n, objects, 3, &view));
 
-    /* Packing over what is packed, and to an address that is none. The views were written over above. */
+    /* Pack over the packed blob, over arrays in use, and to a misaligned address. The views were overwritten
+     * above. */
     EXPECT(HGRID_OK, hgrid_open_packed_scene(at, n, room, m, NULL, 0, &bytes, &opened));
     bytes = 7;
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_pack_scene(&opened, at, n, &bytes));
@@ -167,7 +168,7 @@ static void what_is_refused(void)
     const hgrid_scene zeros = HGRID_SCENE_INIT;
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_pack_scene(&zeros, copy, n, &bytes));
 
-    /* Shapes have a test that is nowhere in memory that could be stored. */
+    /* The test of a shape is code, which cannot be stored. */
     static const float box[6] = {0, 0, 0, 1, 1, 1};
     hgrid_boxes boxes = HGRID_BOXES_INIT;
     hgrid_shapes shapes;
@@ -182,7 +183,7 @@ static void what_is_refused(void)
     EXPECT(HGRID_ERROR_OTHER_CONTENT, hgrid_pack_scene(&view, copy, n, &bytes));
     CHECK(bytes == 7);
 
-    /* A mesh whose triangles have no vertices any more. */
+    /* A mesh whose triangle has an index out of range. */
     const uint32_t was = mesh_data.indices[5][1];
     mesh_data.indices[5][1] = VERTICES;
     EXPECT(HGRID_ERROR_INDEX_OUT_OF_RANGE, hgrid_pack_scene(&scene, copy, n, &bytes));

@@ -1,11 +1,11 @@
-/* Is a parallel build the serial one, byte by byte, and is a broken loop over tasks an error? With an argument, a part of
- * the numbers of tasks, of the broken loops and of the methods. */
+/* A parallel build makes the bytes of the serial one, and a broken loop over tasks is an error. With an
+ * argument, a part of the numbers of tasks, of the broken loops and of the methods. */
 
 #include "check.h"
 
 #include <pthread.h>
 
-/* A sheet large enough for four tasks: none has fewer than 16 384 triangles. */
+/* A sheet large enough for four tasks: no task has fewer than 16 384 triangles. */
 enum { WIDE = 182, WIDE_VERTICES = (WIDE + 1) * (WIDE + 1), WIDE_TRIANGLES = 2 * WIDE * WIDE };
 
 static float positions[WIDE_VERTICES][3];
@@ -37,7 +37,7 @@ static void make_mesh(void)
     mesh.indices = indices, mesh.triangle_count = WIDE_TRIANGLES;
 }
 
-/* What a loop does with the tasks of one of its calls. */
+/* The ways in which a loop runs the tasks of one of its calls. */
 typedef enum {
     ONCE,
     BACKWARDS,
@@ -56,7 +56,7 @@ typedef enum {
 
 typedef struct {
     loop which;
-    /* The call that does so; the others do it right. */
+    /* The number of the call that does so; the others are correct. */
     uint32_t at;
     uint32_t call_count;
     uint32_t most_tasks;
@@ -76,7 +76,7 @@ static void *run_one(void *argument)
     return NULL;
 }
 
-/* Calls a task with each of the indices, each on a thread of its own, all of them at once. */
+/* Calls a task with each of the indices, each on a thread of its own, all at once. */
 static void on_threads(const uint32_t *list, uint32_t count, hgrid_task task, void *task_context)
 {
     one_task all[2 * HGRID_MAX_TASKS];
@@ -115,7 +115,7 @@ static void run(void *context, uint32_t count, hgrid_task task, void *task_conte
     on_threads(list, length, task, task_context);
 }
 
-/* A configuration whose tasks run as planned. */
+/* Returns a configuration whose tasks run as planned. */
 static hgrid_config in_parallel(hgrid_config config, plan *p, uint32_t tasks)
 {
     config.tasks = tasks;
@@ -142,7 +142,7 @@ static void build_serially(void)
     serial_bytes = (size_t)report.index_bytes;
 }
 
-/* A build in memory of the size that was said: the blob must be the serial one. */
+/* Builds in memory of the reported size: the blob must be the serial one. */
 static void check_build(const hgrid_config *config)
 {
     hgrid_report enough = HGRID_REPORT_INIT, exact = HGRID_REPORT_INIT, report = HGRID_REPORT_INIT;
@@ -195,17 +195,17 @@ static unsigned char *built(const hgrid_config *config, const hgrid_report *need
     return index;
 }
 
-/* The other methods ignore tasks: they call nothing, and build the bytes that they build without. methods.c proves
- * small grids of theirs. */
+/* The other methods ignore tasks: they never call the loop, and build the same bytes without it. methods.c
+ * validates small grids of theirs. */
 static void other_methods_call_nothing(void)
 {
     const hgrid_config others[] = {HGRID_CONFIG_INIT_ONE_LEVEL, HGRID_CONFIG_INIT_FIXED,
                                    HGRID_CONFIG_INIT_VARIABLE, HGRID_CONFIG_INIT_RECURSIVE};
     plan p = plan_of(NEVER, 0);
-    /* Half of the sheet: a tree over it would have two tasks, and a recursive grid is built sooner. */
+    /* Half of the sheet, so that recursive grids are built sooner; a tree over it would still use two tasks. */
     mesh.triangle_count = WIDE_TRIANGLES / 2;
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
-        /* It takes six times as long as all the rest together. */
+        /* The recursive method takes six times as long as all the rest together. */
         if (is_part && others[i].method == HGRID_METHOD_RECURSIVE)
             continue;
         const hgrid_config config = in_parallel(others[i], &p, 4);
@@ -262,7 +262,7 @@ static void a_broken_loop_is_an_error(void)
 
     for (int which = NEVER; which < LOOPS; which++)
         for (uint32_t at = 0; at < call_count; at++) {
-            /* Each loop once, and each call. */
+            /* For a part, try each loop and each call once. */
             if (is_part && (uint32_t)which % call_count != at)
                 continue;
             plan p = plan_of((loop)which, at);
@@ -276,7 +276,7 @@ static void a_broken_loop_is_an_error(void)
             CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
             CHECK(report.index_bytes == 0 && report.triangle == HGRID_INVALID_ID);
 
-            /* The sizes for several tasks are a bound, for which none is called. */
+            /* Sizes for several tasks are a bound, which calls no loop. */
             p.call_count = 0;
             EXPECT(HGRID_OK, hgrid_sizes(&mesh, &broken, scratch, scratch_bytes, &report));
             CHECK(p.call_count == 0);

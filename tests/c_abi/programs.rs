@@ -1,8 +1,7 @@
-//! C programs that use the library as a stranger would: by the header and the archive alone.
+//! C programs that use the library by its header and the archive alone.
 //!
-//! Each program ends at the first check that fails. They run with sanitizers, as
-//! C++, with the shared library, and under valgrind, which unlike the sanitizers
-//! also watches what the library does.
+//! Each program ends at the first check that fails. The tests run them with sanitizers, as C++, with the
+//! shared library, and under valgrind, which unlike the sanitizers also checks the library's code.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -18,8 +17,8 @@ use tempfile::TempDir;
 
 use crate::header::DIALECTS;
 
-/// Programs that check for themselves and tell what they reached (see `promises`), and the
-/// flavour of the library that they need.
+/// Programs that check themselves and print what they reached (see `promises`), and the flavour of the
+/// library that they need.
 const PROGRAMS: [(&str, Flavour); 23] = [
     ("queries", Flavour::Bare),
     ("options", Flavour::Bare),
@@ -46,7 +45,7 @@ const PROGRAMS: [(&str, Flavour); 23] = [
     ("create", Flavour::Malloc),
 ];
 
-/// They turn optimisation off: optimised programs take four times as long to compile.
+/// Sanitizer flags, with optimisation off: optimised programs take four times as long to compile.
 pub(crate) const SANITIZERS: [&str; 4] =
     ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-O0"];
 
@@ -65,14 +64,14 @@ pub(crate) fn compile(
     let is_cpp = compiler.get_args().any(|arg| arg.to_string_lossy().starts_with("-std=c++"));
     let language = if is_cpp { "c++" } else { "c" };
     let source = root().join("tests/c_abi").join(name).with_extension("c");
-    // The programs, not the library, want more than plain C: pages with protection, and threads.
+    // The programs, not the library, need more than plain C: page protection and threads.
     compiler.args(["-D_DEFAULT_SOURCE", "-pthread", "-g", "-O1"]).args(flags);
     compiler.args(["-x", language]).arg(source).args(["-x", "none"]).arg(library);
     run(compiler.arg("-o").arg(&program));
     program
 }
 
-/// The programs compiled plainly, for whoever only wants to run them.
+/// Returns the programs, compiled once without sanitizers.
 pub(crate) fn plain() -> impl Iterator<Item = (PathBuf, Flavour)> {
     static DIR: OnceLock<PathBuf> = OnceLock::new();
     let dir = DIR.get_or_init(|| {
@@ -95,11 +94,11 @@ fn they_pass_as_c99_with_sanitizers() {
     }
 }
 
-/// The sources of this folder that are whole: into the others, tests put examples of the header.
+/// Returns the sources of this folder that compile as they are: tests put examples of the header into the others.
 fn sources(dialect: &str) -> Vec<PathBuf> {
     let is_whole = |path: &PathBuf| {
         let name = path.file_name().expect("a name").to_string_lossy();
-        // hgrid.hpp asks for C++14.
+        // hgrid.hpp needs C++14.
         name.ends_with(".c") && !["created.c", "tile.c"].contains(&&*name)
             || name.ends_with(".cpp") && ["c++14", "c++17", "c++20"].contains(&dialect)
     };
@@ -112,7 +111,7 @@ fn no_compiler_warns_about_them_in_old_dialects() {
     nobody_warns_about_them(OLD_DIALECTS.into_iter());
 }
 
-/// Other tests run each program in one or two dialects and by one compiler for each.
+/// Other tests run each program in one or two dialects, with one compiler for each.
 #[test]
 #[ignore = "slow: compiles all programs ten times"]
 fn no_compiler_warns_about_them_in_other_dialects() {
@@ -125,7 +124,7 @@ const OLD_DIALECTS: [&str; 2] = ["c99", "c++14"];
 fn nobody_warns_about_them(dialects: impl Iterator<Item = &'static str>) {
     let dir = TempDir::new().expect("a folder");
     let commands = dialects.flat_map(|dialect| {
-        // Some warnings need an optimiser.
+        // Some warnings need the optimiser.
         let is_optimised = ["c17", "c++17"].contains(&dialect);
         let flags = if is_optimised { &["-O1", "-c"][..] } else { &["-fsyntax-only"] };
         let language = if is_cpp(dialect) { "c++" } else { "c" };
@@ -141,7 +140,7 @@ fn nobody_warns_about_them(dialects: impl Iterator<Item = &'static str>) {
     run_side_by_side(commands.collect());
 }
 
-/// Programs of all kinds: queries, scenes, and memory that the library gets itself.
+/// Returns programs of all kinds: queries, scenes, and memory that the library allocates itself.
 fn some() -> impl Iterator<Item = (&'static str, Flavour)> {
     PROGRAMS.into_iter().filter(|(name, _)| ["queries", "scenes", "create"].contains(name))
 }
@@ -177,8 +176,8 @@ fn they_pass_with_the_shared_libraries() {
     pass_with_the_shared_libraries(PROGRAMS.into_iter());
 }
 
-/// Compiled once: both flavours of the library have the same name, and the one that
-/// can do more does the rest the same.
+/// Compiles each program once: both flavours of the library have the same name, and the larger one must work
+/// for all programs.
 fn pass_with_the_shared_libraries(programs: impl Iterator<Item = (&'static str, Flavour)>) {
     let dir = TempDir::new().expect("a folder");
     for (name, flavour) in programs {
@@ -203,8 +202,8 @@ fn run_side_by_side(commands: Vec<Command>) {
     thread::scope(|scope| (0..count).for_each(|_| drop(scope.spawn(work))));
 }
 
-/// Runs all programs in valgrind, which is slow: a part of their work, unless `HGRID_WHOLE` is set, as `.ci/slow valgrind`
-/// does.
+/// Runs all programs in valgrind, which is slow: a part of their work, unless `HGRID_WHOLE` is set, as in
+/// `.ci/slow valgrind`.
 fn run_in_valgrind(programs: &[PathBuf], options: &[&str]) {
     let valgrind = programs.iter().map(|program| {
         let mut valgrind = command("valgrind");
@@ -224,11 +223,11 @@ fn they_pass_under_valgrind() {
         return;
     }
     let programs = plain().map(|(program, _)| program);
-    // What is about threads is watched by another tool.
+    // Another tool checks the program with threads.
     run_in_valgrind(&programs.filter(|path| !path.ends_with("threads")).collect::<Vec<_>>(), &[]);
 }
 
-/// Queries side by side, and builds.
+/// Runs the programs with concurrent queries and parallel builds.
 #[test]
 #[ignore = "slow: valgrind"]
 fn valgrind_sees_no_thread_get_in_the_way_of_another() {
@@ -268,9 +267,9 @@ fn no_thread_gets_in_the_way_of_another() {
     }
 }
 
-/// The header promises 7 KiB for a ray or a point, 36 KiB for a batch, 18 KiB for a build, 96 KiB for one with tasks and
-/// 13 KiB for a task; for a ray in scenes 8 KiB for each of them and 7 KiB for a grid; for a batch in a scene 80 KiB, and
-/// 8 KiB for each scene inside it.
+/// The header promises 7 KiB for a ray or a point, 36 KiB for a batch, 18 KiB for a build, 96 KiB for one
+/// with tasks and 13 KiB for a task; for a ray in scenes 8 KiB for each of them and 7 KiB for a grid; for a
+/// batch in a scene 80 KiB, and 8 KiB for each scene inside it.
 #[test]
 fn queries_and_builds_take_little_stack() {
     takes_little_stack(&[]);
@@ -294,24 +293,24 @@ fn takes_little_stack(arguments: &[&str]) {
     for name in ["one", "options", "closest", "shapes"] {
         assert!((500..7 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
-    // The buffers alone are 128 rays and 128 hits.
+    // The buffers alone hold 128 rays and 128 hits.
     for name in ["many", "shapes_many"] {
         assert!((128 * 48..36 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
     for name in ["build", "scenes"] {
         assert!((2000..18 << 10).contains(&most(name)), "{name}: {}", most(name));
     }
-    // Four of them, one inside the other.
+    // One scene, and four nested scenes.
     for (name, scenes) in [("scene", 1), ("nested", 4)] {
         let promised = (8 * scenes + 7) << 10;
         assert!((1000..promised).contains(&most(name)), "{name}: {}", most(name));
     }
-    // The rays of a group alone, outside and inside of an instance.
+    // The buffers hold the rays of a group twice, outside and inside an instance.
     for (name, inside) in [("scene_many", 0), ("nested_many", 3)] {
         let promised = (80 + 8 * inside) << 10;
         assert!((2 * 64 * 48..promised).contains(&most(name)), "{name}: {}", most(name));
     }
-    // There is room for 64 of them.
+    // The build has room for 64 tasks.
     assert!((20 << 10..96 << 10).contains(&most("tasks")), "tasks: {}", most("tasks"));
     assert!((500..13 << 10).contains(&most("task")), "task: {}", most("task"));
 }
@@ -324,6 +323,6 @@ fn the_library_links_by_its_name_alone() {
     compiler.arg("-D_DEFAULT_SOURCE").arg(root().join("tests/c_abi/queries.c"));
     compiler.arg("-L").arg(library_dir()).arg("-lhgrid").arg("-o").arg(&program);
     run(compiler.arg(format!("-Wl,-rpath,{}", library_dir().display())));
-    // Cargo has a path of its own for shared libraries, and it would come first.
+    // Cargo sets a path for shared libraries, which would come first.
     run(Command::new(program).env_remove("LD_LIBRARY_PATH"));
 }

@@ -1,4 +1,4 @@
-/* Is a build told to its caller, from nothing to the end, and does it end when the caller says so? */
+/* A build reports its progress from nothing to the end, and stops when the callback says so. */
 
 #include "check.h"
 
@@ -7,7 +7,7 @@
 static sheet mesh_data;
 static hgrid_mesh mesh;
 
-/* Says stop at a call, counted from 0, and looks that there is none behind it. */
+/* Says stop at a call, counted from 0, and checks that none follows. */
 typedef struct {
     size_t stop_at, calls;
     uint32_t last;
@@ -58,7 +58,7 @@ static void every_call_may_cancel(const hgrid_config *plain, uint32_t tasks)
     const size_t calls = w.calls, bytes = (size_t)report.index_bytes;
     void *expected = guarded_copy(index, bytes);
 
-    /* The answer to the last call means nothing: then the grid is there. */
+    /* The answer to the last call is ignored: the grid is complete by then. */
     w = watcher_of(calls - 1);
     EXPECT(HGRID_OK, hgrid_build(&mesh, &config, index, index_bytes, scratch, scratch_bytes, &grid,
                                  NULL));
@@ -74,7 +74,7 @@ static void every_call_may_cancel(const hgrid_config *plain, uint32_t tasks)
         CHECK(w.last < HGRID_PROGRESS_END && w.calls == stop_at + 1);
         CHECK(all_bytes_are(&grid, sizeof grid, 0xc7));
         CHECK(report.index_bytes == 0 && report.triangle == HGRID_INVALID_ID);
-        /* What is left in the index is not mistaken for a grid, nor does it disturb the next one. */
+        /* The bytes left in the index do not open as a grid, nor do they disturb the next build. */
         CHECK(hgrid_open(index, index_bytes, &mesh, &grid) != HGRID_OK);
         w = watcher_of(SIZE_MAX);
         EXPECT(HGRID_OK, hgrid_build(&mesh, &config, index, index_bytes, scratch, scratch_bytes,

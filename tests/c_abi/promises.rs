@@ -1,6 +1,6 @@
-//! Is every promise of the header kept somewhere? The C programs print what they saw, as in
-//! `reached -2 hgrid_open`, `null hgrid_open.blob`, `sized hgrid_open.mesh` and `described -2`; here
-//! it is compared with what the header says.
+//! Every promise of the header is kept somewhere. The C programs print what they saw, as in `reached -2
+//! hgrid_open`, `null hgrid_open.blob`, `sized hgrid_open.mesh` and `described -2`; the tests compare it with
+//! the header's comments.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
@@ -12,7 +12,7 @@ use crate::header::{documentation, functions, parameters, statuses, structs};
 use crate::left_out;
 use crate::programs::plain;
 
-/// What is behind a word at the start of a line of any program.
+/// Returns the rest of each line that starts with a word, over the output of all programs.
 fn printed(word: &str) -> BTreeSet<&'static str> {
     static PRINTED: OnceLock<String> = OnceLock::new();
     let all = PRINTED.get_or_init(|| {
@@ -23,7 +23,7 @@ fn printed(word: &str) -> BTreeSet<&'static str> {
     all.lines().filter_map(|line| line.strip_prefix(word)?.strip_prefix(' ')).collect()
 }
 
-/// The statuses that each function returned.
+/// Returns the statuses that each function returned.
 fn reached() -> BTreeMap<&'static str, BTreeSet<i32>> {
     let mut reached = BTreeMap::<_, BTreeSet<_>>::new();
     for line in printed("reached") {
@@ -33,20 +33,20 @@ fn reached() -> BTreeMap<&'static str, BTreeSet<i32>> {
     reached
 }
 
-/// The words of a text that start like this.
+/// Returns the words of a text that start with a prefix.
 fn words<'t>(text: &'t str, prefix: &str) -> BTreeSet<&'t str> {
     let words = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
     words.filter(|word| word.starts_with(prefix)).collect()
 }
 
-/// The statuses that the text of a function names.
+/// Returns the statuses that the text of a function names.
 fn named(text: &str) -> BTreeSet<i32> {
     let all = statuses();
     let names = words(text, "HGRID_ERROR_").into_iter().chain(words(text, "HGRID_OK"));
     names.map(|name| *all.get(name).unwrap_or_else(|| panic!("no status {name}"))).collect()
 }
 
-/// Those that it may return, too: "what `hgrid_sizes` returns".
+/// Returns the statuses that the text names by reference: "what `hgrid_sizes` returns".
 fn inherited(text: &str) -> BTreeSet<i32> {
     let mut all = BTreeSet::new();
     for behind in text.split("what `").skip(1) {
@@ -106,7 +106,7 @@ fn null_is_tried_in_every_pointer_argument() {
 
 #[test]
 fn every_struct_is_tried_in_other_sizes() {
-    // Those whose first field is their size.
+    // Structs whose first field is their size.
     let sized: Vec<_> =
         structs().into_iter().filter(|(_, fields)| fields[0] == "struct_size").collect();
     assert_eq!(sized.len(), 10);

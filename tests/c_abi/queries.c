@@ -1,4 +1,4 @@
-/* Do queries answer, through every way to hold a grid? */
+/* Queries answer, however the grid is held. */
 
 #include "check.h"
 
@@ -31,7 +31,7 @@ static void build(void)
     built = report;
 }
 
-/* A hit is where its triangle and its ray say. */
+/* Checks that a hit's position is the same on its triangle and on its ray. */
 static void check_hit(const hgrid_ray *ray, const hgrid_hit *hit)
 {
     CHECK(hit->primitive < TRIANGLES);
@@ -46,7 +46,7 @@ static void check_hit(const hgrid_ray *ray, const hgrid_hit *hit)
     }
 }
 
-/* The same answers as the first grid's, bit by bit. */
+/* Checks that answers are those of the first grid, bit by bit. */
 static void check_same(const hgrid_grid *other)
 {
     for (int y = 0; y < 40; y++)
@@ -80,7 +80,7 @@ static void every_triangle_is_hit_in_its_middle(void)
     }
 }
 
-/* A float some floats behind a positive one. */
+/* Returns the float that comes `floats` after a positive one. */
 static float next(float x, int floats)
 {
     int32_t bits;
@@ -90,7 +90,7 @@ static float next(float x, int floats)
     return x;
 }
 
-/* The exact t lies on either side of the rounded one, and no farther than the next floats. */
+/* The exact t lies on one side of the rounded one, and no farther than the next float. */
 static void the_range_of_a_ray_is_decided_by_the_exact_t(void)
 {
     hgrid_ray ray = ray_down(0.4f, 0.3f);
@@ -153,7 +153,7 @@ static void a_blob_opens_elsewhere(void)
     EXPECT_PROOF(HGRID_OK, &opened);
     check_same(&opened);
 
-    /* Bytes behind the blob are ignored. */
+    /* Bytes after the blob are ignored. */
     unsigned char *longer = (unsigned char *)guarded(built.index_bytes + 64);
     memcpy(longer, blob, built.index_bytes);
     EXPECT(HGRID_OK, hgrid_open(longer, built.index_bytes + 64, &mesh, &opened));
@@ -213,8 +213,7 @@ static void the_lowest_of_equal_triangles_wins(void)
     CHECK(hit.primitive == 0 && hit.t == 1 && hit.u == 0.25f && hit.v == 0.5f);
 }
 
-/* Where a ray met the sheet, and rays from there: to the side where they start nothing is in the way,
- * to the other side at most another part of the sheet. */
+/* Rays that start at a hit, above or below the surface, do not hit the triangle where they start. */
 static void rays_leave_the_surface_where_they_start(void)
 {
     size_t found = 0;
@@ -256,7 +255,7 @@ static void rays_leave_the_surface_where_they_start(void)
     CHECK(found > 500);
 }
 
-/* Who takes denormal numbers for zero, as renderers do, gets the same grid and the same hits. */
+/* Programs that flush denormal numbers to zero, as renderers do, get the same grid and the same hits. */
 static void denormal_numbers_may_be_zero(void)
 {
 #if defined(__SSE__)

@@ -1,4 +1,4 @@
-/* Trees whose vertices move: hgrid_refit answers for the new mesh, or refuses and changes nothing. */
+/* Trees whose vertices move: hgrid_refit answers for the new mesh, or fails and changes nothing. */
 
 #include "check.h"
 
@@ -7,7 +7,7 @@ static hgrid_mesh mesh;
 static void *tree;
 static size_t tree_bytes;
 
-/* Refuses a refit: the blob, the view and the costs stay as they were. */
+/* Checks a refused refit: the blob, the view and the costs stay as they were. */
 static hgrid_refit_report refuse(hgrid_status expected, const hgrid_mesh *with, void *blob,
                                  size_t bytes)
 {

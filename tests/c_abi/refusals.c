@@ -1,4 +1,4 @@
-/* What is refused, with which status, and is everything then as it was? */
+/* Refused meshes and configurations: which status they get, and that nothing is changed. */
 
 #include "check.h"
 
@@ -18,14 +18,14 @@ static void prepare(void)
     region_2 = (unsigned char *)guarded(scratch_bytes);
 }
 
-/* A build and the two questions for sizes, which must all say the same; returns the build's report.
- * Nothing else is touched. */
+/* Checks that a build and hgrid_sizes, with and without scratch, return the same status and touch nothing
+ * else; returns the build's report. */
 static hgrid_report refuse_sizes(hgrid_status expected, const hgrid_mesh *input,
                                  const hgrid_config *config)
 {
     hgrid_report report = HGRID_REPORT_INIT;
-    /* The sizes of a tree without scratch are a bound, for which a mesh is not read; and its build keeps
-     * keys in the index before all triangles are known. */
+    /* Without scratch the sizes of a tree are a bound, for which the mesh is not read; and its build writes
+     * keys into the index before it has read all triangles. */
     const bool is_tree = config == NULL || config->method == HGRID_METHOD_BVH;
     if (!is_tree)
         EXPECT(expected, hgrid_sizes(input, config, NULL, 0, &report));
@@ -43,7 +43,7 @@ static hgrid_report refuse_sizes(hgrid_status expected, const hgrid_mesh *input,
     return report;
 }
 
-/* The same, and no coarser grid is possible either. */
+/* The same, and fitting a coarser grid fails too. */
 static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
                            const hgrid_config *config)
 {
@@ -58,7 +58,7 @@ static hgrid_report refuse(hgrid_status expected, const hgrid_mesh *input,
     return refuse_sizes(expected, input, config);
 }
 
-/* The same for a configuration, with which nothing can be said of any mesh. */
+/* The same for a configuration that is invalid for every mesh. */
 static void refuse_config(hgrid_status expected, const hgrid_config *config)
 {
     hgrid_report report = HGRID_REPORT_INIT;
@@ -85,10 +85,10 @@ static void unknown_values_are_errors(void)
         hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL;
         config.method = unknown[i];
         refuse_config(HGRID_ERROR_INVALID_METHOD, &config);
-        /* This number is that of a method that was removed: it stays unknown. */
+        /* Number 5 belonged to a removed method and stays unknown. */
         config.method = 5;
         refuse_config(HGRID_ERROR_INVALID_METHOD, &config);
-        /* All of them have a bit that no flag has. */
+        /* Each of them has a bit that no flag uses. */
         if (unknown[i] != 0) {
             hgrid_config flags = HGRID_CONFIG_INIT_ONE_LEVEL;
             flags.flags = unknown[i];
@@ -101,7 +101,7 @@ static void unknown_values_are_errors(void)
             refuse_mesh(HGRID_ERROR_INVALID_INDEX_TYPE, &input);
         }
     }
-    /* These are too much for this mesh, but less is not; the others are for any (see below). */
+    /* These densities are too high for this mesh, and fitting lowers them; the others are invalid (see below). */
     const float densities[] = {1e30f, FLT_MAX};
     for (size_t i = 0; i < sizeof densities / sizeof *densities; i++) {
         hgrid_config config = HGRID_CONFIG_INIT_ONE_LEVEL;
@@ -112,7 +112,7 @@ static void unknown_values_are_errors(void)
     }
 }
 
-/* A method's own fields are checked, those of the others are not looked at. */
+/* A method's own fields are checked; those of other methods are not read. */
 static void fields_of_methods_are_checked(void)
 {
     const uint32_t depths[] = {0, HGRID_MAX_DEPTH + 1, UINT32_MAX};
@@ -195,7 +195,7 @@ static void bad_triangles_are_named(void)
     static sheet bad;
     const hgrid_mesh input = mesh_of(&bad);
 
-    /* The first one counts. */
+    /* The first bad triangle is named. */
     bad = mesh_data;
     bad.indices[17][2] = VERTICES;
     bad.indices[18][0] = UINT32_MAX;

@@ -1,5 +1,5 @@
-/* Regions that are not where they should be, at every address from one multiple of 64 to the next, and
- * over each other and the mesh: refused, and nothing is written. */
+/* Regions at wrong addresses, at every offset from a multiple of 64, and regions that overlap each other or
+ * the mesh: refused, and nothing is written. */
 
 #include "check.h"
 
@@ -23,7 +23,7 @@ static void prepare(void)
     packed_bytes = (size_t)bytes;
 }
 
-/* In memory that ends right behind the region. */
+/* Tries all calls at one offset. */
 static void check_offset(size_t off)
 {
     const hgrid_report new_report = HGRID_REPORT_INIT;
@@ -57,13 +57,13 @@ static void check_offset(size_t off)
     CHECK(all_bytes_are(scratch, scratch_bytes + 64, 0xc7));
     CHECK(all_bytes_are(to, packed_bytes + 64, 0xc7));
 
-    /* A whole blob there is as good as any bytes. */
+    /* A misaligned blob does not open, even if it is complete. */
     unsigned char *moved = (unsigned char *)guarded(blob_bytes + 64);
     memcpy(moved + off, blob, blob_bytes);
     EXPECT(HGRID_ERROR_MISALIGNED, hgrid_open(moved + off, blob_bytes, &mesh, &view));
     EXPECT(HGRID_ERROR_MISALIGNED, hgrid_open(moved + off, blob_bytes, NULL, &view));
     CHECK(all_bytes_are(&view, sizeof view, 0xc7));
-    /* But it tells what it is. */
+    /* But peek describes it. */
     hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
     EXPECT(HGRID_OK, hgrid_peek(moved + off, blob_bytes, &info));
     CHECK(info.total_bytes == blob_bytes);
@@ -83,7 +83,7 @@ static void refuse_overlap(const hgrid_mesh *input, void *index, size_t bytes, v
 
 static void regions_of_a_build_lie_apart(void)
 {
-    /* index | scratch | positions | indices | masks, right behind each other: fine. */
+    /* index | scratch | positions | indices | masks, with no gap between them, is allowed. */
     const size_t positions_at = index_bytes + scratch_bytes;
     const size_t indices_at = positions_at + sizeof mesh_data.positions;
     const size_t masks_at = indices_at + sizeof mesh_data.indices;
@@ -101,7 +101,7 @@ static void regions_of_a_build_lie_apart(void)
                                  &view, NULL));
     const unsigned char *copy = (unsigned char *)guarded_copy(all, end);
 
-    /* One byte more of either is one too many. */
+    /* One byte more of either is too much. */
     unsigned char *scratch = all + index_bytes;
     refuse_overlap(&input, all, index_bytes + 1, scratch, scratch_bytes);
     refuse_overlap(&input, all, index_bytes, scratch, scratch_bytes + 1);
@@ -111,7 +111,7 @@ static void regions_of_a_build_lie_apart(void)
     EXPECT(HGRID_ERROR_OVERLAP,
            hgrid_fit(&input, NULL, index_bytes, scratch, scratch_bytes + 1, &fitted, &report));
 
-    /* The same, one inside the other, and each over each array of the mesh. */
+    /* The same region twice, one inside the other, and each over each array of the mesh. */
     refuse_overlap(&input, all, index_bytes, all, scratch_bytes);
     refuse_overlap(&input, all, positions_at, all + 64, 64);
     const size_t arrays[] = {positions_at, indices_at, masks_at, end - 64};
@@ -123,10 +123,10 @@ static void regions_of_a_build_lie_apart(void)
         refuse_overlap(&input, all, 64, over, 64);
         EXPECT(HGRID_ERROR_OVERLAP, hgrid_sizes(&input, NULL, over, 64, &report));
     }
-    /* A region without bytes lies nowhere. */
+    /* A region without bytes overlaps nothing. */
     EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL,
            hgrid_build(&input, NULL, all, index_bytes, all + 64, 0, &view, &report));
-    /* None of that wrote a byte. */
+    /* None of the calls wrote a byte. */
     CHECK(memcmp(all, copy, end) == 0);
 }
 

@@ -1,23 +1,23 @@
-/* Do batches in scenes answer as single queries do, wherever rays and answers lie, and touch nothing else? */
+/* Batches in scenes answer as single queries do, wherever rays and answers lie, and touch nothing else. */
 
 #include "scenes.h"
 
 static const hgrid_coherence COHERENCES[] = {HGRID_COHERENCE_INCOHERENT, HGRID_COHERENCE_COHERENT};
 
-/* Several windows of a sort, and many groups with a rest. */
+/* RAYS fills several windows of the sort, and many groups with a part of one. */
 enum { RAYS = 1000, SOME = 100, SHOWN = 24 };
 
-/* Grids, shapes and a scene of both, in one scene. */
+/* One scene that shows grids, shapes and a scene of both. */
 static hgrid_scene all_kinds;
 static hgrid_ray_f64 rays[RAYS];
-/* What single queries say: a hit as a batch writes it, and whether there is one. */
+/* The answers of single queries: hits as a batch writes them, and whether there is one. */
 static hgrid_scene_hit expected[RAYS];
 static uint8_t expected_occluded[RAYS];
 static hgrid_scene_hit hits[RAYS];
 static uint8_t occluded[RAYS];
 static const hgrid_scene_options usual_options = HGRID_SCENE_OPTIONS_INIT;
 
-/* Instances that overlap, some of them mirrored, with three masks. */
+/* Builds a scene of overlapping instances, some of them mirrored, with three masks. */
 static void build_all_kinds(void)
 {
     const hgrid_instance here = HGRID_INSTANCE_INIT;
@@ -39,13 +39,13 @@ static void build_all_kinds(void)
     EXPECT(HGRID_OK, hgrid_open_scene(guarded_copy(index_region, bytes), bytes, objects, 3, &all_kinds));
 }
 
-/* Tiles of 8 x 8 pixels, rays from anywhere, and every odd ray that there is. */
+/* Makes tiles of 8 x 8 pixels, rays from anywhere, and every kind of odd ray. */
 static void make_rays(void)
 {
     for (int i = 0; i < RAYS; i++) {
         const int tile = i / 64, pixel = i % 64;
         const double x = (tile % 4 * 8 + pixel % 8) / 15.0 - 0.2, y = (tile / 4 * 8 + pixel / 8) / 30.0;
-        /* A little that float does not have. */
+        /* Add a little that float cannot represent. */
         hgrid_ray_f64 *const ray = &rays[i];
         *ray = wide_ray(x + 1e-10, y, 1);
         ray->direction[0] = (float)(i % 9 - 4) / 60, ray->direction[1] = (float)(i % 11 - 5) / 60;
@@ -75,7 +75,7 @@ static bool is_miss(const hgrid_scene_hit *hit)
     return memcmp(hit, &miss, sizeof miss) == 0;
 }
 
-/* Returns the number of hits. */
+/* Asks for each ray alone; returns the number of hits. */
 static size_t ask_one_by_one(const hgrid_scene *of, const hgrid_scene_options *options)
 {
     size_t count = 0;
@@ -99,7 +99,7 @@ static void check_batch(const hgrid_scene *of, const hgrid_scene_options *option
     CHECK(memcmp(occluded, expected_occluded, sizeof occluded) == 0);
 }
 
-/* Scenes of every kind of object, masks and sides, and scratch of any size and alignment. */
+/* Tries scenes of every kind of object, masks and culling, and scratch of any size and alignment. */
 static void answers_are_those_of_single_queries(void)
 {
     const hgrid_scene *const scenes[] = {&all_kinds, &inner, &scene};
@@ -118,7 +118,7 @@ static void answers_are_those_of_single_queries(void)
                     check_batch(scenes[s], &options, COHERENCES[c]);
                 }
                 for (size_t size = 0; size < 5; size++) {
-                    /* Ends where nobody may touch. */
+                    /* Let the scratch end at a protected page. */
                     unsigned char *const room = (unsigned char *)guarded(sizes[size] + 3);
                     options.scratch = room + 3, options.scratch_bytes = sizes[size];
                     check_batch(scenes[s], &options, HGRID_COHERENCE_INCOHERENT);
@@ -127,7 +127,7 @@ static void answers_are_those_of_single_queries(void)
             }
 }
 
-/* At odd addresses and strides, cut off behind the last element's own bytes. */
+/* Uses odd addresses and strides, in memory that ends with the last element's own bytes. */
 static void gaps_are_not_touched(hgrid_coherence coherence)
 {
     for (size_t extra = 0; extra < 20; extra += 3) {
@@ -153,7 +153,7 @@ static void gaps_are_not_touched(hgrid_coherence coherence)
     }
 }
 
-/* What renderers have: all of a ray in one struct. */
+/* All of a ray in one struct, as renderers keep it. */
 typedef struct {
     uint8_t is_occluded;
     hgrid_ray_f64 ray;
@@ -172,11 +172,11 @@ static void rays_and_answers_in_one_struct(hgrid_coherence coherence)
                                              coherence, NULL));
     EXPECT(HGRID_OK, hgrid_occluded_scene_n(&all_kinds, &paths->ray, sizeof *paths, &paths->is_occluded, sizeof *paths,
                                             SOME, coherence, NULL));
-    /* Only the answers are new. */
+    /* Nothing but the answers has changed. */
     for (size_t i = 0; i < SOME; i++)
         as_expected[i].hit = expected[i], as_expected[i].is_occluded = expected_occluded[i];
     CHECK(memcmp(as_expected, paths, SOME * sizeof *paths) == 0);
-    /* A hit may not lie in its ray. */
+    /* A hit may not overlap its ray. */
     EXPECT(HGRID_ERROR_OVERLAP,
            hgrid_intersect_scene_n(&all_kinds, &paths->ray, sizeof *paths,
                                    (hgrid_scene_hit *)(void *)&paths->ray.direction[1], sizeof *paths, SOME, coherence,
@@ -200,7 +200,7 @@ static hgrid_verdict note_and_reject_some(void *context, const hgrid_scene_hit *
     return (hit->primitive + hit->path[0]) % 3 == 0 ? HGRID_REJECT : HGRID_ACCEPT;
 }
 
-/* They are asked about the same hits, in the order of the rays, and the work is the same. */
+/* Filters see the same hits as for single rays, in the order of the rays, and the work is the same. */
 static void filters_and_counters_see_one_ray_after_the_other(void)
 {
     static shown_hits alone, together;
@@ -224,7 +224,7 @@ static void filters_and_counters_see_one_ray_after_the_other(void)
     }
 }
 
-/* The same for shapes: rays of float, options of grids. */
+/* The same for shapes: rays in float, options of grids. */
 static void shapes_answer_as_single_queries(void)
 {
     static hgrid_ray narrow[RAYS];
@@ -287,7 +287,7 @@ static void no_rays_are_no_error(void)
     EXPECT(HGRID_OK, hgrid_occluded_scene_n(&all_kinds, NULL, 0, NULL, 0, 0, coherence, NULL));
     EXPECT(HGRID_OK, hgrid_occluded_scene_n(&all_kinds, NULL, 64, NULL, 64, 0, coherence, &options));
     CHECK(work.primitive_tests == 1 && work.cell_steps == 2 && work.grid_steps == 3);
-    /* A scene of nothing misses. */
+    /* A scene without instances misses. */
     hgrid_scene empty;
     EXPECT(HGRID_OK, hgrid_build_scene(NULL, 0, NULL, 0, NULL, index_region, INDEX_BYTES, scratch, SCRATCH_BYTES, &empty,
                                        NULL));

@@ -1,10 +1,10 @@
-/* Shapes of one's own, and scenes of instances: what they refuse, NULL in every pointer, structs of other versions. */
+/* Shapes of the caller and scenes of instances: refusals, NULL in every pointer, structs of other versions. */
 
 #include "scenes.h"
 
 static const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
 
-/* Builds shapes that cannot be. */
+/* Checks that a build of shapes is refused. */
 static uint32_t no_shapes(hgrid_status expected, const hgrid_boxes *of, const hgrid_config *config, void *index,
                           size_t index_bytes, void *extra, size_t extra_bytes)
 {
@@ -17,7 +17,7 @@ static uint32_t no_shapes(hgrid_status expected, const hgrid_boxes *of, const hg
     return report.triangle;
 }
 
-/* Builds a scene that cannot be. */
+/* Checks that a build of a scene is refused. */
 static uint32_t no_scene(hgrid_status expected, const hgrid_instance *of, size_t count, size_t object_count,
                          const hgrid_config *config, void *index, size_t index_bytes, void *extra,
                          size_t extra_bytes)
@@ -53,7 +53,7 @@ static void what_shapes_refuse(void)
     no_shapes(HGRID_ERROR_INDEX_TOO_SMALL, &boxes, NULL, index, 640, extra, SCRATCH_BYTES);
     no_shapes(HGRID_ERROR_SCRATCH_TOO_SMALL, &boxes, NULL, index, INDEX_BYTES, extra, 64);
 
-    /* A box that is not finite is left out, or named. */
+    /* A box that is not finite is left out, or named in strict mode. */
     static sphere broken[SPHERES];
     hgrid_config strict = HGRID_CONFIG_INIT;
     hgrid_report report = new_report;
@@ -67,7 +67,7 @@ static void what_shapes_refuse(void)
            hgrid_build_shapes(&bad, NULL, index, INDEX_BYTES, extra, SCRATCH_BYTES, &view, &report));
     CHECK(report.skipped_count == 1 && report.reference_count == SPHERES - 1);
 
-    /* Blobs of something else. */
+    /* Blobs of other content. */
     hgrid_grid none;
     hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
     EXPECT(HGRID_ERROR_OTHER_CONTENT, hgrid_open_shapes(scene_blob, scene_bytes, &boxes, &view));
@@ -92,7 +92,7 @@ static void what_shapes_refuse(void)
     EXPECT(HGRID_ERROR_NOT_A_GRID, hgrid_object_shapes(&zeros, &object));
     CHECK(!hgrid_intersect_shapes(&zeros, &ray, NULL, &hit) && !hgrid_occluded_shapes(&zeros, &ray, NULL));
 
-    /* A damaged tree is no tree. */
+    /* A damaged tree does not validate. */
     void *copy = guarded_copy(shape_blob, shape_bytes);
     ((unsigned char *)copy)[shape_bytes - 65] ^= 0x5a;
     ((unsigned char *)copy)[200] ^= 0x5a;
@@ -116,7 +116,7 @@ static void what_scenes_refuse(void)
         CHECK(no_scene(HGRID_ERROR_INSTANCE_MATRIX, three, 3, 3, NULL, index, INDEX_BYTES, extra, SCRATCH_BYTES)
               == 2);
     }
-    /* Rank two, and a place that is none. */
+    /* A matrix of rank two, and a place that is not a number. */
     const hgrid_instance flat = {{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}, 0, {0, 0, 0}, 1, 0};
     three[2] = flat;
     CHECK(no_scene(HGRID_ERROR_INSTANCE_MATRIX, three, 3, 3, NULL, index, INDEX_BYTES, extra, SCRATCH_BYTES) == 2);
@@ -135,7 +135,7 @@ static void what_scenes_refuse(void)
     no_scene(HGRID_ERROR_OVERLAP, (const hgrid_instance *)index, 3, 3, NULL, index, INDEX_BYTES, extra,
              SCRATCH_BYTES);
 
-    /* Nothing is a scene, too. */
+    /* A scene may have no instances. */
     hgrid_scene empty;
     hgrid_scene_hit hit;
     const hgrid_ray_f64 ray = wide_ray(0.5, 0.5, 1);
@@ -143,7 +143,7 @@ static void what_scenes_refuse(void)
                                        &empty, NULL));
     CHECK(!hgrid_intersect_scene(&empty, &ray, NULL, &hit));
 
-    /* Four inside one another, and not one more. */
+    /* Four scenes may be nested, and no more. */
     hgrid_object around[4];
     hgrid_scene nested[4];
     EXPECT(HGRID_OK, hgrid_object_scene(&inner, &around[0]));
@@ -183,7 +183,7 @@ static void what_scenes_refuse(void)
 
     /* Boxes that are not those of the instances. */
     copy = guarded_copy(inner_blob, inner_bytes);
-    /* The place of the last instance, before the padding of its section. */
+    /* Move the last instance, which lies before the padding of its section. */
     const double elsewhere = 1234;
     memcpy((char *)copy + inner_bytes - 16 - 72 + 40, &elsewhere, sizeof elsewhere);
     EXPECT(HGRID_OK, hgrid_open_scene(copy, inner_bytes, objects, 2, &empty));
@@ -206,7 +206,7 @@ static void what_scenes_refuse(void)
     CHECK(!hgrid_scene_surface_at(&scene, &ray, &miss, &surface));
 }
 
-/* Both calls for many rays, with one argument wrong. */
+/* The arguments of both batch functions. */
 typedef struct {
     const hgrid_scene *scene;
     const hgrid_ray_f64 *rays;
@@ -228,7 +228,7 @@ static batch good_batch(void)
     return b;
 }
 
-/* They say so and write nothing. */
+/* Checks that both batch functions refuse the arguments and write nothing. */
 static void no_batch(hgrid_status expected, batch b)
 {
     memset(many_answers, 0xc7, sizeof many_answers);
@@ -257,7 +257,7 @@ static void what_batches_refuse(void)
         no_batch(HGRID_ERROR_INVALID_COHERENCE, b);
     }
 
-    /* Rays of float are no rays of double; and no memory reaches so far. */
+    /* A stride for rays in float is too small; and the largest strides reach past the end of memory. */
     const size_t strides[] = {1, sizeof(hgrid_ray), sizeof(hgrid_ray_f64) - 1, SIZE_MAX, SIZE_MAX / 9};
     for (int i = 0; i < 5; i++) {
         b = good_batch(), b.ray_stride = strides[i];
@@ -283,11 +283,12 @@ static void what_batches_refuse(void)
     no_batch(HGRID_ERROR_INVALID_CULL, b);
     options.cull = HGRID_CULL_NONE;
 
-    /* Answers in the rays. */
+    /* Answers that overlap the rays. */
     b.answers = &many_rays[MANY - 1].reserved;
     no_batch(HGRID_ERROR_OVERLAP, b);
 
-    /* Scratch in what the call reads or writes: of the scene, of the scene that it shows, and of what that shows. */
+    /* Scratch that overlaps what the call reads or writes: of the scene, of the scene that it shows, and of
+     * the objects of that. */
     hgrid_scene *const view = &inner;
     struct {
         void *scratch;
@@ -305,7 +306,7 @@ static void what_batches_refuse(void)
             b.hit_stride = sizeof(hgrid_scene_hit), b.occluded_stride = sizeof(hgrid_scene_hit);
             options.scratch = cases[i].scratch, options.scratch_bytes = cases[i].bytes;
             no_batch(HGRID_ERROR_OVERLAP, b);
-            /* Without a byte it lies nowhere; and queries of one ray do not look at it. */
+            /* Without bytes it overlaps nothing; and queries of one ray do not read it. */
             CHECK(hgrid_occluded_scene(&scene, &many_rays[3], &options) ==
                   hgrid_occluded_scene(&scene, &many_rays[3], NULL));
             options.scratch_bytes = 0;
@@ -316,7 +317,7 @@ static void what_batches_refuse(void)
     no_batch(HGRID_ERROR_NULL_ARGUMENT, b);
 }
 
-/* Both calls for shapes say so and write nothing. */
+/* Checks that both batch functions of shapes refuse the arguments and write nothing. */
 static void no_shape_batch(hgrid_status expected, const hgrid_shapes *of, size_t ray_stride, size_t hit_stride,
                            hgrid_coherence how, const hgrid_query_options *options)
 {
@@ -342,7 +343,7 @@ static void what_batches_of_shapes_refuse(void)
     options.struct_size--;
     no_shape_batch(HGRID_ERROR_STRUCT_SIZE, &shapes, 0, 0, how, &options);
     options.struct_size++;
-    /* Scratch in what the call reads or writes. */
+    /* Scratch that overlaps what the call reads or writes. */
     struct {
         void *scratch;
         size_t bytes;
@@ -355,7 +356,7 @@ static void what_batches_of_shapes_refuse(void)
     no_shape_batch(HGRID_ERROR_NULL_ARGUMENT, &shapes, 0, 0, how, &options);
 }
 
-/* NULL for a parameter: refused, allowed, or a miss. */
+/* A call with NULL for a parameter: refused, allowed, or a miss. */
 #define REFUSED(parameter, call) \
     do { \
         EXPECT(HGRID_ERROR_NULL_ARGUMENT, call); \

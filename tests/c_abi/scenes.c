@@ -1,4 +1,4 @@
-/* Shapes of one's own, and scenes of instances: what they answer. */
+/* Shapes of the caller, and scenes of instances: the answers. */
 
 #include "scenes.h"
 
@@ -46,7 +46,7 @@ static void shapes_answer_as_a_loop_over_all(void)
     EXPECT(HGRID_OK, hgrid_open_shapes(shape_blob, shape_bytes, &silent, &view));
     CHECK(!hgrid_intersect_shapes(&view, &ray, NULL, &hit));
 
-    /* A refit follows the boxes, and the way back gives the same bytes. */
+    /* A refit follows the boxes, and moving them back gives the same bytes. */
     hgrid_refit_report first = HGRID_REFIT_REPORT_INIT;
     void *built = guarded_copy(shape_blob, shape_bytes);
     for (size_t i = 0; i < SPHERES; i++)
@@ -72,7 +72,7 @@ static void scenes_show_grids_shapes_and_scenes(void)
     EXPECT(HGRID_OK, hgrid_validate_scene(&inner, scratch, HGRID_VALIDATE_BOUND(INSTANCES)));
     EXPECT(HGRID_ERROR_SCRATCH_TOO_SMALL, hgrid_validate_scene(&inner, scratch, 3));
 
-    /* Every sheet is where it was put, and hit as the grid alone is. */
+    /* Every sheet is at its instance's place, and hit as in the grid alone. */
     const hgrid_ray down = {{0.3f, 0.4f, 1}, 0, {0, 0, -1}, INFINITY};
     hgrid_hit alone;
     CHECK(hgrid_intersect(&grid, &down, NULL, &alone));
@@ -105,7 +105,7 @@ static void scenes_show_grids_shapes_and_scenes(void)
         options.mask = 1u << ((i + 1) % 3);
         CHECK(!hgrid_intersect_scene(&inner, &up, &options, &hit));
         options.mask = 0xffffffffu;
-        /* The front is that of the mesh, though the instance mirrors. */
+        /* The front is that of the mesh, although the instance mirrors. */
         options.cull = HGRID_CULL_BACK;
         CHECK(hgrid_occluded_scene(&inner, &up, &options));
         options.cull = HGRID_CULL_FRONT;
@@ -145,7 +145,7 @@ static void filters_are_shown_hits_of_the_scene(void)
         const bool plain = hgrid_intersect_scene(&scene, &up, NULL, &hit);
         const bool is_hit = hgrid_intersect_scene(&scene, &up, &options, &with);
         CHECK(!is_hit || with.primitive % 2 == 1);
-        /* A neighbour may be hit across an edge. */
+        /* With the filter, a ray may hit a neighbour across an edge. */
         CHECK(plain || !is_hit);
         CHECK(!plain || hit.primitive % 2 == 0 || is_hit);
         hits += is_hit;

@@ -1,4 +1,5 @@
-/* Shapes, a scene of them and of grids, and a scene of that one: what scenes.c asks and scene_refusals.c spoils. */
+/* Shapes, a scene of them and of grids, and a scene of that one, for scenes.c, scene_batches.c and
+ * scene_refusals.c. */
 #ifndef SCENES_H
 #define SCENES_H
 
@@ -29,7 +30,7 @@ static size_t shape_bytes, scene_bytes, inner_bytes;
 
 enum { INDEX_BYTES = 112 * 1000 + 896, SCRATCH_BYTES = 271 * 64 };
 
-/* A square root: the programs are linked without a library of mathematics. */
+/* Returns a square root: the programs are linked without a math library. */
 static inline double root_of(double square)
 {
     double root = square > 1 ? square : 1;
@@ -38,7 +39,7 @@ static inline double root_of(double square)
     return square > 0 ? root : 0;
 }
 
-/* The nearer of the two places where a ray meets a sphere, or the farther one. */
+/* Finds the nearer of the two points where a ray meets a sphere, or the farther one. */
 static inline bool meet(void *context, uint32_t shape, const hgrid_ray *ray, hgrid_shape_hit *hit)
 {
     const sphere *s = (const sphere *)context + shape;
@@ -119,7 +120,7 @@ static inline hgrid_report build_inner(size_t index_bytes, size_t extra_bytes)
         instances[i].object = i % 2;
         instances[i].id = 1000 + i;
         instances[i].mask = 1u << (i % 3);
-        /* Ten units apart, and the sheets upside down: their front shows away. */
+        /* Ten units apart, with the sheets upside down: their fronts face away. */
         instances[i].translation[0] = 10.0 * i;
         instances[i].linear[2][2] = i % 2 ? 1 : -1;
     }

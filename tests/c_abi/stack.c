@@ -1,6 +1,7 @@
-/* Prints how much stack queries and builds take, in bytes, one "name most" a line: the most of all methods and
- * meshes, on a stack that was filled before: a sheet, then one with a crowd of small triangles on it, and for trees (with an
- * argument for all) one with a crowd in the crowd. Grids also stand in scenes, and their triangles are shapes. */
+/* Prints the stack use of queries and builds in bytes, one "name most" a line: the most over all methods and
+ * meshes, on a stack that was filled before. The meshes are a sheet, the sheet with a crowd of small
+ * triangles on it, and for trees (with an argument for all methods) the sheet with a crowd in the crowd.
+ * Grids also stand in scenes, and their triangles serve as shapes. */
 
 #include "check.h"
 
@@ -8,7 +9,7 @@
 
 enum { RAYS = 768, STACK = 256 * 1024, CROWDS = 2, CROWD = 17000 };
 
-/* Where the crowds are, and half their width. */
+/* The centre of the crowds, and half the width of each. */
 static const float CENTER[3] = {0.3f, 0.3f, 0.05f}, WIDTH[CROWDS] = {0.01f, 0.0005f};
 
 static float positions[VERTICES + CROWDS * CROWD * 3][3];
@@ -16,7 +17,7 @@ static uint32_t indices[TRIANGLES + CROWDS * CROWD][3];
 
 static hgrid_mesh mesh;
 
-/* A build, and memory for it that is there. */
+/* A build with memory for it. */
 typedef struct {
     hgrid_config config;
     hgrid_report need;
@@ -82,7 +83,7 @@ static void many(void)
     hgrid_query_options masked = HGRID_QUERY_OPTIONS_INIT;
     masked.mask = 1;
     for (hgrid_coherence c = 0; c < 2; c++) {
-        /* Far from each other, some of them to be sorted, some to be traced alone. */
+        /* Rays far from each other, some of them to be sorted, some to be traced alone. */
         CHECK(hgrid_intersect_n(&grid, mixed, 0, hits, 0, RAYS, c, NULL) == HGRID_OK);
         CHECK(hgrid_intersect_n(&grid, mixed, 0, hits, 0, RAYS, c, &masked) == HGRID_OK);
         CHECK(hgrid_occluded_n(&grid, mixed, 0, occluded, 0, RAYS, c, &masked) == HGRID_OK);
@@ -91,7 +92,7 @@ static void many(void)
         CHECK(hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, c, &all) == HGRID_OK);
         CHECK(hgrid_occluded_n(&grid, rays, 0, occluded, 0, RAYS, c, &all) == HGRID_OK);
         CHECK(hgrid_occluder_n(&grid, mixed, 0, occluders, 0, RAYS, c, NULL) == HGRID_OK);
-        /* A filter that rejects behind a group of rays, in each order of them. */
+        /* A filter that rejects, after a group of rays was traced, for each order of the rays. */
         const hgrid_ray *each[] = {mixed, rays};
         for (int i = 0; i < 4; i++) {
             hgrid_query_options asking = HGRID_QUERY_OPTIONS_INIT;
@@ -107,11 +108,11 @@ static void many(void)
 
 enum { SHOWN = 12, SHOWN_SCENES = 2 };
 
-/* Scenes around a tree, each of which shows the one before; one for each level that may be nested. */
+/* Nested scenes around a tree, each of which shows the one before, as deep as allowed. */
 static hgrid_object shown[HGRID_MAX_NESTING];
 static hgrid_scene around[HGRID_MAX_NESTING];
 static hgrid_shapes corners;
-/* One that shows all kinds of objects, nested as deep as scenes may be. */
+/* A scene that shows all kinds of objects, nested as deep as allowed. */
 static hgrid_scene all_kinds;
 HGRID_ALIGNED static unsigned char scene_blobs[HGRID_MAX_NESTING][HGRID_SCENE_BOUND(SHOWN)];
 HGRID_ALIGNED static unsigned char all_kinds_blob[HGRID_SCENE_BOUND(SHOWN)];
@@ -140,7 +141,7 @@ static void ask_scene(const hgrid_scene *scene)
     }
 }
 
-/* Many rays at once: tiles, and rays to be sorted. */
+/* Traces batches: tiles, and rays to be sorted. */
 static void ask_scene_together(const hgrid_scene *scene)
 {
     static hgrid_ray_f64 wide[RAYS];
@@ -151,7 +152,7 @@ static void ask_scene_together(const hgrid_scene *scene)
         for (int i = 0; i < RAYS; i++) {
             const hgrid_ray *from = &each[order][i];
             hgrid_ray_f64 ray = {{0, 0, 0}, {0, 0, 0}, from->t_min, from->t_max, 0};
-            /* Origins that float does not have are rounded in the tree of the scene. */
+            /* Origins that float cannot represent are rounded in the scene's tree. */
             for (int axis = 0; axis < 3; axis++)
                 ray.origin[axis] = (double)from->origin[axis] + 1e-12, ray.direction[axis] = from->direction[axis];
             wide[i] = ray;
@@ -224,7 +225,7 @@ static void boxes_of_triangles_together(void)
         }
 }
 
-/* Scenes of instances that overlap, and shapes as large as the triangles of the sheet. */
+/* Builds scenes of overlapping instances, and shapes as large as the triangles of the sheet. */
 static void build_scenes(void)
 {
     for (int level = 0; level < HGRID_MAX_NESTING; level++) {
@@ -263,7 +264,7 @@ static void build_scenes(void)
                             sizeof small_scratch, &all_kinds, NULL) == HGRID_OK);
 }
 
-/* Bytes of stack that a call takes: of two stacks the second where a call on the first asks. */
+/* Returns the bytes of stack that a call takes. A call that itself measures uses the second stack. */
 static size_t stack_of(void (*call)(void))
 {
     static unsigned char stacks[2][STACK];
@@ -298,7 +299,7 @@ static void one_task(void)
     next_task.call(next_task.context, next_task.index);
 }
 
-/* Every task on a stack of its own, as a thread has. */
+/* Runs every task on a stack of its own, as a thread has. */
 static void run(void *context, uint32_t count, hgrid_task task, void *task_context)
 {
     (void)context;
@@ -313,7 +314,7 @@ static job job_of(int method, uint32_t tasks)
 {
     const hgrid_report fresh = HGRID_REPORT_INIT;
     job made;
-    /* Behind the usual ones a tree of high quality. */
+    /* After the usual methods comes a tree of high quality. */
     made.config = usual(method < METHODS ? method : METHODS - 1), made.need = fresh;
     if (method == METHODS)
         made.config.quality = HGRID_QUALITY_HIGH;
@@ -324,7 +325,7 @@ static job job_of(int method, uint32_t tasks)
     return made;
 }
 
-/* All that looks at the mesh. */
+/* Calls every function that reads the mesh. */
 static void work(const job *all)
 {
     hgrid_report report = HGRID_REPORT_INIT;
@@ -337,7 +338,7 @@ static void work(const job *all)
     CHECK(hgrid_fit(&mesh, &all->config, index_bytes, all->scratch, scratch_bytes, &fitted, &report) == HGRID_OK);
     CHECK(hgrid_build(&mesh, &all->config, all->index, index_bytes, all->scratch, scratch_bytes,
                       &grid, &report) == HGRID_OK);
-    /* Not in memory of the heap, whose functions take stack, too. */
+    /* Static memory, because heap functions take stack too. */
     static unsigned char bits[HGRID_VALIDATE_BOUND(TRIANGLES + CROWDS * CROWD)];
     CHECK(hgrid_validate_bytes(&grid) <= sizeof bits);
     CHECK(hgrid_validate(&grid, bits, sizeof bits) == HGRID_OK);
@@ -354,7 +355,7 @@ static void tasks(void)
     work(&by_many_tasks);
 }
 
-/* From -1 to 1. */
+/* Returns a random number from -1 to 1. */
 static float random_number(void)
 {
     static uint32_t state = 1;
@@ -362,7 +363,7 @@ static float random_number(void)
     return (float)(state >> 8) / 8388608.0f - 1;
 }
 
-/* The sheet and the first crowds. */
+/* Returns the sheet with the first crowds. */
 static hgrid_mesh crowded(uint32_t crowds)
 {
     static sheet data;
@@ -392,16 +393,17 @@ int main(int argc, char **argv)
 {
     (void)argv;
     for (int i = 0; i < RAYS; i++) {
-        /* Tiles of the sheet, some of them with rays that go elsewhere, then of the crowds. */
+        /* Tiles of the sheet, some of them with rays in other directions, then tiles of the crowds. */
         const int tile = i / 64, pixel = i % 64, crowd = i / 128 - RAYS / 128 + CROWDS;
         const float u = (float)(pixel % 8), v = (float)(pixel / 8);
         rays[i] = ray_down((float)(tile % 4) / 4 + u / 32, (float)(tile / 4) / 4 + v / 32);
         rays[i].direction[0] = tile > 4 && i % 7 == 0 ? -3.0f : 0.1f;
         if (crowd >= 0) {
-            /* Two tiles, one between the rays of the other. */
+            /* Two tiles whose rays interleave. */
             rays[i] = ray_down(CENTER[0] + WIDTH[crowd] * (u / 4 - 1 + (float)(tile % 2) / 8),
                                CENTER[1] + WIDTH[crowd] * (v / 4 - 1));
-            /* From among the triangles of the crowd, or all would end in the larger one around it. */
+            /* Start among the triangles of the crowd; from above, all rays would end in the larger crowd
+             * around it. */
             rays[i].origin[2] = CENTER[2] + 1.2f * WIDTH[crowd];
             rays[i].direction[0] = i % 7 == 0 ? -3.0f : 0.0f;
         }
@@ -412,7 +414,7 @@ int main(int argc, char **argv)
         mixed[i] = i < 512 ? ray_down(0.1f + there, 0.2f) : rays[i * 127 % RAYS];
         mixed[i].direction[1] = (float)(i % 5) / 10;
     }
-    /* The builds come first: the others ask the grid that they leave. */
+    /* The builds come first: the queries use the grid that they leave. */
     struct {
         const char *name;
         void (*call)(void);
@@ -431,7 +433,7 @@ int main(int argc, char **argv)
             mesh = crowded(crowds);
             by_one_task = job_of(method, 1), by_many_tasks = job_of(method, HGRID_MAX_TASKS);
             for (int i = 0; i < CALLS; i++) {
-                /* The other methods build by one task, whatever they are told. */
+                /* The other methods always build with one task. */
                 if (calls[i].call == tasks && by_many_tasks.config.method != HGRID_METHOD_BVH)
                     continue;
                 const size_t bytes = stack_of(calls[i].call);

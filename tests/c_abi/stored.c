@@ -1,16 +1,16 @@
-/* Grids that are stored: what a header tells, blobs that bring their mesh, read by another process, and
- * what a look at all of a grid finds. */
+/* Stored grids: header fields, blobs that contain their mesh, blobs read by another process, and what an
+ * inspection finds. */
 
 #include "check.h"
 
 #include <sys/wait.h>
 
-/* Where the header of a blob has its fields (core/src/blob.rs), and how long it is. */
+/* The offsets of fields in the header of a blob (core/src/blob.rs), and the header's size. */
 enum { BYTE_ORDER_AT = 8, VERSION_AT = 12, TRIANGLES_AT = 32, HEADER = 128 };
 
 enum { RAYS = 64 };
 
-/* The sheet in structs of its owner, with indices of 16 bits, and masks. */
+/* The sheet in structs of the caller, with indices of 16 bits, and masks. */
 typedef struct {
     char name[5];
     float position[3];
@@ -47,7 +47,7 @@ static void make_mesh(void)
     mesh.masks = &triangles[0].mask, mesh.mask_stride = sizeof(triangle);
 }
 
-/* The closest hits of some rays, each with another mask, and how many a ray hits. */
+/* The closest hits of some rays, each with another mask, and the number of hits of each ray. */
 typedef struct {
     hgrid_hit hits[RAYS];
     size_t counts[RAYS];
@@ -82,7 +82,7 @@ static void *pack(const hgrid_grid *grid, size_t *packed_bytes)
     CHECK(again == bytes && all_bytes_are(to, (size_t)bytes, 0xc7));
     EXPECT(HGRID_OK, hgrid_pack(grid, to, (size_t)bytes, &again));
     CHECK(again == bytes);
-    /* What is more than needed is not touched. */
+    /* Bytes that are not needed are not touched. */
     unsigned char *large = (unsigned char *)guarded((size_t)bytes + 128);
     EXPECT(HGRID_OK, hgrid_pack(grid, large, (size_t)bytes + 128, &again));
     CHECK(again == bytes && memcmp(large, to, (size_t)bytes) == 0);
@@ -94,7 +94,7 @@ static void *pack(const hgrid_grid *grid, size_t *packed_bytes)
 static void a_header_tells_what_a_blob_is(uint32_t method, const void *blob, size_t blob_bytes,
                                           const void *packed, size_t packed_bytes)
 {
-    /* From its first bytes, wherever they lie and whatever is behind them. */
+    /* A peek needs only the first bytes, at any address. */
     for (size_t off = 0; off < 9; off++) {
         unsigned char *at = (unsigned char *)guarded(HEADER + off);
         memcpy(at, blob, HEADER);
@@ -126,7 +126,7 @@ static void a_packed_blob_needs_nothing_else(const hgrid_grid *grid, const void 
     EXPECT(HGRID_OK, hgrid_inspect(&opened, &statistics[1]));
     CHECK(memcmp(&statistics[0], &statistics[1], sizeof statistics[0]) == 0);
 
-    /* It is packed again as it is, and with a mesh it is a blob like any other. */
+    /* Packing it again gives the same bytes, and with a mesh it opens as any other blob. */
     size_t again_bytes;
     const void *again = pack(&opened, &again_bytes);
     CHECK(again_bytes == packed_bytes && memcmp(again, packed, packed_bytes) == 0);
@@ -134,7 +134,7 @@ static void a_packed_blob_needs_nothing_else(const hgrid_grid *grid, const void 
     ask(&opened, &found);
     CHECK(memcmp(&expected, &found, sizeof found) == 0);
 
-    /* Each shorter one is refused. */
+    /* Shorter blobs are refused. */
     memset(&opened, 0xc7, sizeof opened);
     for (size_t bytes = 0; bytes < packed_bytes; bytes += bytes < 256 ? 1 : 64) {
         const hgrid_status status = hgrid_open(packed, bytes, NULL, &opened);
@@ -144,7 +144,7 @@ static void a_packed_blob_needs_nothing_else(const hgrid_grid *grid, const void 
     CHECK(all_bytes_are(&opened, sizeof opened, 0xc7));
 }
 
-/* A process that has neither mesh nor grid maps the file and answers. */
+/* Runs in a process that has neither mesh nor grid: maps the file and answers. */
 static void answer_from_file(int file, int to)
 {
     const off_t bytes = lseek(file, 0, SEEK_END);
@@ -219,7 +219,7 @@ static void headers_are_checked(const void *header)
     }
 }
 
-/* A mesh that was damaged after the build has no sound packed form. */
+/* A mesh that was damaged after the build cannot be packed. */
 static void a_damaged_mesh_is_not_packed(const hgrid_grid *grid)
 {
     uint64_t bytes;
@@ -236,7 +236,7 @@ static void a_damaged_mesh_is_not_packed(const hgrid_grid *grid)
     CHECK(memcmp(to, sound, need) == 0);
 }
 
-/* The arrays of a grid that was built here, and those in a packed blob. */
+/* Checks the arrays of a grid that was built here, and those in a packed blob. */
 static void a_grid_knows_its_mesh(const hgrid_grid *grid, const unsigned char *packed,
                                   size_t packed_bytes)
 {
@@ -265,11 +265,11 @@ static void a_grid_knows_its_mesh(const hgrid_grid *grid, const unsigned char *p
         CHECK(memcmp(starts[2] + 4 * i, &triangles[i].mask, 4) == 0);
     }
 
-    /* What is found is as good as what was given: a grid of it is the same. */
+    /* The mesh that was found serves as well as the original: the blob opens with it and validates. */
     hgrid_grid again;
     EXPECT(HGRID_OK, hgrid_open(packed, packed_bytes, &found, &again));
     EXPECT_PROOF(HGRID_OK, &again);
-    /* Another mesh than the packed one is the one that counts. */
+    /* A mesh given by the caller takes precedence over the packed one. */
     static float elsewhere[VERTICES][3];
     found.positions = elsewhere;
     EXPECT(HGRID_OK, hgrid_open(packed, packed_bytes, &found, &again));
@@ -277,7 +277,7 @@ static void a_grid_knows_its_mesh(const hgrid_grid *grid, const unsigned char *p
     CHECK(hgrid_occluded(grid, &ray, NULL) && !hgrid_occluded(&again, &ray, NULL));
 }
 
-/* A view that no call has written is none; nor is a blob something else. */
+/* A view that no call has written is no grid. */
 static void views_of_nothing_are_recognised(void)
 {
     const hgrid_grid none = HGRID_GRID_INIT;
@@ -315,7 +315,7 @@ static void a_look_finds_bad_triangles(void)
         EXPECT(HGRID_OK, hgrid_build(&mesh, &config, index, need.index_bytes, scratch,
                                      need.scratch_bytes, &grid, &report));
         EXPECT(HGRID_OK, hgrid_inspect(&grid, &found));
-        /* Three triangles have that corner; the fourth of the two squares does not. */
+        /* Three triangles use that corner; the fourth triangle of the two squares does not. */
         CHECK(found.skipped_count == 3 && report.skipped_count == 3);
         CHECK(found.degenerate_count == 1 && found.first_bad == 4);
         CHECK(found.list_count > 0 && found.longest_list > 0 && found.reserved == 0);

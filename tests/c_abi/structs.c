@@ -1,5 +1,5 @@
-/* Structs of earlier and later versions (see versions.h), in each function that takes one. The test
- * looks that no struct of no function is missing here. */
+/* Structs of earlier and later versions (see versions.h), in each function that takes one. The test checks
+ * that no struct of any function is missing here. */
 
 #include "versions.h"
 
@@ -22,7 +22,7 @@ static void prepare(void)
     const hgrid_config bvh = HGRID_CONFIG_INIT_BVH;
     build_exactly(&mesh, &bvh, &tree, &tree_bytes);
     hgrid_report need = HGRID_REPORT_INIT;
-    /* Fitting takes as much scratch as is said without any. */
+    /* Fitting takes as much scratch as hgrid_sizes reports without scratch. */
     EXPECT(HGRID_OK, hgrid_sizes(&mesh, &config, NULL, 0, &need));
     index_bytes = (size_t)exact_sizes(&mesh, &config).index_bytes;
     scratch_bytes = (size_t)need.scratch_bytes;
@@ -64,13 +64,13 @@ static void configurations(void)
     CHECK(memcmp(&fitted, &config, sizeof config) == 0);
     CHECK_VERSIONS(hgrid_fit.fitted, hgrid_config, config,
                    hgrid_fit(&mesh, NULL, index_bytes, scratch, scratch_bytes, it, NULL));
-    /* Both in one. */
+    /* The same struct for both. */
     CHECK_VERSIONS(hgrid_fit.fitted, hgrid_config, config,
                    hgrid_fit(&mesh, it, index_bytes, scratch, scratch_bytes, it, NULL));
     CHECK_VERSIONS(hgrid_build.config, hgrid_config, config,
                    hgrid_build(&mesh, it, index_region, index_bytes, scratch, scratch_bytes, &view,
                                NULL));
-    /* A number that nobody knows, where another version of the struct had a field that has to be 0. */
+    /* An unknown value in a field that had to be 0 in another version of the struct. */
     hgrid_config other = config;
     other.method = HGRID_METHOD_BVH, other.quality = 2;
     EXPECT(HGRID_ERROR_INVALID_QUALITY, hgrid_bound(5, &other, &report));
@@ -104,7 +104,7 @@ static void results(void)
                    hgrid_inspect(&grid, it));
 }
 
-/* A query of one ray has no status. */
+/* Returns a status for a query of one ray, which has none. */
 static hgrid_status found(bool is_found)
 {
     return is_found ? HGRID_OK : HGRID_ERROR_STRUCT_SIZE;

@@ -1,5 +1,4 @@
-//! What the libraries export and what they need: nothing but the header's functions, and nothing
-//! but moving memory.
+//! The libraries export nothing but the header's functions, and need nothing but functions that move memory.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,10 +12,10 @@ use tempfile::TempDir;
 
 use crate::header::functions;
 
-/// What compilers may ask of any C library, or of the compiler's own, behind the program's back.
+/// Functions of the C library, or of the compiler's own, that compilers may call on their own.
 const MEMORY: [&str; 5] = ["memcpy", "memmove", "memset", "memcmp", "bcmp"];
 
-/// What `hgrid_create` asks of the C library.
+/// Functions of the C library that `hgrid_create` calls.
 const ALLOCATOR: [&str; 2] = ["posix_memalign", "free"];
 
 /// Returns true if a flavour may need a symbol.
@@ -24,8 +23,8 @@ fn may_need(flavour: Flavour, name: &str) -> bool {
     MEMORY.contains(&name) || flavour == Flavour::Malloc && ALLOCATOR.contains(&name)
 }
 
-/// The committed list of what a flavour exports: `symbols.txt`, a name a line, and
-/// `malloc` behind what only that one has.
+/// Returns the committed list of a flavour's exports: `symbols.txt`, a name a line, with `malloc` after those
+/// that only that flavour has.
 fn exports(flavour: Flavour) -> BTreeSet<String> {
     let lines = include_str!("symbols.txt").lines();
     let names = lines.filter_map(|line| match line.split_once(' ') {
@@ -36,7 +35,7 @@ fn exports(flavour: Flavour) -> BTreeSet<String> {
     names.map(str::to_owned).collect()
 }
 
-/// Functions and source lines from which a symbol with one of the words is called.
+/// Returns the functions and source lines that call a symbol with one of the words in its name.
 fn callers(archive: &Path, words: &[&str]) -> String {
     let dir = TempDir::new().expect("a folder");
     let object = extract_ours(archive, dir.path());
@@ -96,7 +95,7 @@ fn the_static_libraries_need_nothing_but_memory() {
     }
 }
 
-/// Fails if a library has a symbol with one of the words, and says from where it is called.
+/// Fails if a library has a symbol with one of the words, and names its callers.
 fn has_none(words: &[&str]) {
     if !is_installed("binutils") {
         return;
@@ -110,23 +109,22 @@ fn has_none(words: &[&str]) {
     }
 }
 
-/// A panic would end the program of a user who never heard of one. No symbol, no panic.
+/// A panic would end a C program without explanation. Without the symbols there is no panic.
 #[test]
 fn nothing_panics_allocates_or_starts_threads() {
     has_none(&["panic", "_fail", "__rust_", "alloc", "pthread", "unwind"]);
 }
 
-/// A vector operation that is a function has its operands in memory: a closure that the compiler
-/// did not put where the vectors are. It once took a seventh to a fifth of a tile's time, and
-/// only where programs are compiled for any machine. (The word is in the names of
-/// fearless_simd's functions as of 1.2.)
+/// A vector operation that is a function passes its operands in memory: the compiler did not inline a
+/// closure. Such calls once took a seventh to a fifth of a tile's time, and only in programs compiled for any
+/// machine. (The word is in the names of fearless_simd's functions as of 1.2.)
 #[test]
 fn no_vector_operation_is_a_function() {
     has_none(&["fearless_simd_kernel"]);
 }
 
-/// What rustc would tell a C programmer to add to the link line. It does not depend on
-/// the profile, so a quick one serves.
+/// The libraries that rustc would tell a C programmer to link. They do not depend on the profile, so a quick
+/// one serves.
 #[test]
 fn neither_flavour_asks_for_a_library() {
     let target = target_dir().join("link_line");
@@ -147,8 +145,8 @@ fn neither_flavour_asks_for_a_library() {
     }
 }
 
-/// Two libraries may each have taken in a copy of this one. Nothing but the names that C sees can
-/// meet, so with others for these the second copy lies beside the first.
+/// Two libraries may each contain a copy of this one. Only the names that C sees can clash, so with other
+/// names for these the second copy can be linked beside the first.
 #[test]
 fn two_copies_in_one_program_do_not_clash() {
     if !is_installed("binutils") {
@@ -172,14 +170,13 @@ fn two_copies_in_one_program_do_not_clash() {
     run(&mut Command::new(program));
 }
 
-/// And a library in Rust that knows nothing of this one has the same run-time parts.
+/// Another Rust library that does not know this one has the same run-time parts.
 #[test]
 fn the_library_of_another_vendor_in_rust_does_not_clash() {
     let dir = TempDir::new().expect("a folder");
     let [vendor, program] = ["libvendor.a", "vendors"].map(|name| dir.path().join(name));
     let source = |name: &str| root().join("tests/c_abi").join(name);
-    // What is not used of core is left out, as it must be: it asks for
-    // unwinding, which no_std has not.
+    // Unused parts of core must be left out: they need unwinding, which no_std does not have.
     for level in ["3", "s"] {
         run(Command::new("rustc")
             .args(["--edition", "2024", "--crate-type", "staticlib", "-C", "panic=abort"])

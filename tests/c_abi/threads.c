@@ -1,6 +1,6 @@
-/* Eight threads ask one grid everything at once, each with answers and counters of its own, and build
- * grids of their own meanwhile: the answers are those of a single thread. For tools that watch
- * threads, too. */
+/* Eight threads run all queries on one grid at once, each with answers and counters of its own, and build
+ * grids of their own meanwhile: the answers are those of a single thread. Also for tools that check threads.
+ * */
 
 #include "check.h"
 
@@ -19,7 +19,7 @@ static size_t blob_bytes, packed_bytes;
 static hgrid_ray rays[RAYS];
 static pthread_barrier_t barrier;
 
-/* All that there is to ask. Zeroed before, so that whole structs can be compared. */
+/* The answers of all queries. Zeroed before use, so that whole structs can be compared. */
 typedef struct {
     hgrid_hit hits[RAYS], filtered[RAYS], all[RAYS][ROOM], batches[2][RAYS], seen[RAYS];
     uint8_t occluded[RAYS], occluded_batches[2][RAYS];
@@ -31,7 +31,7 @@ typedef struct {
     hgrid_status validated, packed, opened, built;
 } answers;
 
-/* Regions of a thread. */
+/* The regions of a thread. */
 typedef struct {
     pthread_t thread;
     unsigned char *index, *scratch, *packed;

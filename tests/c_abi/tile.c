@@ -1,5 +1,5 @@
-/* The examples in the header's functions, put in place of FUNCTIONS and run: two triangles, one behind
- * the other, fill the lower left half of a tile. POSIX threads are what one of them is about. */
+/* Runs the examples in the comments of the header's functions, which replace FUNCTIONS: two triangles, one
+ * behind the other, fill the lower left half of a tile. One of the examples needs POSIX threads. */
 
 #include "hgrid.h"
 
@@ -41,7 +41,7 @@ int main(void)
             return 3;
     if (count_lit(&grid, rays, 100) != 100 - 36)
         return 4;
-    /* Any memory will do to sort in: these rays are left as they are. */
+    /* Any memory serves to sort in; these rays are not sorted. */
     hgrid_hit all[128];
     unsigned char memory[64];
     if (trace_all(&grid, rays, all, 128, memory, sizeof memory))
@@ -83,7 +83,7 @@ int main(void)
     if (distance_to(&grid, 1, 1, 2) != 2)
         return 16;
 
-    /* From the first triangle nothing is in the way of a light above; between the two is the first. */
+    /* From the first triangle the way to a light above is free; from between the two, the first is in the way. */
     const float up[3] = {0, 0, 1}, down[3] = {0, 0, -1};
     const hgrid_ray between = {{0.25f, 0.25f, -1}, 0, {0, 0, -1}, INFINITY};
     hgrid_hit on_first, on_second;
@@ -131,7 +131,7 @@ int main(void)
     if (trace_tile_of_shapes(&shapes, discs_seen, disc_hits) != 13 || disc_hits[4 * 8 + 4].t != 1)
         return 19;
 
-    /* Two meshes of a triangle each in one grid, and what the second is made of. */
+    /* Two meshes of a triangle each in one grid, and the material of the second. */
     hgrid_mesh halves[2];
     hgrid_part parts[2];
     hgrid_grid both_grid;

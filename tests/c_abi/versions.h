@@ -1,14 +1,14 @@
-/* Structs of earlier and later versions: smaller ones are refused, larger ones are fine as long as the
- * rest is zero, and not a byte outside struct_size is read or written. */
+/* Structs of earlier and later versions: smaller ones are refused, larger ones are accepted if the rest is
+ * zero, and not a byte outside struct_size is read or written. */
 #ifndef VERSIONS_H
 #define VERSIONS_H
 
 #include "check.h"
 
-/* The largest struct_size that is believed. */
+/* The largest struct_size that the library accepts. */
 #define MOST ((size_t)4096)
 
-/* What the bytes behind the known ones hold. */
+/* The bytes after the known fields. */
 typedef enum { ZEROS, FIRST_IS_ONE, LAST_IS_ONE } tail;
 
 /* A struct_size, and whether a struct of that size with that tail is accepted. */
@@ -42,8 +42,8 @@ static inline version version_of(int i, size_t known)
 
 enum { VERSIONS = 15 };
 
-/* A page that ends where a struct of that version does, if it has a believable size, or else where the
- * known bytes end; and what it holds before the call. */
+/* Memory that ends where a struct of that version does, if its size is acceptable, or else where the known
+ * bytes end; and its contents before the call. */
 static unsigned char *page, before[MOST];
 
 static inline void *place(const void *usual, size_t known, version v)
@@ -51,7 +51,7 @@ static inline void *place(const void *usual, size_t known, version v)
     if (page == NULL)
         page = (unsigned char *)guarded(MOST);
     const bool is_there = v.size >= known && v.size <= MOST;
-    /* The end of a struct is aligned like its start, but for the odd ones. */
+    /* The end of a struct is aligned like its start, except for odd sizes. */
     const size_t size = is_there ? (v.size + 7) / 8 * 8 : known;
     unsigned char *start = page + MOST - size;
     memset(page, 0xc7, MOST);
@@ -69,7 +69,8 @@ static inline void *place(const void *usual, size_t known, version v)
     return start;
 }
 
-/* What was refused is as it was; what was accepted has its size still, and the rest is as it was. */
+/* Checks that a refused struct is unchanged, and that an accepted one keeps its size and the bytes after the
+ * known ones. */
 static inline void check_after(const void *place, size_t known, version v)
 {
     const size_t start = (size_t)((const unsigned char *)place - page);

@@ -1,4 +1,4 @@
-/* Sums without an operating system, on top of the start-up code of examples/bare_metal. */
+/* Runs the sums without an operating system, with the start-up code of examples/bare_metal. */
 
 #include "sums.h"
 

@@ -1,4 +1,5 @@
-/* What a build and a picture of a scan take, natively and in WebAssembly: bunny.mjs runs both. */
+/* Builds a grid of a scan and traces a picture of it, natively and in WebAssembly: bunny.mjs runs both and
+ * prints the times. */
 
 #include <hgrid.h>
 
@@ -68,7 +69,7 @@ EXPORT(trace) int trace(void)
     return hgrid_intersect_n(&grid, rays, 0, hits, 0, RAYS, HGRID_COHERENCE_COHERENT, NULL);
 }
 
-/* The same number wherever the hits are. */
+/* Returns a number that is the same wherever the hits are the same. */
 EXPORT(sum) uint32_t sum(void)
 {
     uint32_t all = 2166136261u;
@@ -88,7 +89,7 @@ static double now(void)
     return (double)at.tv_sec * 1e3 + (double)at.tv_nsec / 1e6;
 }
 
-/* The least of some times in milliseconds. */
+/* Returns the least of several times, in milliseconds. */
 static double least(int (*call)(void))
 {
     double best = 1e9;

@@ -1,5 +1,5 @@
 // Compares WebAssembly with native code: node bunny.mjs MODULE NATIVE_PROGRAM MESH.ply
-// Prints for a build and for coherent rays the least time of each, and their ratio.
+// Prints the least time of both for a build and for coherent rays, and their ratio.
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -49,7 +49,7 @@ const web = instance.exports;
 new Float32Array(web.memory.buffer, web.vertices(), positions.length).set(positions);
 new Uint32Array(web.memory.buffer, web.triangles(), indices.length).set(indices);
 if (web.prepare(positions.length / 3, indices.length / 3) !== 0) throw new Error("the mesh is too large");
-// The least of many: the first calls are those of the quick compiler.
+// The least of many times: the first calls run code of the quick compiler.
 function least(call) {
     let best = Infinity;
     for (let i = 0; i < 30; i++) {

@@ -1,4 +1,4 @@
-/* Sums where there is an operating system. */
+/* Runs the sums where there is an operating system. */
 
 #include "sums.h"
 

@@ -1,4 +1,4 @@
-/* Sums for WebAssembly, where JavaScript prints the lines. */
+/* Runs the sums in WebAssembly, where JavaScript prints the lines. */
 
 #include "sums.h"
 

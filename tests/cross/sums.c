@@ -1,6 +1,6 @@
-/* See sums.h. The meshes and rays are made of whole numbers, so that no compiler rounds them its way.
+/* See sums.h. The meshes and rays are made of integers, so that compilers cannot round them differently.
  *
- * SUMS_TINY leaves out the large mesh and what takes more than 16 KB of RAM. */
+ * SUMS_TINY leaves out the large mesh and all that takes more than 16 KB of RAM. */
 
 #include "sums.h"
 
@@ -8,8 +8,8 @@
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
-/* Two wavy sheets of squares, one above the other, and at the end a triangle across both, one without
- * area, one that is not finite. */
+/* Two wavy sheets of squares, one above the other, and at the end a triangle across both, one without area,
+ * one that is not finite. */
 #ifdef SUMS_TINY
 enum { SIDE = 3, RAYS = 16 };
 #define INDEX_BYTES HGRID_INDEX_BOUND_ONE_LEVEL(TRIANGLES)
@@ -40,7 +40,7 @@ static hgrid_ray rays[RAYS];
 
 static uint32_t state;
 
-/* A number below a limit. */
+/* Returns a random number below a limit. */
 static uint32_t random_below(uint32_t limit)
 {
     state = state * 1664525u + 1013904223u;
@@ -67,7 +67,7 @@ static uint32_t bits_of(float value)
     return both.bits;
 }
 
-/* FNV-1a over numbers, the lowest byte first on every machine. */
+/* FNV-1a over integers, lowest byte first on every machine. */
 static uint64_t sum;
 
 static void add(uint64_t number)
@@ -109,7 +109,7 @@ static void set_triangle(uint32_t triangle, uint32_t a, uint32_t b, uint32_t c)
     masks[triangle] = 1u << triangle % 5;
 }
 
-/* Sheets that fill 1024 by 1024, their waves as the seed says. */
+/* Makes sheets 1024 units on a side; the seed decides their waves. */
 static void make_mesh(uint32_t seed)
 {
     uint32_t triangle = 0;
@@ -139,7 +139,7 @@ static void make_mesh(uint32_t seed)
     set_triangle(triangle++, last, last + 1, last + 6);
 }
 
-/* A camera's rays, then rays through a box around the mesh, some along axes and some that are none. */
+/* Makes a camera's rays, then rays through a box around the mesh, some along axes and some invalid. */
 static void make_rays(void)
 {
     const float infinity = from_bits(0x7f800000u);
@@ -174,7 +174,7 @@ static hgrid_verdict every_second(void *context, size_t ray, const hgrid_hit *hi
     return hit->primitive % 2 ? HGRID_ACCEPT : HGRID_REJECT;
 }
 
-/* One ray after the other, and the work that it takes. */
+/* Traces one ray after the other, and adds up the work. */
 static void ask_alone(const hgrid_grid *grid, const char *mesh, const char *method)
 {
     hgrid_counters work = {0, 0, 0};
@@ -322,7 +322,7 @@ static int ask(const hgrid_config *config, const char *mesh_name, const char *na
     const int failure = ask_together(&grid, mesh_name, name);
     if (failure)
         return failure;
-    /* The same from a blob that has its mesh. */
+    /* Ask again from a packed blob, which contains its mesh. */
     hgrid_grid opened;
     hgrid_blob_info info = HGRID_BLOB_INFO_INIT;
     uint64_t bytes;
@@ -341,7 +341,7 @@ static int ask(const hgrid_config *config, const char *mesh_name, const char *na
     say(mesh_name, name, "packed", sum);
 #endif
 
-    /* Damaged here and there, and proved each time. */
+    /* Damage a word at a time, and validate the grid each time. */
     if (hgrid_validate(&grid, scratch, sizeof scratch) != HGRID_OK)
         return 30;
     start();
@@ -387,14 +387,14 @@ int sums(void)
         if (!hgrid_has_method(config.method))
             continue;
 #ifdef SUMS_TINY
-        /* What these take on the stack, or of the index, is too much. */
+        /* The other methods need too much stack or index here. */
         if (config.method != HGRID_METHOD_ONE_LEVEL)
             continue;
 #endif
         if (i == 1)
             config.quality = HGRID_QUALITY_HIGH;
         if (config.method == HGRID_METHOD_RECURSIVE)
-            config.depth = 1; /* With 3 it takes nine megabytes of this mesh. */
+            config.depth = 1; /* With depth 3 this mesh takes nine megabytes. */
         const int failure = ask(&config, mesh, names[i]);
         if (failure)
             return 100 * (int)i + failure;

@@ -1,5 +1,5 @@
-//! Bytes that are not the grid they claim to be: refused, or answered within bounds; never a crash.
-//! Every single bit and every truncation is in tests/hostile.
+//! Bytes that are not the grid they claim to be are refused or answered within bounds, and never crash. Tests
+//! of every bit and every truncation are in tests/hostile.
 
 use hgrid_core::{BLOB_VERSION, BlobInfo, Config, Error, Grid, Method, Ray, Region};
 use hgrid_tests::copy::Copy;
@@ -54,14 +54,14 @@ fn what_is_no_grid_is_refused_for_what_it_is() {
     let misaligned = Grid::open(&shifted.bytes()[1..], mesh.view()).unwrap_err();
     assert_eq!(misaligned, Error::Misaligned { region: Region::Index });
 
-    // More bytes than the grid has are not its business.
+    // Bytes after the end of the grid are ignored.
     let longer = Copy::of(&[bytes, &[0xff; 100]].concat());
     let grid = open(&longer, &mesh).unwrap();
     assert_eq!(grid.blob_bytes(), bytes.len());
     prove(&grid).unwrap();
 }
 
-/// A blob that an older version built with the removed method `brick`.
+/// A blob that an older version built with the removed method `brick` is refused.
 #[test]
 fn a_grid_of_a_removed_method_is_refused_by_name() {
     let mesh = one_triangle();
@@ -74,7 +74,7 @@ fn a_grid_of_a_removed_method_is_refused_by_name() {
     assert_eq!(Method::from_u32(5), None);
 }
 
-/// Rays of every kind; what they answer does not matter, that they do does.
+/// Sends rays of every kind; the answers do not matter, as long as there are answers.
 pub(crate) fn query(grid: &Grid<'_>) {
     let mut random = Random(47);
     for _ in 0..8 {
@@ -97,7 +97,7 @@ fn damaged_bytes(config: &Config) {
     for _ in 0..3000 {
         let mut copy = Copy::of(owned.bytes());
         for _ in 0..=random.below(20) {
-            // Behind the magic, the byte order and the version, or open sees to it.
+            // After the magic, the byte order and the version, which `open` would refuse at once.
             let at = 16 + random.below(owned.bytes().len() - 16);
             let value = [0x00, 0xff, 0x7f, 0x80][random.below(4)];
             copy.set(at, &[value]);
@@ -118,7 +118,7 @@ fn a_grid_of_another_mesh_of_the_same_size_is_not_valid() {
     query(&grid);
     assert!(matches!(prove(&grid), Err(Error::Corrupt { .. })));
 
-    // The same box, but two triangles changed places.
+    // The same box, but two triangles have changed places.
     let mut swapped = mesh.clone();
     swapped.indices.swap(3, 40);
     assert!(matches!(prove(&open(&copy, &swapped).unwrap()), Err(Error::Corrupt { .. })));

@@ -1,4 +1,4 @@
-//! Work has bounds (docs/bounds.md): counted, not timed, on the worst meshes that are known.
+//! Queries and builds stay within the bounds of docs/bounds.md, counted and not timed, on the worst known meshes.
 
 use hgrid_core::{
     Block, Config, Counters, Grid, Hit, Method, Parameters, QueryOptions, Ray, Sizes, Verdict,
@@ -7,14 +7,14 @@ use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 
-/// Triangles of each mesh.
+/// Triangles in each mesh.
 const N: u32 = 1000;
 
-/// The methods that the page has rows for.
+/// The methods that have rows in docs/bounds.md.
 const METHODS: [Method; 5] =
     [Method::OneLevel, Method::Fixed, Method::Variable, Method::Recursive, Method::Bvh];
 
-/// The meshes that make the most work for one method or another.
+/// Returns the meshes that make the most work for one method or another.
 fn worst() -> Vec<(&'static str, Mesh)> {
     let n = N as usize;
     let mut random = Random(7);
@@ -51,7 +51,7 @@ fn worst() -> Vec<(&'static str, Mesh)> {
     all
 }
 
-/// Needles that lie in one row of cells.
+/// Returns needles that all lie in one row of cells.
 fn row() -> Mesh {
     let mut row = Mesh::default();
     for _ in 0..N {
@@ -60,7 +60,7 @@ fn row() -> Mesh {
     row
 }
 
-/// Rays along axes and through the middle, and some others.
+/// Returns rays along axes, rays through the middle, and some others.
 fn rays() -> Vec<Ray> {
     let mut random = Random(11);
     let mut rays: Vec<_> = (0..24)
@@ -81,7 +81,7 @@ fn rays() -> Vec<Ray> {
     rays
 }
 
-/// Asserts that a ray did no more than its row says.
+/// Asserts that a ray did no more work than its row of the page allows.
 fn hold(name: &str, grid: &Grid<'_>, work: &Counters, walks: u64) {
     let n = u64::from(grid.mesh().triangle_count());
     let steps: u64 = grid.resolution().iter().map(|&cells| u64::from(cells)).sum();
@@ -95,7 +95,7 @@ fn hold(name: &str, grid: &Grid<'_>, work: &Counters, walks: u64) {
         }
         Parameters::Variable { .. } => [words, walks * steps + 765 * grid_steps, steps],
         Parameters::Recursive { .. } => [words, words, words],
-        // Nodes, leaves and triangles are met once.
+        // A tree visits each node, leaf and triangle once.
         _ => [n, n, tree_nodes(n)],
     };
     let bounds = bounds.map(|bound| bound.saturating_mul(walks));
@@ -104,7 +104,7 @@ fn hold(name: &str, grid: &Grid<'_>, work: &Counters, walks: u64) {
     assert!(is_held, "{name}, {:?}: {work:?} above {bounds:?}", grid.method());
 }
 
-/// The most nodes of a tree, rounded up (core/src/bvh/layout.rs).
+/// Returns the most nodes that a tree can have, rounded up (core/src/bvh/layout.rs).
 fn tree_nodes(triangles: u64) -> u64 {
     triangles * 24_780 / 168_000 + 11 * (5 * (triangles / 4097) + 1) / 7 + 4
 }
@@ -130,7 +130,7 @@ fn no_ray_does_more_than_its_bound() {
         }
     }
     println!("tests and cell steps a triangle, at most: {most:.2?} of {METHODS:?}");
-    // Half of the bound is reached.
+    // Some mesh reaches half of the bound.
     assert!(most[0][0] >= 8.0 && most[4][0] >= 0.5, "{most:?}");
 }
 
@@ -153,7 +153,7 @@ fn all_hits_take_one_walk_of_a_tree() {
                 hold(name, &grid, &work, 1);
                 assert!(name != "same" || count == 0 || work.primitive_tests == u64::from(N));
             }
-            // A filter sees them in order, whether there is room for all or not.
+            // A filter sees the hits in order, whether there is room for all or not.
             for room in [3, count + 1] {
                 let (mut hits, mut seen) = (vec![Hit::MISS; room], Vec::new());
                 let mut filter = |_: usize, hit: &Hit| {
@@ -186,7 +186,7 @@ fn all_hits_of_grids_take_a_walk_for_each_sixteen() {
             assert_eq!(grid.intersect_all(&ray, options, &mut hits), N as usize);
             let walks = if room > N as usize { 1 } else { 2 + u64::from(N) / 16 };
             hold("same", &grid, &work, walks);
-            // It is reached: all triangles lie at one t, and each walk is shown every one.
+            // The bound is reached: all triangles lie at one t, so each walk meets them all.
             assert!(work.primitive_tests >= walks / 2 * u64::from(N), "{work:?}");
         }
     }
@@ -204,8 +204,8 @@ fn no_point_does_more_than_its_bound() {
                 let (point, mut work) = (random.point().map(|c| c * scale), Counters::default());
                 let options = &mut QueryOptions::counting(&mut work);
                 assert!(grid.closest_point(point, f32::INFINITY, options).is_some());
-                // A tree meets each node, leaf and triangle once. A cube around the point grows in at most
-                // sixteen steps, and shows each list once a step.
+                // A tree visits each node, leaf and triangle once. In a grid, a cube around the point grows
+                // in at most sixteen steps, and each step may show each list once.
                 if method == Method::Bvh {
                     hold(name, &grid, &work, 1);
                 } else {
@@ -228,7 +228,7 @@ fn builds_stay_within_their_references() {
             let most = match method {
                 Method::OneLevel | Method::Fixed => 16 * n + 64,
                 Method::Bvh => n,
-                // Two words for each cell that may be looked at, and a root.
+                // Two words for each cell that the build may look at, and the root.
                 Method::Recursive => 2 * (512 * n + 65_536) + (28 + 16) * n + 129,
                 _ => u64::from(u32::MAX),
             };

@@ -1,7 +1,8 @@
-//! Is docs/format.md enough to read a blob? This reader follows the page and shares nothing with the library.
+//! docs/format.md is enough to read a blob: this reader follows the page and shares nothing with the library.
 //!
-//! It turns the blob of any method into boxes with ids, checks what the page says of them, and answers
-//! rays with them: those whose box a ray meets, tested by a triangle test of its own.
+//! The reader turns the blob of any method into boxes with ids, checks the statements of the page, and
+//! answers rays: it finds the boxes that a ray meets and tests their triangles with a triangle test of its
+//! own.
 
 use hgrid_core::{Block, Grid, MeshPart, Ray, TriangleMesh};
 use hgrid_tests::joined::{Parts, merged};
@@ -12,14 +13,14 @@ use hgrid_tests::random::Random;
 
 type Point = [f64; 3];
 
-/// Part of space, and the triangles in it.
+/// A part of space with the triangles in it.
 struct Leaf {
     min: Point,
     max: Point,
     ids: Vec<u32>,
 }
 
-/// The bytes, with numbers at places.
+/// The bytes of a blob, with functions that read numbers at offsets.
 #[derive(Clone, Copy)]
 struct Bytes<'a>(&'a [u8]);
 
@@ -41,7 +42,7 @@ impl Bytes<'_> {
     }
 }
 
-/// The header's fields, under their names in the page.
+/// The header's fields, named as in the page.
 struct Header {
     blob_bytes: usize,
     vertex_count: usize,
@@ -85,14 +86,14 @@ fn header(blob: Bytes<'_>) -> Header {
     }
 }
 
-/// Sections one behind the other.
+/// Reads sections one after the other.
 struct Sections<'a> {
     blob: Bytes<'a>,
     at: usize,
 }
 
 impl Sections<'_> {
-    /// Returns the start of the next section, which has so many bytes, and asserts that its padding is zero.
+    /// Returns the start of the next section, which has `bytes` bytes, and asserts that its padding is zero.
     fn next(&mut self, bytes: usize) -> usize {
         let (at, end) = (self.at, self.at + bytes);
         self.at = end.next_multiple_of(64);
@@ -143,7 +144,7 @@ fn bvh(blob: Bytes<'_>, header: &Header) -> Vec<Leaf> {
     leaves
 }
 
-/// One part of a grid's box.
+/// Returns the part of the grid's box between two fractions of its sides.
 fn part(header: &Header, low: Point, high: Point) -> (Point, Point) {
     let at = |position: Point| {
         [0, 1, 2].map(|axis| {
@@ -154,14 +155,14 @@ fn part(header: &Header, low: Point, high: Point) -> (Point, Point) {
     (at(low), at(high))
 }
 
-/// The cells of a grid: its number along x, y, z.
+/// Returns the coordinates of all cells, given the number of cells along x, y and z.
 fn cells([x, y, z]: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
     (0..z).flat_map(move |z| (0..y).flat_map(move |y| (0..x).map(move |x| [x, y, z])))
 }
 
 const TOP: u32 = 1 << 31;
 
-/// One-level, fixed and variable.
+/// Reads the methods one-level, fixed and variable.
 fn hashed(blob: Bytes<'_>, header: &Header) -> Vec<Leaf> {
     let [width, height, depth] = header.resolution;
     let rows = (height * depth) as usize;
@@ -286,7 +287,7 @@ fn recursive(blob: Bytes<'_>, header: &Header) -> Vec<Leaf> {
     leaves
 }
 
-/// Positions and indices behind the grid. Masks and first triangles are what the mesh says.
+/// Reads positions and indices after the grid, and compares masks and first triangles with those of the mesh.
 fn packed(
     blob: Bytes<'_>,
     header: &Header,
@@ -347,7 +348,7 @@ fn enters([origin, direction]: [Point; 2], leaf: &Leaf, slack: f64) -> bool {
     near <= far
 }
 
-/// Reads a blob by the page, and checks that its boxes have all triangles and answer rays.
+/// Reads a blob by the page, and checks that its boxes hold all triangles and answer rays.
 fn check(mesh: &Mesh, grid: &Grid<'_>) {
     let mut kept = vec![Block::ZERO; Block::count_for(grid.packed_bytes() as usize)];
     let blob = Bytes(grid.pack(Block::bytes_mut(&mut kept)).unwrap());
@@ -364,7 +365,7 @@ fn check(mesh: &Mesh, grid: &Grid<'_>) {
     assert!(positions.iter().zip(&mesh.positions).all(are_equal));
     assert_eq!(indices, mesh.indices);
 
-    // Every triangle has a place, and only those that are skipped have none.
+    // Every triangle is in some leaf, except those that are skipped.
     let corners = |id: u32| indices[id as usize].map(|vertex| positions[vertex as usize]);
     let is_finite = |id: &u32| corners(*id).iter().flatten().all(|c| c.is_finite());
     let mut ids: Vec<_> = leaves.iter().flat_map(|leaf| leaf.ids.iter().copied()).collect();
@@ -385,7 +386,7 @@ fn check(mesh: &Mesh, grid: &Grid<'_>) {
         }
     }
 
-    // Rays find the library's hits among the triangles of the boxes that they meet.
+    // The boxes that a ray meets contain the triangle that the library hits.
     let mut random = Random(7);
     let mut hits = 0;
     for _ in 0..200 {
@@ -422,7 +423,7 @@ fn the_page_is_enough_to_read_a_blob() {
             check(&mesh, &owned.open(&view).unwrap());
         }
     }
-    // Several meshes as one, some of them with masks.
+    // Several meshes joined as one, some of them with masks.
     let meshes = [ball(6, 0.5), ball(9, 1.0).scaled(0.3), ball(4, 0.2).scaled(0.6)];
     let kept = Parts::of(&meshes);
     let mut parts = kept.parts();

@@ -1,5 +1,4 @@
-//! Meshes and configurations that are wrong get an error that names what is; meshes that are only
-//! odd get a grid.
+//! Wrong meshes and configurations get an error that names the fault; meshes that are only odd get a grid.
 
 use hgrid_core::{
     BatchField, BuildFlags, Config, ConfigField, Error, IndexType, MAX_COORDINATE, MeshField,
@@ -89,12 +88,12 @@ fn densities_outside_the_range_are_refused() {
         let config = Config::from(Parameters::OneLevel { density });
         assert!(Owned::build(&mesh.view(), &config).is_ok());
     }
-    // A tree has none.
+    // A tree has no density.
     let tree = Parameters::new(Method::Bvh);
     assert_eq!((tree.with_density(f32::NAN), tree.density()), (tree, None));
 }
 
-/// The bound for a density that no build takes is still no less than the bound for a lower one.
+/// Bounds grow with the density, even at densities that no build accepts.
 #[test]
 fn bounds_grow_with_the_density_however_high() {
     for config in methods::configs() {
@@ -185,8 +184,7 @@ fn unused_vertices_do_not_matter() {
     assert!(build(&one_triangle()).is_ok());
 }
 
-/// A recursive grid takes any density that its axes can: more cells, or an error, never a grid that
-/// leaves triangles out.
+/// A recursive grid of any accepted density has more cells or fails with an error; it never leaves triangles out.
 #[test]
 fn recursive_grids_of_every_density_answer_right() {
     let mesh = ball(6, 1.0);

@@ -1,4 +1,4 @@
-//! Meshes that are joined: empty ones, none, too many, and ones with triangles that are wrong.
+//! Joined meshes: empty ones, none, too many, and ones with wrong triangles.
 
 use hgrid_core::{
     BuildFlags, Config, Error, Grid, MeshField, MeshPart, Ray, Strided, TriangleMesh, sizes,
@@ -40,7 +40,7 @@ fn a_triangle_that_is_wrong_is_named_by_its_number_among_all() {
             assert_eq!(mesh.locate(triangle), Some((2, 17)));
         };
         let mut meshes = sound.clone();
-        // No part may reach into the vertices of the next one.
+        // An index may not reach the vertices of the next part.
         meshes[2].indices[17][1] = u32::try_from(meshes[2].positions.len()).unwrap();
         meshes[4].indices[3][0] = u32::MAX;
         check(&meshes, &config, Error::IndexOutOfRange { triangle });
@@ -91,10 +91,10 @@ fn parts_that_are_not_numbered_are_refused() {
     assert_eq!(joined.parts()[2].first(), 109);
     let again = TriangleMesh::joined(joined.parts()).unwrap();
     assert_eq!(again.triangle_count(), 110);
-    // The first two are numbered as they would be alone; not the last two.
+    // The first two parts are numbered as if joined alone; the last two are not.
     assert!(TriangleMesh::joined(&joined.parts()[..2]).is_ok());
     assert_eq!(TriangleMesh::joined(&joined.parts()[1..]).unwrap_err(), invalid);
-    // Joined again for another mesh, they have other numbers; and no part is joined itself.
+    // No part may itself be joined.
     let mut nested = [MeshPart::new(views[1]), MeshPart::new(joined)];
     assert_eq!(TriangleMesh::join(&mut nested).unwrap_err(), invalid);
 }
@@ -106,7 +106,7 @@ fn one_mesh_is_its_own_first_part() {
     assert!(view.parts().is_empty());
     assert_eq!(view.locate(5), Some((0, 5)));
     assert_eq!(view.locate(view.triangle_count()), None);
-    // Alone among parts it is the same grid.
+    // A mesh that is the only part gives the same grid.
     let mut parts = [MeshPart::new(view)];
     let joined = TriangleMesh::join(&mut parts).unwrap();
     for config in methods::configs() {
@@ -127,7 +127,7 @@ fn a_grid_of_joined_meshes_is_for_these_counts_only() {
     assert_eq!(owned.open(&ball(3, 1.0).view()).unwrap_err(), Error::MeshMismatch);
 }
 
-/// Parts of a packed blob that no pack would write: opened, they answer something; the proof finds them.
+/// Tables of parts that no pack would write: the opened blob still answers, and `validate` finds the damage.
 #[test]
 fn damaged_parts_of_a_packed_blob_are_found() {
     let meshes = [ball(3, 1.0), one_triangle(), Mesh::default(), soup(7, 0.3, 1)];
@@ -163,7 +163,7 @@ fn damaged_parts_of_a_packed_blob_are_found() {
     }
     prove(&Grid::open_packed(packed.bytes()).unwrap()).unwrap();
 
-    // More parts than there are bytes for, or parts without a mesh.
+    // A count of parts that needs more bytes than there are, or parts without a mesh.
     let word = packed.word(MESH);
     assert_eq!(word, 4 << 2 | 2);
     for (wrong, is_short) in

@@ -1,4 +1,4 @@
-//! What happens at the edges: odd meshes, odd rays, odd numbers, damaged bytes?
+//! Odd meshes, odd rays, odd numbers and damaged bytes.
 
 mod blobs;
 mod bounds;

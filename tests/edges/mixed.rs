@@ -1,5 +1,5 @@
-//! Trees of meshes that mix sizes: answers as brute force gives them, bytes in proportion to the triangles,
-//! and no ray that is shown most of the mesh.
+//! Trees of meshes that mix sizes answer as brute force does, take bytes in proportion to the triangles, and
+//! test only a small part of the mesh for each ray.
 
 use hgrid_core::{Config, Counters, Grid, Method, Parameters, Quality, QueryOptions, Ray};
 use hgrid_tests::meshes::{Mesh, ball, soup};
@@ -7,8 +7,8 @@ use hgrid_tests::oracle;
 use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 
-/// Asks rays between points of the mesh's box, at vertices and along the axes: they are answered as brute
-/// force answers them, and shown no more than so many triangles each.
+/// Sends rays between points of the mesh's box, to vertices and along the axes. Asserts that the answers are
+/// those of brute force and that no ray tests more than `tests` triangles.
 fn agrees(mesh: &Mesh, tests: u64) {
     let view = mesh.view();
     for quality in Quality::ALL.iter().copied() {
@@ -47,7 +47,7 @@ fn rays(mesh: &Mesh, grid: &Grid<'_>, count: usize) -> Vec<Ray> {
                 target = mesh.positions[triangle[i % 3] as usize];
             }
             if i % 5 == 0 {
-                // Along an axis, through the target.
+                // A ray along an axis through the target.
                 let axis = i / 5 % 3;
                 let mut origin = target;
                 origin[axis] = min[axis] - 1.0;
@@ -67,7 +67,7 @@ fn a_detailed_ball_in_a_coarse_room() {
     agrees(&mesh, 200);
 }
 
-/// A ball, a crowd in it, and one in that.
+/// A ball, a crowd in it, and a crowd in that.
 #[test]
 fn crowds_in_crowds() {
     let mut mesh = ball(20, 1.0);
@@ -76,7 +76,7 @@ fn crowds_in_crowds() {
     }
     agrees(&mesh, 1000);
 
-    // Rays within the crowds.
+    // Rays inside the crowds.
     let view = mesh.view();
     let owned = Owned::build(&view, &Config::new(Method::Bvh)).unwrap();
     let grid = owned.open(&view).unwrap();
@@ -135,7 +135,7 @@ fn all_triangles_in_one_place() {
     agrees(&mesh, 2001);
 }
 
-/// Vertices that no triangle uses change nothing but their number in the header.
+/// Vertices that no triangle uses change only their count in the header.
 #[test]
 fn stray_vertices_far_away() {
     let mesh = ball(20, 1.0);

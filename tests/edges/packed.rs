@@ -1,4 +1,4 @@
-//! Blobs that have their mesh in them, and what a header tells.
+//! Blobs that contain their mesh, and the facts that a header tells.
 
 use hgrid_core::{
     ALIGNMENT, BLOB_VERSION, BlobInfo, Block, Error, Grid, IndexType, Ray, Region, Strided,
@@ -14,7 +14,8 @@ fn memory(bytes: u64) -> Vec<Block> {
     vec![Block::ZERO; Block::count_for(bytes as usize)]
 }
 
-/// Shows `visit` a grid of each method over a mesh in the middle of other things, with masks.
+/// Shows `visit` a grid of each method, without masks and with them; the mesh's arrays have other data
+/// between their elements.
 fn each(mesh: &Mesh, mut visit: impl FnMut(&Grid<'_>)) {
     let positions: Vec<[f32; 5]> =
         mesh.positions.iter().map(|&[x, y, z]| [x, y, z, 7.0, 8.0]).collect();
@@ -39,7 +40,7 @@ fn a_packed_blob_needs_nothing_else() {
         each(&mesh, |grid| {
             let mut kept = memory(grid.packed_bytes());
             grid.pack(Block::bytes_mut(&mut kept)).unwrap();
-            // Elsewhere, with something behind it.
+            // Open the blob at another address, with bytes after it.
             let moved = [kept, memory(64)].concat();
             let packed = Grid::open_packed(Block::bytes(&moved)).unwrap();
             prove(&packed).unwrap();
@@ -54,7 +55,7 @@ fn a_packed_blob_needs_nothing_else() {
                 assert_eq!(packed.intersect(&ray), grid.intersect(&ray));
                 oracle::check(&packed, &ray);
             }
-            // With the mesh it opens as any other blob, and it can be packed again.
+            // It also opens with the mesh as any other blob does, and packing it again gives the same bytes.
             let with_mesh = Grid::open(packed.blob(), *grid.mesh()).unwrap();
             prove(&with_mesh).unwrap();
             let mut again = memory(packed.packed_bytes());
@@ -83,7 +84,7 @@ fn a_peek_tells_what_a_blob_is() {
         let packed = grid.pack(Block::bytes_mut(&mut kept)).unwrap();
         let expected = BlobInfo { has_mesh: true, total_bytes: packed.len() as u64, ..expected };
         assert_eq!(BlobInfo::peek(packed), Ok(expected));
-        // From any address, and from no less than a header.
+        // A peek works at any address, and needs no less than a header.
         let moved = [&[0][..], packed].concat();
         assert_eq!(BlobInfo::peek(&moved[1..]), Ok(expected));
         assert!(matches!(BlobInfo::peek(&packed[..127]), Err(Error::Truncated { .. })));
@@ -109,7 +110,7 @@ fn too_little_memory_is_told_and_left_alone() {
         assert!(bytes.iter().all(|&byte| byte == 0xa5), "something was written");
         assert_eq!(grid.pack(bytes).unwrap().len() as u64, needed_bytes);
         assert!(bytes[needed_bytes as usize..].iter().all(|&byte| byte == 0xa5));
-        // Every byte in it was written: zeros would have led to the same.
+        // Pack wrote every byte: over zeros it gives the same.
         let mut zeros = memory(needed_bytes);
         assert_eq!(
             grid.pack(Block::bytes_mut(&mut zeros)).unwrap(),
@@ -133,7 +134,7 @@ fn what_is_no_packed_blob_is_refused() {
             Grid::open_packed(&bytes[ALIGNMENT / 2..]).err(),
             Some(Error::Misaligned { region: Region::Index })
         );
-        // A damaged mesh is one that the grid was not built for: proved, or out of range.
+        // Damage the mesh: validation finds an index out of range, or a mesh that the grid was not built for.
         let at = bytes.len() - ALIGNMENT - if grid.mesh().mask(0) == 0 { 1024 } else { 0 };
         bytes[at..][..4].fill(0xff);
         if let Ok(damaged) = Grid::open_packed(bytes) {

@@ -1,4 +1,4 @@
-//! A value prints one line for a debugger, however large it is.
+//! Debug output is one line, however large the value is.
 
 use std::fmt::Debug;
 

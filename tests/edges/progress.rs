@@ -7,12 +7,12 @@ use hgrid_tests::meshes::{Mesh, ball, one_triangle};
 use hgrid_tests::methods::configs;
 use hgrid_tests::owned::prove;
 
-/// Memory for a grid, at a multiple of 64.
+/// Returns memory for a grid, aligned to 64 bytes.
 fn region(bytes: usize) -> Vec<Block> {
     vec![Block::ZERO; Block::count_for(bytes)]
 }
 
-/// Calls `visit` with memory for each method.
+/// Calls `visit` with memory for a grid of each method.
 fn each(mesh: &Mesh, mut visit: impl FnMut(&Config, &mut [Block], &mut [Block])) {
     for config in configs() {
         let Sizes { index_bytes, scratch_bytes, .. } =
@@ -49,7 +49,7 @@ fn a_build_can_be_cancelled_at_any_call_and_begun_again() {
             let progress = |done: f32| {
                 assert!(calls.get() <= enough, "called again after it had enough");
                 calls.set(calls.get() + 1);
-                // The answer to the last call means nothing.
+                // The answer to the last call is ignored.
                 calls.get() <= enough && done < 1.0
             };
             let control = Control { progress: Some(&progress), ..Control::default() };
@@ -67,8 +67,8 @@ fn a_build_can_be_cancelled_at_any_call_and_begun_again() {
     });
 }
 
-/// A region that held a grid holds that one or none after a build that came to nothing, however far
-/// it got: a header in front of the lists of another grid would let both be taken for one.
+/// After a failed build, however far it got, a region that held a grid holds that grid or none. A header
+/// before the lists of another grid would pass for a mixture of both.
 #[test]
 fn what_is_left_of_a_build_is_the_old_grid_or_none() {
     let old = ball(6, 1.0);

@@ -1,4 +1,4 @@
-//! Rays that are no rays miss; rays at the limits of what is one are answered as brute force does.
+//! Invalid rays miss; valid rays at the limits are answered as brute force does.
 
 use hgrid_core::{Coherence, Config, Cull, Grid, Hit, Parameters, Ray, Strided, StridedMut};
 use hgrid_tests::meshes::{Mesh, ball, soup};
@@ -44,7 +44,7 @@ fn rays_that_are_no_rays_miss() {
     assert_eq!(ask(&mesh, [Ray { t_min: f32::NEG_INFINITY, ..sound }]), 1);
 }
 
-/// Zero, negative zero, denormal and tiny components, alone and together.
+/// Directions with zero, negative zero, denormal and tiny components, alone and together.
 #[test]
 fn directions_along_axes_and_nearly_so() {
     let mesh = ball(8, 0.0);
@@ -57,7 +57,7 @@ fn directions_along_axes_and_nearly_so() {
                 let second = tiny[(i * 5 + 2) % tiny.len()];
                 let mut direction = [along, first * along.abs(), second * along.abs()];
                 direction.rotate_right(axis);
-                // On borders of cells, on faces, on edges, on corners and just anywhere.
+                // On borders of cells, faces, edges and corners, and at no special place.
                 for origin in [[0.0; 3], [0.25; 3], [1.0; 3], [-1.0, 1.0, 0.5], [-3.0, 0.5, 1.0]] {
                     rays.push(Ray::new(origin, direction));
                 }
@@ -90,7 +90,7 @@ fn origins_far_away() {
     let mesh = ball(6, 1.0);
     let mut random = Random(41);
     let mut rays = Vec::new();
-    // 2^29 extents are 1e9. Around that, and to the end of f32.
+    // 2^29 extents are about 1e9: try distances around that, and up to the end of f32.
     let near = [5.0, 100.0, 1e4, 1e8, 3e8, 1e9, 1.1e9, 2e9, 1e10];
     let far = [1e20, 1e30, 1e31, 1e32, 1e35, 2e38];
     for distance in near.into_iter().chain(far) {
@@ -100,7 +100,7 @@ fn origins_far_away() {
             rays.push(Ray::new(origin, towards));
             rays.push(Ray::new(origin, std::array::from_fn(|k| target[k] - origin[k])));
             rays.push(Ray { t_min: distance, ..Ray::new(origin, towards) });
-            // Along an axis and along a diagonal, where nothing is lost on the way.
+            // Along an axis and along a diagonal, where the origin keeps all its digits.
             let mut along = [0.0; 3];
             along[i % 3] = if i % 2 == 0 { -1.0 } else { 1.0 };
             let origin = std::array::from_fn(|k| target[k] - along[k] * distance);
@@ -130,7 +130,7 @@ fn directions_of_any_length_give_t_in_their_multiples() {
     }
 }
 
-/// Along such a border a ray takes so many cells to cross one that a rounding is a step.
+/// Along such a border a ray passes so many cells before it crosses the border that one rounding decides a step.
 #[test]
 fn rays_along_borders_that_they_hardly_cross() {
     let mut random = Random(97);
@@ -161,9 +161,8 @@ fn rays_along_borders_that_they_hardly_cross() {
     assert!(hits > 3000, "{hits}");
 }
 
-/// Many triangles are hit at t = 0, and the answer is the one with the lowest id, in whichever cells
-/// they are: vertices lie a margin away from borders of cells, where a subgrid reaches farther than
-/// its cell.
+/// Many triangles are hit at t = 0, and the answer must be the one with the lowest id, whatever cells they
+/// are in: vertices lie close to borders of cells, where a subgrid reaches farther than its cell.
 #[test]
 fn origins_on_vertices_that_many_triangles_share() {
     let mut random = Random(43);

@@ -64,7 +64,7 @@ fn an_instance_without_an_inverse_is_named() {
 fn scales_from_tiny_to_huge_are_traced() {
     with_triangle(|objects| {
         for scale in [1e-30_f32, 1e-20, 1e-6, 1.0, 1e6, 1e20, 1e30] {
-            // Uneven, too.
+            // Scales that differ between the axes, too.
             for [x, y, z] in [[1.0, 1.0, 1.0], [1.0, -0.5, 2.0], [0.25, 1.0, 1e-3]] {
                 let instance = scaled([x * scale, y * scale, z * scale]);
                 let built = Built::scene(&[instance], objects, &Config::default()).unwrap();
@@ -169,9 +169,9 @@ fn boxes_that_are_none_leave_their_shapes_out() {
         one,
         odd(5, f32::INFINITY),
         odd(3, 1e37),
-        // Turned round: two opposite corners, too.
+        // Opposite corners in the other order.
         [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
-        // Flat, and a point.
+        // A flat box, and a point.
         [0.5, 0.0, 0.0, 0.5, 1.0, 1.0],
         [0.5; 6],
     ];
@@ -233,7 +233,7 @@ fn packed_scenes_are_refused_for_what_they_are() {
         assert_eq!((info.triangle_count, info.vertex_count), (1, 1 + 3));
         prove_packed(bytes).unwrap();
 
-        // No ray hits an object that is `Nothing`, and it stays `Nothing`.
+        // No ray hits `Object::Nothing`, and it stays `Nothing` in the packed blob.
         let ray = RayF64::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
         with_packed(bytes, |opened| {
             let opened = opened.unwrap();
@@ -247,7 +247,7 @@ fn packed_scenes_are_refused_for_what_they_are() {
         let built = Built::scene(&[Instance::new(0)], &nothing, &Config::default()).unwrap();
         assert_eq!(built.open(&nothing).unwrap().intersect(&ray), None);
 
-        // Room.
+        // Too little room for members or objects.
         let open = |members: usize, objects: usize| {
             let (mut members, mut objects) =
                 (vec![Member::EMPTY; members], vec![Object::Nothing; objects]);
@@ -258,7 +258,7 @@ fn packed_scenes_are_refused_for_what_they_are() {
         assert_eq!(open(0, 4), Err(Error::MissingObjects { needed: 1, available: 0 }));
         assert_eq!(open(1, 3), Err(Error::MissingObjects { needed: 4, available: 3 }));
 
-        // Scratch.
+        // Too little scratch.
         let (mut members, mut places) = ([Member::EMPTY; 1], [Object::Nothing; 4]);
         let proven = Scene::open_packed_proven(bytes, &mut members, &mut places, &mut [0; 3]);
         let (needed_bytes, available_bytes) = (4, 3);
@@ -266,7 +266,7 @@ fn packed_scenes_are_refused_for_what_they_are() {
         let error = Error::OutOfMemory { region, needed_bytes, available_bytes };
         assert_eq!(proven.unwrap_err(), error);
 
-        // Blobs of something else, and none.
+        // Blobs of other content, and bytes that are no blob.
         let Object::Grid(grid) = objects[0] else { panic!("a grid") };
         let other = |content| Some(Error::OtherContent(content));
         let error = |blob: &[u8]| with_packed(blob, |opened| opened.err());

@@ -1,4 +1,4 @@
-//! Meshes of odd shapes answer as brute force does and stay within the memory they were promised.
+//! Meshes of odd shapes answer as brute force does and stay within their memory bounds.
 
 use hgrid_core::{Config, Grid, Parameters, Ray, Sizes};
 use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
@@ -6,7 +6,7 @@ use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle, rounds};
 
-/// Rays through and around the mesh, from inside and outside its box, at its vertices and beside.
+/// Compares rays through and around the mesh, from inside and outside its box, at its vertices and beside them.
 fn agrees(mesh: &Mesh) {
     let view = mesh.view();
     let build = |config: Config| {
@@ -55,7 +55,7 @@ fn one_and_a_few_triangles() {
     }
 }
 
-/// A mesh of so many triangles, all the same.
+/// Returns a mesh of `count` equal triangles.
 fn stack(count: usize) -> Mesh {
     let mut mesh = Mesh::default();
     for _ in 0..count {
@@ -175,8 +175,8 @@ fn dense_rows_and_a_crowded_corner() {
     agrees(&crowded);
 }
 
-/// A grid that would need more references than it may have is built with a lower density, and says
-/// so: the configuration that the grid tells builds it again.
+/// A grid that would need more references than allowed is built with a lower density and reports it: building
+/// with the reported configuration gives the same grid.
 #[test]
 fn a_mesh_of_spanning_triangles_lowers_the_density() {
     let mesh = soup(300, 2.0, 23);
@@ -190,7 +190,7 @@ fn a_mesh_of_spanning_triangles_lowers_the_density() {
         if let Some(density) = grid.config().parameters.density() {
             let ratio = 64.0 / density;
             assert!(ratio.log2().fract() == 0.0, "halved, again and again: {ratio}");
-            // A deep recursive grid has few cells at the root, whatever the triangles.
+            // A deep recursive grid has few cells at the root, however many triangles there are.
             let is_deep =
                 matches!(config.parameters, Parameters::Recursive { depth, .. } if depth > 1);
             assert!(ratio > 1.0 || is_deep, "{config:?}");

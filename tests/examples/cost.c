@@ -1,5 +1,5 @@
-/* What a C programmer writes by hand: cost.cpp is the same through hgrid.hpp, and the test compares
- * what the compiler makes of both. */
+/* Functions as a C programmer writes them by hand: cost.cpp has the same through hgrid.hpp, and the test
+ * compares the compiled code. */
 
 #include <hgrid.h>
 

@@ -1,7 +1,7 @@
 //! A query through hgrid.hpp costs what the C call costs, because it is the C call.
 //!
-//! cost.c and cost.cpp hold the same functions; the compiler's output is compared function by
-//! function: what it calls, and how large it is.
+//! cost.c and cost.cpp contain the same functions. The test compares the compiled functions: the calls that
+//! each makes, and its size.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,15 +13,15 @@ use tempfile::TempDir;
 
 use crate::programs::printed;
 
-/// What is known of a compiled function.
+/// The facts of a compiled function that the test compares.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Function {
-    /// What it calls of the library, sorted.
+    /// The library functions that it calls, sorted.
     calls: Vec<String>,
     bytes: u64,
 }
 
-/// The functions of a compiled file, each of which has a section of its own.
+/// Returns the functions of an object file, each of which has a section of its own.
 fn functions(object: &Path) -> BTreeMap<String, Function> {
     let mut functions = BTreeMap::<String, Function>::new();
     let sizes = printed(command("nm").args(["--print-size", "--radix=d"]).arg(object));
@@ -49,11 +49,11 @@ fn functions(object: &Path) -> BTreeMap<String, Function> {
     functions
 }
 
-/// What a compiled file wants from others.
+/// Returns the symbols that an object file needs from others.
 fn wanted(object: &Path) -> Vec<String> {
     let names = printed(command("nm").arg("--undefined-only").arg(object));
     let names = names.lines().filter_map(|line| line.split_whitespace().last());
-    // A compiler may copy structs by a call, or not, as it likes.
+    // A compiler may copy structs with or without a call.
     let names = names.filter(|name| !["memcpy", "memset", "_GLOBAL_OFFSET_TABLE_"].contains(name));
     names.map(str::to_owned).collect()
 }
@@ -82,7 +82,7 @@ fn queries_through_the_header_are_the_calls_in_c() {
             let through_header = &through_header[name];
             assert_eq!(by_hand.calls.len(), 1, "{name}");
             assert_eq!(through_header.calls, by_hand.calls, "{compiler_name}: {name}");
-            // A build takes time for every triangle; its few bytes of arguments may be copied.
+            // A build takes time for every triangle, so a few more instructions that copy its arguments do no harm.
             let most = by_hand.bytes + by_hand.bytes / 4 + 16;
             assert!(
                 name == "build" || through_header.bytes <= most,

@@ -1,4 +1,4 @@
-//! The ray tracer says what is wrong and ends with 1; no file makes it crash.
+//! The ray tracer reports errors and exits with status 1; no file makes it crash.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use crate::pictures::{ascii, binary};
 use crate::programs::{attempt, refusal, watched_raytracer};
 
-/// What it says about a file.
+/// Returns the ray tracer's error message about a file.
 fn refusal_of(dir: &Path, contents: &[u8]) -> String {
     let path = dir.join("bad.ply");
     fs::write(&path, contents).expect("a file");
@@ -24,7 +24,7 @@ fn replaced(from: &str, to: &str) -> Vec<u8> {
 
 #[test]
 fn bad_arguments_are_refused() {
-    // Where the picture goes that one of them begins to draw.
+    // One of the cases begins to draw, and needs a place for its picture.
     let dir = TempDir::new().expect("a folder");
     for (words, message) in [
         (&["--size"][..], "--size needs a value"),
@@ -98,23 +98,23 @@ fn bad_files_are_refused_with_the_reason() {
     assert!(!dir.path().join("none.ppm").exists());
 }
 
-/// The reader passes these on; the library knows which triangle is to blame.
+/// The reader passes these numbers on; the library finds the triangle that has them.
 #[test]
 fn vertices_that_do_not_exist_are_named_by_their_triangle() {
     let dir = TempDir::new().expect("a folder");
     for number in ["10", "-1", "4294967295", "5000000000", "nan"] {
         let contents = replaced("4 0 3 7 4 ", &format!("4 0 3 7 {number} "));
         let said = refusal_of(dir.path(), &contents);
-        // The pentagons before it make three triangles each.
+        // The pentagons before it give three triangles each.
         assert!(said.contains("triangle 7: a vertex number is out of range"), "{number}: {said}");
     }
 }
 
-/// Files that end after any number of bytes, but for so many numbers between.
+/// Cuts files off at every `step`th byte, each of which must be refused.
 fn truncated_files_are_refused(step: usize) {
     let dir = TempDir::new().expect("a folder");
     for whole in [ascii(), binary()] {
-        // The last number of a text may be cut short and still be one.
+        // A text whose last number is cut short may still be valid.
         for end in (0..whole.len() - 4).step_by(step) {
             let said = refusal_of(dir.path(), &whole[..end]);
             assert!(said.contains("bad.ply: "), "{end}: {said}");

@@ -1,4 +1,4 @@
-//! Heat maps show the library's counters, in colours that their bar explains.
+//! Heat maps show the library's counters, in colours that their legend explains.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -18,7 +18,7 @@ use crate::programs::{raytracer, watched_raytracer};
 
 const SIZE: u16 = 96;
 
-/// The work of the camera's rays, as the library counts it.
+/// Returns the work of the camera's rays as the library counts it.
 fn counted(scene: &Scene, config: &Config) -> Vec<Counters> {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices).expect("a sound mesh");
     let owned = Owned::build(&mesh, config).expect("a sound mesh");
@@ -42,14 +42,14 @@ fn drawn(dir: &Path, options: &[&str]) -> Picture {
     Picture::load(&path)
 }
 
-/// The bar of a picture, from no work to much.
+/// Returns the colours of a picture's bar, from no work to much.
 fn bar(picture: &Picture) -> Vec<[u8; 3]> {
     let row = usize::from(SIZE) + 12;
     let row = &picture.pixels[row * picture.width..][..picture.width];
     row.iter().copied().filter(|&pixel| pixel != [255; 3]).collect()
 }
 
-/// How far along the bar a colour is, 0 to 1.
+/// Returns the position of a colour on the bar, from 0 to 1.
 fn place(bar: &[[u8; 3]], color: [u8; 3]) -> f64 {
     let distance = |other: &[u8; 3]| -> i32 {
         color.iter().zip(other).map(|(a, b)| (i32::from(*a) - i32::from(*b)).pow(2)).sum()
@@ -59,7 +59,7 @@ fn place(bar: &[[u8; 3]], color: [u8; 3]) -> f64 {
     nearest as f64 / (bar.len() - 1) as f64
 }
 
-/// The first of 2, 4, 6, 8, 10, 20, 40, ... that leaves no more than 1 of 100 behind it.
+/// Returns the first of 2, 4, 6, 8, 10, 20, 40, ... that at most 1 of 100 pixels exceeds.
 fn top_of(work: &[u64]) -> u64 {
     let powers = (0..).map(|power| 10u64.pow(power));
     let mut numbers = powers.flat_map(|power| [2, 4, 6, 8, 10].map(|digit| digit * power));
@@ -90,7 +90,7 @@ fn each_pixel_has_the_colour_of_its_work() {
     }
 }
 
-/// What shadow rays cost is part of the pixel's work.
+/// The work of shadow rays is part of the pixel's work.
 #[test]
 fn all_rays_of_a_pixel_count() {
     let dir = TempDir::new().expect("a folder");
@@ -117,7 +117,7 @@ const NUMBERS: &str = "
   ###                                         # ###                                ### ###
 ";
 
-/// The legend as text, without the bar itself.
+/// Returns the legend as text, without the bar itself.
 fn letters(picture: &Picture) -> String {
     let rows = picture.pixels.chunks(picture.width).skip(usize::from(SIZE));
     let mut text = String::new();
@@ -138,7 +138,7 @@ fn the_bar_says_what_its_colours_mean() {
     assert!(text.contains(NAME) && text.contains(NUMBERS), "{text}");
 }
 
-/// Where there is no room for numbers there is no bar.
+/// A picture too small for numbers has no bar.
 #[test]
 fn small_and_empty_pictures_have_heat_too() {
     let dir = TempDir::new().expect("a folder");

@@ -1,4 +1,4 @@
-/* What the programs about hgrid.hpp share. */
+/* Helpers of the programs about hgrid.hpp. */
 #ifndef HPP_H
 #define HPP_H
 
@@ -19,7 +19,7 @@
         }                                                                                 \
     } while (false)
 
-/* What a compiler can check. */
+/* A check at compile time. */
 #define STATIC_CHECK(...) static_assert((__VA_ARGS__), #__VA_ARGS__)
 
 /* Each file checks a part; the first check that fails ends the program. */
@@ -38,7 +38,7 @@ struct face {
     std::array<std::uint32_t, 3> corners;
 };
 
-/* Sheets over the unit square at z = 0, 1, 2, ..., facing up. */
+/* Square sheets over the unit square at z = 0, 1, 2, ..., facing up. */
 struct scene {
     std::vector<vertex> vertices;
     std::vector<face> faces;
@@ -67,7 +67,7 @@ struct scene {
     hgrid::mesh mesh() const { return {vertices, hgrid::field(faces, &face::corners)}; }
 };
 
-/* Straight down, at a place that is on no edge. */
+/* Returns a ray straight down, at a point that lies on no edge. */
 inline hgrid::ray down(float x = 0.31f, float y = 0.57f)
 {
     return hgrid::make_ray({x, y, 100}, {0, 0, -1});

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use crate::programs::{example, printed};
 
-/// What an engine that knows no exceptions sets, and more warnings than the project's own.
+/// The flags of an engine without exceptions, and more warnings than the project's own.
 const STRICT: [&str; 5] =
     ["-fno-exceptions", "-fno-rtti", "-Wconversion", "-Wold-style-cast", "-Wsign-conversion"];
 
@@ -56,14 +56,14 @@ fn it_does_what_it_says_in_other_dialects() {
 #[test]
 fn it_does_what_it_says_under_sanitizers() {
     let dir = TempDir::new().expect("a folder");
-    // Not optimised: it is compiled in half the time.
+    // Without optimisation it compiles in half the time.
     let flags = ["-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
     let Some(compiler) = cpp_compiler("c++17") else { return };
     let program = build(compiler, &PROGRAM.map(driver), &flags, dir.path());
     assert_eq!(printed(&mut Command::new(program)), "all is well\n");
 }
 
-/// What hello.cpp prints.
+/// The output of hello.cpp.
 pub(crate) const HELLO: &str = "\
 triangle 2 at t = 2
 through the hole: triangle 0 at t = 3
@@ -90,7 +90,7 @@ fn hello_prints_what_is_there() {
     }
 }
 
-/// The program in the head of the header.
+/// The program in the head comment of the header compiles and prints the hit.
 #[test]
 fn its_own_example_prints_the_hit() {
     let Some(compiler) = cpp_compiler("c++17") else { return };
@@ -106,7 +106,7 @@ fn its_own_example_prints_the_hit() {
     assert_eq!(printed(&mut Command::new(program)), "triangle 0 at t = 1\n");
 }
 
-/// Names in a text that begin with a prefix.
+/// Returns the names in a text that begin with a prefix.
 fn names(text: &str, prefix: &str) -> BTreeSet<String> {
     let words = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
     words.filter(|word| word.starts_with(prefix)).map(str::to_owned).collect()
@@ -126,21 +126,21 @@ fn every_status_and_every_function_of_c_is_there() {
         }
     }
 
-    // Declarations begin in the first column and have their arguments behind them.
+    // Declarations begin in the first column, followed by their arguments.
     let declared = c.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_lowercase()));
     let functions = declared.filter_map(|line| line.split_once('(')).flat_map(|(start, _)| {
         let name = start.rsplit([' ', '*']).next().unwrap_or_default();
         name.starts_with("hgrid_").then(|| name.to_owned())
     });
     let called = names(&cpp, "hgrid_");
-    // Memory by a C callback: hgrid::memory is that here. A text of the version.
+    // hgrid::memory replaces memory from a C callback. The version string has no counterpart.
     let without: BTreeSet<_> = ["hgrid_create", "hgrid_destroy", "hgrid_version_string"].into();
     for function in functions.filter(|name| !without.contains(name.as_str())) {
         assert!(called.contains(&function), "{function} is not called by hgrid.hpp");
     }
 }
 
-/// What must not compile, and what the compiler has to say about it.
+/// Lines that must not compile, each with a word of the compiler's message.
 const REFUSED: [(&str, &str); 23] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
@@ -184,7 +184,7 @@ fn what_cannot_work_compiles_in_no_other_dialect() {
     is_refused(["c++14", "c++17"].into_iter().flat_map(compilers).skip(1));
 }
 
-/// The header and the types that the lines of [`REFUSED`] use.
+/// The header, and types for the lines of [`REFUSED`].
 const PRELUDE: &str = "\
 #include <hgrid.hpp>
 #include <array>
@@ -214,7 +214,7 @@ fn is_refused(compilers: impl Iterator<Item = Command>) {
         let succeeds = |output: Output| {
             assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         };
-        // Compiled once, the header takes a third of the time for each line.
+        // A precompiled header cuts the time for each line to a third.
         let to_header = ["-x", "c++-header", "-o", "prelude.hpp.gch"];
         succeeds(run_on(&to_header, "prelude.hpp", PRELUDE));
         let compile = |line: &str| {
@@ -229,11 +229,11 @@ fn is_refused(compilers: impl Iterator<Item = Command>) {
     }
 }
 
-/// An item begins where the one before ended: with `///`, if anybody outside can name it.
+/// Each item that is visible from outside has a `///` comment. An item begins where the one before ended.
 #[test]
 fn every_public_item_is_documented() {
     let header = header("hgrid.hpp");
-    // Where we are: the items' indentation, and whether they are public.
+    // The enclosing blocks: the indentation of their items, and whether those are public.
     let mut blocks = vec![(0, true)];
     let mut ends_item = true;
     let mut items = 0;
@@ -246,7 +246,7 @@ fn every_public_item_is_documented() {
         let ends_type = text.starts_with('}') && indent + 4 == *inside;
         let is_dialect = text.contains("namespace cpp14");
         if is_dialect {
-            // Around everything, in one dialect.
+            // This namespace encloses everything in one dialect.
         } else if ends_type || text.starts_with("} // namespace") {
             blocks.pop();
         } else if text == "public:" || text == "private:" {
@@ -254,7 +254,7 @@ fn every_public_item_is_documented() {
         } else if text == "namespace detail {" {
             blocks.push((0, false));
         } else if is_code && indent == *inside && *is_public && !text.starts_with('}') {
-            // What is defined outside of its class was documented in it.
+            // A function defined outside its class is documented at its declaration.
             let is_definition = text.starts_with("inline ") && text.contains(" grid::");
             assert!(!ends_item || is_definition, "nothing is said about: {line}");
             items += 1;

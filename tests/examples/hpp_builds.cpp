@@ -1,4 +1,4 @@
-/* Grids in memory of their own and of others, and what building them may be told. */
+/* Grids in memory of their own and of the caller, and the options of a build. */
 
 #include "hpp.h"
 
@@ -69,7 +69,7 @@ static void check_grids()
         CHECK(built->validate() == status::ok);
         CHECK(reinterpret_cast<std::uintptr_t>(built->blob().data()) % hgrid::alignment == 0);
 
-        /* Moved, it answers from the same memory; what is left answers nothing. */
+        /* A moved grid answers from the same memory; the one that it was moved from answers nothing. */
         const auto *bytes = built->blob().data();
         hgrid::grid moved(std::move(*built));
         CHECK(moved.blob().data() == bytes && built->blob().empty());
@@ -79,7 +79,7 @@ static void check_grids()
         other = std::move(moved);
         CHECK(other.occluded(down()) && !moved.occluded(down()) && moved.blob().empty());
 
-        /* A view of it, and the same blob elsewhere. */
+        /* A view of the grid, and the same blob at another address. */
         const hgrid::view view = other;
         CHECK(view.occluded(down()));
         auto copy = hgrid::memory::allocate(other.blob().size());
@@ -94,7 +94,7 @@ static void check_grids()
     }
     CHECK(allocations_alive == 0);
 
-    /* Errors come with the triangle. */
+    /* Errors name the triangle. */
     scene broken(1);
     broken.faces[5].corners[1] = 1000000;
     hgrid::report report;
@@ -111,7 +111,7 @@ static void check_grids()
           std::string(hgrid_status_string(HGRID_ERROR_INVALID_DENSITY)));
 }
 
-/* Whatever allocation fails, the answer is a status, and nothing is left behind. */
+/* Whichever allocation fails, the result is a status, and no memory leaks. */
 static void check_memory_that_runs_out()
 {
     const scene s(2);
@@ -127,7 +127,7 @@ static void check_memory_that_runs_out()
             }
             CHECK(built.error() == status::out_of_memory && allocations_alive == 0);
         }
-        /* At least the scratch and the index. */
+        /* At least the allocations of scratch and index. */
         CHECK(failures >= 2);
     }
     CHECK(hgrid::memory::allocate(std::numeric_limits<std::uint64_t>::max()).error() ==
@@ -153,7 +153,7 @@ static void check_views()
     const auto bound = hgrid::bound(triangles, {});
     CHECK(bound && bound->index_bytes >= rough.index_bytes);
 
-    /* What a build that ran out of memory asks for is enough: with one level to the byte. */
+    /* The size that a failed build asks for is enough, and exact for one-level grids. */
     for (const hgrid::method method : {hgrid::method::bvh, hgrid::method::one_level}) {
         const hgrid::config how(method);
         const auto build = [&](std::size_t bytes, hgrid::report &details) {
@@ -216,7 +216,7 @@ static void check_progress_and_threads()
 static void check_configs()
 {
     scene s(3, 40);
-    /* Detail in a corner, for subgrids. */
+    /* Detail in a corner, so that there are subgrids. */
     for (vertex &v : s.vertices)
         if (v.position[2] < 1)
             v.position = {0.02f * v.position[0], 0.02f * v.position[1], 0};
@@ -234,7 +234,7 @@ static void check_configs()
     CHECK(hgrid::grid::build(s.mesh(), hgrid::config(hgrid::method::recursive).depth(99)).error() ==
           status::invalid_depth);
 
-    /* Half the bytes, with what progress was asked for. */
+    /* Fit half the bytes; the fitted configuration keeps the progress callback. */
     const auto plain = hgrid::grid::build(s.mesh(), hgrid::method::fixed);
     auto scratch = hgrid::memory::allocate(1 << 22);
     CHECK(plain && scratch);
@@ -279,7 +279,7 @@ static void check_blobs()
     CHECK(whole && whole->longest_list > 0 && whole->degenerate_count == 0);
 }
 
-/* A grid keeps what it is given, wherever it moves, and lets go of it in the end. */
+/* A grid keeps the data that it is given wherever it moves, and releases it in the end. */
 struct holder {
     hgrid::grid grid;
     int other = 0;
@@ -306,7 +306,7 @@ static void check_kept()
     CHECK(holders[3].grid.intersect(down())->primitive == expected->intersect(down())->primitive);
     CHECK(!kept->occluded(down()) && holders[3].grid.validate() == status::ok);
 
-    /* Shared data, with a mesh that looks into it; and arrays of another type. */
+    /* Shared data that a mesh points into, and arrays of other types. */
     auto shared = std::make_shared<const scene>(3);
     const auto describe = [](const std::shared_ptr<const scene> &of) { return of->mesh(); };
     {
@@ -322,7 +322,7 @@ static void check_kept()
                                             std::array<std::uint16_t, 3>{0, 1, 2});
     CHECK(triangle && triangle->occluded(down(0.2f, 0.3f)) && !triangle->occluded(down(0.9f, 0.9f)));
 
-    /* What cannot be built is given back. */
+    /* Data of a refused build is released. */
     const auto bad = [](const std::shared_ptr<const scene> &of) {
         hgrid_mesh raw = of->mesh().c();
         raw.vertex_count = 3;
@@ -340,7 +340,7 @@ void check_builds()
 {
     check_grids();
     check_kept();
-    /* Before C++17 what is kept is counted, too, and freed by a delete that nobody counts. */
+    /* Before C++17 the count includes kept data, which is freed by a delete that is not counted. */
     CHECK(allocations_alive >= 0);
 #if __cplusplus < 201703L
     allocations_alive = 0;

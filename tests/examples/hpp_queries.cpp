@@ -1,4 +1,4 @@
-/* Rays one by one and in batches, with all that a query may be told. */
+/* Single rays and batches, with every option of a query. */
 
 #include "hpp.h"
 
@@ -41,7 +41,7 @@ static void check_rays()
         }
     }
 
-    /* Side by side, of different numbers, and none. */
+    /* Contiguous rays, arrays of different lengths, and empty arrays. */
     const std::vector<hgrid::ray> rays(3, down());
     std::vector<hgrid::hit> hits(3);
     CHECK(grid->intersect_n(rays, hits, hgrid::coherence::coherent) == status::ok);
@@ -66,7 +66,7 @@ static void check_rays()
     CHECK(closest && is_near(closest->distance, 0.25f) && is_near(closest->position[2], 2));
     CHECK(!grid->closest_point({0.5f, 0.5f, 2.25f}, 0.2f));
 
-    /* Off the surface, and on through it to the next. */
+    /* Rays that leave the surface, and go on through it to the next. */
     const auto at = grid->surface_at(down(), *top);
     CHECK(at && is_near(at->normal[2], 1) && at->is_front == 1 && is_near(at->position[2], 4));
     const auto from = [](const float (&start)[3], float z) {
@@ -86,7 +86,7 @@ static void check_rays()
 
 static void check_joined()
 {
-    /* Two sheets, none, and four in another form: the highest of the last ones is on top. */
+    /* Two sheets, an empty mesh, and four sheets in another form: the highest of the last is on top. */
     const scene low(2), high(4);
     std::vector<std::uint32_t> masks(low.faces.size(), 2);
     const std::vector<hgrid::point> corners = {{0, 0, 9}, {1, 0, 9}, {0, 1, 9}};
@@ -172,7 +172,7 @@ static void check_filters()
         return hit ? s.faces[hit->primitive].material : -1;
     };
 
-    /* From near to far, with what the lambda remembers. */
+    /* The filter sees hits from near to far, and the lambda keeps a state. */
     std::vector<std::int64_t> offered;
     auto below_three = [&](const hgrid::hit &hit) {
         offered.push_back(s.faces[hit.primitive].material);
@@ -189,7 +189,7 @@ static void check_filters()
     };
     CHECK(material(grid->intersect(down(), hgrid::options().filter(second))) == 3);
 
-    /* All hits but some; and none of them. */
+    /* All hits with a filter that rejects some, and one that rejects all. */
     std::vector<hgrid::hit> hits(5);
     auto odd = [&](const hgrid::hit &hit) { return s.faces[hit.primitive].material % 2 == 1; };
     const auto count = grid->intersect_all(down(), hits, hgrid::options().filter(odd));
@@ -197,7 +197,7 @@ static void check_filters()
     const auto nothing = [](const hgrid::hit &) { return false; };
     CHECK(!grid->intersect(down(), hgrid::options().filter(nothing)));
 
-    /* In a batch, by the ray's place. */
+    /* A filter of a batch gets the index of the ray. */
     const std::vector<hgrid::ray> rays(9, down());
     std::vector<hgrid::hit> batch(9);
     auto by_place = [&](std::size_t ray, const hgrid::hit &hit) {
@@ -215,7 +215,7 @@ static void check_filters()
                            hgrid::options().filter(nothing)) == status::ok);
     CHECK((dark == std::array<std::uint8_t, 9>{}));
 
-    /* Only the sheets 2 and 3 ask; 1 is opaque. */
+    /* The filter is asked about sheets 2 and 3 only; sheet 1 is opaque. */
     std::vector<std::uint32_t> masks;
     for (const face &f : s.faces)
         masks.push_back(1u << f.material);
@@ -234,7 +234,7 @@ static void check_filters()
     CHECK(s.faces[blockers[8]].material == 1);
     CHECK(masked->occluder(down(), asking.mask(0xc)) == hgrid::invalid_id);
 
-    /* A pointer to a function is a callable, too. */
+    /* A pointer to a function serves as a filter, too. */
     auto *function = is_below_256;
     CHECK(material(grid->intersect(down(), hgrid::options().filter(function))) == 1);
 }

@@ -30,7 +30,7 @@ bool is_same(const hgrid::scene_hit &one, const hgrid::scene_hit &other)
            std::equal(std::begin(one.path), std::end(one.path), std::begin(other.path));
 }
 
-// Many rays at once answer as single ones do.
+// Batches answer as single rays do.
 void check_batches(const hgrid::scene &scene)
 {
     using hgrid::status;
@@ -55,7 +55,7 @@ void check_batches(const hgrid::scene &scene)
     }
     CHECK(count > 40 && count < 360);
 
-    // With options: sorted in memory of ours, of one instance, and by a filter.
+    // With options: scratch to sort in, and a filter that accepts one instance.
     std::vector<hgrid::byte> memory(16 * pixels.size());
     CHECK(scene.intersect_n(rays, hits, hgrid::coherence::incoherent, hgrid::scene_options().sort_in(memory)) ==
           status::ok);
@@ -79,7 +79,7 @@ void check_batches(const hgrid::scene &scene)
     auto none = [](const hgrid::scene_hit &) { return hgrid::verdict::reject; };
     CHECK(!scene.occluded({{0.25, 0.25, 3}, {0, 0, -1}, 0, 100, 0}, hgrid::scene_options().filter(none)));
 
-    // Of different numbers, none, and of a view of nothing.
+    // Arrays of different lengths, empty arrays, and an empty view.
     filtered.resize(2);
     std::array<std::uint8_t, 4> bytes{};
     CHECK(scene.intersect_n(rays, filtered, hgrid::coherence::coherent) == status::invalid_answers);
@@ -92,7 +92,7 @@ void check_batches(const hgrid::scene &scene)
 
 void check_scenes()
 {
-    // Cubes in a row, met where their front is.
+    // Cubes in a row; the test finds hits on their fronts.
     std::vector<ball> all;
     for (int i = 0; i < 64; i++) {
         const float x = static_cast<float>(2 * i);
@@ -113,7 +113,7 @@ void check_scenes()
     const auto again = hgrid::shapes::open(hgrid::as_bytes(shape_index), boxes);
     CHECK(again && again->occluded(hgrid::make_ray({0.5f, 0.5f, 3}, {0, 0, -1})));
     CHECK(!hgrid::shapes().occluded(hgrid::make_ray({0.5f, 0.5f, 3}, {0, 0, -1})));
-    // Many at once: every second one between the cubes.
+    // A batch in which every second ray passes between the cubes.
     std::vector<hgrid::ray> many;
     for (int i = 0; i < 64; i++)
         many.push_back(hgrid::make_ray({0.5f + static_cast<float>(i), 0.5f, 3}, {0, 0, -1}));
@@ -132,7 +132,7 @@ void check_scenes()
     dark.pop_back();
     CHECK(shapes->occluded_n(many, dark, hgrid::coherence::coherent) == hgrid::status::invalid_answers);
 
-    // Twice a triangle, and the cubes.
+    // A triangle twice, and the cubes.
     const std::vector<std::array<float, 3>> corners = {{{0, 0, 0}}, {{1, 0, 0}}, {{0, 1, 0}}};
     const std::vector<std::uint32_t> indices = {0, 1, 2};
     const auto grid = hgrid::view::build(hgrid::mesh(corners, indices), hgrid::config(),
@@ -168,7 +168,7 @@ void check_scenes()
     hgrid::report enough;
     CHECK(hgrid::scene::bound(3, hgrid::config(), enough) == hgrid::status::ok);
     CHECK(enough.index_bytes <= hgrid::scene_bound(3));
-    // Alone and with all that it shows; shapes stay the caller's.
+    // A scene packs with all that it shows, but not with shapes, which stay with the caller.
     CHECK(moved->packed_bytes() == 0 && moved->pack().error() == hgrid::status::other_content);
     alignas(64) static unsigned char plain_index[hgrid::scene_bound(8) / 64 * 64 + 64];
     const auto plain = hgrid::scene::build(hgrid::span<const hgrid::instance>(instances.data(), 2), objects,

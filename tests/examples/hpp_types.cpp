@@ -1,4 +1,4 @@
-/* hgrid.hpp as a C++ renderer uses it: what its types promise, spans, and meshes in any form. */
+/* The types of hgrid.hpp as a C++ renderer uses them: their properties, spans, and meshes in every form. */
 
 #include "hpp.h"
 
@@ -80,7 +80,7 @@ struct corners16 {
     std::uint16_t first, second, third;
 };
 
-/* Vertices that begin with three floats, one way or another. */
+/* Vertices that begin with three floats, in several ways. */
 struct named {
     float x, y, z;
     std::uint32_t color;
@@ -96,7 +96,7 @@ public:
     float x, y, z;
 };
 
-/* A mesh gives the hits that the scene's own gives. */
+/* Checks that a mesh gives the same hits as the scene's own mesh. */
 static void check_mesh(const scene &s, const hgrid::mesh &mesh)
 {
     CHECK(mesh.vertex_count() == s.vertices.size() && mesh.triangle_count() == s.faces.size());

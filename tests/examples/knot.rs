@@ -1,4 +1,4 @@
-//! The built-in scene of the ray tracer is the lab's.
+//! The built-in scene of the ray tracer is the same as the lab's.
 
 use std::process::Command;
 
@@ -8,7 +8,7 @@ use tempfile::TempDir;
 
 use crate::programs::{compile, example};
 
-/// What the lab calls the scene that is built into the ray tracer.
+/// The lab's name for the scene that is built into the ray tracer.
 pub(crate) const KNOT: &str = "procedural:knot:500K";
 
 #[test]

@@ -1,7 +1,7 @@
-//! Do the examples print and draw what they are documented to?
+//! The examples print and draw what they are documented to.
 //!
-//! Examples are copied by users, so each has to be right. The ray tracer shares scene, camera and
-//! light with the lab, which makes the lab its oracle: the pictures are the same, byte by byte.
+//! Users copy the examples, so each has to be right. The ray tracer has the scene, camera and light of the
+//! lab, so the lab is its oracle: the pictures are the same, byte by byte.
 
 mod cost;
 mod errors;

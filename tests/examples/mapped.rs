@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use crate::pictures::ascii;
 use crate::programs::{compile, drawing, printed, raytracer, refusal, watched_mapped};
 
-/// The picture of the ray tracer with shadows.
+/// Returns the ray tracer's picture with shadows.
 fn expected(dir: &Path, words: &[&str]) -> Vec<u8> {
     let path = dir.join("expected.ppm");
     run(raytracer().args(words).args(["--shadows", "-o"]).arg(&path));
@@ -32,7 +32,7 @@ fn halves_from_two_processes_are_the_picture_of_one() {
     assert!(!grid.exists(), "the grid's file is left");
 }
 
-/// One row makes two parts of which one is empty.
+/// A picture of one row has two parts, one of them empty.
 #[test]
 fn parts_of_any_size_make_a_picture() {
     let dir = TempDir::new().expect("a folder");
@@ -73,7 +73,7 @@ fn it_says_what_is_wrong_and_leaves_no_file() {
     assert!(printed(watched_mapped().arg("--help")).contains("GRID_FILE must not exist"));
 }
 
-/// A process that cannot write its part says so, and the first one does not pretend.
+/// If a process cannot write its part, the program fails with an error.
 #[test]
 fn a_full_disk_is_noticed() {
     if !Path::new("/dev/full").exists() {

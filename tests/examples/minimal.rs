@@ -10,7 +10,7 @@ use crate::hpp::HELLO;
 use crate::ppm::Picture;
 use crate::programs::{compile, example};
 
-/// The bytes are those of a tree, which NULL stands for.
+/// The output; the bytes are those of a tree, the method of a NULL configuration.
 const PRINTED: &str = "built a grid of 320 bytes\n\
                        hit triangle 0 at t = 1, u = 0.25, v = 0.5\n";
 
@@ -31,7 +31,7 @@ fn the_makefile_builds_and_runs_all() {
     let dir = TempDir::new().expect("a folder");
     let mut make = command("make");
     make.arg("-C").arg(root().join("c_examples")).arg("run");
-    // Not what the outer make or cargo of a test run may have set.
+    // Remove variables that an outer make or cargo may have set.
     for name in ["MAKEFLAGS", "MAKELEVEL", "CFLAGS", "RUSTFLAGS"] {
         make.env_remove(name);
     }

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use crate::pictures::ascii;
 use crate::programs::{drawing, link, printed, raytracer};
 
-/// The program, if there is an MPI to build it with.
+/// Builds the program, if there is an MPI.
 fn mpi(dir: &Path) -> Option<PathBuf> {
     if !is_installed("mpi") {
         return None;
@@ -21,7 +21,7 @@ fn mpi(dir: &Path) -> Option<PathBuf> {
     Some(program)
 }
 
-/// So many ranks on this machine, however few cores it has and whoever runs the test.
+/// Returns a command that runs `count` ranks on this machine, with any number of cores and as any user.
 fn ranks(count: u32, program: &Path) -> Command {
     let mut mpirun = command("mpirun");
     mpirun.args(["-n", &count.to_string()]).arg(program).current_dir(root());
@@ -32,7 +32,7 @@ fn ranks(count: u32, program: &Path) -> Command {
     mpirun
 }
 
-/// The mesh and the grid of the built-in scene are several pieces each.
+/// The mesh and the grid of the built-in scene are sent in several pieces each.
 #[test]
 fn four_ranks_draw_the_picture_of_one() {
     let dir = TempDir::new().expect("a folder");
@@ -46,7 +46,7 @@ fn four_ranks_draw_the_picture_of_one() {
     assert!(fs::read(together).expect("a picture") == fs::read(alone).expect("a picture"));
 }
 
-/// Some ranks have nothing to draw, and one rank is enough.
+/// Some ranks may have nothing to draw, and one rank is enough.
 #[test]
 fn any_number_of_ranks_draws_any_scene() {
     let dir = TempDir::new().expect("a folder");
@@ -62,7 +62,7 @@ fn any_number_of_ranks_draws_any_scene() {
     }
 }
 
-/// The one rank that finds out takes the others along.
+/// The rank that finds an error ends the others.
 #[test]
 fn errors_end_all_ranks() {
     let dir = TempDir::new().expect("a folder");

@@ -16,12 +16,12 @@ use crate::programs::{raytracer, watched_raytracer};
 
 const SIZE: u16 = 64;
 
-/// The lab's picture as a PPM file, and how many rays hit.
+/// Returns the lab's picture as a PPM file, and the number of rays that hit.
 fn expected(scene: &Scene) -> (Vec<u8>, usize) {
     expected_at(scene, SIZE)
 }
 
-/// The same with so many pixels on each side.
+/// Returns the same for a picture of `size` pixels on each side.
 fn expected_at(scene: &Scene, size: u16) -> (Vec<u8>, usize) {
     let mesh = TriangleMesh::new(&scene.positions, &scene.indices).expect("a sound mesh");
     let owned = Owned::build(&mesh, &Config::default()).expect("a sound mesh");
@@ -100,7 +100,7 @@ fn density_is_passed_on() {
     }
 }
 
-/// Tiles are cut off at the edges.
+/// Tiles at the right and lower edges are cut off.
 #[test]
 fn a_picture_of_any_size_is_complete() {
     let dir = TempDir::new().expect("a folder");
@@ -114,7 +114,7 @@ fn a_picture_of_any_size_is_complete() {
     }
 }
 
-/// Vertices of a house without a floor: four walls as one square each, a roof of two.
+/// The vertices of a house without a floor: two gable walls, two side walls, a roof of two quads.
 const VERTICES: [[f32; 3]; 10] = [
     [0.0, 0.0, 0.0],
     [2.0, 0.0, 0.0],
@@ -128,7 +128,7 @@ const VERTICES: [[f32; 3]; 10] = [
     [1.0, 2.25, 3.0],
 ];
 
-/// Its faces: pentagons, squares, a triangle twice.
+/// The faces of the house: pentagons, quads, and a triangle that is also a part of the first pentagon.
 const FACES: [&[u8]; 7] = [
     &[0, 1, 5, 8, 4],
     &[3, 2, 6, 9, 7],
@@ -139,7 +139,7 @@ const FACES: [&[u8]; 7] = [
     &[0, 4, 8],
 ];
 
-/// The house as text, faces before vertices, with a comment and an element that the loader skips.
+/// Returns the house as text, faces before vertices, with a comment and an element that the loader skips.
 pub(crate) fn ascii() -> Vec<u8> {
     let mut text = String::from(
         "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nelement face 7\r\n\
@@ -158,7 +158,7 @@ pub(crate) fn ascii() -> Vec<u8> {
     text.into_bytes()
 }
 
-/// The house in bytes, with normals as doubles, lists counted by `int` and material names as lists.
+/// Returns the house in binary form, with normals as doubles, lists counted by `int` and material names as lists.
 pub(crate) fn binary() -> Vec<u8> {
     let mut bytes = b"ply\nformat binary_little_endian 1.0\nobj_info made by hand\n\
         element vertex 10\nproperty float x\nproperty float32 y\nproperty float z\n\
@@ -180,7 +180,7 @@ pub(crate) fn binary() -> Vec<u8> {
     bytes
 }
 
-/// Renders a file with the watched program.
+/// Renders a file with the ray tracer that has sanitizers.
 fn render(dir: &Path, name: &str, bytes: &[u8]) -> Vec<u8> {
     let (input, output) = (dir.join(name), dir.join("picture.ppm"));
     fs::write(&input, bytes).expect("a file");

@@ -1,4 +1,4 @@
-//! Pictures as the examples write them, and scenes as they read them.
+//! Reads pictures that the examples write, and writes scenes that they read.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ pub(crate) struct Picture {
 }
 
 impl Picture {
-    /// Reads a file of exactly the pixels that its header promises.
+    /// Reads a file, which must have exactly the pixels that its header promises.
     pub(crate) fn load(path: &Path) -> Self {
         let bytes = fs::read(path).expect("the picture");
         let mut parts = bytes.splitn(4, |&byte| byte == b'\n');
@@ -30,7 +30,7 @@ impl Picture {
     }
 }
 
-/// Writes a mesh to a folder and gives its name.
+/// Writes a mesh to a folder and returns its path.
 pub(crate) fn save(dir: &Path, scene: &Scene) -> PathBuf {
     let mut text = format!(
         "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\

@@ -1,4 +1,4 @@
-//! The examples, compiled the way their Makefile does.
+//! The examples, compiled as their Makefile does.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use hgrid_tests::artefact::{compiler, compilers, output, root, run, static_library};
 use tempfile::TempDir;
 
-/// What draws, in every program that does.
+/// The sources of drawing that all such programs share.
 const DRAWING: [&str; 11] = [
     "camera.c",
     "grid.c",
@@ -22,7 +22,7 @@ const DRAWING: [&str; 11] = [
     "threads.c",
 ];
 
-/// Faults that a program would not notice by itself.
+/// Sanitizers for faults that a program would not notice by itself.
 const WATCHED: [&str; 3] = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
 
 /// Compiles sources of `c_examples/` and others into a program.
@@ -30,43 +30,43 @@ pub(crate) fn compile(sources: &[PathBuf], flags: &[&str], program: &Path) {
     link(compiler("c99"), sources, flags, program);
 }
 
-/// The same with another compiler.
+/// Does the same with another compiler.
 pub(crate) fn link(mut compiler: Command, sources: &[PathBuf], flags: &[&str], program: &Path) {
     compiler.args(["-O2", "-ffp-contract=off", "-pthread"]).args(flags);
     compiler.arg("-I").arg(root().join("c_examples")).args(sources);
     run(compiler.arg(static_library()).arg("-lm").arg("-o").arg(program));
 }
 
-/// A source of `c_examples/`.
+/// Returns the path of a source of `c_examples/`.
 pub(crate) fn example(name: &str) -> PathBuf {
     root().join("c_examples").join(name)
 }
 
-/// The sources of a program that draws.
+/// Returns the sources of a program that draws.
 pub(crate) fn drawing(more: &[&str]) -> Vec<PathBuf> {
     DRAWING.iter().chain(more).map(|name| example(name)).collect()
 }
 
-/// A ray tracer in a folder that lasts as long as the test program, compiled once.
+/// Returns the ray tracer, compiled once into a folder that stays until the test program ends.
 pub(crate) fn raytracer() -> Command {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     Command::new(PROGRAM.get_or_init(|| raytracer_with(&[])))
 }
 
-/// The same with sanitizers, for files that are not trusted.
+/// Returns the ray tracer with sanitizers, for files that are not trusted.
 pub(crate) fn watched_raytracer() -> Command {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     Command::new(PROGRAM.get_or_init(|| raytracer_with(&WATCHED)))
 }
 
-/// A ray tracer with flags of its own.
+/// Compiles a ray tracer with flags of its own.
 pub(crate) fn raytracer_with(flags: &[&str]) -> PathBuf {
     let program = TempDir::new().expect("a folder").keep().join("raytracer");
     compile(&drawing(&["raytracer.c", "heat.c"]), flags, &program);
     program
 }
 
-/// The program of two processes, with sanitizers.
+/// Returns the program of two processes, with sanitizers.
 pub(crate) fn watched_mapped() -> Command {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     Command::new(PROGRAM.get_or_init(|| {
@@ -76,7 +76,7 @@ pub(crate) fn watched_mapped() -> Command {
     }))
 }
 
-/// Runs a program that may refuse its arguments, but not crash.
+/// Runs a program that may refuse its arguments, but must not crash.
 pub(crate) fn attempt(program: &mut Command) -> Output {
     let output = output(program);
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -85,7 +85,7 @@ pub(crate) fn attempt(program: &mut Command) -> Output {
     output
 }
 
-/// What a refused program says.
+/// Returns the error message of a program that must refuse its arguments.
 pub(crate) fn refusal(program: &mut Command) -> String {
     let name = Path::new(program.get_program()).file_name().expect("a program has a name");
     let name = name.to_string_lossy().into_owned();
@@ -96,7 +96,7 @@ pub(crate) fn refusal(program: &mut Command) -> String {
     said
 }
 
-/// What a program prints that must succeed.
+/// Returns the output of a program that must succeed.
 pub(crate) fn printed(program: &mut Command) -> String {
     String::from_utf8(run(program).stdout).expect("text")
 }

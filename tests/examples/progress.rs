@@ -1,4 +1,4 @@
-//! People who wait see how far it is; programs that read along see only what they asked for.
+//! Progress is drawn on terminals; into a pipe it goes only if asked for.
 
 use std::process::Command;
 
@@ -8,7 +8,7 @@ use tempfile::TempDir;
 
 use crate::programs::raytracer;
 
-/// A small picture, and where it goes.
+/// Returns a command that draws a small picture into a folder.
 fn small() -> (Command, TempDir) {
     let dir = TempDir::new().expect("a folder");
     let mut program = raytracer();
@@ -24,13 +24,13 @@ fn nothing_is_said_to_a_pipe_unless_it_is_asked_for() {
     let (build, render) = said.split_at(said.find("render").expect("two parts"));
     let tenths: String = (0..=10).map(|tenth| format!("render {} %\n", 10 * tenth)).collect();
     assert_eq!(render, tenths);
-    // A build tells less often; it ends as it should.
+    // A build reports less often, but ends at 100 %.
     let steps: Vec<_> = build.lines().collect();
     assert!(steps.len() > 3 && steps.iter().all(|step| step.starts_with("build ")), "{build}");
     assert_eq!(steps.last(), Some(&"build 100 %"));
 }
 
-/// `script` runs a program as if it sat at a terminal.
+/// `script` runs a program as if at a terminal.
 #[test]
 fn a_terminal_gets_a_line_that_changes() {
     if !is_installed("script") {

@@ -1,4 +1,4 @@
-//! The README says what is so: its C program runs, and the files it names are there.
+//! The README is right: its C program runs, and the files that it names exist.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -15,13 +15,13 @@ fn page(name: &str) -> String {
     fs::read_to_string(root().join(name)).expect("a page of the project")
 }
 
-/// The first block of a language behind a place in the README.
+/// Returns the first code block of a language, and the text after it.
 fn block<'a>(readme: &'a str, language: &str) -> (&'a str, &'a str) {
     let (_, rest) = readme.split_once(&format!("```{language}\n")).expect("a block");
     rest.split_once("```").expect("the end of the block")
 }
 
-/// The program in C and the commands below it, in a folder that looks like the repository.
+/// The C program and the commands below it work in a folder laid out like the repository.
 #[test]
 fn its_c_program_prints_the_hit() {
     let readme = page("README.md");
@@ -29,7 +29,7 @@ fn its_c_program_prints_the_hit() {
     assert!(program.lines().count() <= 16);
     let (commands, _) = block(behind, "sh");
     let commands: Vec<_> = commands.lines().collect();
-    // The library is there already, and the last line has a test of its own.
+    // The library is built already, and the last line has a test of its own.
     let ["cargo build --release -p hgrid-capi", compile, start, _] = commands[..] else {
         panic!("{commands:?}")
     };
@@ -47,7 +47,7 @@ fn its_c_program_prints_the_hit() {
     assert_eq!(String::from_utf8(printed.stdout).as_deref(), Ok("hit at t = 1\n"));
 }
 
-/// The first program of a page and what is said to come of it.
+/// Returns the first program of a page, and the output that the page shows for it.
 fn program_of(page: &str, language: &str) -> (String, String) {
     let page = self::page(page);
     let (program, behind) = block(&page, language);
@@ -74,7 +74,7 @@ fn the_programs_of_docs_print_what_they_say() {
     }
 }
 
-/// A stranger reads one page, and no wall of text.
+/// Pages stay short: few lines, and no long paragraphs.
 #[test]
 fn the_readme_is_short() {
     let readme = page("README.md");
@@ -93,7 +93,7 @@ fn the_readme_is_short() {
     assert!(rejected.lines().count() <= entries + 6, "one line each");
 }
 
-/// Each has a row in the table of tests/README.md, and `.ci/run` leaves out all but make once.
+/// Each optional program has a row in the table of tests/README.md, and `.ci/run` leaves out all but make once.
 #[test]
 fn programs_that_may_be_missing_are_listed() {
     let names = OPTIONAL.map(|(name, _)| name);
@@ -110,7 +110,7 @@ fn programs_that_may_be_missing_are_listed() {
     assert_eq!(list.split(',').collect::<Vec<_>>(), without);
 }
 
-/// The pages of the project: those at its root, in docs, and in the folders.
+/// Returns the names of the project's pages: at its root, in docs, and in the folders.
 fn pages() -> impl Iterator<Item = String> {
     let docs = fs::read_dir(root().join("docs")).expect("docs").map(|entry| {
         let name = entry.expect("an entry").file_name().into_string().expect("a name in UTF-8");
@@ -137,7 +137,7 @@ fn the_files_that_pages_name_are_there() {
     }
 }
 
-/// Links go to files, from the folder of the page.
+/// Links lead to files, relative to the folder of the page.
 #[test]
 fn links_lead_somewhere() {
     let mut count = 0;

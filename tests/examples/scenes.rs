@@ -1,4 +1,4 @@
-//! Shapes and instances: the pictures of their examples, by a hash of their bytes.
+//! Shapes and instances: the pictures of their examples, compared by a hash of their bytes.
 
 use std::path::Path;
 use std::process::Command;
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use crate::programs::{compile, example};
 
-/// Compiles an example, runs it with a name for the picture, and returns what it printed and the picture.
+/// Compiles an example, runs it with a name for the picture, and returns its output and the picture.
 fn draw(name: &str, sources: &[&str], dir: &Path) -> (String, Vec<u8>) {
     let sources: Vec<_> = sources.iter().map(|source| example(source)).collect();
     let (program, picture) = (dir.join(name), dir.join("picture.ppm"));
@@ -39,6 +39,6 @@ fn instances_are_drawn() {
     assert_eq!(hash(&picture), INSTANCES, "the picture is another");
 }
 
-/// What the pictures are on every machine.
+/// The hashes of the pictures, the same on every machine.
 const SPHERES: u64 = 0x1f32_09fc_3d25_e416;
 const INSTANCES: u64 = 0x1462_8e74_492e_8cf8;

@@ -1,6 +1,6 @@
-//! Shadows and ambient occlusion are where they belong, as rays from elsewhere tell.
+//! Shadows and ambient occlusion are where independent rays find them.
 //!
-//! The rays of these tests start and scatter by formulas of their own, so agreement is up to a few
+//! The rays of these tests start and scatter by formulas of their own, so the pictures agree up to a few
 //! pixels along the borders of shadows, and up to noise.
 
 use std::path::Path;
@@ -32,7 +32,7 @@ fn add(a: Vector, amount: f64, b: Vector) -> Vector {
     [0, 1, 2].map(|i| a[i] + amount * b[i])
 }
 
-/// A floor, and a lid above it: so flat that the camera looks down on them.
+/// Returns a floor with a lid above it: so flat that the camera looks down on them.
 fn floor_and_lid() -> Scene {
     let square = |half: f32, y: f32| {
         [[-half, y, -half], [half, y, -half], [half, y, half], [-half, y, half]]
@@ -42,7 +42,7 @@ fn floor_and_lid() -> Scene {
     Scene { positions, indices, ..Scene::default() }
 }
 
-/// A ball of flat triangles: nothing on it is in the way of anything else on it.
+/// Returns a ball of flat triangles: no part of it hides another part of its front.
 fn ball(radius: f32) -> Scene {
     let (rings, around) = (24u32, 48u32);
     let mut positions = vec![[0.0, radius, 0.0], [0.0, -radius, 0.0]];
@@ -68,7 +68,7 @@ fn ball(radius: f32) -> Scene {
     Scene { positions, indices, ..Scene::default() }
 }
 
-/// The ray tracer's picture of a scene.
+/// Returns the ray tracer's picture of a scene.
 fn drawn(dir: &Path, scene: &Path, options: &[&str]) -> Picture {
     let output = dir.join("picture.ppm");
     let size = SIZE.to_string();
@@ -76,20 +76,20 @@ fn drawn(dir: &Path, scene: &Path, options: &[&str]) -> Picture {
     Picture::load(&output)
 }
 
-/// The camera that the ray tracer uses, too.
+/// Returns the camera that the ray tracer uses.
 fn camera_of(scene: &Scene) -> Camera {
     let bounds = scene.framed_bounds();
     Camera::framing(bounds, View::of(bounds, Up::Y), Up::Y)
 }
 
-/// A camera's pixel on the surface: the point just above it, and the normal towards the eye.
+/// A pixel that shows a surface: the point just above it, and the normal towards the eye.
 struct Seen {
     pixel: usize,
     above: Vector,
     normal: Vector,
 }
 
-/// Which pixels see what.
+/// Returns the pixels that show a surface.
 fn look(grid: &Grid<'_>, camera: &Camera) -> Vec<Seen> {
     let pixels = (0..SIZE).flat_map(|row| (0..SIZE).map(move |column| (row, column)));
     let seen = pixels.enumerate().filter_map(|(pixel, (row, column))| {
@@ -110,14 +110,14 @@ fn look(grid: &Grid<'_>, camera: &Camera) -> Vec<Seen> {
     seen.collect()
 }
 
-/// A ray from a point, up to a distance.
+/// Returns a ray from a point, up to a distance.
 fn from(above: Vector, direction: Vector, reach: f64) -> Ray {
     let mut ray = Ray::new(above.map(|c| c as f32), direction.map(|c| c as f32));
     ray.t_max = reach as f32;
     ray
 }
 
-/// The lamp's direction: behind the viewer's left shoulder.
+/// Returns the direction to the lamp, which is behind the viewer's left shoulder.
 fn toward_lamp(camera: &Camera) -> Vector {
     let [right, up, toward] = camera.axes().map(|axis| axis.map(f64::from));
     unit(add(add(right.map(|c| -0.7 * c), 0.8, up), 1.0, toward))
@@ -139,7 +139,7 @@ fn shadows_fall_where_something_hides_the_lamp() {
 
     let (mut in_shadow, mut in_light, mut wrong) = (0, 0, 0);
     for seen in look(&grid, &camera) {
-        // What faces away has no light to lose.
+        // A surface that faces away from the lamp has no light to lose.
         if dot(seen.normal, lamp) < 0.01 {
             assert_eq!(plain.pixels[seen.pixel], shadowed.pixels[seen.pixel]);
             continue;
@@ -153,7 +153,7 @@ fn shadows_fall_where_something_hides_the_lamp() {
     assert!(wrong <= 2, "{wrong} of {in_shadow} and {in_light}");
 }
 
-/// How much of the sky a pixel in the shadow sees, from its red: the inverse of what light.c does.
+/// Returns the share of the sky that a pixel in the shadow sees, from its red: the inverse of the formula in light.c.
 fn open_of(red: u8, normal: Vector, camera: &Camera) -> f64 {
     let sky = 0.5 + 0.5 * dot(normal, camera.axes()[1].map(f64::from));
     let light = (f64::from(red) / 255.0).powi(2);
@@ -184,7 +184,7 @@ fn the_sky_is_hidden_as_far_as_random_rays_say() {
         if !is_dark || seen.pixel % 7 != 0 {
             continue;
         }
-        // A point on the unit sphere, moved by the normal: the cosine comes by itself.
+        // A point on the unit sphere, moved by the normal: such directions are distributed by the cosine.
         let mut rays = (0..).map(|_| random.point().map(f64::from));
         let open = (0..512).filter(|_| {
             let point = rays.find(|p| dot(*p, *p) < 1.0 && dot(*p, *p) > 1e-6).expect("endless");
@@ -202,7 +202,7 @@ fn the_sky_is_hidden_as_far_as_random_rays_say() {
     assert!(mean.abs() < 0.01 && worst < 0.1, "{mean} {worst}");
 }
 
-/// A ray that starts on a surface must not find that surface, at any scale.
+/// A ray that starts on a surface must not hit that surface, at any scale.
 #[test]
 fn a_ball_casts_no_shadow_on_itself() {
     let dir = TempDir::new().expect("a folder");

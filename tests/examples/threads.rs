@@ -1,4 +1,4 @@
-//! The picture does not depend on how many threads draw it.
+//! The picture does not depend on the number of threads that draw it.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use crate::pictures::ascii;
 use crate::programs::{raytracer, raytracer_with};
 
-/// The file that a command with so many threads writes.
+/// Returns the file that a command writes with a number of threads.
 fn drawn(mut program: Command, threads: u32, options: &[&str], dir: &Path) -> Vec<u8> {
     let path = dir.join("picture.ppm");
     program.args(["--threads", &threads.to_string(), "-o"]).arg(&path).args(options);
@@ -23,7 +23,7 @@ fn drawn(mut program: Command, threads: u32, options: &[&str], dir: &Path) -> Ve
 fn any_number_of_threads_draws_the_same_picture() {
     let dir = TempDir::new().expect("a folder");
     for options in [
-        // Of these sizes none is a multiple of a tile.
+        // None of these sizes is a multiple of a tile.
         &["--size", "100", "--shadows", "--ao", "3", "--method", "bvh"][..],
         &["--size", "61", "--heat", "tests", "--shadows"],
         &["--size", "99", "--heat", "steps", "--ao", "2"],

@@ -1,10 +1,10 @@
-//! How much work is done, in numbers that do not depend on the machine?
+//! The amount of work, in numbers that do not depend on the machine.
 //!
-//! Bytes and counters of every method on a few scenes, as a table in counters.txt. A slower
-//! algorithm or a larger blob shows as a difference there, in review and on any machine, and so does
-//! a blob with other bits: `content` is what its lists hold, `words` all behind its header, on
-//! machines of little endian. Another `words` alone asks for another `BLOB_VERSION`. `HGRID_BLESS=1`
-//! writes the table anew.
+//! Bytes and counters of every method on a few scenes, as a table in counters.txt. A slower algorithm or a
+//! larger blob shows as a difference there, in review and on any machine, and so does a blob with other bits:
+//! `content` is a hash of the contents of the lists, `words` a hash of all words after the header, on little-
+//! endian machines. If only `words` differs, `BLOB_VERSION` must change. `HGRID_BLESS=1` writes the table
+//! anew.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,13 +16,13 @@ use hgrid_tests::copy::hash;
 use hgrid_tests::meshes::{Mesh, ball, soup};
 use hgrid_tests::owned::Owned;
 
-/// Pixels on a side of the picture that is counted.
+/// Pixels along a side of the picture.
 const SIZE: u16 = 64;
 
 /// Bytes of a blob's header.
 const HEADER_BYTES: usize = 128;
 
-/// A line for a method on a scene.
+/// Returns the table's line for a method on a scene.
 fn line(name: &str, mesh: &Mesh, config: &Config) -> String {
     let view = mesh.view();
     let owned = Owned::build(&view, config).unwrap();
@@ -57,7 +57,7 @@ fn line(name: &str, mesh: &Mesh, config: &Config) -> String {
 #[test]
 fn work_is_what_it_was() {
     let Scene { positions, indices, .. } = Scene::load("procedural:knot:5000").unwrap();
-    // On a plane, and small enough to be divided again.
+    // On a plane, and small enough to be subdivided again.
     let mut crowd = soup(500, 0.05, 3);
     crowd.append(&soup(1500, 0.05, 5).scaled(2e-3));
     let scenes = [

@@ -1,8 +1,8 @@
-//! Single bits of a blob, flipped: queries end after bounded work, and `validate` refuses it,
-//! or the blob is what a build makes with other parameters, and right.
+//! Single bits of a blob are flipped. Queries end after bounded work, and `validate` refuses the blob, or the
+//! blob is one that a build makes with other parameters, and answers right.
 //!
-//! Each `cargo test` takes the smallest blobs in full and of others every 13th bit, which is each bit of a byte in
-//! turn; the slow tests take every bit of all.
+//! The usual tests flip every bit of the smallest blobs, and every 13th bit of others, so that each bit of a
+//! byte gets its turn; the slow tests flip every bit of all.
 
 use std::ops::Range;
 use std::thread;
@@ -12,44 +12,43 @@ use hgrid_tests::copy::{CHECKSUM, Copy, MESH};
 use hgrid_tests::hostile::{Seed, agrees, ends, fixed_rays, seeds};
 use hgrid_tests::owned::{Owned, prove};
 
-/// The header's fields for what a build was told: method, density, macrocell factor, the ids above
-/// which a cell gets a subgrid, depth. With others there may well be the same grid.
+/// The header's fields for a build's parameters: method, density, macrocell factor, the number of ids above
+/// which a cell gets a subgrid, depth. Other parameters may well give the same grid.
 const TOLD: [usize; 5] = [40, 44, 92, 96, 100];
 
-/// The header's field for what a blob is built over.
+/// The header's field for the content of a blob.
 const CONTENT: Range<usize> = 104..108;
 
 /// The header's field for the quality of a tree.
 const QUALITY: usize = 120;
 
-/// Returns true if a valid blob with a bit of this byte flipped is one that somebody may have made.
+/// Returns true if a blob may be valid in spite of a flipped bit in this byte, because a builder could have made it.
 fn is_fit(at: usize, copy: &Copy, grid: &Grid<'_>) -> bool {
     let rebuilt = Owned::build(grid.mesh(), &grid.config()).unwrap();
-    // Why a list was not divided is not proven: see core/src/variable/validate.rs.
+    // `validate` does not check why a list was not subdivided: see core/src/variable/validate.rs.
     let is_built = rebuilt.bytes() == copy.bytes() || grid.method() == Method::Variable;
-    // A tree may have other boxes than those of a build, if they are large enough; and nobody can tell which
-    // quality it was built with.
+    // A tree may have larger boxes than a build makes, and its quality cannot be checked.
     if grid.method() == Method::Bvh && (at > CHECKSUM || at == QUALITY) {
         return true;
     }
-    // Two ways to say that the mesh lies behind the grid, where nobody looks who brings it.
+    // The field for the mesh after the grid may have more than one value: it is not read if the caller has the mesh.
     is_built && TOLD.contains(&(at & !3)) || at == MESH && copy.word(MESH) <= 2
 }
 
-/// Numbers of flipped bits, by how they ended.
+/// The numbers of flipped bits, by outcome.
 #[derive(Debug, Default)]
 struct Ends {
-    /// Opening refused it.
+    /// Opening refused the blob.
     refused: u32,
-    /// Opening refused it for what it is built over.
+    /// Opening refused the blob because of its content.
     other: u32,
-    /// Only `validate` did.
+    /// Only `validate` refused the blob.
     found: u32,
-    /// It is valid, and right.
+    /// The blob is valid, and answers right.
     valid: u32,
 }
 
-/// Bits from one that is flipped to the next.
+/// The distance from one flipped bit to the next.
 const STEP: usize = 13;
 
 fn flip_all(seed: &Seed, rays: usize, step: usize) -> Ends {
@@ -110,18 +109,18 @@ fn flip(method: Method, step: usize) {
     let is_one = |seed: &&Seed| seed.config.method() == method && seed.blob.len() < 6500;
     assert!(seeds().filter(is_one).count() > 1);
     for seed in seeds().filter(is_one) {
-        // The smallest always in full.
+        // Flip every bit of the smallest blobs.
         let step = if seed.blob.len() < 1000 { 1 } else { step };
-        // Fewer rays where there are more bits.
+        // Send fewer rays where there are more bits.
         let rays = (12_000 / seed.blob.len().max(1000)).max(4);
         let ended = flip_all(seed, rays, step);
         println!("{} triangles, {} bytes: {ended:?}", seed.mesh.indices.len(), seed.blob.len());
-        // Half of the bits of a tree belong to boxes, and half of those make a box larger or belong to none.
+        // Half of the bits of a tree belong to boxes, and half of those make a box larger or belong to an unused one.
         let is_tree = method == Method::Bvh;
         assert!(ended.refused > 400 / step as u32, "{ended:?}");
         assert!(is_tree || ended.valid < 80, "{ended:?}");
         let share = if is_tree { 1 } else { 2 };
-        // Opening refuses what else would be found: that a blob is built over something else.
+        // Flips in the content field are refused when the blob is opened.
         let bits = 8 * CONTENT.start..8 * CONTENT.end;
         assert_eq!(ended.other as usize, bits.filter(|bit| bit % step == 0).count(), "{ended:?}");
         assert!(ended.found + ended.other > share * ended.valid, "{ended:?}");
@@ -168,7 +167,7 @@ fn every_bit() {
     });
 }
 
-/// The mesh behind a grid. The grid may well be right for a mesh that is a little different.
+/// Flips in the mesh after a grid. The grid may be right for a mesh that differs a little.
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn packed_meshes() {
@@ -202,14 +201,14 @@ fn flip_meshes(step: usize) {
                 found += 1;
             }
         }
-        // 12 triangles and 36 vertices end 48, 16 and 16 bytes before their sections do.
+        // With 12 triangles and 36 vertices, the padding of the three sections is 48, 16 and 16 bytes.
         let rounding = if step == 1 { 0 } else { 3 };
         assert!(usize::abs_diff(8 * 80 / step, refused) <= rounding, "what fills up sections");
         assert!(found.min(valid) > 1000 / step, "{found} {valid}");
     }
 }
 
-/// Every bit of the header of a blob with its mesh, where it says how the mesh lies.
+/// Flips of every bit in the header of a blob that contains its mesh, including the field for the mesh.
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn packed_headers() {

@@ -1,4 +1,4 @@
-//! What do bytes do that somebody chose to do harm?
+//! Damaged, random and forged bytes.
 
 mod flips;
 mod invariants;

@@ -1,6 +1,6 @@
 //! Random mutants of the blobs of all methods: what `validate` accepts answers as brute force does.
 //!
-//! `HGRID_MUTANTS` says how many, `HGRID_SEED` which.
+//! `HGRID_MUTANTS` sets the number of mutants, `HGRID_SEED` the seed.
 
 use hgrid_core::{Grid, Method};
 use hgrid_tests::copy::{CHECKSUM, Copy};
@@ -9,11 +9,11 @@ use hgrid_tests::owned::prove;
 use hgrid_tests::random::Random;
 use hgrid_tests::setting;
 
-/// A small change: what a blob has elsewhere, or next to what it has. Most of it is refused late.
+/// Returns a small change: values that the blob has elsewhere, or close to the ones it has. Most such blobs open.
 fn edit(random: &mut Random, words: usize) -> Edit {
     let mut at = || random.below(words) as u16;
     let (a, b) = (at(), at());
-    // Neighbours belong to the same section most of the time.
+    // Close words mostly belong to the same section.
     let near = (usize::from(a) + 1 + random.below(8)) % words;
     match random.below(8) {
         0 => Edit::Flip { at: a, bit: random.below(32) as u8 },
@@ -55,7 +55,7 @@ fn accepted_mutants_answer_right() {
         // Shown if the test fails.
         println!("round {round}: {:?} with {} triangles", grid.method(), seed.mesh.indices.len());
         agrees(&grid, &fixed_rays(grid.bounds(), 10));
-        // With another header alone it may be what a build makes.
+        // If only the header differs, a build may make the same blob.
         let is_other = copy.bytes()[CHECKSUM + 4..] != seed.blob[CHECKSUM + 4..];
         let method = Method::ALL.iter().position(|&method| method == grid.method()).unwrap();
         accepted[method] += u64::from(is_other);

@@ -1,11 +1,11 @@
-//! Random bytes: a fuzzer's first minute, the same every time. A little of it runs under Miri, which
-//! sees in the C entry points what a fuzzer does not.
+//! Random bytes: a fuzzer's first minute, the same every time. A small part runs under Miri, which sees
+//! faults in the C entry points that a fuzzer does not.
 
 use hgrid_tests::hostile::{build_mesh, c_abi};
 use hgrid_tests::random::Random;
 use hgrid_tests::rounds;
 
-/// Runs a target on so many strings of bytes.
+/// Runs a target on `rounds` random inputs.
 fn run(target: fn(&[u8]), rounds: usize, bytes: usize) {
     for round in 0..rounds as u64 {
         let mut random = Random(round);
@@ -21,7 +21,7 @@ fn calls_from_c() {
     run(c_abi, if cfg!(miri) { 60 } else { rounds(1000) }, 600);
 }
 
-/// Few enough for each run of Miri.
+/// A number of calls that is small enough for each run of Miri.
 #[test]
 fn a_few_calls_from_c() {
     run(c_abi, 3, 300);

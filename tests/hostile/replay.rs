@@ -1,7 +1,7 @@
-//! The finds of fuzzing, and the inputs that it found worth keeping: both run again.
+//! Replays the faults that fuzzing found, and the inputs that it found worth keeping.
 //!
-//! The inputs worth keeping are an archive for each target, corpus/TARGET.tar. The finds are files, whose names
-//! say what they did.
+//! The inputs worth keeping are in an archive for each target, corpus/TARGET.tar. The faults are files whose
+//! names say what they did.
 
 use std::fs;
 use std::io::Read as _;
@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 use hgrid_tests::hostile::TARGETS;
 use tar::Archive;
 
-/// A file or folder beside this source.
+/// Returns the path of a file or folder beside this source.
 fn path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("hostile").join(name)
 }
 
-/// The names and bytes of a target's archive, in its order.
+/// Returns the names and bytes of a target's archive, in its order.
 fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
     let path = path("corpus").join(target).with_extension("tar");
     let mut archive = Archive::new(fs::File::open(path).expect("an archive for each target"));
@@ -30,7 +30,7 @@ fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
     read.collect()
 }
 
-/// The names and bytes of the finds of a target, which may have none.
+/// Returns the names and bytes of the faults found in a target, if any.
 fn found(target: &str) -> Vec<(String, Vec<u8>)> {
     let Ok(entries) = fs::read_dir(path("regressions").join(target)) else { return Vec::new() };
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -38,7 +38,7 @@ fn found(target: &str) -> Vec<(String, Vec<u8>)> {
     files.iter().map(|file| (file.display().to_string(), fs::read(file).unwrap())).collect()
 }
 
-/// Runs a target on inputs; how many there were.
+/// Runs a target on inputs; returns their number.
 fn run_all(run: fn(&[u8]), inputs: &[(String, Vec<u8>)]) -> usize {
     for (name, bytes) in inputs {
         // Shown if the test fails.

@@ -1,4 +1,4 @@
-//! Damaged scenes: opening and asking end, and what `validate` accepts answers as the scene that was built.
+//! Damaged scenes: opening and queries end, and a scene that `validate` accepts answers as the one that was built.
 
 use hgrid_core::{Block, Config, Grid, Instance, Object, RayF64, Scene, SceneHit};
 use hgrid_tests::copy::Copy;
@@ -53,7 +53,7 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
             };
             copy.set_word(at, word);
         }
-        // A header whose sum is right is looked at.
+        // Correct the checksum now and then, so that the header is read.
         if random.below(2) == 0 {
             copy.sign();
         }
@@ -64,7 +64,7 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
             continue;
         }
         accepted += 1;
-        // No proof can know where the caller put an instance, which object it shows and who sees it.
+        // No proof can know the place, object and mask that the caller gave an instance.
         let same = (0..25).all(|number| {
             let (one, other) = (mutant.instance(number), scene.instance(number));
             let key = |i: hgrid_core::Instance| (i.linear, i.translation, i.object, i.mask);
@@ -73,14 +73,14 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
         assert!(!same || found == expected, "round {round}");
     }
     assert!(opened > 1000 && accepted > 10, "{opened} opened, {accepted} accepted");
-    // Every truncation is refused.
+    // All truncations are refused.
     for length in (0..bytes.len()).step_by(13) {
         let copy = Copy::of(&bytes[..length]);
         assert!(Scene::open(copy.bytes(), &objects).is_err(), "{length}");
     }
 }
 
-/// The words that a packed scene's own header has, its references, and the heads of all members.
+/// Returns the offsets of words in a packed scene's header, its references, and the headers of all members.
 fn heads(bytes: &[u8]) -> Vec<usize> {
     let mut words: Vec<usize> = (0..64).map(|word| 4 * word).collect();
     let starts = (0..bytes.len()).step_by(64).filter(|&at| bytes[at..].starts_with(b"hgrid"));
@@ -119,7 +119,7 @@ fn damaged_packed_scenes_end_and_accepted_ones_answer_right() {
             };
             copy.set_word(at, word);
         }
-        // Headers whose sums are right are looked at.
+        // Correct the checksums now and then, so that the headers are read.
         if random.below(2) == 0 {
             copy.sign();
             for at in (64..bytes.len()).step_by(64) {
@@ -139,7 +139,7 @@ fn damaged_packed_scenes_end_and_accepted_ones_answer_right() {
         }
         assert!(is_opened, "round {round}: proven, and not opened");
         accepted += 1;
-        // Whatever it is, each hit lies on a triangle of its own meshes: the proof says that trees leave none out.
+        // In any case each hit is on a triangle of the hit object's mesh.
         with_packed(copy.bytes(), |mutant| {
             let mutant = mutant.unwrap();
             for hit in rays.iter().filter_map(|ray| mutant.intersect(ray)) {
@@ -164,7 +164,7 @@ fn a_packed_scene_refers_to_what_lies_before() {
     let file = packed(&built.open(&objects).unwrap()).unwrap();
     let bytes = Block::bytes(&file);
     prove_packed(bytes).unwrap();
-    // The inner scene shows member 0, the outer one member 1; behind them there is nothing but padding.
+    // The inner scene shows member 0, the outer one member 1; after these references there is only padding.
     let with = |at: usize, word: u32| {
         let mut copy = Copy::of(bytes);
         copy.set_word(at, word);
@@ -172,13 +172,13 @@ fn a_packed_scene_refers_to_what_lies_before() {
     };
     let damaged = Err(hgrid_core::Error::Corrupt { offset: 32 });
     assert_eq!((with(128, 0), with(132, 1)), (Ok(()), Ok(())));
-    // Itself, what comes later, what there is not, and something in the padding.
+    // A reference to itself, to a later member, to none, and a word in the padding.
     assert_eq!(
         (with(128, 1), with(128, 2), with(132, 2), with(132, 9)),
         (damaged, damaged, damaged, damaged)
     );
     assert_eq!(with(136, 1), damaged);
-    // The outer scene, put in place of the inner one, and a grid in place of a scene.
+    // The outer scene may show the grid in place of the inner scene; only the proof finds that.
     assert_eq!(with(132, 0), Ok(()));
     let mut copy = Copy::of(bytes);
     copy.set_word(132, 0);

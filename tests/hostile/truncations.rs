@@ -1,17 +1,17 @@
-//! A blob that ends anywhere: refused, whether its header knows of it or not; and where what is
-//! left is a whole blob of fewer words, queries end and `validate` finds what is missing.
+//! Truncated blobs are refused, even if the header has the new length. Where the rest is a complete blob with
+//! fewer words, queries end and `validate` finds the missing ones.
 
 use hgrid_core::{Error, Grid, Method};
 use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::{Seed, ends, fixed_rays, seeds};
 use hgrid_tests::owned::prove;
 
-/// The header's fields for the length of the blob, the words of its lists or its pool, and its nodes.
+/// The offsets of the header's fields for the length of the blob, the words of its lists or its pool, and its nodes.
 const BLOB_BYTES: usize = 16;
 const REFERENCE_COUNT: usize = 88;
 const NODE_COUNT: usize = 112;
 
-/// Returns the header's field that counts the items of the last section, and the bytes of each.
+/// Returns the offset of the header's field that counts the items of the last section, and the size of an item.
 fn last_section(seed: &Seed) -> (usize, usize) {
     if seed.config.method() == Method::Bvh { (NODE_COUNT, 80) } else { (REFERENCE_COUNT, 4) }
 }
@@ -30,7 +30,7 @@ fn every_truncation_is_refused() {
                 assert!(matches!(error, Error::Truncated { needed_bytes, available_bytes }
                     if needed_bytes > length as u64 && available_bytes == length as u64));
             }
-            // A header that says so.
+            // Give the header the new length.
             if length >= 128 {
                 copy.set(BLOB_BYTES, &(length as u64).to_ne_bytes());
                 copy.sign();
@@ -41,8 +41,7 @@ fn every_truncation_is_refused() {
     }
 }
 
-/// A blob with its mesh that ends anywhere: whatever its header says of its length,
-/// nothing is opened that was not there.
+/// Truncations of a blob with its mesh are refused, whatever length the header has.
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn every_truncation_of_a_packed_blob_is_refused() {
@@ -59,8 +58,8 @@ fn every_truncation_of_a_packed_blob_is_refused() {
     }
 }
 
-/// The blob with fewer words or nodes in its last section, and a header that says so. Macrocells, which lie
-/// behind, are left out: they are of no number of lists.
+/// Returns the blob with fewer words or nodes in its last section, and a header to match. Fixed grids, whose
+/// macrocells come last, are left out: their size does not depend on the number of list words.
 fn shortened(seed: &Seed, words: u32) -> Copy {
     let (count_at, size) = last_section(seed);
     let before = Copy::of(&seed.blob).word(count_at) as usize;

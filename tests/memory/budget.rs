@@ -1,4 +1,4 @@
-//! Grids for a budget: as fine as fits.
+//! Grids for a memory budget: as fine as fits.
 
 use hgrid_core::{Block, Config, Error, Grid, Method, Region, fit, sizes};
 use hgrid_tests::meshes::{Mesh, ball};
@@ -26,7 +26,7 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
                     else {
                         panic!("{error}");
                     };
-                    // The size that it asks for is enough.
+                    // The size that the error asks for is enough.
                     fit(&view, &config, needed_bytes as usize, scratch).unwrap()
                 }
             };
@@ -41,9 +41,9 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
             let index = Block::bytes_mut(&mut index);
             Grid::build(view, &fitted, &mut index[..needed.index_bytes], scratch).unwrap();
         }
-        // No grid has less than a header.
+        // Every grid is larger than its header, so 100 bytes never suffice.
         let error = fit(&view, &config, 100, scratch).unwrap_err();
-        // The coarsest one is smaller than this one, if there are coarser ones.
+        // A method with coarser grids asks for less than the whole.
         let most = whole - usize::from(has_dial);
         let is_told = matches!(
             error,
@@ -52,7 +52,7 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
         );
         assert!(is_told, "{config:?}: {error}");
     }
-    // Too fine to be built at all is too large, not wrong.
+    // A density too high to build at all counts as too large, not as invalid.
     for config in configs().filter(|config| config.method() != Method::Bvh) {
         let finer = Config::from(config.parameters.with_density(1e9));
         let enough = sizes(&view, &config, &mut []).unwrap();
@@ -75,7 +75,7 @@ fn the_finest_grid_that_fits_is_built_in_its_budget() {
             matches!(without, Err(Error::OutOfMemory { region: Region::Scratch, .. }));
         assert_eq!(is_asked_for, needs_scratch, "{config:?}: {without:?}");
 
-        // A grid that cannot be planned in the scratch becomes coarser, too, and then it can.
+        // If the scratch is too small to plan a grid, `fit` takes a coarser one that can be planned.
         let enough = sizes(&mesh.view(), &config, &mut []).unwrap().scratch_bytes;
         let mut scratch = vec![Block::ZERO; Block::count_for(enough)];
         for bytes in [enough - 64, enough / 8 * 7, enough / 2, enough / 8] {

@@ -1,5 +1,5 @@
-//! Is the memory exactly what was said: enough at the answer, refused with the need below it, and
-//! nothing touched beside it?
+//! Memory is exactly what the library says: the size it answers is enough, less is refused with the size
+//! needed, and nothing beside the regions is touched.
 
 mod budget;
 mod owned;
@@ -13,8 +13,8 @@ use hgrid_tests::meshes::{Mesh, ball, one_triangle, soup};
 use hgrid_tests::methods;
 use hgrid_tests::owned::Owned;
 
-/// Builds with every `step`th size of one region, from 0 to a little more than enough, and with those next to enough;
-/// the other region is ample.
+/// Builds with every `step`th size of one region, from 0 to a little more than enough, and with the sizes
+/// next to enough; the other region is ample.
 fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
     match config.method() {
         Method::Bvh => trees::every_size(mesh, config, step),
@@ -26,8 +26,7 @@ fn every_size_of_grid(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
     let expected = Owned::build(mesh, config).unwrap();
     let exact = expected.bytes().len();
     let scratch_bytes = sizes(mesh, config, &mut []).unwrap().scratch_bytes;
-    // Methods with a pool fill it as they go, and the variable one needs less scratch than it asks
-    // for.
+    // Methods with a pool fill it as they go, and the variable method asks for more scratch than it needs.
     let is_planned = !matches!(config.method(), Method::Variable | Method::Recursive);
 
     for bytes in (0..exact + 200).step_by(step).chain([exact - 1, exact, exact + 1]) {
@@ -86,7 +85,7 @@ fn every_size_byte_by_byte() {
     }
 }
 
-/// Parts take no memory but their own.
+/// Joined meshes take as much memory as one mesh with the same triangles.
 #[test]
 fn every_size_for_joined_meshes() {
     let meshes = [ball(2, 1.0), Mesh::default(), soup(40, 0.3, 1), one_triangle()];
@@ -121,11 +120,11 @@ fn misaligned_regions_are_refused() {
     assert!(index.is_untouched() && scratch.is_untouched());
 }
 
-/// The bound from counts alone holds for the worst that a mesh can be.
+/// The bound from the number of triangles alone holds for the worst meshes.
 #[test]
 fn the_bound_is_one() {
     let mut meshes = vec![Mesh::default(), one_triangle(), ball(10, 0.5)];
-    // Triangles that span the scene, and more of them than the limit on references lets in.
+    // Triangles that span the scene: some of the meshes need more references than the limit allows.
     meshes.extend([soup(1, 1.0, 2), soup(7, 2.0, 2), soup(800, 2.0, 3), soup(5000, 0.02, 4)]);
     meshes.push(ball(20, 1.0).map(|[x, y, z]| [x, y * 1e-3, z * 0.1]));
     for mesh in &meshes {

@@ -1,5 +1,5 @@
-//! Grids that own their memory: how much of the heap they take while they are built and afterwards, how
-//! they ask for it, and what they do without it. Their answers are those of other grids.
+//! Grids that own their memory: the heap they take during a build and afterwards, how they allocate it, and
+//! how they fail without it. Their answers are those of other grids.
 
 #![expect(unsafe_code, reason = "an allocator is unsafe to implement")]
 
@@ -18,14 +18,14 @@ use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::random::Random;
 use hgrid_tests::{methods, oracle};
 
-/// The heap of a thread, in bytes.
+/// The heap use of a thread, in bytes.
 #[derive(Debug, Clone, Copy)]
 struct Heap {
     current: usize,
     peak: usize,
-    /// Bytes that came with anything in them, or had to be cleared because of their alignment, or were moved.
+    /// Bytes that were allocated uncleared, or cleared by hand because of their alignment, or moved.
     written: usize,
-    /// Allocations that are left, before there is no more memory.
+    /// Allocations that still succeed.
     left: usize,
 }
 
@@ -35,10 +35,10 @@ thread_local! {
     static HEAP: Cell<Heap> = const { Cell::new(UNLIMITED) };
 }
 
-/// As `calloc` and `realloc` are good for, without a look at the bytes.
+/// The alignment up to which `calloc` and `realloc` need not touch the bytes.
 const USUAL_ALIGNMENT: usize = 16;
 
-/// Takes one of the allocations that are left; false if there are none.
+/// Counts an allocation, or returns false if none are left.
 fn take(bytes: usize, is_written: bool) -> bool {
     let heap = HEAP.get();
     let Some(left) = heap.left.checked_sub(1) else { return false };
@@ -64,13 +64,13 @@ struct Counting;
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-// SAFETY: every call goes to the system's allocator as it came; counting does not allocate.
+// SAFETY: every call is passed on unchanged to the system's allocator; counting does not allocate.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         if !take(layout.size(), true) {
             return std::ptr::null_mut();
         }
-        // SAFETY: the caller's promise about the layout is the one that is needed.
+        // SAFETY: the caller promises a valid layout.
         unsafe { System.alloc(layout) }
     }
 
@@ -114,8 +114,8 @@ fn check(grid: &Grid<'_>) {
     }
 }
 
-/// Bytes beside the grid that an owned one takes: to move to an aligned address, and for the boxes
-/// around the caller's containers.
+/// Bytes that an owned grid takes besides its blob: for an aligned address, and for the boxes around the
+/// caller's containers.
 const LITTLE: usize = ALIGNMENT + 256;
 
 #[test]
@@ -144,7 +144,7 @@ fn a_grid_keeps_what_it_takes_and_nothing_is_written_but_by_the_build() {
     }
 }
 
-/// Where the allocator has nothing, at whichever call, the build says so.
+/// If any allocation fails, the build returns an error.
 #[test]
 fn without_memory_there_is_an_error() {
     let mesh = scene();
@@ -172,7 +172,7 @@ fn without_memory_there_is_an_error() {
     }
 }
 
-/// A field of a struct, in another thread, under a lock, in a list that moves.
+/// A grid as a field of a struct, which goes to another thread, under a lock, into a list that moves.
 struct Holder {
     grid: OwnedGrid,
     _name: String,
@@ -229,7 +229,7 @@ fn vertices_in_structs_small_indices_and_masks() {
     let grid = OwnedGrid::build(input.clone(), &Config::default()).unwrap();
     assert_eq!(grid.grid().blob(), Owned::build(&mesh.view(), &Config::default()).unwrap().bytes());
     check(&grid.grid());
-    // Fields that reach beyond the last struct.
+    // A field offset past the end of the struct is refused.
     assert!(strided(12).is_ok() && strided(13).is_err() && strided(usize::MAX).is_err());
 
     assert!(input.clone().with_masks(OwnedStrided::new(MASKS.as_slice())).is_err());
@@ -268,7 +268,7 @@ fn a_refit_takes_the_mesh_that_moved() {
     let expected = &moved.positions;
     assert_eq!(grid.mesh().view().positions().bytes, Strided::new(expected).bytes);
     check(&grid.grid());
-    // One that does not fit is not taken.
+    // A mesh that does not fit the tree is refused.
     assert_eq!(grid.refit(owned(&ball(2, 1.0))), Err(Error::MeshMismatch));
     check(&grid.grid());
     let mut grid = OwnedGrid::build(owned(&mesh), &Config::new(Method::OneLevel)).unwrap();
@@ -276,7 +276,7 @@ fn a_refit_takes_the_mesh_that_moved() {
     check(&grid.grid());
 }
 
-/// Vertices that are not there any more after some looks.
+/// A container of vertices that shrinks after some calls.
 struct Fickle(Vec<[f32; 3]>, AtomicUsize);
 
 impl AsRef<[[f32; 3]]> for Fickle {

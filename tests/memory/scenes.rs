@@ -1,4 +1,4 @@
-//! Scenes: every size of both regions, with canaries around them.
+//! Scenes with every size of both regions, with canaries around them.
 
 use hgrid_core::{Block, Config, Error, Grid, Instance, Object, Region, Scene};
 use hgrid_tests::guarded::Guarded;

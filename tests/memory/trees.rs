@@ -1,4 +1,4 @@
-//! Trees: what the number of triangles alone promises, for meshes that come nearest to it.
+//! Trees: the bounds from the number of triangles alone, on meshes that come nearest to them.
 
 use std::thread;
 
@@ -10,7 +10,7 @@ use hgrid_tests::guarded::Guarded;
 use hgrid_tests::meshes::{Mesh, soup};
 use hgrid_tests::owned::{Owned, prove};
 
-/// The header's fields for the number of nodes, and that of their levels.
+/// The offsets of the header's fields for the number of nodes and for the number of levels.
 const NODE_COUNT: usize = 112;
 const LEVELS: usize = 116;
 
@@ -18,10 +18,10 @@ fn config(quality: Quality) -> Config {
     Parameters::Bvh { quality }.into()
 }
 
-/// `every_size` for trees.
+/// Does for trees what `every_size` does for all methods.
 ///
-/// Ids lie in the index before it is known how many nodes there are, so what an error asks for may be
-/// more than would do. A build without crowded bins takes less scratch than it may ask for.
+/// Ids lie in the index before the number of nodes is known, so an error may ask for more than is needed.
+/// A build without crowded bins takes less scratch than the bound.
 pub(crate) fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) {
     let expected = Owned::build(mesh, config).unwrap();
     let exact = expected.bytes().len();
@@ -65,24 +65,24 @@ pub(crate) fn every_size(mesh: &TriangleMesh<'_>, config: &Config, step: usize) 
     }
 }
 
-/// A small triangle around a point: the centre of its box is that point.
+/// Adds a small triangle around a point; its box has its centre at that point.
 fn around(mesh: &mut Mesh, [x, y, z]: [f32; 3], size: f32) {
     mesh.push([[x - size, y - size, z], [x + size, y - size, z], [x, y + size, z]]);
 }
 
-/// Boxes of all sizes around one point.
+/// Returns triangles of all sizes around one point.
 fn one_centre(count: usize) -> Mesh {
     let mut mesh = Mesh::default();
     (0..count).for_each(|i| around(&mut mesh, [0.0; 3], 1.0 + i as f32));
     mesh
 }
 
-/// Each halving of the space leaves all triangles but one in one half: nodes have seven leaves of one
-/// triangle each, and all roots are as small as they may be.
+/// Returns a mesh in which each halving of space leaves all triangles but one in one half: nodes have seven
+/// leaves of one triangle each, and all roots are as small as they can be.
 fn one_by_one(count: usize) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..count {
-        // The corner of the scene, then points at powers of two of it along the axes.
+        // The corner of the scene, then points on the axes at powers of two from it.
         let mut center = [0.0; 3];
         if i % 31 > 0 {
             let step = i % 31 - 1;
@@ -93,8 +93,8 @@ fn one_by_one(count: usize) -> Mesh {
     mesh
 }
 
-/// A mesh of `count` triangles: a crowd in a corner and a triangle far away; all that in a corner of something
-/// larger, and another triangle; and so on, `depth` times.
+/// Returns `count` triangles: a crowd in a corner and a triangle far away; all of that in a corner of
+/// something larger with another triangle; and so on, `depth` times.
 fn nested(count: usize, depth: i32) -> Mesh {
     let mut mesh = Mesh::default();
     for level in 0..depth {
@@ -106,7 +106,7 @@ fn nested(count: usize, depth: i32) -> Mesh {
     mesh
 }
 
-/// Several of them side by side.
+/// Returns several nested meshes side by side.
 fn many_nested(count: usize) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..8 {
@@ -130,7 +130,7 @@ fn crowds_leave_alone_what_is_behind_the_blob() {
     assert_eq!(index.region()[used..], before[used..]);
 }
 
-/// Builds in the memory that is enough for so many triangles, and returns nodes and levels.
+/// Builds in the memory of the bound, and returns the numbers of nodes and levels.
 fn builds_in_its_bound(mesh: &Mesh, quality: Quality) -> [u32; 2] {
     let (view, config) = (mesh.view(), config(quality));
     let bound = Sizes::bound(view.triangle_count(), &config).unwrap();
@@ -172,7 +172,7 @@ fn the_worst_meshes_stay_within_the_bound() {
     assert!(deepest > 8, "{deepest}");
 }
 
-/// The most nodes of a tree of high quality.
+/// Returns the most nodes that a tree of high quality can have.
 fn most_nodes(count: usize) -> u32 {
     count.saturating_sub(2).div_euclid(7).max(1) as u32
 }
@@ -190,7 +190,7 @@ fn the_worst_meshes_of_high_quality_reach_the_bound() {
             build(&mesh);
         }
     }
-    // SAH cuts off one triangle at a time.
+    // The SAH cuts off one triangle at a time.
     for count in [9, 16, 23, 30, 37] {
         let mut mesh = Mesh::default();
         for i in 0..count {
@@ -200,7 +200,7 @@ fn the_worst_meshes_of_high_quality_reach_the_bound() {
         let [nodes, levels] = build(&mesh);
         assert_eq!([nodes, nodes], [most_nodes(mesh.indices.len()), levels], "{count}");
     }
-    // Triangles that nothing tells apart: all leaves but one of the last nodes have one.
+    // Identical triangles: all leaves but one of each last node hold one triangle.
     let mut same = Mesh::default();
     (0..9 * 8_usize.pow(4)).for_each(|_| around(&mut same, [1.0; 3], 1.0));
     assert_eq!(build(&same), [4681, 5]);
@@ -212,7 +212,7 @@ fn the_worst_meshes_of_high_quality_reach_the_bound() {
     }
 }
 
-/// The chain of the powers of two that f32 has, around which there are too few triangles to cut.
+/// Chains of crowds from 1e20 to 1e-20, each nearer to zero than the one before by a constant factor.
 #[test]
 fn trees_are_no_deeper_than_queries_are_prepared_for() {
     let (mut deepest, mut deepest_high) = (0, 0);
@@ -232,7 +232,7 @@ fn trees_are_no_deeper_than_queries_are_prepared_for() {
     assert!((12..=64).contains(&deepest), "{deepest}");
 }
 
-/// Runs tasks on threads, or one after the other from the last to the first.
+/// Runs each task on its own thread.
 fn on_threads(count: u32, task: &Task<'_>) {
     thread::scope(|scope| (0..count).for_each(|i| drop(scope.spawn(move || task(i)))));
 }
@@ -241,7 +241,7 @@ fn backwards(count: u32, task: &Task<'_>) {
     (0..count).rev().for_each(task);
 }
 
-/// Five crowds far from each other, each dense in its middle: crowded bins with small bins in them.
+/// Returns five crowds far from each other, each dense in its middle: crowded bins with small bins in them.
 fn crowds(count: usize) -> Mesh {
     let mut mesh = Mesh::default();
     for crowd in 0..5_u8 {
@@ -252,7 +252,7 @@ fn crowds(count: usize) -> Mesh {
     mesh
 }
 
-/// Any number of tasks makes the same blob, in memory for so many, for fewer, and for one.
+/// Any number of tasks makes the same blob, in scratch for that many tasks, for fewer, and for one.
 #[test]
 fn tasks_do_not_show() {
     const COUNT: usize = 7 * 16_384 + 100;
@@ -274,7 +274,7 @@ fn tasks_do_not_show() {
             for memory in [tasks, 2, 1] {
                 let (index_bytes, mut scratch_bytes) =
                     (bound(tasks).index_bytes, bound(memory).scratch_bytes);
-                // Not quite enough for as many.
+                // Slightly more than two tasks need, and too little for more.
                 if memory == 2 {
                     scratch_bytes += 1000;
                 }
@@ -290,7 +290,7 @@ fn tasks_do_not_show() {
                 assert!(index.around_is_intact() && scratch.around_is_intact());
             }
         }
-        // An index that only holds the tree is enough, and then for one task.
+        // An index that holds only the tree is enough; the build then uses one task.
         let control = Control { tasks: 7, run: &on_threads, progress: None };
         let mut index = Guarded::new(expected.bytes().len());
         let mut scratch = Guarded::new(bound(7).scratch_bytes);

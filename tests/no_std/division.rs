@@ -1,4 +1,4 @@
-//! Is what divides on processors that cannot divide right? It is tried here, beside the processor.
+//! Compares the division routines for processors without a divide instruction with the processor's own division.
 
 #[path = "../../capi/src/division.rs"]
 mod shared;
@@ -6,7 +6,7 @@ mod shared;
 use hgrid_tests::random::Random;
 use shared::{divide, divide_signed};
 
-/// Numbers of all sizes, those at the ends among them.
+/// Returns numbers of all sizes, among them those at the ends.
 fn numbers() -> Vec<u64> {
     let mut random = Random(3);
     let mut all = vec![0, 1, 2, 3, u64::MAX, u64::MAX - 1, 1 << 63, (1 << 63) - 1, (1 << 63) + 1];

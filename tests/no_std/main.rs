@@ -1,7 +1,8 @@
-//! Does it build where there is no operating system?
+//! Builds where there is no operating system.
 //!
-//! A host build proves little: a crate without `std` may still lean on one. So core and the C
-//! library are built for machines that have none, and what a small one keeps of it is measured.
+//! A build for the host proves little: a crate without `std` may still depend on one that needs it. So these
+//! tests build core and the C library for targets that have none, and measure how much of it a small program
+//! keeps.
 
 mod division;
 
@@ -16,16 +17,16 @@ use hgrid_tests::readme::check_sizes;
 use hgrid_tests::tools::{command, is_installed, skip};
 use tempfile::TempDir;
 
-/// How long `rustup` may take to fetch a target.
+/// The longest time that `rustup` may take to fetch a target.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// What rustc says about itself.
+/// Returns the output of `rustc --print`.
 fn rustc(what: &str) -> String {
     let said = run(Command::new("rustc").args(["--print", what])).stdout;
     String::from_utf8(said).expect("text").trim().to_owned()
 }
 
-/// Where Rust keeps what belongs to a target.
+/// Returns the folder of a target's libraries.
 fn rustlib(target: &str) -> PathBuf {
     Path::new(&rustc("sysroot")).join("lib/rustlib").join(target)
 }
@@ -43,7 +44,7 @@ fn is_available(target: &str) -> bool {
     true
 }
 
-/// Asks rustup for a target, once and not for long.
+/// Asks rustup for a target, for at most `PATIENCE`.
 fn is_fetched(target: &str) -> bool {
     if !is_installed("rustup") {
         return false;
@@ -61,13 +62,13 @@ fn is_fetched(target: &str) -> bool {
     false
 }
 
-/// What leaves out all methods but one.
+/// Returns cargo arguments that leave out all methods but one.
 fn only(method: &str) -> [&str; 3] {
     ["--no-default-features", "--features", method]
 }
 
-/// Builds the C library, and core for it, and returns the folder it is in: one for each target and its
-/// methods, so that no build waits for the other. Arguments may leave methods out.
+/// Builds core and the C library for a target, and returns their folder. Each target and choice of methods
+/// has a folder of its own, so that no build waits for another. `arguments` may leave methods out.
 fn build(target: &str, arguments: &[&str]) -> PathBuf {
     let dir = target_dir().join("no_std").join(target).join(arguments.last().unwrap_or(&"all"));
     let mut build = cargo_in(&dir, "build");
@@ -100,8 +101,8 @@ fn each_method_takes_as_much_flash_as_the_page_says() {
     }
 }
 
-/// Links what programs need of the archive, and of nothing else, as the linker would for them, and
-/// compares it with a row of the table in docs/embedded.md.
+/// Links what programs need of the archive, as a linker that drops unused sections would, and compares the
+/// size with a row of the table in docs/embedded.md.
 fn check_flash(row: &str, archive: &Path) {
     let host = rustc("host-tuple");
     let linker = rustlib(&host).join("bin/rust-lld");
@@ -150,7 +151,7 @@ fn check_module(arguments: &[&str]) {
 const IMPORTS: u8 = 2;
 const EXPORTS: u8 = 7;
 
-/// The ids of a module's sections: behind eight bytes, each is an id, a size and so many bytes.
+/// Returns the ids of a module's sections. After eight bytes, each section has an id, a size and its contents.
 fn sections(module: &[u8]) -> Vec<u8> {
     let mut rest = module.strip_prefix(b"\0asm\x01\0\0\0").expect("a module of version 1");
     let mut ids = Vec::new();
@@ -162,7 +163,7 @@ fn sections(module: &[u8]) -> Vec<u8> {
     ids
 }
 
-/// A number in seven bits a byte, lowest first, and what is behind it.
+/// Reads a number of seven bits per byte, lowest first; returns it with the rest of the bytes.
 fn leb128(bytes: &[u8]) -> (usize, &[u8]) {
     let length = bytes.iter().position(|byte| byte & 0x80 == 0).expect("its last byte") + 1;
     let (number, rest) = bytes.split_at(length);

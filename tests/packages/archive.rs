@@ -1,4 +1,4 @@
-//! The archive that `dist/make` makes for this machine, used by somebody who has no Rust.
+//! The archive that `dist/make` makes for this machine, used without Rust.
 
 use std::env;
 use std::fs;
@@ -16,10 +16,10 @@ use crate::cmake::{build_and_run_by, cmake, configure, has_cmake};
 use crate::installed::soname;
 use crate::prefix::{HIT, VERSION, dynamic, files, output_of, program};
 
-/// What hello.cpp prints first.
+/// The first line that hello.cpp prints.
 const HELLO: &str = "triangle 2 at t = 2\n";
 
-/// The archive, made once. Nothing, and a line that says so, where there are no tools for it.
+/// Returns the archive, made once; `None` after a message if tools for it are missing.
 fn archive() -> Option<&'static Path> {
     static ARCHIVE: OnceLock<PathBuf> = OnceLock::new();
     for program in ["bash", "tar", "gzip", "sha256sum"] {
@@ -41,7 +41,7 @@ fn archive() -> Option<&'static Path> {
     }))
 }
 
-/// A folder of its own with the archive in it.
+/// Unpacks the archive into a folder of its own.
 fn unpacked() -> Option<(TempDir, PathBuf)> {
     let archive = archive()?;
     let dir = TempDir::new().expect("a folder");
@@ -51,7 +51,7 @@ fn unpacked() -> Option<(TempDir, PathBuf)> {
     Some((dir, folder))
 }
 
-/// A folder with all programs of this machine but those of Rust.
+/// Returns a folder with links to all programs of this machine except those of Rust.
 fn programs_without_rust() -> &'static Path {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     let dir = DIR.get_or_init(|| {
@@ -64,7 +64,7 @@ fn programs_without_rust() -> &'static Path {
                 .iter()
                 .any(|rust| name.as_encoded_bytes().starts_with(rust.as_bytes()));
             if !is_of_rust {
-                // The first of a name is the one that would be run.
+                // The first program of a name is the one that a shell would run.
                 let _ = symlink(program.path(), dir.path().join(name));
             }
         }
@@ -73,7 +73,7 @@ fn programs_without_rust() -> &'static Path {
     dir.path()
 }
 
-/// Takes Rust away from a command.
+/// Removes Rust from a command's environment.
 fn without_rust(mut command: Command) -> Command {
     for (name, _) in env::vars_os() {
         if name.to_str().is_some_and(|name| name.starts_with("CARGO") || name.starts_with("RUST")) {
@@ -85,7 +85,7 @@ fn without_rust(mut command: Command) -> Command {
     command
 }
 
-/// A cmake that finds no Rust.
+/// Returns a cmake command that finds no Rust.
 fn rustless_cmake() -> Command {
     without_rust(cmake())
 }
@@ -121,7 +121,7 @@ fn the_archive_has_what_it_says() {
         let text = fs::read_to_string(folder.join(name)).expect("text");
         assert!(!text.contains('@'), "{name} has a gap:\n{text}");
     }
-    // Nothing tells where it was made.
+    // No library contains the path where it was made.
     let here = root().to_str().expect("a path in UTF-8").as_bytes();
     for name in ["libhgrid.a", "libhgrid.so"] {
         let library = fs::read(folder.join("lib").join(name)).expect("a library");
@@ -151,7 +151,7 @@ fn the_archive_has_a_name_and_a_sum() {
         .current_dir(archive.parent().expect("a folder")));
 }
 
-/// As the README in the archive says.
+/// Follows the README in the archive.
 #[test]
 #[ignore = "slow: an archive for this machine, made from nothing"]
 fn the_archive_brings_a_program_that_checks_it() {
@@ -195,7 +195,7 @@ fn pkg_config_finds_the_library_in_the_archive() {
     assert!(printed.ends_with(HIT), "{printed}");
 }
 
-/// Builds the project that has hgrid in a folder of its own, and runs its two programs.
+/// Builds a project that has hgrid in a subfolder, and runs its two programs.
 pub(crate) fn build_within(cmake: fn() -> Command, hgrid: &Path, options: &[String]) -> TempDir {
     let dir = TempDir::new().expect("a folder");
     let mut ask = cmake();
@@ -220,7 +220,7 @@ fn a_project_has_the_archive_in_a_folder_of_its_own() {
     }
     let Some((_dir, folder)) = unpacked() else { return };
     build_within(rustless_cmake, &folder, &[]);
-    // CMake unpacks it itself.
+    // CMake can unpack the archive itself.
     build_within(rustless_cmake, archive().expect("it was unpacked"), &[]);
 }
 
@@ -234,7 +234,7 @@ fn a_checkout_takes_an_archive_in_place_of_cargo() {
     build_within(rustless_cmake, root(), &[format!("-DHGRID_PREBUILT={}", folder.display())]);
 }
 
-/// Without either, the message names both ways on.
+/// Without cargo or an archive, the message names both ways to get the library.
 #[test]
 fn a_checkout_without_cargo_says_how_to_get_it() {
     if !has_cmake() {

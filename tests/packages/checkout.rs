@@ -1,4 +1,4 @@
-//! A project that has a checkout of hgrid in a folder of its own: CMake calls cargo.
+//! A project with a checkout of hgrid in a subfolder: CMake calls cargo.
 
 use std::env;
 use std::fs;
@@ -14,7 +14,7 @@ use crate::cmake::{build_and_run_by, cmake, configure, has_cmake};
 use crate::installed::soname;
 use crate::prefix::{HIT, VERSION, dynamic, output_of, program};
 
-/// A cmake that finds the cargo of this test, which does without a network.
+/// Returns a cmake command that finds the cargo of this test, which works offline.
 fn cargo_cmake() -> Command {
     let mut cmake = cmake();
     for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET"] {
@@ -24,7 +24,7 @@ fn cargo_cmake() -> Command {
     cmake
 }
 
-/// What is set for all projects here: one compiled library serves them.
+/// Returns the settings of all projects here, which share one compiled library.
 fn options() -> Vec<String> {
     vec![
         format!("-DHGRID_CARGO={}", env!("CARGO")),
@@ -48,7 +48,7 @@ fn a_project_builds_a_checkout_and_installs_it() {
         assert!(dynamic(&dir.path().join("shared"), "NEEDED").contains(&soname()));
         assert!(!dynamic(&dir.path().join("static"), "NEEDED").contains(&soname()));
     }
-    // Nothing is built twice.
+    // A second build compiles nothing.
     let shared = dir.path().join("shared");
     let built = || fs::metadata(&shared).and_then(|file| file.modified()).expect("a time");
     let before = built();
@@ -59,7 +59,7 @@ fn a_project_builds_a_checkout_and_installs_it() {
     install("odd/place");
 }
 
-/// Installs the checkout, with libraries in a folder of this name, and uses what is there.
+/// Installs the checkout, with libraries in the folder `lib`, and uses the installed files.
 fn install(lib: &str) {
     let dir = TempDir::new().expect("a folder");
     let [build, prefix] = ["build", "prefix"].map(|name| dir.path().join(name));
@@ -69,7 +69,7 @@ fn install(lib: &str) {
     assert!(status.success(), "{}", String::from_utf8_lossy(&stderr));
     run(cargo_cmake().arg("--build").arg(&build));
     run(cargo_cmake().arg("--install").arg(&build).arg("--prefix").arg(&prefix));
-    // The place is found from where the package lies, now and when all of it was moved.
+    // The package finds its files relative to its own place, even after it was moved.
     let moved = dir.path().join("another place");
     fs::rename(&prefix, &moved).expect("a new place");
     build_and_run_by(cmake, &moved);
@@ -103,7 +103,7 @@ fn asks_pkg_config(prefix: &Path, lib: &str) {
     assert!(printed.ends_with(HIT), "{printed}");
 }
 
-/// A bare machine, with clang for its compiler.
+/// A toolchain file for a bare machine, with clang as the compiler.
 const TOOLCHAIN: &str = "
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR arm)
@@ -135,7 +135,7 @@ fn a_cross_build_gets_a_static_library_for_the_target() {
         cmake.arg(format!("-DCMAKE_TOOLCHAIN_FILE={}", toolchain.display())).args(options);
         configure(cmake, root(), &dir.path().join("build"))
     };
-    // CMake's words tell no target of Rust's.
+    // CMake does not name the target in Rust's terms, so the caller must.
     let Output { status, stderr, .. } = ask(&[]);
     let said = String::from_utf8(stderr).expect("text");
     assert!(!status.success() && said.contains("set HGRID_CARGO_TARGET"), "{said}");

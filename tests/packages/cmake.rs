@@ -1,4 +1,4 @@
-//! A project that asks CMake: `find_package(hgrid)` and two targets.
+//! A project that uses CMake's `find_package(hgrid)` and two targets.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,12 +11,12 @@ use tempfile::TempDir;
 use crate::installed::soname;
 use crate::prefix::{HIT, Prefix, VERSION, dynamic, installed, laid_out, output_of, program};
 
-/// CMake builds nothing by itself: it writes files for make.
+/// Returns true if cmake and make are installed: CMake only writes files for make.
 pub(crate) fn has_cmake() -> bool {
     is_installed("cmake") && is_installed("make")
 }
 
-/// A cmake command that nothing in the environment bends.
+/// Returns a cmake command without settings from the environment.
 pub(crate) fn cmake() -> Command {
     let mut cmake = command("cmake");
     for name in ["CMAKE_PREFIX_PATH", "CMAKE_GENERATOR", "CFLAGS", "LDFLAGS", "MAKEFLAGS"] {
@@ -25,24 +25,24 @@ pub(crate) fn cmake() -> Command {
     cmake
 }
 
-/// Asks a cmake command for a project's build files.
+/// Configures a project with a cmake command.
 pub(crate) fn configure(mut cmake: Command, project: &Path, build: &Path) -> Output {
     output(cmake.arg("-S").arg(project).arg("-B").arg(build))
 }
 
-/// The same for a project that looks for packages in a folder.
+/// Configures a project that looks for packages in a folder.
 fn configure_with(mut cmake: Command, project: &Path, prefix: &Path, build: &Path) -> Output {
     cmake.arg(format!("-DCMAKE_PREFIX_PATH={}", prefix.display()));
     cmake.arg(format!("-DSOURCE={}", root().join("c_examples/minimal.c").display()));
     configure(cmake, project, build)
 }
 
-/// Builds the project outside with what lies in a folder, and runs its two programs.
+/// Builds the project in tests/packages/outside with the library in a folder, and runs its two programs.
 fn build_and_run(prefix: &Path) -> (TempDir, [PathBuf; 2]) {
     build_and_run_by(cmake, prefix)
 }
 
-/// The same by another cmake command.
+/// Does the same with another cmake command.
 pub(crate) fn build_and_run_by(cmake: fn() -> Command, prefix: &Path) -> (TempDir, [PathBuf; 2]) {
     let dir = TempDir::new().expect("a folder");
     let project = root().join("tests/packages/outside");
@@ -68,8 +68,8 @@ fn a_project_links_what_cargo_c_installs() {
     assert!(!dynamic(&static_, "NEEDED").contains(&soname()));
 }
 
-/// Debian has a folder for each architecture, Fedora has lib64, most others lib; and packages are
-/// moved about before they come to rest.
+/// Debian has a folder for each architecture, Fedora has lib64, most others lib; and packages may be moved
+/// after they were laid out.
 #[test]
 fn a_project_finds_libraries_wherever_they_lie() {
     if !has_cmake() {
@@ -89,7 +89,7 @@ fn a_project_finds_libraries_wherever_they_lie() {
     }
 }
 
-/// A project that says what it found.
+/// A project that prints which versions and targets it found.
 const PROBE: &str = r#"
 cmake_minimum_required(VERSION 3.19)
 project(probe C)
@@ -106,7 +106,7 @@ endforeach()
 find_package(hgrid REQUIRED)
 "#;
 
-/// What the probe says, and whether it was content.
+/// Returns the messages of the probe, and whether it succeeded.
 fn probe(prefix: &Path, wanted: &str) -> (String, bool) {
     let dir = TempDir::new().expect("a folder");
     let lists = format!("set(WANTED {wanted})\n{PROBE}");

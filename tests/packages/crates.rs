@@ -1,5 +1,4 @@
-//! The packages for crates.io: what they say of themselves, and what is in them. `.ci/publish` builds them
-//! from that.
+//! The packages for crates.io: their metadata, and their files. `.ci/publish` builds them from these files.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +12,7 @@ use crate::prefix::VERSION;
 const PACKAGES: [(&str, &str); 3] =
     [("hgrid-core", "core"), ("hgrid-capi", "capi"), ("hgrid-lab", "lab")];
 
-/// What cargo tells of a package.
+/// Returns the metadata that cargo prints for a package.
 fn metadata(name: &str) -> Value {
     let metadata = run(bare_cargo("metadata").args(["--no-deps", "--format-version", "1"])).stdout;
     let metadata: Value = serde_json::from_slice(&metadata).expect("JSON");
@@ -21,7 +20,7 @@ fn metadata(name: &str) -> Value {
     packages.iter().find(|package| package["name"] == name).expect("the package").clone()
 }
 
-/// The files of a package as it is uploaded.
+/// Returns the files of a package as it is uploaded.
 fn listed(name: &str) -> Vec<String> {
     let mut list = bare_cargo("package");
     let list = run(list.args(["--list", "--allow-dirty", "--quiet", "-p", name])).stdout;
@@ -38,17 +37,17 @@ fn packages_say_what_they_are() {
         assert_eq!(text("license"), "MIT OR Apache-2.0");
         assert!(text("description").to_lowercase().contains("ray tracing"), "{name}");
         assert_eq!(text("documentation"), format!("https://docs.rs/{name}"));
-        // There is no such place yet.
+        // The project has no such address yet.
         assert!(package["repository"].is_null() && package["homepage"].is_null(), "{name}");
         for field in ["keywords", "categories"] {
-            // crates.io takes no more than five.
+            // crates.io accepts at most five.
             let count = package[field].as_array().map_or(0, Vec::len);
             assert!((1..=5).contains(&count), "{name} has {count} {field}");
         }
         assert!(!package["metadata"]["docs"]["rs"].is_null(), "{name}");
         for dependency in package["dependencies"].as_array().expect("dependencies") {
             let is_ours = dependency["name"].as_str().is_some_and(|name| name.starts_with("hgrid"));
-            // What only tests need, by its path alone, is left out of what is uploaded.
+            // A dependency of tests alone, given only by its path, is left out of the upload.
             let is_for_tests = dependency["kind"] == "dev" && dependency["req"] == "*";
             assert!(
                 !is_ours || is_for_tests || dependency["req"] == format!("^{VERSION}"),
@@ -58,7 +57,7 @@ fn packages_say_what_they_are() {
     }
 }
 
-/// What lies above a package's folder does not get into it by itself.
+/// Files above a package's folder are not packed by themselves, so each folder needs its own.
 #[test]
 fn packages_have_their_licences_and_pages() {
     for (name, folder) in PACKAGES {
@@ -80,7 +79,7 @@ fn packages_have_their_licences_and_pages() {
     }
 }
 
-/// A file outside of a package is there in the repository, and nowhere else.
+/// A file outside a package exists in the repository, but not in the uploaded package.
 #[test]
 fn packages_name_no_file_outside_of_them() {
     fn look(dir: &Path, depth: usize) {
@@ -104,12 +103,12 @@ fn packages_name_no_file_outside_of_them() {
         }
     }
     for (_, folder) in PACKAGES {
-        // src lies one below the package's folder.
+        // src is one level below the package's folder.
         look(&root().join(folder).join("src"), 1);
     }
 }
 
-/// Alone, the C library is built with the profiles that the workspace gives it, but that debug builds abort.
+/// Outside the workspace, the C library is built with the workspace's profiles; debug builds also abort on a panic.
 #[test]
 fn the_c_library_has_its_profiles_in_its_package() {
     let [workspace, package] = ["Cargo.toml", "capi/.cargo/config.toml"]

@@ -1,5 +1,4 @@
-//! Do the modules of core import downwards only? With a cycle of imports, no module can be understood
-//! alone.
+//! The modules of core import downwards only. With a cycle of imports, no module could be understood alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -10,20 +9,20 @@ use hgrid_tests::artefact::root;
 /// Modules, and the modules that each imports.
 type Imports = BTreeMap<String, BTreeSet<String>>;
 
-/// All sources in a folder.
+/// Returns all sources in a folder.
 fn sources(dir: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(dir).expect("a folder").map(|entry| entry.expect("an entry").path());
     entries.flat_map(|path| if path.is_dir() { sources(&path) } else { vec![path] }).collect()
 }
 
-/// The source without comments and without the tests at its end.
+/// Returns a source without comments and without the tests at its end.
 fn code(source: &str) -> String {
     let source = source.split("#[cfg(test)]\nmod ").next().expect("the part before");
     let lines = source.lines().map(|line| line.split("//").next().expect("the part before"));
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// The names that `crate::` stands before, one or several in braces.
+/// Returns the names that follow `crate::`, one or several in braces.
 fn names(code: &str) -> Vec<&str> {
     let is_in_name = |c: char| c.is_alphanumeric() || c == '_';
     let name = |text: &str| text.len() - text.trim_start_matches(is_in_name).len();
@@ -40,7 +39,7 @@ fn names(code: &str) -> Vec<&str> {
     found
 }
 
-/// What lib.rs exports, and the module that each name is from.
+/// Returns the names that lib.rs exports, each with its module.
 fn exports(lib: &str) -> BTreeMap<String, String> {
     let lines = lib.split("\npub use ").skip(1).map(|line| line.split(';').next().expect("a line"));
     let pairs = lines.flat_map(|line| {
@@ -70,7 +69,7 @@ fn imports() -> Imports {
     imports
 }
 
-/// A cycle of modules, if there is one: leaves out modules that import nothing that is left, until none is.
+/// Returns a cycle of modules, if there is one: removes modules that import no remaining module, until none is.
 fn cycle(mut imports: Imports) -> Vec<String> {
     loop {
         let left: BTreeSet<_> = imports.keys().cloned().collect();
@@ -79,7 +78,7 @@ fn cycle(mut imports: Imports) -> Vec<String> {
             break;
         }
     }
-    // Each module that is left imports another that is left, so this reaches a module twice.
+    // Each remaining module imports another remaining one, so this path reaches some module twice.
     let mut way: Vec<String> = Vec::new();
     let mut module = imports.keys().next().cloned();
     while let Some(at) = module {
@@ -101,7 +100,7 @@ fn modules_of_core_import_downwards_only() {
     assert!(way.is_empty(), "modules of core import one another in a circle: {}", way.join(" -> "));
 }
 
-/// The modules of each layer, the lowest first: the table in lib.rs.
+/// Returns the modules of each layer, the lowest first, by the table in lib.rs.
 fn layers(lib: &str) -> Vec<Vec<String>> {
     let rows = lib.lines().skip_while(|line| !line.starts_with("//! | layer | modules |")).skip(2);
     let rows = rows.map_while(|line| line.strip_prefix("//! | ")?.split(" | ").nth(1));

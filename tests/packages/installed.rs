@@ -1,5 +1,5 @@
-//! What `cargo cinstall` installs: the files, the name that programs look for, and the libraries
-//! themselves, which are built by another road than the tests' own.
+//! The results of `cargo cinstall`: the files, the name that programs look for, and the libraries, which are
+//! built in another way than those of the tests.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -11,7 +11,7 @@ use hgrid_tests::tools::is_installed;
 
 use crate::prefix::{VERSION, assets, dynamic, files, installed};
 
-/// The name that programs look for: that of all versions which do not break them.
+/// Returns the library name that programs look for, which all compatible versions share.
 pub(crate) fn soname() -> String {
     let numbers: Vec<_> = VERSION.split('.').collect();
     let kept = if numbers[0] == "0" { &numbers[..2] } else { &numbers[..1] };
@@ -24,7 +24,7 @@ fn every_header_and_every_cmake_file_is_on_the_list() {
         let listed: BTreeSet<_> =
             assets(kind).into_iter().filter_map(|(from, _)| name(&from)).collect();
         let there = files(&root().join(folder)).into_iter().filter_map(|file| name(&file));
-        // One that a test is just writing anew has another ending.
+        // Leave out a file that another test is writing anew.
         let there: BTreeSet<_> = there.filter(|name| !name.ends_with(".fresh")).collect();
         assert_eq!(listed, there);
     }
@@ -65,7 +65,7 @@ fn the_shared_library_has_the_name_of_its_compatible_versions() {
     }
 }
 
-/// Were they not optimised as a whole, there would be more than one object, and panics in it.
+/// Without optimisation across the whole library there would be several objects, with panics in them.
 #[test]
 fn the_installed_libraries_are_those_of_the_tests() {
     if !is_installed("binutils") {

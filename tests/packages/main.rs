@@ -1,8 +1,8 @@
-//! Does what is installed serve a stranger's project, and is it as small as it is said to be?
+//! The installed library serves a project of its own, and a program with it is as small as documented.
 //!
 //! `cargo cinstall`, CMake and the archive of `dist/make` install it, from one set of package files.
-//! cargo-c takes a quarter of an hour to get: without it the CMake package is still tried, in a folder
-//! that is laid out by the same list of files.
+//! Installing cargo-c takes a quarter of an hour; without it the CMake package is still tried, in a folder
+//! laid out by the same list of files.
 
 mod archive;
 mod checkout;

@@ -1,4 +1,4 @@
-//! A project that asks pkg-config: flags in, program out.
+//! A project that uses pkg-config to get its compiler flags.
 
 use std::path::Path;
 
@@ -9,21 +9,21 @@ use tempfile::TempDir;
 use crate::installed::soname;
 use crate::prefix::{HIT, Prefix, VERSION, dynamic, installed, output_of, program};
 
-/// What pkg-config answers about the installed library.
+/// Returns the answer of pkg-config about the installed library.
 fn ask(prefix: &Prefix, question: &[&str]) -> String {
     let mut pkg_config = command("pkg-config");
     pkg_config.args(question).arg("hgrid").env("PKG_CONFIG_PATH", prefix.lib.join("pkgconfig"));
     output_of(&mut pkg_config).trim().to_owned()
 }
 
-/// Compiles a program with what it answers and nothing else.
+/// Compiles a program with the flags of the answer and nothing else.
 fn compile(source: &Path, flags: &[&str], answer: &str, to: &Path) {
     let mut compiler = bare_compiler();
     compiler.args(flags).arg(source).args(answer.split_whitespace()).arg("-o").arg(to);
     run(&mut compiler);
 }
 
-/// The prefix of a flavour, where there are the tools to make and to use it.
+/// Returns the prefix of a flavour, if the tools to make and to use it are installed.
 fn prefix(flavour: Flavour) -> Option<&'static Prefix> {
     ["binutils", "pkg-config"].into_iter().all(is_installed).then(|| installed(flavour))?
 }
@@ -45,7 +45,7 @@ fn a_program_links_the_shared_library() {
 fn a_program_links_the_static_library() {
     let Some(prefix) = prefix(Flavour::Bare) else { return };
     let answer = ask(prefix, &["--static", "--cflags", "--libs"]);
-    // Neither -lm nor -lpthread nor any other: nothing but the library itself.
+    // The library itself is the only one named: no -lm, no -lpthread.
     assert_eq!(answer.matches(" -l").count(), 1, "{answer}");
     let dir = TempDir::new().expect("a folder");
     let path = dir.path().join("minimal");

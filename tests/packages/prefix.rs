@@ -10,20 +10,20 @@ use hgrid_tests::tools::{command, is_installed};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// What minimal.c prints, whatever the size of its grid.
+/// The line that minimal.c prints about its hit, whatever the size of its grid.
 pub(crate) const HIT: &str = "hit triangle 0 at t = 1, u = 0.25, v = 0.5\n";
 
 /// The version of the package.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// A folder and where its libraries lie.
+/// An install folder, and the folder of its libraries.
 #[derive(Debug)]
 pub(crate) struct Prefix {
     pub(crate) dir: PathBuf,
     pub(crate) lib: PathBuf,
 }
 
-/// What cargo-c installs of a flavour. Nothing, and a line that says so, where there is none.
+/// Returns what cargo-c installs of a flavour; `None` after a message if there is no cargo-c.
 pub(crate) fn installed(flavour: Flavour) -> Option<&'static Prefix> {
     static PREFIXES: [OnceLock<Prefix>; 2] = [const { OnceLock::new() }; 2];
     if !is_installed("cargo-c") {
@@ -45,8 +45,8 @@ pub(crate) fn installed(flavour: Flavour) -> Option<&'static Prefix> {
     }))
 }
 
-/// A folder laid out by the lists that cargo-c goes by, with the usual libraries in a folder of
-/// this name: enough for the CMake package, which knows no SONAME and no pkg-config.
+/// Lays out a folder by the lists that cargo-c uses, with the usual libraries in the subfolder `lib`: enough
+/// for the CMake package, which needs no SONAME and no pkg-config.
 pub(crate) fn laid_out(lib: &str) -> (TempDir, Prefix) {
     let temporary = TempDir::new().expect("a folder");
     let dir = temporary.path().join("prefix");
@@ -63,7 +63,7 @@ pub(crate) fn laid_out(lib: &str) -> (TempDir, Prefix) {
     (temporary, Prefix { dir, lib })
 }
 
-/// The files that the package's metadata say are installed, and where below the folder for them.
+/// Returns the files that the package's metadata lists for installation, each with its place in the install folder.
 pub(crate) fn assets(kind: &str) -> Vec<(PathBuf, PathBuf)> {
     let metadata = run(bare_cargo("metadata").args(["--no-deps", "--format-version", "1"])).stdout;
     let metadata: Value = serde_json::from_slice(&metadata).expect("JSON");
@@ -93,7 +93,7 @@ fn copy(from: &Path, to: &Path) {
     fs::copy(from, to).expect("a copy");
 }
 
-/// All files and links below a folder, as paths from there, sorted.
+/// Returns all files and links below a folder as relative paths, sorted.
 pub(crate) fn files(dir: &Path) -> Vec<PathBuf> {
     let listed = run(Command::new("find").arg(dir).args(["-not", "-type", "d"])).stdout;
     let listed = String::from_utf8(listed).expect("text");
@@ -103,20 +103,20 @@ pub(crate) fn files(dir: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// A program that finds shared libraries as strangers' programs do: by what they are told, and not
-/// by the folders that cargo names for tests.
+/// Returns a command that finds shared libraries as users' programs do, and not by the folders that cargo
+/// sets for tests.
 pub(crate) fn program(path: &Path) -> Command {
     let mut program = Command::new(path);
     program.env_remove("LD_LIBRARY_PATH");
     program
 }
 
-/// What such a program prints.
+/// Returns the output of a program that must succeed.
 pub(crate) fn output_of(program: &mut Command) -> String {
     String::from_utf8(run(program).stdout).expect("text")
 }
 
-/// The entries of one kind in the dynamic section: what stands between the brackets.
+/// Returns the entries of one kind in the dynamic section: the text between the brackets.
 pub(crate) fn dynamic(file: &Path, kind: &str) -> Vec<String> {
     let section = output_of(command("readelf").args(["-d", "-W"]).arg(file));
     let lines = section.lines().filter(|line| line.contains(&format!("({kind})")));

@@ -1,4 +1,4 @@
-//! How large is a program with the library in it? docs/embedded.md says so.
+//! The size of a program with the library in it, as docs/embedded.md gives it.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use hgrid_tests::readme::check_sizes;
 use hgrid_tests::tools::leave_out;
 use tempfile::TempDir;
 
-/// The most that a user should have to carry for all methods.
+/// The largest acceptable size of a program with all methods.
 const MOST_BYTES: u64 = 300_000;
 
 #[test]
@@ -24,7 +24,7 @@ fn minimal_is_as_small_as_the_page_says() {
     check_sizes(words, [program, library, whole, whole_library]);
 }
 
-/// The size of the stripped program, and the bytes in it that come from the library.
+/// Returns the size of the stripped program, and the bytes in it that come from the library.
 fn measure(flags: &[&str]) -> [u64; 2] {
     let dir = TempDir::new().expect("a folder");
     let [program, map] = ["minimal", "map"].map(|name| dir.path().join(name));
@@ -35,8 +35,8 @@ fn measure(flags: &[&str]) -> [u64; 2] {
     [fs::metadata(program).expect("the program").len(), bytes_of_the_library(&map)]
 }
 
-/// What the linker's map says was put into memory out of our archive. Its lines end with an
-/// address, a size and a file; what was thrown away is at address 0.
+/// Returns the bytes that the linker's map puts into memory from our archive. Its lines end with an address,
+/// a size and a file; discarded sections are at address 0.
 fn bytes_of_the_library(map: &Path) -> u64 {
     let map = fs::read_to_string(map).expect("a map");
     let number = |word: &str| u64::from_str_radix(word.strip_prefix("0x")?, 16).ok();

@@ -1,8 +1,8 @@
-//! The C library as its users get it, and the C compiler that links it.
+//! The C library as users get it, and the C compiler that links it.
 //!
-//! The library is built by the same cargo, in the release profile, once for each test program, into
-//! a folder of its own below the target folder: a test program holds the lock of the outer one.
-//! Each flavour has a folder, so that one does not take the place of the other.
+//! The same cargo builds the library, in the release profile, once for each test program. It works in a
+//! folder below the target folder, because a test program holds the lock of the target folder itself. Each
+//! flavour has a folder of its own, so that none replaces another.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -13,13 +13,13 @@ use cc::Tool;
 
 use crate::tools::{command, is_installed};
 
-/// The root of the repository.
+/// Returns the root of the repository.
 #[must_use]
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the repository")
 }
 
-/// A target folder that no other cargo of this test run works in.
+/// Returns a target folder that no other cargo of this test run uses.
 #[must_use]
 pub fn target_dir() -> PathBuf {
     let program = env::current_exe().expect("a test program knows its path");
@@ -27,7 +27,7 @@ pub fn target_dir() -> PathBuf {
     program.ancestors().nth(3).expect("cargo runs it in its target folder").join("artefacts")
 }
 
-/// A cargo command for this repository that nothing in the environment bends.
+/// Returns a cargo command for this repository without settings from the environment.
 #[must_use]
 pub fn bare_cargo(subcommand: &str) -> Command {
     let mut cargo = Command::new(env!("CARGO"));
@@ -38,13 +38,13 @@ pub fn bare_cargo(subcommand: &str) -> Command {
     cargo
 }
 
-/// The same for one that compiles, into the target folder of the tests.
+/// Returns a cargo command that compiles into the target folder of the tests.
 #[must_use]
 pub fn cargo(subcommand: &str) -> Command {
     cargo_in(&target_dir(), subcommand)
 }
 
-/// The same with another target folder.
+/// Returns the same with another target folder.
 #[must_use]
 pub fn cargo_in(target_dir: &Path, subcommand: &str) -> Command {
     let mut cargo = bare_cargo(subcommand);
@@ -52,17 +52,17 @@ pub fn cargo_in(target_dir: &Path, subcommand: &str) -> Command {
     cargo
 }
 
-/// The features that the library is built with.
+/// A set of features that the library is built with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flavour {
-    /// Nothing: what needs no operating system.
+    /// No features: a library that needs no operating system.
     Bare,
-    /// The feature `malloc`: the same, and `hgrid_create`.
+    /// The feature `malloc`, which adds `hgrid_create`.
     Malloc,
 }
 
 impl Flavour {
-    /// Both.
+    /// Both flavours.
     pub const ALL: [Self; 2] = [Self::Bare, Self::Malloc];
 
     /// Returns the arguments for cargo.
@@ -74,7 +74,7 @@ impl Flavour {
         }
     }
 
-    /// Returns the folder of `libhgrid.a` and `libhgrid.so`, fresh from the compiler.
+    /// Builds the flavour, and returns the folder of `libhgrid.a` and `libhgrid.so`.
     pub fn dir(self) -> &'static Path {
         static DIRS: [OnceLock<PathBuf>; 2] = [const { OnceLock::new() }; 2];
         DIRS[self as usize].get_or_init(|| {
@@ -88,27 +88,28 @@ impl Flavour {
         })
     }
 
-    /// The static library.
+    /// Returns the path of the static library.
     #[must_use]
     pub fn static_library(self) -> PathBuf {
         self.dir().join("libhgrid.a")
     }
 
-    /// The shared library.
+    /// Returns the path of the shared library.
     #[must_use]
     pub fn shared_library(self) -> PathBuf {
         self.dir().join(format!("{}hgrid{}", env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX))
     }
 }
 
-/// The static library with some of its methods: the names of features, between commas. It is compiled in a third of
-/// the time, as only its answers count, not its size; without any LTO the core of Rust asks for a runtime.
+/// Builds the static library with some of its methods: the names of features, separated by commas. Lighter
+/// optimisation cuts the compile time to a third, as only its answers matter, not its size; without any LTO,
+/// Rust's core would need a runtime.
 ///
 /// # Panics
 /// If it cannot be built or copied.
 #[must_use]
 pub fn library_with(features: &str) -> PathBuf {
-    // All are built in one folder, so that they share what they depend on: one after the other.
+    // All are built in one folder and share their dependencies, so build one after the other.
     static FOLDER: Mutex<()> = Mutex::new(());
     let _turn = FOLDER.lock().expect("nobody panicked");
     let target = target_dir().join("methods");
@@ -127,19 +128,19 @@ pub fn library_dir() -> &'static Path {
     Flavour::Bare.dir()
 }
 
-/// The usual static library.
+/// Returns the usual static library.
 #[must_use]
 pub fn static_library() -> PathBuf {
     Flavour::Bare.static_library()
 }
 
-/// The usual shared library.
+/// Returns the usual shared library.
 #[must_use]
 pub fn shared_library() -> PathBuf {
     Flavour::Bare.shared_library()
 }
 
-/// The compiler that a build script would use, so `$CC` or `$CXX` if they are set.
+/// Returns the compiler that a build script would use: `$CC` or `$CXX` if they are set.
 fn tool(is_cpp: bool) -> &'static Tool {
     static TOOLS: [OnceLock<Tool>; 2] = [const { OnceLock::new() }; 2];
     TOOLS[usize::from(is_cpp)].get_or_init(|| {
@@ -154,7 +155,7 @@ pub(crate) fn cpp_path() -> &'static Path {
     tool(true).path()
 }
 
-/// The usual C compiler alone, for command lines as strangers write them.
+/// Returns the usual C compiler without flags, for command lines as users write them.
 #[must_use]
 pub fn bare_compiler() -> Command {
     Command::new(tool(false).path())
@@ -162,19 +163,19 @@ pub fn bare_compiler() -> Command {
 
 fn usual_compiler(dialect: &str) -> Command {
     let tool = tool(is_cpp(dialect));
-    // Not `to_command`: it sets the whole environment, which a failing test would print.
+    // `to_command` would set the whole environment, which a failing test would print.
     let mut compiler = Command::new(tool.path());
     compiler.args(tool.args());
     warnings(compiler, dialect)
 }
 
-/// Returns whether a dialect is one of C++, like `c++17`, and not of C, like `c99`.
+/// Returns true if a dialect is one of C++, like `c++17`, and not of C, like `c99`.
 #[must_use]
 pub fn is_cpp(dialect: &str) -> bool {
     dialect.starts_with("c++")
 }
 
-/// The usual C compiler for a dialect, with the header on its path and every warning an error.
+/// Returns the usual C compiler for a dialect, with the header on its path and every warning an error.
 ///
 /// # Panics
 /// If the dialect is one of C++, whose compiler may be missing.
@@ -184,27 +185,27 @@ pub fn compiler(dialect: &str) -> Command {
     usual_compiler(dialect)
 }
 
-/// The same for a dialect of C++, if there is a C++ compiler.
+/// Returns the same for a dialect of C++, if there is a C++ compiler.
 #[must_use]
 pub fn cpp_compiler(dialect: &str) -> Option<Command> {
     assert!(is_cpp(dialect), "{dialect} is C");
     is_installed("c++").then(|| usual_compiler(dialect))
 }
 
-/// The same for clang and a dialect of either language.
+/// Returns the same with clang for a dialect of either language.
 #[must_use]
 pub fn clang(dialect: &str) -> Option<Command> {
     let program = if is_cpp(dialect) { "clang++" } else { "clang" };
     is_installed("clang").then(|| warnings(command(program), dialect))
 }
 
-/// All compilers that there are for a dialect: the usual one and clang.
+/// Returns all available compilers for a dialect: the usual one and clang.
 pub fn compilers(dialect: &str) -> impl Iterator<Item = Command> {
     let usual = if is_cpp(dialect) { cpp_compiler(dialect) } else { Some(usual_compiler(dialect)) };
     usual.into_iter().chain(clang(dialect))
 }
 
-/// The triple of this machine, as its Rust compiler tells it.
+/// Returns the target triple of this machine, as rustc gives it.
 fn host() -> &'static str {
     static HOST: OnceLock<String> = OnceLock::new();
     HOST.get_or_init(|| {
@@ -228,7 +229,7 @@ pub fn warnings(mut compiler: Command, dialect: &str) -> Command {
 /// Runs a command that must succeed.
 ///
 /// # Panics
-/// If it does not, with all that it said.
+/// If it fails; the message contains all its output.
 pub fn run(command: &mut Command) -> Output {
     let output = output(command);
     let [out, err] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
@@ -246,13 +247,13 @@ pub fn output(command: &mut Command) -> Output {
 
 /// Runs a program that was compiled with `ThreadSanitizer`; `None` where the kernel does not let it run.
 ///
-/// Kernels that scatter addresses widely put something where the sanitizer wants its own memory, so it
-/// runs again without that.
+/// Kernels that scatter addresses widely may use addresses that the sanitizer needs, so the program runs
+/// again without address randomisation.
 #[must_use]
 pub fn output_watching_threads(program: &mut Command) -> Option<Output> {
     let is_refused = |output: &Output| {
         let said = String::from_utf8_lossy(&output.stderr);
-        // Of the sanitizer and of setarch.
+        // Messages of the sanitizer and of setarch.
         ["unexpected memory mapping", "personality"].iter().any(|words| said.contains(words))
     };
     let first = output(program);

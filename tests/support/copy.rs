@@ -1,14 +1,14 @@
-//! The bytes of a grid, to be changed.
+//! The bytes of a grid, for tests that change them.
 
 use hgrid_core::Block;
 
-/// The byte of the header's checksum, behind all that it covers.
+/// The offset of the header's checksum, which follows all that it covers.
 pub const CHECKSUM: usize = 124;
 
-/// The byte of the header's field that says whether the mesh lies behind the grid.
+/// The offset of the header's field for the mesh after the grid.
 pub const MESH: usize = 108;
 
-/// Bytes in memory that is aligned as blobs must be.
+/// Bytes in memory with the alignment of blobs.
 #[derive(Debug, Clone)]
 pub struct Copy {
     blocks: Vec<Block>,
@@ -16,7 +16,7 @@ pub struct Copy {
 }
 
 impl Copy {
-    /// A copy of these bytes.
+    /// Copies the bytes.
     #[must_use]
     pub fn of(bytes: &[u8]) -> Self {
         let mut blocks = vec![Block::ZERO; Block::count_for(bytes.len())];
@@ -24,27 +24,27 @@ impl Copy {
         Self { blocks, length: bytes.len() }
     }
 
-    /// The bytes.
+    /// Returns the bytes.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &Block::bytes(&self.blocks)[..self.length]
     }
 
-    /// The bytes, to be written.
+    /// Returns the bytes for changes.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         &mut Block::bytes_mut(&mut self.blocks)[..self.length]
     }
 
-    /// The word at a byte.
+    /// Returns the word at an offset.
     ///
     /// # Panics
-    /// If the bytes end before it does.
+    /// If the bytes end before the word does.
     #[must_use]
     pub fn word(&self, at: usize) -> u32 {
         word(self.bytes(), at)
     }
 
-    /// Writes bytes at a place.
+    /// Writes bytes at an offset.
     ///
     /// # Panics
     /// If the copy ends before they do.
@@ -52,7 +52,7 @@ impl Copy {
         self.bytes_mut()[at..at + bytes.len()].copy_from_slice(bytes);
     }
 
-    /// Writes a word at a place.
+    /// Writes a word at an offset.
     ///
     /// # Panics
     /// If the copy ends before it does.
@@ -60,8 +60,7 @@ impl Copy {
         self.set(at, &word.to_ne_bytes());
     }
 
-    /// Makes the header's checksum right again: FNV-1a over its words, folded. What is too
-    /// short for a header stays as it is.
+    /// Corrects the header's checksum: FNV-1a over its words, folded. A copy too short for a header stays as it is.
     pub fn sign(&mut self) {
         let Some((covered, behind)) = self.bytes_mut().split_at_mut_checked(CHECKSUM) else {
             return;
@@ -73,7 +72,7 @@ impl Copy {
     }
 }
 
-/// A hash of the words of a blob: FNV-1a, word by word.
+/// Returns a hash of the words of a blob: FNV-1a, word by word.
 #[must_use]
 pub fn hash(words: &[u8]) -> u64 {
     let words = words.as_chunks::<4>().0.iter().map(|word| u32::from_ne_bytes(*word));
@@ -82,7 +81,7 @@ pub fn hash(words: &[u8]) -> u64 {
     })
 }
 
-/// The word at a byte of a blob.
+/// Returns the word at an offset of a blob.
 ///
 /// # Panics
 /// If the blob ends before it does.

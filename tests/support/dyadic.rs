@@ -1,4 +1,4 @@
-//! Numbers that are never rounded: a whole number of any size times a power of two.
+//! Numbers that are never rounded: an integer of any size times a power of two.
 
 use std::cmp::Ordering;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -13,7 +13,7 @@ pub struct Dyadic {
 }
 
 impl Dyadic {
-    /// A finite f64, exactly.
+    /// Returns a finite f64, exactly.
     ///
     /// # Panics
     /// If it is not finite.
@@ -28,20 +28,20 @@ impl Dyadic {
         Self { number: BigInt::from_biguint(sign, magnitude.into()), exponent }
     }
 
-    /// The number times a power of two.
+    /// Returns the number times a power of two.
     #[must_use]
     pub fn scaled(mut self, power: i32) -> Self {
         self.exponent += power;
         self
     }
 
-    /// The number without its sign.
+    /// Returns the absolute value.
     #[must_use]
     pub fn abs(self) -> Self {
         if self.sign() == Ordering::Less { -self } else { self }
     }
 
-    /// The number compared with 0.
+    /// Compares the number with 0.
     #[must_use]
     pub fn sign(&self) -> Ordering {
         match self.number.sign() {
@@ -106,7 +106,7 @@ impl PartialOrd for Dyadic {
 fn dyadics_are_exact() {
     let [one, tiny, third] = [1.0, f64::from_bits(1), 1.0 / 3.0].map(Dyadic::new);
     assert!(&one + &tiny > one && &(&one + &tiny) - &one == tiny);
-    // Three times the f64 next to a third is not 1.
+    // Three times the f64 nearest to a third is not exactly 1.
     let three = Dyadic::new(3.0);
     assert_eq!((&(&three * &third) - &one).scaled(54), Dyadic::new(-1.0));
     assert_eq!(Dyadic::new(-2.5).abs(), Dyadic::new(5.0).scaled(-1));

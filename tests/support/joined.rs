@@ -4,13 +4,13 @@ use hgrid_core::{IndexType, MeshPart, Strided, TriangleMesh};
 
 use crate::meshes::Mesh;
 
-/// Meshes side by side: with tight arrays, with strides of their own, with indices of 16 bits, with masks.
+/// Meshes in different forms: with tight arrays, with strides of their own, with indices of 16 bits, with masks.
 #[derive(Debug)]
 pub struct Parts {
     parts: Vec<Part>,
 }
 
-/// One mesh, its arrays with junk between elements and nothing behind the last.
+/// One mesh; its arrays have junk between elements and nothing after the last.
 #[derive(Debug)]
 struct Part {
     positions: Vec<u8>,
@@ -23,7 +23,7 @@ struct Part {
     triangles: usize,
 }
 
-/// Elements as bytes, one every `stride` bytes.
+/// Returns elements as bytes, one every `stride` bytes.
 fn scatter(elements: impl Iterator<Item = Vec<u8>>, stride: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (i, element) in elements.enumerate() {
@@ -33,13 +33,13 @@ fn scatter(elements: impl Iterator<Item = Vec<u8>>, stride: usize) -> Vec<u8> {
     bytes
 }
 
-/// The mask of a triangle of a part that has masks.
+/// Returns the mask of a triangle, for a part that has masks.
 const fn mask_of(part: usize, triangle: usize) -> u32 {
     1 << ((part + triangle) % 5)
 }
 
 impl Part {
-    /// The mesh in the form that its number has.
+    /// Returns the mesh in the form of its number.
     fn new(mesh: &Mesh, number: usize) -> Self {
         let (position_stride, index_stride, index_type) = match number % 4 {
             0 => (12, 12, IndexType::U32),
@@ -49,7 +49,7 @@ impl Part {
         };
         let bytes = |vertex: u32| match index_type {
             IndexType::U32 => vertex.to_ne_bytes().to_vec(),
-            // A vertex that does not fit is out of range in either form.
+            // A vertex number that does not fit is out of range in either form.
             IndexType::U16 => u16::try_from(vertex).unwrap_or(u16::MAX).to_ne_bytes().to_vec(),
         };
         let position = |p: &[f32; 3]| p.iter().flat_map(|c| c.to_ne_bytes()).collect();
@@ -82,19 +82,19 @@ impl Part {
 }
 
 impl Parts {
-    /// Meshes, each in another form.
+    /// Stores meshes, each in another form.
     #[must_use]
     pub fn of(meshes: &[Mesh]) -> Self {
         Self { parts: meshes.iter().enumerate().map(|(at, mesh)| Part::new(mesh, at)).collect() }
     }
 
-    /// The parts, not numbered yet.
+    /// Returns the parts, not numbered yet.
     #[must_use]
     pub fn parts(&self) -> Vec<MeshPart<'_>> {
         self.parts.iter().map(|part| MeshPart::new(part.view())).collect()
     }
 
-    /// The masks of all triangles.
+    /// Returns the masks of all triangles.
     #[must_use]
     pub fn masks(&self) -> Vec<u32> {
         let masks = |part: &Part| part.masks.clone().unwrap_or(vec![u32::MAX; part.triangles]);
@@ -102,7 +102,7 @@ impl Parts {
     }
 }
 
-/// The triangles of all meshes in one.
+/// Returns the triangles of all meshes as one mesh.
 #[must_use]
 pub fn merged(meshes: &[Mesh]) -> Mesh {
     let mut all = Mesh::default();

@@ -1,4 +1,4 @@
-//! Code that the tests of hgrid share: the oracle, meshes to ask about, a grid that owns its memory.
+//! Code that the tests of hgrid share: the oracle, test meshes, a grid that owns its memory.
 
 /// The example in the project's README runs as a test.
 #[cfg(doctest)]
@@ -31,16 +31,16 @@ pub mod tools;
 /// Returns `count` times the number in `HGRID_ROUNDS`, 1 unless set; `.ci/run` sets 4.
 ///
 /// # Panics
-/// If it is no number.
+/// If the value is not a number.
 #[must_use]
 pub fn rounds(count: usize) -> usize {
     count * usize::try_from(setting("HGRID_ROUNDS", 1)).expect("not that many")
 }
 
-/// The number in an environment variable, or another one if it is not set.
+/// Returns the number in an environment variable, or the default if it is not set.
 ///
 /// # Panics
-/// If it is no number.
+/// If the value is not a number.
 #[must_use]
 pub fn setting(name: &str, default: u64) -> u64 {
     let Some(value) = std::env::var_os(name) else { return default };

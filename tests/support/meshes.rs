@@ -1,4 +1,4 @@
-//! Small meshes with a name.
+//! Small test meshes.
 
 use hgrid_core::TriangleMesh;
 
@@ -7,26 +7,26 @@ use crate::random::Random;
 /// Vertices and triangles.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
-    /// Three coordinates a vertex.
+    /// Three coordinates per vertex.
     pub positions: Vec<[f32; 3]>,
-    /// Three vertices a triangle.
+    /// Three vertices per triangle.
     pub indices: Vec<[u32; 3]>,
 }
 
 impl Mesh {
-    /// The view that the library takes.
+    /// Returns the mesh in the library's form.
     pub fn view(&self) -> TriangleMesh<'_> {
         TriangleMesh::new(&self.positions, &self.indices).expect("a sound mesh")
     }
 
-    /// The same mesh, every coordinate through a function.
+    /// Returns the mesh with every vertex mapped by a function.
     #[must_use]
     pub fn map(&self, change: impl Fn([f32; 3]) -> [f32; 3]) -> Self {
         let positions = self.positions.iter().map(|&p| change(p)).collect();
         Self { positions, indices: self.indices.clone() }
     }
 
-    /// The same mesh at another size.
+    /// Returns the mesh at another size.
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
         self.map(|p| p.map(|c| c * scale))
@@ -47,15 +47,15 @@ impl Mesh {
     }
 }
 
-/// One triangle in the plane z = 0.
+/// Returns one triangle in the plane z = 0.
 pub fn one_triangle() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.push([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
     mesh
 }
 
-/// A closed cube from -1 to 1 whose faces are cut into `cells * cells` squares, bulged into a ball
-/// with `roundness` 1: the square roots of IEEE make the same bits everywhere.
+/// Returns a closed cube from -1 to 1 whose faces are cut into `cells * cells` squares; `roundness` 1 bulges
+/// it into a ball. IEEE square roots give the same bits on every machine.
 pub fn ball(cells: u32, roundness: f32) -> Mesh {
     let mut mesh = Mesh::default();
     let mut vertices = std::collections::HashMap::new();
@@ -89,7 +89,7 @@ pub fn ball(cells: u32, roundness: f32) -> Mesh {
     mesh
 }
 
-/// Triangles of about `size` anywhere in the cube from -1 to 1.
+/// Returns triangles of about `size` anywhere in the cube from -1 to 1.
 pub fn soup(count: usize, size: f32, seed: u64) -> Mesh {
     let mut random = Random(seed);
     let mut mesh = Mesh::default();

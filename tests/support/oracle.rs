@@ -1,8 +1,8 @@
 //! Brute force: every triangle, no structure, the lowest `t`, then the lowest id.
 //!
 //! Exact arithmetic decides which triangles a ray hits and whether they show their front ([`Line`]), and
-//! holds the numbers of each hit against its own. Only the last bits of `t`, `u` and `v`, which the documented
-//! rule leaves open, come from the library's ray-triangle test. Every query must give them.
+//! checks the numbers of each hit. Only the last bits of `t`, `u` and `v`, which the documented rule leaves
+//! open, come from the library's ray-triangle test. Every query must give the same bits.
 
 use hgrid_core::{
     Counters, Cull, Grid, Hit, INVALID_ID, QueryOptions, Ray, TriangleMesh, TriangleTest, Verdict,
@@ -10,10 +10,10 @@ use hgrid_core::{
 
 use crate::reference::{Answer, Line};
 
-/// A triangle by its number, and its corners.
+/// A triangle's id and its corners.
 type Numbered = (u32, [[f32; 3]; 3]);
 
-/// The triangles that the whole line of a ray passes through.
+/// Returns the triangles that the whole line of a ray passes through.
 fn passed(mesh: &TriangleMesh<'_>, ray: &Ray) -> Vec<Numbered> {
     let whole = Ray { t_min: f32::NEG_INFINITY, t_max: f32::INFINITY, ..*ray };
     let Some(line) = Line::new(&whole) else { return Vec::new() };
@@ -22,7 +22,7 @@ fn passed(mesh: &TriangleMesh<'_>, ray: &Ray) -> Vec<Numbered> {
     all.filter(|(_, triangle)| line.passes(triangle)).collect()
 }
 
-/// The hit with a triangle and whether it shows its front, if there is one.
+/// Returns the hit with a triangle, if there is one, and true if it shows the front.
 fn hit_on((id, triangle): &Numbered, line: &Line, ray: &Ray) -> Option<(Hit, bool)> {
     let answer = line.answer_of_passed(triangle);
     if answer == Answer::Miss {
@@ -38,11 +38,11 @@ fn hit_on((id, triangle): &Numbered, line: &Line, ray: &Ray) -> Option<(Hit, boo
     Some((hit, line.sees_front(triangle)))
 }
 
-/// The hits among the triangles that the line of a ray passes through, the nearest first.
+/// Returns the hits among the triangles that the line of a ray passes through, the nearest first.
 fn hits_among(passed: &[Numbered], ray: &Ray, cull: Cull) -> Vec<Hit> {
     let Some(line) = Line::new(ray) else { return Vec::new() };
     let mut hits = Vec::new();
-    // A triangle like the one before it is hit like it.
+    // A triangle equal to the one before it is hit in the same way.
     let mut last: Option<(&Numbered, Option<(Hit, bool)>)> = None;
     for numbered in passed {
         let found = match last {
@@ -59,28 +59,28 @@ fn hits_among(passed: &[Numbered], ray: &Ray, cull: Cull) -> Vec<Hit> {
         };
         hits.extend(found.filter(|(_, is_front)| is_shown(*is_front)).map(|(hit, _)| hit));
     }
-    // Stable: at equal `t` the ids stay ascending.
+    // The sort is stable: at equal `t` the ids stay ascending.
     hits.sort_by(|a, b| a.t.partial_cmp(&b.t).expect("no hit is at NaN"));
     hits
 }
 
-/// All hits of a ray with a mesh, the nearest first.
+/// Returns all hits of a ray with a mesh, the nearest first.
 pub fn hits_of(mesh: &TriangleMesh<'_>, ray: &Ray, cull: Cull) -> Vec<Hit> {
     hits_among(&passed(mesh, ray), ray, cull)
 }
 
-/// The same for each way to cull: none, back and front.
+/// Returns the same for each way to cull: none, back and front.
 pub fn hits_by_cull(mesh: &TriangleMesh<'_>, ray: &Ray) -> [Vec<Hit>; 3] {
     let passed = passed(mesh, ray);
     [Cull::None, Cull::Back, Cull::Front].map(|cull| hits_among(&passed, ray, cull))
 }
 
-/// All hits of a ray with the mesh of a grid, the nearest first.
+/// Returns all hits of a ray with the mesh of a grid, the nearest first.
 pub fn all_hits(grid: &Grid<'_>, ray: &Ray, cull: Cull) -> Vec<Hit> {
     hits_of(grid.mesh(), ray, cull)
 }
 
-/// The closest hit among all triangles of the grid's mesh.
+/// Returns the closest hit among all triangles of the grid's mesh.
 pub fn brute_force(grid: &Grid<'_>, ray: &Ray) -> Option<Hit> {
     all_hits(grid, ray, Cull::None).first().copied()
 }
@@ -88,10 +88,10 @@ pub fn brute_force(grid: &Grid<'_>, ray: &Ray) -> Option<Hit> {
 /// The answers of brute force about a ray.
 struct Expected {
     ray: Ray,
-    /// All hits, the nearest first, and those of them that show their front.
+    /// All hits, the nearest first, and those of them on the front of a triangle.
     all: Vec<Hit>,
     front: Vec<Hit>,
-    /// Ranges that end at the closest hit, or next to it, and the closest hit in each: the exact t lies on
+    /// Ranges that end at the closest hit or next to it, with the closest hit in each: the exact t may lie on
     /// either side of the rounded one.
     parts: Vec<(Ray, Option<Hit>)>,
 }
@@ -118,7 +118,7 @@ impl Expected {
         Self { ray: *ray, all, front, parts }
     }
 
-    /// Compares every entry point of a grid with it.
+    /// Compares every entry point of a grid with the answers.
     fn check(&self, grid: &Grid<'_>) {
         let Self { ray, all, front, parts } = self;
         let expected = all.first().copied();
@@ -128,7 +128,7 @@ impl Expected {
             assert_eq!(grid.intersect(part), *expected, "part of the ray {part:?}");
             assert_eq!(grid.occluded(part), expected.is_some(), "part of the ray {part:?}");
         }
-        // Without memory for more, the ray is walked again for each few hits: not with a million.
+        // With little room a grid walks again for each few hits, which takes too long for a million.
         if all.len() > 1000 {
             let mut hits = vec![Hit::MISS; all.len() + 1];
             let count = grid.intersect_all(ray, &mut QueryOptions::default(), &mut hits);
@@ -148,7 +148,7 @@ pub fn check(grid: &Grid<'_>, ray: &Ray) {
     Expected::new(grid.mesh(), ray).check(grid);
 }
 
-/// The same of grids that have one mesh.
+/// Does the same for several grids of one mesh.
 ///
 /// # Panics
 /// On the first difference, with the ray.
@@ -158,7 +158,7 @@ pub fn check_all(grids: &[Grid<'_>], ray: &Ray) {
     grids.iter().for_each(|grid| expected.check(grid));
 }
 
-/// All hits, and filters that let the first few pass: in order, none twice.
+/// Checks all hits, and filters that reject the first few: hits in order, none twice.
 fn check_order(grid: &Grid<'_>, ray: &Ray, all: &[Hit]) {
     for room in [0, 1, all.len(), all.len() + 2] {
         let mut hits = vec![Hit::MISS; room];
@@ -195,7 +195,8 @@ fn check_order(grid: &Grid<'_>, ray: &Ray, all: &[Hit]) {
     }
 }
 
-/// Masks, culling, the triangle to skip, and the counters. Of all hits, `front` are those on the front of a triangle.
+/// Checks masks, culling, the triangle to skip, and the counters. Of all hits, `front` are those on the front
+/// of a triangle.
 fn check_selection(grid: &Grid<'_>, ray: &Ray, all: &[Hit], front: &[Hit]) {
     let skip = all.first().map_or(INVALID_ID, |hit| hit.primitive);
     for (mask, cull, skip) in [

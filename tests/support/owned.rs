@@ -1,4 +1,4 @@
-//! A grid and the memory it lives in, and the proof that it is right.
+//! A grid with its memory, and the proof that it is valid.
 
 use hgrid_core::{ALIGNMENT, Config, Error, Grid, TriangleMesh, sizes};
 
@@ -34,10 +34,10 @@ pub struct Owned {
     index: Region,
 }
 
-/// Proves that a grid is right, in scratch of just the size that it asks for, which may hold anything.
+/// Validates a grid, in scratch of exactly the size that it asks for, which may hold anything.
 ///
 /// # Errors
-/// The errors of the proof.
+/// The errors of the validation.
 pub fn prove(grid: &Grid<'_>) -> Result<(), Error> {
     grid.validate(&mut vec![0xa5; grid.validate_bytes()])
 }
@@ -61,15 +61,15 @@ impl Owned {
         Ok(Self { index })
     }
 
-    /// The view that queries run on.
+    /// Returns the view for queries.
     ///
     /// # Errors
-    /// The errors of opening, if the mesh is another.
+    /// The errors of opening, if the mesh is another one.
     pub fn open<'a>(&'a self, mesh: &TriangleMesh<'a>) -> Result<Grid<'a>, Error> {
         Grid::open(self.index.bytes(), *mesh)
     }
 
-    /// The grid's bytes.
+    /// Returns the grid's bytes.
     pub fn bytes(&self) -> &[u8] {
         self.index.bytes()
     }

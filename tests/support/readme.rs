@@ -1,5 +1,5 @@
-//! Sizes that docs/embedded.md says and a test measures: a library that grows without anybody noticing
-//! does not stay one that a small machine can carry.
+//! Sizes in docs/embedded.md that tests measure, so that the library does not grow too large for small
+//! machines without notice.
 
 use std::fs;
 use std::sync::{Mutex, PoisonError};
@@ -8,13 +8,13 @@ use crate::artefact::root;
 
 const PAGE: &str = "docs/embedded.md";
 
-/// Checks that the page says each of these sizes, to a tenth, behind the words for it, one after
-/// the other. With `HGRID_BLESS` it writes them there.
+/// Checks each size on the page, to a tenth; each follows its words in the text, in this order. With
+/// `HGRID_BLESS` it writes the sizes there.
 ///
 /// # Panics
-/// If it says something else, or lacks the words.
+/// If the page has another size, or lacks the words.
 pub fn check_sizes<const N: usize>(words: [&str; N], sizes: [u64; N]) {
-    // One test after the other, so that none writes over what another wrote.
+    // One test at a time, so that none overwrites what another wrote.
     static WRITES: Mutex<()> = Mutex::new(());
     let _alone = WRITES.lock().unwrap_or_else(PoisonError::into_inner);
     let path = root().join(PAGE);

@@ -9,11 +9,9 @@
 //! in the range         t_min <= T <= t_max, T where the line meets the plane of the corners as they are
 //! grazed               nor are all corners outside, nor is the t of the places by more than 2^-21 Z
 //! ```
-//!
-//! The places are data that the rule defines: they come from f64. Everything that follows from them
-//! is decided by f64 with a proved error where that is enough, and by [`Dyadic`] numbers where it is
-//! not. [`Line::holds_places`] shows without rounding that the places are where the documentation
-//! says: up to 2^-50 L from those of the corners.
+//! The rule defines the places as f64 data. Everything that follows from them is decided in f64 with a proved
+//! error where that is enough, and with [`Dyadic`] numbers where it is not. [`Line::holds_places`] shows
+//! without rounding that the places are where the documentation says: within 2^-50 L of those of the corners.
 
 use std::cmp::Ordering;
 
@@ -37,7 +35,7 @@ pub enum Answer {
 /// A ray that can hit something.
 #[derive(Debug)]
 pub struct Line {
-    /// The axes so that the longest is the last.
+    /// The axes, the longest last.
     axes: [usize; 3],
     origin: [f64; 3],
     direction: [f64; 3],
@@ -46,11 +44,11 @@ pub struct Line {
     range: [f64; 2],
 }
 
-/// A corner's place across the ray, and how far along it is.
+/// A corner's position across the ray, and its distance along it.
 type Place = [f64; 3];
 
 impl Line {
-    /// `None` for a ray that hits nothing, whatever there is.
+    /// Returns `None` for a ray that can hit nothing.
     #[must_use]
     pub fn new(ray: &Ray) -> Option<Self> {
         let Ray { origin, t_min, direction, t_max } = *ray;
@@ -68,7 +66,7 @@ impl Line {
         Some(Self { axes, origin: o, direction: d, shear: [d[0] / d[2], d[1] / d[2]], range })
     }
 
-    /// A corner with the ray's axis as the last.
+    /// Returns a corner with the ray's longest axis as the last.
     // `turned`, `places` and `passes` use no closures over arrays: brute force is most of the time of many tests.
     fn turned(&self, corner: [f32; 3]) -> [f64; 3] {
         let [x, y, z] = self.axes;
@@ -92,7 +90,7 @@ impl Line {
         if self.passes(corners) { self.answer_of_passed(corners) } else { Answer::Miss }
     }
 
-    /// The same of a triangle that the whole line passes through.
+    /// Returns the rule's answer about a triangle that the whole line passes through.
     #[must_use]
     pub fn answer_of_passed(&self, corners: &Corners) -> Answer {
         self.range_answer(corners, &self.places(corners))
@@ -110,8 +108,8 @@ impl Line {
             return false;
         }
         let places = self.places(corners);
-        // Nothing that lies on one side of the line surrounds it: then two edge functions have opposite signs,
-        // or all are 0.
+        // A triangle that lies on one side of the line does not surround it: then two edge functions have
+        // opposite signs, or all are 0.
         let [a, b, c] = &places;
         let is_beside = |k: usize| {
             (a[k] < 0.0 && b[k] < 0.0 && c[k] < 0.0) || (a[k] > 0.0 && b[k] > 0.0 && c[k] > 0.0)
@@ -131,7 +129,8 @@ impl Line {
         signs.contains(&Ordering::Greater) == (self.direction[2] > 0.0)
     }
 
-    /// Returns how far along the ray the range and the corners are, growing, in units of the longest axis.
+    /// Returns the positions of the range's ends and of the corners along the ray, ascending, in units of the
+    /// longest axis.
     fn along(&self, places: &[Place; 3]) -> ([f64; 2], [f64; 3]) {
         // Products of two f32 numbers: exact.
         let ends = self.range.map(|t| t * self.direction[2].abs());
@@ -140,7 +139,7 @@ impl Line {
 
     fn range_answer(&self, corners: &Corners, places: &[Place; 3]) -> Answer {
         let ([from, to], along) = self.along(places);
-        // Rounding is monotonic and the ends are exact: what these say holds without rounding, too.
+        // Rounding is monotonic and the ends are exact, so these comparisons hold without rounding, too.
         if along.iter().all(|&z| from < z && z < to) {
             return Answer::Hit;
         }
@@ -154,10 +153,10 @@ impl Line {
         });
         let sides = [0, 1].map(|end| self.meets(corners, self.range[end]));
         let [Some(first), Some(last)] = sides else {
-            // No plane, or one along the line: the places decide.
+            // If there is no plane, or the line lies in it, the places decide.
             return self.places_answer(places, 0.0);
         };
-        // An end that lies beyond all corners is kept by all points between them.
+        // If an end lies beyond all corners, so do all points between them.
         let is_ahead = along.iter().all(|&z| from < z);
         let is_before = along.iter().all(|&z| z < to);
         let is_in =
@@ -170,8 +169,8 @@ impl Line {
         }
     }
 
-    /// Returns true if the t of the places lies in the range, or no farther outside than a part of the
-    /// corners' range. That t is rounded: next to the limit either may be.
+    /// Returns a hit if the t of the places lies in the range, or no farther outside than a share `outside`
+    /// of the corners' range. That t is rounded: next to the limit the answer is `Either`.
     fn places_answer(&self, places: &[Place; 3], outside: f64) -> Answer {
         let ([from, to], along) = self.along(places);
         let along = along.map(Dyadic::new);
@@ -181,7 +180,7 @@ impl Line {
         let weights = exact_edges(places).map(Dyadic::abs);
         let area = &(&weights[0] + &weights[1]) + &weights[2];
         let depth = dot(&weights, &along);
-        // All of it times the area, which is positive.
+        // Multiply everything by the area, which is positive.
         let least = &(&Dyadic::new(from) - &outside) * &area;
         let most = &(&Dyadic::new(to) + &outside) * &area;
         let error = (&depth.clone().abs() + &(&width * &area)).scaled(-38);
@@ -196,7 +195,7 @@ impl Line {
         }
     }
 
-    /// Compares T, where the line meets the plane of the corners, with `t`; `None` if it does not, or not in a point.
+    /// Compares T, where the line meets the plane of the corners, with `t`; `None` if they do not meet in one point.
     fn meets(&self, corners: &Corners, t: f64) -> Option<Ordering> {
         let exact = |v: [f64; 3]| v.map(Dyadic::new);
         let [a, b, c] = corners.map(|corner| exact(self.turned(corner)));
@@ -212,9 +211,9 @@ impl Line {
         }
     }
 
-    /// Returns true if the numbers of a hit are as exact as they are said to be: `u` and `v` to
-    /// (2^-24 + 2^-38) of their value, `t` to 2^-24 |t| + 2^-38 (|t| + Z), all to 2^-149. The `t` lies
-    /// in the range: of a triangle that is grazed, whose `t` does not, it is the end.
+    /// Returns true if the numbers of a hit are as exact as documented: `u` and `v` to (2^-24 + 2^-38) of
+    /// their value, `t` to 2^-24 |t| + 2^-38 (|t| + Z), all to 2^-149. The `t` must lie in the range; if a
+    /// grazed triangle's `t` would not, it is the end of the range.
     #[must_use]
     pub fn holds_numbers(&self, corners: &Corners, hit: &Hit) -> bool {
         let [first, last] = self.range;
@@ -224,11 +223,11 @@ impl Line {
         is_in && (self.holds_surely(&places, hit) || self.holds_exactly(&places, hit))
     }
 
-    /// The same in f64: true if it is so by a margin.
+    /// Decides the same in f64; returns true if it holds by a margin.
     ///
-    /// Where no edge function is smaller than 2^-9 of its products, it is off by 2^-43 of its value, and as they
-    /// have one sign so is their sum. A weight is off by 2^-41, and t by 2^-40 of the largest |t| of a
-    /// corner, which is no more than |t| + Z. So half of the error that is allowed to each is enough.
+    /// Where no edge function is smaller than 2^-9 of its products, it is off by 2^-43 of its value, and so is
+    /// the sum, because all have one sign. A weight is off by 2^-41, and t by 2^-40 of the largest |t| of a
+    /// corner, which is no more than |t| + Z. So half of the error allowed for each is enough here.
     fn holds_surely(&self, places: &[Place; 3], hit: &Hit) -> bool {
         let mut weights = [0.0; 3];
         for (weight, (p, q)) in weights.iter_mut().zip(edges(places)) {
@@ -246,7 +245,7 @@ impl Line {
         let high = depths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let reach = t.abs() + (high - low) / length.abs();
         let (digit, rest) = (2_f64.powi(-24), 2_f64.powi(-39));
-        // Half of the smallest f32: what is rounded to nearest is off by no more.
+        // Half of the smallest f32: rounding to nearest is off by no more.
         let least = 2_f64.powi(-150);
         let is_weight = |found: f32, weight: f64| {
             let value = weight / area;
@@ -262,12 +261,12 @@ impl Line {
         let area = &(&weights[0] + &weights[1]) + &weights[2];
         let least = Dyadic::new(1.0).scaled(-149);
         let part = &Dyadic::new(1.0).scaled(-24) + &Dyadic::new(1.0).scaled(-38);
-        // Times the area.
+        // Multiply by the area.
         let is_weight = |found: f32, weight: &Dyadic| {
             let off = (&(&Dyadic::new(found.into()) * &area) - weight).abs();
             off <= &(&part * weight) + &(&least * &area)
         };
-        // Times the area and the length of the direction.
+        // Multiply by the area and the length of the direction.
         let depths = places.map(|place| Dyadic::new(place[2]));
         let [low, high] = extremes(&depths);
         let length = Dyadic::new(self.direction[2]);
@@ -276,7 +275,7 @@ impl Line {
         let width = &(&high - &low) * &area;
         let off = &(&Dyadic::new(hit.t.into()) * &scale) - &t;
         let allowed = &(&part * &t.abs()) + &width.scaled(-38);
-        // Growing with t. What lies beyond an end is cut there.
+        // Make the difference grow with t. A t beyond an end is cut there.
         let off = if scale.sign() == Ordering::Less { -off } else { off };
         let is_behind = off > Dyadic::new(0.0);
         let is_cut = f64::from(hit.t) == self.range[usize::from(!is_behind)];
@@ -284,8 +283,8 @@ impl Line {
         is_t && is_weight(hit.u, &weights[1]) && is_weight(hit.v, &weights[2])
     }
 
-    /// Returns true if the places of a triangle's corners are up to 2^-50 L from where the corners are, L the
-    /// largest difference of a coordinate between the origin and a corner.
+    /// Returns true if the places of a triangle's corners are within 2^-50 L of where the corners are; L is
+    /// the largest difference of a coordinate between the origin and a corner.
     #[must_use]
     pub fn holds_places(&self, corners: &Corners) -> bool {
         let exact = |v: [f64; 3]| v.map(Dyadic::new);
@@ -297,7 +296,7 @@ impl Line {
         corners.iter().zip(&from_origin).all(|(corner, p)| {
             let place = self.place(*corner);
             (0..2).all(|k| {
-                // Times the direction's longest coordinate.
+                // Multiply by the direction's longest coordinate.
                 let right = &(&p[k] * &direction[2]) - &(&direction[k] * &p[2]);
                 let found = &Dyadic::new(place[k]) * &direction[2];
                 (&found - &right).abs() <= allowed
@@ -306,16 +305,16 @@ impl Line {
     }
 }
 
-/// The corners between which the weights of the three corners are.
+/// Returns the pairs of corners that define the weights of the three corners.
 fn edges([a, b, c]: &[Place; 3]) -> [(Place, Place); 3] {
     [(*c, *b), (*a, *c), (*b, *a)]
 }
 
-/// The sign of `p.x q.y - p.y q.x`.
+/// Returns the sign of `p.x q.y - p.y q.x`.
 ///
-/// Two products and a difference are off by 2^-53 of themselves, 2^-52 of the products in all: no
-/// place is smaller than 2^-430 unless it is 0, so nothing underflows. Where that does not decide, the products
-/// are so close that their difference is exact, and what each lost to rounding is an f64, too.
+/// Two products and a difference are off by 2^-53 of themselves, 2^-52 of the products in all: no place is
+/// smaller than 2^-430 unless it is 0, so nothing underflows. Where that does not decide, the products are so
+/// close that their difference is exact, and the rounding error of each product is an f64, too.
 fn edge_sign(p: Place, q: Place) -> Ordering {
     let (one, other) = (p[0] * q[1], p[1] * q[0]);
     let edge = one - other;
@@ -324,8 +323,8 @@ fn edge_sign(p: Place, q: Place) -> Ordering {
     if edge.abs() > 2_f64.powi(-51) * size || size == 0.0 {
         return compare(edge, 0.0);
     }
-    // The sign of edge - (lost - kept). Rounding keeps the order, so that only equals need what it takes away
-    // (Knuth 1969: the error of a sum).
+    // Take the sign of edge - (lost - kept). Rounding keeps the order, so only if both are equal does its
+    // error matter (Knuth 1969: the error of a sum).
     let (kept, lost) = (p[0].mul_add(q[1], -one), p[1].mul_add(q[0], -other));
     let rounded = lost - kept;
     let part = lost - rounded;

@@ -1,15 +1,15 @@
-//! Real scans, where they are at hand.
+//! Real scans, where they are available.
 //!
-//! They are not part of the project (their makers hold the rights). A test that wants one looks in
-//! the folder that `HGRID_SCENES` names, or in `../shared/scenes` beside the checkout, and skips
-//! with one line if it is not there, whatever `HGRID_REQUIRE_ALL` says.
+//! The scans are not part of the project, because their makers hold the rights. A test that needs one looks
+//! in the folder that `HGRID_SCENES` names, or in `../shared/scenes` beside the checkout, and skips with one
+//! line if it is not there, whatever `HGRID_REQUIRE_ALL` says.
 
 use std::path::{Path, PathBuf};
 
 use crate::meshes::Mesh;
 use crate::tools::leave_out;
 
-/// The scan of this name, or `None` after a line that says so.
+/// Returns the scan with this name, or `None` after a message.
 ///
 /// # Panics
 /// If the file is there but cannot be read.

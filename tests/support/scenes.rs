@@ -1,4 +1,4 @@
-//! Scenes and trees of shapes with the memory they live in, and instances to put into them.
+//! Scenes and trees of shapes with their memory, and instances to put into them.
 
 use hgrid_core::{
     BlobInfo, Block, Boxes, Config, Error, Instance, Member, Object, Scene, Shapes, Sizes,
@@ -19,10 +19,10 @@ fn memory(sizes: Option<Sizes>) -> Result<(Vec<Block>, Vec<Block>), Error> {
 }
 
 impl Built {
-    /// Builds a scene in as much memory as any of its size takes, and proves it.
+    /// Builds a scene in the memory of the bound, and validates it.
     ///
     /// # Errors
-    /// The errors of the build and of the proof.
+    /// The errors of the build and of the validation.
     pub fn scene(
         instances: &[Instance],
         objects: &[Object<'_>],
@@ -37,10 +37,10 @@ impl Built {
         Ok(Self { index })
     }
 
-    /// Builds a tree of shapes, and proves it.
+    /// Builds a tree of shapes, and validates it.
     ///
     /// # Errors
-    /// The errors of the build and of the proof.
+    /// The errors of the build and of the validation.
     pub fn shapes(boxes: Boxes<'_>, config: &Config) -> Result<Self, Error> {
         let (mut index, mut scratch) = memory(Sizes::bound(boxes.count(), config))?;
         let scratch = Block::bytes_mut(&mut scratch);
@@ -49,7 +49,7 @@ impl Built {
         Ok(Self { index })
     }
 
-    /// The view that queries run on.
+    /// Returns the view for queries.
     ///
     /// # Errors
     /// The errors of opening.
@@ -57,18 +57,18 @@ impl Built {
         Scene::open(self.bytes(), objects)
     }
 
-    /// All bytes.
+    /// Returns all bytes.
     pub fn bytes(&self) -> &[u8] {
         Block::bytes(&self.index)
     }
 
-    /// All bytes, to be changed.
+    /// Returns all bytes for changes.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         Block::bytes_mut(&mut self.index)
     }
 }
 
-/// A scene with all that it shows, in memory of just the size.
+/// Packs a scene with all that it shows, in memory of exactly the size.
 ///
 /// # Errors
 /// The errors of packing.
@@ -80,36 +80,36 @@ pub fn packed(scene: &Scene<'_>) -> Result<Vec<Block>, Error> {
     Ok(blocks)
 }
 
-/// Room for a packed scene, by its header; not more than a test has.
+/// Returns the room that a packed scene needs by its header, limited to what tests use.
 fn room<'a>(blob: &[u8]) -> (Vec<Member<'a>>, Vec<Object<'a>>) {
     let (members, objects) = BlobInfo::peek(blob)
         .map_or((0, 0), |info| (info.triangle_count as usize, info.vertex_count as usize));
     (vec![Member::EMPTY; members.min(1000)], vec![Object::Nothing; objects.min(1000)])
 }
 
-/// Opens a packed scene in room of just the size.
+/// Opens a packed scene in exactly the room that it needs.
 pub fn with_packed<T>(blob: &[u8], run: impl FnOnce(Result<Scene<'_>, Error>) -> T) -> T {
     let (mut members, mut objects) = room(blob);
     run(Scene::open_packed(blob, &mut members, &mut objects))
 }
 
-/// Proves a packed scene, in as much scratch as is enough.
+/// Opens and validates a packed scene, in enough scratch.
 ///
 /// # Errors
-/// The errors of opening and of the proofs.
+/// The errors of opening and of validation.
 pub fn prove_packed(blob: &[u8]) -> Result<(), Error> {
     let (mut members, mut objects) = room(blob);
     let mut scratch = vec![0xa5; blob.len() / 64];
     Scene::open_packed_proven(blob, &mut members, &mut objects, &mut scratch).map(|_| ())
 }
 
-/// A matrix of some kind: a rotation, a mirror, a scale that is not the same on all axes, a shear.
+/// Returns a random matrix: a rotation, a mirror, a scale that differs between the axes, or a shear.
 pub fn matrix(random: &mut Random) -> [[f32; 3]; 3] {
     let size = 0.2 + 2.0 * random.unit();
     let [x, y, z] = random.point();
     match random.below(5) {
         0 => [[size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]],
-        // A quaternion as a rotation, with a scale.
+        // A rotation from a quaternion, with a scale.
         1 => {
             let length = (x * x + y * y + z * z + 1.0).sqrt();
             let [w, x, y, z] = [1.0, x, y, z].map(|c| c / length);
@@ -126,7 +126,7 @@ pub fn matrix(random: &mut Random) -> [[f32; 3]; 3] {
     }
 }
 
-/// Instances of the first `objects` objects all over a cube.
+/// Returns instances of the first `objects` objects all over a cube.
 pub fn scattered(count: usize, objects: u32, width: f64, seed: u64) -> Vec<Instance> {
     let mut random = Random(seed);
     (0..count)

@@ -1,4 +1,4 @@
-//! The names in a library, as binutils tell them: tests ask `tools` for these before.
+//! The symbols in a library, as binutils list them. Tests ask `tools` for binutils first.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::artefact::run;
 use crate::tools::command;
 
-/// The symbols that `nm` lists with these flags.
+/// Returns the symbols that `nm` lists with these flags.
 ///
 /// # Panics
 /// If it cannot read the library.
@@ -15,12 +15,11 @@ pub fn symbols(library: &Path, flags: &[&str]) -> BTreeSet<String> {
     names(list(library, flags).lines())
 }
 
-/// The same for the object in an archive that is ours. The others are the compiler's run-time
-/// library, from which the linker takes what a target lacks.
+/// Returns the same for our own object in an archive. The other objects are the compiler's run-time library,
+/// from which the linker takes what a target lacks.
 ///
 /// # Panics
-/// If it cannot read the archive, or if ours is not one object: then
-/// nothing optimised it as a whole.
+/// If it cannot read the archive, or if our code is not one object, so that it was not optimised as a whole.
 #[must_use]
 pub fn symbols_of_ours(archive: &Path, flags: &[&str]) -> BTreeSet<String> {
     let heading = format!("{}:", ours(archive));
@@ -29,10 +28,10 @@ pub fn symbols_of_ours(archive: &Path, flags: &[&str]) -> BTreeSet<String> {
     names(behind.take_while(|line| !line.is_empty()))
 }
 
-/// Puts that object into a folder.
+/// Extracts our object into a folder.
 ///
 /// # Panics
-/// If it is not one.
+/// If our code is not one object.
 #[must_use]
 pub fn extract_ours(archive: &Path, dir: &Path) -> PathBuf {
     let ours = ours(archive);
@@ -40,7 +39,7 @@ pub fn extract_ours(archive: &Path, dir: &Path) -> PathBuf {
     dir.join(ours)
 }
 
-/// The name of that object.
+/// Returns the name of our object.
 fn ours(archive: &Path) -> String {
     let members = run(command("ar").arg("t").arg(archive)).stdout;
     let members = String::from_utf8(members).expect("text");
@@ -54,8 +53,8 @@ fn list(library: &Path, flags: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// The names in lines like `0000000000000010 T name` and `U name`. There are others: headings, and
-/// what a plug-in of `nm` has to say about objects of newer compilers.
+/// Returns the names in lines like `0000000000000010 T name` and `U name`. Other lines are headings, and
+/// messages of `nm` plug-ins about objects of newer compilers.
 fn names<'a>(lines: impl Iterator<Item = &'a str>) -> BTreeSet<String> {
     let name = |line: &str| {
         let mut words = line.split_whitespace().rev();

@@ -1,8 +1,8 @@
-//! Programs that tests use where they are installed, and do without elsewhere.
+//! Programs that tests use if they are installed, and do without otherwise.
 //!
-//! A test that wants more than Rust, a C compiler, the C library and POSIX commands asks here. The
-//! variable `HGRID_WITHOUT` names what to treat as missing, so that a machine with every program can
-//! run the tests as one with few of them does. `HGRID_REQUIRE_ALL=1` makes a failure of every skip but those.
+//! A test that needs more than Rust, a C compiler, the C library and POSIX commands asks here. The variable
+//! `HGRID_WITHOUT` lists programs to treat as missing, so that a machine with every program can run the tests
+//! like one with few. With `HGRID_REQUIRE_ALL=1` every skip fails, except for programs in that list.
 
 use std::collections::BTreeSet;
 use std::env;
@@ -14,8 +14,8 @@ use std::thread;
 
 use crate::artefact::cpp_path;
 
-/// The names that `HGRID_WITHOUT` takes, and the programs that come with each. Those without a
-/// program are libraries, or what only scripts of .ci ask for. tests/README.md tells how to install them.
+/// The names that `HGRID_WITHOUT` takes, each with its programs. Those without a program are libraries, or
+/// are needed only by scripts of .ci. tests/README.md tells how to install them.
 pub const OPTIONAL: [(&str, &[&str]); 25] = [
     ("aarch64", &[]),
     ("armv7", &[]),
@@ -44,7 +44,7 @@ pub const OPTIONAL: [(&str, &[&str]); 25] = [
     ("wasm", &[]),
 ];
 
-/// The names in `HGRID_WITHOUT`.
+/// Returns the names in `HGRID_WITHOUT`.
 fn left_out() -> BTreeSet<&'static str> {
     let list = env::var_os("HGRID_WITHOUT").unwrap_or_default();
     let list = list.to_string_lossy();
@@ -59,7 +59,7 @@ fn left_out() -> BTreeSet<&'static str> {
     names.map(known).collect()
 }
 
-/// The command line of a program begins with this.
+/// Returns the path that starts a program.
 fn path(program: &str) -> OsString {
     if program == "c++" { cpp_path().into() } else { program.into() }
 }
@@ -68,8 +68,8 @@ fn runs(program: &str) -> bool {
     Command::new(path(program)).arg("--version").output().is_ok()
 }
 
-/// Returns whether all programs of a name in [`OPTIONAL`] are installed and not left out. If not, the
-/// test says what it does without.
+/// Returns true if all programs of a name in [`OPTIONAL`] are installed and not left out. If not, the test
+/// prints what it does without.
 ///
 /// # Panics
 /// If there is no such name, here or in `HGRID_WITHOUT`.
@@ -87,7 +87,7 @@ pub fn is_installed(name: &str) -> bool {
     missing.is_none()
 }
 
-/// A command that runs an optional program, for tests that asked [`is_installed`] before.
+/// Returns a command that runs an optional program, for tests that asked [`is_installed`] before.
 ///
 /// # Panics
 /// If the program comes with no name in [`OPTIONAL`], or with one that is left out.
@@ -99,7 +99,7 @@ pub fn command(program: &str) -> Command {
     Command::new(path(program))
 }
 
-/// Skips a part of a test, or all of it, for want of something that another machine may have.
+/// Skips all or part of a test, because of something that another machine may have.
 ///
 /// # Panics
 /// If `HGRID_REQUIRE_ALL` is 1: then nothing may be missing.
@@ -109,10 +109,10 @@ pub fn skip(reason: &str) {
     leave_out(reason);
 }
 
-/// Says once for each test why a part of it, or all of it, is left out: because somebody asked for that, or
-/// because it asks nothing about this machine.
+/// Prints once per test why all or part of it is left out: because the user asked for that, or because it
+/// does not apply to this machine.
 ///
-/// The line goes past the test harness, which shows what a test prints only if the test fails.
+/// The line bypasses the test harness, which shows a test's output only if the test fails.
 pub fn leave_out(reason: &str) {
     static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     let thread = thread::current();

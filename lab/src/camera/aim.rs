@@ -1,4 +1,4 @@
-//! The views that the words of `--view` name: a side of any scene, or a view of one.
+//! The views that `--view` accepts: a side of any scene, or a named view of one scene.
 
 use core::str::FromStr;
 
@@ -7,17 +7,17 @@ use anyhow::{Error, Result};
 use super::{Camera, Lens, Up, View, named};
 use crate::scene::Scene;
 
-/// A view as it is asked for.
+/// A view as the command line gives it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Aim {
     /// All of a scene from a side.
     Side(View),
-    /// The view that a scene has under a name.
+    /// The view of a scene that has this name.
     Named(&'static str),
 }
 
 impl Aim {
-    /// The camera for a scene.
+    /// Returns the camera for a scene.
     ///
     /// # Errors
     /// If the scene has no view of that name.

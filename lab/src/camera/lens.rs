@@ -4,7 +4,7 @@ use core::str::FromStr;
 
 use anyhow::{Error, Result, ensure};
 
-/// The field of view of a square picture, from edge to edge: 40 degrees unless somebody says so.
+/// The field of view of a square picture, from edge to edge: 40 degrees by default.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {
     half_view_tangent: f32,

@@ -33,7 +33,7 @@ const MARGIN: f64 = 1.04;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     eye: [f32; 3],
-    /// Unit vectors in scene space; the picture's edges are at a tangent of the half view.
+    /// Unit vectors in scene space; the picture's edges are at the tangent of half the field of view.
     right: [f32; 3],
     up: [f32; 3],
     forward: [f32; 3],
@@ -41,13 +41,13 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The camera that sees all of a box, and not much else.
+    /// Returns the camera that sees all of a box, and little else.
     #[must_use]
     pub fn framing(bounds: Bounds, view: View, up: Up) -> Self {
         Self::framing_through(Lens::default(), bounds, view, up)
     }
 
-    /// The same with another lens.
+    /// Returns the same camera with another lens.
     #[must_use]
     pub fn framing_through(lens: Lens, bounds: Bounds, view: View, up: Up) -> Self {
         let basis = Basis::new(view.toward_eye(), up);
@@ -65,7 +65,7 @@ impl Camera {
         basis.camera(offset(centre, distance, basis.toward_eye), lens)
     }
 
-    /// The camera at a point, looking at another; straight down -z if the two are the same.
+    /// Returns the camera at a point that looks at another; straight down -z if the two are the same.
     #[must_use]
     pub fn between(Point(eye): Point, Point(target): Point, up: Up, lens: Lens) -> Self {
         Basis::new(up.turned(offset(eye, -1.0, target)), up).camera(eye, lens)
@@ -112,7 +112,7 @@ impl Camera {
         [0, 1, 2].map(|axis| pixel * (right * self.right[axis] - down * self.up[axis]))
     }
 
-    /// The column and the row of the pixel that a ray goes through.
+    /// Returns the column and the row of the pixel that a ray goes through.
     pub(crate) fn pixel(&self, ray: &Ray, size: u16) -> [f32; 2] {
         let along =
             |axis: [f32; 3]| axis.iter().zip(ray.direction).map(|(a, d)| a * d).sum::<f32>();
@@ -142,11 +142,11 @@ struct Basis {
 }
 
 impl Basis {
-    /// The frame whose `right` is level, from a direction that was turned.
+    /// Makes the frame whose `right` is level, from a direction that was turned so that y is up.
     fn new(toward_eye: Vector, up: Up) -> Self {
         let toward_eye = unit(toward_eye).unwrap_or([0.0, 0.0, 1.0]);
         let level = [toward_eye[2], 0.0, -toward_eye[0]];
-        // Straight up and down, every direction is level.
+        // For a direction straight up or down, any `right` is level.
         let right = unit(level).unwrap_or([1.0, 0.0, 0.0]);
         let [right, up, toward_eye] =
             [right, cross(toward_eye, right), toward_eye].map(|axis| up.turned_back(axis));

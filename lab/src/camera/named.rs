@@ -1,4 +1,4 @@
-//! Views of the standard scenes that have a name: all of them stand here.
+//! The named views of the standard scenes.
 
 use anyhow::{Context as _, Result};
 
@@ -44,15 +44,15 @@ const VIEWS: &[Named] = &[
     between("buddha.ply", "close", [-0.012, 0.13, 0.065], [-0.012, 0.13, 0.0]),
 ];
 
-/// The word itself if a view of any scene has it as its name.
+/// Returns the word itself if it names a view of any scene.
 pub(super) fn name(word: &str) -> Option<&'static str> {
     VIEWS.iter().map(|view| view.name).find(|&name| name == word)
 }
 
-/// The camera of a named view of a scene.
+/// Returns the camera of a named view of a scene.
 ///
 /// # Errors
-/// If the scene has no such view; the message names those that it has.
+/// If the scene has no such view; the message lists the names that it has.
 pub(super) fn camera(scene: &Scene, name: &str, up: Up, lens: Lens) -> Result<Camera> {
     let views = || VIEWS.iter().filter(|view| view.scene == scene.name);
     let view = views().find(|view| view.name == name).with_context(|| {
@@ -66,7 +66,7 @@ pub(super) fn camera(scene: &Scene, name: &str, up: Up, lens: Lens) -> Result<Ca
     })
 }
 
-/// The scenes and the names of their views, for the help.
+/// Lists the scenes and the names of their views, for the help.
 #[must_use]
 pub fn list() -> String {
     let mut lines: Vec<(&str, Vec<&str>)> = Vec::new();

@@ -11,7 +11,7 @@ use crate::vector::{Vector, round, unit};
 /// A box lower than this part of its width is flat.
 const FLAT: f64 = 0.25;
 
-/// Which axis of the scene is up in the picture.
+/// The axis of the scene that is up in the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Up {
     /// As scans and most renderers have it.
@@ -21,7 +21,7 @@ pub enum Up {
 }
 
 impl Up {
-    /// The axis that is up in a scene: as its format says, or z if it lies flat on x and y.
+    /// Returns the axis that is up in a scene: the one of its format, or z if it lies flat on x and y.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         let bounds = scene.framed_bounds();
@@ -32,12 +32,12 @@ impl Up {
         }
     }
 
-    /// The direction that is up.
+    /// Returns the direction that is up.
     pub(crate) fn direction(self) -> Vector {
         self.turned_back([0.0, 1.0, 0.0])
     }
 
-    /// A vector of the scene, turned so that y is up.
+    /// Turns a vector of the scene so that y is up.
     pub(crate) fn turned(self, [x, y, z]: Vector) -> Vector {
         match self {
             Self::Y => [x, y, z],
@@ -45,7 +45,7 @@ impl Up {
         }
     }
 
-    /// The vector of the scene that was turned.
+    /// Turns a vector whose y is up back into the scene: the inverse of `turned`.
     pub(crate) fn turned_back(self, [x, y, z]: Vector) -> Vector {
         match self {
             Self::Y => [x, y, z],
@@ -93,7 +93,7 @@ impl View {
         round(up.turned_back(unit(self.toward_eye()).unwrap_or_default()))
     }
 
-    /// The direction from the scene to the eye; any length.
+    /// Returns the direction from the scene to the eye, of any length, in axes whose y is up.
     pub(super) fn toward_eye(self) -> Vector {
         match self {
             Self::Front => [0.0, 0.0, 1.0],
@@ -162,7 +162,7 @@ impl FromStr for Point {
     }
 }
 
-/// Exactly `N` finite numbers between commas.
+/// Parses exactly `N` finite numbers between commas.
 pub(super) fn numbers<const N: usize>(word: &str) -> Result<[f64; N]> {
     let numbers = word.split(',').map(|number| number.trim().parse::<f64>());
     let numbers = numbers.collect::<Result<Vec<_>, _>>()?;

@@ -7,8 +7,8 @@
 //! anything else           from the front, a little above
 //! ```
 //!
-//! From its middle, a room shows the fronts of its triangles and a solid shows backs.
-//! Rays from the middle tell which of the two a scene is.
+//! Seen from its middle, a room shows the fronts of its triangles, and a solid shows backs. Rays from the
+//! middle tell them apart.
 
 use hgrid_core::{Ray, SceneHit};
 
@@ -24,10 +24,10 @@ const AROUND: u16 = 256;
 /// Level rays that look for an open side.
 const LEVEL: u16 = 72;
 
-/// The part of all directions in which a room has walls, at least.
+/// The least part of all directions in which the middle of a room sees walls.
 const ENCLOSED: f64 = 0.75;
 
-/// The part of all level directions that an open side takes, at least.
+/// The least number of level rays that pass through an open side.
 const OPEN_SIDE: u16 = LEVEL / 12;
 
 /// The view of a thing that is not flat.
@@ -43,7 +43,7 @@ const ROOM_DEGREES: &str = "70";
 const ALONG: [f64; 5] = [0.12, 0.3, 0.5, 0.7, 0.88];
 const UPWARD: [f64; 2] = [0.2, 0.35];
 
-/// Directions that are looked into from each place.
+/// The directions in which the camera looks from each place.
 const AZIMUTHS: u16 = 16;
 
 /// Rays on each side of a coarse picture from a place.
@@ -81,16 +81,16 @@ fn is_in_room(world: World<'_>, point: Vector) -> bool {
     f64::from(fronts) >= ENCLOSED * f64::from(AROUND) && backs < AROUND / 8
 }
 
-/// Returns a direction of the unit sphere; together they are spread evenly over it.
+/// Returns one of `AROUND` directions that are spread evenly over the unit sphere.
 fn spread(number: u16) -> Vector {
     let height = (2.0 * f64::from(number) + 1.0) / f64::from(AROUND) - 1.0;
     let radius = (1.0 - height * height).sqrt();
-    // Turned by the golden angle from one to the next.
+    // The golden angle turns each direction from the one before.
     let (sin, cos) = (f64::from(number) * 2.399_963_229_728_653).sin_cos();
     [radius * cos, height, radius * sin]
 }
 
-/// Returns the middle of the widest run of level directions in which nothing is, in degrees.
+/// Returns the middle, in degrees, of the widest run of level directions in which nothing is hit.
 fn open_side(world: World<'_>, middle: Vector, up: Up) -> Option<f64> {
     let degrees = |at: u16| 360.0 * f64::from(at) / f64::from(LEVEL);
     let is_open: Vec<bool> = (0..LEVEL)
@@ -103,15 +103,15 @@ fn open_side(world: World<'_>, middle: Vector, up: Up) -> Option<f64> {
         let around = (0..LEVEL).map(|step| is_open[usize::from((start + step) % LEVEL)]);
         around.take_while(|&is_open| is_open).count()
     };
-    // Of runs of equal length the one nearest to the front.
+    // Of runs of equal length, the one nearest to the front wins.
     let from_front = |start: u16| start.min(LEVEL - start);
     let longest = (0..LEVEL).max_by_key(|&start| (length(start), LEVEL - from_front(start)))?;
     let length = u16::try_from(length(longest)).unwrap_or(LEVEL);
     (length >= OPEN_SIDE).then(|| degrees(longest) + 0.5 * degrees(length - 1))
 }
 
-/// Returns the camera in a room that sees farthest: with the largest harmonic mean of distances,
-/// which one close wall makes small.
+/// Returns the camera in a room that sees farthest. The measure is the harmonic mean of distances, which one
+/// close wall makes small.
 fn within(world: World<'_>, part: Bounds, up: Up, lens: Option<Lens>) -> Option<Camera> {
     let lens = lens.or_else(|| ROOM_DEGREES.parse().ok())?;
     let (Point(middle), half) = (Point::centre_of(part), up.turned(half_extent(part)));
@@ -151,7 +151,7 @@ fn openness(world: World<'_>, camera: &Camera) -> f64 {
     f64::from(COARSE * COARSE) / nearness.sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
-/// Returns the point at a distance from the eye along a camera's view, for tests of where it looks.
+/// Returns the eye of a camera and the direction of its view, for tests of where it looks.
 #[cfg(test)]
 fn ahead(camera: &Camera) -> (Vector, Vector) {
     let ray = camera.ray(0, 0, 1);
@@ -169,7 +169,7 @@ mod tests {
     use crate::regions::Regions;
     use crate::scene::Scene;
 
-    /// A box of 8 x 3 x 4 whose fronts are within, without some of its sides.
+    /// Makes a box of 8 x 3 x 4 whose fronts are inside, without some of its sides.
     fn room(without: &[usize]) -> Scene {
         let mut scene = Scene::default();
         let corner =
@@ -196,7 +196,7 @@ mod tests {
         let (eye, along) = chosen(&room(&[]));
         assert!((0..3).all(|axis| eye[axis] > 0.0 && eye[axis] < [8.0, 3.0, 4.0][axis]), "{eye:?}");
         assert!(along[0].abs() > 0.9, "{along:?}");
-        // Back to front it is a solid.
+        // With its triangles reversed, the box is a solid.
         let mut solid = room(&[]);
         solid.indices.iter_mut().for_each(|triangle| triangle.swap(0, 1));
         let (eye, _) = chosen(&solid);

@@ -1,4 +1,4 @@
-//! The words of `hgrid info`, `hgrid pack` and `hgrid validate`.
+//! The arguments of `hgrid info`, `hgrid pack` and `hgrid validate`.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use hgrid_core::Method;
 
 use super::{Tuning, method_parser};
 
-/// What to look at.
+/// The arguments of `hgrid info`.
 #[derive(Debug, Parser)]
 pub struct InfoArgs {
     /// A mesh file, a blob or procedural:NAME:TRIANGLES
@@ -17,7 +17,7 @@ pub struct InfoArgs {
     pub json: bool,
 }
 
-/// What to build and where to write it.
+/// The arguments of `hgrid pack`.
 #[derive(Debug, Parser)]
 pub struct PackArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
@@ -39,7 +39,7 @@ pub struct PackArgs {
     pub tuning: Tuning,
 }
 
-/// What to prove.
+/// The arguments of `hgrid validate`.
 #[derive(Debug, Parser)]
 pub struct ValidateArgs {
     /// A blob, as `hgrid pack` writes it, `hgrid_pack` in C or `Grid::pack` in Rust

@@ -1,4 +1,4 @@
-//! What the command says about itself: examples, scenes and views.
+//! The help texts of the command: examples, scenes and views.
 
 use crate::camera::named;
 
@@ -124,7 +124,7 @@ Views:
 Named views:
 ";
 
-/// Returns what is said about views, and the named ones.
+/// Returns the help about views, and the named ones.
 pub(super) fn views() -> String {
     VIEWS.to_owned() + &named::list()
 }

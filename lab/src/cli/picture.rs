@@ -1,4 +1,4 @@
-//! The words that say how large a picture is and from where it is taken.
+//! The arguments for the size of a picture and its camera.
 
 use anyhow::{Result, ensure};
 use clap::Args;
@@ -8,7 +8,7 @@ use crate::scene::Scene;
 use crate::tiles::Tiles;
 use crate::world::World;
 
-/// How large a picture is and from where it is taken.
+/// The size of a picture, and its camera.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Picture {
     /// Pixels on each side
@@ -33,7 +33,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The picture of a scene for measurements: of all of it unless the words say otherwise.
+    /// Returns the picture of a scene for measurements; by default it shows all of the scene.
     ///
     /// # Errors
     /// If the scene has no view of that name, or the eye is where it looks.
@@ -45,7 +45,7 @@ impl Picture {
         Ok(Tiles { camera, size: self.size })
     }
 
-    /// The picture of a scene to look at: from where one sees most unless the words say otherwise.
+    /// Returns the picture of a scene for viewers; by default the camera stands at the best viewpoint.
     ///
     /// # Errors
     /// Those of [`tiles`](Self::tiles).
@@ -62,7 +62,7 @@ impl Picture {
         self.up.unwrap_or_else(|| Up::of(scene))
     }
 
-    /// The camera that the words ask for, if they do.
+    /// Returns the camera of the arguments; none if they name none.
     fn asked(&self, scene: &Scene) -> Result<Option<Camera>> {
         let (up, lens) = (self.up(scene), self.fov.unwrap_or_default());
         if let Some(eye) = self.eye {

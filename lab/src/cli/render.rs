@@ -1,4 +1,4 @@
-//! The words of `hgrid render`.
+//! The arguments of `hgrid render`.
 
 use core::num::NonZero;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ use crate::light::Lights;
 const SAMPLES: u16 = 4;
 const SKY_RAYS: u16 = 4;
 
-/// What to render and how.
+/// The arguments of `hgrid render`.
 #[derive(Debug, Parser)]
 pub struct RenderArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
@@ -64,16 +64,16 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// The grid that the words ask for.
+    /// Returns the configuration of the grid.
     #[must_use]
     pub fn config(&self) -> Config {
         self.tuning.config(self.method, self.density)
     }
 
-    /// Refuses options that would be ignored.
+    /// Refuses options that would have no effect.
     ///
     /// # Errors
-    /// The first such option, and what it is for.
+    /// If there is one; the message names the option and its purpose.
     pub fn check(&self) -> Result<()> {
         ensure!(
             self.density.is_none() || self.config().parameters.density().is_some(),
@@ -99,8 +99,8 @@ impl RenderArgs {
         Ok(())
     }
 
-    /// Returns true if meshes that stand more than once stay instances: only diffuse pictures with bvh show them.
-    /// Otherwise they become triangles.
+    /// Returns true if meshes that stand more than once stay instances. Only diffuse pictures with bvh show
+    /// them; otherwise they become triangles.
     #[must_use]
     pub fn takes_instances(&self) -> bool {
         self.method == Method::Bvh && self.shading == Shading::Diffuse
@@ -113,8 +113,8 @@ impl RenderArgs {
         if self.shading == Shading::Heat { 1 } else { self.samples.unwrap_or(default) }
     }
 
-    /// The lights: all that a tree traces in a few seconds; grids take longer for rays that go
-    /// anywhere, and get shadows alone.
+    /// Returns the lights. By default a tree gets all of them, which takes it a few seconds. Grids are slow
+    /// for rays in all directions, and get shadows alone.
     #[must_use]
     pub fn lights(&self) -> Lights {
         if self.shading != Shading::Diffuse {
@@ -136,7 +136,7 @@ impl RenderArgs {
     }
 }
 
-/// What the colours of a picture mean.
+/// The meaning of a picture's colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Shading {
     /// A grey solid under lamp and sky

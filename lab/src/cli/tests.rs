@@ -1,4 +1,4 @@
-//! Words, and what becomes of them.
+//! Tests of the command line: words, and their parsed arguments.
 
 use hgrid_core::Parameters;
 

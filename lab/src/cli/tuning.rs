@@ -1,4 +1,4 @@
-//! The words that say how a method is built.
+//! The arguments for the parameters of single methods.
 
 use anyhow::{Result, ensure};
 use clap::Args;
@@ -23,7 +23,8 @@ pub struct Tuning {
 }
 
 impl Tuning {
-    /// The method with these parameters, this density, and the paper's where none are given.
+    /// Returns the method's configuration with these parameters and this density; the paper's values replace
+    /// missing ones.
     #[must_use]
     pub fn config(&self, method: Method, density: Option<f32>) -> Config {
         let mut parameters = Parameters::new(method);
@@ -44,7 +45,7 @@ impl Tuning {
     /// Refuses parameters of methods that are not built.
     ///
     /// # Errors
-    /// The first such parameter, and the method that it is for.
+    /// If there is one; the message names the parameter and its method.
     pub fn check(&self, methods: &[Method]) -> Result<()> {
         for (option, is_there, method) in [
             ("--macrocell-factor", self.macrocell_factor.is_some(), Method::Fixed),
@@ -62,12 +63,12 @@ impl Tuning {
     }
 }
 
-/// As many threads as a build can use.
+/// Parses a number of threads, at most as many as a build can use.
 pub(super) fn thread_parser() -> impl TypedValueParser<Value = u32> {
     clap::value_parser!(u32).range(1..=i64::from(Control::MAX_TASKS))
 }
 
-/// A method by its name.
+/// Parses the name of a method.
 pub(super) fn method_parser() -> impl TypedValueParser<Value = Method> {
     let names = Method::ALL.iter().copied().map(Method::name);
     PossibleValuesParser::new(names).try_map(|word| {
@@ -76,7 +77,7 @@ pub(super) fn method_parser() -> impl TypedValueParser<Value = Method> {
     })
 }
 
-/// A quality by its name.
+/// Parses the name of a quality.
 pub(super) fn quality_parser() -> impl TypedValueParser<Value = Quality> {
     let names = Quality::ALL.iter().copied().map(Quality::name);
     PossibleValuesParser::new(names).try_map(|word| {

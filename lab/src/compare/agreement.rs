@@ -7,11 +7,10 @@ use super::system::is_hit;
 /// The largest distance between hits that count as the same, as a part of the scene's diagonal.
 const TOLERANCE: f64 = 1e-4;
 
-/// Rays of a thousand that may differ before a system is marked.
+/// The part of the rays, in thousandths, that may differ before a system is marked.
 const MARKED_ABOVE: u64 = 1;
 
-/// Rays whose answers differ: one hits and the other does not, or they hit at different places.
-///
+/// Counts the rays whose answers differ: one hits and the other does not, or they hit at different distances.
 /// Directions are about one long, so `t` is a length.
 #[must_use]
 pub fn differing_hits(expected: &[Hit], found: &[Hit], diagonal: f64) -> u64 {
@@ -22,7 +21,7 @@ pub fn differing_hits(expected: &[Hit], found: &[Hit], diagonal: f64) -> u64 {
     count(expected.iter().zip(found), |(a, b)| !is_same(a, b))
 }
 
-/// Distances that differ: one is none and the other is not, or they are too far apart.
+/// Counts the distances that differ: only one is finite, or they are too far apart.
 #[must_use]
 pub fn differing_distances(expected: &[f32], found: &[f32], diagonal: f64) -> u64 {
     let is_same = |a: f32, b: f32| match (a.is_finite(), b.is_finite()) {
@@ -32,19 +31,19 @@ pub fn differing_distances(expected: &[f32], found: &[f32], diagonal: f64) -> u6
     count(expected.iter().zip(found), |(&a, &b)| !is_same(a, b))
 }
 
-/// Distances that are finite.
+/// Counts the finite distances.
 #[must_use]
 pub fn finite(distances: &[f32]) -> u64 {
     count(distances.iter(), |distance| distance.is_finite())
 }
 
-/// Answers that are not the same to the last bit.
+/// Counts the answers that are not the same to the last bit.
 #[must_use]
 pub fn unequal<T: PartialEq>(expected: &[T], found: &[T]) -> u64 {
     count(expected.iter().zip(found), |(a, b)| a != b)
 }
 
-/// Rays that hit.
+/// Counts the rays that hit.
 #[must_use]
 pub fn hits(hits: &[Hit]) -> u64 {
     count(hits.iter(), is_hit)

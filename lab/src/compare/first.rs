@@ -1,7 +1,7 @@
 //! The first build in a new process.
 //!
-//! A process that has built before has memory, code and tables that it keeps. So `compare` starts
-//! its own program once for every such build; that one loads the scene, builds, and prints the time.
+//! A process that has built before keeps memory, code and tables. So `compare` starts its own program once
+//! for every first build; that process loads the scene, builds, and prints the time.
 
 use std::env;
 use std::io::{self, Write as _};
@@ -28,11 +28,11 @@ pub const COMMAND: &str = "first-build";
 pub struct FirstBuild {
     /// From the mesh to a structure that answers.
     pub seconds: f64,
-    /// Pages that were first touched meanwhile.
+    /// Pages that were first touched during the build.
     pub page_faults: Option<u64>,
 }
 
-/// Builds for the first time with a system.
+/// A function that builds for the first time with a system.
 pub type FirstBuilds<'a> = dyn Fn(&dyn System) -> Result<FirstBuild> + 'a;
 
 /// Builds once in this process and prints the time as JSON.
@@ -45,7 +45,7 @@ pub fn run(args: &FirstBuildArgs) -> Result<()> {
     Ok(writeln!(io::stdout(), "{}", serde_json::to_string(&first)?)?)
 }
 
-/// Loads a scene and builds once over what it shows, whatever this process has done before.
+/// Loads a scene and builds once over what it shows, in this process.
 ///
 /// # Errors
 /// If the scene cannot be loaded, or the structure not be built.
@@ -53,7 +53,7 @@ pub fn in_this_process(scene: &str, shown: Shown, system: &dyn System) -> Result
     let scene = Scene::load(scene)?;
     let field = Field::over(&scene, shown.instances());
     let input = Input::of(scene, shown, field.as_ref());
-    // Free what loading has left behind.
+    // Free what loading has left on the heap.
     give_back_heap();
     let watch = Watch::start();
     let mut measured = None;
@@ -65,7 +65,7 @@ pub fn in_this_process(scene: &str, shown: Shown, system: &dyn System) -> Result
     Ok(FirstBuild { seconds, page_faults })
 }
 
-/// The same in a process that is started for it, on the core of this one.
+/// Builds as `in_this_process` does, in a process that is started for it, on the core of this one.
 ///
 /// # Errors
 /// If that process fails.

@@ -1,4 +1,4 @@
-//! hgrid itself.
+//! The systems of hgrid itself.
 
 use core::cell::RefCell;
 
@@ -22,7 +22,7 @@ use crate::tiles::TILE_RAYS;
 /// The ending of the name of a tree of high quality.
 pub(super) const HIGH: &str = "-high";
 
-/// One method.
+/// The system of one method.
 pub(super) struct GridSystem {
     config: Config,
 }
@@ -52,10 +52,10 @@ impl System for GridSystem {
     fn modes(&self, workload: Workload, shown: Shown) -> &'static [Mode] {
         let method = self.config.method();
         match workload {
-            // Scenes and shapes are trees, and have no points.
+            // Scenes and shapes are built only as trees, and have no closest-point query.
             _ if shown != Shown::Mesh && method != Method::Bvh => &[],
             Workload::Near | Workload::Far if shown != Shown::Mesh => &[],
-            // Far from the mesh, a point can take another method as long as a picture.
+            // For a point far from the mesh, other methods can take as long as for a picture.
             Workload::Near | Workload::Far if method == Method::default() => &[Mode::Single],
             Workload::Near | Workload::Far => &[],
             _ if is_of_paper(method) => one_by_one(workload),
@@ -142,15 +142,15 @@ impl Tracer for GridTracer<'_> {
     }
 }
 
-/// The calls that trace batches.
+/// The form of the calls that trace batches.
 pub(super) struct Call {
-    /// Rays in a call, at most.
+    /// The largest number of rays in a call.
     pub(super) rays: usize,
     pub(super) coherence: Coherence,
 }
 
 impl Call {
-    /// The calls of a mode; none if it hands rays over one by one.
+    /// Returns the calls of a mode; none if the mode hands over rays one by one.
     pub(super) const fn of(mode: Mode) -> Option<Self> {
         match mode {
             Mode::Coherent => Some(Self { rays: TILE_RAYS, coherence: Coherence::Coherent }),
@@ -159,10 +159,10 @@ impl Call {
         }
     }
 
-    /// Memory to sort so many rays in, if the call may sort them.
+    /// Returns memory to sort so many rays in. It grows only for calls that may sort.
     pub(super) fn memory<'m>(&self, rays: usize, memory: &'m mut Vec<u8>) -> &'m mut [u8] {
         if self.coherence == Coherence::Incoherent {
-            // Sixteen bytes a ray, and those in front of the first that is aligned.
+            // Sixteen bytes a ray, and up to sixteen to align the first.
             memory.resize(memory.len().max(16 * rays + 16), 0);
         }
         memory

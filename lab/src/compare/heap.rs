@@ -1,4 +1,4 @@
-//! Bytes on the heap: an allocator that counts for Rust, and a question to the C library.
+//! Bytes on the heap: an allocator that counts those of Rust, and queries of the C library.
 
 #![expect(unsafe_code, reason = "an allocator is unsafe to implement")]
 
@@ -14,7 +14,7 @@ static PEAK: AtomicUsize = AtomicUsize::new(0);
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// The system's allocator, counting the bytes that are asked for.
+/// The system's allocator with counts of the bytes in use.
 struct Counting;
 
 fn add(bytes: usize) {
@@ -26,11 +26,11 @@ fn remove(bytes: usize) {
     CURRENT.fetch_sub(bytes, Relaxed);
 }
 
-// SAFETY: every call goes to the system's allocator as it came; counting does not allocate.
+// SAFETY: every call goes to the system's allocator unchanged; counting does not allocate.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         add(layout.size());
-        // SAFETY: the caller's promise about the layout is the one that is needed.
+        // SAFETY: the caller's promise about the layout is all that the call needs.
         unsafe { System.alloc(layout) }
     }
 
@@ -49,19 +49,19 @@ unsafe impl GlobalAlloc for Counting {
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         remove(layout.size());
         add(size);
-        // SAFETY: as above, and the caller promises that the size is no zero.
+        // SAFETY: as above, and the caller promises that the size is not zero.
         unsafe { System.realloc(memory, layout, size) }
     }
 }
 
-/// Bytes of Rust's heap, from which a peak is counted anew.
+/// Returns the bytes on Rust's heap, and starts a new peak from there.
 pub(super) fn start_peak() -> usize {
     let now = CURRENT.load(Relaxed);
     PEAK.store(now, Relaxed);
     now
 }
 
-/// Returns the bytes that were put on Rust's heap since it held `before`, and the most at any time.
+/// Returns the bytes that Rust's heap has gained over `before`, and the most that it had gained at any time.
 pub(super) fn since(before: usize) -> Bytes {
     Bytes {
         index: CURRENT.load(Relaxed).saturating_sub(before),
@@ -69,22 +69,22 @@ pub(super) fn since(before: usize) -> Bytes {
     }
 }
 
-/// Keeps what is freed: heaps ask the system for no page twice.
+/// Makes the heap keep freed memory, so that it does not request the same pages twice.
 pub(super) fn keep() {
-    // SAFETY: the calls set numbers of the allocator, which it locks.
+    // SAFETY: the calls set numbers of the allocator, which locks them.
     let is_set = unsafe { libc::mallopt(libc::M_MMAP_MAX, 0) }
-        // SAFETY: as above; -1 is never.
+        // SAFETY: as above; a threshold of -1 means never.
         & unsafe { libc::mallopt(libc::M_TRIM_THRESHOLD, -1) };
     debug_assert_eq!(is_set, 1, "the allocator knows both");
 }
 
-/// Gives the system what is free.
+/// Returns free memory of the heap to the system.
 pub(super) fn give_back() {
     // SAFETY: the call takes a number and locks what it changes.
     let _ = unsafe { libc::malloc_trim(0) };
 }
 
-/// Bytes in use on the heap of C, where that of Rust is too.
+/// Returns the bytes in use on the C heap, which holds Rust's heap too.
 pub(super) fn in_use() -> usize {
     // SAFETY: the call takes nothing and locks what it reads.
     let heap = unsafe { libc::mallinfo2() };
@@ -95,7 +95,7 @@ pub(super) fn in_use() -> usize {
 mod tests {
     use super::*;
 
-    // Other tests allocate meanwhile: only much memory is told apart.
+    // Other tests allocate at the same time: only a large block stands out.
     const MUCH: usize = 1 << 28;
 
     #[test]

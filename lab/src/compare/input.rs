@@ -1,4 +1,4 @@
-//! The mesh, and the instances or spheres that are shown in its place, as every system gets them.
+//! The input that every system gets: a mesh, and the instances or spheres that are shown in its place.
 
 use anyhow::Result;
 use hgrid_core::{Instance, TriangleMesh};
@@ -9,10 +9,9 @@ use crate::field::Field;
 use crate::scene::Scene;
 use crate::vector::round;
 
-/// A triangle mesh in two plain arrays, with one more position behind the last one.
-///
-/// Embree loads sixteen bytes of a twelve-byte position, so the memory after the last one must be
-/// there. Everybody else sees the positions alone.
+/// A triangle mesh in two plain arrays, with one more position after the last one. Embree loads sixteen bytes
+/// for a position of twelve, so the bytes after the last one must be readable. All other systems see only the
+/// positions.
 #[derive(Debug)]
 pub struct Input {
     padded: Vec<[f32; 3]>,
@@ -32,13 +31,13 @@ impl Input {
         Self { padded, indices, shown, instances, spheres }
     }
 
-    /// Takes the arrays of a scene, and makes its spheres or takes the places of its instances from a field if it
-    /// shows them.
+    /// Takes the arrays of a scene. If it shows spheres, makes them; if it shows instances, takes their
+    /// places from a field.
     #[must_use]
     pub fn of(scene: Scene, shown: Shown, field: Option<&Field>) -> Self {
         let mut instances = field.map_or_else(Vec::new, |field| field.instances(0.0));
         for instance in &mut instances {
-            // Embree takes places in f32: all systems get the same.
+            // Embree takes places in f32; all systems get the same ones.
             instance.translation = round(instance.translation).map(f64::from);
         }
         let mut input = Self { shown, instances, ..Self::new(scene) };
@@ -66,19 +65,19 @@ impl Input {
         &self.spheres
     }
 
-    /// The vertices. Four bytes behind the last one may be read.
+    /// Returns the vertices. The four bytes after the last one are readable.
     #[must_use]
     pub fn positions(&self) -> &[[f32; 3]] {
         self.padded.split_last().map_or(&[], |(_, positions)| positions)
     }
 
-    /// Three vertices for each triangle.
+    /// Returns three vertices for each triangle.
     #[must_use]
     pub fn indices(&self) -> &[[u32; 3]] {
         &self.indices
     }
 
-    /// The same for hgrid.
+    /// Returns the mesh as hgrid takes it.
     ///
     /// # Errors
     /// If an index is out of range or there are too many triangles.
@@ -86,7 +85,7 @@ impl Input {
         Ok(TriangleMesh::new(self.positions(), &self.indices)?)
     }
 
-    /// The corners of every triangle, for systems that take no indices.
+    /// Returns the corners of every triangle, for systems that take no indices.
     #[must_use]
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = [[f32; 3]; 3]> + '_ {
         self.indices.iter().map(|&triangle| triangle.map(|at| self.padded[at as usize]))

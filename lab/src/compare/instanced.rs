@@ -1,4 +1,4 @@
-//! Instances of a mesh by hgrid: a scene over the tree of the mesh, which is built once.
+//! Instances of a mesh in hgrid: a scene over the tree of the mesh, which is built once.
 
 use core::cell::RefCell;
 
@@ -12,8 +12,9 @@ use super::system::{Bytes, Tracer, Use, each};
 use crate::regions::Regions;
 use crate::world::{SceneBatch, on_mesh};
 
-/// Builds the mesh's tree and the scene, and calls `then` with the scene. With `start` it builds the scene
-/// before, calls `start`, and builds the scene alone in the memory that it has just written.
+/// Builds the mesh's tree and the scene, and calls `then` with the scene. With `start`, builds the scene
+/// twice: calls `start` between the two, so that the second build alone is timed, in memory that the first
+/// one has written.
 pub(super) fn build(
     input: &Input,
     config: &Config,

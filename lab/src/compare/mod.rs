@@ -1,7 +1,7 @@
 //! hgrid and other ray tracers, its peers, over the same rays: the `compare` command.
 //!
 //! ```text
-//! workloads: the rays, and the answers of one grid to them
+//! workloads: the rays, and the answers of hgrid to them
 //!     |
 //! system: builds, then traces slices of rays in one mode or more
 //!     |-- grid: a system for each method          '-- peers: a system for each other library
@@ -9,9 +9,9 @@
 //! race: all systems in turn --> numbers --> tables, ratios, charts
 //! ```
 //!
-//! Everything but the peers is compiled always; the peers need libraries of the system. Without the
-//! features `peers` and `embree` the command says how to build with them. docs/performance.md says how each
-//! is set up and measured.
+//! The peers need libraries of the system; everything else is always compiled. Without the features `peers`
+//! and `embree` the command says how to build with them. docs/performance.md says how each system is set up
+//! and measured.
 
 pub mod agreement;
 mod charts;
@@ -89,7 +89,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     Ok(())
 }
 
-/// Removes systems and workloads without instances or spheres if these are shown, and prints their names.
+/// Removes systems and workloads that cannot take the instances or spheres that are shown, and prints their names.
 fn leave_out(
     systems: &mut Vec<Box<dyn System>>,
     workloads: &mut Vec<Workload>,
@@ -124,13 +124,13 @@ fn leave_out(
     Ok(())
 }
 
-/// A system for each method, at the density that it has by itself; for all if none is named.
+/// Returns a system for each method, at its default density; for all methods if none is named.
 #[must_use]
 pub fn methods(methods: &[Method]) -> Vec<Box<dyn System>> {
     methods_of(methods, Quality::default())
 }
 
-/// The same with trees of a quality.
+/// Returns the same systems, with trees of a quality.
 fn methods_of(methods: &[Method], quality: Quality) -> Vec<Box<dyn System>> {
     let methods = if methods.is_empty() { Method::ALL } else { methods };
     let parameters = |method| match method {
@@ -141,10 +141,10 @@ fn methods_of(methods: &[Method], quality: Quality) -> Vec<Box<dyn System>> {
     methods.iter().map(system).collect()
 }
 
-/// The system with a name: a method or a peer.
+/// Returns the system with a name: a method or a peer.
 ///
 /// # Errors
-/// If there is none, or it does not start.
+/// If there is no such system, or it does not start.
 pub fn system_named(name: &str) -> Result<Box<dyn System>> {
     let (of, quality) = match name.strip_suffix(HIGH) {
         Some(of) => (of, Quality::High),
@@ -164,7 +164,7 @@ mod tests {
     use super::numbers::Kind;
     use super::*;
 
-    /// A comparison of all that there is on small scenes.
+    /// Compares systems on small scenes, in all workloads.
     fn compare(systems: &[Box<dyn System>]) -> Comparison {
         compare_on(&Workload::ALL, systems)
     }
@@ -253,7 +253,7 @@ mod tests {
         assert!(error.contains("--spheres is for bvh and Embree"), "{error}");
     }
 
-    /// Checks a comparison on fields of instances, all of whose systems have some.
+    /// Checks a comparison on fields of instances, which all of its systems can take.
     fn check_instances(systems: &[Box<dyn System>], ratios: usize) {
         const COUNT: u32 = 40;
         let workloads = &Workload::ALL[..4];
@@ -264,7 +264,7 @@ mod tests {
             for system in &scene.systems {
                 let name = &system.system;
                 assert_eq!(system.items(), u64::from(COUNT));
-                // Matrix, place and box of an instance; less than the structure of the mesh.
+                // The matrix, the place and the box of an instance take less than the structure of the mesh.
                 let each = system.index_bytes_per_item();
                 assert!((96.0..4000.0).contains(&each), "{name}: {each}");
                 assert!(system.peak_bytes >= system.index_bytes, "{name}");
@@ -288,7 +288,7 @@ mod tests {
         assert!(text.contains("rebuilds of the scene alone"), "{text}");
     }
 
-    /// Checks a comparison on spheres, all of whose systems have some.
+    /// Checks a comparison on spheres, which all of its systems can take.
     fn check_spheres(systems: &[Box<dyn System>], ratios: usize) {
         let workloads = &Workload::ALL[..4];
         let comparison = compare_of(Shown::Spheres, workloads, systems);
@@ -337,8 +337,8 @@ mod tests {
         let mut systems = methods(&[Method::Bvh]);
         let embree = [Peer::EmbreeLow, Peer::EmbreeDynamic, Peer::EmbreeMedium];
         systems.extend(peers::systems(&embree).unwrap());
-        // Two builds, bytes kept and at most; coherent and single primary rays, ao, bounces, and random rays beside
-        // both qualities.
+        // The rows: two builds, bytes kept and bytes at most, coherent and single primary rays, ao, bounces,
+        // and random rays against both qualities.
         check_instances(&systems, 10);
     }
 
@@ -370,7 +370,7 @@ mod tests {
             assert_eq!(scene.systems.len(), systems.len());
             for system in &scene.systems {
                 let name = &system.system;
-                // The heap is that of the whole program, other tests included.
+                // The heap is that of the whole program, and other tests use it too.
                 if !system.is_peer || name.starts_with("embree") {
                     assert!(system.index_bytes > 0, "{name}");
                     assert!(system.peak_bytes >= system.index_bytes, "{name}");

@@ -9,9 +9,9 @@ pub enum Mode {
     Single,
     /// Some hundred rays a call, neighbours next to each other.
     Coherent,
-    /// All rays of a workload in one call, in no order that the structure is told of.
+    /// All rays of a workload in one call, without a hint about their order.
     Batch,
-    /// A packet a call: rays side by side, axis by axis.
+    /// A packet a call: several rays, stored axis by axis.
     Packet(Lanes, Hint),
     /// Many rays a call, one after the other in memory.
     Stream(Hint),

@@ -1,4 +1,4 @@
-//! Every number of a comparison, and where they come from.
+//! Every number of a comparison, with the machine and the settings.
 
 use std::path::Path;
 
@@ -34,7 +34,7 @@ pub struct Comparison {
     pub size: u16,
     /// Builds and runs that times are medians of.
     pub repeats: u32,
-    /// In the order of the command line.
+    /// The scenes, in the order of the command line.
     pub scenes: Vec<SceneNumbers>,
 }
 
@@ -44,12 +44,12 @@ pub struct SceneNumbers {
     /// The scene.
     #[serde(flatten)]
     pub facts: SceneFacts,
-    /// The content of it that the systems built over.
+    /// The content that the systems built over.
     #[serde(flatten)]
     pub shown: Shown,
     /// The methods of hgrid, then the peers.
     pub systems: Vec<SystemNumbers>,
-    /// hgrid divided by a peer.
+    /// Numbers of hgrid divided by those of a peer.
     pub ratios: Vec<Ratio>,
 }
 
@@ -58,36 +58,36 @@ pub struct SceneNumbers {
 pub struct SystemNumbers {
     /// The system's name.
     pub system: String,
-    /// The library and its version, if it tells.
+    /// The library and its version, if known.
     pub version: Option<String>,
     /// True if it is not hgrid.
     pub is_peer: bool,
     /// The first build in a new process.
     pub first_build: Build,
-    /// The build in memory that was kept from a build before.
+    /// The build in memory that an earlier build has written.
     pub rebuild: Build,
     /// Triangles of the mesh.
     pub triangles: u64,
     /// The content of the scene.
     #[serde(flatten)]
     pub shown: Shown,
-    /// Bytes that are kept for queries, without the mesh. With instances, without the structure of the mesh, too; with
-    /// spheres, without these.
+    /// Bytes that queries need, without the mesh. With instances they are also without the structure of the
+    /// mesh; with spheres, without the spheres.
     pub index_bytes: u64,
-    /// The most bytes that there were during the build, likewise.
+    /// The most bytes during the build, likewise.
     pub peak_bytes: u64,
-    /// Every workload in every mode that makes sense.
+    /// The runs of every workload, in every mode of the system.
     pub runs: Vec<Run>,
 }
 
-/// From the mesh to a structure that answers.
+/// A build: from the mesh to a structure that answers queries.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Build {
     /// The median.
     pub seconds: f64,
     /// The times that it is the median of, one for each repetition.
     pub samples: Vec<f64>,
-    /// Pages that were first touched meanwhile: the median.
+    /// Pages that were first touched during the build: the median.
     pub page_faults: Option<u64>,
 }
 
@@ -96,28 +96,28 @@ pub struct Build {
 pub enum Kind {
     /// The first in a new process.
     First,
-    /// Another one, in memory that was kept.
+    /// A later one, in memory that the program has kept.
     Rebuild,
 }
 
 /// One way to trace one workload.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Run {
-    /// The rays.
+    /// The workload.
     pub workload: Workload,
-    /// The way.
+    /// The mode.
     pub mode: Mode,
     /// The median.
     pub seconds: f64,
     /// The times that it is the median of, one for each repetition.
     pub samples: Vec<f64>,
-    /// Pages that were first touched meanwhile: the median.
+    /// Pages that were first touched during the run: the median.
     pub page_faults: Option<u64>,
-    /// Rays that were traced, or points that were asked.
+    /// Rays that were traced, or points that were queried.
     pub rays: u64,
-    /// Rays that hit something, points that found something.
+    /// Rays that hit, or points with a surface in their radius.
     pub hits: u64,
-    /// Rays or points whose answer is not that of hgrid.
+    /// Rays or points whose answer differs from that of hgrid.
     pub differing: u64,
 }
 
@@ -130,20 +130,20 @@ impl Run {
 }
 
 impl SystemNumbers {
-    /// The run of a workload in a mode.
+    /// Returns the run of a workload in a mode.
     #[must_use]
     pub fn run(&self, workload: Workload, mode: Mode) -> Option<&Run> {
         self.runs.iter().find(|run| run.workload == workload && run.mode == mode)
     }
 
-    /// The fastest run of a workload whose answers are right.
+    /// Returns the fastest run of a workload whose answers are right.
     #[must_use]
     pub fn best(&self, workload: Workload) -> Option<&Run> {
         let runs = self.runs.iter().filter(|run| run.workload == workload && !run.is_off());
         runs.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
     }
 
-    /// The builds of a kind.
+    /// Returns the builds of a kind.
     #[must_use]
     pub const fn build(&self, kind: Kind) -> &Build {
         match kind {
@@ -152,7 +152,8 @@ impl SystemNumbers {
         }
     }
 
-    /// Build and primary rays: from a mesh in memory to a picture. Instances and spheres get no colours, so none.
+    /// Returns the time of a build and of the primary rays, from a mesh in memory to a picture. Instances and
+    /// spheres are not shaded, so they have none.
     #[must_use]
     pub fn time_to_image(&self, kind: Kind) -> Option<f64> {
         let run = self.best(Workload::Primary).filter(|_| self.shown == Shown::Mesh)?;
@@ -165,13 +166,13 @@ impl SystemNumbers {
         self.shown.items(self.triangles)
     }
 
-    /// Bytes kept for each triangle, instance or sphere.
+    /// Returns the bytes kept for each triangle, instance or sphere.
     #[must_use]
     pub fn index_bytes_per_item(&self) -> f64 {
         ratio(self.index_bytes, self.items())
     }
 
-    /// The most bytes during the build, likewise.
+    /// Returns the most bytes during the build, likewise.
     #[must_use]
     pub fn peak_bytes_per_item(&self) -> f64 {
         ratio(self.peak_bytes, self.items())
@@ -179,7 +180,7 @@ impl SystemNumbers {
 }
 
 impl Comparison {
-    /// Runs the race on one scene after the other.
+    /// Runs the race on each scene in turn.
     ///
     /// # Errors
     /// If a scene cannot be loaded, and those of [`race`].
@@ -202,13 +203,13 @@ impl Comparison {
         Ok(Self { machine: Machine::here(), target: target(), size, repeats, scenes })
     }
 
-    /// Aligned tables, then what their numbers mean and where they come from.
+    /// Returns aligned tables, notes about their numbers, and their origin.
     #[must_use]
     pub fn text(&self) -> String {
         tables::text(self)
     }
 
-    /// The same as Markdown.
+    /// Returns the same as Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
         tables::markdown(self)

@@ -1,4 +1,4 @@
-//! Points whose closest point of the surface is wanted.
+//! Points for queries of the closest point of the surface.
 
 use hgrid_core::{Grid, QueryOptions};
 
@@ -7,26 +7,26 @@ use super::workloads::{Asked, narrow};
 use crate::scene::Bounds;
 use crate::vector::{Vector, length, offset, round};
 
-/// The largest distance of points near the surface from it, and the radius of their search, as parts
-/// of the diagonal of the scene's box.
+/// The largest distance of near points from the surface, and the radius of their search, as parts of the
+/// diagonal of the scene's box.
 const NEAR: f64 = 0.01;
 const NEAR_RADIUS: f64 = 0.1;
 
-/// The least and the largest distance of the others from the middle of the box, and their radius, likewise.
+/// The least and the largest distance of far points from the middle of the box, and their radius, likewise.
 const FAR: [f64; 2] = [1.0, 3.0];
 const FAR_RADIUS: f64 = 4.0;
 
-/// Points, and how far hgrid says that the surface is.
+/// Points, and their distances to the surface by hgrid.
 #[derive(Debug, PartialEq)]
 pub struct Points {
     /// The radius of the search.
     pub radius: f32,
-    /// Points and distances, which are infinite where the surface is farther.
+    /// Points and distances; a distance is infinite if the surface is outside the radius.
     pub asked: Asked<[f32; 3], f32>,
 }
 
 impl Points {
-    /// Points near random triangles.
+    /// Makes points near random triangles.
     pub(super) fn near(grid: &Grid<'_>, diagonal: f64, count: usize) -> Self {
         let mesh = grid.mesh();
         let mut random = Random::new(1);
@@ -42,7 +42,7 @@ impl Points {
         Self::new(grid, points.collect(), NEAR_RADIUS * diagonal)
     }
 
-    /// Points in all directions, far from the box.
+    /// Makes points in all directions, far from the box.
     pub(super) fn far(grid: &Grid<'_>, (min, max): Bounds, diagonal: f64, count: usize) -> Self {
         let middle = [0, 1, 2].map(|axis| 0.5 * f64::from(min[axis]) + 0.5 * f64::from(max[axis]));
         let mut random = Random::new(2);
@@ -68,7 +68,7 @@ pub(super) fn distance(grid: &Grid<'_>, point: [f32; 3], radius: f32) -> f32 {
 }
 
 impl Random {
-    /// A point of the unit ball.
+    /// Returns a point of the unit ball.
     fn in_ball(&mut self) -> Vector {
         loop {
             let point = self.point(([-1.0; 3], [1.0; 3]));

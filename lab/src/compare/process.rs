@@ -1,9 +1,9 @@
-//! Facts that the system tells of this process, and settings that it is told.
+//! Facts about this process that the system reports, and settings of it.
 
 use anyhow::Result;
 
-/// Minor page faults so far: pages that were given when they were first touched. `None` if
-/// the system does not tell.
+/// Returns the minor page faults so far: pages that the system provided at their first touch. `None` if the
+/// system does not report them.
 #[must_use]
 pub fn page_faults() -> Option<u64> {
     #[cfg(feature = "embree")]
@@ -16,9 +16,9 @@ pub fn page_faults() -> Option<u64> {
     None
 }
 
-/// Keeps this thread, and all that it will start, on the core that it runs on.
+/// Pins this thread, and all threads that it will start, to the core that it runs on.
 ///
-/// A library that starts threads then shares one core among them, as if it had one.
+/// If a library starts threads, they share this core.
 ///
 /// # Errors
 /// If the system refuses.
@@ -38,20 +38,20 @@ pub fn pin_to_one_core() -> Result<()> {
     Ok(())
 }
 
-/// Lets the heap keep what is freed, so that a build can use the memory of the one before. (It gives
-/// large blocks back to the system otherwise.)
+/// Lets the heap keep freed memory, so that a build can reuse the memory of the one before. By default, the
+/// heap returns large blocks to the system.
 pub fn keep_heap() {
     #[cfg(feature = "embree")]
     super::heap::keep();
 }
 
-/// Gives the system what the heap does not use.
+/// Returns the heap's unused memory to the system.
 pub fn give_back_heap() {
     #[cfg(feature = "embree")]
     super::heap::give_back();
 }
 
-/// Returns what the program was compiled for: the architecture and the widest vectors that it may use.
+/// Returns the target of the program: the architecture and the widest vectors that it may use.
 #[must_use]
 pub fn target() -> String {
     let vectors = [

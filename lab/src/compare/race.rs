@@ -6,9 +6,9 @@
 //! repetition 2:  turn of A | turn of B | ...                             medians of each
 //! ```
 //!
-//! As in [`measure`](crate::measure), taking turns lets a machine that others use disturb all
-//! alike. A structure is dropped before the next is built. Arrays for answers and pixels are
-//! written once before the clock runs, so that no time has their page faults in it.
+//! As in [`measure`](crate::measure), systems take turns, so that load on the machine disturbs all alike. A
+//! structure is dropped before the next one is built. Arrays for answers and pixels are written once before
+//! the clock runs, so that no time includes their page faults.
 
 use core::cell::Cell;
 
@@ -24,21 +24,21 @@ use super::system::{Bytes, System};
 use super::workloads::{Amount, Rays, Workload};
 use crate::progress::Progress;
 
-/// First builds of each system, at least.
+/// The least number of first builds of each system.
 const FIRST_BUILDS: u32 = 3;
 
-/// The plan of a race: what is measured, how often, and how much of it.
+/// The plan of a race: the workloads, their amounts, and the repetitions.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// Repetitions that times are medians of.
     pub repeat: u32,
-    /// Workloads, in the order in which they are asked.
+    /// The workloads, in the order in which they run.
     pub workloads: Vec<Workload>,
-    /// Questions of each workload.
+    /// The amount of queries of each workload.
     pub amount: Amount,
     /// The content of each scene.
     pub shown: Shown,
-    /// Builds for the first time over what a scene shows.
+    /// The function that builds for the first time.
     pub first: fn(&str, Shown, &dyn System) -> Result<FirstBuild>,
 }
 
@@ -64,7 +64,7 @@ pub fn race(
             let name = system.name();
             progress.set_message(&format!("{name}, {repetition} of {repeat}"));
             let [is_first, is_last] = [repetition == 1, repetition == repeat];
-            // The last repetition makes up for those that there are not.
+            // The last repetition adds the builds that are missing from `FIRST_BUILDS`.
             let builds = if is_last { FIRST_BUILDS.saturating_sub(repeat) + 1 } else { 1 };
             for _ in 0..builds {
                 let FirstBuild { seconds, page_faults } = first(system.as_ref())
@@ -79,7 +79,7 @@ pub fn race(
     Ok(records.into_iter().map(|record| record.numbers(rays, input)).collect())
 }
 
-/// One rebuild and one run of each kind.
+/// Runs one rebuild, and each workload in each mode.
 fn turn(
     stage: &mut Stage<'_>,
     input: &Input,
@@ -115,7 +115,7 @@ fn turn(
     })
 }
 
-/// Bytes on the heap before a build.
+/// Returns the bytes on the heap before a build, and starts a new peak.
 fn heap_before() -> usize {
     #[cfg(feature = "embree")]
     return super::heap::start_peak();
@@ -123,7 +123,7 @@ fn heap_before() -> usize {
     0
 }
 
-/// Bytes that a build has put on the heap since.
+/// Returns the bytes that a build has added to the heap since.
 fn heap_since(before: usize) -> Bytes {
     #[cfg(feature = "embree")]
     return super::heap::since(before);
@@ -161,7 +161,7 @@ mod tests {
         race(&input, &rays, systems, &plan, &first, &mut Progress::new("", 0))
     }
 
-    /// A structure that sees nothing.
+    /// A structure that misses everything.
     struct Blind {
         is_peer: bool,
     }

@@ -1,9 +1,9 @@
-//! Numbers that look random and are the same every time.
+//! Pseudorandom numbers, the same in every run.
 
 use crate::scene::Bounds;
 use crate::vector::Vector;
 
-/// Numbers from 0 to 1, always the same ones for the same start (`SplitMix64`).
+/// A generator of numbers from 0 to 1, which only depend on its start (`SplitMix64`).
 pub(super) struct Random(u64);
 
 impl Random {
@@ -19,13 +19,13 @@ impl Random {
         ((mixed ^ mixed >> 31) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// A whole number below another, 0 below 0.
+    /// Returns a whole number below another, or 0 if that is 0.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below a u32")]
     pub(super) fn below(&mut self, limit: u32) -> u32 {
         (self.next() * f64::from(limit)) as u32
     }
 
-    /// A point of a box.
+    /// Returns a point of a box.
     pub(super) fn point(&mut self, (min, max): Bounds) -> Vector {
         [0, 1, 2].map(|axis| {
             let (min, max) = (f64::from(min[axis]), f64::from(max[axis]));

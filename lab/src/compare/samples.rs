@@ -1,4 +1,4 @@
-//! Samples that are written down while the systems take turns.
+//! Samples that are recorded while the systems take turns.
 
 use std::time::Instant;
 
@@ -39,7 +39,7 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// Adds a time, and the page faults meanwhile if they are known.
+    /// Adds a time, and the page faults during it if they are known.
     pub(super) fn add(&mut self, seconds: f64, faults: Option<u64>) {
         self.seconds.push(seconds);
         self.faults.extend(faults);
@@ -68,7 +68,7 @@ impl Watch {
         Self { faults: page_faults(), start: Instant::now() }
     }
 
-    /// Seconds and page faults since the start.
+    /// Returns the seconds and the page faults since the start.
     pub(super) fn stop(&self) -> (f64, Option<u64>) {
         let seconds = self.start.elapsed().as_secs_f64();
         let faults = self.faults.zip(page_faults());
@@ -77,7 +77,7 @@ impl Watch {
 }
 
 impl Record {
-    /// Nothing yet, for the workloads in every mode of the system.
+    /// Makes an empty record for the workloads in every mode of the system.
     pub(super) fn new(system: &dyn System, workloads: &[Workload], shown: Shown) -> Self {
         let runs = workloads.iter().flat_map(|&workload| {
             system.modes(workload, shown).iter().map(move |&mode| RunRecord {
@@ -99,7 +99,7 @@ impl Record {
         }
     }
 
-    /// Medians and samples.
+    /// Returns the medians and the samples.
     pub(super) fn numbers(self, rays: &Rays, input: &Input) -> SystemNumbers {
         let runs = self.runs.into_iter().map(|run| Run {
             workload: run.workload,

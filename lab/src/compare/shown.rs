@@ -15,7 +15,7 @@ pub enum Shown {
 }
 
 impl Shown {
-    /// The content that two options ask for; 0 instances are the mesh as it is.
+    /// Returns the content for two options; 0 instances mean the mesh itself.
     #[must_use]
     pub const fn of(instances: u32, is_of_spheres: bool) -> Self {
         match instances {
@@ -25,7 +25,7 @@ impl Shown {
         }
     }
 
-    /// The number of instances; 0 if the mesh is not shown by instances.
+    /// Returns the number of instances; 0 if the content is not instances.
     #[must_use]
     pub const fn instances(self) -> u32 {
         match self {
@@ -34,7 +34,7 @@ impl Shown {
         }
     }
 
-    /// The number of things that a structure is built over, for a mesh of so many triangles.
+    /// Returns the number of items that a structure is built over, for a mesh of so many triangles.
     #[must_use]
     pub const fn items(self, triangles: u64) -> u64 {
         match self {
@@ -43,7 +43,7 @@ impl Shown {
         }
     }
 
-    /// The word for one of them.
+    /// Returns the word for one item.
     #[must_use]
     pub const fn item(self) -> &'static str {
         match self {
@@ -53,7 +53,7 @@ impl Shown {
         }
     }
 
-    /// The same in the heads of columns.
+    /// Returns its short form for the heads of columns.
     #[must_use]
     pub const fn short_item(self) -> &'static str {
         match self {
@@ -63,7 +63,7 @@ impl Shown {
         }
     }
 
-    /// The option of the command that asks for it, and the word for many of them; none for the mesh.
+    /// Returns the command's option for it, and the word for many items; none for the mesh.
     #[must_use]
     pub const fn option(self) -> Option<(&'static str, &'static str)> {
         match self {
@@ -73,7 +73,7 @@ impl Shown {
         }
     }
 
-    /// The words of the command line that ask for it.
+    /// Returns the words of the command line for it.
     #[must_use]
     pub fn words(self) -> Vec<String> {
         match self {
@@ -84,7 +84,7 @@ impl Shown {
     }
 }
 
-/// Two fields of results: `instances`, 0 if there are none, and `spheres`.
+/// Writes two fields of results: `instances`, 0 without instances, and `spheres`.
 impl Serialize for Shown {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut fields = serializer.serialize_struct("Shown", 2)?;

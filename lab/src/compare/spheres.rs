@@ -1,8 +1,8 @@
-//! Spheres in place of triangles: a shape of the caller's own, and hgrid's tree over them.
+//! Spheres in place of triangles: a user-defined shape, and hgrid's tree over them.
 //!
 //! ```text
 //! triangle -> sphere -> box: hgrid writes all boxes into memory, Embree asks for them one by one
-//!                    -> meet: the one test by which all systems find hits
+//!                    -> meet: the test by which all systems find hits
 //! ```
 
 use core::cell::RefCell;
@@ -29,13 +29,13 @@ const BOX_BYTES: usize = 24;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sphere {
     center: [f32; 3],
-    /// Zero for a sphere that nothing hits.
+    /// The radius; a sphere of radius zero is never hit.
     radius: f32,
 }
 
 impl Sphere {
-    /// Makes the sphere around the mean of a triangle's corners. The radius is half of its
-    /// longest edge. A triangle without an area, or that is not finite, gets a radius of zero.
+    /// Makes the sphere around the mean of a triangle's corners. The radius is half of its longest edge, or
+    /// zero if the triangle has no area or is not finite.
     #[must_use]
     pub fn of(triangle: &Triangle) -> Self {
         let corners = triangle.map(|corner| corner.map(f64::from));
@@ -83,7 +83,7 @@ impl Sphere {
         unit(self.away(offset(origin, f64::from(t), direction)))
     }
 
-    /// The vector from the center to a point.
+    /// Returns the vector from the centre to a point.
     #[inline]
     fn away(&self, point: Vector) -> Vector {
         [0, 1, 2].map(|axis| point[axis] - f64::from(self.center[axis]))
@@ -97,7 +97,7 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// Maps as much as is enough for these spheres.
+    /// Allocates enough for these spheres.
     pub(super) fn new(spheres: &[Sphere], config: &Config) -> Result<Self> {
         let regions = Regions::of(bound(spheres, config)?)?;
         Ok(Self { boxes: memory(BOX_BYTES * spheres.len())?, regions })
@@ -123,8 +123,8 @@ fn bound(spheres: &[Sphere], config: &Config) -> Result<Sizes> {
     Sizes::bound(count, config).context("too many spheres")
 }
 
-/// Builds a tree over the spheres and calls `then` with it. With `start` it builds the tree before, calls `start`,
-/// and builds again in the memory that it has just written.
+/// Builds a tree over the spheres and calls `then` with it. With `start`, builds it twice: calls `start`
+/// between the two, so that the second build alone is timed, in memory that the first one has written.
 pub(super) fn build(
     input: &Input,
     config: &Config,
@@ -187,7 +187,7 @@ impl Tracer for SphereTracer<'_> {
         }
     }
 
-    /// The bytes of the tree, and those of the boxes, which it reads while it is traced.
+    /// Returns the bytes of the tree and of the boxes, which traversal reads.
     fn bytes(&self) -> Result<Option<Bytes>> {
         let Self { shapes, spheres, config, .. } = self;
         let (index, boxes) = (shapes.blob().len(), BOX_BYTES * spheres.len());
@@ -239,7 +239,7 @@ mod tests {
             for axis in 0..3 {
                 let (c, r) = (f64::from(sphere.center[axis]), f64::from(sphere.radius));
                 assert!(r > 0.0 && sides[axis] < c - r && sides[axis + 3] > c + r, "{sphere:?}");
-                // No more than a few steps of a coordinate.
+                // The error is at most a few steps of a coordinate.
                 let most = 4.0 * f64::from(f32::EPSILON) * (c.abs() + r);
                 assert!(sides[axis] > c - r - most && sides[axis + 3] < c + r + most);
             }

@@ -1,4 +1,4 @@
-//! One system at a time over all workloads: runs that are timed, and their answers.
+//! One system at a time over all workloads: timed runs, and their answers.
 
 use core::hint::black_box;
 
@@ -16,10 +16,10 @@ use super::workloads::{Rays, Workload};
 use crate::shade::{Rgb, Shader};
 use crate::tiles::TILE_RAYS;
 
-/// The questions that all systems share, and room for answers.
+/// The queries that all systems share, and buffers for answers.
 pub(super) struct Stage<'a> {
     rays: &'a Rays,
-    /// The shader of the mesh; none for others, whose surfaces it does not know.
+    /// The shader of the mesh; none for instances and spheres, which are not shaded.
     shader: Option<Shader<'a>>,
     pixels: Vec<Rgb>,
     hits: Vec<Hit>,
@@ -35,7 +35,7 @@ impl<'a> Stage<'a> {
         Ok(Self {
             rays,
             shader,
-            // Not zero: zeros may come as pages that were never touched.
+            // Not zero: zeroed memory may have pages that were never touched.
             pixels: vec![[1; 3]; pixels],
             hits: vec![Hit::MISS; pixels.max(rays.random.questions.len())],
             occluded: vec![1; rays.ao.questions.len()],
@@ -46,7 +46,7 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// One timed run.
+    /// Times one run.
     pub(super) fn trace(&mut self, tracer: &dyn Tracer, run: &mut RunRecord) {
         let Self { rays, shader, pixels, hits, occluded, distances } = self;
         let mode = run.mode;
@@ -75,12 +75,12 @@ impl<'a> Stage<'a> {
         run.samples.add(seconds, faults);
     }
 
-    /// Compares the answers of the run before, those of hgrid to the last bit.
+    /// Compares the answers of the last run; those of hgrid must be the same to the last bit.
     pub(super) fn check(&mut self, tracer: &dyn Tracer, run: &mut RunRecord, is_peer: bool) {
         let rays = self.rays;
         match run.workload {
             Workload::Primary => {
-                // Only their colours were kept.
+                // The run kept only the colours of the hits.
                 primary_hits(tracer, run.mode, rays, &mut self.hits);
                 self.check_hits(&rays.primary_hits, run, is_peer);
             }
@@ -117,18 +117,18 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// The closest hits of the primary rays, row by row in the first places.
+/// Traces the primary rays for their closest hits, row by row into the first places.
 fn primary_hits(tracer: &dyn Tracer, mode: Mode, rays: &Rays, hits: &mut [Hit]) {
     let hits = &mut hits[..rays.primary_hits.len()];
     rays.tiles.fill(hits, |rays, hits| tracer.intersect(mode, rays, hits));
 }
 
-/// The closest hits of rays, in the first places.
+/// Traces rays for their closest hits, into the first places.
 fn closest_hits(tracer: &dyn Tracer, mode: Mode, rays: &[Ray], hits: &mut [Hit]) {
     tracer.intersect(mode, rays, &mut hits[..rays.len()]);
 }
 
-/// The distances of points, likewise.
+/// Finds the distances of points, likewise.
 fn closest_points(tracer: &dyn Tracer, points: &Points, distances: &mut [f32]) {
     let questions = &points.asked.questions;
     tracer.closest_points(questions, points.radius, &mut distances[..questions.len()]);

@@ -1,4 +1,4 @@
-//! Systems that take part: each builds, and then traces slices of rays into slices of answers.
+//! The compared systems: each builds, and then traces slices of rays into slices of answers.
 //!
 //! A new peer is one [`System`] with its [`Tracer`]; a new way to trace is one more arm in the
 //! [`Tracer`] of a system and one more word in its [`System::modes`].
@@ -21,18 +21,18 @@ pub const fn is_hit(hit: &Hit) -> bool {
 /// Bytes of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bytes {
-    /// Bytes that are kept for queries, without the mesh.
+    /// Bytes that queries need, without the mesh.
     pub index: usize,
-    /// The most that there was during the build.
+    /// The most bytes during the build.
     pub peak: usize,
 }
 
-/// Receives a build once it is complete.
+/// A function that receives a complete build.
 pub type Use<'a> = dyn FnMut(&dyn Tracer) -> Result<()> + 'a;
 
-/// Something that builds.
+/// A way to build a structure.
 pub trait System {
-    /// The name in tables.
+    /// Returns the name in tables.
     fn name(&self) -> String;
 
     /// Returns true if it is not hgrid.
@@ -40,26 +40,25 @@ pub trait System {
         true
     }
 
-    /// The library and its version, if it tells.
+    /// Returns the library and its version, if known.
     fn version(&self) -> Option<String> {
         None
     }
 
-    /// The ways to ask for a workload that make sense, on what is shown; none if the
-    /// system does not answer it.
+    /// Returns the useful modes of a workload on what is shown; none if the system cannot answer it.
     fn modes(&self, workload: Workload, shown: Shown) -> &'static [Mode] {
         if shown == Shown::Mesh { one_by_one(workload) } else { &[] }
     }
 
-    /// Builds and calls `then` with the structure. What happens before that call is the build.
+    /// Builds and calls `then` with the structure. The time before that call is the time of the build.
     ///
     /// # Errors
     /// If it cannot be built, and those of `then`.
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()>;
 
-    /// Builds until that takes no new memory, calls `start`, and builds once more in the memory
-    /// that was kept; then calls `then`. What happens between the two calls is the rebuild. Of
-    /// instances it is that of the scene alone: the mesh's structure is there before `start`.
+    /// Builds until a build takes no new memory, calls `start`, builds once more in the kept memory, and
+    /// calls `then`. The time between the two calls is that of the rebuild. For instances it is that of the
+    /// scene alone: the mesh's structure exists before `start`.
     ///
     /// # Errors
     /// As [`build`](Self::build).
@@ -68,13 +67,13 @@ pub trait System {
     }
 }
 
-/// The modes of a system that takes one ray a call, and no points.
+/// Returns the modes of a system that takes one ray a call, and no points.
 #[must_use]
 pub const fn one_by_one(workload: Workload) -> &'static [Mode] {
     if workload.asks_points() { &[] } else { &[Mode::Single] }
 }
 
-/// A rebuild by a system that keeps no more than its heap.
+/// Rebuilds with a system that keeps nothing but its heap.
 ///
 /// # Errors
 /// The errors of its builds.
@@ -89,13 +88,13 @@ pub fn rebuild_anew(
     system.build(input, then)
 }
 
-/// Builds before a rebuild, at most.
+/// The largest number of builds before a rebuild.
 const WARM_UPS: u32 = 4;
 
-/// Pages that a build may touch for the first time and still be one in memory that was kept.
+/// The most pages that a build in kept memory may touch for the first time.
 const FEW_PAGES: u64 = 16;
 
-/// Builds again and again, until that touches no new pages.
+/// Builds repeatedly, until a build touches hardly any new pages.
 ///
 /// # Errors
 /// The errors of a build.
@@ -111,16 +110,16 @@ pub fn warm_up(mut build: impl FnMut() -> Result<()>) -> Result<()> {
     Ok(())
 }
 
-/// A structure that is built.
+/// A complete structure.
 pub trait Tracer {
-    /// Closest hits; [`Hit::MISS`] where there is none. Both slices are equally long.
+    /// Finds closest hits; [`Hit::MISS`] for a ray without one. Both slices are equally long.
     fn intersect(&self, mode: Mode, rays: &[Ray], hits: &mut [Hit]);
 
-    /// 1 where there is any hit, 0 where there is none. Both slices are equally long.
+    /// Writes 1 for a ray with any hit, 0 for a ray with none. Both slices are equally long.
     fn occluded(&self, mode: Mode, rays: &[Ray], occluded: &mut [u8]);
 
-    /// Distances to the closest points of the surface; infinite where none is in the radius. Both
-    /// slices are equally long.
+    /// Finds distances to the closest points of the surface; infinite if none is in the radius. Both slices
+    /// are equally long.
     fn closest_points(&self, _points: &[[f32; 3]], _radius: f32, distances: &mut [f32]) {
         distances.fill(f32::INFINITY);
     }

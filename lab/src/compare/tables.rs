@@ -10,13 +10,13 @@ use super::workloads::{AO_REACH, Workload};
 use crate::measure::ratio;
 use crate::table::{count, display_name, markdown as as_markdown, seconds, times};
 
-/// Behind a time whose rays have too many answers that differ.
+/// The mark after a time whose rays have too many differing answers.
 const MARK: &str = " (!)";
 
-/// Columns of words, from the left.
+/// The number of columns of words, from the left.
 const WORDS: usize = 2;
 
-/// Aligned tables and notes.
+/// Formats aligned tables and notes.
 pub(super) fn text(comparison: &Comparison) -> String {
     let aligned = |mut table: Table| {
         table.load_style(presets::NOTHING);
@@ -32,7 +32,7 @@ pub(super) fn text(comparison: &Comparison) -> String {
     parts.join("\n\n")
 }
 
-/// The same as Markdown.
+/// Formats the same as Markdown.
 pub(super) fn markdown(comparison: &Comparison) -> String {
     let scene = |scene: &SceneNumbers| {
         let title = format!("### {}", scene.title());
@@ -46,7 +46,7 @@ pub(super) fn markdown(comparison: &Comparison) -> String {
 }
 
 impl Comparison {
-    /// Says what the numbers mean.
+    /// Returns notes that explain the numbers.
     fn notes(&self) -> Vec<String> {
         let Self { size, repeats, .. } = self;
         let mut notes = vec![
@@ -90,7 +90,7 @@ impl Comparison {
         notes
     }
 
-    /// Says which systems are of which version of a library.
+    /// Lists the systems with their library's version.
     fn versions(&self) -> Option<String> {
         let systems = &self.scenes.first()?.systems;
         let told = |system: &SystemNumbers| {
@@ -131,7 +131,8 @@ impl SceneNumbers {
         core::iter::once(self.builds()).chain(queries).chain(ratios)
     }
 
-    /// Builds, first images and memory. With instances or spheres, the build time of each in place of images.
+    /// Makes the table of builds, first images and memory. With instances or spheres, the build time of each
+    /// replaces images.
     fn builds(&self) -> Table {
         let (has_images, item) = (self.shown == Shown::Mesh, self.shown.short_item());
         let images = ["first image (s)", "image, rebuilt (s)"].map(str::to_owned).to_vec();
@@ -170,7 +171,7 @@ impl SceneNumbers {
         table
     }
 
-    /// Something of every run: a row for each mode of each system.
+    /// Makes a table of one number of every run: a row for each mode of each system.
     fn runs(&self, unit: &str, cell: impl Fn(&Run) -> String) -> Table {
         let runs = || self.systems.iter().flat_map(|system| &system.runs);
         let is_asked = |workload: &Workload| runs().any(|run| run.workload == *workload);
@@ -194,7 +195,7 @@ impl SceneNumbers {
     }
 }
 
-/// The modes of a system.
+/// Returns the modes of a system.
 fn modes(system: &SystemNumbers) -> Vec<Mode> {
     let mut modes: Vec<Mode> = Vec::new();
     for run in &system.runs {
@@ -222,7 +223,7 @@ fn ratios(ratios: &[Ratio]) -> Table {
     table
 }
 
-/// A table with columns of words, then of numbers.
+/// Makes a table with columns of words, then of numbers.
 fn table<T: Into<Cell>>(header: impl IntoIterator<Item = T>) -> Table {
     let mut table = Table::new();
     table.set_header(header.into_iter().map(Into::into).collect::<Vec<Cell>>());

@@ -1,8 +1,8 @@
-//! Questions that every system is asked, and the answers that hgrid gives.
+//! The queries that every system answers, and the answers that hgrid gives.
 //!
-//! Primary rays are made tile by tile while they are traced, as a renderer does. The others are
-//! made once, beforehand: they are the same for all systems and in none of the times. Nothing here
-//! depends on a clock or on the machine.
+//! Primary rays are made tile by tile during tracing, as in a renderer. The others are made once, beforehand;
+//! they are the same for all systems, and no time includes them. Nothing here depends on a clock or on the
+//! machine.
 
 use anyhow::{Context as _, Result};
 use clap::ValueEnum;
@@ -26,10 +26,10 @@ use crate::world::on_mesh;
 /// where the scene is a field of its instances.
 pub const AO_REACH: f64 = 0.1;
 
-/// The distance of such a ray's start from its surface, likewise: far above rounding, far below triangles.
+/// The distance of such a ray's start from its surface, likewise: far above rounding errors, far below triangles.
 const AO_START: f64 = 1e-5;
 
-/// The questions of a measurement.
+/// The kinds of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Workload {
@@ -48,11 +48,11 @@ pub enum Workload {
 }
 
 impl Workload {
-    /// In the order in which they are measured.
+    /// All of them, in the order of measurement.
     pub const ALL: [Self; 6] =
         [Self::Primary, Self::Ao, Self::Bounce, Self::Random, Self::Near, Self::Far];
 
-    /// The word that tables use.
+    /// Returns the word that tables use.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -65,14 +65,14 @@ impl Workload {
         }
     }
 
-    /// Returns true if points are asked, not rays.
+    /// Returns true if the queries are points, not rays.
     #[must_use]
     pub const fn asks_points(self) -> bool {
         matches!(self, Self::Near | Self::Far)
     }
 }
 
-/// Numbers of questions, for the workloads whose numbers do not follow from the picture.
+/// The numbers of queries of the workloads for which the picture does not give them.
 #[derive(Debug, Clone, Copy)]
 pub struct Amount {
     /// Rays between random points.
@@ -84,11 +84,11 @@ pub struct Amount {
 }
 
 impl Amount {
-    /// The full amounts: as many random rays as a picture of 1024 x 1024 has. Far points are few,
-    /// because a grid looks at much of the mesh for each.
+    /// The full amounts: as many random rays as a picture of 1024 x 1024 has. Far points are few, because a
+    /// grid has to search much of the mesh for each.
     const FULL: Self = Self { random_rays: 1 << 20, near_points: 1 << 15, far_points: 1 << 11 };
 
-    /// All that the workloads ask, and nothing for the others.
+    /// Returns the full amounts of these workloads, and 0 for the others.
     #[must_use]
     pub fn of(workloads: &[Workload]) -> Self {
         let full = |workload, count| if workloads.contains(&workload) { count } else { 0 };
@@ -100,7 +100,7 @@ impl Amount {
     }
 }
 
-/// Questions, and hgrid's answers in their order.
+/// Queries, and hgrid's answers in their order.
 #[derive(Debug, PartialEq)]
 pub struct Asked<Q, A> {
     /// Rays or points.
@@ -123,17 +123,17 @@ pub struct Rays {
     pub tiles: Tiles,
     /// The answers to the primary rays, row by row.
     pub primary_hits: Vec<Hit>,
-    /// One from every primary hit, and 1 where something is in its way.
+    /// One ray from every primary hit, and 1 if it is occluded.
     pub ao: Asked<Ray, u8>,
-    /// The same without an end.
+    /// The same rays, unlimited.
     pub bounce: Asked<Ray, Hit>,
-    /// From points toward points.
+    /// Rays from random points toward others.
     pub random: Asked<Ray, Hit>,
-    /// Near the surface.
+    /// Points near the surface.
     pub near: Points,
-    /// Far outside.
+    /// Points far outside.
     pub far: Points,
-    /// From the smallest to the largest coordinates of the scene.
+    /// The length of the diagonal of the scene's box.
     pub diagonal: f64,
 }
 
@@ -176,7 +176,7 @@ impl Rays {
                 );
             }
         });
-        // A tenth of the mesh, not of the field: rays that are occluded nearby.
+        // A tenth of the mesh, not of the field: the rays find nearby occluders.
         let of_mesh = if count > 0 { diagonal_of(grid.bounds()) } else { diagonal };
         let t_max = narrow(AO_REACH * of_mesh);
         let ao = bounce.iter().map(|&ray| Ray { t_max, ..ray }).collect();
@@ -206,8 +206,8 @@ impl Rays {
     }
 }
 
-/// The structure that gives the answers: the default method on the mesh, a scene of its instances, or a tree over
-/// spheres.
+/// The structure that gives the answers: the default method on the mesh, a scene of its instances, or a tree
+/// over spheres.
 enum Asks<'a> {
     Mesh(Grid<'a>),
     Field(Scene<'a>),
@@ -215,7 +215,7 @@ enum Asks<'a> {
 }
 
 impl Asks<'_> {
-    /// The closest hit, and the normal there unless it is on a triangle without an area.
+    /// Returns the closest hit, and the normal there unless its triangle has no area.
     fn closest(&self, ray: &Ray) -> (Hit, Option<Vector>) {
         match self {
             Self::Mesh(grid) => {
@@ -245,12 +245,12 @@ impl Asks<'_> {
     }
 }
 
-/// From the smallest to the largest coordinates.
+/// Returns the length of a box's diagonal.
 fn diagonal_of((min, max): Bounds) -> f64 {
     length([0, 1, 2].map(|axis| f64::from(max[axis]) - f64::from(min[axis])))
 }
 
-/// A ray from a hit into the half space above its surface, by the cosine of the angle.
+/// Makes a ray from a hit into the half space above its surface, with a cosine distribution.
 fn bounce_ray(normal: Vector, ray: &Ray, hit: &Hit, pixel: usize, diagonal: f64) -> Option<Ray> {
     let direction = ray.direction.map(f64::from);
     let normal = if dot(normal, direction) > 0.0 { normal.map(|c| -c) } else { normal };
@@ -270,19 +270,19 @@ fn bounce_ray(normal: Vector, ray: &Ray, hit: &Hit, pixel: usize, diagonal: f64)
     Some(Ray::new(round(origin), round(direction)))
 }
 
-/// Rays of unit direction from one point of the box toward another, without an end.
+/// Makes rays of unit direction from one point of the box toward another, unlimited.
 fn random_rays(bounds: Bounds, count: usize) -> Vec<Ray> {
     let mut random = Random::new(0);
     let rays = (0..count).map(|_| {
         let (from, to) = (random.point(bounds), random.point(bounds));
-        // Two points are the same only in a box without a size; any direction does there.
+        // Two points are the same only if the box has no size; any direction will do then.
         let direction = unit(offset(to, -1.0, from)).unwrap_or([0.0, 0.0, 1.0]);
         Ray::new(round(from), round(direction))
     });
     rays.collect()
 }
 
-/// The nearest length that a ray can have.
+/// Rounds a length to that of a ray.
 #[expect(clippy::cast_possible_truncation, reason = "the rounding that is wanted")]
 pub(super) fn narrow(length: f64) -> f32 {
     length as f32

@@ -1,4 +1,4 @@
-//! Figure 2: what every method takes on every scene, as bars: memory, build, render, time to image.
+//! Figure 2: bars of every method on every scene: memory, build, render, time to image.
 
 use plotters::coord::ranged1d::Ranged as _;
 use plotters::prelude::*;
@@ -12,14 +12,14 @@ use crate::plot::{
 };
 use crate::table::{Results, SceneResults, display_name, mebibytes, times};
 
-/// The drawing.
+/// The charts of figure 2.
 pub(super) struct Figure<'a>(pub(super) &'a Results);
 
 /// Units of a chart.
 const WIDTH: u32 = 600;
 const HEIGHT: u32 = 340;
 
-/// The part of a scene's place that its bars fill, and the part of its own place that a bar fills.
+/// The part of a scene's width that its bars fill, and the part of a bar's place that it fills.
 const SCENE_PART: f64 = 0.84;
 const BAR_PART: f64 = 0.88;
 
@@ -32,7 +32,7 @@ enum Quantity {
     Memory,
 }
 
-/// In the order of the paper: "from bottom right clockwise: memory consumption; build time; render
+/// The charts in the order of the paper: "from bottom right clockwise: memory consumption; build time; render
 /// time; time to image".
 const QUANTITIES: [Quantity; 4] = [
     Quantity::Seconds("render", |m| m.render_seconds),
@@ -117,7 +117,7 @@ fn draw<B: DrawingBackend>(
 ) -> AreaResult<B> {
     let groups: Vec<_> = scenes.iter().map(|scene| quantity.bars(scene)).collect();
     let amounts = groups.iter().flatten().flat_map(|bar| [bar.amount, bar.peak]);
-    // Above the highest bar stands its number, upright.
+    // The number of the highest bar stands above it, upright.
     let y = Scale::fitting(amounts, 0.16);
     let floor = y.range().start;
     let places = || (0u32..).map(f64::from);
@@ -157,7 +157,7 @@ fn draw<B: DrawingBackend>(
     Ok(())
 }
 
-/// A name in lines of so many letters, if its words allow; a longer word is cut.
+/// Breaks a name into lines of so many letters, between words; a longer word is cut.
 fn broken(name: &str, letters: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in name.split(['_', '-', ' ']).filter(|word| !word.is_empty()) {

@@ -82,13 +82,13 @@ impl Curves {
 }
 
 impl Curve {
-    /// Returns true if the density means anything to the method.
+    /// Returns true if the density makes a difference to the method.
     fn is_curve(&self) -> bool {
         let first = self.points.first().map(|point| point.resolution);
         self.points.len() < 2 || self.points.iter().any(|point| Some(point.resolution) != first)
     }
 
-    /// The points that are grids of the density they stand for.
+    /// Returns the points whose grids are as dense as they were configured to be.
     fn points(&self) -> impl Iterator<Item = &Measurement> {
         self.points.iter().filter(|point| point.density >= point.configured_density)
     }
@@ -103,7 +103,7 @@ const TIMES: [Time; 3] = [
     ("build", COLORS[3], |m| m.build_seconds),
 ];
 
-/// The drawing.
+/// The charts of figure 1.
 pub(super) struct Figure<'a>(pub(super) &'a Curves);
 
 /// Units of a chart.
@@ -115,14 +115,14 @@ impl Figure<'_> {
         self.0.methods.iter().filter(|curve| curve.is_curve()).collect()
     }
 
-    /// Charts side by side, and one above the other.
+    /// Returns the number of columns and of rows of charts.
     fn grid(&self) -> (u32, u32) {
         let count = u32::try_from(self.curves().len()).unwrap_or(u32::MAX).max(1);
         let columns = if count <= 3 { count } else { count.div_ceil(2) };
         (columns, count.div_ceil(columns))
     }
 
-    /// The axes of all charts: powers of two, and times.
+    /// Returns the axes of all charts: powers of two, and times.
     fn axes(&self) -> (Stops, Scale) {
         let curves = self.curves();
         let points = || curves.iter().flat_map(|curve| curve.points());
@@ -178,7 +178,7 @@ impl Curve {
         let is_shown = axes.0.range.contains(&x);
         let mut chart = chart(area, pen, words, axes)?;
 
-        // Mark the density that users get.
+        // Mark the default density.
         if is_shown {
             let ends = [(x, range.start), (x, range.end)];
             let dash = DashedPathElement::new(ends, pen.px(4), pen.px(4), pen.line(MUTED, 1));

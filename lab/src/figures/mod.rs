@@ -1,7 +1,7 @@
 //! The paper's figures, measured here: the `figures` command.
 //!
-//! Figure 1 shows times against density for one scene, figure 2 memory and times of every method
-//! on every scene. Each is an SVG, a PNG and, the numbers alone, a JSON file.
+//! Figure 1 shows times against density for one scene; figure 2 shows memory and times of every method on
+//! every scene. Each is an SVG and a PNG, with its numbers in a JSON file.
 
 mod bars;
 mod density;
@@ -41,7 +41,7 @@ pub fn run(args: &FiguresArgs) -> Result<()> {
 /// Draws figure 1 from the JSON file that the command wrote, as SVG.
 ///
 /// # Errors
-/// If the file is none, and those of drawing.
+/// If the JSON is not that of figure 1, and those of drawing.
 pub(crate) fn figure1(json: &str) -> Result<String> {
     let curves: density::Curves = serde_json::from_str(json).context("no numbers of figure 1")?;
     svg(&density::Figure(&curves))
@@ -67,7 +67,7 @@ fn write(
     fs::write(&path, json).with_context(|| format!("cannot write `{}`", path.display()))
 }
 
-/// The colour of a method, the same in every picture.
+/// Returns the colour of a method, the same in every picture.
 fn color_of(name: &str) -> RGBColor {
     let place = Method::ALL.iter().position(|method| method.name() == name).unwrap_or(0);
     COLORS[place % COLORS.len()]

@@ -1,4 +1,4 @@
-//! Tables from what `hgrid compare` wrote: hgrid beside other libraries.
+//! Tables from the results of `hgrid compare`: hgrid beside other libraries.
 
 use comfy_table::{Cell, CellAlignment, Table};
 use serde::Deserialize;
@@ -7,7 +7,7 @@ use crate::machine::Machine;
 use crate::measure::ratio;
 use crate::table::{count, display_name, markdown, seconds};
 
-/// A file of `hgrid compare --json`, as much of it as tables show.
+/// A file of `hgrid compare --json`: the part that tables show.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(super) struct Comparison {
     machine: Machine,
@@ -19,10 +19,10 @@ pub(super) struct Comparison {
 struct Scene {
     scene: String,
     triangles: usize,
-    /// Results from before there were instances have none.
+    /// Missing in results older than instances.
     #[serde(default)]
     instances: usize,
-    /// Likewise of spheres in place of the triangles.
+    /// True if spheres replace the triangles. Missing in results older than spheres.
     #[serde(default)]
     spheres: bool,
     systems: Vec<System>,
@@ -71,7 +71,7 @@ struct Ratio {
 /// The workloads, in the order of columns.
 const WORKLOADS: [&str; 6] = ["primary", "ao", "bounce", "random", "near", "far"];
 
-/// The scenes of all files, with the names that columns have: a named view is part of it.
+/// Returns the scenes of all files with their column names, which include a named view.
 fn scenes(files: &[Comparison]) -> impl Iterator<Item = (String, &Scene)> {
     files.iter().flat_map(|file| {
         let mut words = file.machine.command.split(' ');
@@ -84,7 +84,7 @@ fn scenes(files: &[Comparison]) -> impl Iterator<Item = (String, &Scene)> {
 }
 
 impl Scene {
-    /// The number of triangles or spheres, and that of instances if there are any.
+    /// Returns the number of triangles or spheres, and that of instances if there are any.
     fn size(&self) -> String {
         match self.instances {
             0 if self.spheres => format!("{} spheres", count(self.triangles)),
@@ -94,7 +94,7 @@ impl Scene {
     }
 }
 
-/// A row for each ratio, a column for each scene: the medians.
+/// Makes a table of the median ratios: a row for each ratio, a column for each scene.
 pub(super) fn ratios(files: &[Comparison]) -> String {
     let columns = scenes(files).map(|(name, scene)| format!("{name} {}", scene.size()));
     let mut table = table("hgrid's default / peer", columns);
@@ -109,7 +109,7 @@ pub(super) fn ratios(files: &[Comparison]) -> String {
     markdown(&mut table, 1)
 }
 
-/// A table for each scene: the ratios with their least and most, and what they are ratios of.
+/// Makes a table for each scene: the ratios with their least and most, and the two numbers of each.
 pub(super) fn ratios_in_full(files: &[Comparison]) -> String {
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["ratio", "least to most", "hgrid", "peer", "modes"].map(str::to_owned);
@@ -133,7 +133,7 @@ pub(super) fn ratios_in_full(files: &[Comparison]) -> String {
     tables.collect::<Vec<_>>().join("\n\n")
 }
 
-/// A table for each scene: builds, bytes and the fastest mode of every workload, for each structure.
+/// Makes a table for each scene: builds, bytes and the fastest mode of every workload, for each structure.
 pub(super) fn systems(files: &[Comparison]) -> String {
     let tables = scenes(files).map(|(name, scene)| {
         let columns = ["first build", "rebuild", "index", "peak"];
@@ -157,10 +157,10 @@ pub(super) fn systems(files: &[Comparison]) -> String {
 }
 
 impl System {
-    /// Nanoseconds a ray in the fastest mode whose answers are right, and that mode.
+    /// Formats the nanoseconds a ray in the fastest mode whose answers are right, and that mode.
     fn fastest(&self, workload: &str) -> String {
         let runs = self.runs.iter().filter(|run| run.workload == workload);
-        // The rule of the ratios: no more than one answer in a thousand differs.
+        // The rule of the ratios: at most one answer in a thousand may differ.
         let right = runs.filter(|run| run.differing * 1000 <= run.rays);
         let fastest = right.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
         fastest.map_or_else(String::new, |run| {
@@ -176,7 +176,7 @@ fn nanoseconds(seconds: f64, of: u64) -> String {
     }
 }
 
-/// A table with a column of words, then of numbers.
+/// Makes a table with a column of words, then of numbers.
 fn table(title: &str, columns: impl IntoIterator<Item = String>) -> Table {
     let mut table = Table::new();
     let header = core::iter::once(title.to_owned()).chain(columns);
@@ -199,7 +199,7 @@ mod tests {
             );
             serde_json::from_str::<Scene>(&json).unwrap().size()
         };
-        // Results from before there were instances and spheres have neither field.
+        // Results older than instances and spheres have neither field.
         assert_eq!(size(""), "2.00K");
         assert_eq!(size(r#""instances": 40,"#), "40 instances of 2.00K");
         assert_eq!(size(r#""instances": 0, "spheres": true,"#), "2.00K spheres");

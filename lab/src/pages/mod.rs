@@ -6,8 +6,8 @@
 //! <!-- end of report -->
 //! ```
 //!
-//! A number in a page is thus one that a file has, and measuring again is a new file and one command.
-//! Paths are relative to the root of a checkout. Charts are written beside the page.
+//! So every number in a page comes from a file, and a new measurement is a new file and one command. Paths
+//! are relative to the root of a checkout. Charts are written beside the page.
 
 mod compared;
 mod paper;
@@ -32,10 +32,10 @@ const PAGES: [&str; 3] = ["README.md", "docs/performance.md", "docs/paper.md"];
 const BEGIN: &str = "<!-- hgrid report ";
 const END: &str = "<!-- end of report -->";
 
-/// Writes the tables of all pages, or tells which differ from the results.
+/// Writes the tables of all pages, or lists the files that differ from the results.
 ///
 /// # Errors
-/// If a page or a result cannot be read, a marker is wrong, or pages differ and were only to be checked.
+/// If a page or a result cannot be read, a marker is wrong, or a check finds files that differ.
 pub fn run(args: &ReportArgs) -> Result<()> {
     let stale = stale(&args.root)?;
     let mut out = io::stdout();
@@ -56,7 +56,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     Ok(())
 }
 
-/// A file as it should be.
+/// A file with the text that it should have.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct File {
     /// The path below the root.
@@ -64,7 +64,7 @@ struct File {
     text: String,
 }
 
-/// Returns the files that are not what they should be.
+/// Returns the files whose text is not up to date.
 fn stale(root: &Path) -> Result<Vec<File>> {
     let mut files = Vec::new();
     for page in PAGES {
@@ -79,7 +79,7 @@ fn stale(root: &Path) -> Result<Vec<File>> {
     Ok(files)
 }
 
-/// Returns a page with the text between its markers made anew; charts go to `files`.
+/// Returns a page with new text between its markers; the charts go to `files`.
 fn fill(root: &Path, page: &str, text: &str, files: &mut Vec<File>) -> Result<String> {
     let (mut filled, mut rest) = (String::new(), text);
     while let Some((before, behind)) = rest.split_once(BEGIN) {
@@ -97,7 +97,7 @@ fn fill(root: &Path, page: &str, text: &str, files: &mut Vec<File>) -> Result<St
 struct Block<'a> {
     root: &'a Path,
     page: &'a str,
-    /// The kind, then the files.
+    /// The files, after the kind.
     words: Vec<&'a str>,
 }
 
@@ -125,7 +125,7 @@ impl Block<'_> {
         }
     }
 
-    /// Puts a chart beside the page, and returns the line that shows it.
+    /// Adds a chart beside the page, and returns the line that shows it.
     fn chart(&self, svg: &str, name: &str, files: &mut Vec<File>) -> Result<String> {
         let folder = Path::new(self.page).parent().unwrap_or(Path::new(""));
         let path: PathBuf = folder.join(name).with_extension("svg");
@@ -134,7 +134,7 @@ impl Block<'_> {
         Ok(format!("![{name}]({name}.svg)"))
     }
 
-    /// Says where the numbers come from, a line for each file.
+    /// Lists the origin of the numbers, a line for each file.
     fn sources(&self, names: &[&str]) -> Result<String> {
         #[derive(serde::Deserialize)]
         struct Source {

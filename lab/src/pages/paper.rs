@@ -1,4 +1,4 @@
-//! The paper's Table 1 beside ours.
+//! The paper's Table 1 beside the lab's numbers.
 
 use anyhow::{Result, ensure};
 use comfy_table::{Cell, CellAlignment, Table};
@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::measure::Measurement;
 use crate::table::{Results, count, display_name, markdown, seconds};
 
-/// lab/results/paper.json: the paper's numbers.
+/// The paper's numbers: lab/results/paper.json.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(super) struct Paper {
     scenes: Vec<String>,
@@ -27,7 +27,7 @@ struct Method {
     time_to_image_seconds: Vec<f64>,
 }
 
-/// A row of a method: its name, the paper's numbers, ours, and how they are written.
+/// A row of a method: its name, the paper's numbers, the lab's, and their format.
 type Row = (&'static str, fn(&Method) -> &[f64], fn(&Measurement) -> f64, fn(f64) -> String);
 
 const ROWS: [Row; 6] = [
@@ -44,7 +44,7 @@ fn two_places(number: f64) -> String {
 }
 
 impl Paper {
-    /// A table with our numbers, and the paper's in brackets. Scenes match by their order.
+    /// Makes a table with the lab's numbers, and the paper's in brackets. Scenes match by their order.
     pub(super) fn beside(&self, results: &Results) -> Result<String> {
         ensure!(
             results.scenes.len() == self.scenes.len(),

@@ -1,24 +1,24 @@
-//! Axes for charts: amounts on a scale that fits them, and stops with names.
+//! Axes for charts: scales of amounts, and named places.
 
 use core::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-/// From this ratio of the largest to the smallest amount on, a scale is logarithmic.
+/// The least ratio of the largest to the smallest amount for which a scale is logarithmic.
 const WIDE: f64 = 12.0;
 
-/// An axis of amounts above zero: linear from zero, or logarithmic where they are far apart.
+/// An axis of amounts above zero: linear from zero, or logarithmic if the amounts are far apart.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Scale {
     range: Range<f64>,
     is_logarithmic: bool,
-    /// Amounts with a label, and the light lines between them.
+    /// Amounts with a label, then those of the light lines between them.
     labelled: Vec<f64>,
     light: Vec<f64>,
 }
 
 impl Scale {
-    /// The scale for these amounts; above the largest stays a part `headroom` of the axis.
+    /// Makes the scale for these amounts; a part `headroom` of the axis stays free above the largest.
     pub(crate) fn fitting(amounts: impl Iterator<Item = f64>, headroom: f64) -> Self {
         let (low, high) = amounts
             .filter(|&amount| amount > 0.0)
@@ -42,7 +42,7 @@ impl Scale {
     }
 
     fn logarithmic(low: f64, high: f64, headroom: f64) -> Self {
-        // The shortest bar must be one: the axis starts well below it.
+        // The axis starts well below the smallest amount, so that the shortest bar is visible.
         let start = nice_below(low / 1.5);
         let end = start * (high / start).powf(1.0 / (1.0 - headroom));
         let decades = decade(start)..=decade(end);
@@ -132,21 +132,21 @@ impl ValueFormatter<f64> for Stops {
     }
 }
 
-/// The least of 1, 2, 5, 10, 20, ... and their tenths that is no less than an amount above zero.
+/// Returns the least of 1, 2, 5, 10, 20, ... and their tenths that is at least an amount above zero.
 pub(crate) fn nice_above(amount: f64) -> f64 {
     let power = 10f64.powi(decade(amount));
     let nice = [1.0, 2.0, 5.0].map(|digit| digit * power);
     nice.into_iter().find(|&nice| nice >= amount).unwrap_or(10.0 * power)
 }
 
-/// The greatest of the same that is no more than an amount above zero.
+/// Returns the greatest of the same that is at most an amount above zero.
 fn nice_below(amount: f64) -> f64 {
     let power = 10f64.powi(decade(amount));
     let nice = [5.0, 2.0, 1.0].map(|digit| digit * power);
     nice.into_iter().find(|&nice| nice <= amount).unwrap_or(power)
 }
 
-/// A number with as many digits as it needs, up to three.
+/// Formats a number with up to three significant digits, without trailing zeros.
 pub(crate) fn number(amount: f64) -> String {
     let digits = usize::try_from(2 - decade(amount.abs().max(1e-9))).unwrap_or(0);
     let text = format!("{amount:.digits$}");
@@ -157,13 +157,13 @@ pub(crate) fn number(amount: f64) -> String {
     }
 }
 
-/// The power of ten of a number's first digit.
+/// Returns the power of ten of a number's first digit.
 #[expect(clippy::cast_possible_truncation, reason = "a logarithm")]
 fn decade(amount: f64) -> i32 {
     amount.log10().floor() as i32
 }
 
-/// A pixel between two, from a part between 0 and 1.
+/// Returns the pixel at a part from 0 to 1 of the way between two.
 #[expect(clippy::cast_possible_truncation, reason = "between two pixels")]
 fn pixel(part: f64, (from, to): (i32, i32)) -> i32 {
     from + (part * f64::from(to - from)).round() as i32

@@ -6,28 +6,28 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::{Area, AreaResult, FAINT, INK, MUTED, Pen, Scale, Stops, centred};
 
-/// The size of most words, and of titles.
+/// The font size of most words, and of titles.
 pub(crate) const WORDS: u32 = 13;
 const TITLE: u32 = 18;
 
-/// Units that the heading of a drawing takes from its upper edge.
+/// Units of the heading's height.
 pub(crate) const HEADING: u32 = 88;
 
-/// A frame with axes, ready for what it is about.
+/// A frame with axes, ready for its data.
 pub(crate) type Chart<'a, B> = ChartContext<'a, B, Cartesian2d<Stops, Scale>>;
 
-/// The words that say what a chart shows in which unit.
+/// The words of a chart: its title and the quantities of its axes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Words<'a> {
-    /// Above the chart.
+    /// The text above the chart.
     pub(crate) title: &'a str,
-    /// Below the x axis; may be empty.
+    /// The text below the x axis; may be empty.
     pub(crate) x: &'a str,
-    /// Above the y axis.
+    /// The text above the y axis.
     pub(crate) y: &'a str,
 }
 
-/// Draws a frame with axes on all of an area.
+/// Draws a frame with axes that fills an area.
 pub(crate) fn chart<'a, B: DrawingBackend>(
     area: &'a Area<B>,
     pen: Pen,
@@ -38,7 +38,7 @@ pub(crate) fn chart<'a, B: DrawingBackend>(
     let middle = i32::midpoint(pen.at(64), width.cast_signed());
     area.draw(&Text::new(words.title.to_owned(), (middle, pen.at(14)), centred(&pen.title(15))))?;
 
-    // Beside the axis, plotters would put it half outside the area.
+    // Plotters would write it beside the axis, half outside the area.
     let style = pen.text(WORDS, MUTED).pos(Pos::new(HPos::Right, VPos::Center));
     area.draw(&Text::new(words.y.to_owned(), (pen.at(58), pen.at(14)), style))?;
 
@@ -64,7 +64,7 @@ pub(crate) fn chart<'a, B: DrawingBackend>(
     Ok(chart)
 }
 
-/// Writes a title, what the picture was measured on, and a legend in one row.
+/// Writes a title, the origin of the numbers, and a legend in one row.
 pub(crate) fn heading<B: DrawingBackend>(
     area: &Area<B>,
     pen: Pen,
@@ -75,7 +75,7 @@ pub(crate) fn heading<B: DrawingBackend>(
         area.draw(&Text::new(text.to_owned(), (pen.at(16), pen.at(y)), style))
     };
     line(title, 22, pen.title(TITLE))?;
-    // Letters are about 7/15 as wide as the font is high: smaller ones where they are many.
+    // Letters are about 7/15 as wide as the font is high: a long text gets a smaller font.
     let (width, _) = area.dim_in_pixel();
     let room = (width / pen.scale).saturating_sub(32);
     let letters = u32::try_from(source.len()).unwrap_or(u32::MAX).max(1);

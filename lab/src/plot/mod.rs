@@ -1,14 +1,13 @@
-//! Drawings that exist twice, as SVG and as PNG, from one description.
+//! Drawings from one description, as SVG and as PNG.
 //!
 //! ```text
 //! Drawing --> plotters' SVG backend ------------------------> name.svg
 //!         '-> Raster: pixels, 4 x 4 for each unit --average-> name.png, 2 x 2 for each unit
 //! ```
 //!
-//! The PNG is drawn twice as large as it is written, so that every edge is smooth, and written
-//! twice as large as the SVG says, so that it is sharp on today's screens. Text comes from a font
-//! in the program: the same picture on a machine that has none. An SVG names the font and leaves
-//! the rest to its reader.
+//! The raster is twice as large as the PNG, so that every edge is smooth. The PNG is twice as large as the
+//! SVG's size, so that it is sharp on today's screens. Text uses a font in the program, so a machine without
+//! fonts draws the same picture. An SVG names the font and leaves the rest to its reader.
 
 mod axis;
 mod chart;
@@ -29,7 +28,7 @@ pub(crate) use raster::Raster;
 use crate::image;
 use crate::shade::Rgb;
 
-/// The font of drawings, and what a reader of an SVG may take instead.
+/// The font of drawings, and its replacements in an SVG's reader.
 const FONT: &str = "Noto Sans, DejaVu Sans, Helvetica, Arial, sans-serif";
 
 /// Text, axes and grid lines, from dark to light.
@@ -47,22 +46,22 @@ pub(crate) const COLORS: [RGBColor; 6] = [
     RGBColor(0x56, 0xb4, 0xe9),
 ];
 
-/// The area that a drawing goes to.
+/// An area for drawing.
 pub(crate) type Area<B> = DrawingArea<B, Shift>;
 
-/// The result of drawing there.
+/// The result of drawing on an area.
 pub(crate) type AreaResult<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
 /// A picture of lines, areas and words.
 pub(crate) trait Drawing {
-    /// Width and height, in units that are a pixel of an ordinary screen.
+    /// Returns width and height, in units of a pixel of an ordinary screen.
     fn size(&self) -> (u32, u32);
 
-    /// Draws on an area of that size on the pen's scale.
+    /// Draws on an area of that size, at the pen's scale.
     fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B>;
 }
 
-/// Turns units into pixels.
+/// A converter of units into pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pen {
     /// Pixels in a unit.
@@ -70,38 +69,38 @@ pub(crate) struct Pen {
 }
 
 impl Pen {
-    /// A length.
+    /// Returns a length in pixels.
     pub(crate) const fn px(self, units: u32) -> u32 {
         units * self.scale
     }
 
-    /// A coordinate.
+    /// Returns a coordinate in pixels.
     pub(crate) const fn at(self, units: i32) -> i32 {
         units * self.scale.cast_signed()
     }
 
-    /// A line.
+    /// Returns the style of a line.
     pub(crate) fn line(self, color: impl Color, width: u32) -> ShapeStyle {
         color.stroke_width(self.px(width))
     }
 
-    /// Words with their left end at the point; `size` is that of CSS.
+    /// Returns the style of words whose left end is at the point; `size` is a size of CSS.
     pub(crate) fn text(self, size: u32, color: RGBColor) -> TextStyle<'static> {
-        // The SVG backend divides by 1.24, and so does Raster.
+        // Both the SVG backend and Raster divide by 1.24.
         let size = f64::from(self.px(size)) * 1.24;
         let font = FontDesc::new(FontFamily::Name(FONT), size, FontStyle::Normal);
         let pos = Pos::new(HPos::Left, VPos::Center);
         TextStyle { font, color: color.to_backend_color(), pos }
     }
 
-    /// The same, in bold.
+    /// Returns the same style in bold.
     pub(crate) fn title(self, size: u32) -> TextStyle<'static> {
         let style = self.text(size, INK);
         TextStyle { font: style.font.style(FontStyle::Bold), ..style }
     }
 }
 
-/// Words around the point instead of to its right.
+/// Returns the style of words that are centred on the point.
 pub(crate) fn centred(style: &TextStyle<'static>) -> TextStyle<'static> {
     style.pos(Pos::new(HPos::Center, VPos::Center))
 }
@@ -118,7 +117,7 @@ pub(crate) fn save(drawing: &impl Drawing, folder: &Path, name: &str) -> Result<
     image::write_png(&path.with_extension("png"), size, &pixels)
 }
 
-/// The drawing as SVG.
+/// Returns the drawing as SVG.
 ///
 /// # Errors
 /// The errors of drawing.
@@ -131,7 +130,7 @@ pub(crate) fn svg(drawing: &impl Drawing) -> Result<String> {
     Ok(text)
 }
 
-/// Pixels of a unit in a PNG, and pixels that each of those is the average of, on each axis.
+/// Pixels for each unit of a PNG, and raster pixels for each of those, on each axis.
 const SHARPNESS: u32 = 2;
 const SMOOTHNESS: u32 = 2;
 
@@ -153,7 +152,7 @@ fn draw<B: DrawingBackend>(drawing: &impl Drawing, area: &Area<B>, pen: Pen) -> 
     drawn.and_then(|()| area.present()).map_err(|error| anyhow!("cannot draw: {error}"))
 }
 
-/// The pixels of a picture of this size from one that is `SMOOTHNESS` times as large.
+/// Averages the pixels of a picture of this size from one that is `SMOOTHNESS` times as large.
 fn averages(fine: &[u8], (width, height): (u32, u32)) -> Vec<Rgb> {
     let (fine, _) = fine.as_chunks::<3>();
     let row = (width * SMOOTHNESS) as usize;

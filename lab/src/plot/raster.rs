@@ -1,7 +1,7 @@
 //! Drawing on pixels, with text that needs no font of the system.
 //!
-//! Lines and areas are those of plotters' bitmap backend; text is Noto Sans, placed as the SVG
-//! backend places it, so that the two pictures of a drawing agree.
+//! Plotters' bitmap backend draws lines and areas. Text is Noto Sans, placed as the SVG backend places it, so
+//! that the two pictures of a drawing agree.
 
 use ab_glyph::{Font as _, FontRef, Glyph, PxScale, ScaleFont as _, point};
 use anyhow::{Result, anyhow};
@@ -19,7 +19,7 @@ pub(crate) struct Raster<'a> {
 }
 
 impl<'a> Raster<'a> {
-    /// A backend for a picture of this width and height, with what is on it already.
+    /// Makes a backend that draws over a picture of this width and height.
     pub(crate) fn new(bytes: &'a mut [u8], size: (u32, u32)) -> Result<Self> {
         let inner = BitMapBackend::with_buffer_and_format(bytes, size);
         let font = |bytes| FontRef::try_from_slice(bytes).map_err(|error| anyhow!("{error}"));
@@ -34,7 +34,7 @@ impl<'a> Raster<'a> {
         if matches!(style.style(), FontStyle::Bold) { &self.bold } else { &self.regular }
     }
 
-    /// The letters of a line that starts at the origin, its width, and the size of its font.
+    /// Returns the letters of a line that starts at the origin, its width, and the size of its font.
     fn lay_out<S: BackendTextStyle>(&self, text: &str, style: &S) -> (Vec<Glyph>, f32, f32) {
         let font = self.font(style);
         let em = narrow(style.size() / 1.24);
@@ -99,7 +99,7 @@ impl DrawingBackend for Raster<'_> {
             HPos::Center => -0.5 * width,
             HPos::Right => -width,
         };
-        // The height of an x is 0.54 of the font's size.
+        // The height of a lower-case x is 0.54 of the font's size.
         let baseline = em
             * match anchor.v_pos {
                 VPos::Top => 0.76,

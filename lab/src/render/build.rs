@@ -1,4 +1,4 @@
-//! Building what is rendered: a grid, or one for each mesh and a scene of its instances.
+//! Builds for rendering: a grid, or a grid for each mesh and a scene of their instances.
 
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ pub(super) struct Built {
     pub(super) instances: usize,
 }
 
-/// Builds, and hands on what is built.
+/// Builds, and calls `then` with the result.
 pub(super) fn build<T>(
     scene: &Scene,
     model: Option<&Model>,

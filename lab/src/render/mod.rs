@@ -1,8 +1,8 @@
 //! From a scene to a picture: the `render` command.
 //!
 //! ```text
-//! scene -> build: a world -> camera (as asked for, or viewpoint) -> studio (lamp, sky, floor) -> paint -> PNG
-//!                                                      '> heat: the work of each ray
+//! scene -> build: a world -> camera (given, or viewpoint) -> studio (lamp, sky, floor) -> paint -> PNG
+//!                                               '> heat: the work of each ray
 //! ```
 
 mod build;
@@ -91,7 +91,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         render_seconds,
         work: outcome.work,
     };
-    // Not println, which panics when the reader of a pipe has gone.
+    // Not `println`, which panics if the reader has closed the pipe.
     let mut out = io::stdout();
     if args.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&summary)?)?;
@@ -102,7 +102,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     Ok(())
 }
 
-/// A picture, and what it took.
+/// A picture, with the numbers of its rendering.
 struct Outcome {
     picture: Picture,
     rays: u64,
@@ -136,7 +136,7 @@ fn draw(
                 0
             })
         }
-        // Only this shading loads instances.
+        // Only diffuse shading loads instances.
         (Shading::Diffuse, _) | (_, World::Instances(_)) => {
             let part = (scene.framed_bounds(), scene.focus.is_none());
             let studio = Studio::new(world, tiles, lights, part, args.picture.up(scene));
@@ -148,7 +148,7 @@ fn draw(
     Ok(Outcome { picture: square(pixels), rays, hits, threads, work: None, note: None })
 }
 
-/// Counts the work of every ray, on one thread.
+/// Draws the work of every ray, counted on one thread.
 fn heat(args: &RenderArgs, grid: &Grid<'_>, tiles: &Tiles) -> Result<Outcome> {
     let counter = args.counter.unwrap_or(Counter::Cost);
     let mut progress = Progress::new("counting", tiles.size.into());
@@ -178,7 +178,8 @@ mod tests {
 
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-    /// Runs the command in a folder of its own that has a file, and returns the pixels of the picture, if there is one.
+    /// Runs the command in a new folder, with a file if one is given, and returns the pixels of the picture
+    /// if the command wrote one.
     fn run_words(
         name: &str,
         words: &[&str],
@@ -239,7 +240,7 @@ mod tests {
         };
         let [inner, outer] = ["procedural:knot:500", "procedural:stage:500"];
         assert!(!orange(inner).contains(&true));
-        // A floor all around the knot.
+        // The picture shows the outer scene's floor all around the knot.
         let both = orange(&format!("{inner}+{outer}"));
         let corners = [0, 19, 380, 399].map(|at| both[at]);
         assert!(corners == [true; 4], "{corners:?}");

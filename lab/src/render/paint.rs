@@ -1,7 +1,7 @@
 //! A picture from samples: every pixel is the mean of several rays, on all threads.
 //!
-//! Tiles go down band by band. A sample moves the rays of a tile by a part of a pixel, the same for
-//! all of them, so that the places of its samples are spread over each pixel:
+//! Each thread paints one band of tiles at a time. A sample shifts all rays of a tile by the same part of a
+//! pixel. The samples of a pixel are spread over it:
 //!
 //! ```text
 //! +---------+
@@ -23,7 +23,7 @@ use crate::threads::Threads;
 use crate::tiles::{TILE_RAYS, Tiles};
 use crate::world::World;
 
-/// The rays of a tile with their hits, and which sample of their pixels they are.
+/// The rays of a tile with their hits, and the number of their sample.
 pub(super) struct Seen<'a> {
     pub(super) rays: &'a [Ray],
     pub(super) hits: &'a [SceneHit],
@@ -35,14 +35,14 @@ pub(super) struct Seen<'a> {
 /// Counts of a picture's rays.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
-    /// Rays from the eye and from what they hit.
+    /// Rays from the eye and from their hits.
     pub(super) rays: AtomicU64,
     /// Rays from the eye that hit something.
     pub(super) hits: AtomicU64,
 }
 
-/// Paints a picture; `shade` gives the light of each ray, which a screen takes the root of, and
-/// returns how many more rays it sent.
+/// Paints a picture. The function `shade` writes the light of each ray, before a screen's square root, and
+/// returns the number of rays that it has traced.
 #[expect(clippy::cast_possible_truncation, reason = "fewer bands than pixels of a side")]
 pub(super) fn paint(
     world: World<'_>,
@@ -113,7 +113,7 @@ fn place(number: u16, samples: u16) -> [f32; 2] {
     [0.754_877_7, 0.569_840_3].map(|step| (0.5 + step * f32::from(number)).fract() - 0.5)
 }
 
-/// Returns linear light as a screen wants it; a square root is close to a screen's curve.
+/// Converts linear light to a screen's value; a square root is close to a screen's curve.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 255")]
 fn display(light: f32) -> u8 {
     (light.clamp(0.0, 1.0).sqrt() * 255.0).round() as u8

@@ -1,10 +1,10 @@
-//! The light of a picture: a lamp, sky and ground, and the floor that a thing stands on.
+//! The light of a picture: a lamp, sky and ground, and a floor under a thing.
 //!
 //! ```text
 //!  lamp                  thing: the lamp over the viewer's left shoulder, and a floor under it that
-//!     \    sky                  has the colours of the background, but for what shades it
-//!      \  .---.          room:  of some lamps the one that lights most of what is seen, as bright
-//!       \ | * |                 as it takes to see the rest
+//!     \    sky                  has the colours of the background, but is darker in the shade
+//!      \  .---.          room:  of some lamps the one that lights most of the visible surfaces, with
+//!       \ | * |                 sky and ground bright enough to show the rest
 //!  -------floor-----
 //! ```
 
@@ -24,32 +24,32 @@ const KEY: [f32; 3] = [0.92, 0.86, 0.76];
 const SKY: [f32; 3] = [0.21, 0.25, 0.31];
 const GROUND: [f32; 3] = [0.11, 0.10, 0.085];
 
-/// The red, green and blue that the geometries of a scene reflect; the sixth is like the first. The first is grey, and
-/// so is a scene of one geometry.
+/// The red, green and blue that the geometries of a scene reflect, in turn. The first is grey, and so is a
+/// scene of one geometry.
 const TINTS: [[f32; 3]; 5] =
     [[1.0, 1.0, 1.0], [1.0, 0.74, 0.48], [0.55, 0.78, 1.0], [0.62, 0.92, 0.58], [1.0, 0.6, 0.62]];
 
-/// The distance up to which something hides the sky: in parts of half the scene's diagonal, and in a
-/// room in parts of the mean distance that is seen.
+/// The distance within which surfaces hide the sky: in parts of half the scene's diagonal, or in a room in
+/// parts of the mean distance of its hits.
 const REACH: f64 = 0.5;
 const ROOM_REACH: f64 = 0.35;
 
-/// The light in a room: the mean that its pictures get, and how much brighter they may become.
+/// The light in a room: the mean that exposure aims at, and the largest exposure.
 const ROOM_MEAN: f32 = 0.34;
 const MAX_EXPOSURE: f32 = 6.0;
 
-/// Surfaces that face the lamp more than this count no more for its choice: a light that falls on
-/// many of them beats one that falls on a floor alone.
+/// The largest cosine that counts in the choice of a lamp: a lamp that lights many surfaces beats one that
+/// lights a floor alone.
 const GRAZING: f32 = 0.5;
 
-/// The part of the floor's light that is left without the lamp, and without the sky.
+/// The parts of the floor's light that remain without the lamp, and without the sky.
 const FLOOR_SHADE: f32 = 0.5;
 const FLOOR_CLOSED: f32 = 0.35;
 
-/// The floor's shade begins to fade and ends so many radii of the scene from its middle.
+/// The distances from the scene's middle at which the floor's shade begins to fade and ends, in its radii.
 const FADE: [f64; 2] = [1.2, 3.5];
 
-/// Rays on each side of the coarse picture that the light of a room is chosen by.
+/// Rays on each side of the coarse picture that decides about the light of a room.
 const COARSE: u16 = 48;
 
 /// The lights on the surfaces of a scene, as a camera sees them.
@@ -61,7 +61,7 @@ pub(super) struct Studio<'a> {
     around: Around,
     /// The direction to the sky.
     up: [f32; 3],
-    /// The brightness of sky and ground, 1 outside.
+    /// The brightness of sky and ground: 1 except in rooms.
     exposure: f32,
     floor: Option<Floor>,
 }
@@ -167,12 +167,12 @@ impl<'a> Studio<'a> {
         }
     }
 
-    /// The camera's picture.
+    /// Returns the camera of the picture.
     fn camera(&self) -> &Camera {
         &self.tiles.camera
     }
 
-    /// Gives rays their light, and returns how many more it took.
+    /// Computes the light of rays, and returns the number of rays that it has traced.
     pub(super) fn shade(&self, seen: &Seen<'_>, light: &mut [[f32; 3]]) -> u64 {
         let size = self.tiles.size;
         let mut spots = Vec::with_capacity(seen.rays.len());
@@ -207,7 +207,7 @@ impl<'a> Studio<'a> {
         reached.rays
     }
 
-    /// Returns the light of a surface, as film takes it: bright light never quite becomes white.
+    /// Returns the light of a surface, with a curve like that of film: bright light never quite becomes white.
     fn surface(&self, normal: [f32; 3], tint: [f32; 3], lit: f32, open: f32) -> [f32; 3] {
         let dot = crate::shade::dot;
         let key = lit * dot(normal, self.around.lamp).max(0.0);
@@ -218,7 +218,7 @@ impl<'a> Studio<'a> {
         })
     }
 
-    /// Returns where a ray meets the floor, and how much of the floor's shade is to be seen there.
+    /// Returns the point where a ray meets the floor, and the strength of the floor's shade there.
     fn on_floor(&self, ray: &Ray) -> Option<([f32; 3], f32)> {
         let Floor { middle, radius } = self.floor?;
         let (up, along) = (self.up.map(f64::from), ray.direction.map(f64::from));

@@ -13,17 +13,17 @@ pub struct Summary {
     /// The scene.
     #[serde(flatten)]
     pub scene: SceneFacts,
-    /// Geometries: the meshes of `A+B`, each in a colour of its own; 1 for any other scene.
+    /// Geometries: the meshes of `A+B`, each in its own colour; 1 for any other scene.
     pub geometries: usize,
-    /// Instances by which its meshes are shown; 0 for one mesh where it is.
+    /// Instances that show its meshes; 0 for a mesh without instances.
     pub instances: usize,
-    /// Reading or generating it.
+    /// The time of reading or generating the scene.
     pub load_seconds: f64,
     /// The structure.
     pub method: &'static str,
     /// Threads that built, if the method is built in parallel, and rendered.
     pub threads: u32,
-    /// Asking for sizes, getting memory and building.
+    /// The time of computing the sizes, allocating and building.
     pub build_seconds: f64,
     /// Bytes of the grid, or of the grids and the scene of instances, without meshes.
     pub index_bytes: usize,
@@ -33,7 +33,7 @@ pub struct Summary {
     pub size: u16,
     /// Rays from the eye through each pixel.
     pub samples: u16,
-    /// The lamp casts shadows.
+    /// True if the lamp casts shadows.
     pub shadows: bool,
     /// Rays of ambient occlusion from each sample.
     pub ao: u16,
@@ -41,7 +41,7 @@ pub struct Summary {
     pub rays: u64,
     /// Rays from the eye that hit something.
     pub hits: u64,
-    /// Tracing and shading every pixel.
+    /// The time of tracing and shading every pixel.
     pub render_seconds: f64,
     /// The work of rays from the eye, if it was counted.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -51,11 +51,11 @@ pub struct Summary {
 /// The work of rays from the eye.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Work {
-    /// Triangles tested.
+    /// Triangles tested for each ray.
     pub primitive_tests_per_ray: f64,
-    /// Cells or leaves entered.
+    /// Cells or leaves entered for each ray.
     pub cell_steps_per_ray: f64,
-    /// Subgrids, levels or nodes entered.
+    /// Subgrids, levels or nodes entered for each ray.
     pub grid_steps_per_ray: f64,
     /// The most tests and steps that one ray took.
     pub largest_ray_cost: u64,
@@ -119,7 +119,7 @@ impl fmt::Display for Summary {
     }
 }
 
-/// A time with three digits that count.
+/// Formats a time with three significant digits.
 pub(crate) fn seconds(seconds: f64) -> String {
     match seconds {
         s if s >= 100.0 => format!("{s:.0} s"),

@@ -1,7 +1,7 @@
-//! The formats of mesh files, told by what a file starts with and by the ending of its name.
+//! The formats of mesh files, recognised by a file's first bytes and by the ending of its name.
 //!
-//! Content goes before the name where a format has a mark of its own. A file that has the mark of
-//! something else gets an error that says what it is.
+//! For formats whose files start with a mark, the mark goes before the name. A file with the mark of a
+//! foreign format gets an error that names that format.
 
 use std::fs::{self, File};
 use std::io::Read as _;
@@ -13,26 +13,26 @@ use hgrid_core::{BlobInfo, Error};
 use super::model::Model;
 use super::{gltf, obj, packed, ply, stl};
 
-/// The endings of files that can be read, for messages.
+/// The endings of readable files, for messages.
 pub const ENDINGS: &str = ".ply, .obj, .stl, .gltf, .glb or .hgrid";
 
-/// A format that can be read.
+/// A readable format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Stanford's polygon files.
     Ply,
     /// Wavefront's text files.
     Obj,
-    /// Triangles for printers.
+    /// STL, the triangles of 3D printing.
     Stl,
     /// glTF as JSON, or GLB.
     Gltf,
-    /// A blob of this library with its mesh.
+    /// A blob of this library that contains its mesh.
     Blob,
 }
 
 impl Format {
-    /// Returns the format that the ending of a name stands for.
+    /// Returns the format for the ending of a name.
     #[must_use]
     pub fn named(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_ascii_lowercase();
@@ -106,7 +106,7 @@ impl Format {
         })
     }
 
-    /// Returns the axis that the format says is up, if it says so: true for z, false for y.
+    /// Returns true if the format's z axis is up, false if y is, and none if it does not say.
     #[must_use]
     pub const fn is_z_up(self) -> Option<bool> {
         match self {
@@ -144,7 +144,7 @@ impl Format {
     }
 }
 
-/// The marks of other things that are found under the names of meshes, or beside them.
+/// The marks of foreign files that are found under the names of meshes, or beside them.
 const FOREIGN: [(&[u8], &str); 15] = [
     (b"version https://git-lfs", "a pointer of Git LFS: fetch the file with `git lfs pull`"),
     (b"<!DOCTYPE", "a web page: the download went wrong"),

@@ -1,9 +1,7 @@
-//! glTF files, as JSON or binary (GLB): the triangles of the default scene's meshes, where its
-//! nodes put them.
+//! glTF files, as JSON or binary (GLB): the triangles of the default scene's meshes, placed by its nodes.
 //!
-//! A primitive is a mesh here, because it has vertices of its own; a node that shows a glTF mesh
-//! is an instance of each of its primitives. Materials, skins, morph targets and animations are
-//! left out: everything is as it rests.
+//! A primitive is a mesh here, because it has its own vertices; a node with a glTF mesh is an instance of
+//! each of its primitives. Materials, skins, morph targets and animations are ignored: the scene is at rest.
 
 use core::ops::Range;
 use std::fs;
@@ -19,13 +17,13 @@ use gltf::{Document, Gltf, Primitive, Semantic};
 use super::model::{IDENTITY, Mesh, Model, Transform};
 use crate::vector::round;
 
-/// A matrix in `f64`: the product of a chain of nodes is rounded once.
+/// A matrix in `f64`, so that the product of a chain of nodes is rounded once.
 type Matrix = [[f64; 4]; 3];
 
-/// Reads the bytes of a file; the files that it names are beside it.
+/// Reads the bytes of a file, and the files that it names beside it.
 ///
 /// # Errors
-/// If it is not glTF, needs an extension that is not read, or names data that are not there.
+/// If it is not valid glTF, requires an unsupported extension, or names missing data.
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Model> {
     let Gltf { document, blob } = Gltf::from_slice(bytes).context("it is not a valid glTF file")?;
     let buffers = buffers(&document, blob, path.parent().unwrap_or(Path::new("")))?;
@@ -126,7 +124,7 @@ fn triangles(primitive: &Primitive<'_>, buffers: &[Vec<u8>]) -> Result<Option<Me
     Ok(Some(Mesh { positions, indices }))
 }
 
-/// Walks the nodes of the default scene, of the first one or of no scene at all: of all then.
+/// Walks the nodes of the default scene, or of the first one; without scenes, all nodes.
 fn instances(document: &Document, places: &[Range<usize>]) -> Result<Vec<(usize, Transform)>> {
     let scene = document.default_scene().or_else(|| document.scenes().next());
     let roots: Vec<_> = if let Some(scene) = scene {
@@ -165,12 +163,12 @@ fn wide(transform: &Transform) -> Matrix {
     transform.map(|row| row.map(f64::from))
 }
 
-/// Returns the rows of a matrix that glTF gives as four columns.
+/// Returns the rows of a matrix, which glTF stores as four columns.
 fn rows(columns: [[f32; 4]; 4]) -> Matrix {
     [0, 1, 2].map(|row| columns.map(|column| f64::from(column[row])))
 }
 
-/// Returns the map that applies `b` and then `a`.
+/// Returns the transform that applies `b` and then `a`.
 fn product(a: &Matrix, b: &Matrix) -> Matrix {
     a.map(|row| {
         let column = |at: usize| row[0] * b[0][at] + row[1] * b[1][at] + row[2] * b[2][at];
@@ -184,7 +182,8 @@ mod tests {
 
     use super::*;
 
-    /// A mesh of one triangle and one strip of two, twice: moved by a parent, and mirrored there.
+    /// Returns a file that shows a mesh twice: in place, and mirrored and moved below a parent. The mesh has
+    /// a triangle, a strip of two and points.
     fn json(buffer: &str) -> String {
         format!(
             r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0, 1]}}],
@@ -231,7 +230,7 @@ mod tests {
         let numbers: Vec<_> = model.instances.iter().map(|&(mesh, _)| mesh).collect();
         assert_eq!(numbers, [0, 1, 0, 1]);
         assert_eq!(model.instances[1].1, IDENTITY);
-        // Half a turn about z takes x and y to their opposites, after the child's own place.
+        // Half a turn about z negates x and y, after the child's own transform.
         let mesh = model.flatten().unwrap();
         assert_eq!(
             mesh.positions[8..12],

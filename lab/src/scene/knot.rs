@@ -21,18 +21,17 @@ const TORUS_RADIUS: f64 = 1.0;
 const STRAND_RADIUS: f64 = 0.45;
 const TUBE_RADIUS: f64 = 0.26;
 
-/// Length of the curve divided by the tube's circumference, rounded: it makes quads near-square.
+/// The length of the curve divided by the tube's circumference, rounded, which makes quads near-square.
 const ROWS_PER_COLUMN: u32 = 10;
 
-/// Bumps: the frequency and the height of the coarsest octave, how many octaves there are, and the
-/// height of each as a part of the one before. The frequency doubles from octave to octave.
+/// Bumps: the frequency and the height of the coarsest octave, the number of octaves, and the height of each
+/// as a part of the one before. The frequency doubles from octave to octave.
 const BUMP_FREQUENCY: f64 = 3.0;
 const BUMP_HEIGHT: f64 = 0.08;
 const BUMP_OCTAVES: u32 = 6;
 const BUMP_GAIN: f64 = 0.45;
 
-/// Rows and columns of the mesh with `2 * rows * columns` closest to
-/// `triangles`, quads near-square.
+/// Returns the rows and columns of near-square quads for which `2 * rows * columns` is closest to `triangles`.
 pub(super) fn size(triangles: u32) -> (u32, u32) {
     let quads = (triangles / 2).max(1);
     let square = (quads / ROWS_PER_COLUMN).isqrt().max(3);
@@ -75,7 +74,7 @@ struct Station {
 }
 
 impl Station {
-    /// The station at an angle that goes once around while the curve closes.
+    /// Returns the station at an angle that goes once around while the curve closes.
     fn new(angle: [f64; 2]) -> Self {
         let [cos2, sin2] = turn(angle, angle);
         let [cos3, sin3] = turn([cos2, sin2], angle);
@@ -92,7 +91,7 @@ impl Station {
         Self { centre: [reach * cos2, reach * sin2, STRAND_RADIUS * sin3], normal, binormal }
     }
 
-    /// The point of the surface at an angle around the tube.
+    /// Returns the point of the surface at an angle around the tube.
     fn point(&self, [cos, sin]: [f64; 2]) -> Vector {
         let outward = offset(self.normal.map(|c| cos * c), sin, self.binormal);
         let smooth = offset(self.centre, TUBE_RADIUS, outward);
@@ -100,7 +99,7 @@ impl Station {
     }
 }
 
-/// Returns how far the surface stands out at a point of the smooth tube.
+/// Returns the height of the bumps at a point of the smooth tube.
 fn bumps(point: Vector) -> f64 {
     let (mut sum, mut frequency, mut height) = (0.0, BUMP_FREQUENCY, BUMP_HEIGHT);
     for _ in 0..BUMP_OCTAVES {
@@ -111,11 +110,11 @@ fn bumps(point: Vector) -> f64 {
     sum
 }
 
-/// Point `i` of `n` on the unit circle, almost equally spaced.
+/// Returns point `i` of `n` on the unit circle, almost equally spaced.
 ///
-/// Each quadrant is the rational curve `(1 - t^2, 2 t) / (1 + t^2)`, where `t` would be the tangent
-/// of half the angle. A polynomial stands in for that tangent: it meets 0 and 1, and its slopes
-/// there make the spacing the same on both sides of a quadrant's end.
+/// Each quadrant is the rational curve `(1 - t^2, 2 t) / (1 + t^2)`, where `t` would be the tangent of half
+/// the angle. A polynomial approximates that tangent: it meets 0 and 1, and its slopes there make the spacing
+/// the same on both sides of a quadrant's end.
 fn circle(i: u32, n: u32) -> [f64; 2] {
     let quadrant = 4 * i / n;
     let f = f64::from(4 * i - quadrant * n) / f64::from(n);
@@ -131,7 +130,7 @@ fn circle(i: u32, n: u32) -> [f64; 2] {
     }
 }
 
-/// The sum of two angles, each given as cosine and sine.
+/// Returns the sum of two angles, each given as cosine and sine.
 fn turn([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
     [a * c - b * d, a * d + b * c]
 }

@@ -1,8 +1,8 @@
 //! Scenes that can be rendered: a mesh from a file or from a formula, under one name.
 //!
-//! A scene is two plain arrays, the ones that the core takes. Loaders write into them directly;
-//! nothing is merged, reordered or repaired, because a measurement should see the file as it is.
-//! Only faces with more than three corners are cut into triangles.
+//! A scene is the two plain arrays that the core takes. Loaders write into them directly. They do not merge,
+//! reorder or repair anything, because a measurement should see the file as it is. They only cut faces with
+//! more than three corners into triangles.
 
 pub mod format;
 mod gltf;
@@ -26,10 +26,10 @@ use self::model::{Mesh, Model};
 /// Two opposite corners of a box: the smallest and the largest coordinates.
 pub type Bounds = ([f32; 3], [f32; 3]);
 
-/// A triangle mesh and what a picture of it should show.
+/// A triangle mesh, with the part of it that pictures show.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Scene {
-    /// The file's name, or the words that make the scene again.
+    /// The file's name, or the words that generate the scene.
     pub name: String,
     /// Vertices, in scene units.
     pub positions: Vec<[f32; 3]>,
@@ -37,19 +37,19 @@ pub struct Scene {
     pub indices: Vec<[u32; 3]>,
     /// The first triangle of each geometry, in ascending order from 0 on; empty for a scene of one geometry.
     pub geometries: Vec<usize>,
-    /// The part that pictures are about, if that is not all of it.
+    /// The part that pictures show, if not all of it.
     pub focus: Option<Bounds>,
-    /// The axis that the format of the file says is up, if it says so: true for z, false for y.
+    /// The axis that the file's format says is up, if it does: true for z, false for y.
     pub is_z_up: Option<bool>,
 }
 
 impl Scene {
-    /// Loads a file, or makes a scene from `procedural:NAME[:TRIANGLES]`, or puts one of them into
-    /// another: `bunny.ply+stadium.ply` is the bunny, as large as it is, in the middle of the
-    /// stadium, pictures are of the bunny, and each of the two is a geometry. Instances become triangles.
+    /// Loads a file, makes a scene from `procedural:NAME[:TRIANGLES]`, or puts one scene into another:
+    /// `bunny.ply+stadium.ply` is the bunny, at its own size, in the middle of the stadium. Pictures then
+    /// show the bunny, and each of the two is a geometry. Instances become triangles.
     ///
     /// # Errors
-    /// If the words name no scene or the file cannot be read; the message says what to do.
+    /// If the words name no scene or the file cannot be read; the message says how to correct it.
     ///
     /// ```
     /// let scene = hgrid_lab::scene::Scene::load("procedural:knot:2000")?;
@@ -60,9 +60,9 @@ impl Scene {
         Self::open(spec, false).map(|(scene, _)| scene)
     }
 
-    /// Loads a scene. If the caller takes instances and it is a file in which a mesh stands more than once, they
-    /// stay instances: their meshes come beside the scene, which then has no triangles, and the two
-    /// corners of its box for vertices.
+    /// Loads a scene. If the caller takes instances, and the file shows a mesh more than once, the instances
+    /// are kept. The scene is then returned with its model, and has no triangles, only the two corners of its
+    /// box as vertices.
     ///
     /// # Errors
     /// The errors of [`load`](Self::load).
@@ -95,7 +95,7 @@ impl Scene {
         Ok((Self { positions, indices, ..scene }, None))
     }
 
-    /// This scene in the middle of another, as large as both are; pictures are of what this one is.
+    /// Puts this scene in the middle of another, both at their own sizes; pictures show this one.
     fn within(self, outer: Self) -> Self {
         let middle = |scene: &Self| {
             let (min, max) = scene.bounds().unwrap_or_default();
@@ -112,7 +112,7 @@ impl Scene {
         let before = self.indices.len();
         let mut geometries = self.first_triangles();
         geometries.extend(outer.first_triangles().iter().map(|first| before + first));
-        // An index out of range stays one, for the core to refuse.
+        // An index out of range stays out of range, for the core to refuse.
         let [own, others] = [&self, &outer].map(|scene| scene.positions.len());
         let shift = u32::try_from(own).unwrap_or(u32::MAX);
         let vertex = |v: u32, count: usize, shift: u32| {
@@ -126,7 +126,7 @@ impl Scene {
         Self { name, positions, indices, geometries, focus, is_z_up: self.is_z_up }
     }
 
-    /// The first triangle of each geometry, also of one alone.
+    /// Returns the first triangle of each geometry, or 0 for a scene of one.
     fn first_triangles(&self) -> Vec<usize> {
         if self.geometries.is_empty() { vec![0] } else { self.geometries.clone() }
     }
@@ -144,7 +144,7 @@ impl Scene {
         self.geometries.iter().zip(ends).map(part).collect()
     }
 
-    /// Returns all triangles as one mesh, which knows of each triangle the geometry, given the scene's
+    /// Returns all triangles as one mesh that knows each triangle's geometry; takes the scene's
     /// [`parts`](Self::parts).
     ///
     /// # Errors
@@ -156,20 +156,20 @@ impl Scene {
         TriangleMesh::join(parts)
     }
 
-    /// The box around all finite vertices, or `None` if there are none.
+    /// Returns the box around all finite vertices, or `None` if there are none.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         model::bounds(self.positions.iter().copied())
     }
 
-    /// The box that a picture shows: the focus, or all of the scene, or the origin if it is empty.
+    /// Returns the box that a picture shows: the focus, or all of the scene, or the origin if it is empty.
     #[must_use]
     pub fn framed_bounds(&self) -> Bounds {
         self.focus.or_else(|| self.bounds()).unwrap_or_default()
     }
 }
 
-/// Reads the meshes of a file and where they stand, in the format that it has.
+/// Reads the meshes of a file and their instances, in the file's format.
 ///
 /// # Errors
 /// If the file cannot be read.

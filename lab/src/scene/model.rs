@@ -1,11 +1,11 @@
-//! The content of a file: meshes, and the places where they stand.
+//! The content of a file: meshes, and their instances.
 //!
 //! ```text
 //! meshes     [ knot, floor ]
 //! instances  (0, here) (0, there) (1, at the origin)      three things from two meshes
 //! ```
 //!
-//! A file without transforms is one mesh and one instance that leaves it where it is.
+//! A file without transforms is one mesh with one instance, whose transform is the identity.
 
 use hgrid_core::Instance;
 
@@ -27,12 +27,12 @@ pub struct Mesh {
     pub indices: Vec<[u32; 3]>,
 }
 
-/// Meshes, and where each of them stands how often.
+/// Meshes with their instances.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Model {
-    /// The meshes, each once.
+    /// The meshes, each stored once.
     pub meshes: Vec<Mesh>,
-    /// The number of a mesh, and its place.
+    /// The index of a mesh, and its transform.
     pub instances: Vec<(usize, Transform)>,
 }
 
@@ -43,8 +43,8 @@ impl From<Mesh> for Model {
 }
 
 impl Model {
-    /// Returns true if a mesh with triangles stands more than once, and all stand where instances of a scene can:
-    /// none is made flat.
+    /// Returns true if a mesh with triangles has more than one instance, and a scene can take all of them: no
+    /// transform is flat.
     #[must_use]
     pub fn is_shared(&self) -> bool {
         let mut is_seen = vec![false; self.meshes.len()];
@@ -67,9 +67,9 @@ impl Model {
         bounds(corners)
     }
 
-    /// Returns the triangles of all instances as one mesh; `None` if that has more than 2^32 vertices.
+    /// Returns the triangles of all instances as one mesh; `None` if it would have more than 2^32 vertices.
     ///
-    /// The front of a triangle stays its front: under a mirror its corners change their order.
+    /// Fronts of triangles stay fronts: a mirroring transform swaps two corners.
     #[must_use]
     pub fn flatten(mut self) -> Option<Mesh> {
         if let ([_], [(0, IDENTITY)]) = (&*self.meshes, &*self.instances) {
@@ -92,7 +92,7 @@ impl Model {
             let first = u32::try_from(all.positions.len()).ok()?;
             all.positions.extend(mesh.positions.iter().map(|&p| moved(&transform, p)));
             let is_mirrored = determinant(&transform) < 0.0;
-            // An index out of range stays one, for the core to refuse.
+            // An index out of range stays out of range, for the core to refuse.
             let vertex =
                 |v: u32| if (v as usize) < mesh.positions.len() { first + v } else { u32::MAX };
             all.indices.extend(mesh.indices.iter().map(|triangle| {
@@ -104,7 +104,7 @@ impl Model {
     }
 }
 
-/// Moves a point, in `f64` until it is there.
+/// Transforms a point in `f64`, and rounds the result.
 pub(crate) fn moved(transform: &Transform, point: [f32; 3]) -> [f32; 3] {
     let point = point.map(f64::from);
     round(transform.map(|row| {
@@ -122,7 +122,7 @@ pub(crate) fn transform_of(instance: &Instance) -> Transform {
     })
 }
 
-/// Returns the volume that the unit cube gets, negative under a mirror.
+/// Returns the determinant: the volume of the transformed unit cube, negative for a mirror.
 pub(crate) fn determinant(transform: &Transform) -> f64 {
     let [a, b, c] = transform.map(|[x, y, z, _]| -> Vector { [x, y, z].map(f64::from) });
     dot(a, crate::vector::cross(b, c))

@@ -1,7 +1,7 @@
 //! Random numbers with the same bits everywhere: a sequence, and a field over space.
 //!
-//! Both stand on one 64-bit mixer (`SplitMix64`, Steele, Lea and Flood 2014), so that scenes need
-//! nothing but integer arithmetic and IEEE + - * /, and a port to another language is line by line.
+//! Both use one 64-bit mixer (`SplitMix64`, Steele, Lea and Flood 2014). So scenes need only integer
+//! arithmetic and IEEE + - * /, and can be ported to another language line by line.
 
 /// The odd number next to 2^64 divided by the golden ratio.
 const GOLDEN_GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
@@ -15,27 +15,27 @@ impl SplitMix64 {
         Self(seed)
     }
 
-    /// The next number, in `0..1`.
+    /// Returns the next number, in `0..1`.
     pub(super) fn next_unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(GOLDEN_GAMMA);
         unit(mix(self.0))
     }
 }
 
-/// Every bit of the result depends on every bit of `z`.
+/// Mixes bits: every bit of the result depends on every bit of `z`.
 const fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
 }
 
-/// 53 random bits as a number in `0..1`.
+/// Converts 53 of the bits to a number in `0..1`.
 #[expect(clippy::cast_precision_loss, reason = "53 bits are what an f64 holds")]
 const fn unit(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Value noise: random values at the points of the integer lattice, smooth in between; `-1..1`.
+/// Returns value noise: random values at the points of the integer lattice, smooth in between; `-1..1`.
 pub(super) fn noise(point: [f64; 3]) -> f64 {
     let cell = point.map(f64::floor);
     let [fx, fy, fz] = [0, 1, 2].map(|axis| fade(point[axis] - cell[axis]));
@@ -45,13 +45,13 @@ pub(super) fn noise(point: [f64; 3]) -> f64 {
     lerp(lerp(row(y, z), row(y1, z), fy), lerp(row(y, z1), row(y1, z1), fy), fz)
 }
 
-/// A whole coordinate as an integer; negative ones wrap around.
+/// Converts a whole coordinate to an integer; negative ones wrap around.
 #[expect(clippy::cast_possible_truncation, reason = "scenes span a few thousand lattice points")]
 const fn lattice(coordinate: f64) -> u64 {
     (coordinate as i64).cast_unsigned()
 }
 
-/// The value at a lattice point, in `-1..1`.
+/// Returns the value at a lattice point, in `-1..1`.
 fn value(x: u64, y: u64, z: u64) -> f64 {
     let key = x
         .wrapping_mul(GOLDEN_GAMMA)
@@ -60,7 +60,7 @@ fn value(x: u64, y: u64, z: u64) -> f64 {
     2.0 * unit(mix(key)) - 1.0
 }
 
-/// 0 at 0 and 1 at 1, level at both.
+/// Returns the smooth step from 0 at 0 to 1 at 1, with level ends.
 fn fade(t: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }

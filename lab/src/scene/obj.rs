@@ -1,8 +1,7 @@
 //! OBJ files: all objects and groups of the file as one mesh.
 //!
-//! The lines that start with `v` and `f` are read; materials, normals, texture coordinates, points
-//! and lines are left out. Errors name the line, which is why there is a reader here: the crates
-//! for this format do not tell it.
+//! The reader takes the lines that start with `v` and `f`, and ignores materials, normals, texture
+//! coordinates, points and lines. Its errors name the line, which the crates for this format do not.
 
 use anyhow::{Context as _, Result, bail, ensure};
 
@@ -11,8 +10,7 @@ use super::Mesh;
 /// Reads a file.
 ///
 /// # Errors
-/// If a line is not what its first word announces, or a face names a vertex that the file does
-/// not have.
+/// If a line does not match its first word, or a face names a vertex that the file does not have.
 pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
     let mut mesh = Mesh::default();
     // The largest index so far and its line: a face may come before its vertices.

@@ -1,4 +1,4 @@
-//! The mesh of a blob that has one: grids that were packed with their mesh can be looked at.
+//! The mesh of a blob that contains it, so that packed grids can be rendered.
 
 use std::path::Path;
 

@@ -1,13 +1,13 @@
 //! Scenes that need no file: the same vertices, bit for bit, on every platform.
 //!
-//! | name | what | what it asks of a grid |
+//! | name | what | what it tests in a grid |
 //! |---|---|---|
 //! | `knot` | a closed, finely bumped surface | the usual: a scanned object |
 //! | `stage` | a knot on a floor eighty times its size | one cell size cannot fit both |
 //! | `soup` | a cube full of small triangles | density without surfaces: rows without gaps |
 //!
-//! On the stage, a grid of one level has all of the knot in one or two cells, so that rays test
-//! most of its triangles: the time grows with the triangle count, and the default is small.
+//! On the stage, a grid of one level has all of the knot in one or two cells, so that rays test most of its
+//! triangles. The time grows with the triangle count, so the default is small.
 
 use anyhow::{Result, bail};
 
@@ -19,7 +19,7 @@ use crate::vector::round;
 /// The names that [`make`] knows.
 pub const NAMES: [&str; 3] = ["knot", "stage", "soup"];
 
-/// The triangle counts of scenes that are named without one.
+/// The default triangle counts of scenes.
 const DEFAULT_KNOT: u32 = 500_000;
 const DEFAULT_STAGE: u32 = 2000;
 const DEFAULT_SOUP: u32 = 100_000;
@@ -31,7 +31,7 @@ const MAX_TRIANGLES: u32 = 100_000_000;
 const FLOOR_SQUARES: u32 = 10;
 const FLOOR_SCALE: f64 = 80.0;
 
-/// Makes the scene that `NAME` or `NAME:TRIANGLES` means, with `TRIANGLES` like 5000, 20K or 3M.
+/// Makes the scene of `NAME` or `NAME:TRIANGLES`, with `TRIANGLES` like 5000, 20K or 3M.
 ///
 /// # Errors
 /// If there is no such scene or the count is not in range.
@@ -54,7 +54,7 @@ pub fn make(words: &str) -> Result<Scene> {
     Ok(Scene { name: format!("procedural:{name}:{}", scene.indices.len()), ..scene })
 }
 
-/// A whole number, or one of thousands (`K`) or millions (`M`).
+/// Parses a whole number, with `K` for thousands or `M` for millions.
 fn parse_count(word: &str) -> Option<u32> {
     let (digits, unit) = match word.char_indices().last()? {
         (end, 'k' | 'K') => (&word[..end], 1000),
@@ -69,7 +69,7 @@ fn knot(triangles: u32) -> Scene {
     knot::make(rows, columns)
 }
 
-/// The knot takes what the floor leaves, and pictures show the knot.
+/// Makes the stage. The knot gets the triangles that the floor leaves, and pictures show the knot.
 fn stage(triangles: u32) -> Scene {
     let floor_triangles = 2 * FLOOR_SQUARES * FLOOR_SQUARES;
     let mut scene = knot(triangles.saturating_sub(floor_triangles));
@@ -95,7 +95,7 @@ fn stage(triangles: u32) -> Scene {
     scene
 }
 
-/// Triangles of random shape in random places: the corners of each lie in a small cube.
+/// Makes triangles of random shape in random places: the corners of each lie in a small cube.
 fn soup(triangles: u32) -> Scene {
     let mut progress = Progress::new("generating", u64::from(triangles));
     let mut random = SplitMix64::new(1);
@@ -117,7 +117,7 @@ fn soup(triangles: u32) -> Scene {
     scene
 }
 
-/// The side of a cube of a volume up to 1, by bisection: a cube root would need a library.
+/// Returns the side of a cube of a volume up to 1, by bisection: a cube root would need a library.
 fn side_of(volume: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..60 {

@@ -1,7 +1,7 @@
-//! STL files, binary and ASCII: three vertices of its own for each triangle, as the file has them.
+//! STL files, binary and ASCII: three vertices for each triangle, as in the file.
 //!
-//! A binary file is told by its length, which follows from the triangle count behind its header:
-//! many of them start with `solid`, as ASCII files do. An ASCII file may have several solids.
+//! The length of a binary file follows from the triangle count after its header, and identifies it: many
+//! binary files start with `solid`, as ASCII files do. An ASCII file may have several solids.
 
 use anyhow::{Context as _, Result, bail, ensure};
 
@@ -10,13 +10,13 @@ use super::Mesh;
 /// Bytes before the first triangle of a binary file: a comment and the triangle count.
 const HEADER_BYTES: usize = 84;
 
-/// Bytes of a triangle: its normal, three corners, and two that programs use in their own ways.
+/// Bytes of a triangle: its normal, three corners, and two bytes without a fixed use.
 const TRIANGLE_BYTES: usize = 50;
 
 /// Reads a file.
 ///
 /// # Errors
-/// If the file is cut off, or a line of an ASCII file is not what it should be.
+/// If the file is cut off, or a line of an ASCII file is malformed.
 pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
     let count = bytes.get(..HEADER_BYTES).and_then(|header| header.last_chunk());
     let count = count.map(|count| u32::from_le_bytes(*count) as usize);
@@ -25,7 +25,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
     match count {
         Some(count) if count.saturating_mul(TRIANGLE_BYTES) == rest.len() => Ok(binary(rest)),
         _ if is_text => ascii(str::from_utf8(bytes).context("it is neither binary STL nor text")?),
-        // Some programs write more behind the last triangle.
+        // Some programs write more bytes after the last triangle.
         Some(count) => {
             let present = rest.len() / TRIANGLE_BYTES;
             ensure!(

@@ -14,7 +14,7 @@ use super::{Case, case, refused};
 const NODE_COUNT: usize = 112;
 const LEVELS: usize = 116;
 
-/// Bytes of a node, and where its fields lie.
+/// The size of a node, and the offsets of its fields.
 const NODE: usize = 80;
 const ORIGIN: usize = 0;
 const EXPONENTS: usize = 12;
@@ -33,7 +33,7 @@ struct Tree {
     node_count: usize,
 }
 
-/// A child of a node: another node, or a leaf of so many ids from a word on.
+/// A child of a node: another node, or a leaf of `count` ids from word `first` on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Child {
     Node(usize),
@@ -48,27 +48,27 @@ impl Tree {
         Self { ids: HEAD, id_count, nodes, node_count }
     }
 
-    /// The byte of a field of a node.
+    /// Returns the offset of a field of a node.
     const fn at(&self, node: usize, field: usize) -> usize {
         self.nodes + NODE * node + field
     }
 
-    /// Returns the bytes where errors about a node point.
+    /// Returns the range of offsets in errors about a node.
     const fn node(&self, node: usize) -> core::ops::Range<usize> {
         self.at(node, 0)..self.at(node + 1, 0)
     }
 
-    /// Returns the bytes where errors about ids point.
+    /// Returns the range of offsets in errors about ids.
     const fn all_ids(&self) -> core::ops::Range<usize> {
         self.ids..self.ids + 4 * self.id_count
     }
 
-    /// Returns the bytes where errors about anything but the header point.
+    /// Returns the range of offsets in errors about anything but the header.
     const fn all(&self) -> core::ops::Range<usize> {
         self.ids..self.at(self.node_count, 0)
     }
 
-    /// The children of a node with their slots.
+    /// Returns the children of a node with their slots.
     fn children(&self, blob: &[u8], node: usize) -> Vec<(usize, Child)> {
         let copy = Copy::of(blob);
         let mut child = copy.word(self.at(node, CHILD)) as usize;
@@ -87,7 +87,7 @@ impl Tree {
         children
     }
 
-    /// The way down to the deepest leaf: each node with the slot of the next one, or of the leaf.
+    /// Returns the path to the deepest leaf: each node with the slot of the next one, or of the leaf.
     fn deepest(&self, blob: &[u8]) -> Vec<(usize, usize)> {
         let mut ways = vec![vec![]];
         let mut deepest: Vec<(usize, usize)> = Vec::new();
@@ -109,7 +109,7 @@ impl Tree {
     }
 }
 
-/// Enough triangles for a tree on top of several roots, some of them in a crowd.
+/// Returns enough triangles for a tree on top of several roots, some of them in a crowd.
 fn deep() -> Seed {
     let mut mesh = soup(400, 0.05, 3);
     mesh.append(&soup(300, 0.05, 5).map(|p| p.map(|c| 0.3 + 1e-3 * c)));
@@ -160,7 +160,7 @@ fn every_triangle_stands_in_one_leaf() {
             }),
             case("ids that wrap", t.all(), move |b| b.set_word(t.at(last, FIRST), u32::MAX - 1)),
             case("fewer ids than triangles", counts.clone(), move |b| {
-                // The ids take as many blocks as before: nothing moves.
+                // The ids take as many blocks as before, so nothing moves.
                 assert!(t.id_count % 16 > 1);
                 b.set_word(word(t.id_count - 1), 0);
                 add(b, REFERENCE_COUNT, -1);
@@ -170,7 +170,7 @@ fn every_triangle_stands_in_one_leaf() {
     );
 }
 
-/// A triangle's first corner in the mesh of [`deep`].
+/// Returns the first corner of a triangle in the mesh of [`deep`].
 fn seed_center(id: usize) -> [f32; 3] {
     let mesh = deep_mesh();
     mesh.positions[mesh.indices[id][0] as usize]
@@ -181,8 +181,7 @@ fn deep_mesh() -> &'static Mesh {
     MESH.get_or_init(|| deep().mesh)
 }
 
-/// Of a tight box, one step less on any side loses a triangle or its margin, on every level of the
-/// way down.
+/// Boxes are tight: two steps less on any side loses a triangle or its margin, on every level of the path.
 #[test]
 fn boxes_hold_what_is_below_them() {
     let seed = deep();
@@ -298,16 +297,16 @@ fn the_header_of_a_tree_has_nothing_else() {
         cases.push(case("more than one cell", RESOLUTION..HASH_COUNT, move |b| b.set_word(at, 2)));
     }
     for at in [HASH_COUNT, MACROCELL_FACTOR, SUBDIVIDE_ABOVE, DEPTH, CELL_SIZE, DENSITY] {
-        // 1 to 3 are contents that other functions open.
+        // Contents 1 to 3 belong to other functions that open blobs.
         cases.push(case("a field of another method", 0..HEAD, move |b| b.set_word(at, 4)));
     }
     refused(&seed, &cases);
 }
 
-/// The bytes behind the ids, and behind the nodes.
+/// The padding after the ids and after the nodes is zero.
 #[test]
 fn what_fills_up_the_sections_of_a_tree_is_zero() {
-    // A section ends at a multiple of 64 bytes: take a tree in which neither is full.
+    // Sections end at multiples of 64 bytes: take a tree in which both have padding.
     let behind = |seed: &Seed| {
         let t = Tree::of(&seed.blob);
         [t.ids + 4 * t.id_count..t.nodes, t.at(t.node_count, 0)..seed.blob.len()]
@@ -322,7 +321,7 @@ fn what_fills_up_the_sections_of_a_tree_is_zero() {
     }
 }
 
-/// An adversary's tree: nodes in a circle, all of them below themselves, leaves that overlap.
+/// A hostile tree: its nodes form cycles, and its leaves overlap.
 #[test]
 fn circles_end() {
     let seed = deep();
@@ -344,8 +343,7 @@ fn circles_end() {
     }
 }
 
-/// Trees that a build would not write, and that are right: `validate` lets them pass, and they answer
-/// as brute force does.
+/// Trees that no build writes, but that are right: `validate` accepts them, and they answer as brute force does.
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn what_is_proven_answers_right() {
@@ -380,14 +378,13 @@ fn what_is_proven_answers_right() {
     assert!(proven > 100 && proven < tried - 100, "{proven} of {tried}");
 }
 
-/// Two children of a node in each other's place, with all that lies below them: right, but not what a
-/// build makes.
+/// Two leaves of a node are exchanged: the tree is right, but no build makes it.
 #[test]
 fn children_in_any_order_are_right() {
     let seed = deep();
     let t = Tree::of(&seed.blob);
     let mut bytes = seed.blob.clone();
-    // Leaves of equal length in each other's place, ids and boxes.
+    // Exchange leaves of equal length, with their ids and boxes.
     let mut swapped = 0;
     for node in 0..t.node_count {
         let children = t.children(&seed.blob, node);

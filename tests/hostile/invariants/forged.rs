@@ -1,4 +1,4 @@
-//! Blobs by somebody who knows the proof, and chose slot numbers with equal scrambled sums.
+//! Blobs forged with knowledge of the proof: their slot numbers have equal scrambled sums.
 
 use std::collections::BTreeMap;
 
@@ -12,16 +12,15 @@ use hgrid_tests::random::Random;
 use super::sections::*;
 use super::variable::{Sub, subgrids};
 
-/// Slots whose scrambled numbers have the same sum, to 64 bits: a birthday search found them.
-/// Cells may share the first four in pairs while no cell has the others, and the sum over cells
-/// is that over slots.
+/// Slots whose scrambled numbers have the same sum, to 64 bits; a birthday search found them. If cells share
+/// the first four in pairs and no cell has the others, the sum over cells still equals the sum over slots.
 const SHARED: [usize; 4] = [1535, 11_941, 20_919, 28_447];
 const ORPHANED: [usize; 4] = [39_775, 45_454, 58_142, 63_241];
 
-/// An id that nobody reads.
+/// An id that no cell reads.
 const JUNK: u32 = 0xdead_beef;
 
-/// A table of slots with these lists, and the lists one behind the other.
+/// Returns a table of slots with these lists, and the lists one after the other.
 fn table(lists: &BTreeMap<usize, Vec<u32>>) -> [Vec<u32>; 2] {
     let (mut ends, mut ids) = (vec![0], Vec::new());
     for slot in 0..=*lists.keys().last().unwrap() {
@@ -31,7 +30,7 @@ fn table(lists: &BTreeMap<usize, Vec<u32>>) -> [Vec<u32>; 2] {
     [ends, ids]
 }
 
-/// A sheet of small triangles across x, in one cell of a box that two others hold open.
+/// Returns a sheet of small triangles across x, in one cell of a box that two other triangles span.
 fn sheet() -> Mesh {
     let mut mesh = Mesh::default();
     for corner in [0.0, 1.0] {
@@ -55,7 +54,7 @@ struct Listed {
     ids: Vec<u32>,
 }
 
-/// The cells of a subgrid with lists. There is one cell in a row, so each can have any slot.
+/// Returns the cells of a subgrid that have lists. Each row has one cell, so each cell can have any slot.
 fn listed(blob: &Copy, sub: &Sub) -> Vec<Listed> {
     assert_eq!(sub.resolution[0], 1, "rows of one cell");
     let word = |section: usize, at: usize| blob.word(section + 4 * at) as usize;
@@ -69,8 +68,8 @@ fn listed(blob: &Copy, sub: &Sub) -> Vec<Listed> {
     .collect()
 }
 
-/// Four pairs of cells that can share what both list: what they lose by that is listed in a cell
-/// before them, where a proof counts it.
+/// Returns four pairs of cells that can share the ids that both list: the ids that they lose are listed in a
+/// cell before them, where the proof counts them.
 fn pairs(lists: &[Listed]) -> [(usize, usize, Vec<u32>); 4] {
     let is_listed_before =
         |cell: usize, id: &u32| lists[..cell].iter().any(|list| list.ids.contains(id));
@@ -99,7 +98,7 @@ fn pairs(lists: &[Listed]) -> [(usize, usize, Vec<u32>); 4] {
     chosen.try_into().expect("four pairs")
 }
 
-/// A subgrid whose cells share lists in pairs, and which has as many ids as before in all.
+/// Forges a subgrid whose cells share lists in pairs, with as many ids in all as before.
 fn forge(seed: &Seed) -> (Copy, std::ops::Range<usize>) {
     let mut copy = Copy::of(&seed.blob);
     let (s, subs) = subgrids(seed);
@@ -107,7 +106,7 @@ fn forge(seed: &Seed) -> (Copy, std::ops::Range<usize>) {
     let cells = listed(&copy, &sub);
     let pairs = pairs(&cells);
 
-    // Give each cell a slot: those of a pair the same.
+    // Give each cell a slot, and both cells of a pair the same.
     let mut slots: Vec<usize> = (0..cells.len()).collect();
     let mut lists: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
     for ((i, j, common), shared) in pairs.into_iter().zip(SHARED) {
@@ -117,7 +116,7 @@ fn forge(seed: &Seed) -> (Copy, std::ops::Range<usize>) {
     for (cell, &slot) in cells.iter().zip(&slots) {
         lists.entry(slot).or_insert_with(|| cell.ids.clone());
     }
-    // Put as many ids as are left over where no cell looks.
+    // Put the remaining ids into slots that no cell uses.
     let total = (sub.end - sub.ids) / 4;
     let mut rest = total - lists.values().map(Vec::len).sum::<usize>();
     for slot in ORPHANED {
@@ -153,7 +152,7 @@ fn lists_that_no_cell_names_do_not_count() {
     let forged = Grid::open(copy.bytes(), view).unwrap();
     ends(&forged, &fixed_rays(forged.bounds(), 12));
 
-    // It answers wrongly: the proof has something to find.
+    // The forged blob answers wrongly, so the proof has something to find.
     let blob = Copy::of(&seed.blob);
     let built = Grid::open(blob.bytes(), view).unwrap();
     let mut random = Random(1);
@@ -169,8 +168,7 @@ fn lists_that_no_cell_names_do_not_count() {
     assert!(is_there, "{result:?}");
 }
 
-/// Cells may share a list where all of them have the same: no build writes that, and nobody can tell
-/// by an answer.
+/// Cells may share a list if all of them have the same ids: no build writes that, but the answers are right.
 #[test]
 #[cfg_attr(miri, ignore = "minutes")]
 fn equal_lists_may_be_shared() {
@@ -204,13 +202,13 @@ fn equal_lists_may_be_shared() {
     let grid = Grid::open(copy.bytes(), view).unwrap();
     prove(&grid).expect("the answers are right");
     agrees(&grid, &fixed_rays(grid.bounds(), 40));
-    // One orphan less, and there are more ids than the cells list.
+    // With one orphan less there are more ids than the cells list.
     copy.set_word(s.rows, copy.word(s.rows + 4 * 9));
     let grid = Grid::open(copy.bytes(), view).unwrap();
     assert!(matches!(prove(&grid), Err(Error::Corrupt { .. })));
 }
 
-/// A crowded cell with a list instead of a subgrid is slower, and nothing else.
+/// A crowded cell with a list instead of a subgrid is slower, but right.
 #[test]
 fn a_list_may_have_any_length() {
     let parameters = Parameters::Variable { density: 4.0, subdivide_above: 1000 };

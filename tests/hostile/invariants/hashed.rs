@@ -16,12 +16,12 @@ fn parameters(method: Method, density: f32) -> Parameters {
     }
 }
 
-/// A grid with empty rows, and with empty cells in others.
+/// Returns a grid with empty rows, and with empty cells in other rows.
 fn sparse(method: Method) -> Seed {
     Seed::new(soup(60, 0.05, 9), parameters(method, 4.0).into())
 }
 
-/// Returns cases that break the invariants of every hash table with its lists in the pool behind it.
+/// Returns cases that break the invariants of every hash table with its lists in the pool after it.
 pub(super) fn table(seed: &Seed) -> Vec<Case<'static>> {
     let blob = &seed.blob;
     let s = Hashed::of(blob);
@@ -31,7 +31,7 @@ pub(super) fn table(seed: &Seed) -> Vec<Case<'static>> {
     let in_bits = s.bits..s.hash;
     let in_hash = s.hash..s.pool;
     let empty_row = s.empty_row(blob);
-    // A cell without a list in a row that has some.
+    // A cell without a list, in a row that has lists.
     let bit = s.bit(first.cell) + 1;
     let beside = (bit..s.cells()).find(|&bit| full.iter().all(|cell| s.bit(cell.cell) != bit));
     let beside = beside.unwrap();
@@ -54,14 +54,13 @@ pub(super) fn table(seed: &Seed) -> Vec<Case<'static>> {
         }),
         case("the last list ends late", in_hash, move |b| add(b, s.hash + 4 * s.slots, 1)),
     ];
-    // The place behind the last slot is free in this blob: a slot more
-    // fits without moving anything.
+    // The padding after the last slot has room in this blob: one more slot fits without moving anything.
     assert!(!(s.slots + 1).is_multiple_of(16), "no room for a slot");
     cases.push(case("a slot without a list at the end", HASH_COUNT..HASH_COUNT + 4, move |b| {
         add(b, HASH_COUNT, 1);
         b.set_word(s.hash + 4 * (s.slots + 1), s.words as u32);
     }));
-    // Two rows that have changed places.
+    // Exchange two rows.
     let rows: Vec<usize> =
         full.iter().map(|cell| cell.cell[2] * s.resolution[1] + cell.cell[1]).collect();
     let (one, other) = (rows[0], rows[rows.len() - 1]);
@@ -73,8 +72,8 @@ pub(super) fn table(seed: &Seed) -> Vec<Case<'static>> {
     cases
 }
 
-/// Returns cases that break the invariants of every list of a cell: `ids` are its bytes, `at` those where
-/// errors point.
+/// Returns cases that break the invariants of any list of a cell: `ids` are its bytes, `at` the offsets of
+/// the errors.
 pub(super) fn list(
     mesh: &Mesh,
     ids: std::ops::Range<usize>,
@@ -97,11 +96,11 @@ pub(super) fn list(
     ]
 }
 
-/// A triangle that does not reach a cell.
+/// Returns a triangle that does not reach a cell.
 fn stranger(seed: &Seed, s: &Hashed, cell: &Cell) -> u32 {
     let copy = Copy::of(&seed.blob);
     let ids: Vec<u32> = (cell.start..cell.end).map(|word| copy.word(s.at(word))).collect();
-    // One that would keep the ids ascending.
+    // Take one that keeps the ids ascending.
     let last = ids[ids.len() - 1];
     (last + 1..seed.mesh.indices.len() as u32).find(|id| !ids.contains(id)).unwrap()
 }
@@ -120,7 +119,7 @@ fn tables_and_lists_are_what_a_build_makes() {
         cases.push(case("a triangle of another cell", in_pool.clone(), move |b| {
             b.set_word(last, stranger);
         }));
-        // The list in front of another gives it its last one.
+        // Give the last id of a list to the next list.
         let behind = full.iter().find(|other| other.slot == cell.slot + 1).map(|other| other.slot);
         let behind = behind.unwrap_or(cell.slot);
         cases.push(case("a triangle given to the next cell", in_pool, move |b| {
@@ -149,8 +148,7 @@ fn a_missing_triangle_is_missed() {
     }
 }
 
-/// Every cell of one triangle's box has the same list: rows can share
-/// slots, and all lists are right.
+/// Every cell of one triangle's box has the same list: rows could share slots, and all lists would be right.
 #[test]
 fn slots_are_not_shared() {
     for method in [Method::OneLevel, Method::Fixed, Method::Variable] {
@@ -171,7 +169,7 @@ fn macrocells_are_full_where_something_is_below() {
     let s = Hashed::of(&seed.blob);
     let [x, y, z] = s.resolution;
     assert!(x * y * z / 8 > 64 && seed.blob.len() - s.overlay >= 64, "{s:?}");
-    // All bits of the first level, one by one, and what lies behind its last macrocell.
+    // All bits of the first level, one by one, and the bit after its last macrocell.
     let cells = s.resolution.map(|cells| cells.div_ceil(2)).iter().product::<usize>();
     let end = seed.blob.len();
     let words = s.overlay..(s.overlay + 8 * cells.div_ceil(64)).min(end);

@@ -8,11 +8,11 @@ use super::sections::*;
 use super::{Case, case, refused};
 
 fn small(method: Method) -> &'static Seed {
-    // A dozen triangles.
+    // A mesh of a dozen triangles.
     seeds().find(|seed| seed.config.method() == method && seed.mesh.indices.len() == 12).unwrap()
 }
 
-/// A field that means nothing to a method, and one that every method must have right.
+/// Returns cases for fields that mean nothing to a method, and for fields that every method must have right.
 fn fields(seed: &Seed) -> Vec<Case<'static>> {
     let method = seed.config.method();
     let mut cases = vec![
@@ -48,9 +48,9 @@ fn fields(seed: &Seed) -> Vec<Case<'static>> {
             case("a cell more", 0..HEAD + 64, move |b| add(b, resolution, 1)),
         ]);
     }
-    // Set what lies behind the last known field, and fields of other methods.
+    // Set the bytes after the last known field, and fields of other methods.
     let unused = RESERVED - 20..RESERVED + 12;
-    // A tree counts its nodes and their levels there (see bvh.rs), and tells its quality.
+    // A tree has the numbers of nodes and levels there (see bvh.rs), and its quality.
     let is_tree = method == Method::Bvh;
     let used = if is_tree { 2 } else { 0 };
     for reserved in [0, 4, 8].map(|at| RESERVED + at).into_iter().skip(used) {
@@ -103,13 +103,12 @@ fn parameters_that_no_build_takes_are_refused() {
     refused(small(Method::Recursive), &[is(DEPTH, 0), is(DEPTH, 5), is(HASH_COUNT, 1)]);
 }
 
-/// The bytes between the sections.
+/// The padding between sections is zero.
 #[test]
 fn what_fills_up_sections_is_zero() {
     let mut found = 0;
     for seed in seeds().filter(|seed| !seed.mesh.indices.is_empty()) {
-        // The last section ends with what fills it up, if anything
-        // does; macrocells fill their words.
+        // The last section ends with padding, if any; macrocells fill their words.
         let count = |at| Copy::of(&seed.blob).word(at) as usize;
         let is_tree = seed.config.method() == Method::Bvh;
         let words = if is_tree { 20 * count(RESERVED) } else { count(REFERENCE_COUNT) };

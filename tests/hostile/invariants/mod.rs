@@ -1,7 +1,7 @@
-//! Invariants of every blob that a build writes, broken one by one: opening or `validate` refuses the
-//! blob, at a byte that has to do with it, and queries end whatever it is.
+//! Invariants of every blob that a build writes, broken one by one: opening or `validate` refuses the blob,
+//! at an offset that belongs to the damage, and queries end in any case.
 //!
-//! The words are found here from the format's description alone.
+//! The tests find the words by the format's description alone.
 
 mod bvh;
 mod forged;
@@ -18,15 +18,15 @@ use hgrid_tests::copy::Copy;
 use hgrid_tests::hostile::{Seed, ends, fixed_rays};
 use hgrid_tests::owned::prove;
 
-/// A row of a table: what is broken, where the error points, and how to break it.
+/// A row of a table: a name of the damage, the offsets where the error may point, and the change.
 type Case<'c> = (&'c str, Range<usize>, Box<dyn Fn(&mut Copy) + 'c>);
 
-/// Makes a row of a table.
+/// Returns a row of a table.
 fn case<'c>(what: &'c str, at: Range<usize>, change: impl Fn(&mut Copy) + 'c) -> Case<'c> {
     (what, at, Box::new(change))
 }
 
-/// Changes a blob, makes its checksum right, and asserts that it is refused where it should be.
+/// Changes a blob, corrects its checksum, and asserts that it is refused at the right offset.
 fn refused(seed: &Seed, cases: &[Case<'_>]) {
     let view = seed.mesh.view();
     for (what, at, change) in cases {

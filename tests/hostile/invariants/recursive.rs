@@ -1,4 +1,4 @@
-//! Recursive grids: a pool of grids, each with a head, entries, and what its cells hold.
+//! Recursive grids: a pool of grids, each with a head, entries, and the contents of its cells.
 
 use hgrid_core::{Config, Method, Parameters};
 use hgrid_tests::copy::Copy;
@@ -9,12 +9,12 @@ use super::hashed::list;
 use super::sections::*;
 use super::{case, refused};
 
-/// Grids in grids.
+/// Returns grids in grids.
 fn crowded() -> Seed {
     Seed::new(nested(), Config::new(Method::Recursive))
 }
 
-/// A grid: the byte of its head, and its entries; a cell's number to what it holds.
+/// A grid: the offsets of its head and its entries, and the contents of each cell.
 #[derive(Debug, Clone)]
 struct Node {
     head: usize,
@@ -24,7 +24,7 @@ struct Node {
     depth: usize,
 }
 
-/// All grids, the root first.
+/// Returns all grids, the root first.
 fn nodes(blob: &[u8]) -> Vec<Node> {
     let copy = Copy::of(blob);
     let mut todo = vec![(HEAD, 0)];
@@ -103,7 +103,7 @@ fn lists_hold_the_triangles_of_their_cells() {
     assert!(lists.len() > 3, "{lists:?}");
     for (from, to, _) in lists {
         let mut cases = list(&seed.mesh, from..to, pool.clone());
-        // A triangle of another place, which keeps the ids ascending.
+        // A triangle of another cell, which keeps the ids ascending.
         let ids = |blob: &[u8]| {
             (from..to).step_by(4).map(|at| Copy::of(blob).word(at)).collect::<Vec<_>>()
         };
@@ -122,7 +122,7 @@ fn lists_hold_the_triangles_of_their_cells() {
 
 #[test]
 fn nothing_is_missing_and_nothing_is_left_over() {
-    // One grid and no other.
+    // One grid without subgrids.
     let parameters = Parameters::Recursive { density: 8.0, depth: 1 };
     let seed = Seed::new(soup(12, 0.5, 51), parameters.into());
     let nodes = nodes(&seed.blob);
@@ -151,7 +151,7 @@ fn nothing_is_missing_and_nothing_is_left_over() {
 #[test]
 fn grids_are_no_deeper_than_the_header_says() {
     let seed = crowded();
-    // The resolution of the root depends on the depth: it refuses most others itself.
+    // The resolution of the root depends on the depth, so most other depths are refused because of it.
     for depth in [1, 2, 4] {
         refused(
             &seed,

@@ -1,9 +1,8 @@
-//! The layout of a blob, from the format's description
-//! (core/src/one_level/mod.rs and others).
+//! The layout of a blob, by the format's description (core/src/one_level/mod.rs and others).
 
 use hgrid_tests::copy::Copy;
 
-/// The fields of a header.
+/// The offsets of a header's fields.
 pub(super) const BLOB_BYTES: usize = 16;
 pub(super) const SKIPPED_COUNT: usize = 36;
 pub(super) const METHOD: usize = 40;
@@ -19,10 +18,10 @@ pub(super) const DEPTH: usize = 100;
 pub(super) const CELL_SIZE: usize = 104;
 pub(super) const RESERVED: usize = 112;
 
-/// The bytes behind a header.
+/// The size of a header.
 pub(super) const HEAD: usize = 128;
 
-/// The bit that tells a grid from a list.
+/// The bit that marks a subgrid; lists do not have it.
 pub(super) const GRID: u32 = 1 << 31;
 
 /// The sections of a grid with a hash table.
@@ -39,7 +38,7 @@ pub(super) struct Hashed {
     pub(super) words: usize,
 }
 
-/// A cell with a list, and where that lies.
+/// A cell with a list, and the place of the list.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
     pub(super) cell: [usize; 3],
@@ -72,17 +71,17 @@ impl Hashed {
         self.resolution[1] * self.resolution[2]
     }
 
-    /// The number of a cell's bit.
+    /// Returns the number of a cell's bit.
     pub(super) fn bit(&self, [x, y, z]: [usize; 3]) -> usize {
         (z * self.resolution[1] + y) * self.resolution[0] + x
     }
 
-    /// The byte of a word of the pool.
+    /// Returns the offset of a word of the pool.
     pub(super) fn at(&self, word: usize) -> usize {
         self.pool + 4 * word
     }
 
-    /// The cells with lists, in the order of their bits.
+    /// Returns the cells with lists, in the order of their bits.
     pub(super) fn full(&self, blob: &[u8]) -> Vec<Cell> {
         let copy = Copy::of(blob);
         let [width, height, depth] = self.resolution;
@@ -104,7 +103,7 @@ impl Hashed {
             .collect()
     }
 
-    /// A row with nothing in it.
+    /// Returns a row without lists.
     pub(super) fn empty_row(&self, blob: &[u8]) -> usize {
         let full = self.full(blob);
         let row = |cell: &Cell| cell.cell[2] * self.resolution[1] + cell.cell[1];
@@ -122,7 +121,7 @@ pub(super) fn add(copy: &mut Copy, at: usize, by: i32) {
     copy.set_word(at, copy.word(at).wrapping_add_signed(by));
 }
 
-/// A blob with a word of its last section taken out or put in, and a header that says so.
+/// Removes words from the last section of a blob or adds some, and adapts the header.
 pub(super) fn resized(copy: &mut Copy, section: usize, change: impl Fn(&mut Vec<u8>)) {
     let words = copy.word(REFERENCE_COUNT) as usize;
     let mut bytes = copy.bytes()[..section + 4 * words].to_vec();

@@ -9,7 +9,7 @@ use super::hashed::list;
 use super::sections::*;
 use super::{Case, case, refused};
 
-/// Two cells that hold grids.
+/// Returns a grid in which two cells hold subgrids.
 fn crowded() -> Seed {
     let mut mesh = soup(20, 0.1, 3);
     for (count, at) in [(30, 0.3), (20, -0.5)] {
@@ -18,7 +18,7 @@ fn crowded() -> Seed {
     Seed::new(mesh, Parameters::Variable { density: 4.0, subdivide_above: 4 }.into())
 }
 
-/// A subgrid: where its sections start, in bytes.
+/// A subgrid: the offsets of its sections.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sub {
     pub(super) head: usize,
@@ -60,7 +60,7 @@ fn inside(seed: &Seed, sub: Sub) -> Vec<Case<'static>> {
     let copy = Copy::of(&seed.blob);
     let cells = sub.resolution.iter().product::<usize>();
     let mut cases = Vec::new();
-    // Make its box, to 1/256 of the cell, smaller and larger where that is possible.
+    // Make the subgrid's box smaller and larger by 1/256 of the cell, where that is possible.
     for (name, byte) in (0..3).map(|k| ("low", k)).chain((4..7).map(|k| ("high", k))) {
         for by in [-1_i32, 1] {
             let before = i32::from(seed.blob[sub.head + byte]);
@@ -94,7 +94,7 @@ fn inside(seed: &Seed, sub: Sub) -> Vec<Case<'static>> {
     for bit in 0..cells.next_multiple_of(32) {
         cases.push(case("a mark", at.clone(), move |b| flip(b, sub.bits, bit)));
     }
-    // Break its first list of two or more.
+    // Break the subgrid's first list of two or more.
     let ends: Vec<usize> =
         (0..=sub.slots).map(|slot| copy.word(sub.hash + 4 * slot) as usize).collect();
     let slot = ends.windows(2).position(|ends| ends[1] - ends[0] > 1).unwrap();

@@ -1,4 +1,4 @@
-/* A stranger's program: a grid without a thought for memory. The library was built with malloc. */
+/* A user's program: a grid without memory management by hand. The library was built with malloc. */
 
 #define HGRID_MALLOC
 #include <hgrid.h>

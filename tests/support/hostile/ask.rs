@@ -1,5 +1,5 @@
-//! Every question that a grid answers: about any grid, that it ends with something possible; about
-//! one that is right, that it says what brute force says.
+//! Every query that a grid answers: on any grid it must end with a possible answer, on a valid grid it must
+//! give the answer of brute force.
 
 use hgrid_core::{
     BlobInfo, ClosestPoint, Coherence, Counters, Cull, Error, Grid, Hit, INVALID_ID, Method,
@@ -14,16 +14,16 @@ use crate::owned::prove;
 
 const COHERENCES: [Coherence; 2] = [Coherence::Coherent, Coherence::Incoherent];
 
-/// Of so many rays everything is asked; of the rest, which are tiles, what tiles answer.
+/// The number of rays for which every query runs; the other rays, which are tiles, only go through batches.
 const ASKED_ALL: usize = 12;
 
-/// The vector levels worth asking for: only trees have vectors.
+/// Returns the SIMD levels worth a test: only trees have SIMD kernels.
 fn levels(grid: &Grid<'_>) -> impl Iterator<Item = SimdLevel> {
     let all = grid.method() == Method::Bvh;
     SimdLevel::available().filter(move |level| all || *level == SimdLevel::detect())
 }
 
-/// Returns true if a hit, or none, is one that the ray has with that triangle, wherever it was found.
+/// Returns true if the ray hits the triangle of a hit exactly there, wherever the hit came from.
 fn is_possible(grid: &Grid<'_>, ray: &Ray, hit: &Hit) -> bool {
     let test = TriangleTest::new(ray);
     let triangle = grid.mesh().triangle(hit.primitive);
@@ -32,12 +32,12 @@ fn is_possible(grid: &Grid<'_>, ray: &Ray, hit: &Hit) -> bool {
         .is_some_and(|found| bits(&Hit { t: found.t, u: found.u, v: found.v, ..*hit }) == bits(hit))
 }
 
-/// A hit in bits: -0.0 is not 0.0.
+/// Returns the bits of a hit, which tell -0.0 from 0.0.
 fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
 }
 
-/// The answers of both batches.
+/// Returns the answers of both batch queries.
 fn batch(grid: &Grid<'_>, rays: &[Ray], coherence: Coherence) -> (Vec<Hit>, Vec<u8>) {
     let mut hits = vec![Hit { primitive: 7, ..Hit::MISS }; rays.len()];
     let mut occluded = vec![7; rays.len()];
@@ -48,11 +48,11 @@ fn batch(grid: &Grid<'_>, rays: &[Ray], coherence: Coherence) -> (Vec<Hit>, Vec<
     (hits, occluded)
 }
 
-/// Asks a grid, whatever its bytes say: it answers with triangles that there are and that
-/// the ray hits, after bounded work.
+/// Queries a grid, whatever its bytes say: answers must name triangles that exist and that the ray hits,
+/// after bounded work.
 ///
 /// # Panics
-/// If not.
+/// If an answer is not possible.
 pub fn ends(grid: &Grid<'_>, rays: &[Ray]) {
     let most = limits::most(grid);
     let is_bounded = |counters: &Counters| {
@@ -83,18 +83,16 @@ pub fn ends(grid: &Grid<'_>, rays: &[Ray]) {
     for coherence in COHERENCES {
         many(grid, rays, coherence);
     }
-    // These are what none of the others may be: all in a few cells, so that two bundles go together.
+    // These rays all lie in a few cells, unlike any others, so that two groups are traced together.
     many(grid, &close(grid), Coherence::Coherent);
 }
 
-/// Asks about many rays at once: of every ray it is said that it hits a triangle that there is,
-/// where the ray is, or nothing.
+/// Runs batches: each ray must hit an existing triangle within the ray's range, or nothing.
 fn many(grid: &Grid<'_>, rays: &[Ray], coherence: Coherence) {
     let (hits, occluded) = batch(grid, rays, coherence);
     for (ray, (hit, occluded)) in rays.iter().zip(hits.iter().zip(occluded)) {
         let is_miss = bits(hit) == bits(&Hit::MISS);
-        // Tiles do not ask whether a ray meets the box: a damaged one
-        // may lie beside its triangles.
+        // Tiles do not test whether a ray meets the leaf's box, and a damaged box may lie beside its triangles.
         let is_hit = hit.primitive < grid.mesh().triangle_count()
             && (ray.t_min..=ray.t_max).contains(&hit.t);
         assert!(is_miss || is_hit, "{coherence:?} {hit:?} {ray:?}");
@@ -102,17 +100,17 @@ fn many(grid: &Grid<'_>, rays: &[Ray], coherence: Coherence) {
     }
 }
 
-/// The closest point to a ray's origin, no farther than its end.
+/// Returns the closest point to a ray's origin, no farther than its end.
 fn closest(grid: &Grid<'_>, ray: &Ray) -> Option<ClosestPoint> {
     grid.closest_point(ray.origin, ray.t_max, &mut QueryOptions::default())
 }
 
-/// The closest point of one triangle to a ray's origin.
+/// Returns the closest point of one triangle to a ray's origin.
 fn on_triangle(grid: &Grid<'_>, primitive: u32, ray: &Ray) -> Option<ClosestPoint> {
     ClosestPoint::on_triangle(&grid.mesh().triangle(primitive)?, primitive, ray.origin)
 }
 
-/// The closest point of all triangles to a ray's origin, no farther than its end.
+/// Returns the closest point of all triangles to a ray's origin, no farther than its end.
 fn closest_of_all(grid: &Grid<'_>, ray: &Ray) -> Option<ClosestPoint> {
     let is_point = ray.origin.iter().all(|c| c.is_finite());
     let all = (0..grid.mesh().triangle_count()).filter_map(|id| on_triangle(grid, id, ray));
@@ -120,7 +118,7 @@ fn closest_of_all(grid: &Grid<'_>, ray: &Ray) -> Option<ClosestPoint> {
     near.reduce(|best, found| if found.distance < best.distance { found } else { best })
 }
 
-/// Asks for all hits, and for those that a filter lets pass: each once, from near to far.
+/// Checks queries for all hits, and for those that a filter accepts: each hit once, from near to far.
 fn in_order(grid: &Grid<'_>, ray: &Ray) {
     let is_ordered = |hits: &[Hit]| {
         hits.windows(2).all(|pair| pair[0].is_closer(&pair[1]))
@@ -144,10 +142,10 @@ fn in_order(grid: &Grid<'_>, ray: &Ray) {
     assert!(shown.iter().all(is_seen), "{shown:?} {ray:?}");
 }
 
-/// Asks a grid that is right: every answer is that of brute force, bit for bit, with all vectors.
+/// Queries a valid grid: every answer must be that of brute force, bit for bit, at every SIMD level.
 ///
 /// # Panics
-/// If one is not.
+/// If an answer differs.
 pub fn agrees(grid: &Grid<'_>, rays: &[Ray]) {
     let expected: Vec<Hit> =
         rays.iter().map(|ray| oracle::brute_force(grid, ray).unwrap_or(Hit::MISS)).collect();
@@ -174,7 +172,7 @@ pub fn agrees(grid: &Grid<'_>, rays: &[Ray]) {
     packs(grid, rays);
 }
 
-/// Packs a grid that is right with its mesh: what opens again answers the same.
+/// Packs a valid grid with its mesh: the packed blob must open and give the same answers.
 fn packs(grid: &Grid<'_>, rays: &[Ray]) {
     let bytes = usize::try_from(grid.packed_bytes()).expect("a small mesh");
     let mut copy = Copy::of(&vec![0xc7; bytes]);

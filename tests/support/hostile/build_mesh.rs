@@ -1,5 +1,5 @@
-//! Any bytes as a mesh and a configuration: the build takes the memory that was said, or says why
-//! not; what it makes opens, is valid, and answers as brute force does.
+//! Any bytes as a mesh and a configuration: the build takes exactly the memory that was announced, or fails
+//! for a reason; the grid opens, is valid, and answers as brute force does.
 
 use std::cell::Cell;
 
@@ -16,10 +16,10 @@ use super::shape::{Shape, config};
 use crate::guarded::Guarded;
 use crate::owned::prove;
 
-/// The most bytes of index or scratch that are built; more are only asked about.
+/// The largest index or scratch that is built; larger ones are only sized.
 const MOST_BYTES: usize = 1 << 20;
 
-/// See the head of this file.
+/// Runs the target, see the head of this file.
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let _ = describe_and_build(&mut u);
@@ -29,7 +29,7 @@ fn describe_and_build(u: &mut Unstructured<'_>) -> Result<()> {
     let config = config(u)?;
     let (tasks, run) = (u32::arbitrary(u)? % 8, Loop::arbitrary(u)?);
     let shape = Shape::new(u)?;
-    // Any strides and counts: refused, or a mesh that can be built like any other.
+    // Any strides and counts: they are refused, or describe a mesh that builds like any other.
     if rarely(u, 8)? {
         let numbers =
             <[usize; 4]>::arbitrary(u)?.map(|n| if n.leading_zeros() < 4 { n } else { n % 64 });
@@ -40,7 +40,7 @@ fn describe_and_build(u: &mut Unstructured<'_>) -> Result<()> {
         return Ok(());
     }
     build(u, shape.view(), &config, tasks, run);
-    // Last, so that the bytes before mean what they did when they were kept.
+    // This comes last, so that bytes kept before it was added keep their meaning.
     if rarely(u, 3)? {
         let cuts = <[u8; 6]>::arbitrary(u)?;
         let count = u.int_in_range(0..=cuts.len())?;
@@ -61,7 +61,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     let enough = match sizes_with(&mesh, config, &mut [], &honest) {
         Ok(enough) => enough,
         Err(error) => {
-            // Without a size there is no grid either, for the same reason.
+            // If sizes fail, the build fails for the same reason.
             let (mut index, mut scratch) = (Guarded::new(4096), Guarded::new(4096));
             let result = Grid::build_with(mesh, config, index.region(), scratch.region(), &honest);
             assert!(result.is_err_and(|again| is_same(error, again)), "{error:?}");
@@ -77,7 +77,8 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
         return;
     }
     let mut scratch = Guarded::new(enough.scratch_bytes);
-    // A tree's bound is told without a look at the mesh, with several tasks even where there is scratch.
+    // The bound of a tree needs no look at the mesh; with several tasks the answer is a bound even if there
+    // is scratch.
     let is_tree = config.method() == Method::Bvh;
     if is_tree && let Err(error) = sizes(&mesh, config, scratch.region()) {
         let is_odd =
@@ -86,10 +87,10 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     }
     let exact = match sizes_with(&mesh, config, scratch.region(), &honest) {
         Ok(exact) => exact,
-        // An invalid configuration may show only when all is counted.
+        // An invalid configuration may only show in the full computation.
         Err(error) => return assert!(matches!(error, Error::InvalidConfig(_)), "{error:?}"),
     };
-    // Several tasks of a tree may take as much as any mesh, and get that where it is there.
+    // With several tasks, the bound covers any mesh.
     let is_exact = !is_tree || tasks < 2;
     assert!(exact.is_exact == is_exact && exact.index_bytes <= enough.index_bytes, "{exact:?}");
     assert!(exact.scratch_bytes <= enough.scratch_bytes, "{exact:?} {enough:?}");
@@ -107,7 +108,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
         assert!(index.around_is_intact() && scratch.around_is_intact());
     }
 
-    // One block too little, with the need in the error; then exactly so much.
+    // Build with one block too little, where the error tells the need; then with exactly enough.
     let mut small = Guarded::new(exact.index_bytes.saturating_sub(64));
     match Grid::build_with(mesh, config, small.region(), scratch.region(), &honest) {
         Err(Error::OutOfMemory { region: Region::Index, needed_bytes, .. }) => {
@@ -134,7 +135,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     assert_eq!(done.to_bits(), 1.0_f32.to_bits(), "a build ends with all done");
     assert!(index.around_is_intact() && scratch.around_is_intact());
 
-    // Stopped at one of these calls: cancelled, or done already.
+    // Stop at one of the calls: the build is cancelled, or complete already.
     if let Ok(at) = u.int_in_range(0..=calls) {
         let left = Cell::new(at);
         let progress = |_| left.replace(left.get().wrapping_sub(1)) != 0;
@@ -146,7 +147,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
         assert!(index.around_is_intact() && scratch.around_is_intact());
     }
 
-    // Alone, on the same memory with whatever is in it now: the same bits.
+    // Build without tasks, on the same memory with whatever is in it now: the bits must be the same.
     let alone = Grid::build(mesh, config, index.region(), scratch.region()).expect("enough memory");
     assert!(alone.blob() == blob, "the number of tasks shows");
     let copy = crate::copy::Copy::of(&blob);
@@ -158,7 +159,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     agrees(&grid, &rays);
 }
 
-/// Returns true if two errors have one reason: what is too small may be named by either call.
+/// Returns true if two errors have one cause; either call may instead name the memory that is too small.
 fn is_same(one: Error, other: Error) -> bool {
     one == other || matches!(other, Error::OutOfMemory { .. })
 }

@@ -1,7 +1,6 @@
-//! Any calls of the C entry points, with any numbers in their structs, as far as the header's
-//! rules on pointers allow: every answer has a status that is known, an error leaves the outputs
-//! alone, and what succeeds answers as the same call in Rust does. Here is what builds;
-//! `c_stored`, `c_queries` and `c_joined` have the rest.
+//! Any sequence of C calls with any numbers in their structs, as far as the header's rules on pointers allow:
+//! every call returns a known status, an error leaves the outputs unchanged, and a success has the answer of
+//! the same call in Rust. This file has the builds; `c_stored`, `c_queries` and `c_joined` have the rest.
 
 use std::cell::Cell;
 use std::ffi::{CStr, c_void};
@@ -16,28 +15,28 @@ use super::caller::Loop;
 use super::memory::{Lent, Memory, Struct, array, rarely};
 use super::shape::{self, Shape};
 
-/// The most bytes of index or scratch that are built.
+/// The largest index or scratch that is built.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// See the head of this file.
+/// Runs the target, see the head of this file.
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let Ok(shape) = Shape::new(&mut u) else { return };
     let mut caller =
         Caller { shape: &shape, grid: hgrid_grid::NONE, opened: None, memory: Vec::new() };
     let _ = caller.calls(&mut u);
-    // Last, so that the calls before mean what they did when their bytes were kept.
+    // This comes last, so that bytes kept before it was added keep their meaning.
     let _ = caller.join(&mut u);
     caller.settle();
 }
 
-/// The bytes of a view that was not written.
+/// A view that no call has written.
 pub(super) const UNWRITTEN: hgrid_grid =
     hgrid_grid { opaque: [MaybeUninit::new(0xc7c7_c7c7_c7c7_c7c7); 64] };
 
-/// Returns true if it still holds that.
+/// Returns true if the view is still unwritten.
 pub(super) fn is_unwritten(grid: &hgrid_grid) -> bool {
-    // SAFETY: it was made of numbers, and a library that keeps its promise has written none.
+    // SAFETY: the view was made of numbers, and a library that keeps its promise wrote only numbers.
     let words = grid.opaque.map(|word| unsafe { word.assume_init() });
     words == [0xc7c7_c7c7_c7c7_c7c7; 64]
 }
@@ -47,18 +46,18 @@ pub(super) struct Caller<'s> {
     pub(super) shape: &'s Shape,
     pub(super) grid: hgrid_grid,
     pub(super) opened: Option<Opened>,
-    /// All that was lent to the library: a view stays good while others are built.
+    /// All memory lent to the library: a view stays valid while others are built.
     pub(super) memory: Vec<Memory>,
 }
 
-/// The blob and the mesh that the program's grid is a view of.
+/// The blob and the mesh of the program's grid.
 pub(super) struct Opened {
-    /// The number of its memory, and the byte at which the blob starts.
+    /// The index of its memory, and the offset at which the blob starts.
     pub(super) blob: usize,
     pub(super) from: usize,
-    /// `None` for the blob's own.
+    /// `None` for the mesh in the blob.
     pub(super) mesh: Option<hgrid_mesh>,
-    /// True if the library built it of this mesh.
+    /// True if the library built the blob from this mesh.
     pub(super) is_right: bool,
 }
 
@@ -81,7 +80,7 @@ enum Call {
     Words(i32),
 }
 
-/// The structs of a question for sizes, or of a build.
+/// The structs of a call that asks for sizes or builds.
 pub(super) struct Input {
     pub(super) mesh: Struct<hgrid_mesh>,
     pub(super) config: Struct<hgrid_config>,
@@ -92,7 +91,7 @@ pub(super) struct Input {
 /// The behaviour of a build's callbacks; the context of the configuration.
 pub(super) struct Control {
     run: Loop,
-    /// Times that progress says to go on.
+    /// The number of calls after which progress says stop.
     patience: u32,
     done: Cell<u32>,
     calls: Cell<u32>,
@@ -105,15 +104,15 @@ unsafe extern "C" fn run_tasks(
     task: hgrid_task,
     task_context: *mut c_void,
 ) {
-    // SAFETY: only ever given together with one.
+    // SAFETY: the library passes on the context of the configuration, a `Control`.
     let control = unsafe { &*context.cast::<Control>() };
-    // SAFETY: any index may be asked for, as long as this runs.
+    // SAFETY: the loop may pass any index to a task while this function runs.
     control.run.run(count, |index| unsafe { task(task_context, index) });
 }
 
-/// Watches a build.
+/// Checks the progress of a build.
 unsafe extern "C" fn progress(context: *mut c_void, done: u32) -> bool {
-    // SAFETY: only ever given together with one.
+    // SAFETY: the library passes on the context of the configuration, a `Control`.
     let control = unsafe { &*context.cast::<Control>() };
     let before = control.done.get();
     assert!(before <= done && done <= HGRID_PROGRESS_END, "{done} after {before}");
@@ -122,9 +121,9 @@ unsafe extern "C" fn progress(context: *mut c_void, done: u32) -> bool {
     control.calls.get() <= control.patience
 }
 
-/// The text of a status, which must be one that there is.
+/// Returns a status, after checking that it has a text.
 pub(super) fn known(status: hgrid_status) -> hgrid_status {
-    // SAFETY: a text for any number.
+    // SAFETY: the function returns a static text for any number.
     let text = unsafe { CStr::from_ptr(hgrid_status_string(status)) };
     assert_ne!(text, c"unknown status", "{status}");
     status
@@ -153,7 +152,7 @@ impl Caller<'_> {
         Ok(())
     }
 
-    /// The mesh: as it is, or as far from it as its arrays allow.
+    /// Returns the shape's mesh, or a changed one as far as its arrays allow.
     pub(super) fn mesh(&self, u: &mut Unstructured<'_>) -> Result<Struct<hgrid_mesh>> {
         let shape = self.shape;
         let is_short = shape.index_type == IndexType::U16;
@@ -186,7 +185,7 @@ impl Caller<'_> {
         if rarely(u, 32)? {
             mesh.mask_stride = u.int_in_range(0..=8)?;
         }
-        // Not more masks than there are, unless no memory could hold them.
+        // No more masks than there are, unless their span exceeds any memory.
         let step = if mesh.mask_stride == 0 { 4 } else { mesh.mask_stride };
         let span = mesh.triangle_count.saturating_sub(1).checked_mul(step);
         let span = span.and_then(|span| span.checked_add(4));
@@ -284,7 +283,7 @@ impl Caller<'_> {
             61 => index_start = null_mut(),
             62 => scratch_start = null_mut(),
             63 => {
-                // One memory twice: refused, unless it is of no bytes.
+                // The same memory for both regions is refused, unless it has no bytes.
                 (scratch_start, lengths[1]) = (index_start, lengths[0]);
             }
             _ => {}
@@ -294,7 +293,7 @@ impl Caller<'_> {
         let (mesh, config, report) =
             (input.mesh.as_ptr(), input.config.as_ptr(), input.report.as_mut_ptr());
         let [index_length, scratch_length] = lengths;
-        // SAFETY: all pointers are NULL or good for what is said with them.
+        // SAFETY: all pointers are NULL or valid for the given sizes.
         let status = known(unsafe {
             hgrid_build(
                 mesh,
@@ -335,16 +334,16 @@ impl Caller<'_> {
         let (mesh, config, report) =
             (input.mesh.as_ptr(), input.config.as_ptr(), input.report.as_mut_ptr());
         let to = fitted.as_mut_ptr();
-        // SAFETY: all pointers are NULL or good for what is said with them.
+        // SAFETY: all pointers are NULL or valid for the given sizes.
         let status = known(unsafe {
             hgrid_fit(mesh, config, budget, scratch.at(0), scratch.bytes().len(), to, report)
         });
         if status == HGRID_OK {
-            // A configuration that fits says so again.
+            // Asking for sizes confirms that the fitted configuration fits.
             assert!(fitted.is_sound() && input.mesh.is_sound());
             let is_told = input.report.is_sound();
             assert!(!is_told || input.report.value().index_bytes <= budget as u64);
-            // Without tasks, which take memory of their own.
+            // Without tasks, which take extra memory.
             input.config = Struct::right(hgrid_config { tasks: 1, ..*fitted.value() });
             let again = input.ask(scratch.at(0), scratch.bytes().len());
             assert!(again == HGRID_OK || !is_told, "{again}");
@@ -356,7 +355,7 @@ impl Caller<'_> {
     fn bound(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         let mut input = self.input(u)?;
         let count = if rarely(u, 4)? { usize::arbitrary(u)? } else { self.shape.triangle_count };
-        // SAFETY: all pointers are NULL or good for what is said with them.
+        // SAFETY: all pointers are NULL or valid for the given sizes.
         let status =
             known(unsafe { hgrid_bound(count, input.config.as_ptr(), input.report.as_mut_ptr()) });
         let is_mine = count == self.shape.triangle_count && input.report.is_sound();
@@ -377,11 +376,11 @@ impl Input {
     fn ask(&mut self, scratch: *mut c_void, scratch_bytes: usize) -> hgrid_status {
         let (mesh, config) = (self.mesh.as_ptr(), self.config.as_ptr());
         let report = self.report.as_mut_ptr();
-        // SAFETY: all pointers are NULL or good for what is said with them.
+        // SAFETY: all pointers are NULL or valid for the given sizes.
         unsafe { hgrid_sizes(mesh, config, scratch, scratch_bytes, report) }
     }
 
-    /// Returns the bytes that a build takes, if they can be asked for and are not too many.
+    /// Returns the sizes of a build, if they can be asked for and are not too large.
     pub(super) fn need(&mut self) -> Option<[usize; 2]> {
         if !self.report.is_sound() || self.ask(null_mut(), 0) != HGRID_OK {
             return None;
@@ -392,7 +391,7 @@ impl Input {
             return None;
         }
         let report = self.report.value();
-        // Several tasks of a tree get as much as any mesh takes.
+        // With several tasks, a tree's sizes are a bound for any mesh.
         let config = self.config.value();
         let is_bound =
             !self.config.is_null() && config.method == HGRID_METHOD_BVH && config.tasks > 1;

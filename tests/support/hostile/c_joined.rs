@@ -1,4 +1,4 @@
-//! Meshes that are joined by the C entry points: any of them, in memory of just the size.
+//! Meshes joined through C calls: any meshes, in memory of exactly the size.
 
 use std::ptr::{from_mut, null, null_mut};
 
@@ -8,10 +8,10 @@ use hgrid_capi::*;
 use super::c_abi::{Caller, UNWRITTEN, known};
 use super::memory::{Memory, rarely};
 
-/// The most bytes of index or scratch that are built.
+/// The largest index or scratch that is built.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// A mesh that was not filled.
+/// A mesh without any fields set.
 const EMPTY: hgrid_mesh = hgrid_mesh {
     struct_size: size_of::<hgrid_mesh>() as u32,
     index_type: HGRID_INDEX_U32,
@@ -28,12 +28,12 @@ const EMPTY: hgrid_mesh = hgrid_mesh {
 };
 
 impl Caller<'_> {
-    /// Joins a few meshes and builds a grid of them, which knows where its triangles come from.
+    /// Joins a few meshes and builds a grid of them, which must locate its triangles.
     pub(super) fn join(&self, u: &mut Unstructured<'_>) -> Result<()> {
         let mut meshes = Vec::new();
         for _ in 0..u.int_in_range(0..=4)? {
             let mut mesh = *self.mesh(u)?.value();
-            // The first one says how large all are, and behind it nothing is that belongs to it alone.
+            // The struct size of the first mesh applies to all, so it may not cover bytes after the first struct.
             if meshes.is_empty() {
                 mesh.struct_size = mesh.struct_size.min(EMPTY.struct_size);
             }
@@ -42,7 +42,7 @@ impl Caller<'_> {
         let parts = Memory::new(meshes.len() * size_of::<hgrid_part>());
         let mut joined = EMPTY;
         let to = if meshes.is_empty() { null_mut() } else { parts.at(0).cast() };
-        // SAFETY: so many meshes and parts; the meshes are what their arrays allow.
+        // SAFETY: the counts of meshes and parts are right; the meshes stay within their arrays.
         let status =
             known(unsafe { hgrid_join(meshes.as_ptr(), meshes.len(), to, from_mut(&mut joined)) });
         if status != HGRID_OK {
@@ -63,7 +63,7 @@ impl Caller<'_> {
             resolution: [0; 3],
             reserved: 0,
         };
-        // SAFETY: the mesh was just joined, and nothing of it is gone.
+        // SAFETY: the mesh was just joined, and its parts and arrays still exist.
         let status = known(unsafe {
             hgrid_sizes(&raw const joined, null(), null_mut(), 0, &raw mut report)
         });
@@ -74,7 +74,7 @@ impl Caller<'_> {
             .map(|bytes| Memory::new(usize::try_from(bytes).expect("not too large")));
         let mut grid = UNWRITTEN;
         let [index_bytes, scratch_bytes] = [&index, &scratch].map(|region| region.bytes().len());
-        // SAFETY: the same, and regions of just that size.
+        // SAFETY: as above, with regions of exactly that size.
         let status = known(unsafe {
             hgrid_build(
                 &raw const joined,
@@ -96,7 +96,7 @@ impl Caller<'_> {
         let mut at = 0;
         for (place, mesh) in (0_u32..).zip(&meshes) {
             for own in (0_u32..).take(mesh.triangle_count) {
-                // SAFETY: a grid that was just built.
+                // SAFETY: the grid was just built.
                 let is_there = unsafe {
                     hgrid_locate(&raw const grid, at, &raw mut geometry, &raw mut triangle)
                 };
@@ -104,10 +104,10 @@ impl Caller<'_> {
                 at += 1;
             }
         }
-        // SAFETY: the same.
+        // SAFETY: as above.
         let bytes = unsafe { hgrid_validate_bytes(&raw const grid) };
         let proof = Memory::new(bytes);
-        // SAFETY: scratch of just that size.
+        // SAFETY: the scratch has exactly that size.
         let status = known(unsafe { hgrid_validate(&raw const grid, proof.at(0), bytes) });
         assert_eq!(status, HGRID_OK);
         Ok(())

@@ -1,4 +1,4 @@
-//! The options of a query: in C as a fuzzer chooses them, and the same in Rust.
+//! Query options: in C as a fuzzer chooses them, and the same in Rust.
 
 use std::cell::RefCell;
 use std::ffi::c_void;
@@ -10,29 +10,29 @@ use hgrid_core::{Counters, Cull, Hit, INVALID_ID, QueryOptions, Verdict};
 
 use super::memory::{Lent, Struct, rarely};
 
-/// A hit in bits.
+/// Returns the bits of a hit.
 pub(super) fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
 }
 
-/// A hit of C's in bits.
+/// Returns the bits of a C hit.
 pub(super) fn c_bits(hit: &hgrid_hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive]
 }
 
-/// Options and what they point to.
+/// Options, and the memory that they point to.
 pub(super) struct Options {
     options: Struct<hgrid_query_options>,
     filter: Lent<Filter>,
     counters: Lent<hgrid_counters>,
-    /// Not read here; it has to live as long as the options that point to it.
+    /// Not read here, but it must live as long as the options that point to it.
     _scratch: Lent<[u8; SCRATCH]>,
 }
 
-/// More than a window on the stack has.
+/// More scratch than a window on the stack.
 const SCRATCH: usize = 9000;
 
-/// Says of a hit what two bits say: those of its triangle.
+/// A filter whose verdict on a hit is two of its bits, chosen by the triangle's id.
 struct Filter {
     verdicts: u32,
     shown: RefCell<Vec<(usize, [u32; 4])>>,
@@ -51,13 +51,13 @@ unsafe extern "C" fn filter(
     ray: usize,
     hit: *const hgrid_hit,
 ) -> hgrid_verdict {
-    // SAFETY: only ever given together with one.
+    // SAFETY: the library passes on the context of the options, a `Filter`.
     let filter = unsafe { &*context.cast::<Filter>() };
-    // SAFETY: a hit by the header.
+    // SAFETY: the library passes a valid hit, as the header promises.
     filter.ask(ray, c_bits(unsafe { &*hit }))
 }
 
-/// The hits that the filter was shown by questions in Rust, and their work.
+/// The hits that the filter was shown by queries in Rust, and their work.
 #[derive(Default)]
 pub(super) struct Told {
     shown: Vec<(usize, [u32; 4])>,
@@ -102,7 +102,7 @@ impl Options {
         Ok(Self { options: Struct::new(u, options)?, filter: context, counters, _scratch: scratch })
     }
 
-    /// NULL is fine.
+    /// Returns true if the options are valid; NULL is.
     pub(super) fn are_sound(&self) -> bool {
         self.options.is_null() || self.options.is_sound() && self.cull().is_some()
     }
@@ -115,7 +115,7 @@ impl Options {
         [Cull::None, Cull::Back, Cull::Front].get(self.options.value().cull as usize).copied()
     }
 
-    /// Asks in Rust what is asked in C about the ray at a place.
+    /// Runs a query in Rust as C runs it for the ray with this index.
     pub(super) fn ask<T>(
         &self,
         told: &mut Told,
@@ -145,7 +145,7 @@ impl Options {
         answer
     }
 
-    /// Returns true if the filter was shown, and the counters count, what the questions in Rust came to.
+    /// Returns true if the filter was shown the same hits, and the counters have the same work, as in Rust.
     pub(super) fn agree(&self, told: &Told) -> bool {
         let is_counting = !self.options.is_null() && !self.options.value().counters.is_null();
         let work = if is_counting { told.work } else { Counters::default() };
@@ -155,8 +155,8 @@ impl Options {
                 == [work.primitive_tests + 1, work.cell_steps + 2, work.grid_steps + 3]
     }
 
-    /// The same for a batch that asks whether anything is hit: of a ray that an opaque triangle blocks the
-    /// filter may be shown less.
+    /// Returns the same for a batch of occlusion queries: the filter may be shown fewer hits of a ray that an
+    /// opaque triangle blocks.
     pub(super) fn agree_but_for_blocked_rays(&self, told: &Told, is_blocked: &[bool]) -> bool {
         let seen = self.filter.shown.borrow();
         let of = |all: &[(usize, [u32; 4])], ray| -> Vec<[u32; 4]> {
@@ -181,7 +181,7 @@ impl Options {
         self.options.is_null() || self.options.value().counters.is_null()
     }
 
-    /// Returns true if a filter is asked.
+    /// Returns true if there is a filter.
     pub(super) fn have_filter(&self) -> bool {
         !self.options.is_null() && self.options.value().filter.is_some()
     }

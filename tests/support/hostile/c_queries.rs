@@ -1,5 +1,5 @@
-//! The queries of the C entry points: what they answer is what Rust answers on the same bytes, bit
-//! for bit, and nothing but the answer is written.
+//! The queries of the C calls: their answers are those of Rust on the same bytes, bit for bit, and nothing
+//! but the answers is written.
 
 use std::ptr::{from_mut, from_ref, null, null_mut};
 
@@ -24,7 +24,7 @@ fn for_c(ray: &Ray) -> hgrid_ray {
     hgrid_ray { origin, t_min, direction, t_max }
 }
 
-/// A closest point in bits.
+/// Returns the bits of a closest point.
 fn closest_bits(found: &ClosestPoint) -> [u32; 7] {
     let ClosestPoint { position: [x, y, z], distance, u, v, primitive } = *found;
     let [x, y, z] = [x, y, z].map(f32::to_bits);
@@ -32,7 +32,7 @@ fn closest_bits(found: &ClosestPoint) -> [u32; 7] {
 }
 
 impl Caller<'_> {
-    /// The grid as Rust opens it.
+    /// Returns the grid as Rust opens it.
     pub(super) fn core(&self) -> Option<Grid<'_>> {
         let opened = self.opened.as_ref()?;
         let blob = &self.memory[opened.blob].bytes()[opened.from..];
@@ -61,7 +61,7 @@ impl Caller<'_> {
         view.with_masks(masks).ok()
     }
 
-    /// Some rays, and at least one.
+    /// Returns some rays, at least one.
     fn rays(&self, u: &mut Unstructured<'_>) -> Result<Vec<Ray>> {
         let Some(grid) = self.core() else {
             return Ok(rays::fixed_rays(([-1.0; 3], [1.0; 3]), 1));
@@ -71,12 +71,12 @@ impl Caller<'_> {
         Ok(rays)
     }
 
-    /// The view, or now and then NULL.
+    /// Returns the view, or now and then NULL.
     fn view(&self, u: &mut Unstructured<'_>) -> Result<*const hgrid_grid> {
         Ok(if rarely(u, 48)? { null() } else { from_ref(&self.grid) })
     }
 
-    /// Asks about one ray after the other.
+    /// Queries one ray after the other.
     pub(super) fn ask(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         for ray in self.rays(u)? {
             let ray_for_c = for_c(&ray);
@@ -92,7 +92,7 @@ impl Caller<'_> {
             let expected = asked.and_then(|grid| {
                 options.ask(&mut told, 0, |options| grid.intersect_with(&ray, options))
             });
-            // SAFETY: all pointers are NULL or point to what they should.
+            // SAFETY: all pointers are NULL or valid.
             let is_hit = unsafe { hgrid_intersect(grid, to_ray, options.as_ptr(), to_hit) };
             assert_eq!(is_hit, expected.is_some(), "{ray:?}");
             let expected = expected.map_or(c_bits(&UNTOUCHED), |hit| bits(&hit));
@@ -105,7 +105,7 @@ impl Caller<'_> {
             let expected = asked.is_some_and(|grid| {
                 options.ask(&mut told, 0, |options| grid.occluded_with(&ray, options))
             });
-            // SAFETY: all pointers are NULL or point to what they should.
+            // SAFETY: all pointers are NULL or valid.
             let is_hit = unsafe { hgrid_occluded(grid, to_ray, options.as_ptr()) };
             assert_eq!(is_hit, expected, "{ray:?}");
             assert!(options.agree(&told), "{ray:?}");
@@ -113,7 +113,7 @@ impl Caller<'_> {
         Ok(())
     }
 
-    /// Asks for all hits of rays, with room for some of them.
+    /// Queries all hits of rays, with room for some of them.
     pub(super) fn all(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         for ray in self.rays(u)? {
             let ray_for_c = for_c(&ray);
@@ -139,8 +139,7 @@ impl Caller<'_> {
                 options
                     .ask(&mut told, 0, |options| grid.intersect_all(&ray, options, &mut expected))
             });
-            // SAFETY: all pointers are NULL or point to what they should;
-            // no memory holds so many hits.
+            // SAFETY: all pointers are NULL or valid for the given room, or the room is larger than any memory.
             let status = known(unsafe {
                 hgrid_intersect_all(grid, to_ray, options.as_ptr(), to_hits, capacity, to_count)
             });
@@ -156,7 +155,7 @@ impl Caller<'_> {
         Ok(())
     }
 
-    /// Asks for closest points.
+    /// Queries closest points.
     pub(super) fn closest(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         for ray in self.rays(u)? {
             let point = ray.origin;
@@ -174,7 +173,7 @@ impl Caller<'_> {
             let expected = core.and_then(|grid| {
                 options.ask(&mut told, 0, |options| grid.closest_point(point, ray.t_max, options))
             });
-            // SAFETY: all pointers are NULL or point to what they should.
+            // SAFETY: all pointers are NULL or valid.
             let is_found = unsafe { hgrid_closest_point(grid, to_query, options.as_ptr(), to) };
             assert_eq!(is_found, expected.is_some(), "{point:?} {}", ray.t_max);
             let hgrid_closest { position, distance, u, v, primitive } = closest;
@@ -187,7 +186,7 @@ impl Caller<'_> {
         Ok(())
     }
 
-    /// Asks about many rays, in arrays side by side, one in the other, or where they may not be.
+    /// Runs a batch with arrays that lie side by side, interleave, or overlap where they may not.
     pub(super) fn batch(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         let rays = self.rays(u)?;
         let any = bool::arbitrary(u)?;
@@ -199,7 +198,7 @@ impl Caller<'_> {
             let start = rays_at + i * if ray_stride == 0 { 32 } else { ray_stride };
             memory.bytes_mut()[start..start + 32].copy_from_slice(ray.as_bytes());
         }
-        // Where rays overlap, what lies there counts.
+        // Where rays overlap, take the bytes in memory.
         let read = |memory: &Memory, i: usize| -> Ray {
             let start = rays_at + i * if ray_stride == 0 { 32 } else { ray_stride };
             Ray::read_from_bytes(&memory.bytes()[start..start + 32]).unwrap()
@@ -211,10 +210,10 @@ impl Caller<'_> {
         let grid = self.view(u)?;
         let from = if rarely(u, 48)? { null() } else { memory.at(rays_at).cast_const().cast() };
         let to = if rarely(u, 48)? { null_mut() } else { memory.at(answers_at) };
-        // A count that no memory can hold, now and then.
+        // Now and then, a count that exceeds any memory.
         let count = if rarely(u, 48)? { usize::MAX - 1 } else { rays.len() };
 
-        // Ask Rust, if there is a grid and the options are sound.
+        // Ask Rust, if there is a grid and the options are valid.
         let core = self.core();
         let is_right = self.opened.as_ref().is_some_and(|opened| opened.is_right);
         let mut told = Told::default();
@@ -233,7 +232,7 @@ impl Caller<'_> {
                 answer.copy_from_slice(found.unwrap_or(Hit::MISS).as_bytes());
             }
         }
-        // SAFETY: all pointers are NULL or good for so many elements, or nothing is.
+        // SAFETY: all pointers are NULL or valid for so many elements, or the count exceeds any memory.
         let status = known(unsafe {
             let options = options.as_ptr();
             if any {
@@ -268,7 +267,7 @@ impl Caller<'_> {
             return Ok(());
         }
         assert!(core.is_some() && options.are_sound() && coherence <= HGRID_COHERENCE_COHERENT);
-        // Rays that go together may find other triangles in damaged lists.
+        // In damaged lists, rays that are traced together may find other triangles.
         let must_agree = is_right || !options.let_rays_go_together();
         if must_agree {
             assert!(memory.bytes() == expected, "other answers, or written beside them");
@@ -284,7 +283,7 @@ impl Caller<'_> {
         Ok(())
     }
 
-    /// The grid that is there in the end answers.
+    /// Checks the last grid of the program.
     pub(super) fn settle(&self) {
         let Some(grid) = self.core() else { return };
         let rays = rays::fixed_rays(grid.bounds(), 4);
@@ -297,13 +296,13 @@ impl Caller<'_> {
     }
 }
 
-/// The places of the rays and the answers of a batch.
+/// The offsets and strides of the rays and the answers of a batch.
 struct Arrays {
     rays_at: usize,
     ray_stride: usize,
     answers_at: usize,
     answer_stride: usize,
-    /// Of both together.
+    /// The bytes that both take together.
     bytes: usize,
 }
 
@@ -313,7 +312,7 @@ impl Arrays {
         let [mut rays_at, mut answers_at] = [small(u)?, small(u)?];
         let [mut ray_stride, mut answer_stride] = [32 + small(u)?, size + small(u)?];
         match u.int_in_range(0..=7)? {
-            // In one struct, in either order.
+            // In one struct, the ray first or the answer first.
             0 => {
                 ray_stride += size;
                 (answer_stride, answers_at) = (ray_stride, rays_at + 32);
@@ -322,9 +321,9 @@ impl Arrays {
                 ray_stride += size;
                 (answer_stride, rays_at) = (ray_stride, answers_at + size);
             }
-            // Anywhere.
+            // At any distance.
             2 => {}
-            // Too near, or side by side.
+            // With strides that are too small, or contiguous.
             3 => (ray_stride, answer_stride) = (small(u)?, small(u)?),
             4 => (ray_stride, answer_stride) = (0, 0),
             // Apart from each other.

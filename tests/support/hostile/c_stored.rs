@@ -1,5 +1,4 @@
-//! Stored grids by the C entry points: opening, packing, peeking, proving,
-//! and grids with memory of their own.
+//! Stored grids through C calls: opening, packing, peeking, validating, and grids that own their memory.
 
 use std::cell::RefCell;
 use std::ffi::c_void;
@@ -17,13 +16,13 @@ use crate::guarded::CANARY;
 use crate::owned::prove;
 
 impl Caller<'_> {
-    /// The bytes of the grid's blob, or of none.
+    /// Returns the bytes of the grid's blob, or none.
     fn blob(&self) -> &[u8] {
         let opened = self.opened.as_ref();
         opened.map_or(&[], |opened| &self.memory[opened.blob].bytes()[opened.from..])
     }
 
-    /// A copy of the blob, changed or not; whether it was.
+    /// Returns a copy of the blob and true if it was changed.
     fn damaged(&self, u: &mut Unstructured<'_>) -> Result<(Copy, bool)> {
         let mut bytes = self.blob().to_vec();
         let count = u.int_in_range(0..=3)?;
@@ -48,7 +47,7 @@ impl Caller<'_> {
         let mut grid = UNWRITTEN;
         let to = if rarely(u, 48)? { null_mut() } else { from_mut(&mut grid) };
         let of = mesh.as_ref().map_or(null(), Struct::as_ptr);
-        // SAFETY: all pointers are NULL or good for what is said with them.
+        // SAFETY: all pointers are NULL or valid for the given sizes.
         let status = known(unsafe { hgrid_open(from, copy.bytes().len() - start, of, to) });
         if status != HGRID_OK {
             assert!(is_unwritten(&grid), "{status}");
@@ -71,11 +70,11 @@ impl Caller<'_> {
         Ok(())
     }
 
-    /// Packs grid and mesh, and goes on with what that made, if it is enough memory.
+    /// Packs grid and mesh, and goes on with the packed blob if there is enough memory.
     pub(super) fn pack(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         let mut bytes = 7;
         let grid = if rarely(u, 48)? { null() } else { from_ref(&self.grid) };
-        // SAFETY: NULL or a view; nothing to write to.
+        // SAFETY: the view is NULL or valid; nothing is written to.
         let status = known(unsafe { hgrid_pack(grid, null_mut(), 0, &raw mut bytes) });
         let core = self.core().filter(|_| !grid.is_null());
         let Some(core) = core.filter(|_| status == HGRID_ERROR_INDEX_TOO_SMALL) else {
@@ -88,7 +87,7 @@ impl Caller<'_> {
             capacity = capacity.saturating_sub(u8::arbitrary(u)?.into());
         }
         let memory = Memory::new(capacity);
-        // Over the blob itself, which is refused.
+        // Now and then pack over the blob itself, which is refused.
         let opened = self.opened.as_ref().filter(|_| rarely(u, 48).unwrap_or(false));
         let (to, capacity) = match opened {
             Some(opened) => {
@@ -97,7 +96,7 @@ impl Caller<'_> {
             }
             None => (memory.at(0), capacity),
         };
-        // SAFETY: so many bytes to write to.
+        // SAFETY: `to` has `capacity` bytes.
         let status = known(unsafe { hgrid_pack(grid, to, capacity, &raw mut bytes) });
         if status != HGRID_OK {
             assert!(memory.bytes().iter().all(|&byte| byte == CANARY), "written, but {status}");
@@ -106,7 +105,7 @@ impl Caller<'_> {
         assert!(to == memory.at(0), "packed over its own blob");
         let is_right = self.opened.as_ref().is_some_and(|opened| opened.is_right);
         let mut grid = self.grid;
-        // SAFETY: a blob with its mesh.
+        // SAFETY: the blob contains its mesh.
         let status = known(unsafe { hgrid_open(to, capacity, null(), from_mut(&mut grid)) });
         assert_eq!(status, HGRID_OK, "what was packed opens");
         self.grid = grid;
@@ -132,7 +131,7 @@ impl Caller<'_> {
         };
         let mut info = Struct::new(u, info)?;
         let from = if copy.bytes().is_empty() { null() } else { copy.bytes().as_ptr() };
-        // SAFETY: so many bytes to read, and a struct or NULL.
+        // SAFETY: the bytes can be read; the struct is valid or NULL.
         let status =
             known(unsafe { hgrid_peek(from.cast(), copy.bytes().len(), info.as_mut_ptr()) });
         let core = BlobInfo::peek(copy.bytes());
@@ -155,14 +154,14 @@ impl Caller<'_> {
 
     pub(super) fn validate(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         let grid = if rarely(u, 48)? { null() } else { from_ref(&self.grid) };
-        // SAFETY: NULL or a view.
+        // SAFETY: the view is NULL or valid.
         let bytes = unsafe { hgrid_validate_bytes(grid) };
         assert!(
             bytes <= self.core().map_or(0, |grid| grid.mesh().triangle_count() as usize / 8 + 4)
         );
         let mut scratch = vec![0xa5_u8; bytes];
         let to = if bytes == 0 { null_mut() } else { scratch.as_mut_ptr().cast() };
-        // SAFETY: NULL or a view, and so many bytes to write.
+        // SAFETY: the view is NULL or valid, and `to` has so many bytes.
         let status = known(unsafe { hgrid_validate(grid, to, bytes) });
         let core = self.core().filter(|_| !grid.is_null());
         let is_valid = core.is_some_and(|grid| prove(&grid).is_ok());
@@ -180,7 +179,7 @@ impl Caller<'_> {
             content_hash: 7,
         };
         let mut statistics = Struct::new(u, statistics)?;
-        // SAFETY: NULL or a view, a struct or NULL.
+        // SAFETY: view and struct are NULL or valid.
         let status = known(unsafe { hgrid_inspect(grid, statistics.as_mut_ptr()) });
         let core = core.filter(|_| statistics.is_sound());
         assert_eq!(status == HGRID_OK, core.is_some(), "{status}");
@@ -189,7 +188,7 @@ impl Caller<'_> {
         Ok(())
     }
 
-    /// A grid in memory that the library asks for, which it gives back to the byte.
+    /// Creates a grid in memory that the library allocates and must give back to the byte.
     pub(super) fn create(&mut self, u: &mut Unstructured<'_>) -> Result<()> {
         let mut input = self.input(u)?;
         let is_small = input.need().is_some();
@@ -202,7 +201,7 @@ impl Caller<'_> {
             release: if rarely(u, 48)? { None } else { Some(release) },
         };
         let allocator = Struct::new(u, allocator)?;
-        // The system's memory, but not all of it.
+        // Do not take too much of the system's memory.
         if allocator.is_null() && !is_small {
             return Ok(());
         }
@@ -210,25 +209,25 @@ impl Caller<'_> {
         let to = if rarely(u, 48)? { null_mut() } else { from_mut(&mut grid) };
         let (mesh, config, report) =
             (input.mesh.as_ptr(), input.config.as_ptr(), input.report.as_mut_ptr());
-        // SAFETY: all pointers are NULL or good for what is said with them.
+        // SAFETY: all pointers are NULL or valid.
         let status = known(unsafe { hgrid_create(mesh, config, allocator.as_ptr(), to, report) });
         assert_eq!(status == HGRID_OK, !grid.is_null(), "{status}");
         if !grid.is_null() {
-            // SAFETY: a view that was just made.
+            // SAFETY: the view was just made.
             let mut scratch = vec![0xa5_u8; unsafe { hgrid_validate_bytes(grid) }];
-            // SAFETY: a view that was just made, and so many bytes to write.
+            // SAFETY: the view was just made, and the scratch has so many bytes.
             let status =
                 known(unsafe { hgrid_validate(grid, scratch.as_mut_ptr().cast(), scratch.len()) });
             assert_eq!(status, HGRID_OK, "what was created is valid");
         }
-        // SAFETY: what was just made, or NULL.
+        // SAFETY: the grid was just made, or is NULL.
         unsafe { hgrid_destroy(grid) };
         assert!(heap.lent.borrow().is_empty(), "not given back");
         Ok(())
     }
 }
 
-/// Returns true if two descriptions are of one mesh.
+/// Returns true if two descriptions are of the same mesh.
 fn same(one: &hgrid_mesh, other: &hgrid_mesh) -> bool {
     let numbers = |mesh: &hgrid_mesh| {
         let addresses = [mesh.positions.addr(), mesh.indices.addr()];
@@ -238,7 +237,7 @@ fn same(one: &hgrid_mesh, other: &hgrid_mesh) -> bool {
     numbers(one) == numbers(other)
 }
 
-/// Memory for the library.
+/// An allocator for the library.
 struct Heap {
     lent: RefCell<Vec<Memory>>,
     /// The most pieces that it lends at once.
@@ -249,7 +248,7 @@ struct Heap {
 const PIECE: usize = 1 << 22;
 
 unsafe extern "C" fn allocate(context: *mut c_void, bytes: usize, alignment: usize) -> *mut c_void {
-    // SAFETY: only ever given together with one.
+    // SAFETY: the library passes on the context of the allocator, a `Heap`.
     let heap = unsafe { &*context.cast::<Heap>() };
     assert!(alignment == 64 && bytes > 0);
     let mut lent = heap.lent.borrow_mut();
@@ -266,7 +265,7 @@ unsafe extern "C" fn release(
     bytes: usize,
     alignment: usize,
 ) {
-    // SAFETY: only ever given together with one.
+    // SAFETY: the library passes on the context of the allocator, a `Heap`.
     let heap = unsafe { &*context.cast::<Heap>() };
     let mut lent = heap.lent.borrow_mut();
     let place = lent.iter().position(|lent| lent.at(0) == memory).expect("memory of this heap");

@@ -1,4 +1,4 @@
-//! The loop over tasks that a caller brings, right or wrong.
+//! A loop over tasks as a caller may write it, right or wrong.
 
 use arbitrary::Arbitrary;
 use hgrid_core::Task;
@@ -8,11 +8,11 @@ use hgrid_core::Task;
 pub(super) enum Loop {
     Forwards,
     Backwards,
-    /// Runs one a second time.
+    /// Runs one task a second time.
     Twice(u8),
-    /// Leaves one out.
+    /// Leaves one task out.
     Not(u8),
-    /// Runs one that there is not.
+    /// Runs a task with an index out of range.
     Beyond(u32),
 }
 
@@ -29,12 +29,12 @@ impl Loop {
         }
     }
 
-    /// The same as core takes it.
+    /// Returns the loop in the form that core takes.
     pub(super) fn for_core(self) -> impl for<'t> Fn(u32, &'t Task<'t>) {
         move |count, task| self.run(count, task)
     }
 
-    /// Returns true if it does what is asked of it.
+    /// Returns true if each task runs exactly once.
     pub(super) const fn is_right(self) -> bool {
         matches!(self, Self::Forwards | Self::Backwards)
     }

@@ -8,30 +8,30 @@ use super::rays;
 use super::seeds::{Seed, seed};
 use crate::copy::Copy;
 
-/// One change. Places are words, counted round and round.
+/// One change. Offsets are in words and wrap around.
 #[derive(Debug, Clone, Copy, Arbitrary)]
 pub enum Edit {
-    /// Another word.
+    /// Replaces a word.
     Set { at: u16, word: u32 },
-    /// Another bit.
+    /// Flips a bit.
     Flip { at: u16, bit: u8 },
-    /// A little more or less.
+    /// Changes a word by a little.
     Add { at: u16, by: i8 },
-    /// A byte.
+    /// Replaces a byte.
     Byte { at: u32, byte: u8 },
-    /// Words from elsewhere.
+    /// Copies words from elsewhere.
     Copy { from: u16, to: u16, words: u8 },
-    /// Two words in each other's place.
+    /// Exchanges two words.
     Swap { a: u16, b: u16 },
-    /// Many equal bytes.
+    /// Writes many equal bytes.
     Fill { at: u16, words: u8, byte: u8 },
-    /// Fewer words: those behind move up.
+    /// Removes words; those after them move up.
     Remove { at: u16, words: u8 },
-    /// More words, all zero: those behind move down.
+    /// Inserts words of zeros; those after them move down.
     Insert { at: u16, words: u8 },
-    /// Fewer bytes.
+    /// Cuts bytes off the end.
     Cut { bytes: u16 },
-    /// More bytes.
+    /// Adds bytes at the end.
     Extend { bytes: u16, byte: u8 },
 }
 
@@ -97,12 +97,12 @@ impl Edit {
     }
 }
 
-/// A number of bytes that there are.
+/// Returns a number of bytes from 0 to `length`.
 const fn place_of(count: u16, length: usize) -> usize {
     count as usize % (length + 1)
 }
 
-/// A seed and bytes to open with its mesh, or with the mesh in them.
+/// A seed, and a changed blob to open with the seed's mesh or with the mesh in the blob.
 #[derive(Debug)]
 pub(super) struct Damaged {
     seed: &'static Seed,
@@ -111,7 +111,7 @@ pub(super) struct Damaged {
 }
 
 impl Damaged {
-    /// Returns what the bytes describe: a seed with changes, or a blob of their own.
+    /// Reads a seed with changes, or a blob from the remaining bytes.
     pub(super) fn new(u: &mut Unstructured<'_>) -> Result<Self> {
         let seed = seed(u8::arbitrary(u)?.into());
         let (is_own, is_signed) = (rarely(u, 16)?, !rarely(u, 16)?);
@@ -131,10 +131,10 @@ impl Damaged {
         Ok(Self { seed, copy, is_packed })
     }
 
-    /// The grid, if it opens.
+    /// Opens the grid.
     pub(super) fn open(&self) -> core::result::Result<Grid<'_>, Error> {
         let bytes = self.copy.bytes();
-        // Harmless whatever it says.
+        // A peek is harmless whatever the bytes say.
         let _ = BlobInfo::peek(bytes);
         if self.is_packed {
             Grid::open_packed(bytes)
@@ -143,7 +143,7 @@ impl Damaged {
         }
     }
 
-    /// The rays to ask about: those that are always asked about, and those that the bytes choose.
+    /// Returns the fixed rays, and rays that the bytes choose.
     pub(super) fn rays(u: &mut Unstructured<'_>, grid: &Grid<'_>) -> Vec<Ray> {
         let mut all = rays::fixed_rays(grid.bounds(), 8);
         all.extend(rays::chosen(u, grid).unwrap_or_default());

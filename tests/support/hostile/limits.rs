@@ -2,11 +2,11 @@
 
 use hgrid_core::{Counters, Grid, Method, Parameters};
 
-/// The most that a query of one ray may count.
+/// Returns the most that a query of one ray may count.
 ///
-/// A walk moves one axis towards its end at every step, so it has no more steps than the cells
-/// on the three axes of its box sum up to. Boxes within boxes multiply that; where bytes say
-/// how deep, there is a last depth.
+/// A walk moves one axis towards its end at every step, so it has no more steps than the sum of the cells
+/// along the three axes of its box. Nested boxes multiply that; where the bytes set the nesting, there is
+/// a maximum depth.
 #[must_use]
 pub fn most(grid: &Grid<'_>) -> Counters {
     let sum = |cells: [u32; 3]| cells.iter().map(|&c| u64::from(c)).sum::<u64>();
@@ -18,28 +18,28 @@ pub fn most(grid: &Grid<'_>) -> Counters {
         Parameters::Fixed { macrocell_factor, .. } => {
             macrocells(grid.resolution(), macrocell_factor)
         }
-        // In every cell a subgrid of no more than 255 cells on an axis.
+        // A subgrid in every cell, with no more than 255 cells along an axis.
         Parameters::Variable { .. } => cells * (1 + 3 * 255),
         // One step for each entry.
         Parameters::Recursive { .. } => words,
-        // A node for each node, and eight leaves; one more, and the budget is spent.
+        // Each node counts once, with at most eight leaves; one more step exhausts the budget.
         Parameters::Bvh { .. } => 9 * nodes(grid) + 1,
         others => panic!("nobody has said what {others:?} may cost"),
     };
-    // Lists hold each word once, but for leaves of a tree, which have eight ids or fewer; a ray from too
-    // far away for any structure is shown every triangle.
+    // Each word of a list is tested once; leaves of a tree have at most eight ids. A ray from too far away
+    // for any structure tests every triangle.
     let primitive_tests = if grid.method() == Method::Bvh { 8 * cell_steps } else { words };
     let primitive_tests = primitive_tests.max(grid.mesh().triangle_count().into());
     Counters { primitive_tests, cell_steps, grid_steps: cell_steps }
 }
 
-/// Nodes of a tree, which lie behind the ids.
+/// Returns the number of nodes of a tree, which follow the ids.
 fn nodes(grid: &Grid<'_>) -> u64 {
     let ids = (4 * u64::from(grid.reference_count())).next_multiple_of(64);
     (grid.blob_bytes() as u64 - 128 - ids) / 80
 }
 
-/// Steps on all levels, if all macrocells were full.
+/// Returns the steps on all levels if all macrocells were full.
 fn macrocells(resolution: [u32; 3], factor: u32) -> u64 {
     let sum = |cells: [u32; 3]| cells.iter().map(|&c| u64::from(c)).sum::<u64>();
     let few = |cells: [u32; 3]| cells.iter().map(|&c| u64::from(c)).product::<u64>() <= 10_000;

@@ -10,12 +10,12 @@ use hgrid_core::ALIGNMENT;
 
 use crate::guarded::CANARY;
 
-/// True once in about `n` times; not where the bytes have ended.
+/// Returns true about once in `n` times, and false where the bytes have ended.
 pub(super) fn rarely(u: &mut Unstructured<'_>, n: u8) -> Result<bool> {
     Ok(!u.ratio(n - 1, n)?)
 }
 
-/// Memory that starts at a multiple of 64 and of which not a byte behind the last may be touched.
+/// Memory at a multiple of 64, of exactly the given size: no byte after the last may be touched.
 pub(super) struct Memory {
     start: NonNull<u8>,
     layout: Layout,
@@ -25,7 +25,7 @@ pub(super) struct Memory {
 impl Memory {
     pub(super) fn new(bytes: usize) -> Self {
         let layout = Layout::from_size_align(bytes.max(1), ALIGNMENT).expect("not too large");
-        // SAFETY: not of size 0.
+        // SAFETY: the size is not 0.
         let start = unsafe { alloc(layout) };
         let Some(start) = NonNull::new(start) else { handle_alloc_error(layout) };
         // SAFETY: so many bytes were just allocated.
@@ -39,32 +39,31 @@ impl Memory {
         memory
     }
 
-    /// The address of a byte, or of the end.
+    /// Returns the address of a byte, or of the end.
     pub(super) fn at(&self, byte: usize) -> *mut c_void {
         assert!(byte <= self.bytes);
         self.start.as_ptr().wrapping_add(byte).cast()
     }
 
     pub(super) fn bytes(&self) -> &[u8] {
-        // SAFETY: allocated, written, and not given back before `self` is.
+        // SAFETY: the bytes are allocated and written, and live as long as `self`.
         unsafe { std::slice::from_raw_parts(self.start.as_ptr(), self.bytes) }
     }
 
     pub(super) fn bytes_mut(&mut self) -> &mut [u8] {
-        // SAFETY: the same, and `self` is borrowed for as long.
+        // SAFETY: as above, and `self` is borrowed mutably.
         unsafe { std::slice::from_raw_parts_mut(self.start.as_ptr(), self.bytes) }
     }
 }
 
 impl Drop for Memory {
     fn drop(&mut self) {
-        // SAFETY: allocated so.
+        // SAFETY: the memory was allocated with this layout.
         unsafe { dealloc(self.start.as_ptr(), self.layout) };
     }
 }
 
-/// A value that a program lends to the library by its address and
-/// looks at itself, too: a box that may be moved.
+/// A value that a program lends to the library by its address and also reads itself: a box that may be moved.
 pub(super) struct Lent<T>(NonNull<T>);
 
 impl<T> Lent<T> {
@@ -81,22 +80,22 @@ impl<T> Deref for Lent<T> {
     type Target = T;
 
     fn deref(&self) -> &T {
-        // SAFETY: of a box; no call of the library, which alone writes to it, is under way.
+        // SAFETY: the pointer is that of a box; only calls of the library write to it, and none is under way.
         unsafe { self.0.as_ref() }
     }
 }
 
 impl<T> Drop for Lent<T> {
     fn drop(&mut self) {
-        // SAFETY: it was leaked to be given back here.
+        // SAFETY: the box was leaked to be given back here.
         drop(unsafe { Box::from_raw(self.0.as_ptr()) });
     }
 }
 
-/// The largest size that a struct may say it has: as many bytes are there.
+/// The largest size that a struct may claim; so many bytes exist.
 const LARGEST: usize = 4096;
 
-/// A struct that starts with its size, right or wrong, and what lies behind it; or NULL.
+/// A struct that starts with its size, right or wrong, with bytes after it; or NULL.
 pub(super) struct Struct<T> {
     all: Box<Padded<T>>,
     is_null: bool,
@@ -109,7 +108,7 @@ struct Padded<T> {
 }
 
 impl<T: Copy> Struct<T> {
-    /// The struct with a size that is mostly right.
+    /// Returns the struct with a size that is mostly right.
     pub(super) fn new(u: &mut Unstructured<'_>, value: T) -> Result<Self> {
         let right = size_of::<T>() as u32;
         let mut all = Box::new(Padded { value, behind: [0; LARGEST] });
@@ -125,20 +124,20 @@ impl<T: Copy> Struct<T> {
                 all.behind[usize::from(u8::arbitrary(u)?)] = 1;
             }
         }
-        // SAFETY: every struct that is given here starts with its size.
+        // SAFETY: every struct in use here starts with its size.
         unsafe { (&raw mut all.value).cast::<u32>().write(size) };
         Ok(Self { all, is_null: rarely(u, 48)? })
     }
 
-    /// The struct as it should be.
+    /// Returns the struct with its right size.
     pub(super) fn right(value: T) -> Self {
         let mut all = Box::new(Padded { value, behind: [0; LARGEST] });
-        // SAFETY: every struct that is given here starts with its size.
+        // SAFETY: every struct in use here starts with its size.
         unsafe { (&raw mut all.value).cast::<u32>().write(size_of::<T>() as u32) };
         Self { all, is_null: false }
     }
 
-    /// Returns true if the library takes it.
+    /// Returns true if the library accepts the struct.
     pub(super) fn is_sound(&self) -> bool {
         // SAFETY: as above.
         let size = unsafe { (&raw const self.all.value).cast::<u32>().read() } as usize;
@@ -166,7 +165,7 @@ impl<T: Copy> Struct<T> {
     }
 }
 
-/// A stride and a count of elements that lie in so many bytes, or that no memory can hold.
+/// Returns a stride and a count of elements that fit into so many bytes, or that exceed any memory.
 pub(super) fn array(u: &mut Unstructured<'_>, bytes: usize, size: usize) -> Result<(usize, usize)> {
     let number = |u: &mut Unstructured<'_>| {
         Ok(if rarely(u, 4)? { usize::arbitrary(u)? } else { usize::from(u8::arbitrary(u)? % 64) })

@@ -1,11 +1,11 @@
-//! Targets of fuzzing: functions of any bytes that panic where the library breaks a promise.
+//! Targets of fuzzing: functions of any bytes that panic if the library breaks a promise.
 //!
-//! `tests/fuzz` gives them the bytes that a fuzzer invents, `tests/hostile` those that were kept.
-//! The types of each target say what the bytes mean, through `arbitrary`: most bytes mean something,
-//! and what is missing at the end is zero.
+//! `tests/fuzz` feeds them the bytes that a fuzzer invents, `tests/hostile` those that were kept. The types
+//! of each target define the meaning of the bytes, through `arbitrary`: most bytes mean something, and
+//! missing bytes at the end are zero.
 //!
-//! A new entry point of the library belongs into `ask`, where every target that has a grid asks it,
-//! and into `c_abi`, where C does.
+//! A new entry point of the library belongs into `ask`, which queries the grid of every target that has one,
+//! and into `c_abi`, which calls it through C.
 
 mod ask;
 mod build_mesh;
@@ -36,13 +36,13 @@ pub use validate::run as validate;
 /// A function that a fuzzer runs, and the folder of its bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct Target {
-    /// The name, and that of the folders.
+    /// The name of the target and of its folders.
     pub name: &'static str,
     /// The function.
     pub run: fn(&[u8]),
 }
 
-/// All of them.
+/// All targets.
 pub const TARGETS: [Target; 4] = [
     Target { name: "open_query", run: open_query },
     Target { name: "validate", run: validate },

@@ -1,11 +1,11 @@
-//! Rays of all kinds: what a fuzzer chooses, and a set that is always asked about.
+//! Rays of all kinds: those that a fuzzer chooses, and a fixed set.
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_core::{Grid, Ray, TriangleMesh};
 
 use crate::random::Random;
 
-/// No fuzzer needs more at once: a tile of two bundles and two rays.
+/// The most rays at once, enough for a tile of two groups and two more rays.
 const MOST: usize = if cfg!(miri) { 9 } else { 130 };
 
 /// A way to choose the numbers of a ray.
@@ -13,19 +13,19 @@ const MOST: usize = if cfg!(miri) { 9 } else { 130 };
 enum Kind {
     /// Any bits.
     Any([f32; 8]),
-    /// From a place in or around the grid's box, in a direction of small whole numbers.
+    /// From a point in or around the grid's box, in a direction of small integers.
     Around { at: [i8; 3], towards: [i8; 3] },
-    /// Through a point of a triangle, with whole weights, from so many directions away.
+    /// Through a point of a triangle, with integer weights, from a number of directions away.
     Through { triangle: u16, weights: [u8; 2], towards: [i8; 3], back: i8 },
     /// Along an axis through a vertex.
     Along { triangle: u16, corner: u8, axis: u8, back: i8 },
     /// From one vertex to another.
     Between { from: u16, to: u16, corners: u8 },
-    /// Neighbours as the pixels of a picture, this many.
+    /// Neighbours like the pixels of a picture, this many.
     Tile { at: [i8; 3], towards: [i8; 3], spread: u8, count: u8 },
 }
 
-/// The part of the ray that counts.
+/// The range of a ray.
 #[derive(Debug, Clone, Copy, Arbitrary)]
 enum Part {
     Ahead,
@@ -34,14 +34,14 @@ enum Part {
     Any(f32, f32),
 }
 
-/// A ray or several.
+/// One ray or several.
 #[derive(Debug, Clone, Arbitrary)]
 struct Shot {
     kind: Kind,
     part: Part,
 }
 
-/// The rays that the bytes describe.
+/// Returns the rays that the bytes describe.
 pub(super) fn chosen(u: &mut Unstructured<'_>, grid: &Grid<'_>) -> Result<Vec<Ray>> {
     let mut rays = Vec::new();
     for _ in 0..u.int_in_range(0..=11)? {
@@ -107,8 +107,8 @@ impl Shot {
     }
 }
 
-/// A full tile of rays from beside the grid's box through its middle: a thousandth of the way
-/// apart, so that they are in the same cells of all but the finest grids.
+/// Returns a full tile of rays from beside the grid's box through its middle. Neighbours differ by a ten-
+/// thousandth of the way, so they are in the same cells of all but the finest grids.
 pub(super) fn close(grid: &Grid<'_>) -> [Ray; 128] {
     let (from, to) = (around(grid, [-96, -80, -48]), around(grid, [0; 3]));
     std::array::from_fn(|ray| {
@@ -118,7 +118,7 @@ pub(super) fn close(grid: &Grid<'_>) -> [Ray; 128] {
     })
 }
 
-/// A place in the grid's box, or around it as far as the box is wide.
+/// Returns a point in the grid's box, or around it up to the box's width.
 fn around(grid: &Grid<'_>, at: [i8; 3]) -> [f32; 3] {
     let (min, max) = grid.bounds();
     std::array::from_fn(|k| {
@@ -127,7 +127,7 @@ fn around(grid: &Grid<'_>, at: [i8; 3]) -> [f32; 3] {
     })
 }
 
-/// Through a place, from `back` directions before it.
+/// Returns a ray through a point, which starts `back` directions before it.
 fn away(at: [f32; 3], direction: [f32; 3], back: i8) -> Ray {
     let back = f32::from(back) / 8.0;
     Ray::new(std::array::from_fn(|k| at[k] - direction[k] * back), direction)
@@ -138,8 +138,7 @@ fn corners(mesh: &TriangleMesh<'_>, triangle: u16) -> [[f32; 3]; 3] {
     mesh.triangle(u32::from(triangle) % count).unwrap_or_default()
 }
 
-/// Rays that are always asked about: across the box, at the mesh, along axes, and no rays
-/// at all; half of them neighbours.
+/// Returns the fixed rays: across the box, at the mesh, along axes, and invalid ones; half of them neighbours.
 #[must_use]
 pub fn fixed_rays(bounds: ([f32; 3], [f32; 3]), count: usize) -> Vec<Ray> {
     let (min, max) = bounds;
@@ -161,7 +160,7 @@ pub fn fixed_rays(bounds: ([f32; 3], [f32; 3]), count: usize) -> Vec<Ray> {
             2 => ray.t_min = f32::NEG_INFINITY,
             3 => ray.t_max = 1.0,
             _ => {
-                // A tile: one origin, directions side by side.
+                // A tile: one origin and neighbouring directions.
                 let step = |k: usize| half[k] * [0.0, 0.01, -0.02, 0.03][(i + k) % 4];
                 ray.origin = std::array::from_fn(|k| center[k] - [3.0, 2.5, 1.5][k] * half[k]);
                 ray.direction =
@@ -170,7 +169,7 @@ pub fn fixed_rays(bounds: ([f32; 3], [f32; 3]), count: usize) -> Vec<Ray> {
         }
         rays.push(ray);
     }
-    // Put in what is no ray, now and then.
+    // Put in invalid rays now and then.
     let odd = [
         [f32::NAN, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0],
         [0.0, 0.0, 0.0, 0.0, 0.0, -0.0, 0.0, 1.0],

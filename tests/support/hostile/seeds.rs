@@ -1,4 +1,4 @@
-//! Grids that damage starts from: small ones with all that a method's blob can have.
+//! Grids to damage: small ones with every feature of a method's blob.
 
 use std::sync::OnceLock;
 
@@ -12,21 +12,21 @@ use crate::owned::{Owned, prove};
 /// A grid as it was built.
 #[derive(Debug)]
 pub struct Seed {
-    /// The mesh that it was built of.
+    /// The mesh that it was built from.
     pub mesh: Mesh,
     /// The configuration that it was built with.
     pub config: Config,
     /// The blob.
     pub blob: Vec<u8>,
-    /// The blob with the mesh behind it, and a mask for each triangle.
+    /// The blob with the mesh after it, and a mask for each triangle.
     pub packed: Vec<u8>,
 }
 
 impl Seed {
-    /// Builds it.
+    /// Builds the grid.
     ///
     /// # Panics
-    /// If it cannot be built, or is not right.
+    /// If it cannot be built, or is not valid.
     #[must_use]
     pub fn new(mesh: Mesh, config: Config) -> Self {
         let view = mesh.view();
@@ -43,16 +43,16 @@ impl Seed {
     }
 }
 
-/// The meshes, each with every method.
+/// The meshes; each is built with every method.
 const MESHES: [fn() -> Mesh; 6] = [small, odd, nested, || ball(3, 1.0), crowded, Mesh::default];
 const COUNT: usize = MESHES.len() * Method::ALL.len();
 
-/// Some meshes with every method.
+/// Returns all seeds: some meshes with every method.
 pub fn seeds() -> impl Iterator<Item = &'static Seed> {
     (0..COUNT).map(seed)
 }
 
-/// One of them, counted round and round; built when it is first asked for.
+/// Returns the seed with a number, which wraps around; it is built when first needed.
 pub(super) fn seed(which: usize) -> &'static Seed {
     static SEEDS: [OnceLock<Seed>; COUNT] = [const { OnceLock::new() }; COUNT];
     let which = which % COUNT;
@@ -63,12 +63,12 @@ pub(super) fn seed(which: usize) -> &'static Seed {
     })
 }
 
-/// A dozen triangles, some of them large.
+/// Returns a dozen triangles, some of them large.
 fn small() -> Mesh {
     soup(12, 0.5, 51)
 }
 
-/// Triangles that are none, equal ones, flat ones, and some that are not finite.
+/// Returns equal triangles, triangles without area, and some that are not finite.
 fn odd() -> Mesh {
     let mut mesh = soup(6, 0.4, 5);
     let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -81,8 +81,8 @@ fn odd() -> Mesh {
     mesh
 }
 
-/// A few triangles, some in a tenth of the place, and some in a
-/// hundredth: grids in grids of few bytes.
+/// Returns a few triangles, some in a tenth of the space and some in less than a hundredth: grids in grids of
+/// few bytes.
 pub fn nested() -> Mesh {
     let mut mesh = soup(10, 0.1, 3);
     for (count, size) in [(30, 0.1), (12, 0.004)] {
@@ -91,7 +91,7 @@ pub fn nested() -> Mesh {
     mesh
 }
 
-/// A crowd in a crowd, under larger triangles.
+/// Returns a crowd in a crowd, under larger triangles.
 fn crowded() -> Mesh {
     let mut mesh = soup(40, 0.02, 3);
     for size in [0.05, 2e-3] {

@@ -1,5 +1,5 @@
-//! Meshes and configurations, as a fuzzer chooses them: of any bytes, at any stride, and of few
-//! enough triangles that brute force takes no time.
+//! Meshes and configurations as a fuzzer chooses them: from any bytes, with any stride, and with so few
+//! triangles that brute force is quick.
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use hgrid_core::{
@@ -9,20 +9,20 @@ use hgrid_core::{
 
 use super::memory::rarely;
 
-/// The most triangles that a fuzzer writes down, and after they are repeated.
+/// The most triangles that a fuzzer writes down, and the most after repetition.
 const MOST: usize = if cfg!(miri) { 6 } else { 48 };
 const MOST_REPEATED: usize = if cfg!(miri) { 12 } else { 400 };
 
 /// A way to choose coordinates.
 #[derive(Debug, Clone, Copy, Arbitrary)]
 enum Numbers {
-    /// Small whole numbers times a power of two: equal ones, planes, vertices on borders.
+    /// Small integers times a power of two: equal coordinates, planes, vertices on borders.
     Whole { exponent: i8 },
-    /// From a table of what floats can be.
+    /// Values from a table of special floats.
     Odd,
     /// Any bits.
     Any,
-    /// Whole numbers times any power of two, each with its own.
+    /// Integers times any power of two, each with its own.
     Mixed,
 }
 
@@ -70,7 +70,7 @@ impl Numbers {
     }
 }
 
-/// Vertices and triangles in memory of their own, not a byte longer than they are.
+/// Vertices and triangles in memory of their own, which ends with the last element.
 #[derive(Debug)]
 pub(super) struct Shape {
     pub(super) positions: Vec<u8>,
@@ -80,13 +80,13 @@ pub(super) struct Shape {
     pub(super) index_stride: usize,
     pub(super) triangle_count: usize,
     pub(super) index_type: IndexType,
-    /// Four bytes for each triangle, and as many more to the next; or none at all.
+    /// Four bytes for each triangle, with a gap before the next; or no bytes at all.
     pub(super) masks: Vec<u8>,
     pub(super) mask_stride: usize,
 }
 
 impl Shape {
-    /// The mesh that the bytes describe.
+    /// Reads the mesh that the bytes describe.
     pub(super) fn new(u: &mut Unstructured<'_>) -> Result<Self> {
         let numbers = Numbers::arbitrary(u)?;
         let index_type = if bool::arbitrary(u)? { IndexType::U16 } else { IndexType::U32 };
@@ -105,7 +105,7 @@ impl Shape {
             let count = (vertices.len() + usize::from(is_stranger_allowed)).max(1);
             triangles.push(corners.map(|corner| corner % count));
         }
-        // Crowds: the same again, smaller, about the first vertex.
+        // Make crowds: copies about the first vertex, each smaller than the last.
         let (first, count) = (vertices.clone(), triangles.len());
         for copy in 1..=copies.min(MOST_REPEATED / count.max(1)) {
             let scale = 2_f32.powi(-((copy * usize::from(shrink % 32)) as i32 / 8));
@@ -158,7 +158,7 @@ impl Shape {
         })
     }
 
-    /// The view that the library takes.
+    /// Returns the mesh in the library's form.
     pub(super) fn view(&self) -> TriangleMesh<'_> {
         let positions = [self.position_stride, self.vertex_count];
         let indices = [self.index_stride, self.triangle_count];
@@ -170,7 +170,7 @@ impl Shape {
         view.with_masks(Strided { bytes, stride, count }).expect("a mask for each triangle")
     }
 
-    /// The same triangles in parts, cut at these, every other one without masks.
+    /// Returns the same triangles in parts, cut at these positions, every other part without masks.
     pub(super) fn parts<'s>(&'s self, cuts: &[u8]) -> Vec<MeshPart<'s>> {
         let mut ends: Vec<_> =
             cuts.iter().map(|&cut| cut as usize % (self.triangle_count + 1)).collect();
@@ -180,7 +180,7 @@ impl Shape {
         let parts = starts.zip(ends).enumerate().map(|(at, (start, end))| {
             let count = end - start;
             let from = |bytes: &'s [u8], stride: usize| {
-                // Behind the last triangle there is nothing, not even the rest of its stride.
+                // After the last triangle there are no bytes, not even the rest of its stride.
                 let start = if count == 0 { 0 } else { start * stride };
                 Strided { bytes: &bytes[start..], stride, count }
             };
@@ -202,7 +202,7 @@ impl Shape {
         parts.collect()
     }
 
-    /// The same bytes under another description.
+    /// Describes the same bytes with other strides and counts.
     pub(super) fn strided(
         &self,
         [position_stride, vertex_count]: [usize; 2],
@@ -217,11 +217,11 @@ impl Shape {
     }
 }
 
-/// A number that a configuration can have.
+/// A float in a configuration.
 #[derive(Debug, Clone, Copy, Arbitrary)]
 enum Setting {
     Default,
-    /// A sound one: 2^-8 to 2^8.
+    /// A valid value: 2^-8 to 2^8 times the default.
     Power(i8),
     Odd(u8),
     Any(f32),
@@ -238,7 +238,7 @@ impl Setting {
     }
 }
 
-/// A count that a configuration can have.
+/// A count in a configuration.
 #[derive(Debug, Clone, Copy, Arbitrary)]
 enum Count {
     Default,
@@ -256,7 +256,7 @@ impl Count {
     }
 }
 
-/// The choices of C: the fields of all methods.
+/// The configuration as C has it: the fields of all methods.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Chosen {
     pub(super) method: Method,
@@ -268,7 +268,7 @@ pub(super) struct Chosen {
     pub(super) flags: BuildFlags,
 }
 
-/// The configuration that the bytes describe.
+/// Reads the configuration that the bytes describe.
 pub(super) fn config(u: &mut Unstructured<'_>) -> Result<Config> {
     let Chosen { method, density, macrocell_factor, subdivide_above, depth, quality, flags } =
         chosen(u)?;
@@ -282,7 +282,7 @@ pub(super) fn config(u: &mut Unstructured<'_>) -> Result<Config> {
     Ok(Config { parameters, flags })
 }
 
-/// The choice that the bytes describe.
+/// Reads the fields that the bytes describe.
 pub(super) fn chosen(u: &mut Unstructured<'_>) -> Result<Chosen> {
     let which = usize::from(u8::arbitrary(u)?);
     let method = Method::ALL[which % Method::ALL.len()];

@@ -1,5 +1,4 @@
-//! Any bytes as a blob: what `validate` lets pass answers as brute force does, and is what a build
-//! makes.
+//! Any bytes as a blob: a grid that `validate` accepts answers as brute force does, and is one that a build makes.
 
 use arbitrary::Unstructured;
 use hgrid_core::Method;
@@ -9,7 +8,7 @@ use super::damage::Damaged;
 use crate::copy::{CHECKSUM, Copy, MESH};
 use crate::owned::{Owned, prove};
 
-/// See the head of this file.
+/// Runs the target, see the head of this file.
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let Ok(damaged) = Damaged::new(&mut u) else { return };
@@ -19,8 +18,8 @@ pub fn run(data: &[u8]) {
     }
     agrees(&grid, &Damaged::rays(&mut u, &grid));
 
-    // A build does not say whether the mesh lies behind the grid, and nothing proves why a list was not
-    // divided (see core/src/variable/validate.rs), or that a tree is the one of a build.
+    // Builds do not set the field for the mesh after the grid, and `validate` does not check why a list was
+    // not subdivided (see core/src/variable/validate.rs), or that a tree is the one of a build.
     let rebuilt = Owned::build(grid.mesh(), &grid.config()).expect("it says how it was built");
     let without = |bytes: &[u8]| {
         let mut copy = Copy::of(bytes);

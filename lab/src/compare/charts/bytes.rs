@@ -12,15 +12,15 @@ use crate::plot::{
 };
 use crate::table::display_name;
 
-/// The drawing.
+/// The chart of the bytes per triangle.
 pub(super) struct Figure<'a>(pub(super) &'a Comparison);
 
-/// Units of a group, of all beside the groups, and of the chart's height.
+/// Units of a group's width, of the width beside all groups, and of the chart's height.
 const GROUP: u32 = 92;
 const BESIDE: u32 = 100;
 const HEIGHT: u32 = 440;
 
-/// The part of a group's place that its bars fill.
+/// The part of a group's width that its bars fill.
 const PART: f64 = 0.8;
 
 impl Drawing for Figure<'_> {
@@ -31,7 +31,7 @@ impl Drawing for Figure<'_> {
 
     fn draw<B: DrawingBackend>(&self, area: &Area<B>, pen: Pen) -> AreaResult<B> {
         let Comparison { machine, scenes, .. } = self.0;
-        // Bytes do not depend on large pages: those of grids are counted in small ones.
+        // Bytes do not depend on large pages, so the caption leaves those out.
         let source = Machine { large_pages: None, ..machine.clone() }.summary();
         let legend = scenes.iter().zip(0..);
         let legend: Vec<_> =

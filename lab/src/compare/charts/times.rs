@@ -1,4 +1,4 @@
-//! Time to image against triangles: a line for each system, with those of hgrid the stronger ones.
+//! Time to image against triangles: a line for each system, stronger for those of hgrid.
 
 use plotters::element::{DynElement, IntoDynElement as _};
 use plotters::prelude::*;
@@ -11,7 +11,7 @@ use crate::plot::{
 };
 use crate::table::{display_name, times};
 
-/// The drawing.
+/// The chart of the times to image.
 pub(super) struct Figure<'a>(pub(super) &'a Comparison);
 
 /// Units of the chart and of the names beside it.
@@ -24,7 +24,7 @@ struct Line {
     name: String,
     color: RGBColor,
     is_peer: bool,
-    /// True if it is the second one of its colour.
+    /// True if an earlier line of its kind has the same colour.
     is_again: bool,
     points: Vec<(f64, f64)>,
 }
@@ -53,7 +53,8 @@ impl Figure<'_> {
         names(self.0).into_iter().map(line).collect()
     }
 
-    /// Powers of ten and what lies between, because scenes may be too close for their names.
+    /// Returns the axes. The names are powers of ten and their multiples by 2 and 5, because scenes may lie
+    /// between two powers.
     fn axes(&self, lines: &[Line]) -> (Stops, Scale) {
         let places = self.0.scenes.iter().map(|scene| triangles(scene.facts.triangles));
         let (low, high) =
@@ -109,8 +110,8 @@ impl Drawing for Figure<'_> {
 }
 
 impl Line {
-    /// Methods of hgrid are filled circles; peers are open ones, or triangles in a colour's second
-    /// turn.
+    /// Returns the marker: a filled circle for a method of hgrid, an open one for a peer, and a triangle for
+    /// a peer whose colour is used again.
     fn marker<B: DrawingBackend>(
         &self,
         pen: Pen,
@@ -130,7 +131,7 @@ fn triangles(count: usize) -> f64 {
     ratio(count as u64, 1).max(1.0).log10()
 }
 
-/// A number with one digit that counts: 5000, 20K, 1M.
+/// Formats a number that has one significant digit: 5000, 20K, 1M.
 fn short(number: usize) -> String {
     match number {
         0..10_000 => number.to_string(),

@@ -1,8 +1,8 @@
 //! bvh: a binary tree by binned SAH over shapes that bound themselves.
 //!
-//! The library's triangle test sees front faces only, so the adapter brings one for both sides. Leaves
-//! come in the order in which the ray enters their boxes; the search ends at the first one that
-//! begins behind the closest hit.
+//! The library's triangle test sees front faces only, so the adapter has its own for both sides. Leaves come
+//! in the order in which the ray enters their boxes; the search ends at the first box that begins beyond the
+//! closest hit.
 
 use ::bvh::aabb::{Aabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
@@ -17,7 +17,7 @@ use crate::compare::input::Input;
 use crate::compare::mode::Mode;
 use crate::compare::system::{System, Tracer, Use, each};
 
-/// The library's only builder.
+/// The system of the library's only builder.
 pub(super) struct BvhSystem(pub(super) Peer);
 
 impl System for BvhSystem {
@@ -37,7 +37,7 @@ impl System for BvhSystem {
     }
 }
 
-/// A triangle as the library wants it: it bounds itself and remembers its leaf.
+/// A triangle as the library takes it: with its box and the index of its leaf.
 struct Shape {
     corners: [Point3<f32>; 3],
     id: u32,
@@ -62,7 +62,7 @@ impl BHShape<f32, 3> for Shape {
 }
 
 impl Shape {
-    /// The `t` of a hit from either side (Möller and Trumbore 1997).
+    /// Returns the `t` of a hit from either side (Möller and Trumbore 1997).
     fn intersect(&self, ray: &BvhRay<f32, 3>) -> Option<f32> {
         let [a, b, c] = self.corners;
         let (ab, ac, ao) = (b - a, c - a, ray.origin - a);
@@ -82,7 +82,7 @@ struct Built {
 }
 
 impl Built {
-    /// The closest hit up to `t_max`, or the first that is found.
+    /// Returns the closest hit up to `t_max`, or the first one found if any will do.
     fn search(&self, ray: &BvhRay<f32, 3>, t_max: f32, is_any: bool) -> Option<Hit> {
         let mut closest = Hit { t: t_max, ..Hit::MISS };
         let mut is_found = false;
@@ -114,7 +114,7 @@ impl Tracer for Built {
     }
 }
 
-/// The library's own constructor would make the direction one long, and every `t` with it.
+/// Converts a ray. The library's own constructor would normalise the direction, which would change every `t`.
 fn to_bvh(ray: &Ray) -> BvhRay<f32, 3> {
     let direction = Vector3::from(ray.direction);
     let inv_direction = direction.map(|c| 1.0 / c);

@@ -1,7 +1,7 @@
 //! The other libraries: one adapter each, Embree's behind the feature `embree`, the others behind `peers`.
 //!
-//! An adapter turns the rays of hgrid into those of its library and the answers back, inside the
-//! time that is measured: who uses the library does the same.
+//! An adapter converts the rays of hgrid to those of its library and the answers back, inside the measured
+//! time: any user of the library has to do the same.
 
 #[cfg(feature = "peers")]
 mod bvh;
@@ -48,7 +48,7 @@ pub enum Peer {
 }
 
 impl Peer {
-    /// The name in commands and tables.
+    /// Returns the name in commands and tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -66,7 +66,7 @@ impl Peer {
         }
     }
 
-    /// Says why this program does not have it, and how to build one that does; `None` if it has it.
+    /// Returns why this program lacks the peer and how to build one that has it; `None` if it has it.
     #[cfg(feature = "embree")]
     fn lack(self) -> Option<&'static str> {
         match self {
@@ -74,7 +74,7 @@ impl Peer {
             _ if cfg!(not(feature = "peers")) => {
                 Some("is not in this program: build it with --features peers, not embree")
             }
-            // tinybvh-rs leaves out a layout that the compiler may not use.
+            // tinybvh-rs omits these layouts if the compiler may not use AVX2.
             Self::Tinybvh8 | Self::Tinybvh8Hq if cfg!(not(target_feature = "avx2")) => Some(
                 "needs a program that may use AVX2: build it with RUSTFLAGS='-C target-cpu=native'",
             ),
@@ -113,10 +113,10 @@ impl Peer {
     }
 }
 
-/// A system for each peer; for all that this program has if none is named.
+/// Starts a system for each peer; for all that this program has if none is named.
 ///
 /// # Errors
-/// If this program has no peers or not this one, or a library does not start.
+/// If this program lacks one of the peers, or a library does not start.
 #[cfg(feature = "embree")]
 pub fn systems(peers: &[Peer]) -> Result<Vec<Box<dyn System>>> {
     let all = Peer::value_variants().iter().copied().filter(|peer| peer.lack().is_none());
@@ -124,7 +124,7 @@ pub fn systems(peers: &[Peer]) -> Result<Vec<Box<dyn System>>> {
     peers.into_iter().map(Peer::system).collect()
 }
 
-/// A system for each peer: without the feature there is none.
+/// Fails: without the feature there is no peer.
 ///
 /// # Errors
 /// Always; the message says how to build a program that has them.
@@ -148,7 +148,7 @@ mod tests {
     fn names_are_those_of_the_command_line_and_of_no_method() {
         for peer in Peer::value_variants() {
             assert_eq!(peer.to_possible_value().unwrap().get_name(), peer.name());
-            // A first build is started by name.
+            // First builds find their system by name, so no peer may have the name of a method.
             let is_method = |method: &Method| method.name() == peer.name();
             assert!(!Method::ALL.iter().any(is_method), "{peer:?}");
         }

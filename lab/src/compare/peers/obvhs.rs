@@ -1,7 +1,7 @@
 //! obvhs: a two-wide tree by PLOC and reinsertion, turned into a compressed eight-wide one.
 //!
-//! Users of the library keep triangles of their own, in the order of the leaves and in the form that
-//! its triangle test wants: they are part of the structure here.
+//! Users of the library keep their own triangles, in the order of the leaves and in the form of its triangle
+//! test. So they are part of the structure here.
 
 use core::time::Duration;
 
@@ -20,19 +20,19 @@ use crate::compare::input::Input;
 use crate::compare::mode::Mode;
 use crate::compare::system::{System, Tracer, Use, each};
 
-/// A preset of its builder.
+/// A preset of the library's builder.
 pub(super) struct Obvhs {
     peer: Peer,
     params: BvhBuildParams,
 }
 
 impl Obvhs {
-    /// The fastest preset that improves its tree, as the library advises to.
+    /// Returns the fastest preset that improves its tree, which the library recommends.
     pub(super) const fn fast(peer: Peer) -> Self {
         Self { peer, params: BvhBuildParams::very_fast_build() }
     }
 
-    /// The preset of the highest quality.
+    /// Returns the preset of the highest quality.
     pub(super) const fn slow(peer: Peer) -> Self {
         Self { peer, params: BvhBuildParams::very_slow_build() }
     }

@@ -1,7 +1,7 @@
 //! parry3d: the binary tree of a collision library, over the caller's mesh.
 //!
-//! The library's `TriMesh` copies the mesh and knows one builder; the tree alone takes boxes and
-//! either builder, and asks for a triangle's hit when it comes to one.
+//! The library's `TriMesh` copies the mesh and has one builder. Its tree alone takes boxes and either
+//! builder, and calls back for the hit of a triangle.
 
 use anyhow::Result;
 use hgrid_core::{Hit, Ray};
@@ -16,19 +16,19 @@ use crate::compare::input::Input;
 use crate::compare::mode::Mode;
 use crate::compare::system::{System, Tracer, Use, each};
 
-/// One of its builders.
+/// One of the library's builders.
 pub(super) struct Parry {
     peer: Peer,
     strategy: BvhBuildStrategy,
 }
 
 impl Parry {
-    /// The faster one.
+    /// Returns the faster builder.
     pub(super) const fn binned(peer: Peer) -> Self {
         Self { peer, strategy: BvhBuildStrategy::Binned }
     }
 
-    /// The one of higher quality.
+    /// Returns the builder of higher quality.
     pub(super) const fn ploc(peer: Peer) -> Self {
         Self { peer, strategy: BvhBuildStrategy::Ploc }
     }
@@ -79,7 +79,7 @@ impl Tracer for Built<'_> {
     fn occluded(&self, _: Mode, rays: &[Ray], occluded: &mut [u8]) {
         each(rays, occluded, |ray| {
             let (ray, t_max) = to_parry(ray);
-            // There is no query for any hit: a hit that is closer than any box ends the search.
+            // The library has no any-hit query: a hit at a distance closer than any box ends the search.
             let hit = self.bvh.cast_ray(&ray, t_max, |id, closest| {
                 self.triangle(id).cast_local_ray(&ray, closest, false).map(|_| f32::MIN)
             });
@@ -88,7 +88,7 @@ impl Tracer for Built<'_> {
     }
 }
 
-/// Returns the library's ray and the end of its range: the largest number where that is infinite.
+/// Converts a ray, and the end of its range: the largest finite number replaces infinity.
 fn to_parry(ray: &Ray) -> (ParryRay, f32) {
     (ParryRay::new(ray.origin.into(), ray.direction.into()), ray.t_max.min(f32::MAX))
 }

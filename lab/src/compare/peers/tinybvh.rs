@@ -1,9 +1,8 @@
-//! tinybvh: binned SAH or spatial splits; traced two-wide as built, or
-//! eight-wide after a conversion.
+//! tinybvh: binned SAH or spatial splits; traced two-wide as built, or eight-wide after a conversion.
 //!
-//! The wrapper tinybvh-rs has no query for any hit: a closest hit answers. It has no smallest `t`
-//! either; all rays of the workloads start at 0. Large builds start threads, which share one core
-//! here (see `process`).
+//! The wrapper tinybvh-rs has no any-hit query, so closest hits answer those. It has no smallest `t` either;
+//! all rays of the workloads start at 0. Large builds start threads, which share one core here (see
+//! `process`).
 
 use anyhow::{Result, anyhow};
 use hgrid_core::{Hit, Ray};
@@ -15,7 +14,7 @@ use crate::compare::input::Input;
 use crate::compare::mode::Mode;
 use crate::compare::system::{Bytes, System, Tracer, Use, each};
 
-/// Two nodes below each node, over positions that stay where they are.
+/// A tree with two children a node, which reads the positions in place.
 pub(super) struct Tinybvh2(pub(super) Peer);
 
 impl System for Tinybvh2 {
@@ -32,11 +31,11 @@ impl System for Tinybvh2 {
     }
 }
 
-/// Eight nodes below each node, with triangles of its own.
+/// A tree with eight children a node, which keeps its own triangles.
 #[cfg(target_feature = "avx2")]
 pub(super) struct Tinybvh8 {
     pub(super) peer: Peer,
-    /// True if triangles are split between nodes.
+    /// True if nodes may split triangles.
     pub(super) is_hq: bool,
 }
 
@@ -49,7 +48,7 @@ impl System for Tinybvh8 {
     fn build(&self, input: &Input, then: &mut Use<'_>) -> Result<()> {
         use tinybvh_rs::{bvh8_cpu, mbvh};
 
-        /// Triangles that a leaf of the eight-wide layout holds.
+        /// The most triangles in a leaf of the eight-wide layout.
         const LEAF: u32 = 4;
 
         let before = heap::in_use();
@@ -68,7 +67,7 @@ impl System for Tinybvh8 {
     }
 }
 
-/// Three corners for each triangle, sixteen bytes each.
+/// Returns three corners for each triangle, sixteen bytes each.
 fn positions(input: &Input) -> Vec<[f32; 4]> {
     input.triangles().flatten().map(|[x, y, z]| [x, y, z, 0.0]).collect()
 }
@@ -99,21 +98,21 @@ impl<T: Intersector> Tracer for Built<T> {
     }
 }
 
-/// A ray in the room that it has in C++: the wrapper's type has half the size and alignment. Its
-/// constructor is C++ and writes all of that room, so it cannot be called.
+/// A ray with the size and alignment of the C++ type, which are twice those of the wrapper's type. The
+/// wrapper's constructor is C++ and would write past the smaller type, so it is not called.
 #[repr(C, align(64))]
 struct Roomy {
     ray: TinyRay,
     _rest: [u64; 8],
 }
 
-/// The mask that sees everything, which C++ has behind the origin.
+/// The mask that sees everything; the C++ type stores it after the origin.
 const SEES_ALL: u32 = 0xffff;
 
-/// The closest hit.
+/// Returns the closest hit.
 #[inline]
 fn closest(bvh: &impl Intersector, ray: &Ray) -> Intersection {
-    /// The library's reciprocal: a component below this is none.
+    /// The smallest component whose reciprocal the library computes.
     const LEAST: f32 = 1e-12;
     let reciprocal = |c: f32| {
         if c.abs() > LEAST {

@@ -1,9 +1,8 @@
-//! hgrid divided by a peer: the numbers that decide whether it is worth its place.
+//! Numbers of hgrid divided by those of a peer.
 //!
-//! Less than one is better in every row. Runs whose answers are off take no part.
-//!
-//! One method of hgrid stands in all rows: the default one, or the first if it takes no part. A
-//! peer stands with its fastest mode in each. Every row of builds has both kinds of them.
+//! Below one, hgrid is better, in every row. Runs with wrong answers are left out. All rows show the same
+//! method of hgrid: the default one, or the first if that is not measured. A row shows a peer in its fastest
+//! mode, unless it names a mode. Every row of builds stands for both kinds of them.
 
 mod entry;
 
@@ -30,16 +29,16 @@ pub struct Ratio {
     pub peer: String,
     /// The peer's number.
     pub peer_value: f64,
-    /// The first divided by the second in each repetition: the median.
+    /// The median over the repetitions of hgrid's number divided by the peer's.
     pub ratio: f64,
-    /// The least of these.
+    /// The least ratio of a repetition.
     pub least: f64,
-    /// The most.
+    /// The largest ratio of a repetition.
     pub most: f64,
 }
 
 impl Ratio {
-    /// All that the systems of a scene allow.
+    /// Returns all ratios for which the scene's systems have numbers.
     #[must_use]
     pub fn all(systems: &[SystemNumbers]) -> Vec<Self> {
         let (peers, methods): (Vec<_>, Vec<_>) = systems.iter().partition(|system| system.is_peer);
@@ -70,7 +69,7 @@ impl Ratio {
     }
 }
 
-/// Builds, first images and bytes.
+/// Compares builds, first images and bytes.
 fn builds(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>> {
     let best = |kind| least(peers.iter().filter_map(|peer| Entry::image(peer, kind)));
     let build = |kind, words| {
@@ -103,7 +102,7 @@ fn builds(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>>
 const FIRST: &str = "first in a new process";
 const REBUILD: &str = "rebuild in memory that is kept";
 
-/// Rays against Embree.
+/// Compares queries with Embree's.
 fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>> {
     let best = |peer: Peer, quality: &str, what: &str, workload| {
         let peer = find(peers, peer)?;
@@ -146,17 +145,17 @@ fn queries(hgrid: &SystemNumbers, peers: &[&SystemNumbers]) -> Vec<Option<Ratio>
     ]
 }
 
-/// The least of some numbers.
+/// Returns the entry with the least number.
 fn least<'a>(entries: impl Iterator<Item = Entry<'a>>) -> Option<Entry<'a>> {
     entries.min_by(|a, b| a.value.total_cmp(&b.value))
 }
 
-/// The numbers of a peer that takes part.
+/// Finds the numbers of a peer.
 fn find<'a>(peers: &[&'a SystemNumbers], peer: Peer) -> Option<&'a SystemNumbers> {
     peers.iter().copied().find(|system| system.system == peer.name())
 }
 
-/// The library and its version, or the name of the peer.
+/// Returns the library and its version, or the name of the peer.
 fn library(peer: &SystemNumbers) -> &str {
     peer.version.as_deref().unwrap_or(&peer.system)
 }
@@ -171,7 +170,7 @@ mod tests {
     /// Workload, mode, seconds in each repetition, rays that differ.
     type Timed<'a> = (Workload, Mode, &'a [f64], u64);
 
-    /// A system whose first builds take twice as long as its rebuilds.
+    /// Makes a system whose first builds take twice as long as its rebuilds.
     fn system(name: &str, rebuilds: &[f64], runs: &[Timed<'_>]) -> SystemNumbers {
         let run = |&(workload, mode, samples, differing): &Timed<'_>| Run {
             workload,
@@ -212,7 +211,7 @@ mod tests {
 
     #[test]
     fn repetitions_are_compared_with_each_other() {
-        // A machine that is twice as slow in the second one, and three times for the peer in the third.
+        // The second repetition is twice as slow; the third is three times as slow, for the peer only.
         let with = |name, builds: [f64; 3], renders: [f64; 3]| {
             system(name, &builds, &[(Workload::Primary, Mode::Single, &renders, 0)])
         };

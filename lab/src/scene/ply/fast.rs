@@ -1,12 +1,11 @@
 //! Binary PLY as nearly every program writes it, decoded a buffer at a time.
 //!
 //! ```text
-//! vertex:  ... x .. y .. z ...     floats at fixed places of a record of fixed size
+//! vertex:  ... x .. y .. z ...     floats at fixed offsets of a record of fixed size
 //! face:    ... 3 a b c ...         one list, a byte and 32-bit corners; the rest has fixed sizes
 //! ```
 //!
-//! Little-endian only. The general parser reads every other file, and looks at each number of this
-//! one on its own.
+//! Little-endian only. The general parser reads all other files, and handles every number separately.
 
 use std::io::{self, BufRead, ErrorKind};
 
@@ -24,7 +23,7 @@ pub(super) struct VertexLayout {
     bytes: usize,
 }
 
-/// The bytes before and behind the list of a face.
+/// The bytes before and after the list of a face.
 pub(super) struct FaceLayout {
     before: usize,
     behind: usize,
@@ -41,7 +40,7 @@ const fn bytes_of(scalar: &ScalarType) -> usize {
 }
 
 impl VertexLayout {
-    /// Returns the layout of an element if its records have one.
+    /// Returns the layout of an element if this decoder can read its records.
     pub(super) fn of(element: &ElementDef) -> Option<Self> {
         let (mut at, mut bytes) = ([None; 3], 0);
         for (name, property) in &element.properties {
@@ -82,7 +81,7 @@ impl VertexLayout {
                 source.consume(whole * self.bytes);
                 done += whole;
             } else {
-                // A record that starts in this buffer and ends in the next one.
+                // The record starts in this buffer and ends in the next one.
                 let mut record = [0; MAX_BYTES];
                 let record = &mut record[..self.bytes];
                 source.read_exact(record).map_err(|error| ended(error, done, element))?;
@@ -95,7 +94,7 @@ impl VertexLayout {
 }
 
 impl FaceLayout {
-    /// Returns the layout of an element if its records have one.
+    /// Returns the layout of an element if this decoder can read its records.
     pub(super) fn of(element: &ElementDef) -> Option<Self> {
         let (mut before, mut behind, mut list) = (0, 0, None);
         for (name, property) in &element.properties {
@@ -115,7 +114,7 @@ impl FaceLayout {
         (before + behind <= MAX_BYTES).then_some(Self { before, behind, is_signed })
     }
 
-    /// Reads all faces, as triangles that fan out from their first corners.
+    /// Reads all faces, as triangle fans around their first corners.
     pub(super) fn read(
         &self,
         source: &mut impl BufRead,
@@ -126,7 +125,7 @@ impl FaceLayout {
         let mut done = 0;
         let mut face = Vec::new();
         while done < element.count {
-            // Take triangles from the buffer, as many as follow one another.
+            // Take successive triangles from the buffer.
             let mut rest = source.fill_buf()?;
             let start = rest.len();
             while done < element.count
@@ -143,7 +142,7 @@ impl FaceLayout {
                 break;
             }
 
-            // Read one face of any kind, which may go on in the next buffer.
+            // Read one face of any kind, which may continue in the next buffer.
             let mut read = |bytes: usize, face: &mut Vec<u8>| {
                 face.resize(bytes, 0);
                 source.read_exact(face).map_err(|error| ended(error, done, element))
@@ -175,7 +174,7 @@ impl FaceLayout {
     }
 }
 
-/// The error of a read that got too little, or none at all.
+/// Returns the error of an incomplete or failed read.
 fn ended(error: io::Error, done: usize, element: &ElementDef) -> Error {
     let is_end = error.kind() == ErrorKind::UnexpectedEof;
     if is_end { cut_off(done, element) } else { error.into() }

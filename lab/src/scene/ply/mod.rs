@@ -1,9 +1,8 @@
 //! PLY files: ASCII and binary, any number type, faces with any number of corners.
 //!
-//! Elements are read one at a time and go straight into the arrays that the scene keeps, so a
-//! file of ten million triangles needs no second copy of itself. Everything that is neither a
-//! coordinate nor a list of corners is read past. The elements that nearly every binary file has
-//! are decoded a buffer at a time ([`fast`]), all others number by number.
+//! Elements are read one at a time, directly into the arrays that the scene keeps, so a file of ten million
+//! triangles needs no second copy. Everything but coordinates and lists of corners is skipped. The elements
+//! that nearly every binary file has are decoded a buffer at a time ([`fast`]), all others number by number.
 
 mod fast;
 
@@ -21,7 +20,7 @@ use self::fast::{FaceLayout, VertexLayout};
 use super::Mesh;
 use crate::progress::Progress;
 
-/// Bytes per read: large enough that system calls do not show.
+/// Bytes per read: enough that system calls cost next to nothing.
 const BUFFER_BYTES: usize = 1 << 20;
 
 /// Reads a file.
@@ -35,12 +34,12 @@ pub(super) fn load(path: &Path) -> Result<Mesh> {
     read(BufReader::with_capacity(BUFFER_BYTES, reader), byte_count)
 }
 
-/// Reads a PLY of at most `byte_count` bytes, which only limits what is reserved in advance.
+/// Reads a PLY of at most `byte_count` bytes, a number that only limits the memory reserved in advance.
 fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
     let is_ply = source.fill_buf()?.starts_with(b"ply");
     ensure!(is_ply, "it is not a PLY file: it does not start with `ply`");
     let mut reader = Reader::new(source);
-    // The parser's error goes on with its own state behind the first line.
+    // After its first line, the parser's error describes its own state.
     let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|error| {
         let text = error.to_string();
         anyhow!("its header is damaged: {}", text.lines().next().unwrap_or_default())
@@ -55,9 +54,9 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
     let mut source = reader.into_inner();
     let mut mesh = Mesh::default();
     for element in header.elements.values() {
-        // Elements of no bytes would never end the file, however many the header promises.
+        // Elements without bytes would let a header promise endless work.
         ensure!(!element.properties.is_empty(), "its `{}` elements are empty", element.name);
-        // No element takes less than a byte, so a header that lies cannot make this reserve more.
+        // Every element takes at least a byte, so a wrong header cannot reserve more memory than this.
         let count = element.count.min(usize::try_from(byte_count).unwrap_or(usize::MAX));
         match element.name.as_str() {
             "vertex" => {
@@ -87,7 +86,7 @@ fn read(mut source: impl BufRead, byte_count: u64) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// Reads all elements of one kind and hands them on.
+/// Reads all elements of one kind and hands each to `take`.
 fn each<E: PropertyAccess>(
     source: &mut impl BufRead,
     encoding: Encoding,
@@ -122,7 +121,7 @@ fn each<E: PropertyAccess>(
     Ok(())
 }
 
-/// The error of a file that ends within its elements.
+/// Returns the error of a file that ends within its elements.
 fn cut_off(number: usize, element: &ElementDef) -> Error {
     let (count, name) = (element.count, &element.name);
     anyhow!("it is cut off after {number} of {count} `{name}` elements: fetch or export it again")
@@ -143,7 +142,7 @@ fn check_face(element: &ElementDef) -> Result<()> {
     Ok(())
 }
 
-/// Both names are in use; the format's own paper has the first.
+/// Returns true for either name of the list; the format's own paper has the first.
 fn is_corner_list(name: &str) -> bool {
     name == "vertex_indices" || name == "vertex_index"
 }
@@ -194,8 +193,7 @@ impl PropertyAccess for Vertex {
 struct Face(Vec<i32>);
 
 impl Face {
-    /// Appends the triangles that fan out from the first corner; fewer
-    /// than three corners give none.
+    /// Appends the triangle fan around the first corner; fewer than three corners give no triangle.
     fn fan(&self, triangles: &mut Vec<[u32; 3]>) -> Result<()> {
         let mut corners = self.0.iter().map(|&corner| {
             u32::try_from(corner).with_context(|| format!("vertex {corner} does not exist"))
@@ -293,7 +291,7 @@ mod tests {
         }
     }
 
-    /// Records that end anywhere in a buffer are decoded like those that lie within one.
+    /// Records that cross the end of a buffer are decoded like those within one.
     #[test]
     fn buffers_of_any_size_give_one_mesh() {
         let file = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);

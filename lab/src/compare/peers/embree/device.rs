@@ -1,4 +1,4 @@
-//! A device and its scenes, and the bytes that Embree reports for them.
+//! A device and its scenes, with the bytes that Embree reports for them.
 
 use core::ffi::{c_uint, c_void};
 use core::ptr;
@@ -15,7 +15,7 @@ use crate::compare::shown::Shown;
 use crate::compare::system::Bytes;
 use crate::vector::round;
 
-/// One thread; everything else, the vector width too, is what Embree chooses.
+/// One thread; Embree chooses everything else, the vector width included.
 const CONFIG: &core::ffi::CStr = c"threads=1";
 
 /// A way to build a scene.
@@ -59,7 +59,7 @@ pub(super) struct Device {
     memory: Box<Memory>,
 }
 
-/// Called by Embree for what it gets and gives back.
+/// Counts bytes that Embree allocates and frees; Embree calls it.
 extern "C" fn monitor(memory: *mut c_void, bytes: isize, _: bool) -> bool {
     // SAFETY: the pointer is the one that `Device::new` gave, and the device does not outlive it.
     let memory = unsafe { &*memory.cast::<Memory>() };
@@ -82,7 +82,7 @@ impl Device {
 
     /// The version of the library, as 3.13.5.
     pub(super) fn version(&self) -> String {
-        // SAFETY: the device is a live one.
+        // SAFETY: the device is valid.
         let number = unsafe { ffi::rtcGetDeviceProperty(self.handle, ffi::PROPERTY_VERSION) };
         format!("{}.{}.{}", number / 10_000, number / 100 % 100, number % 100)
     }
@@ -91,7 +91,7 @@ impl Device {
     pub(super) fn build<'a>(&'a self, input: &'a Input, quality: Quality) -> Result<Scene<'a>> {
         let scene = self.start(input, None, quality)?;
         let geometry = self.geometry(ffi::GEOMETRY_TYPE_TRIANGLE)?;
-        // SAFETY: the geometry is a live one.
+        // SAFETY: the geometry is valid.
         unsafe { ffi::rtcSetGeometryBuildQuality(geometry, quality.number()) };
         share(geometry, ffi::BUFFER_TYPE_VERTEX, ffi::FORMAT_FLOAT3, input.positions());
         share(geometry, ffi::BUFFER_TYPE_INDEX, ffi::FORMAT_UINT3, input.indices());
@@ -110,7 +110,7 @@ impl Device {
         let geometry = self.geometry(ffi::GEOMETRY_TYPE_USER)?;
         let count = u32::try_from(input.spheres().len())?;
         let user = ptr::from_ref(input).cast_mut().cast();
-        // SAFETY: the geometry is a live one, here and below.
+        // SAFETY: the geometry is valid, here and below.
         unsafe { ffi::rtcSetGeometryBuildQuality(geometry, quality.number()) };
         // SAFETY: as above.
         unsafe { ffi::rtcSetGeometryUserPrimitiveCount(geometry, count) };
@@ -127,7 +127,7 @@ impl Device {
         Ok(scene)
     }
 
-    /// Builds a scene of the instances of a mesh whose own scene is built.
+    /// Builds a scene of the instances of a mesh whose own scene is complete.
     pub(super) fn build_instances<'a>(
         &'a self,
         mesh: &Scene<'a>,
@@ -139,7 +139,7 @@ impl Device {
         Ok(scene)
     }
 
-    /// Makes a scene without geometries.
+    /// Starts a scene without geometries.
     fn start<'a>(
         &'a self,
         input: &'a Input,
@@ -148,11 +148,11 @@ impl Device {
     ) -> Result<Scene<'a>> {
         let before = self.memory.current.load(Relaxed);
         self.memory.peak.store(before, Relaxed);
-        // SAFETY: the device is a live one.
+        // SAFETY: the device is valid.
         let handle = unsafe { ffi::rtcNewScene(self.handle) };
         let scene = Scene { handle, device: self, before, buffers: Buffers::new(), input, mesh };
         ensure!(!handle.is_null(), "Embree has no memory left");
-        // SAFETY: the scene is a live one, here and below.
+        // SAFETY: the scene is valid, here and below.
         unsafe { ffi::rtcSetSceneFlags(handle, quality.flags()) };
         // SAFETY: as above.
         unsafe { ffi::rtcSetSceneBuildQuality(handle, quality.number()) };
@@ -161,26 +161,26 @@ impl Device {
 
     /// Makes a geometry.
     fn geometry(&self, kind: c_uint) -> Result<ffi::Geometry> {
-        // SAFETY: the device is a live one.
+        // SAFETY: the device is valid.
         let geometry = unsafe { ffi::rtcNewGeometry(self.handle, kind) };
         ensure!(!geometry.is_null(), "Embree has no memory left");
         Ok(geometry)
     }
 
-    /// Fails if Embree reports an error of the calls so far.
+    /// Fails if any call so far has set Embree's error code.
     fn check(&self) -> Result<()> {
-        // SAFETY: the device is a live one.
+        // SAFETY: the device is valid.
         let error = unsafe { ffi::rtcGetDeviceError(self.handle) };
         ensure!(error == ffi::ERROR_NONE, "Embree reports error {error}");
         Ok(())
     }
 }
 
-/// Lets a geometry read an array where it is.
+/// Shares an array with a geometry, which reads it in place.
 fn share<T>(geometry: ffi::Geometry, kind: u32, format: u32, items: &[[T; 3]]) {
     let stride = size_of::<[T; 3]>();
-    // SAFETY: the array outlives the scene, which borrows the input. Embree reads sixteen bytes of
-    // the last position, and `Input` has four more behind it.
+    // SAFETY: the array outlives the scene, which borrows the input. Embree reads sixteen bytes of the last
+    // position, and `Input` has four more after it.
     unsafe {
         ffi::rtcSetSharedGeometryBuffer(
             geometry,
@@ -195,7 +195,7 @@ fn share<T>(geometry: ffi::Geometry, kind: u32, format: u32, items: &[[T; 3]]) {
     };
 }
 
-/// Puts an instance where it stands.
+/// Sets the place of an instance.
 fn place(geometry: ffi::Geometry, instance: &Instance) {
     let Instance { linear, translation, .. } = instance;
     let translation = round(*translation);
@@ -203,7 +203,7 @@ fn place(geometry: ffi::Geometry, instance: &Instance) {
         let [x, y, z] = linear[axis];
         [x, y, z, translation[axis]]
     });
-    // SAFETY: the geometry is a live one, and Embree reads twelve floats, which it copies.
+    // SAFETY: the geometry is valid, and Embree reads twelve floats, which it copies.
     unsafe {
         ffi::rtcSetGeometryTransform(geometry, 0, ffi::FORMAT_FLOAT3X4, rows.as_ptr().cast());
     };
@@ -211,19 +211,19 @@ fn place(geometry: ffi::Geometry, instance: &Instance) {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: the device is a live one, and scenes borrow it: there is none left.
+        // SAFETY: the device is valid, and no scene is left, because scenes borrow it.
         unsafe { ffi::rtcReleaseDevice(self.handle) };
     }
 }
 
-/// A scene that is built.
+/// A scene, complete or being built.
 pub(super) struct Scene<'a> {
     handle: ffi::Scene,
     device: &'a Device,
     before: isize,
     buffers: Buffers,
     input: &'a Input,
-    /// The scene of the mesh that the instances show, if it is a scene of them. They keep it alive.
+    /// The scene of the mesh, if this is a scene of its instances, which keep it alive.
     mesh: Option<ffi::Scene>,
 }
 
@@ -234,11 +234,11 @@ impl Scene<'_> {
 
     /// Commits a geometry and hands it to the scene.
     fn attach(&self, geometry: ffi::Geometry) {
-        // SAFETY: the geometry is a live one, here and below.
+        // SAFETY: the geometry is valid, here and below.
         unsafe { ffi::rtcCommitGeometry(geometry) };
-        // SAFETY: the scene is a live one, too.
+        // SAFETY: the scene is valid, too.
         unsafe { ffi::rtcAttachGeometry(self.handle, geometry) };
-        // SAFETY: as above; the scene keeps a count of its own.
+        // SAFETY: as above; the scene keeps its own reference.
         unsafe { ffi::rtcReleaseGeometry(geometry) };
     }
 
@@ -246,7 +246,7 @@ impl Scene<'_> {
     fn attach_instances(&self, mesh: ffi::Scene) -> Result<()> {
         for instance in self.input.instances() {
             let geometry = self.device.geometry(ffi::GEOMETRY_TYPE_INSTANCE)?;
-            // SAFETY: geometry and scene are live; the geometry keeps a count of the scene.
+            // SAFETY: geometry and scene are valid; the geometry keeps a reference to the scene.
             unsafe { ffi::rtcSetGeometryInstancedScene(geometry, mesh) };
             place(geometry, instance);
             self.attach(geometry);
@@ -255,15 +255,14 @@ impl Scene<'_> {
     }
 
     fn commit(&self) -> Result<()> {
-        // SAFETY: the scene is a live one.
+        // SAFETY: the scene is valid.
         unsafe { ffi::rtcCommitScene(self.handle) };
         self.device.check()
     }
 
     /// Builds again, as if all vertices, spheres or instances had moved.
     pub(super) fn rebuild(&self) -> Result<()> {
-        // SAFETY: the scene is a live one and holds the geometries that were attached to it, numbered
-        // from 0 on.
+        // SAFETY: the scene is valid and holds the attached geometries, numbered from 0 on.
         let geometry = |number| unsafe { ffi::rtcGetGeometry(self.handle, number) };
         if self.mesh.is_some() {
             for (number, instance) in (0..).zip(self.input.instances()) {
@@ -284,7 +283,7 @@ impl Scene<'_> {
         self.commit()
     }
 
-    /// The mesh.
+    /// Returns the input.
     pub(super) const fn input(&self) -> &Input {
         self.input
     }
@@ -293,7 +292,7 @@ impl Scene<'_> {
         &self.buffers
     }
 
-    /// Bytes since the build began.
+    /// Returns the bytes since the build began.
     pub(super) fn memory(&self) -> Result<Bytes> {
         let Memory { current, peak } = &*self.device.memory;
         let since =
@@ -303,8 +302,9 @@ impl Scene<'_> {
         Ok(Bytes { index: index + untold, peak: peak + untold })
     }
 
-    /// Bytes of the geometries of instances, which Embree's monitor is not told of: what the heap of C grows by,
-    /// beyond what the monitor is told, while they are attached to another scene.
+    /// Returns the bytes of instance geometries that Embree's monitor does not report. Attaches the same
+    /// instances to another scene; the bytes are the growth of the C heap beyond what the monitor reports
+    /// meanwhile.
     fn untold(&self) -> Result<usize> {
         let Some(mesh) = self.mesh else { return Ok(0) };
         let told = || self.device.memory.current.load(Relaxed);
@@ -318,7 +318,7 @@ impl Scene<'_> {
 
 impl Drop for Scene<'_> {
     fn drop(&mut self) {
-        // SAFETY: the scene is a live one, or null, which Embree refuses with an error code.
+        // SAFETY: the scene is valid, or null, which Embree refuses with an error code.
         unsafe { ffi::rtcReleaseScene(self.handle) };
     }
 }

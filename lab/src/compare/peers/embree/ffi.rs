@@ -1,7 +1,7 @@
 //! The few functions and structs of embree3/rtcore.h (3.13) that the adapter needs.
 //!
-//! Functions keep their C names. Structs have the fields of C in its order; what is not read has
-//! a short name.
+//! Functions keep their C names. Structs have the fields of C in the same order; fields that are not read
+//! have short names.
 
 use core::ffi::{c_char, c_int, c_uint, c_void};
 
@@ -41,7 +41,7 @@ pub(super) const PROPERTY_VERSION: c_uint = 0;
 /// `RTC_ERROR_NONE`.
 pub(super) const ERROR_NONE: c_uint = 0;
 
-/// `RTCDevice`, `RTCScene`, `RTCGeometry`: what is behind them is Embree's.
+/// `RTCDevice`, `RTCScene`, `RTCGeometry`: opaque pointers of Embree.
 pub(super) type Device = *mut c_void;
 pub(super) type Scene = *mut c_void;
 pub(super) type Geometry = *mut c_void;
@@ -91,8 +91,7 @@ pub(super) struct RayHit1 {
     pub(super) hit: Hit1,
 }
 
-/// `RTCRay4`, `RTCRay8` and `RTCRay16`: coordinates of all rays, axis by axis. C aligns the smaller
-/// ones less.
+/// `RTCRay4`, `RTCRay8` and `RTCRay16`: the coordinates of all rays, axis by axis. C aligns the smaller structs less.
 #[repr(C, align(64))]
 pub(super) struct Rays<const LANES: usize> {
     pub(super) origin: [[f32; LANES]; 3],
@@ -131,7 +130,7 @@ pub(super) struct PointQuery {
     pub(super) radius: f32,
 }
 
-/// `RTCPointQueryContext`: transformations, of which there are none.
+/// `RTCPointQueryContext`: a stack of transformations, which is empty here.
 #[repr(C, align(16))]
 pub(super) struct PointContext {
     pub(super) world_to_instance: [f32; 16],
@@ -191,7 +190,7 @@ pub(super) type BoundsFunction = unsafe extern "C" fn(*const BoundsArguments);
 /// `RTCIntersectFunctionN` and `RTCOccludedFunctionN`.
 pub(super) type ShapeFunction = unsafe extern "C" fn(*const ShapeArguments);
 
-/// Marks of the rays of a packet: -1 for those that are there, 0 for the others.
+/// The marks of a packet's rays: -1 for rays to trace, 0 for unused lanes.
 #[repr(C, align(64))]
 pub(super) struct Valid<const LANES: usize>(pub(super) [c_int; LANES]);
 

@@ -1,5 +1,5 @@
-//! Embree 3: a device with one thread, the mesh's own arrays as shared buffers, a geometry for each instance of it,
-//! and one of the caller's own for spheres.
+//! Embree 3: a device with one thread, the mesh's own arrays as shared buffers, a geometry for each instance
+//! of the mesh, and a user geometry for spheres.
 //!
 //! ```text
 //! mod     System and Tracer: which query for which mode
@@ -34,14 +34,14 @@ pub(super) struct Embree {
 }
 
 impl Embree {
-    /// Starts a device, which is not part of any build.
+    /// Starts a device, outside of every timed build.
     pub(super) fn new(peer: Peer, quality: Quality) -> Result<Self> {
         Ok(Self { peer, quality, device: Device::new()? })
     }
 }
 
-/// The calls without a hint, for instances. `rtcOccluded16` of version 3.13.5 does not return from some packets of rays at
-/// instances if they are hinted to be coherent.
+/// The calls without a hint, for instances. With a hint of coherence, `rtcOccluded16` of version 3.13.5 does
+/// not return from some packets of rays at instances.
 const UNHINTED: &[Mode] = &[
     Mode::Single,
     Mode::Packet(Lanes::Four, Hint::None),

@@ -1,11 +1,11 @@
-//! Queries: rays in, answers out. Rays are turned into Embree's here, inside the measured time.
+//! Queries: rays in, answers out. Rays are converted to Embree's here, inside the measured time.
 //!
 //! ```text
 //! single   rtcIntersect1, rtcOccluded1
 //! packet   rtcIntersect4, 8 and 16, rtcOccluded4, 8 and 16
 //! stream   rtcIntersect1M, rtcOccluded1M
 //! point    rtcPointQuery
-//! sphere   the functions that Embree calls for spheres
+//! sphere   the functions by which Embree tests spheres
 //! ```
 
 mod packet;
@@ -50,13 +50,13 @@ const NO_HIT: RayHit1 = RayHit1 {
 };
 
 impl RayHit1 {
-    /// Asks the next ray. Embree wants nothing of a hit but that its geometry is none.
+    /// Sets the next ray. Of a hit, Embree only needs the geometry to be invalid.
     fn ask(&mut self, ray: &Ray) {
         self.ray = ray1(ray);
         self.hit.geometry = ffi::INVALID_ID;
     }
 
-    /// The answer.
+    /// Returns the answer.
     fn answer(&self) -> Hit {
         let Self { ray, hit } = self;
         if hit.geometry == ffi::INVALID_ID {
@@ -67,7 +67,7 @@ impl RayHit1 {
     }
 }
 
-/// Embree answers with a far end of minus infinity.
+/// Returns true if the ray is occluded: Embree then sets the far end to minus infinity.
 fn is_occluded(far: f32) -> bool {
     far < 0.0
 }

@@ -53,8 +53,7 @@ impl Scene<'_> {
         for (rays, answers) in rays.chunks(LANES).zip(hits.chunks_mut(LANES)) {
             let (valid, rays) = packet(rays);
             let mut both = RayHits { rays, hits: no_hits() };
-            // SAFETY: the scene is committed; the structs are those of the header, aligned; there
-            // is a mask for every lane.
+            // SAFETY: the scene is committed; the structs are those of the header, aligned; every lane has a mark.
             unsafe {
                 intersect(
                     ptr::from_ref(&valid).cast(),
@@ -101,7 +100,7 @@ impl Scene<'_> {
     }
 }
 
-/// Up to so many rays, axis by axis.
+/// Makes a packet of up to `LANES` rays, axis by axis.
 fn packet<const LANES: usize>(rays: &[Ray]) -> (Valid<LANES>, Rays<LANES>) {
     let mut valid = Valid([0; LANES]);
     let mut packet = Rays {
@@ -126,7 +125,7 @@ fn packet<const LANES: usize>(rays: &[Ray]) -> (Valid<LANES>, Rays<LANES>) {
     (valid, packet)
 }
 
-/// Answers that are not there yet.
+/// Makes hits without a geometry, for Embree to fill in.
 const fn no_hits<const LANES: usize>() -> Hits<LANES> {
     Hits {
         normal: [[0.0; LANES]; 3],

@@ -1,5 +1,5 @@
-//! The closest point of the surface. Embree finds the triangles; the distance to one is the caller's
-//! to compute, and is in f32 here, as in Embree's own example.
+//! The closest point of the surface. Embree finds the triangles, and the caller computes the distance to
+//! each: in f32 here, as in Embree's own example.
 
 use core::ffi::c_void;
 use core::ptr;
@@ -37,13 +37,13 @@ impl Scene<'_> {
     }
 }
 
-/// Makes the radius smaller if a triangle is closer, and tells whether it is.
+/// Shrinks the radius if a triangle is closer, and returns true if it is.
 unsafe extern "C" fn closer(arguments: *mut PointArguments) -> bool {
-    // SAFETY: no one else uses the arguments that Embree passes.
+    // SAFETY: nothing else uses the arguments that Embree passes.
     let arguments = unsafe { &*arguments };
     // SAFETY: the pointer is the one that `distances` gave.
     let input = unsafe { &*arguments.user.cast::<Input>() };
-    // SAFETY: the query lives as long as the call, and only this reference to it is used meanwhile.
+    // SAFETY: the query lives as long as the call, and only this reference to it is used during the call.
     let query = unsafe { &mut *arguments.query };
     let Some(&triangle) = input.indices().get(arguments.primitive as usize) else { return false };
     let corners = triangle.map(|at| input.positions().get(at as usize).copied());
@@ -57,7 +57,7 @@ unsafe extern "C" fn closer(arguments: *mut PointArguments) -> bool {
     is_closer
 }
 
-/// The point of a triangle that is closest to a point (Ericson 2005, 5.1.5).
+/// Returns the point of a triangle that is closest to a point (Ericson 2005, 5.1.5).
 fn closest_on([a, b, c]: [Vec3A; 3], p: Vec3A) -> Vec3A {
     let (ab, ac) = (b - a, c - a);
     let ap = p - a;

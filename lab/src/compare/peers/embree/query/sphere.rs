@@ -1,7 +1,7 @@
 //! Spheres as user geometry: the functions that Embree calls for their boxes and hits.
 //!
-//! Embree hands over one ray, or a packet of rays that meet the box of a sphere, number by number. As hgrid asks for no
-//! more than a place on the ray, normals and instances stay as they are.
+//! Embree hands over one ray, or a packet of rays that meet the box of a sphere, stored number by number. The
+//! comparison only reads distance and primitive, so normals and instances stay as they are.
 
 use core::ffi::{c_int, c_void};
 
@@ -11,17 +11,17 @@ use crate::compare::input::Input;
 use crate::compare::peers::embree::ffi::{BoundsArguments, ShapeArguments};
 use crate::compare::spheres::Sphere;
 
-/// Numbers of a ray, and of a ray with its hit.
+/// The count of numbers of a ray, and of a ray with its hit.
 const RAY: usize = 12;
 const RAY_AND_HIT: usize = 20;
 
-/// Places of numbers of a ray: from these on three, or one.
+/// The rows of a ray's numbers: the first of three, or the only one.
 const ORIGIN: usize = 0;
 const NEAR: usize = 3;
 const DIRECTION: usize = 4;
 const FAR: usize = 8;
 
-/// Places of numbers of its hit.
+/// The rows of its hit's numbers.
 const U: usize = 15;
 const V: usize = 16;
 const PRIMITIVE: usize = 17;
@@ -40,7 +40,7 @@ pub(in super::super) unsafe extern "C" fn bounds(arguments: *const BoundsArgumen
     (bounds.lower, bounds.upper) = ([x, y, z], [to_x, to_y, to_z]);
 }
 
-/// Finds the hits of rays on a sphere that are closer than those so far.
+/// Finds hits of rays on a sphere that are closer than the earlier ones.
 pub(in super::super) unsafe extern "C" fn intersect(arguments: *const ShapeArguments) {
     // SAFETY: Embree passes arguments that live as long as the call.
     let arguments = unsafe { &*arguments };
@@ -49,12 +49,12 @@ pub(in super::super) unsafe extern "C" fn intersect(arguments: *const ShapeArgum
         4 => intersect_lanes::<4>(arguments),
         8 => intersect_lanes::<8>(arguments),
         16 => intersect_lanes::<16>(arguments),
-        // Embree's packets have no other lengths. Rays that miss for this would be counted as differing.
+        // Embree's packets have no other lengths. Rays of another length would miss, and be counted as differing.
         _ => {}
     }
 }
 
-/// Marks the rays that a sphere blocks by a far end of minus infinity.
+/// Marks the rays that a sphere occludes with a far end of minus infinity.
 pub(in super::super) unsafe extern "C" fn occluded(arguments: *const ShapeArguments) {
     // SAFETY: Embree passes arguments that live as long as the call.
     let arguments = unsafe { &*arguments };
@@ -68,7 +68,7 @@ pub(in super::super) unsafe extern "C" fn occluded(arguments: *const ShapeArgume
     }
 }
 
-/// The numbers of rays, one kind of them after the other.
+/// The numbers of rays: a row for each kind of number.
 type Rows<const LANES: usize, const KINDS: usize> = [[u32; LANES]; KINDS];
 
 fn intersect_lanes<const LANES: usize>(arguments: &ShapeArguments) {
@@ -88,7 +88,7 @@ fn occluded_lanes<const LANES: usize>(arguments: &ShapeArguments) {
     });
 }
 
-/// Tests a sphere for every ray that asks, and hands on where it is hit.
+/// Tests a sphere for every active ray, and calls `found` for each hit.
 #[inline(always)]
 fn each_hit<const LANES: usize, const KINDS: usize>(
     arguments: &ShapeArguments,
@@ -98,8 +98,8 @@ fn each_hit<const LANES: usize, const KINDS: usize>(
     let Some(sphere) = sphere(user, arguments.primitive) else { return };
     // SAFETY: there is a mark for each of the rays.
     let valid = unsafe { &*valid.cast::<[c_int; LANES]>() };
-    // SAFETY: so many numbers of so many rays follow one another, and only this reference to them is used during
-    // the call.
+    // SAFETY: `KINDS` rows of `LANES` numbers follow one another, and only this reference to them is used
+    // during the call.
     let rows = unsafe { &mut *rays.cast::<Rows<LANES, KINDS>>() };
     for (lane, mark) in valid.iter().enumerate() {
         if *mark == 0 {
@@ -119,7 +119,7 @@ fn each_hit<const LANES: usize, const KINDS: usize>(
     }
 }
 
-/// The sphere with a number.
+/// Returns the sphere with a number.
 #[inline(always)]
 fn sphere<'a>(user: *mut c_void, primitive: u32) -> Option<&'a Sphere> {
     // SAFETY: the user data is the input that `Device::build_spheres` gave, which outlives the scene.

@@ -1,8 +1,8 @@
 //! Many rays a call: Embree's streams.
 //!
-//! Embree works on 32 rays of a stream at a time, whatever the length of the stream; for any hit
-//! without the coherent flag it gathers rays by octant first. So rays are handed over in lengths
-//! that stay in the first cache, one buffer for all of them.
+//! Embree works on 32 rays of a stream at a time, whatever its length; for any-hit queries without the
+//! coherent flag it first gathers rays by octant. So the adapter hands over rays in lengths that stay in the
+//! first-level cache, in one buffer for all of them.
 
 use core::cell::RefCell;
 
@@ -13,10 +13,10 @@ use crate::compare::mode::Hint;
 use crate::compare::peers::embree::device::Scene;
 use crate::compare::peers::embree::ffi::{self, Ray1, RayHit1};
 
-/// Rays in a call.
+/// The number of rays in a call.
 const LENGTH: u32 = 512;
 
-/// Room for the rays of a call, kept from call to call.
+/// Buffers for the rays of a call, kept from call to call.
 pub(in super::super) struct Buffers {
     closest: RefCell<Vec<RayHit1>>,
     any: RefCell<Vec<Ray1>>,
@@ -39,8 +39,7 @@ impl Scene<'_> {
             for (asked, ray) in asked.iter_mut().zip(rays) {
                 asked.ask(ray);
             }
-            // SAFETY: the scene is committed; the buffer holds as many structs of the header,
-            // one right after the other, aligned.
+            // SAFETY: the scene is committed; the buffer holds as many structs of the header, contiguous and aligned.
             unsafe {
                 ffi::rtcIntersect1M(
                     self.handle(),
@@ -83,7 +82,7 @@ impl Scene<'_> {
     }
 }
 
-/// Rays of a chunk, which are no more than [`LENGTH`].
+/// Returns the number of rays in a chunk, at most [`LENGTH`].
 fn length(rays: &[Ray]) -> u32 {
     u32::try_from(rays.len()).map_or(LENGTH, |length| length.min(LENGTH))
 }
