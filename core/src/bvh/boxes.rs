@@ -8,7 +8,7 @@
 //! ```
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
+use fearless_simd::{Simd, f32x8, mask32x8};
 
 use super::node::{Node, WIDTH};
 use super::shape_leaf::boxes_of_leaf;
@@ -60,10 +60,7 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
     /// The eight boxes of a node relative to a point, grown on each side.
     #[inline(always)]
     pub(crate) fn decode(simd: S, node: &Node, center: [f32; 3], growth: f32) -> Self {
-        // The exponents of x, y and z stand in the three low bytes.
-        let origin = node.origin();
-        let word = u32x8::splat(simd, node.word);
-        let steps = [word << 23, word << 15, word << 7];
+        let (origin, steps) = (node.origin(), node.wide_steps(simd));
         // Turn the bytes of both sides of an axis into numbers.
         let growth = f32x8::splat(simd, growth);
         let [a, b, c, d, e, f] = node.bounds;
@@ -72,10 +69,9 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
         // Scale them, and move them to the origin of the group.
         let mut boxes = Self { low: [growth; 3], high: [growth; 3] };
         for axis in 0..3 {
-            let step = (steps[axis] & 0x7f80_0000).bitcast::<f32x8<S>>();
             let base = f32x8::splat(simd, origin[axis] - center[axis]);
-            boxes.low[axis] = rows[axis].0 * step + base - growth;
-            boxes.high[axis] = rows[axis].1 * step + base + growth;
+            boxes.low[axis] = rows[axis].0 * steps[axis] + base - growth;
+            boxes.high[axis] = rows[axis].1 * steps[axis] + base + growth;
         }
         boxes
     }

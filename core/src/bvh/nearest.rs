@@ -23,12 +23,13 @@
 //!   the distance that it reports may be smaller by that, and the reach grows by `slack`.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u32x8};
+use fearless_simd::{Simd, f32x8};
 
 use super::Bvh;
 use super::boxes::{bits, splat};
 use super::node::{Child, Node, WIDTH};
-use super::walk::{StackEntry, bytes};
+use super::shape_leaf::nearest_of;
+use super::walk::{StackEntry, bytes, pop, waiting};
 use crate::aabb::{Aabb, greater};
 use crate::counters::Tally;
 use crate::eight::{Eight, first_eight};
@@ -42,7 +43,8 @@ const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 const TINY: f32 = f32::MIN_POSITIVE;
 /// Error bound of a scalar product, in parts of the product of the vectors' sums of magnitudes.
 const DOTS: f32 = 1.0 / 2_097_152.0; // 2^-21
-/// The most by which the test in f64 may report a point as too near, in parts of the largest coordinate.
+/// The most by which the test in f64 may report a point as too near, in parts of the largest coordinate: 32 times the
+/// 2^-45 of above.
 const SLACK: f32 = 1.0 / 1_048_576.0 / 1_048_576.0; // 2^-40
 
 /// A point, and what is looked for.
@@ -98,15 +100,13 @@ impl Point {
 /// The squared distances from the point to the boxes of a node.
 #[inline(always)]
 fn boxes<S: Simd>(simd: S, node: &Node, point: &Point) -> f32x8<S> {
-    let origin = node.origin();
-    let word = u32x8::splat(simd, node.word);
-    let steps = [word << 23, word << 15, word << 7];
+    let (origin, steps) = (node.origin(), node.wide_steps(simd));
     let scale = f32x8::splat(simd, point.scale);
     let [a, b, c, d, e, f] = node.bounds;
     let rows = [bytes(simd, a, d), bytes(simd, b, e), bytes(simd, c, f)];
     let mut away = [scale; 3];
     for axis in 0..3 {
-        let step = (steps[axis] & 0x7f80_0000).bitcast::<f32x8<S>>() * scale;
+        let step = steps[axis] * scale;
         let base = f32x8::splat(simd, origin[axis] * point.scale - point.at[axis]);
         let (low, high) = rows[axis];
         away[axis] = outside(simd, low * step + base, high * step + base);
@@ -199,12 +199,6 @@ fn outside<S: Simd>(simd: S, low: f32x8<S>, high: f32x8<S>) -> f32x8<S> {
     low.greater(-high).greater(f32x8::splat(simd, 0.0))
 }
 
-/// A child to come back to.
-#[inline(always)]
-fn waiting(node: u32, slot: u32, away: f32) -> StackEntry {
-    u64::from(away.to_bits()) << 32 | u64::from(node << 3 | slot)
-}
-
 impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
     type Output = ();
 
@@ -235,13 +229,13 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                         let mut nearest = rest.trailing_zeros();
                         rest &= rest - 1;
                         while rest != 0 {
-                            let slot = rest.trailing_zeros();
+                            let mut other = rest.trailing_zeros();
                             rest &= rest - 1;
-                            let is_nearer = at(slot) < at(nearest);
-                            let other = if is_nearer { nearest } else { slot };
-                            nearest = if is_nearer { slot } else { nearest };
+                            if at(other) < at(nearest) {
+                                core::mem::swap(&mut other, &mut nearest);
+                            }
                             let Some(place) = stack.get_mut(top) else { return };
-                            *place = waiting(number, other, at(other));
+                            *place = waiting(number, other, at(other).to_bits());
                             top += 1;
                         }
                         child = node.child(nearest);
@@ -259,15 +253,7 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                     let away: [f32; WIDTH] = away.into();
                     while rest != 0 {
                         // The nearest first: it may show that the others are too far.
-                        let mut lane = rest.trailing_zeros() as usize;
-                        let mut others = rest & (rest - 1);
-                        while others != 0 {
-                            let other = others.trailing_zeros() as usize;
-                            others &= others - 1;
-                            if away[other % WIDTH] < away[lane % WIDTH] {
-                                lane = other;
-                            }
-                        }
+                        let lane = nearest_of(rest, &away);
                         rest &= !(1 << lane);
                         // Continue, do not break: a lane whose bound is NaN must be tested, too.
                         if away[lane % WIDTH] > reach {
@@ -279,19 +265,8 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                 }
             }
             // Pop what is within reach.
-            loop {
-                let Some(below) = top.checked_sub(1) else { return };
-                top = below;
-                let Some(&waiting) = stack.get(top) else { return };
-                let is_beyond = f32::from_bits((waiting >> 32) as u32) > reach;
-                if !is_beyond {
-                    #[expect(clippy::cast_possible_truncation, reason = "the low half")]
-                    let (node, slot) = ((waiting as u32) >> 3, waiting as u32 & 7);
-                    child =
-                        bvh.nodes.get(node as usize).map_or(Child::NONE, |node| node.child(slot));
-                    break;
-                }
-            }
+            let Some(next) = pop(bvh, stack, &mut top, reach) else { return };
+            child = next;
         }
     }
 }

@@ -100,6 +100,16 @@ impl Node {
         [step(x), step(y), step(z)]
     }
 
+    /// The size of a step on each axis, in all lanes.
+    #[inline(always)]
+    pub(crate) fn wide_steps<S: Simd>(&self, simd: S) -> [f32x8<S>; 3] {
+        // The exponents of x, y and z stand in the three low bytes.
+        let word = u32x8::splat(simd, self.word);
+        let exponents = [word << 23, word << 15, word << 7];
+        let step = |axis: usize| (exponents[axis] & 0x7f80_0000).bitcast();
+        [step(0), step(1), step(2)]
+    }
+
     /// The children that are nodes, as bits.
     #[inline(always)]
     pub(crate) const fn inner(&self) -> u32 {

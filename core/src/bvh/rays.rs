@@ -13,7 +13,7 @@ use zerocopy::{transmute_mut, transmute_ref};
 
 use super::boxes::{Beam, Slabs, bits, splat};
 use super::slab::{EARLIER, STEEP, TINY, WIDER};
-use crate::aabb::Aabb;
+use crate::aabb::{Aabb, lesser};
 use crate::approach::FAR_EXTENTS;
 use crate::eight::columns;
 use crate::extremes::Extremes;
@@ -40,15 +40,15 @@ pub(crate) struct Rays {
     pub(crate) alive: u64,
     /// The triangles that they see.
     choice: Choice,
-    /// True if nothing lies behind the origins: those of rays with a negative `t_min` were moved to the box of the tree.
-    pub(crate) start_outside: bool,
+    /// Raises `t_min` to 0. For rays that were moved to the box of the tree, so that nothing lies behind their origins.
+    pub(crate) starts_at_box: bool,
     /// The most that origins may be off, in scene units: they are given in f64 and were rounded. 0 for rays in f32.
-    pub(crate) off: f32,
+    pub(crate) origin_error: f32,
     /// The point that boxes and origins are relative to.
     pub(crate) center: [f32; 3],
     /// Eight roundings of the origin farthest from the center: the growth of boxes that covers them.
     spread: f32,
-    /// The growth of boxes that covers all of this.
+    /// The growth of boxes that covers both: `spread + origin_error`.
     pub(crate) growth: f32,
     /// Relative to the center.
     origin: [PerRay; 3],
@@ -70,7 +70,7 @@ pub(crate) struct Rays {
     pair_count: usize,
 }
 
-/// The spread of scattered rays, in extents of the scene: that of origins a quarter of it apart.
+/// The spread of scattered rays, in extents of the scene: eight roundings of an origin a quarter of it away.
 const SCATTERED: f32 = 8.0 * UNIT / 4.0;
 
 /// Pairs that are decided at once.
@@ -88,8 +88,8 @@ impl Rays {
             alive: 0,
             choice,
             center: [0.0; 3],
-            start_outside: false,
-            off: 0.0,
+            starts_at_box: false,
+            origin_error: 0.0,
             spread: 0.0,
             growth: 0.0,
             origin: [ZEROS; 3],
@@ -115,10 +115,10 @@ impl Rays {
     }
 
     /// Prepares the first `count` rays for triangles inside `bounds`. Returns a mask of the valid rays that must be
-    /// traced alone: the origin is far away, `t_min` is negative, or the direction is too long or too short for f32.
+    /// traced alone: the origin is far away, the start is negative, or the direction is too long or too short for f32.
     #[inline(always)]
     pub(crate) fn prepare<S: Simd>(&mut self, simd: S, count: usize, bounds: &Aabb) -> u64 {
-        let (alive, special) = (&mut 0, &mut 0);
+        let (mut alive, mut special) = (0, 0);
         let middle = ((bounds.min + bounds.max) * 0.5).to_array();
         let size = bounds.size();
         let half = (size * 0.5).to_array();
@@ -145,8 +145,8 @@ impl Rays {
                 & z.simd_eq(z);
             let is_valid = is_finite & longest.simd_gt(zero) & t_min.simd_le(t_max);
             let [a, b, c] = [(a - middle[0]).abs(), (b - middle[1]).abs(), (c - middle[2]).abs()];
-            // Boxes behind the start have margins that groups do not: see `Slab`.
-            let start = if self.start_outside { t_min.greater(zero) } else { t_min };
+            // `Slab` has a margin for boxes behind the start; groups have none.
+            let start = if self.starts_at_box { t_min.greater(zero) } else { t_min };
             let is_near = a.greater(b).greater(c).simd_le(near)
                 & start.simd_ge(zero)
                 & longest.simd_gt(f32x8::splat(simd, NEARBY_SHORT))
@@ -154,8 +154,8 @@ impl Rays {
             let of_count = bits_below(count - 8 * octet);
             let valid = u64::from(bits(is_valid)) & of_count;
             let ready = u64::from(bits(is_valid & is_near)) & of_count;
-            *alive |= ready << (8 * octet);
-            *special |= (valid & !ready) << (8 * octet);
+            alive |= ready << (8 * octet);
+            special |= (valid & !ready) << (8 * octet);
 
             // Scale directions by powers of two: the largest component lies between 1 and 2.
             let exponent = longest.bitcast::<u32x8<S>>() & 0x7f80_0000;
@@ -186,9 +186,9 @@ impl Rays {
             self.slope[octet] = filter.slope.into();
             self.floor[octet] = filter.floor.into();
         }
-        self.alive = *alive;
+        self.alive = alive;
         self.settle(simd);
-        *special
+        special
     }
 
     /// Returns true if origins lie so far apart that rays share little: alone they are faster.
@@ -217,7 +217,7 @@ impl Rays {
             }
         }
         self.spread = farthest.reduce_max() * 8.0 * UNIT;
-        self.growth = self.spread + self.off;
+        self.growth = self.spread + self.origin_error;
     }
 
     /// All rays as one beam, before any of them is done.
@@ -226,7 +226,7 @@ impl Rays {
         let [a, b, c] = &self.origin;
         let [d, e, f] = &self.inverse;
         let inverses = [interval(simd, d), interval(simd, e), interval(simd, f)];
-        let [d, e, f] = inverses;
+        let [x, y, z] = inverses;
         let first = f32x8::splat(simd, get(&self.start, self.alive.trailing_zeros()));
         let (mut start, mut end) = (first, first);
         for octet in 0..OCTETS {
@@ -242,7 +242,7 @@ impl Rays {
                 ends(simd, interval(simd, b)),
                 ends(simd, interval(simd, c)),
             ],
-            inverse: [ends(simd, d), ends(simd, e), ends(simd, f)],
+            inverse: [ends(simd, x), ends(simd, y), ends(simd, z)],
             is_bounded: inverses.map(|[low, high]| low > 0.0 || high < 0.0),
             is_positive: inverses.map(|[low, _]| low > 0.0),
             start: f32x8::splat(simd, start.reduce_min()),
@@ -418,8 +418,8 @@ impl Rays {
     /// Returns a ray up to its closest hit so far.
     pub(crate) fn rest(&self, ray: u32) -> Ray {
         let at = ray as usize % GROUP;
-        let (given, end) = (self.given[at], self.hits[at].t);
-        Ray { t_max: if end < given.t_max { end } else { given.t_max }, ..given }
+        let given = self.given[at];
+        Ray { t_max: lesser(self.hits[at].t, given.t_max), ..given }
     }
 
     /// Keeps a hit with a shape if it is the closest so far; with `is_any` it ends its ray.

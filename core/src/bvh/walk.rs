@@ -13,7 +13,7 @@ use fearless_simd::{Simd, f32x8, i32x8, u8x16, u16x8, u32x8};
 use zerocopy::transmute;
 
 use super::Bvh;
-use super::boxes::bits;
+use super::boxes::{bits, splat};
 use super::node::{Child, Node, WIDTH};
 use super::shape_leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
 use super::slab::Slab;
@@ -118,18 +118,15 @@ impl<S: Simd> Wide<S> {
         // Splat integers: floats would be loaded into one lane first and then broadcast.
         let [x, y, z] = node.origin;
         let origin = [u32x8::splat(simd, x), u32x8::splat(simd, y), u32x8::splat(simd, z)];
-        let word = u32x8::splat(simd, node.word);
-        // The exponents of x, y and z stand in the three low bytes.
-        let steps = [word << 23, word << 15, word << 7];
+        let steps = node.wide_steps(simd);
         let mut distances = [(self.start, self.start); 3];
         for axis in 0..3 {
             let near = side(simd, node, axis, flips[axis]);
             let far = side(simd, node, axis, flips[axis] ^ FLIP);
-            let step = (steps[axis] & 0x7f80_0000).bitcast::<f32x8<S>>();
             let origin = origin[axis].bitcast::<f32x8<S>>();
             // The product is exact, eight bits times a power of two: fused or not, the sum has the same bits.
-            let near = near.mul_add(step, origin - self.origin_near[axis]);
-            let far = far.mul_add(step, origin - self.origin_far[axis]);
+            let near = near.mul_add(steps[axis], origin - self.origin_near[axis]);
+            let far = far.mul_add(steps[axis], origin - self.origin_far[axis]);
             distances[axis] = (near * self.inverse_near[axis], far * self.inverse_far[axis]);
         }
         let [x, y, z] = distances;
@@ -227,12 +224,6 @@ fn numbers<S: Simd>(half: u16x8<S>) -> f32x8<S> {
     low.combine(high).bitcast::<i32x8<S>>().to_float()
 }
 
-/// A point in vectors.
-#[inline(always)]
-fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
-    [f32x8::splat(simd, x), f32x8::splat(simd, y), f32x8::splat(simd, z)]
-}
-
 impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
     /// False if the ray starts too far away for [`Slab::nearby`]; nothing was traversed then.
     type Output = bool;
@@ -324,12 +315,12 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
             budget = rest;
             tally.cell_step();
             tally.primitive_tests(ids.len());
+            if F::OF_BOXES
+                && offer_leaf(simd, wide, slab, mesh, ids, flips, bounds, &mut end, *search)
+            {
+                return true;
+            }
             let mut survivors = match wide {
-                _ if F::OF_BOXES
-                    && offer_leaf(simd, wide, slab, mesh, ids, bounds, &mut end, *search) =>
-                {
-                    return true;
-                }
                 _ if F::OF_BOXES => 0,
                 Some(ray) => ray.survivors(simd, bvh, mesh, first, ids),
                 None => filter.survivors(mesh, ids),
@@ -363,13 +354,14 @@ fn offer_leaf<S: Simd, F: Search>(
     slab: &Slab,
     mesh: &TriangleMesh<'_>,
     ids: &[u32],
+    flips: NearSides,
     bounds: &Aabb,
     end: &mut f32,
     search: &mut F,
 ) -> bool {
     let pad = pad_of(bounds);
     let (mut met, near) = match wide {
-        Some(ray) => ray.meet_leaf(simd, mesh, ids, flips_of(slab), pad, *end),
+        Some(ray) => ray.meet_leaf(simd, mesh, ids, flips, pad, *end),
         None => meet_leaf(slab, mesh, ids, pad, *end),
     };
     while met != 0 {
@@ -389,11 +381,17 @@ fn offer_leaf<S: Simd, F: Search>(
     false
 }
 
+/// The entry of a child that is `near` away, as the bits of an f32.
+#[inline(always)]
+pub(super) fn waiting(node: u32, slot: u32, near: u32) -> StackEntry {
+    u64::from(near) << 32 | u64::from(node << 3 | slot)
+}
+
 /// Pushes a child so that the nearest child of a node is popped first. `near` holds the bits of a distance: distance
 /// and child are stored as one integer, because a pop that spans two stores would wait for both.
 #[inline(always)]
 fn push(stack: &mut [StackEntry], top: &mut usize, base: usize, node: u32, slot: u32, near: u32) {
-    let waiting = u64::from(near) << 32 | u64::from(node << 3 | slot);
+    let waiting = waiting(node, slot, near);
     let mut at = *top;
     let Some(_) = stack.get(at) else { return };
     *top += 1;
@@ -413,7 +411,7 @@ fn push(stack: &mut [StackEntry], top: &mut usize, base: usize, node: u32, slot:
 
 /// Pops the next child that does not begin behind the end of the ray.
 #[inline(always)]
-fn pop(bvh: &Bvh<'_>, stack: &[StackEntry], top: &mut usize, end: f32) -> Option<Child> {
+pub(super) fn pop(bvh: &Bvh<'_>, stack: &[StackEntry], top: &mut usize, end: f32) -> Option<Child> {
     loop {
         *top = top.checked_sub(1)?;
         let waiting = *stack.get(*top)?;

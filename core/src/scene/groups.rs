@@ -109,7 +109,7 @@ struct SceneRays<'r> {
 impl<'r> SceneRays<'r> {
     fn new(scene: &'r Scene<'r>, question: Question) -> Self {
         let mut inside = Rays::new(question.options().choice());
-        inside.start_outside = true;
+        inside.starts_at_box = true;
         Self {
             scene,
             question,
@@ -140,7 +140,7 @@ impl<'r> SceneRays<'r> {
     /// Finds a hit of each ray of a group. Returns a mask of those that must be traced alone instead.
     fn trace(&mut self, group: &mut Group<'_>, level: SimdLevel) -> u64 {
         self.best = [SceneHit::MISS; GROUP];
-        group.rays.off = self.largest * f32::EPSILON;
+        group.rays.origin_error = self.largest * f32::EPSILON;
         let is_any = self.question.is_any;
         group.offer(level, is_any, &mut |number, mask, outer| self.offer(number, mask, outer))
     }
