@@ -1604,6 +1604,26 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_OTHER_CONTENT -49
 
 /**
+ * The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
+ */
+#define HGRID_ERROR_INVALID_RAYS -50
+
+/**
+ * The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
+ */
+#define HGRID_ERROR_INVALID_ANSWERS -51
+
+/**
+ * The coherence is none that this version knows.
+ */
+#define HGRID_ERROR_INVALID_COHERENCE -52
+
+/**
+ * The options' `cull` is none that this version knows.
+ */
+#define HGRID_ERROR_INVALID_CULL -53
+
+/**
  * An instance names an object that does not exist. The report's `triangle` is the number of the instance.
  */
 #define HGRID_ERROR_INSTANCE_OBJECT -60
@@ -1623,26 +1643,6 @@ typedef struct hgrid_allocator {
  * More scenes stand inside one another than `HGRID_MAX_NESTING`.
  */
 #define HGRID_ERROR_TOO_DEEP -63
-
-/**
- * The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
- */
-#define HGRID_ERROR_INVALID_RAYS -50
-
-/**
- * The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
- */
-#define HGRID_ERROR_INVALID_ANSWERS -51
-
-/**
- * The coherence is none that this version knows.
- */
-#define HGRID_ERROR_INVALID_COHERENCE -52
-
-/**
- * The options' `cull` is none that this version knows.
- */
-#define HGRID_ERROR_INVALID_CULL -53
 
 #ifdef __cplusplus
 extern "C" {
