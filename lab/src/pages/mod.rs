@@ -67,10 +67,15 @@ struct File {
 /// Returns the files that are not what they should be.
 fn stale(root: &Path) -> Result<Vec<File>> {
     let mut files = Vec::new();
+    ensure!(
+        root.join("README.md").exists(),
+        "`{}` is no checkout of hgrid: it has no README.md",
+        root.display()
+    );
     for page in PAGES {
         let path = root.join(page);
         let text = fs::read_to_string(&path)
-            .with_context(|| format!("cannot read `{}`: is it a checkout?", path.display()))?;
+            .with_context(|| format!("cannot read `{}`", path.display()))?;
         let text = fill(root, page, &text, &mut files).with_context(|| page.to_owned())?;
         files.push(File { name: page.to_owned(), text });
     }
