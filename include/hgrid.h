@@ -180,10 +180,11 @@
  * There is no epsilon: the error of a hit is relative to the ray and the triangle (hgrid_hit has the
  * bound), and whether t lies in the range is decided exactly. So meshes of any scale from 1e-30 to 1e30
  * work; between 1e-15 and 1e15 rays are faster, as tests in float replace most tests in double. Only IEEE
- * + - * / and square roots are used, in a fixed order: the same input gives the same bits on every
- * machine. They are rounded to nearest, as in every C program that does not call fesetround: another
- * mode loses hits. Where denormal numbers are flushed to zero (FTZ and DAZ of x86), inputs and
- * intermediate results below 1.2e-38 become zero: scenes of size 1e-25 and less may get other hits.
+ * + - * / and square roots are used, in a fixed order: the same input gives the same blobs and hits, bit
+ * for bit, on every machine. They are rounded to nearest, as in every C program that does not call
+ * fesetround: another mode loses hits. Where denormal numbers are flushed to zero (FTZ and DAZ of x86),
+ * inputs and intermediate results below 1.2e-38 become zero: scenes of size 1e-25 and less may get other
+ * hits.
  *
  * Versions
  * --------
