@@ -1,9 +1,11 @@
 /*
  * hgrid: a ray-tracing acceleration structure that a renderer links and a microcontroller can carry.
  *
- * It builds a tree or a grid over a triangle mesh, in time proportional to the number of triangles
- * and in memory that you bring, and traces rays through it. All of them are called grids here. This
- * file is the whole manual. It is made from the sources in capi/: change it there.
+ * It builds a tree, or one of the four grids of the paper "Multi-Level Hashed Grid Construction
+ * Methods" (2010), over a triangle mesh, in time proportional to the number of triangles and in
+ * memory that you bring, and traces rays through it. A tree is called a grid, too, wherever this file
+ * does not speak of the grids of the paper. This file is the whole manual. It is made from the
+ * sources in capi/: change it there.
  *
  * Three calls
  * -----------
@@ -94,7 +96,7 @@
  *   HGRID_METHOD_ONE_LEVEL   one hashed grid, the least memory on large scans; fixed and variable are
  *                            built from it
  *   HGRID_METHOD_FIXED       a finer hashed grid under macrocells: the shortest time to a first image
- *                            among the grids
+ *                            among the four grids of the paper
  *   HGRID_METHOD_VARIABLE    a hashed grid with hashed subgrids, for uneven detail
  *   HGRID_METHOD_RECURSIVE   grids within grids, not hashed: to compare with
  *
@@ -134,9 +136,10 @@
  * Regions, blobs, positions, indices and masks point to as many bytes as the sizes next to them
  * say. Each function says which of its pointers may be NULL; any other NULL is answered with
  * HGRID_ERROR_NULL_ARGUMENT, or by a query of one ray with false. Outputs come last, those of a
- * batch right after its rays. They are written when a call succeeds and not touched when it fails,
- * except for the report, which is written in both cases, for the size that hgrid_pack wants, and
- * for an index in the cases that hgrid_build names.
+ * batch right after its rays. Views, hits and other results are written only when a call succeeds.
+ * A report is written in both cases, and so is the size that hgrid_pack and its like ask for. A region
+ * (index, scratch, parts, the room for a packed blob or for views) may hold anything after an error,
+ * unless the call says otherwise.
  *
  * Structs
  * -------
@@ -177,10 +180,11 @@
  * There is no epsilon: the error of a hit is relative to the ray and the triangle (hgrid_hit has the
  * bound), and whether t lies in the range is decided exactly. So meshes of any scale from 1e-30 to 1e30
  * work; between 1e-15 and 1e15 rays are faster, as tests in float replace most tests in double. Only IEEE
- * + - * / and square roots are used, in a fixed order: the same input gives the same bits on every
- * machine. They are rounded to nearest, as in every C program that does not call fesetround: another
- * mode loses hits. Where denormal numbers are flushed to zero (FTZ and DAZ of x86), inputs and
- * intermediate results below 1.2e-38 become zero: scenes of size 1e-25 and less may get other hits.
+ * + - * / and square roots are used, in a fixed order: the same input gives the same blobs and hits, bit
+ * for bit, on every machine. They are rounded to nearest, as in every C program that does not call
+ * fesetround: another mode loses hits. Where denormal numbers are flushed to zero (FTZ and DAZ of x86),
+ * inputs and intermediate results below 1.2e-38 become zero: scenes of size 1e-25 and less may get other
+ * hits.
  *
  * Versions
  * --------
@@ -216,7 +220,8 @@
 
 /**
  * Bytes of index that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. No mesh takes less than a third of it, and a scan takes half.
+ * default configuration: a constant expression. A scan takes half of it, and no mesh of finite triangles less
+ * than three tenths.
  * Where `size_t` has 32 bits the result wraps beyond 268 million triangles; `hgrid_bound` answers with an
  * error there.
  */
@@ -303,8 +308,8 @@
 /**
  * A hashed grid of many small cells, and above it levels of macrocells that say where anything is.
  *
- * Rays cross empty space in large steps, and the small cells hold few triangles each. Among the paper's
- * grids it has the shortest time to a first image. `macrocell_factor` belongs to it.
+ * Rays cross empty space in large steps, and the small cells hold few triangles each. Among the four grids
+ * of the paper it has the shortest time to a first image. `macrocell_factor` belongs to it.
  *
  * Memory: one and a half to three times that of one level. The build plans every byte in the
  * scratch before it writes the index.
@@ -343,9 +348,8 @@
  * A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
  * to eight children with tight boxes.
  *
- * It is the default: rays of every kind, scenes of every kind, and the least memory that is known before.
- * `quality` belongs to it. It has no cells, so `density` means nothing to it, and its resolution is
- * 1 x 1 x 1.
+ * It is the default: rays of every kind, scenes of every kind, and the smallest bound that is known before the build.
+ * `quality` belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.
  *
  * Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
  * alone and is less than twice that: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it
@@ -819,7 +823,8 @@ typedef struct hgrid_query_options {
     uint32_t struct_size;
     /**
      * A triangle is seen if its mask and this have a bit in common; see `masks` of `hgrid_mesh`.
-     * With all bits, the default, every triangle is seen, even one whose mask is 0.
+     * With all bits, the default, every triangle is seen, even one whose mask is 0. 0 sees nothing, and no error
+     * tells: begin with `HGRID_QUERY_OPTIONS_INIT`, not with zeros.
      */
     uint32_t mask;
     /**
@@ -829,7 +834,8 @@ typedef struct hgrid_query_options {
     /**
      * A triangle that is not hit, usually the one that the ray leaves, or `HGRID_INVALID_ID`. It needs no
      * epsilon, but a neighbour across an edge may still be hit if rounding put the origin below it. All
-     * rays of a batch skip the same triangle; rays from origins of `hgrid_surface_at` need not skip any.
+     * rays of a batch skip the same triangle; rays from origins of `hgrid_surface_at` need not skip any. 0 skips
+     * triangle 0.
      */
     uint32_t skip;
     /**
@@ -1244,8 +1250,8 @@ typedef struct hgrid_instance {
 } hgrid_instance;
 
 /**
- * A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. All else is as in
- * `hgrid_ray`; an origin beyond the range of float misses.
+ * A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. It has the fields
+ * of `hgrid_ray` in another order: `t_min` stands behind `direction`. An origin beyond the range of float misses.
  */
 typedef struct hgrid_ray_f64 {
     /**
@@ -1307,8 +1313,9 @@ typedef struct hgrid_scene_options {
      */
     uint32_t struct_size;
     /**
-     * An instance is seen if its mask and this have a bit in common, and so are triangles and shapes in it. With all bits,
-     * the default, everything is seen.
+     * An instance is seen if its mask and this have a bit in common, and so are triangles and shapes in it. With all
+     * bits, the default, everything is seen. 0 sees nothing, and no error tells: begin with
+     * `HGRID_SCENE_OPTIONS_INIT`, not with zeros.
      */
     uint32_t mask;
     /**
@@ -1630,6 +1637,26 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_OTHER_CONTENT -49
 
 /**
+ * The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
+ */
+#define HGRID_ERROR_INVALID_RAYS -50
+
+/**
+ * The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
+ */
+#define HGRID_ERROR_INVALID_ANSWERS -51
+
+/**
+ * The coherence is none that this version knows.
+ */
+#define HGRID_ERROR_INVALID_COHERENCE -52
+
+/**
+ * The options' `cull` is none that this version knows.
+ */
+#define HGRID_ERROR_INVALID_CULL -53
+
+/**
  * An instance names an object that does not exist. The report's `triangle` is the number of the instance.
  */
 #define HGRID_ERROR_INSTANCE_OBJECT -60
@@ -1649,26 +1676,6 @@ typedef struct hgrid_allocator {
  * More scenes stand inside one another than `HGRID_MAX_NESTING`.
  */
 #define HGRID_ERROR_TOO_DEEP -63
-
-/**
- * The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
- */
-#define HGRID_ERROR_INVALID_RAYS -50
-
-/**
- * The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
- */
-#define HGRID_ERROR_INVALID_ANSWERS -51
-
-/**
- * The coherence is none that this version knows.
- */
-#define HGRID_ERROR_INVALID_COHERENCE -52
-
-/**
- * The options' `cull` is none that this version knows.
- */
-#define HGRID_ERROR_INVALID_CULL -53
 
 #ifdef __cplusplus
 extern "C" {
@@ -1798,9 +1805,9 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
 /**
  * Looks for the finest grid that fits into a budget.
  *
- * `fitted` becomes a copy of `config` whose density is as low as an index of `index_bytes` bytes needs,
- * and no more than a step lower: a step is a factor of 1.41 in the number of cells. A tree
- * (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call takes at most a dozen times as long
+ * `fitted` becomes a copy of `config` with the highest density whose index fits into `index_bytes`, found in steps
+ * down from that of `config`. A step divides the number of cells by 1.41. A tree (`HGRID_METHOD_BVH`) has no cells: it
+ * fits or does not. The call takes at most a dozen times as long
  * as `hgrid_sizes`. A density that is too fine for a build counts as one that does not fit.
  *
  * Bring as much scratch as `hgrid_sizes` without scratch returns. With less, the grid may become coarser
@@ -2112,11 +2119,11 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * }
  * ```
  *
- * A start lies above the plane by 1 / 2^20 of the distance to the triangle's farthest corner, far more
- * than a test may be off. A ray nearly along the plane may still hit the triangle, as the normal is
- * rounded. A triangle without area, or a needle thinner than 1e-9 of its length, has no normal to
- * rely on; if there is none at all, `normal` faces the ray. `is_front` agrees with `cull`, except for
- * triangles that the ray sees nearly edge-on.
+ * A start lies off the plane by 2^-20 of the distance from the point to the triangle's farthest corner, measured along
+ * one axis, and is rounded away from the plane: far more than a test may be off. A ray nearly along the plane may
+ * still hit the triangle, as the normal is rounded. A triangle without area, or a needle thinner than 1e-9 of its
+ * length, has no normal to rely on; if there is none at all, `normal` faces the ray. `is_front` agrees with `cull`,
+ * except for triangles that the ray sees nearly edge-on.
  *
  * Threads: any number of calls and queries on the same grid at once.
  *

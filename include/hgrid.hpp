@@ -5,8 +5,8 @@
  * It adds no code of its own to a query: each function here is the C call of the same name, and the
  * manual is hgrid.h. What it adds is for the programmer:
  *
- *   hgrid::grid       a built grid that owns its memory, and its mesh if it is moved in; moves, frees
- *                     itself
+ *   hgrid::grid       a built grid, by default a tree, that owns its memory, and its mesh if it is
+ *                     moved in; moves, frees itself
  *   hgrid::view       a grid in memory of yours: an arena, a mapped file; hgrid_grid in C
  *   hgrid::mesh       your vertices and indices, in structs of any kind
  *   hgrid::config     the settings of a build; progress and parallel_for are callables of yours
@@ -91,6 +91,8 @@ inline namespace cpp14 {
 
 /// A ray, or the part of it from `t_min` to `t_max`. See `hgrid_ray`.
 using ray = ::hgrid_ray;
+/// A ray whose origin is in double. See `hgrid_ray_f64`.
+using ray_f64 = ::hgrid_ray_f64;
 /// The hit of a ray on a triangle. See `hgrid_hit`.
 using hit = ::hgrid_hit;
 /// The nearest point of a mesh. See `hgrid_closest`.
@@ -326,6 +328,17 @@ inline constexpr ray make_ray(const point &origin, const point &direction, float
             t_min,
             {direction[0], direction[1], direction[2]},
             t_max};
+}
+
+/// A ray from a point in double, for queries of scenes: `make_ray`.
+inline constexpr ray_f64 make_ray_f64(const std::array<double, 3> &origin, const point &direction, float t_min = 0,
+                                      float t_max = std::numeric_limits<float>::infinity()) noexcept
+{
+    return {{origin[0], origin[1], origin[2]},
+            {direction[0], direction[1], direction[2]},
+            t_min,
+            t_max,
+            0};
 }
 
 /// Returns true if the library that is linked has the version of this header, but for repairs.
@@ -661,9 +674,10 @@ struct scalar<T, void_t<typename T::value_type>> {
     using type = typename T::value_type;
 };
 
-// Converts to float and to nothing else.
-struct only_float {
-    template <class T, std::enable_if_t<std::is_same<T, float>::value, int> = 0>
+// Converts to one type of numbers and to nothing else.
+template <class Number>
+struct only {
+    template <class T, std::enable_if_t<std::is_same<T, Number>::value, int> = 0>
     constexpr operator T() const noexcept
     {
         return 0;
@@ -675,33 +689,32 @@ struct only_float {
 #pragma GCC diagnostic ignored "-Wmissing-braces"
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 #endif
-// Tells whether an aggregate begins with three floats, in members of its own or in arrays and structs that it
-// begins with.
-template <class T, class = void>
-struct begins_with_floats : std::false_type {};
-template <class T>
-struct begins_with_floats<T,
-                          void_t<decltype(T{only_float(), only_float(), only_float()})>>
+// Tells whether an aggregate begins with three numbers of a type, in members of its own or in arrays and structs
+// that it begins with.
+template <class T, class Number, class = void>
+struct begins_with : std::false_type {};
+template <class T, class Number>
+struct begins_with<T, Number, void_t<decltype(T{only<Number>(), only<Number>(), only<Number>()})>>
     : std::is_standard_layout<T> {};
 #if defined(__GNUC__)
 #pragma GCC diagnostic pop
 #endif
 
-// Tells whether a class, which may have constructors, begins with floats x, y and z.
-template <class T, class = void>
+// Tells whether a class, which may have constructors, begins with numbers x, y and z of a type.
+template <class T, class Number, class = void>
 struct has_xyz : std::false_type {};
-template <class T>
-struct has_xyz<T, void_t<decltype(T::x), decltype(T::y), decltype(T::z)>>
+template <class T, class Number>
+struct has_xyz<T, Number, void_t<decltype(T::x), decltype(T::y), decltype(T::z)>>
     : std::integral_constant<bool, std::is_standard_layout<T>::value &&
-                                       std::is_same<decltype(T::x), float>::value &&
-                                       std::is_same<decltype(T::y), float>::value &&
-                                       std::is_same<decltype(T::z), float>::value> {};
-template <class T, bool = has_xyz<T>::value>
+                                       std::is_same<decltype(T::x), Number>::value &&
+                                       std::is_same<decltype(T::y), Number>::value &&
+                                       std::is_same<decltype(T::z), Number>::value> {};
+template <class T, class Number, bool = has_xyz<T, Number>::value>
 struct begins_with_xyz : std::false_type {};
-template <class T>
-struct begins_with_xyz<T, true>
-    : std::integral_constant<bool, offsetof(T, x) == 0 && offsetof(T, y) == sizeof(float) &&
-                                       offsetof(T, z) == 2 * sizeof(float)> {};
+template <class T, class Number>
+struct begins_with_xyz<T, Number, true>
+    : std::integral_constant<bool, offsetof(T, x) == 0 && offsetof(T, y) == sizeof(Number) &&
+                                       offsetof(T, z) == 2 * sizeof(Number)> {};
 
 template <class T>
 constexpr strided<const T> elements(const strided<T> &container) noexcept
@@ -788,12 +801,15 @@ private:
     {
         using number = typename detail::scalar<V>::type;
         constexpr bool is_flat = std::is_same<V, float>::value && !IsField;
-        static_assert(std::is_same<number, float>::value || std::is_void<number>::value,
+        constexpr bool is_double = std::is_same<number, double>::value || detail::begins_with<V, double>::value ||
+                                   detail::begins_with_xyz<V, double>::value;
+        static_assert(!is_double, "coordinates must be float, not double");
+        static_assert(is_double || std::is_same<number, float>::value || std::is_void<number>::value,
                       "the coordinates of a vertex are floats");
         static_assert(std::is_same<V, float>::value || sizeof(V) >= 3 * sizeof(float),
                       "a vertex has three coordinates");
-        static_assert(std::is_same<number, float>::value || detail::begins_with_floats<V>::value ||
-                          detail::begins_with_xyz<V>::value,
+        static_assert(is_double || std::is_same<number, float>::value ||
+                          detail::begins_with<V, float>::value || detail::begins_with_xyz<V, float>::value,
                       "where does the vertex have its three floats? name the field: "
                       "hgrid::field(vertices, &vertex::position)");
         raw_.positions = vertices.first();
@@ -1602,8 +1618,6 @@ inline result<grid> grid::build(const mesh &of, const config &how, report *detai
 
 /// The hit of a ray on a shape. See `hgrid_shape_hit`.
 using shape_hit = ::hgrid_shape_hit;
-/// A ray whose origin is in double. See `hgrid_ray_f64`.
-using ray_f64 = ::hgrid_ray_f64;
 /// The hit of a ray in a scene. See `hgrid_scene_hit`.
 using scene_hit = ::hgrid_scene_hit;
 /// An object at a place in a scene. See `hgrid_instance`: `instance one = HGRID_INSTANCE_INIT;`

@@ -164,9 +164,9 @@ pub unsafe extern "C" fn hgrid_sizes(
 
 /// Looks for the finest grid that fits into a budget.
 ///
-/// `fitted` becomes a copy of `config` whose density is as low as an index of `index_bytes` bytes needs,
-/// and no more than a step lower: a step is a factor of 1.41 in the number of cells. A tree
-/// (`HGRID_METHOD_BVH`) has no cells: it fits or does not. The call takes at most a dozen times as long
+/// `fitted` becomes a copy of `config` with the highest density whose index fits into `index_bytes`, found in steps
+/// down from that of `config`. A step divides the number of cells by 1.41. A tree (`HGRID_METHOD_BVH`) has no cells: it
+/// fits or does not. The call takes at most a dozen times as long
 /// as `hgrid_sizes`. A density that is too fine for a build counts as one that does not fit.
 ///
 /// Bring as much scratch as `hgrid_sizes` without scratch returns. With less, the grid may become coarser

@@ -241,11 +241,11 @@ pub unsafe extern "C" fn hgrid_closest_point(
 /// }
 /// ```
 ///
-/// A start lies above the plane by 1 / 2^20 of the distance to the triangle's farthest corner, far more
-/// than a test may be off. A ray nearly along the plane may still hit the triangle, as the normal is
-/// rounded. A triangle without area, or a needle thinner than 1e-9 of its length, has no normal to
-/// rely on; if there is none at all, `normal` faces the ray. `is_front` agrees with `cull`, except for
-/// triangles that the ray sees nearly edge-on.
+/// A start lies off the plane by 2^-20 of the distance from the point to the triangle's farthest corner, measured along
+/// one axis, and is rounded away from the plane: far more than a test may be off. A ray nearly along the plane may
+/// still hit the triangle, as the normal is rounded. A triangle without area, or a needle thinner than 1e-9 of its
+/// length, has no normal to rely on; if there is none at all, `normal` faces the ray. `is_front` agrees with `cull`,
+/// except for triangles that the ray sees nearly edge-on.
 ///
 /// Threads: any number of calls and queries on the same grid at once.
 ///

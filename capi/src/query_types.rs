@@ -130,13 +130,15 @@ pub struct hgrid_query_options {
     /// `sizeof(hgrid_query_options)`.
     pub struct_size: u32,
     /// A triangle is seen if its mask and this have a bit in common; see `masks` of `hgrid_mesh`.
-    /// With all bits, the default, every triangle is seen, even one whose mask is 0.
+    /// With all bits, the default, every triangle is seen, even one whose mask is 0. 0 sees nothing, and no error
+    /// tells: begin with `HGRID_QUERY_OPTIONS_INIT`, not with zeros.
     pub mask: u32,
     /// The sides that are not hit: one of `HGRID_CULL_...`.
     pub cull: u32,
     /// A triangle that is not hit, usually the one that the ray leaves, or `HGRID_INVALID_ID`. It needs no
     /// epsilon, but a neighbour across an edge may still be hit if rounding put the origin below it. All
-    /// rays of a batch skip the same triangle; rays from origins of `hgrid_surface_at` need not skip any.
+    /// rays of a batch skip the same triangle; rays from origins of `hgrid_surface_at` need not skip any. 0 skips
+    /// triangle 0.
     pub skip: u32,
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,

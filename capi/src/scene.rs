@@ -65,8 +65,8 @@ impl hgrid_scene {
     pub const NONE: Self = Self { opaque: [MaybeUninit::zeroed(); 72] };
 }
 
-/// A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. All else is as in
-/// `hgrid_ray`; an origin beyond the range of float misses.
+/// A ray whose origin is in double: 48 bytes, for scenes in which float is too coarse for an origin. It has the fields
+/// of `hgrid_ray` in another order: `t_min` stands behind `direction`. An origin beyond the range of float misses.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_ray_f64 {
@@ -106,8 +106,9 @@ pub struct hgrid_scene_hit {
 pub struct hgrid_scene_options {
     /// `sizeof(hgrid_scene_options)`.
     pub struct_size: u32,
-    /// An instance is seen if its mask and this have a bit in common, and so are triangles and shapes in it. With all bits,
-    /// the default, everything is seen.
+    /// An instance is seen if its mask and this have a bit in common, and so are triangles and shapes in it. With all
+    /// bits, the default, everything is seen. 0 sees nothing, and no error tells: begin with
+    /// `HGRID_SCENE_OPTIONS_INIT`, not with zeros.
     pub mask: u32,
     /// The sides of triangles that are not hit: one of `HGRID_CULL_...`. The front is that of the triangle in its own
     /// mesh: an instance that mirrors does not turn it round.

@@ -132,6 +132,18 @@ pub const HGRID_ERROR_METHOD_REMOVED: hgrid_status = -48;
 /// The blob is built over something else: triangles, shapes or instances. Open it with the function for these.
 pub const HGRID_ERROR_OTHER_CONTENT: hgrid_status = -49;
 
+/// The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
+pub const HGRID_ERROR_INVALID_RAYS: hgrid_status = -50;
+
+/// The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
+pub const HGRID_ERROR_INVALID_ANSWERS: hgrid_status = -51;
+
+/// The coherence is none that this version knows.
+pub const HGRID_ERROR_INVALID_COHERENCE: hgrid_status = -52;
+
+/// The options' `cull` is none that this version knows.
+pub const HGRID_ERROR_INVALID_CULL: hgrid_status = -53;
+
 /// An instance names an object that does not exist. The report's `triangle` is the number of the instance.
 pub const HGRID_ERROR_INSTANCE_OBJECT: hgrid_status = -60;
 
@@ -144,18 +156,6 @@ pub const HGRID_ERROR_MISSING_OBJECTS: hgrid_status = -62;
 
 /// More scenes stand inside one another than `HGRID_MAX_NESTING`.
 pub const HGRID_ERROR_TOO_DEEP: hgrid_status = -63;
-
-/// The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
-pub const HGRID_ERROR_INVALID_RAYS: hgrid_status = -50;
-
-/// The stride of a batch's answers is below the size of one, or the answers do not fit into memory.
-pub const HGRID_ERROR_INVALID_ANSWERS: hgrid_status = -51;
-
-/// The coherence is none that this version knows.
-pub const HGRID_ERROR_INVALID_COHERENCE: hgrid_status = -52;
-
-/// The options' `cull` is none that this version knows.
-pub const HGRID_ERROR_INVALID_CULL: hgrid_status = -53;
 
 /// The status that stands for an error of core.
 pub(crate) const fn status_of(error: Error) -> hgrid_status {
@@ -212,7 +212,9 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_OVERLAP => {
             c"overlapping memory: keep index, scratch and mesh apart, and answers off their rays"
         }
-        HGRID_ERROR_INDEX_TOO_SMALL => c"index too small: bring as many bytes as the report, or hgrid_pack, says",
+        HGRID_ERROR_INDEX_TOO_SMALL => {
+            c"index too small: bring the report's index_bytes, or what the call wrote to bytes"
+        }
         HGRID_ERROR_SCRATCH_TOO_SMALL => c"scratch too small: bring the report's scratch_bytes",
         HGRID_ERROR_OUT_OF_MEMORY => {
             c"out of memory: the report says how many bytes index and scratch need"
@@ -255,7 +257,9 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
             c"a blob without its mesh: bring the mesh it was built for, or pack both with hgrid_pack"
         }
         HGRID_ERROR_INVALID_CULL => c"unknown cull: use one of HGRID_CULL_...",
-        HGRID_ERROR_NOT_A_GRID => c"not a grid: build or open one first",
+        HGRID_ERROR_NOT_A_GRID => {
+            c"not a grid: the bytes or the view come from no build; build or open one first"
+        }
         HGRID_ERROR_WRONG_BYTE_ORDER => {
             c"a blob of the other byte order: build it again on this machine"
         }
@@ -269,16 +273,20 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_OTHER_CONTENT => {
             c"a blob of another kind: open grids with hgrid_open, shapes with hgrid_open_shapes, scenes with hgrid_open_scene"
         }
-        HGRID_ERROR_INSTANCE_OBJECT => c"an instance of no object: repair the report's triangle, which is its number",
+        HGRID_ERROR_INSTANCE_OBJECT => {
+            c"an instance names an object that does not exist: the report's triangle is its number"
+        }
         HGRID_ERROR_INSTANCE_MATRIX => {
             c"a matrix without an inverse: repair the instance that the report's triangle names"
         }
         HGRID_ERROR_MISSING_OBJECTS => c"too few objects: bring those that the scene was built with",
         HGRID_ERROR_TOO_DEEP => c"too many scenes inside one another: HGRID_MAX_NESTING at most",
         HGRID_ERROR_CORRUPT => c"a damaged blob, or one of another mesh: build it again",
-        HGRID_ERROR_INVALID_RAYS => c"invalid rays: check count and stride (0, or at least a ray)",
+        HGRID_ERROR_INVALID_RAYS => {
+            c"invalid rays: check count; stride is 0 or at least sizeof(hgrid_ray), in scenes sizeof(hgrid_ray_f64)"
+        }
         HGRID_ERROR_INVALID_ANSWERS => {
-            c"invalid answers: check count and stride (0, or at least one)"
+            c"invalid answers: check count; stride is 0 or at least the size of an answer"
         }
         HGRID_ERROR_INVALID_COHERENCE => c"unknown coherence: use one of HGRID_COHERENCE_...",
         _ => c"unknown status",

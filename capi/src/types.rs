@@ -44,8 +44,8 @@ pub const HGRID_METHOD_ONE_LEVEL: u32 = 1;
 
 /// A hashed grid of many small cells, and above it levels of macrocells that say where anything is.
 ///
-/// Rays cross empty space in large steps, and the small cells hold few triangles each. Among the paper's
-/// grids it has the shortest time to a first image. `macrocell_factor` belongs to it.
+/// Rays cross empty space in large steps, and the small cells hold few triangles each. Among the four grids
+/// of the paper it has the shortest time to a first image. `macrocell_factor` belongs to it.
 ///
 /// Memory: one and a half to three times that of one level. The build plans every byte in the
 /// scratch before it writes the index.
@@ -78,9 +78,8 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 /// A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
 /// to eight children with tight boxes.
 ///
-/// It is the default: rays of every kind, scenes of every kind, and the least memory that is known before.
-/// `quality` belongs to it. It has no cells, so `density` means nothing to it, and its resolution is
-/// 1 x 1 x 1.
+/// It is the default: rays of every kind, scenes of every kind, and the smallest bound that is known before the build.
+/// `quality` belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.
 ///
 /// Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
 /// alone and is less than twice that: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it

@@ -1,10 +1,10 @@
 //! A ray-tracing acceleration structure that a renderer links and a microcontroller can carry.
 //!
-//! hgrid builds an acceleration structure over a triangle mesh, in memory that the caller brings, and answers
-//! ray queries on it. The default structure is a bounding volume hierarchy ([`Method::Bvh`]); the others are
-//! the grids of *Multi-Level Hashed Grid Construction Methods* (Costa, Pereira, Jorge, 2010). The API calls
-//! each of them a grid. No allocation, no threads, no I/O, no panic. Only `simd` contains `unsafe` code: it
-//! asks the processor for its vector instructions and makes the tokens that stand for them.
+//! hgrid builds an acceleration structure over a triangle mesh, in memory that the caller brings, and answers ray
+//! queries on it. The default structure is a bounding volume hierarchy ([`Method::Bvh`]), a tree; the others are the
+//! four grids of the paper *Multi-Level Hashed Grid Construction Methods* (Costa, Pereira, Jorge, 2010). The API calls
+//! a tree a grid, too. No allocation, no threads, no I/O, no panic. Only `simd` contains `unsafe` code: it asks the
+//! processor for its vector instructions and makes the tokens that stand for them.
 //!
 //! ```
 //! use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};
@@ -41,7 +41,8 @@
 //! | operations: sizes, queries, statistics, refit | `sizes`, `query`, `batch`, `closest`, `inspect`, `refit` |
 //! | on top of grids | `owned`, `shapes`, `scene`, `packed` |
 //!
-//! core/DESIGN.md tells how it all works, core/REJECTED.md what was left out.
+//! core/DESIGN.md tells how it all works, core/REJECTED.md what was left out, and CONTRIBUTING.md how to add a query or
+//! a method.
 //!
 //! Each structure has a feature of the package (`one-level`, `fixed`, `variable`, `recursive` and
 //! `bvh`, all on by default), so that a program with little flash takes the ones it needs:

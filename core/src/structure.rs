@@ -2,8 +2,8 @@
 //!
 //! A method is a folder with a cargo feature of its name. Without the feature the folder is not compiled, and calls
 //! with the method return [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes` and `build`, which
-//! take the method's own parameters, and a type that reads what was built; [`Structure`] is an enum of these types. A
-//! new method is a variant of [`Parameters`], a line of the list at the end and a module in lib.rs.
+//! take the method's own parameters, and a type that reads what was built; [`Structure`] is an enum of these types.
+//! CONTRIBUTING.md lists what a new method needs beside its line of the list at the end.
 
 use crate::aabb::Aabb;
 use crate::arena::Sizes;

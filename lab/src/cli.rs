@@ -8,8 +8,9 @@ mod tuning;
 
 use core::iter;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use hgrid_core::{Config, Method, Quality};
 
@@ -57,10 +58,42 @@ impl Cli {
             let flags = ["help", "-h", "--help", "-V", "--version"];
             flags.contains(&&*word) || Self::command().find_subcommand(&*word).is_some()
         };
-        if !words.first().is_some_and(is_own) {
-            words.insert(0, "render".into());
+        let parse = |words: &[OsString]| {
+            Self::try_parse_from(iter::once("hgrid".into()).chain(words.iter().cloned()))
+        };
+        if words.first().is_some_and(is_own) {
+            return parse(&words);
         }
-        Self::try_parse_from(iter::once("hgrid".into()).chain(words))
+        let first = words.first().map(|word| word.to_string_lossy().into_owned());
+        let first = first.filter(|word| is_bare(word) && !Path::new(word).exists());
+        let nearest = first.as_ref().and_then(|_| nearest_command(&parse(&words).err()?));
+        words.insert(0, "render".into());
+        let parsed = parse(&words);
+        let is_refused =
+            || parsed.as_ref().is_err_and(|error| error.kind() == ErrorKind::UnknownArgument);
+        match first {
+            Some(word) if nearest.is_some() || is_refused() => {
+                let hint = nearest.map(|name| format!("; the nearest command is `{name}`"));
+                let message = format!("no command or file `{word}`{}", hint.unwrap_or_default());
+                Err(Self::command().error(ErrorKind::InvalidSubcommand, message))
+            }
+            _ => parsed,
+        }
+    }
+}
+
+/// Returns true if a word may be meant as a command: it is no option, and has nothing that names of scenes have.
+fn is_bare(word: &str) -> bool {
+    word.chars().all(|c| c.is_ascii_alphabetic() || c == '-') && !word.starts_with('-')
+}
+
+/// The command that is spelt nearly as the one that an error is about.
+fn nearest_command(error: &clap::Error) -> Option<String> {
+    match error.get(ContextKind::SuggestedSubcommand)? {
+        ContextValue::String(name) => Some(name.clone()),
+        // The last one is the most alike.
+        ContextValue::Strings(names) => names.last().cloned(),
+        _ => None,
     }
 }
 
@@ -129,7 +162,7 @@ pub struct FiguresArgs {
     #[arg(long, value_name = "SCENE")]
     pub figure1: Option<String>,
     /// The densities of figure 1, between commas
-    #[arg(long, value_name = "CELLS", value_delimiter = ',',
+    #[arg(long, value_name = "CELLS", allow_negative_numbers = true, value_delimiter = ',',
           default_values_t = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])]
     pub densities: Vec<f32>,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
@@ -144,7 +177,7 @@ pub struct AnimateArgs {
     #[arg(default_value = DEFAULT_SCENE)]
     pub scene: String,
     /// How many frames
-    #[arg(long, value_name = "NUMBER", default_value_t = 30,
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 30,
           value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
     /// The structure to build
@@ -154,14 +187,15 @@ pub struct AnimateArgs {
     #[command(flatten)]
     pub tuning: Tuning,
     /// Show a field of so many moving instances of the mesh, in a scene that is built for every frame, too
-    #[arg(long, value_name = "NUMBER", default_value_t = 0,
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 0,
           value_parser = clap::value_parser!(u32).range(..=10_000_000))]
     pub instances: u32,
     /// From the second frame on, give the trees of the first one their new boxes, for `bvh`
     #[arg(long)]
     pub refit: bool,
     /// Threads that build, for `bvh`, and render
-    #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = thread_parser())]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
+          default_value_t = 1, value_parser = thread_parser())]
     pub threads: u32,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
@@ -194,14 +228,14 @@ pub struct CompareArgs {
     #[arg(long, value_name = "WORKLOADS", value_delimiter = ',', value_enum)]
     pub workloads: Vec<Workload>,
     /// Compare scenes of this many instances of the mesh (`bvh` and Embree only); 0 compares the mesh itself
-    #[arg(long, value_name = "NUMBER", default_value_t = 0, conflicts_with = "output",
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 0, conflicts_with = "output",
           value_parser = clap::value_parser!(u32).range(..=10_000_000))]
     pub instances: u32,
     /// Compare trees over spheres, a shape of the caller's own, in place of triangles (`bvh` and Embree only)
     #[arg(long, conflicts_with_all = ["instances", "output"])]
     pub spheres: bool,
     /// Build and trace so many times, taking turns, and report the medians
-    #[arg(long, value_name = "TIMES", default_value_t = 5,
+    #[arg(long, value_name = "TIMES", allow_negative_numbers = true, default_value_t = 5,
           value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
@@ -267,7 +301,7 @@ pub struct Race {
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
     methods: Vec<Method>,
     /// Build and render so many times, taking turns, and report the medians
-    #[arg(long, value_name = "TIMES", default_value_t = 3,
+    #[arg(long, value_name = "TIMES", allow_negative_numbers = true, default_value_t = 3,
           value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
@@ -288,7 +322,7 @@ impl Race {
     /// If there is one; the message names the parameter and its method.
     pub fn check(&self) -> anyhow::Result<()> {
         let methods: Vec<_> = self.configs().iter().map(Config::method).collect();
-        self.tuning.check(&methods)
+        self.tuning.check("--methods", &methods)
     }
 
     /// Returns a configuration for each method, at the paper's density.
@@ -303,7 +337,8 @@ impl Race {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Builders {
     /// Threads that build, for `bvh`; the other methods, and all rays, have one
-    #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = thread_parser())]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
+          default_value_t = 1, value_parser = thread_parser())]
     pub threads: u32,
 }
 

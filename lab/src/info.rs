@@ -232,11 +232,9 @@ impl BlobFacts {
         ]);
         if let Some(grid) = &self.grid {
             rows.extend([
-                ("bounds", corners(grid.bounds)),
-                (
-                    "lists",
-                    format!("{}, of {} triangles at most", count(grid.lists), grid.longest_list),
-                ),
+                ("box (padded)", corners(grid.bounds)),
+                ("lists", count(grid.lists)),
+                ("longest list", count(grid.longest_list)),
                 ("references", count(grid.references)),
                 ("not finite", format!("{} triangles", count(grid.triangles_not_finite))),
                 ("without area", format!("{} triangles", count(grid.triangles_without_area))),

@@ -18,7 +18,7 @@ fn main() -> ExitCode {
         Command::Table(args) => args.race.check().and_then(|()| table::run(&args)),
         Command::Figures(args) => args.race.check().and_then(|()| figures::run(&args)),
         Command::Animate(args) => {
-            args.tuning.check(&[args.method]).and_then(|()| animate::run(&args))
+            args.tuning.check("--method", &[args.method]).and_then(|()| animate::run(&args))
         }
         Command::Compare(args) => compare::run(&args),
         Command::Report(args) => pages::run(&args),

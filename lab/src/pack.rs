@@ -61,7 +61,7 @@ fn check(args: &PackArgs) -> Result<()> {
         "--density is not for {}, which has none",
         method.name()
     );
-    args.tuning.check(&[method])?;
+    args.tuning.check("--method", &[method])?;
     let is_mesh = Format::named(&args.output).is_some_and(|format| format != Format::Blob);
     ensure!(!is_mesh, "`{output}` would be a mesh by its name: name a file like x.hgrid or x.c");
     let is_source = |path: &Path| {

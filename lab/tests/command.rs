@@ -61,6 +61,10 @@ fn a_file_alone_is_rendered() {
     assert!(folder.fails("a.obj -o a.jpg").unwrap().contains("name it a.png"));
     assert!(folder.fails("nothing.ply").unwrap().contains("cannot open it"));
     assert!(folder.fails("nothing").unwrap().contains("no scene `nothing`"));
+    assert!(folder.fails("rendr a.obj").unwrap().contains("the nearest command is `render`"));
+    assert!(folder.fails("report nope").unwrap().contains("`nope` is no checkout of hgrid"));
+    fs::write(folder.0.join("empty.ply"), "").unwrap();
+    assert!(folder.fails("empty.ply").unwrap().contains("`empty.ply`: it is empty"));
     assert!(
         folder
             .fails("hgrid.png")
@@ -71,7 +75,7 @@ fn a_file_alone_is_rendered() {
         folder
             .fails("table a.obj --methods bvh --depth 2")
             .unwrap()
-            .contains("--depth is for recursive")
+            .contains("--depth is for --methods recursive")
     );
 }
 
@@ -87,6 +91,8 @@ fn packed_files_are_described_proved_and_rendered() {
         assert_eq!((&json["triangles"], &json["has_mesh"]), (&3.into(), &true.into()));
         let total = fs::metadata(folder.0.join("a.hgrid")).unwrap().len();
         assert_eq!(json["total_bytes"], total);
+        let facts = folder.says("info a.hgrid").unwrap();
+        assert!(facts.contains("box (padded)") && facts.contains("longest list"), "{facts}");
         assert!(folder.says("validate a.hgrid").unwrap().contains("valid"));
         assert!(folder.says("a.hgrid --size 16").unwrap().contains("3 triangles"));
     }
@@ -123,7 +129,7 @@ fn a_blob_can_be_an_array_of_c() {
         ("pack a.obj -o b.hgrid --c-array b", "is not C by its name"),
         ("pack a.obj -o b.c --c-array 1b", "is no name in C"),
         ("pack a.obj -o b.ply", "would be a mesh by its name"),
-        ("pack a.obj -o b.hgrid --depth 2", "--depth is for recursive"),
+        ("pack a.obj -o b.hgrid --depth 2", "--depth is for --method recursive"),
     ] {
         let message = folder.fails(words).unwrap();
         assert!(message.contains(expected), "{message}");

@@ -141,15 +141,18 @@ fn every_status_and_every_function_of_c_is_there() {
 }
 
 /// Lines that must not compile, each with a word of the compiler's message.
-const REFUSED: [(&str, &str); 23] = [
+const REFUSED: [(&str, &str); 26] = [
     ("hgrid::options().filter([](const hgrid::hit &) { return true; });", "filter"),
     ("auto f = [](int *) { return true; }; hgrid::options().filter(f);", "called with a hit"),
     ("hgrid::config().progress([](float) {});", "progress"),
     ("auto f = [](hgrid::task) {}; hgrid::config().parallel_for(2, f);", "std::uint32_t and a"),
     ("hgrid::mesh m(std::vector<float>(9), indices);", "give them a name"),
-    ("std::vector<double> v(9); hgrid::mesh m(v, indices);", "coordinates of a vertex are floats"),
+    ("std::vector<double> v(9); hgrid::mesh m(v, indices);", "must be float, not double"),
+    ("std::vector<of<double>> v(3); hgrid::mesh m(v, indices);", "must be float, not double"),
+    ("std::vector<wide> v(3); hgrid::mesh m(v, indices);", "must be float, not double"),
+    ("std::vector<int> v(9); hgrid::mesh m(v, indices);", "coordinates of a vertex are floats"),
     ("std::vector<std::array<float, 2>> v(3); hgrid::mesh m(v, indices);", "three coordinates"),
-    ("std::vector<of<double>> v(3); hgrid::mesh m(v, indices);", "name the field"),
+    ("std::vector<of<int>> v(3); hgrid::mesh m(v, indices);", "name the field"),
     ("std::vector<late> v(3); hgrid::mesh m(v, indices);", "name the field"),
     ("std::vector<backwards> v(3); hgrid::mesh m(v, indices);", "name the field"),
     ("std::vector<face> v(3); hgrid::mesh m(v, indices);", "name the field"),
@@ -191,6 +194,7 @@ const PRELUDE: &str = "\
 #include <vector>
 struct face { int material; unsigned corners[3]; };
 template <class T> struct of { T x, y, z; };
+struct wide { wide() : x(0), y(0), z(0) {} double x, y, z; };
 struct late { int id; float x, y, z; };
 struct backwards { backwards() : z(0), y(0), x(0) {} float z, y, x; };
 void refused(const std::vector<float> &vertices, const std::vector<unsigned> &indices);

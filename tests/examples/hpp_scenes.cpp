@@ -37,7 +37,7 @@ void check_batches(const hgrid::scene &scene)
     std::vector<pixel> pixels(200);
     for (std::size_t i = 0; i < pixels.size(); i++) {
         const double x = -1.5 + 0.0625 * static_cast<double>(i % 50), y = i < 100 ? 0.25 : 10.5;
-        pixels[i].ray = {{x, y, 3}, {0, 0, -1}, 0, 100, 0};
+        pixels[i].ray = hgrid::make_ray_f64({x, y, 3}, {0, 0, -1}, 0, 100);
     }
     const auto rays = hgrid::field(pixels, &pixel::ray);
     const auto hits = hgrid::field(pixels, &pixel::hit);
@@ -77,7 +77,7 @@ void check_batches(const hgrid::scene &scene)
         CHECK(scene.occluded(pixels[i].ray, asking) == (pixels[i].is_dark == 1));
     }
     auto none = [](const hgrid::scene_hit &) { return hgrid::verdict::reject; };
-    CHECK(!scene.occluded({{0.25, 0.25, 3}, {0, 0, -1}, 0, 100, 0}, hgrid::scene_options().filter(none)));
+    CHECK(!scene.occluded(hgrid::make_ray_f64({0.25, 0.25, 3}, {0, 0, -1}), hgrid::scene_options().filter(none)));
 
     // Arrays of different lengths, empty arrays, and an empty view.
     filtered.resize(2);
@@ -149,7 +149,7 @@ void check_scenes()
                                            hgrid::as_writable_bytes(scene_index),
                                            hgrid::as_writable_bytes(scratch));
     CHECK(scene && scene->validate(hgrid::as_writable_bytes(scratch)) == hgrid::status::ok);
-    const hgrid::ray_f64 left = {{-0.25, 0.25, 1}, {0, 0, -1}, 0, 100, 0};
+    const auto left = hgrid::make_ray_f64({-0.25, 0.25, 1}, {0, 0, -1}, 0, 100);
     const auto found = scene->intersect(left);
     CHECK(found && found->path[0] == 1 && found->t == 6);
     const hgrid::point normal = scene->normal(*found);
@@ -157,7 +157,7 @@ void check_scenes()
     const auto at = scene->surface_at(left, *found);
     CHECK(at && at->normal[2] == 1 && at->position[2] == -5 && at->above[2] > -5 && at->below[2] < -5);
     CHECK(!scene->surface_at(left, {1, 0, 0, hgrid::invalid_id, {0, 0, 0, 0}}));
-    CHECK(scene->occluded({{10.25, 10.5, 3}, {0, 0, -1}, 0, 100, 0}));
+    CHECK(scene->occluded(hgrid::make_ray_f64({10.25, 10.5, 3}, {0, 0, -1})));
     CHECK(hgrid::scene::open(hgrid::as_bytes(scene_index), objects));
     CHECK(!hgrid::scene().occluded(left));
     check_batches(*scene);

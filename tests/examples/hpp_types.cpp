@@ -27,6 +27,11 @@ STATIC_CHECK(!std::is_convertible<hgrid::strided<int>, hgrid::span<int>>::value)
 STATIC_CHECK(std::is_convertible<hgrid::strided<int>, hgrid::strided<const int>>::value);
 STATIC_CHECK(std::is_convertible<std::array<int, 3> &, hgrid::strided<int>>::value);
 STATIC_CHECK(hgrid::make_ray({1, 2, 3}, {4, 5, 6}, 7, 8).t_max == 8);
+STATIC_CHECK(hgrid::make_ray_f64({1e10 + 1, 2, 3}, {4, 5, 6}, 7, 8).origin[0] == 1e10 + 1);
+STATIC_CHECK(hgrid::make_ray_f64({1, 2, 3}, {4, 5, 6}, 7, 8).direction[2] == 6);
+STATIC_CHECK(hgrid::make_ray_f64({1, 2, 3}, {4, 5, 6}, 7, 8).t_min == 7);
+STATIC_CHECK(hgrid::make_ray_f64({1, 2, 3}, {4, 5, 6}, 7, 8).t_max == 8);
+STATIC_CHECK(hgrid::make_ray_f64({1, 2, 3}, {4, 5, 6}).t_max == std::numeric_limits<float>::infinity());
 
 /* --- spans --------------------------------------------------------------------------------------- */
 

@@ -12,7 +12,7 @@ use crate::world::World;
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Picture {
     /// Pixels on each side
-    #[arg(long, value_name = "PIXELS", default_value_t = 1024,
+    #[arg(long, value_name = "PIXELS", allow_negative_numbers = true, default_value_t = 1024,
           value_parser = clap::value_parser!(u16).range(1..=16_384))]
     pub size: u16,
     /// From which side to look, or a named view of the scene
@@ -25,7 +25,7 @@ pub struct Picture {
     #[arg(long, value_name = "X,Y,Z", requires = "eye", allow_hyphen_values = true)]
     pub target: Option<Point>,
     /// Degrees that the picture covers, from edge to edge [default: 40, in a room 70]
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub fov: Option<Lens>,
     /// Which axis of the scene is up [default: y, or z for STL and what lies flat on x and y]
     #[arg(long, value_enum)]

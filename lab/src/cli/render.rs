@@ -31,11 +31,13 @@ pub struct RenderArgs {
     /// What the colours mean
     #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
     pub shading: Shading,
-    /// Rays through each pixel, against jagged edges and noise [default: 4, of a grid 1]
-    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Rays through each pixel, against jagged edges and noise [default: 4; 1 for the four grids of the paper]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u16).range(1..=1024))]
     samples: Option<u16>,
-    /// Rays of ambient occlusion from each sample, 0 for none [default: 16 a pixel, of a grid 0]
-    #[arg(long, value_name = "RAYS", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    /// Rays of ambient occlusion from each sample, 0 for none [default: 16 a pixel; 0 for the four grids of the paper]
+    #[arg(long, value_name = "RAYS", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u16).range(0..=1024))]
     ao: Option<u16>,
     /// The lamp casts no shadows
     #[arg(long)]
@@ -44,7 +46,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum)]
     pub counter: Option<Counter>,
     /// For heat: the number that is red, to compare pictures [default: what 99 of 100 rays take]
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     pub heat_top: Option<u32>,
     /// The structure to build
     #[arg(long, value_parser = method_parser(), default_value = Method::default().name())]
@@ -56,7 +58,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub tuning: Tuning,
     /// Threads that render and, for bvh, build [default: one for each core]
-    #[arg(long, value_name = "NUMBER", value_parser = thread_parser())]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = thread_parser())]
     threads: Option<u32>,
     /// Print the numbers as a JSON object
     #[arg(long)]
@@ -80,7 +82,7 @@ impl RenderArgs {
             "--density is not for {}, which has none",
             self.method.name()
         );
-        self.tuning.check(&[self.method])?;
+        self.tuning.check("--method", &[self.method])?;
         let is_for = |option: &str, is_there: bool, shading: Shading, word: &str| {
             ensure!(
                 !is_there || self.shading == shading,
@@ -113,8 +115,8 @@ impl RenderArgs {
         if self.shading == Shading::Heat { 1 } else { self.samples.unwrap_or(default) }
     }
 
-    /// Returns the lights. By default a tree gets all of them, which takes it a few seconds. Grids are slow
-    /// for rays in all directions, and get shadows alone.
+    /// Returns the lights. By default a tree gets all of them, which takes it a few seconds. The four grids of the paper
+    /// are slow for rays in all directions, and get shadows alone.
     #[must_use]
     pub fn lights(&self) -> Lights {
         if self.shading != Shading::Diffuse {

@@ -45,6 +45,40 @@ fn bad_values_are_refused() {
     }
 }
 
+/// The message names the range, and not how to write the name of a file that starts with a hyphen.
+#[test]
+fn negative_numbers_are_refused_by_their_range() {
+    for words in [
+        "render --ao -3",
+        "render --samples -1",
+        "render --threads -1",
+        "render --size -1",
+        "animate --frames -1",
+        "compare a.ply --repeat -1",
+        "compare a.ply --instances -1",
+    ] {
+        let words = ["hgrid"].into_iter().chain(words.split(' '));
+        let message = Cli::try_parse_from(words).unwrap_err().to_string();
+        assert!(message.contains("is not in") && !message.contains("-- -"), "{message}");
+    }
+}
+
+#[test]
+fn a_misspelt_command_is_no_file() {
+    let message = |words: &str| {
+        let words = words.split(' ').map(OsString::from);
+        Cli::of_words(words).unwrap_err().to_string()
+    };
+    for words in ["rendr one.obj", "rendr", "rendr --json"] {
+        let said = message(words);
+        let expected = "no command or file `rendr`; the nearest command is `render`";
+        assert!(said.contains(expected), "{said}");
+    }
+    let said = message("xyz one.obj");
+    assert!(said.contains("no command or file `xyz`\n"), "{said}");
+    assert!(message("a.ply b.ply").contains("unexpected argument 'b.ply'"));
+}
+
 #[test]
 fn without_a_command_a_scene_is_rendered() {
     let parse = |words: &str| {
@@ -86,7 +120,7 @@ fn parameters_of_others_are_refused() {
     check("--depth 2").unwrap();
     check("--methods fixed,bvh --quality high").unwrap();
     let message = check("--methods fixed,bvh --depth 2").unwrap_err().to_string();
-    assert!(message.contains("--depth is for recursive"), "{message}");
+    assert!(message.contains("--depth is for --methods recursive"), "{message}");
 }
 
 #[test]

@@ -9,13 +9,13 @@ use hgrid_core::{Config, Control, Method, Parameters, Quality};
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Tuning {
     /// For `fixed`: cells in a macrocell on each axis [default: the paper's, 6]
-    #[arg(long, value_name = "CELLS")]
+    #[arg(long, value_name = "CELLS", allow_negative_numbers = true)]
     pub macrocell_factor: Option<u32>,
     /// For `variable`: a cell with more triangles than this gets a subgrid [default: 16]
-    #[arg(long, value_name = "TRIANGLES")]
+    #[arg(long, value_name = "TRIANGLES", allow_negative_numbers = true)]
     pub subdivide_above: Option<u32>,
     /// For `recursive`: levels of grids [default: the paper's, 3]
-    #[arg(long, value_name = "LEVELS")]
+    #[arg(long, value_name = "LEVELS", allow_negative_numbers = true)]
     pub depth: Option<u32>,
     /// For `bvh`: `high` builds longer for rays that are faster [default: fast]
     #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
@@ -42,11 +42,11 @@ impl Tuning {
         density.map_or(parameters, |density| parameters.with_density(density)).into()
     }
 
-    /// Refuses parameters of methods that are not built.
+    /// Refuses parameters of methods that are not built. `choice` is the option that chooses methods.
     ///
     /// # Errors
     /// If there is one; the message names the parameter and its method.
-    pub fn check(&self, methods: &[Method]) -> Result<()> {
+    pub fn check(&self, choice: &str, methods: &[Method]) -> Result<()> {
         for (option, is_there, method) in [
             ("--macrocell-factor", self.macrocell_factor.is_some(), Method::Fixed),
             ("--subdivide-above", self.subdivide_above.is_some(), Method::Variable),
@@ -55,7 +55,7 @@ impl Tuning {
         ] {
             ensure!(
                 !is_there || methods.contains(&method),
-                "{option} is for {0}, which is not built: ask for {0}, or leave it out",
+                "{option} is for {choice} {}: ask for that, or leave out {option}",
                 method.name()
             );
         }

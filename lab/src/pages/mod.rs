@@ -7,7 +7,8 @@
 //! ```
 //!
 //! So every number in a page comes from a file, and a new measurement is a new file and one command. Paths
-//! are relative to the root of a checkout. Charts are written beside the page.
+//! are relative to the root of a checkout. Charts are written beside the page. A result that was measured with
+//! changes that no commit has is refused: nobody could measure it again.
 
 mod compared;
 mod paper;
@@ -67,10 +68,15 @@ struct File {
 /// Returns the files whose text is not up to date.
 fn stale(root: &Path) -> Result<Vec<File>> {
     let mut files = Vec::new();
+    ensure!(
+        root.join("README.md").exists(),
+        "`{}` is no checkout of hgrid: it has no README.md",
+        root.display()
+    );
     for page in PAGES {
         let path = root.join(page);
         let text = fs::read_to_string(&path)
-            .with_context(|| format!("cannot read `{}`: is it a checkout?", path.display()))?;
+            .with_context(|| format!("cannot read `{}`", path.display()))?;
         let text = fill(root, page, &text, &mut files).with_context(|| page.to_owned())?;
         files.push(File { name: page.to_owned(), text });
     }
@@ -159,8 +165,29 @@ impl Block<'_> {
 
     fn text(&self, names: &[&str]) -> Result<String> {
         let [name] = names else { bail!("one file, not {}", names.len()) };
-        fs::read_to_string(self.root.join(name)).with_context(|| format!("cannot read `{name}`"))
+        let text = fs::read_to_string(self.root.join(name))
+            .with_context(|| format!("cannot read `{name}`"))?;
+        let commit = commit_of(&text).filter(|commit| commit.ends_with("-dirty"));
+        if let Some(commit) = commit {
+            bail!(
+                "`{name}` was measured with changes that no commit has (`{commit}`): commit them and measure again"
+            );
+        }
+        Ok(text)
     }
+}
+
+/// The commit that a result was measured at, if it has one.
+fn commit_of(result: &str) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Origin {
+        machine: Commit,
+    }
+    #[derive(serde::Deserialize)]
+    struct Commit {
+        commit: Option<String>,
+    }
+    serde_json::from_str::<Origin>(result).ok()?.machine.commit
 }
 
 #[cfg(test)]
@@ -197,6 +224,34 @@ mod tests {
         assert!(filled.starts_with("a\n") && filled.ends_with("\nb\n"), "{filled}");
         assert!(filled.contains(name) && !filled.contains("old"), "{filled}");
         assert_eq!(fill(&filled).unwrap(), filled);
+    }
+
+    #[test]
+    fn results_of_no_commit_are_refused() {
+        let root = std::env::temp_dir().join(format!("hgrid-pages-{}", std::process::id()));
+        fs::create_dir_all(root.join("docs")).unwrap();
+        let fill_with = |kind: &str, commit: &str| {
+            let result = format!(r#"{{"machine": {{"commit": "{commit}"}}, "scenes": []}}"#);
+            fs::write(root.join("a.json"), result).unwrap();
+            let page = format!("{BEGIN}{kind} a.json -->\n{END}");
+            for name in PAGES {
+                fs::write(root.join(name), &page).unwrap();
+            }
+            format!("{:#}", stale(&root).unwrap_err())
+        };
+        for kind in
+            ["ratios", "ratios-in-full", "systems", "table1", "figure1", "figure2", "sources"]
+        {
+            let refused = fill_with(kind, "0123456789ab-dirty");
+            assert!(
+                refused.contains("`a.json` was measured with changes that no commit has"),
+                "{refused}"
+            );
+            // What is missing besides is told of a commit's result.
+            let other = fill_with(kind, "0123456789ab");
+            assert!(!other.contains("no commit"), "{other}");
+        }
+        fs::remove_dir_all(root).unwrap();
     }
 
     #[test]

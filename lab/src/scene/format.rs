@@ -59,6 +59,8 @@ impl Format {
     }
 
     fn of_content(start: &[u8], named: Option<Self>) -> Result<Self> {
+        // An OBJ file without a line is one without triangles.
+        ensure!(!start.is_empty() || named == Some(Self::Obj), "it is empty");
         if start.starts_with(b"ply") {
             return Ok(Self::Ply);
         }
@@ -189,6 +191,9 @@ mod tests {
     fn another_format_is_named() {
         let message =
             |start: &[u8], named| Format::of_content(start, named).unwrap_err().to_string();
+        for named in [Some(Format::Ply), Some(Format::Blob), Some(Format::Stl), None] {
+            assert_eq!(message(b"", named), "it is empty");
+        }
         assert_eq!(
             message(b"v 0 0 0\n", Some(Format::Ply)),
             "it is not a PLY file, in spite of its name"
