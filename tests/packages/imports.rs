@@ -45,7 +45,8 @@ fn exports(lib: &str) -> BTreeMap<String, String> {
     let pairs = lines.flat_map(|line| {
         let (module, items) = line.split_once("::").expect("a path");
         let items = items.trim_matches(['{', '}']).split(',').map(|item| item.trim().to_owned());
-        items.map(move |item| (item, module.to_owned()))
+        // A list of several lines has a comma behind its last item, too.
+        items.filter(|item| !item.is_empty()).map(move |item| (item, module.to_owned()))
     });
     pairs.collect()
 }
