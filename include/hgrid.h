@@ -20,7 +20,8 @@
  * The nearest point: hgrid_closest_point. Masks, culling, a triangle to skip, filters and counters are
  * options of these. hgrid_bound, hgrid_sizes and hgrid_fit are about memory: enough for any mesh, for
  * this one, and the best grid for a budget. hgrid_config has the fields for a build on your threads, and
- * for its progress. hgrid_surface_at returns the normal of a hit and the origins of rays that leave it.
+ * for its progress. hgrid_surface_at, and in scenes hgrid_scene_surface_at, returns the normal of a hit
+ * and the origins of rays that leave it.
  * hgrid_join joins several meshes for one grid, and hgrid_locate tells which of them was hit. Trees of
  * your own shapes begin with hgrid_build_shapes, scenes of instances with hgrid_build_scene. For grids
  * that are stored there are hgrid_open, hgrid_peek, hgrid_pack, hgrid_mesh_of and hgrid_validate, for
