@@ -26,7 +26,7 @@ options parse_options(int count, char **words);
 /* Parts for other programs: returns the value of the option at `*i`, and advances `*i` to it. */
 const char *value_of(int count, char **words, int *i);
 
-/* Parses the value of an option: a whole number from `least` to `most`, or ends the program. */
+/* Returns the value of an option as a whole number from `least` to `most`; ends the program if it is none. */
 int parse_count(const char *option, const char *value, int least, int most);
 
 #endif

@@ -116,7 +116,7 @@ static void read_header(ply *p)
     fail("%s: %s", p->path, is_first ? "not a PLY file: it is empty" : "no end_header line");
 }
 
-/* Reads the next number of the file; returns false if it ends or has none. */
+/* Reads the next number of the file; returns false at the end of the file or if what follows is no number. */
 static bool next_number(const ply *p, type t, double *number)
 {
     static const unsigned char sizes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};

@@ -27,7 +27,7 @@ static int wrong(const char *method, const char *what)
 }
 
 /* Traces rays at both triangles of every side: from outside they must hit at 2, from the middle at 0.5, at
- * the same triangle. */
+ * the same triangle. A ray that ends before the cube must miss it. */
 static int trace(const char *method, const hgrid_grid *grid)
 {
     int found = 0;
@@ -46,7 +46,7 @@ static int trace(const char *method, const hgrid_grid *grid)
         hgrid_hit from_outside, from_inside;
         if (!hgrid_intersect(grid, &in, NULL, &from_outside) ||
             !hgrid_intersect(grid, &out, NULL, &from_inside))
-            found += wrong(method, "a ray goes through the cube");
+            found += wrong(method, "a ray misses the cube");
         else if (from_outside.t != 2 || from_inside.t != 0.5f ||
                  from_outside.primitive != from_inside.primitive)
             found += wrong(method, "a ray hits another place than it must");

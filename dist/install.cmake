@@ -22,7 +22,7 @@ endif()
 configure_file(dist/hgrid.pc.in hgrid.pc @ONLY)
 
 file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/hgrid-build.cmake"
-  "# How CMake built and installed this hgrid.\n"
+  "# Settings with which CMake built and installed this hgrid.\n"
   "set(_hgrid_libdirs \"${CMAKE_INSTALL_LIBDIR}\")\n"
   "set(_hgrid_includedir \"${CMAKE_INSTALL_INCLUDEDIR}\")\n")
 if(HGRID_MALLOC)

@@ -3,7 +3,7 @@
 //! It adds nothing to what [`hgrid_sizes`] and [`hgrid_build`] do: it asks the first, gets so much
 //! memory, and does what the second does.
 //!
-//! # Who owns what
+//! # Ownership
 //!
 //! [`Memory`] is one allocation and frees itself when it is dropped, so that no way out of
 //! [`create`] leaks. A grid keeps one `Memory`: it contains an [`Owned`] and behind it the index.

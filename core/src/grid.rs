@@ -148,7 +148,7 @@ impl<'a> Grid<'a> {
     /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
     /// # let grid = owned.grid();
     /// # let mesh = *grid.mesh();
-    /// // What a build wrote: from a file, say, into memory at a multiple of 64.
+    /// // The bytes of a build, say from a file, in memory at a multiple of 64.
     /// let mut memory = vec![Block::ZERO; Block::count_for(grid.blob_bytes())];
     /// Block::bytes_mut(&mut memory)[..grid.blob_bytes()].copy_from_slice(grid.blob());
     ///

@@ -1,4 +1,4 @@
-//! Blobs in files: packed grids, with or without their mesh.
+//! Blobs in files: grids, with their mesh (packed) or without it.
 
 use std::fs::File;
 use std::io::Read as _;

@@ -1,7 +1,7 @@
 //! Pictures as PNG files.
 //!
 //! A check before the work tests that the file can be written, and leaves no empty file behind. The file
-//! itself is written at once when the picture is complete.
+//! itself is written in a single write when the picture is complete.
 
 use std::fs::{self, OpenOptions};
 use std::io::{Cursor, ErrorKind};

@@ -1,4 +1,4 @@
-//! A square picture in tiles of 16 x 16 pixels, as all renderings of the lab.
+//! A square picture in tiles of 16 x 16 pixels, as in all renderings of the lab.
 //!
 //! ```text
 //! +-------------+---   Tiles come row by row from the upper left. The rays of one are in Morton
@@ -7,9 +7,8 @@
 //! |  8  9 12 .. |
 //! ```
 //!
-//! This order suits the packets of other structures and [`Grid::intersect_n`], for which a call has four of
-//! the groups of 64 rays that a tree traces together. The rays of a tile are made just before it is traced,
-//! as in a renderer.
+//! This order suits the packets of other structures and [`Grid::intersect_n`]: a tree traces a whole
+//! tile as four groups of 64 rays. The rays of a tile are made just before it is traced, as in a renderer.
 
 use hgrid_core::{Coherence, Grid, Hit, Ray, Strided, StridedMut};
 
@@ -35,7 +34,7 @@ static MORTON: [[u16; 2]; TILE_RAYS] = {
     places
 };
 
-/// Packs the bits in even places side by side: the four lowest of them.
+/// Moves bits 0, 2, 4 and 6 to bits 0 to 3.
 const fn even_bits(at: u16) -> u16 {
     at & 1 | at >> 1 & 2 | at >> 2 & 4 | at >> 3 & 8
 }

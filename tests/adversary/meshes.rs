@@ -201,7 +201,7 @@ fn strip(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// Triangles whose sizes differ by up to 2^30.
+/// Triangles whose sizes differ by a factor of up to 2^30.
 fn sizes(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     for _ in 0..few(random) {

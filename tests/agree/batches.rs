@@ -417,7 +417,7 @@ fn rays_in_any_order_agree_with_any_scratch() {
                             &mut options,
                         )
                         .unwrap();
-                        assert_eq!(options.scratch.len(), bytes, "lent again");
+                        assert_eq!(options.scratch.len(), bytes, "the scratch is returned whole");
                         let mut occluded = vec![7_u8; rays.len()];
                         let answers = &mut StridedMut::new(&mut occluded);
                         grid.occluded_n_with(

@@ -1,4 +1,4 @@
-//! The ray-triangle test compared with integers. Where exact arithmetic says "clearly inside", the test must
+//! The ray-triangle test compared with exact integer arithmetic. Where that says "clearly inside", the test must
 //! hit with the right numbers; where it says "clearly outside", it must miss.
 
 use hgrid_core::{Ray, TriangleTest};

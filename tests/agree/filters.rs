@@ -121,7 +121,10 @@ fn check_occluder(grid: &Grid<'_>, hits: &[Hit], asked: Asked, named: u32, what:
     if named == INVALID_ID {
         assert!(blocking.peek().is_none(), "{what} {asked:?}: {:?} blocks", blocking.peek());
     } else {
-        assert!(blocking.any(|hit| hit.primitive == named), "{what} {asked:?}: {named} does not");
+        assert!(
+            blocking.any(|hit| hit.primitive == named),
+            "{what} {asked:?}: {named} does not block"
+        );
     }
 }
 

@@ -224,7 +224,7 @@ fn a_packed_grid_still_knows_the_parts() {
             prove(&opened).unwrap();
             locates(opened.mesh(), &places(&meshes));
             answers_the_same(&opened, &grid);
-            assert!(pack(&opened).bytes() == packed.bytes(), "packed again");
+            assert!(pack(&opened).bytes() == packed.bytes(), "packing again changes bytes");
 
             // Before the table of parts the bytes are those of the one mesh, except in the header.
             if stored.parts().iter().any(|part| !part.mesh().masks().bytes.is_empty()) {

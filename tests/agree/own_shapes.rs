@@ -80,7 +80,7 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
 
                 let mut asked = HashSet::new();
                 let mut test = |id: u32, part: &Ray| {
-                    assert!(asked.insert(id), "each shape once");
+                    assert!(asked.insert(id), "shape {id} was tested twice");
                     assert_eq!((part.origin, part.direction), (ray.origin, ray.direction));
                     assert!(part.t_min == ray.t_min && part.t_max <= ray.t_max);
                     meet(all[id as usize], part)
@@ -185,7 +185,10 @@ fn shapes_of_a_batch_are_tested_once_for_each_ray() {
         .collect();
     let mut asked = HashSet::new();
     let mut test = |id: u32, part: &Ray| {
-        assert!(asked.insert((id, part.direction.map(f32::to_bits))), "each shape once for a ray");
+        assert!(
+            asked.insert((id, part.direction.map(f32::to_bits))),
+            "shape {id} was tested twice for one ray"
+        );
         meet(all[id as usize], part)
     };
     let mut hits = vec![Hit::MISS; rays.len()];

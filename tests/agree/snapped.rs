@@ -7,7 +7,8 @@ use hgrid_tests::owned::{Owned, prove};
 use hgrid_tests::{oracle, rounds, setting};
 use proptest::prelude::*;
 
-/// The width of the scene in quarters: 4 units. At the densities below, a cell is 1 unit, half of one, or two.
+/// The width of the scene in quarters of a unit; the scene is 4 units wide. At the densities below, a cell is
+/// 1 unit, half of one, or two.
 const WIDTH: i32 = 16;
 
 fn snapped() -> impl Strategy<Value = [f32; 3]> {
@@ -55,7 +56,7 @@ fn rays() -> impl Strategy<Value = Vec<Ray>> {
 
 /// Returns the number of cases: `PROPTEST_CASES`, or as many as take some seconds.
 fn cases() -> u32 {
-    setting("PROPTEST_CASES", rounds(1500) as u64).try_into().expect("not that many")
+    setting("PROPTEST_CASES", rounds(1500) as u64).try_into().expect("a count that fits")
 }
 
 proptest! {

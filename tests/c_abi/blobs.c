@@ -161,7 +161,7 @@ int main(void)
     every_shorter_blob_is_refused();
     another_mesh_is_refused();
     a_changed_mesh_is_found();
-    /* A box of a tree that is too large is no error: it costs work, not hits. */
+    /* A tree's box may be larger than needed: that costs work, not hits. */
     damage_is_harmless_and_found(blob_bytes / 4);
     const hgrid_config one_level = HGRID_CONFIG_INIT_ONE_LEVEL;
     build(&one_level);

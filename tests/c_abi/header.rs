@@ -65,8 +65,9 @@ pub(crate) fn parameters(function: &str) -> Vec<Parameter> {
     let header = committed();
     let is_declared =
         |line: &&str| line.contains(&format!("{function}(")) && !line.starts_with(' ');
-    let (start, _) =
-        header.split_once(header.lines().find(is_declared).expect("a function")).expect("it");
+    let (start, _) = header
+        .split_once(header.lines().find(is_declared).expect("a function"))
+        .expect("the declaration");
     let declaration = header[start.len()..].split_once(");").expect("an end").0;
     let (_, list) = declaration.split_once('(').expect("parameters");
     let parameters =

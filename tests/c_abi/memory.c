@@ -248,7 +248,7 @@ int main(void)
         indices_of_16_bits_are_read_as_such();
         masks_are_read_to_their_last_byte_and_no_further();
     }
-    /* methods.c checks the other methods: these promises hold to the byte. */
+    /* The rest is checked to the byte for one_level only; methods.c checks the other methods. */
     CHECK(config.method == HGRID_METHOD_ONE_LEVEL);
     one_byte_less_is_refused_and_nothing_is_touched();
     what_is_more_than_needed_is_not_touched();

@@ -154,7 +154,7 @@ static void too_small_an_index_is_refused_and_used_again(const built *b)
         /* A size that ends anywhere, even within a word. */
         const size_t bytes = half + (need - half) * i / SIZES;
         refuse_index(b, region, need, bytes);
-        /* The whole blocks of it, up to a protected page. */
+        /* The same size rounded down to whole blocks of 64 bytes, which end at a protected page. */
         const size_t whole = bytes / 64 * 64;
         refuse_index(b, (unsigned char *)guarded(whole), whole, whole);
     }

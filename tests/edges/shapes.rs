@@ -189,7 +189,10 @@ fn a_mesh_of_spanning_triangles_lowers_the_density() {
         prove(&grid).unwrap();
         if let Some(density) = grid.config().parameters.density() {
             let ratio = 64.0 / density;
-            assert!(ratio.log2().fract() == 0.0, "halved, again and again: {ratio}");
+            assert!(
+                ratio.log2().fract() == 0.0,
+                "the density was divided by {ratio}, no power of two"
+            );
             // A deep recursive grid has few cells at the root, however many triangles there are.
             let is_deep =
                 matches!(config.parameters, Parameters::Recursive { depth, .. } if depth > 1);

@@ -105,7 +105,7 @@ fn programs_that_may_be_missing_are_listed() {
 
     let ci = page(".ci/run");
     let list = ci.lines().find_map(|line| line.trim_start().strip_prefix("HGRID_WITHOUT="));
-    let list = list.and_then(|line| line.split(' ').next()).expect("a run without them");
+    let list = list.and_then(|line| line.split(' ').next()).expect(".ci/run sets HGRID_WITHOUT");
     let without: Vec<_> = names.into_iter().filter(|name| *name != "make").collect();
     assert_eq!(list.split(',').collect::<Vec<_>>(), without);
 }
@@ -132,7 +132,7 @@ fn the_files_that_pages_name_are_there() {
         for word in words.map(|word| word.trim_end_matches('.')) {
             let is_path = folders.iter().any(|folder| word.starts_with(&format!("{folder}/")));
             assert!(!is_path || Path::exists(&root().join(word)), "{name} names {word}");
-            assert!(!word.starts_with('@'), "{name} has a gap: {word}");
+            assert!(!word.starts_with('@'), "{name} has an unfilled @ placeholder: {word}");
         }
     }
 }

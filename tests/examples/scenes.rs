@@ -25,7 +25,7 @@ fn spheres_are_drawn() {
     let dir = TempDir::new().expect("a folder");
     let (printed, picture) = draw("spheres", &["spheres.c", "memory.c", "picture.c"], dir.path());
     assert!(printed.starts_with("4000 spheres in 39360 bytes, wrote "), "{printed}");
-    assert_eq!(hash(&picture), SPHERES, "the picture is another");
+    assert_eq!(hash(&picture), SPHERES, "the picture has changed");
 }
 
 #[test]
@@ -36,7 +36,7 @@ fn instances_are_drawn() {
     let (printed, picture) = draw("instances", &sources, dir.path());
     assert!(printed.starts_with("2306 instances in "), "{printed}");
     assert!(printed.contains(", 500002 triangles in memory, "), "{printed}");
-    assert_eq!(hash(&picture), INSTANCES, "the picture is another");
+    assert_eq!(hash(&picture), INSTANCES, "the picture has changed");
 }
 
 /// The hashes of the pictures, the same on every machine.

@@ -2,8 +2,8 @@
 //!
 //! Bytes and counters of every method on a few scenes, as a table in counters.txt. A slower algorithm or a
 //! larger blob shows as a difference there, in review and on any machine, and so does a blob with other bits:
-//! `content` is a hash of the contents of the lists, `words` a hash of all words after the header, on little-
-//! endian machines. If only `words` differs, `BLOB_VERSION` must change. `HGRID_BLESS=1` writes the table
+//! `content` is a hash of the contents of the lists, `words` a hash of all words after the header, on
+//! little-endian machines. If only `words` differs, `BLOB_VERSION` must change. `HGRID_BLESS=1` writes the table
 //! anew.
 
 use std::fmt::Write as _;

@@ -16,7 +16,7 @@ use hgrid_tests::owned::{Owned, prove};
 /// which a cell gets a subgrid, depth. Other parameters may well give the same grid.
 const TOLD: [usize; 5] = [40, 44, 92, 96, 100];
 
-/// The header's field for the content of a blob.
+/// The header's field `content`: the kind of primitives that the blob is built over.
 const CONTENT: Range<usize> = 104..108;
 
 /// The header's field for the quality of a tree.
@@ -40,7 +40,7 @@ fn is_fit(at: usize, copy: &Copy, grid: &Grid<'_>) -> bool {
 struct Ends {
     /// Opening refused the blob.
     refused: u32,
-    /// Opening refused the blob because of its content.
+    /// Opening refused the blob because field `content` names another kind, or none.
     other: u32,
     /// Only `validate` refused the blob.
     found: u32,
@@ -67,7 +67,7 @@ fn flip_all(seed: &Seed, rays: usize, step: usize) -> Ends {
                     | Error::UnsupportedVersion { .. }
                     | Error::Corrupt { offset: 124 }
             );
-            assert!(is_fit, "{what}: the header has a checksum: {error:?}");
+            assert!(is_fit, "{what}: not an error that a damaged header may give: {error:?}");
         }
         if at < CHECKSUM {
             copy.sign();
@@ -93,7 +93,7 @@ fn flip_all(seed: &Seed, rays: usize, step: usize) -> Ends {
                     ended.found += 1;
                 } else {
                     agrees(&grid, &rays);
-                    assert!(is_fit(at, &copy, &grid), "{what}: not seen");
+                    assert!(is_fit(at, &copy, &grid), "{what}: valid, but no build makes it");
                     ended.valid += 1;
                 }
             }
@@ -203,7 +203,10 @@ fn flip_meshes(step: usize) {
         }
         // With 12 triangles and 36 vertices, the padding of the three sections is 48, 16 and 16 bytes.
         let rounding = if step == 1 { 0 } else { 3 };
-        assert!(usize::abs_diff(8 * 80 / step, refused) <= rounding, "what fills up sections");
+        assert!(
+            usize::abs_diff(8 * 80 / step, refused) <= rounding,
+            "{refused} flips were refused, not those of all padding bits"
+        );
         assert!(found.min(valid) > 1000 / step, "{found} {valid}");
     }
 }

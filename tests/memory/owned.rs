@@ -140,7 +140,7 @@ fn a_grid_keeps_what_it_takes_and_nothing_is_written_but_by_the_build() {
         check(&grid.grid());
         drop(grid);
         let left = HEAP.get().current.wrapping_sub(before.current).cast_signed();
-        assert!(left < 0, "{left} bytes left, and the mesh");
+        assert!(left < 0, "the grid and its mesh were not freed: {left} bytes");
     }
 }
 

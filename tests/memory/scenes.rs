@@ -39,7 +39,10 @@ fn scenes_take_what_they_ask_for_and_no_byte_beside_it() {
             };
             assert_eq!(available_bytes, bytes as u64);
             let enough = usize::try_from(needed_bytes).unwrap();
-            assert!(bytes < enough && enough <= bound.index_bytes, "{enough} of {exact} bytes");
+            assert!(
+                bytes < enough && enough <= bound.index_bytes,
+                "the error needs {enough}, not above {bytes} and up to the bound"
+            );
         }
         for bytes in (0..bound.scratch_bytes).step_by(31) {
             match build(&mut Guarded::new(exact), &mut Guarded::new(bytes)) {

@@ -119,7 +119,7 @@ fn the_archive_has_what_it_says() {
     assert_eq!(files(&folder), expected);
     for name in ["README.md", "lib/pkgconfig/hgrid.pc", "share/cmake/hgrid/hgrid-build.cmake"] {
         let text = fs::read_to_string(folder.join(name)).expect("text");
-        assert!(!text.contains('@'), "{name} has a gap:\n{text}");
+        assert!(!text.contains('@'), "{name} has an unfilled @ placeholder:\n{text}");
     }
     // No library contains the path where it was made.
     let here = root().to_str().expect("a path in UTF-8").as_bytes();

@@ -32,7 +32,7 @@ fn packages_say_what_they_are() {
     for (name, _) in PACKAGES {
         let package = metadata(name);
         let text = |field: &str| package[field].as_str().unwrap_or_default().to_owned();
-        assert!(package["publish"].is_null(), "{name} is not to be published");
+        assert!(package["publish"].is_null(), "{name} must not set `publish`");
         assert_eq!(text("version"), VERSION);
         assert_eq!(text("license"), "MIT OR Apache-2.0");
         assert!(text("description").to_lowercase().contains("ray tracing"), "{name}");

@@ -46,6 +46,6 @@ fn bytes_of_the_library(map: &Path) -> u64 {
         (file.contains("libhgrid.a(") && number(address)? > 0).then(|| number(size))?
     };
     let sum = map.lines().filter_map(size).sum();
-    assert!(sum > 10_000, "the map has another shape: {sum}");
+    assert!(sum > 10_000, "{sum} bytes are too few; has the map's format changed?");
     sum
 }

@@ -111,7 +111,7 @@ impl Flavour {
 pub fn library_with(features: &str) -> PathBuf {
     // All are built in one folder and share their dependencies, so build one after the other.
     static FOLDER: Mutex<()> = Mutex::new(());
-    let _turn = FOLDER.lock().expect("nobody panicked");
+    let _turn = FOLDER.lock().expect("no thread panicked with the lock");
     let target = target_dir().join("methods");
     let mut build = cargo_in(&target, "rustc");
     build.args(["--release", "-p", "hgrid-capi", "--no-default-features", "--features", features]);

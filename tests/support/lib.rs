@@ -34,7 +34,7 @@ pub mod tools;
 /// If the value is not a number.
 #[must_use]
 pub fn rounds(count: usize) -> usize {
-    count * usize::try_from(setting("HGRID_ROUNDS", 1)).expect("not that many")
+    count * usize::try_from(setting("HGRID_ROUNDS", 1)).expect("a count that fits")
 }
 
 /// Returns the number in an environment variable, or the default if it is not set.

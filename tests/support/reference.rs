@@ -9,6 +9,7 @@
 //! in the range         t_min <= T <= t_max, T where the line meets the plane of the corners as they are
 //! grazed               nor are all corners outside, nor is the t of the places by more than 2^-21 Z
 //! ```
+//!
 //! The rule defines the places as f64 data. Everything that follows from them is decided in f64 with a proved
 //! error where that is enough, and with [`Dyadic`] numbers where it is not. [`Line::holds_places`] shows
 //! without rounding that the places are where the documentation says: within 2^-50 L of those of the corners.

@@ -28,7 +28,7 @@ impl Built {
         objects: &[Object<'_>],
         config: &Config,
     ) -> Result<Self, Error> {
-        let count = u32::try_from(instances.len()).expect("not so many");
+        let count = u32::try_from(instances.len()).expect("a count that fits");
         let (mut index, mut scratch) = memory(Scene::bound(count, config))?;
         let scratch = Block::bytes_mut(&mut scratch);
         let scene =
@@ -73,7 +73,7 @@ impl Built {
 /// # Errors
 /// The errors of packing.
 pub fn packed(scene: &Scene<'_>) -> Result<Vec<Block>, Error> {
-    let bytes = usize::try_from(scene.packed_bytes()).expect("not so many");
+    let bytes = usize::try_from(scene.packed_bytes()).expect("a count that fits");
     let mut blocks = vec![Block::ZERO; Block::count_for(bytes)];
     let length = scene.pack(Block::bytes_mut(&mut blocks))?.len();
     assert_eq!(length, bytes);
@@ -133,7 +133,7 @@ pub fn scattered(count: usize, objects: u32, width: f64, seed: u64) -> Vec<Insta
         .map(|number| Instance {
             linear: matrix(&mut random),
             translation: random.point().map(|c| f64::from(c) * width),
-            id: u32::try_from(number).expect("not so many"),
+            id: u32::try_from(number).expect("a count that fits"),
             ..Instance::new(u32::try_from(random.below(objects as usize)).expect("an object"))
         })
         .collect()

@@ -72,7 +72,7 @@ impl Workload {
     }
 }
 
-/// The numbers of queries of the workloads for which the picture does not give them.
+/// The number of queries of each workload that does not depend on the picture's size.
 #[derive(Debug, Clone, Copy)]
 pub struct Amount {
     /// Rays between random points.

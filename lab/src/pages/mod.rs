@@ -247,7 +247,7 @@ mod tests {
                 refused.contains("`a.json` was measured with changes that no commit has"),
                 "{refused}"
             );
-            // What is missing besides is told of a commit's result.
+            // For the result of a commit, the error names something else that is missing.
             let other = fill_with(kind, "0123456789ab");
             assert!(!other.contains("no commit"), "{other}");
         }

@@ -177,7 +177,7 @@ fn equal_lists_may_be_shared() {
     let seed = Seed::new(mesh, Parameters::OneLevel { density: 40.0 }.into());
     let s = Hashed::of(&seed.blob);
     let rows = s.row_count();
-    assert!(s.resolution[0] == 1 && rows > 8 && s.words == rows, "one cell a row, all the same");
+    assert!(s.resolution[0] == 1 && rows > 8 && s.words == rows, "each row must be one cell");
 
     let mut lists: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
     let mut copy = Copy::of(&seed.blob);

@@ -51,7 +51,7 @@ fn nodes(blob: &[u8]) -> Vec<Node> {
 fn every_word_of_a_head_counts() {
     let seed = crowded();
     let nodes = nodes(&seed.blob);
-    assert!(nodes.iter().any(|node| node.depth == 2), "grids in grids in the root");
+    assert!(nodes.iter().any(|node| node.depth == 2), "no grid at depth 2");
     for node in [&nodes[0], nodes.iter().find(|node| node.depth == 2).unwrap(), &nodes[1]] {
         let at = HEAD..seed.blob.len();
         for word in (0..7).map(|word| node.head + 4 * word) {

@@ -63,12 +63,12 @@ pub fn ends(grid: &Grid<'_>, rays: &[Ray]) {
     for ray in rays {
         let mut counters = Counters::default();
         let hit = grid.intersect_with(ray, &mut QueryOptions::counting(&mut counters));
-        assert!(is_bounded(&counters), "{counters:?}, not {most:?}, for {ray:?}");
+        assert!(is_bounded(&counters), "{counters:?} exceed {most:?} for {ray:?}");
         assert!(hit.is_none_or(|hit| is_possible(grid, ray, &hit)), "{hit:?} {ray:?}");
         assert_eq!(grid.intersect(ray).as_ref().map(bits), hit.as_ref().map(bits), "{ray:?}");
         let mut counters = Counters::default();
         let is_hit = grid.occluded_with(ray, &mut QueryOptions::counting(&mut counters));
-        assert!(is_bounded(&counters), "{counters:?}, not {most:?}, for {ray:?}");
+        assert!(is_bounded(&counters), "{counters:?} exceed {most:?} for {ray:?}");
         assert_eq!(grid.occluded(ray), is_hit, "{ray:?}");
     }
     for ray in rays.iter().take(ASKED_ALL) {
@@ -136,7 +136,7 @@ fn in_order(grid: &Grid<'_>, ray: &Ray) {
     let options = QueryOptions { mask: 5, cull: Cull::Back, skip: 3, ..QueryOptions::default() };
     let mut options = QueryOptions { filter: Some(&mut filter), ..options };
     let count = grid.intersect_all(ray, &mut options, &mut []);
-    assert_eq!(count, (shown.len() + 1) / 3, "one in three counts {ray:?}");
+    assert_eq!(count, (shown.len() + 1) / 3, "the filter accepts every third hit: {ray:?}");
     assert!(is_ordered(&shown), "{shown:?} {ray:?}");
     let is_seen = |hit: &Hit| hit.primitive != 3 && grid.mesh().mask(hit.primitive) & 5 != 0;
     assert!(shown.iter().all(is_seen), "{shown:?} {ray:?}");

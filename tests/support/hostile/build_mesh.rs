@@ -19,7 +19,7 @@ use crate::owned::prove;
 /// The largest index or scratch that is built; larger ones are only sized.
 const MOST_BYTES: usize = 1 << 20;
 
-/// Runs the target, see the head of this file.
+/// Runs the target; see the head of this file.
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let _ = describe_and_build(&mut u);
@@ -132,7 +132,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
         grid.expect("enough memory").blob().to_vec()
     };
     let (done, calls) = seen.get();
-    assert_eq!(done.to_bits(), 1.0_f32.to_bits(), "a build ends with all done");
+    assert_eq!(done.to_bits(), 1.0_f32.to_bits(), "the last progress call is not 1");
     assert!(index.around_is_intact() && scratch.around_is_intact());
 
     // Stop at one of the calls: the build is cancelled, or complete already.
@@ -149,7 +149,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
 
     // Build without tasks, on the same memory with whatever is in it now: the bits must be the same.
     let alone = Grid::build(mesh, config, index.region(), scratch.region()).expect("enough memory");
-    assert!(alone.blob() == blob, "the number of tasks shows");
+    assert!(alone.blob() == blob, "the blob depends on the number of tasks");
     let copy = crate::copy::Copy::of(&blob);
     let grid = Grid::open(copy.bytes(), mesh).expect("what was built opens");
     prove(&grid).expect("what was built is valid");
@@ -159,7 +159,7 @@ fn build(u: &mut Unstructured<'_>, mesh: TriangleMesh<'_>, config: &Config, task
     agrees(&grid, &rays);
 }
 
-/// Returns true if two errors have one cause; either call may instead name the memory that is too small.
+/// Returns true if the errors are equal, or if the second one, that of the build, is too little memory.
 fn is_same(one: Error, other: Error) -> bool {
     one == other || matches!(other, Error::OutOfMemory { .. })
 }

@@ -18,7 +18,7 @@ use super::shape::{self, Shape};
 /// The largest index or scratch that is built.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// Runs the target, see the head of this file.
+/// Runs the target; see the head of this file.
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let Ok(shape) = Shape::new(&mut u) else { return };
@@ -314,7 +314,10 @@ impl Caller<'_> {
         let Control { done, calls, patience, .. } = &*input.control;
         let is_watched = !input.config.is_null() && input.config.value().progress.is_some();
         assert!(!is_watched || done.get() == HGRID_PROGRESS_END);
-        assert!(calls.get() <= patience.saturating_add(1), "went on when it was to stop");
+        assert!(
+            calls.get() <= patience.saturating_add(1),
+            "the build went on after progress returned false"
+        );
         self.grid = grid;
         self.opened = Some(Opened {
             blob: self.memory.len(),

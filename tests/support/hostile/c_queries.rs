@@ -139,7 +139,8 @@ impl Caller<'_> {
                 options
                     .ask(&mut told, 0, |options| grid.intersect_all(&ray, options, &mut expected))
             });
-            // SAFETY: all pointers are NULL or valid for the given room, or the room is larger than any memory.
+            // SAFETY: all pointers are NULL or valid, that to hits for `capacity` of them, or `capacity` is larger
+            // than any memory, which the call refuses.
             let status = known(unsafe {
                 hgrid_intersect_all(grid, to_ray, options.as_ptr(), to_hits, capacity, to_count)
             });
@@ -270,7 +271,10 @@ impl Caller<'_> {
         // In damaged lists, rays that are traced together may find other triangles.
         let must_agree = is_right || !options.let_rays_go_together();
         if must_agree {
-            assert!(memory.bytes() == expected, "other answers, or written beside them");
+            assert!(
+                memory.bytes() == expected,
+                "other answers than core's, or bytes around them changed"
+            );
         }
         if must_agree || !options.have_filter() {
             let agrees = if any {
@@ -278,7 +282,7 @@ impl Caller<'_> {
             } else {
                 options.agree(&told)
             };
-            assert!(agrees, "shown or counted otherwise");
+            assert!(agrees, "other filter calls or counters than core's");
         }
         Ok(())
     }

@@ -99,7 +99,10 @@ impl Caller<'_> {
         // SAFETY: `to` has `capacity` bytes.
         let status = known(unsafe { hgrid_pack(grid, to, capacity, &raw mut bytes) });
         if status != HGRID_OK {
-            assert!(memory.bytes().iter().all(|&byte| byte == CANARY), "written, but {status}");
+            assert!(
+                memory.bytes().iter().all(|&byte| byte == CANARY),
+                "written in spite of {status}"
+            );
             return Ok(());
         }
         assert!(to == memory.at(0), "packed over its own blob");
@@ -222,7 +225,7 @@ impl Caller<'_> {
         }
         // SAFETY: the grid was just made, or is NULL.
         unsafe { hgrid_destroy(grid) };
-        assert!(heap.lent.borrow().is_empty(), "not given back");
+        assert!(heap.lent.borrow().is_empty(), "hgrid_create or hgrid_destroy kept memory");
         Ok(())
     }
 }
@@ -270,5 +273,8 @@ unsafe extern "C" fn release(
     let mut lent = heap.lent.borrow_mut();
     let place = lent.iter().position(|lent| lent.at(0) == memory).expect("memory of this heap");
     let memory = lent.swap_remove(place);
-    assert!(memory.bytes().len() == bytes && alignment == 64, "other bytes than were asked for");
+    assert!(
+        memory.bytes().len() == bytes && alignment == 64,
+        "released with another size or alignment"
+    );
 }

@@ -24,7 +24,7 @@ pub fn most(grid: &Grid<'_>) -> Counters {
         Parameters::Recursive { .. } => words,
         // Each node counts once, with at most eight leaves; one more step exhausts the budget.
         Parameters::Bvh { .. } => 9 * nodes(grid) + 1,
-        others => panic!("nobody has said what {others:?} may cost"),
+        others => panic!("no bound for {others:?}"),
     };
     // Each word of a list is tested once; leaves of a tree have at most eight ids. A ray from too far away
     // for any structure tests every triangle.

@@ -4,8 +4,8 @@
 //! of each target define the meaning of the bytes, through `arbitrary`: most bytes mean something, and
 //! missing bytes at the end are zero.
 //!
-//! A new entry point of the library belongs into `ask`, which queries the grid of every target that has one,
-//! and into `c_abi`, which calls it through C.
+//! A new entry point of the library belongs in `ask`, which queries the grid of every target that has one,
+//! and in `c_abi`, which calls it through C.
 
 mod ask;
 mod build_mesh;

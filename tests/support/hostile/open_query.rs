@@ -5,7 +5,7 @@ use arbitrary::Unstructured;
 use super::ask::ends;
 use super::damage::Damaged;
 
-/// Runs the target, see the head of this file.
+/// Runs the target; see the head of this file.
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let Ok(damaged) = Damaged::new(&mut u) else { return };

@@ -107,8 +107,8 @@ impl Shot {
     }
 }
 
-/// Returns a full tile of rays from beside the grid's box through its middle. Neighbours differ by a ten-
-/// thousandth of the way, so they are in the same cells of all but the finest grids.
+/// Returns a full tile of rays from beside the grid's box through its middle. Neighbours differ by a
+/// ten-thousandth of the way, so they are in the same cells of all but the finest grids.
 pub(super) fn close(grid: &Grid<'_>) -> [Ray; 128] {
     let (from, to) = (around(grid, [-96, -80, -48]), around(grid, [0; 3]));
     std::array::from_fn(|ray| {

@@ -1,4 +1,5 @@
-//! Any bytes as a blob: a grid that `validate` accepts answers as brute force does, and is one that a build makes.
+//! Any bytes as a blob: a grid that `validate` accepts answers as brute force does, and is one that a build makes,
+//! except for the division of lists (variable) and the shape of trees (bvh).
 
 use arbitrary::Unstructured;
 use hgrid_core::Method;
@@ -8,7 +9,7 @@ use super::damage::Damaged;
 use crate::copy::{CHECKSUM, Copy, MESH};
 use crate::owned::{Owned, prove};
 
-/// Runs the target, see the head of this file.
+/// Runs the target; see the head of this file.
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let Ok(damaged) = Damaged::new(&mut u) else { return };

@@ -112,7 +112,7 @@ const SEES_ALL: u32 = 0xffff;
 /// Returns the closest hit.
 #[inline]
 fn closest(bvh: &impl Intersector, ray: &Ray) -> Intersection {
-    /// The smallest component whose reciprocal the library computes.
+    /// The library takes a component no larger than this for zero.
     const LEAST: f32 = 1e-12;
     let reciprocal = |c: f32| {
         if c.abs() > LEAST {
