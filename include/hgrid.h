@@ -1375,7 +1375,7 @@ typedef struct hgrid_scene_surface {
      */
     float normal[3];
     /**
-     * 1 if the ray met the front, which the triangle has in its mesh: mirroring does not turn it; 0 if the back.
+     * 1 if the ray met the triangle's front, else 0; an instance that mirrors does not turn it.
      */
     uint32_t is_front;
 } hgrid_scene_surface;
@@ -2981,12 +2981,15 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
  *
  * It is to a scene what `hgrid_surface_at` is to a grid. `hit` is what a query has found for `ray`, of which the direction
  * tells the side. Returns true and writes `surface`; or returns false and writes nothing: the hit names no triangle (but a
- * shape, or nothing), the ray has no direction, `double` is too coarse at this distance from the scene's origin to tell
- * the sides of the triangle apart, the view is one of zeros, or a pointer is NULL, which none may be.
+ * shape, or nothing), the ray has no direction, the view is one of zeros, a pointer is NULL, which is allowed for none, or
+ * coordinates are too coarse to tell the sides of the triangle apart: `double` at this distance from the scene's origin, or
+ * `float` in the object.
  *
  * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the other
- * side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane may, as normal and
- * direction are rounded. Pass the start as it is: rounded to `float` it may lie below the plane.
+ * side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane, as the object sees
+ * them, may: normal and direction are rounded. A start is lifted as by `hgrid_surface_at`, or by up to four times the
+ * rounding of its way into the object, if that is more. Pass the start as it is: rounded to `float` it may lie below the
+ * plane. `hgrid_surface_at` tells about triangles without area; the same holds here.
  *
  * ```c
  * static bool sees_light_in_scene(const hgrid_scene *scene, const hgrid_ray_f64 *ray, const hgrid_scene_hit *hit,

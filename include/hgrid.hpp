@@ -801,15 +801,18 @@ private:
     {
         using number = typename detail::scalar<V>::type;
         constexpr bool is_flat = std::is_same<V, float>::value && !IsField;
-        constexpr bool is_double = std::is_same<number, double>::value || detail::begins_with<V, double>::value ||
-                                   detail::begins_with_xyz<V, double>::value;
-        static_assert(!is_double, "coordinates must be float, not double");
+        constexpr bool has_floats = std::is_same<number, float>::value || detail::begins_with<V, float>::value ||
+                                    detail::begins_with_xyz<V, float>::value;
+        // Some classes with floats can be made from doubles, too.
+        constexpr bool is_double =
+            std::is_same<number, double>::value ||
+            (!has_floats && (detail::begins_with<V, double>::value || detail::begins_with_xyz<V, double>::value));
+        static_assert(!is_double, "coordinates must be float, not double: or name a field of floats");
         static_assert(is_double || std::is_same<number, float>::value || std::is_void<number>::value,
                       "the coordinates of a vertex are floats");
-        static_assert(std::is_same<V, float>::value || sizeof(V) >= 3 * sizeof(float),
+        static_assert(is_double || std::is_same<V, float>::value || sizeof(V) >= 3 * sizeof(float),
                       "a vertex has three coordinates");
-        static_assert(is_double || std::is_same<number, float>::value ||
-                          detail::begins_with<V, float>::value || detail::begins_with_xyz<V, float>::value,
+        static_assert(is_double || has_floats,
                       "where does the vertex have its three floats? name the field: "
                       "hgrid::field(vertices, &vertex::position)");
         raw_.positions = vertices.first();

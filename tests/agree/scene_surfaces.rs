@@ -38,7 +38,7 @@ fn rays_from(random: &mut Random, surface: &SceneSurface) -> [RayF64; 2] {
 #[test]
 fn the_triangle_that_a_ray_leaves_is_not_hit() {
     with_grids(|objects, _| {
-        let mut count = 0;
+        let (mut count, mut back_count) = (0, 0);
         for far in [0.0, 1e3, 1e9, 1e12] {
             let inner = scattered(3, 3, 2.0, 61);
             let inner_built = Built::scene(&inner, objects, &Config::default()).unwrap();
@@ -79,13 +79,13 @@ fn the_triangle_that_a_ray_leaves_is_not_hit() {
                     assert!(!meets(&scene, &leaves, &hit), "{leaves:?} {hit:?} {surface:?}");
                     count += 1;
                 }
-                // The test can fail: a ray back to the triangle hits it.
+                // The test can fail: most rays back to the triangle hit it.
                 let [x, y, z] = surface.normal;
                 let back = RayF64::new(surface.above, [-x, -y, -z]);
-                count += usize::from(meets(&scene, &back, &hit));
+                back_count += usize::from(meets(&scene, &back, &hit));
             }
         }
-        assert!(count > 3000, "{count}");
+        assert!(count > 3000 && back_count > count / 3, "{back_count} back of {count}");
     });
 }
 

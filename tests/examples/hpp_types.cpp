@@ -100,6 +100,14 @@ public:
     explicit constructed(const hgrid::point &p) noexcept : x(p[0]), y(p[1]), z(p[2]) {}
     float x, y, z;
 };
+/* Any three numbers make one, doubles, too. */
+class generous {
+public:
+    generous() noexcept : x(0), y(0), z(0) {}
+    template <class X, class Y, class Z>
+    generous(X x_, Y y_, Z z_) noexcept : x(float(x_)), y(float(y_)), z(float(z_)) {}
+    float x, y, z;
+};
 
 /* Checks that a mesh gives the same hits as the scene's own mesh. */
 static void check_mesh(const scene &s, const hgrid::mesh &mesh)
@@ -147,14 +155,17 @@ static void check_meshes()
     std::vector<named> by_name;
     std::vector<nested> in_structs;
     std::vector<constructed> of_classes;
+    std::vector<generous> of_any;
     for (const hgrid::point &p : arrays) {
         by_name.push_back({p[0], p[1], p[2], 0});
         in_structs.push_back({by_name.back(), nullptr});
         of_classes.emplace_back(p);
+        of_any.emplace_back(p[0], p[1], p[2]);
     }
     check_mesh(s, {by_name, triples});
     check_mesh(s, {in_structs, triples});
     check_mesh(s, {of_classes, triples});
+    check_mesh(s, {of_any, triples});
 #if __cplusplus >= 202002L
     check_mesh(s, {std::span(arrays), std::span(flat16)});
 #endif

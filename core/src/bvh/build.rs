@@ -11,7 +11,7 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | spare |
 //! ```
 //!
-//! `spare` is the second buffer of the sort, and of binning crowded bins again. `sizes` computes the exact size by a
+//! `spare` is the second buffer of the sort, and of binning crowded bins again, after it has held their centres. `sizes` computes the exact size by a
 //! build without an index: it also puts the keys and the top tree into `spare`, and only counts ids and nodes. A build
 //! puts the keys there, too, if they do not fit into the index: an index of exact size has no room for keys of triangles
 //! that are skipped.

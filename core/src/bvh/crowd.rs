@@ -4,7 +4,7 @@
 //! centers     read each triangle once: note twice its centre, find the box around all centres
 //! new keys    for eight triangles: keys of their centres in that box; count the bin of each
 //!
-//! the notes   | entry: z, id | and in spare, for every eight entries | 8 x | 8 y |
+//! the notes   twice each centre: | entry: z, id | and in spare, for every eight entries | 8 x | 8 y |
 //! ```
 
 use fearless_simd::prelude::*;

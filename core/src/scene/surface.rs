@@ -31,19 +31,20 @@ pub struct SceneSurface {
     pub below: [f64; 3],
     /// The triangle's normal in the scene, of length 1, on the side that the ray came from.
     pub normal: [f32; 3],
-    /// 1 if the ray met the front, which the triangle has in its mesh, else 0.
+    /// 1 if the ray met the triangle's front, else 0; an instance that mirrors does not turn it.
     pub is_front: u32,
 }
 
 impl Scene<'_> {
     /// The point where a ray met a triangle of this scene, with starts for the rays that leave it. `None` if the hit names no
-    /// triangle, if the ray has no direction, or if f64 is too coarse at this distance from the scene's origin to tell the
-    /// sides of the triangle apart.
+    /// triangle, if the ray has no direction, or if coordinates are too coarse to tell the sides of the triangle apart: f64 at
+    /// this distance from the scene's origin, or f32 in the object.
     ///
     /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the other
-    /// side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the plane may, as
-    /// normal and direction are rounded. What [`TriangleMesh::surface`](crate::TriangleMesh::surface) says about triangles
-    /// without area holds here, too.
+    /// side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the plane, as the
+    /// object sees them, may: normal and direction are rounded. A start is lifted as in a mesh, or by up to four times the
+    /// rounding of its way into the object, if that is more. Rounded to f32, a start may lie below the plane.
+    /// [`TriangleMesh::surface`](crate::TriangleMesh::surface) tells about triangles without area; the same holds here.
     ///
     /// ```
     /// # use hgrid_core::*;

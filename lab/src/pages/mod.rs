@@ -8,7 +8,7 @@
 //!
 //! So every number in a page comes from a file, and a new measurement is a new file and one command. Paths
 //! are relative to the root of a checkout. Charts are written beside the page. A result that was measured with
-//! changes that no commit has is refused: nobody could measure it again.
+//! uncommitted changes is refused: it cannot be measured again.
 
 mod compared;
 mod paper;
