@@ -2979,17 +2979,18 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
 /**
  * Tells where a ray met a triangle of a scene, which way the triangle faces there, and where rays start that leave it.
  *
- * It is to a scene what `hgrid_surface_at` is to a grid. `hit` is what a query has found for `ray`, of which the direction
- * tells the side. Returns true and writes `surface`; or returns false and writes nothing: the hit names no triangle (but a
- * shape, or nothing), the ray has no direction, the view is one of zeros, a pointer is NULL, which is allowed for none, or
- * coordinates are too coarse to tell the sides of the triangle apart: `double` at this distance from the scene's origin, or
- * `float` in the object.
+ * It is to a scene what `hgrid_surface_at` is to a grid. `hit` is what a query has found for `ray`; the direction of
+ * `ray` tells the side. Returns true and writes `surface`; or returns false and writes nothing, in these cases:
+ * - the hit names no triangle, but a shape or nothing;
+ * - the ray has no direction, the view is one of zeros, or a pointer is NULL;
+ * - coordinates are too coarse to tell the sides of the triangle apart: `double` at this distance from the scene's
+ *   origin, or `float` in the object.
  *
  * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the other
- * side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane, as the object sees
- * them, may: normal and direction are rounded. A start is lifted as by `hgrid_surface_at`, or by up to four times the
- * rounding of its way into the object, if that is more. Pass the start as it is: rounded to `float` it may lie below the
- * plane. `hgrid_surface_at` tells about triangles without area; the same holds here.
+ * side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane, as the object
+ * sees them, may hit it, because normal and direction are rounded. A start is lifted as by `hgrid_surface_at`, or by up
+ * to four times the rounding error of its transformation, if that is more. Do not round a start to `float`: it may lie
+ * below the plane then. What `hgrid_surface_at` says about triangles without area holds here, too.
  *
  * ```c
  * static bool sees_light_in_scene(const hgrid_scene *scene, const hgrid_ray_f64 *ray, const hgrid_scene_hit *hit,
@@ -3019,9 +3020,9 @@ bool hgrid_scene_surface_at(const struct hgrid_scene *scene,
 /**
  * Takes a normal from the space of the object that a hit names to the scene's, of length 1.
  *
- * `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit, cross(b - a,
- * c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing: the hit names nothing in
- * the scene, or the normal is null, or it is NULL and the hit names no triangle.
+ * `object_normal` is three floats of any length, or NULL: then it is the normal of the triangle that was hit,
+ * cross(b - a, c - a). Returns true and writes three floats to `normal`; or returns false and writes nothing: the hit
+ * names nothing in the scene, or the normal is null, or it is NULL and the hit names no triangle.
  *
  * Threads: any number of calls and queries on the same scene at once.
  *

@@ -1946,7 +1946,7 @@ public:
         return occluded_n(rays, answers, know, &with.c());
     }
     /// The point where a ray met a triangle, its normal there, and starts for rays that leave it; `at` is
-    /// what a query has found for the ray.
+    /// what a query has found for the ray. Nothing where `hgrid_scene_surface_at` returns false.
     optional<scene_surface> surface_at(const ray_f64 &along, const scene_hit &at) const noexcept
     {
         scene_surface found;

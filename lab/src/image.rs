@@ -14,7 +14,7 @@ use crate::shade::Rgb;
 /// Refuses a path where no PNG can be written, or whose name promises another format.
 ///
 /// # Errors
-/// Those of [`check_writable`], and one if the name is that of another format.
+/// The errors of [`check_writable`], and one if the name has the ending of another format.
 pub fn check_picture(path: &Path) -> Result<()> {
     let is_png = path.extension().is_none_or(|ending| ending.eq_ignore_ascii_case("png"));
     ensure!(

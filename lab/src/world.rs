@@ -3,17 +3,15 @@
 //! ```text
 //! World      closest hits       any hit               surface
 //! mesh       a tile together    all rays together     the mesh's
-//! instances  a tile together    all rays together     that of the triangle, placed by its instance, with starts
-//!                                                     as far off as rays at instances need
+//! instances  a tile together    all rays together     the scene's, with starts as far off as rays in f32 need
 //! ```
 
 use hgrid_core::{
     Batch, Coherence, Grid, Hit, INVALID_ID, Instance, MAX_NESTING, Object, Ray, RayF64, Scene,
-    SceneHit, SceneOptions, Strided, StridedMut, Surface, TriangleMesh,
+    SceneHit, SceneOptions, SceneSurface, Strided, StridedMut, Surface,
 };
 
 use crate::scene::Bounds;
-use crate::scene::model::{determinant, moved, transform_of};
 use crate::tiles::{TILE_RAYS, intersect};
 
 /// A batch of f32 rays for a scene, with places for their answers and a conversion of each.
@@ -50,8 +48,8 @@ pub enum World<'a> {
 /// twice the error that docs/renderers.md gives.
 const LIFT: f32 = 32.0 * f32::EPSILON; // 2^-18
 
-/// The further lift for the rounding of transformed corners, in parts of their coordinates in the scene.
-const CORNERS: f32 = 2.0 * f32::EPSILON; // 2^-22
+/// The further lift for rounding a start to f32, in parts of its coordinates in the scene.
+const ROUNDING: f32 = 2.0 * f32::EPSILON; // 2^-22
 
 impl World<'_> {
     /// Finds the closest hits of rays, as many as there are rays.
@@ -140,25 +138,20 @@ pub(crate) const fn on_mesh(SceneHit { t, u, v, primitive, .. }: SceneHit) -> Hi
     Hit { t, u, v, primitive }
 }
 
+/// Returns the surface of a scene for rays in f32. Core's starts are f64; rounded, they need a further lift.
+#[expect(clippy::cast_possible_truncation, reason = "to the precision of the rays")]
 fn surface(scene: &Scene<'_>, ray: &Ray, hit: &SceneHit) -> Option<Surface> {
     let Object::Grid(grid) = scene.object_of(hit)? else { return None };
-    let instance = scene.instance_of(hit)?;
-    let transform = transform_of(&instance);
-    let [a, b, c] = grid.mesh().triangle(hit.primitive)?.map(|corner| moved(&transform, corner));
-    let SceneHit { t, u, v, .. } = *hit;
-    // The front stays the front, as when instances become triangles.
-    let (corners, [u, v]) =
-        if determinant(&transform) < 0.0 { ([a, c, b], [v, u]) } else { ([a, b, c], [u, v]) };
-    let mesh = TriangleMesh::new(&corners, &[[0, 1, 2]]).ok()?;
-    let surface = mesh.surface(ray, &Hit { t, u, v, primitive: 0 })?;
-
-    let far = surface.position.iter().fold(0.0, |far: f32, c| far.max(c.abs()));
-    let lift = LIFT * size(&instance, grid.bounds()) + CORNERS * far;
-    let lifted = |start: [f32; 3], by: f32| {
-        core::array::from_fn(|axis| start[axis] + by * surface.normal[axis])
+    let SceneSurface { position, above, below, normal, is_front } =
+        scene.surface(&ray.into(), hit)?;
+    let position = position.map(|c| c as f32);
+    let far = position.iter().fold(0.0, |far: f32, c| far.max(c.abs()));
+    let lift = LIFT * size(&scene.instance_of(hit)?, grid.bounds()) + ROUNDING * far;
+    let lifted = |start: [f64; 3], by: f32| {
+        core::array::from_fn(|axis| start[axis] as f32 + by * normal[axis])
     };
-    let (above, below) = (lifted(surface.above, lift), lifted(surface.below, -lift));
-    Some(Surface { above, below, ..surface })
+    let (above, below) = (lifted(above, lift), lifted(below, -lift));
+    Some(Surface { position, normal, above, below, is_front })
 }
 
 /// Returns the extent of an object plus its largest coordinate, scaled by its instance.
@@ -170,7 +163,7 @@ fn size(instance: &Instance, (min, max): Bounds) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use hgrid_core::{Block, Config, Sizes};
+    use hgrid_core::{Block, Config, Sizes, TriangleMesh};
 
     use super::*;
     use crate::camera::{Camera, Up, View};

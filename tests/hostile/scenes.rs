@@ -26,6 +26,16 @@ fn answers(scene: &Scene<'_>, rays: &[RayF64]) -> Vec<(Option<SceneHit>, bool)> 
     rays.iter().map(|ray| (scene.intersect(ray), scene.occluded(ray))).collect()
 }
 
+/// Asks for the surface of a ray's hit, and of a hit that no query found.
+fn ask_for_surfaces(scene: &Scene<'_>, ray: &RayF64, random: &mut Random) {
+    let number = |random: &mut Random| [0, random.below(40) as u32, u32::MAX][random.below(3)];
+    let path = [0; 4].map(|_| number(random));
+    let weight = |random: &mut Random| [0.5, -1e30, f32::INFINITY, f32::NAN][random.below(4)];
+    let (u, v, primitive) = (weight(random), weight(random), number(random));
+    let _ = scene.surface(ray, &SceneHit { t: 1.0, u, v, primitive, path });
+    let _ = scene.intersect(ray).map(|hit| scene.surface(ray, &hit));
+}
+
 #[test]
 #[cfg_attr(miri, ignore = "hours")]
 fn damaged_scenes_end_and_accepted_ones_answer_right() {
@@ -60,6 +70,7 @@ fn damaged_scenes_end_and_accepted_ones_answer_right() {
         let Ok(mutant) = Scene::open(copy.bytes(), &objects) else { continue };
         opened += 1;
         let found = answers(&mutant, &rays);
+        rays.iter().for_each(|ray| ask_for_surfaces(&mutant, ray, &mut random));
         if mutant.validate(&mut vec![0; mutant.validate_bytes()]).is_err() {
             continue;
         }

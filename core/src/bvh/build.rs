@@ -11,10 +11,10 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | spare |
 //! ```
 //!
-//! `spare` is the second buffer of the sort, and of binning crowded bins again, after it has held their centres. `sizes` computes the exact size by a
-//! build without an index: it also puts the keys and the top tree into `spare`, and only counts ids and nodes. A build
-//! puts the keys there, too, if they do not fit into the index: an index of exact size has no room for keys of triangles
-//! that are skipped.
+//! `spare` is the second buffer of the sort, and of binning crowded bins again, after it has held their centres. `sizes`
+//! computes the exact size by a build without an index: it also puts the keys and the top tree into `spare`, and only
+//! counts ids and nodes. A build puts the keys there, too, if they do not fit into the index: an index of exact size has
+//! no room for keys of triangles that are skipped.
 //!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
 //! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up

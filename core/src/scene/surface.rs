@@ -1,8 +1,9 @@
 //! The point where a ray met a triangle of an instance, and the starts of the next rays.
 //!
-//! As in a single mesh ([`surface`](crate::surface)), a start lies above the triangle's plane, in the space of its object.
-//! But the query of the next ray moves the start there from the scene and rounds it to f32, which may take it below the
-//! plane. So each start makes this way beforehand, and is lifted twice as far until it stays above:
+//! As in a single mesh ([`surface`](crate::surface)), a start lies above the triangle's plane, in the space of its
+//! object. But the query of the next ray moves the start from the scene into this space and rounds it to f32, which may
+//! put it below the plane. So `surface` does the same to each start beforehand, and doubles its lift until it stays
+//! above:
 //!
 //! ```text
 //! lift = that of a start in the mesh
@@ -36,15 +37,17 @@ pub struct SceneSurface {
 }
 
 impl Scene<'_> {
-    /// The point where a ray met a triangle of this scene, with starts for the rays that leave it. `None` if the hit names no
-    /// triangle, if the ray has no direction, or if coordinates are too coarse to tell the sides of the triangle apart: f64 at
-    /// this distance from the scene's origin, or f32 in the object.
+    /// The point where a ray met a triangle of this scene, with starts for the rays that leave it.
     ///
-    /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the other
-    /// side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the plane, as the
-    /// object sees them, may: normal and direction are rounded. A start is lifted as in a mesh, or by up to four times the
-    /// rounding of its way into the object, if that is more. Rounded to f32, a start may lie below the plane.
-    /// [`TriangleMesh::surface`](crate::TriangleMesh::surface) tells about triangles without area; the same holds here.
+    /// `None` if the hit names no triangle, if the ray has no direction, or if coordinates are too coarse to tell the
+    /// sides of the triangle apart: f64 at this distance from the scene's origin, or f32 in the object.
+    ///
+    /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the
+    /// other side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the plane,
+    /// as the object sees them, may hit it, because normal and direction are rounded. A start is lifted as in a mesh, or
+    /// by up to four times the rounding error of its transformation, if that is more. Do not round a start to f32: it may
+    /// lie below the plane then. What [`TriangleMesh::surface`](crate::TriangleMesh::surface) says about triangles
+    /// without area holds here, too.
     ///
     /// ```
     /// # use hgrid_core::*;
@@ -108,7 +111,7 @@ impl Place<'_> {
     /// The start on a side of a facet, 1 above and -1 below.
     fn start(&self, facet: &Facet, side: f64, extent: f64) -> Option<DVec3> {
         let mut lift = facet.lift;
-        // An object that is smaller than a step of f64 in the scene has no sides.
+        // A lift beyond the object would be none: give up.
         while lift <= extent {
             let wanted = facet.point + facet.normal * (side * lift);
             let start = self.outward(wanted)?;

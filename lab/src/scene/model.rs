@@ -7,8 +7,6 @@
 //!
 //! A file without transforms is one mesh with one instance, whose transform is the identity.
 
-use hgrid_core::Instance;
-
 use super::Bounds;
 use crate::vector::{Vector, dot, round};
 
@@ -113,15 +111,6 @@ pub(crate) fn moved(transform: &Transform, point: [f32; 3]) -> [f32; 3] {
     }))
 }
 
-/// Returns the transform by which an instance places its object.
-pub(crate) fn transform_of(instance: &Instance) -> Transform {
-    let translation = round(instance.translation);
-    [0, 1, 2].map(|axis| {
-        let [x, y, z] = instance.linear[axis];
-        [x, y, z, translation[axis]]
-    })
-}
-
 /// Returns the determinant: the volume of the transformed unit cube, negative for a mirror.
 pub(crate) fn determinant(transform: &Transform) -> f64 {
     let [a, b, c] = transform.map(|[x, y, z, _]| -> Vector { [x, y, z].map(f64::from) });
@@ -190,8 +179,6 @@ mod tests {
         let model = of(&[(0, IDENTITY), (0, beside), (7, beside)]);
         assert_eq!(model.bounds(), Some(([0.0; 3], [6.0, 1.0, 2.0])));
         assert_eq!(Model::default().bounds(), None);
-        let transform = transform_of(&Instance::with_transform(0, beside));
-        assert_eq!(transform, beside);
     }
 
     #[test]
