@@ -126,6 +126,7 @@ fn no_vector_operation_is_a_function() {
 /// The libraries that rustc would tell a C programmer to link. They do not depend on the profile, so a quick
 /// one serves.
 #[test]
+#[ignore = "slow: compiles both flavours again"]
 fn neither_flavour_asks_for_a_library() {
     let target = target_dir().join("link_line");
     for flavour in Flavour::ALL {

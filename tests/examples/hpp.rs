@@ -54,6 +54,7 @@ fn it_does_what_it_says_in_other_dialects() {
 }
 
 #[test]
+#[ignore = "slow: compiles much C++ with sanitizers"]
 fn it_does_what_it_says_under_sanitizers() {
     let dir = TempDir::new().expect("a folder");
     // Without optimisation it compiles in half the time.

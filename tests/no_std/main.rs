@@ -67,22 +67,31 @@ fn only(method: &str) -> [&str; 3] {
     ["--no-default-features", "--features", method]
 }
 
-/// Builds core and the C library for a target, and returns their folder. Each target and choice of methods
-/// has a folder of its own, so that no build waits for another. `arguments` may leave methods out.
+/// Builds core and the C library for a target, and returns their folder. `arguments` may leave methods out; each choice
+/// has a folder of its own, so that none replaces another.
 fn build(target: &str, arguments: &[&str]) -> PathBuf {
-    let dir = target_dir().join("no_std").join(target).join(arguments.last().unwrap_or(&"all"));
+    build_all(target, &[], arguments)
+}
+
+/// Does the same, and builds for other targets at the same time if they are installed. Two tests that call this for each
+/// other's target take less time than two builds.
+fn build_all(target: &str, others: &[&str], arguments: &[&str]) -> PathBuf {
+    let others = others.iter().copied().filter(|other| rustlib(other).join("lib").is_dir());
+    let dir = target_dir().join("no_std").join(arguments.last().unwrap_or(&"all"));
     let mut build = cargo_in(&dir, "build");
-    let library = ["--release", "-p", "hgrid-capi", "--target", target];
-    run(build.args(library).args(arguments));
+    build.args(["--release", "-p", "hgrid-capi", "--target", target]).args(arguments);
+    run(build.args(others.flat_map(|other| ["--target", other])));
     dir.join(target).join("release")
 }
 
 const MICROCONTROLLER: &str = "thumbv7em-none-eabihf";
+const BROWSER: &str = "wasm32-unknown-unknown";
 
 #[test]
 fn a_microcontroller_gets_a_static_library() {
     if is_available(MICROCONTROLLER) {
-        let archive = build(MICROCONTROLLER, &only("one-level")).join("libhgrid.a");
+        let build = build_all(MICROCONTROLLER, &[BROWSER], &only("one-level"));
+        let archive = build.join("libhgrid.a");
         let bytes = fs::read(&archive).expect("the C library");
         assert!(bytes.starts_with(b"!<arch>\n"));
         check_flash("| `one-level` | ", &archive);
@@ -138,9 +147,8 @@ fn a_web_page_gets_all_methods() {
 }
 
 fn check_module(arguments: &[&str]) {
-    let target = "wasm32-unknown-unknown";
-    if is_available(target) {
-        let dir = build(target, arguments);
+    if is_available(BROWSER) {
+        let dir = build_all(BROWSER, &[MICROCONTROLLER], arguments);
         let module = fs::read(dir.join("hgrid.wasm")).expect("the module");
         let sections = sections(&module);
         assert!(sections.contains(&EXPORTS) && !sections.contains(&IMPORTS), "{sections:?}");

@@ -1,8 +1,8 @@
 //! The C library as users get it, and the C compiler that links it.
 //!
-//! The same cargo builds the library, in the release profile, once for each test program. It works in a
-//! folder below the target folder, because a test program holds the lock of the target folder itself. Each
-//! flavour has a folder of its own, so that none replaces another.
+//! The same cargo builds the library, in the release profile. It works in a folder below the target folder,
+//! because a test program holds the lock of the target folder itself. Sets of features share that folder, and with
+//! it the compiled dependencies; each library is copied, so that none replaces another.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -77,50 +77,49 @@ impl Flavour {
     /// Builds the flavour, and returns the folder of `libhgrid.a` and `libhgrid.so`.
     pub fn dir(self) -> &'static Path {
         static DIRS: [OnceLock<PathBuf>; 2] = [const { OnceLock::new() }; 2];
-        DIRS[self as usize].get_or_init(|| {
-            let target = match self {
-                Self::Bare => target_dir(),
-                Self::Malloc => target_dir().join("malloc"),
-            };
-            let mut build = cargo_in(&target, "build");
-            run(build.args(["--release", "-p", "hgrid-capi"]).args(self.features()));
-            target.join("release")
-        })
+        DIRS[self as usize]
+            .get_or_init(|| build(["bare", "malloc"][self as usize], self.features()))
     }
 
     /// Returns the path of the static library.
     #[must_use]
     pub fn static_library(self) -> PathBuf {
-        self.dir().join("libhgrid.a")
+        self.dir().join(STATIC_LIBRARY)
     }
 
     /// Returns the path of the shared library.
     #[must_use]
     pub fn shared_library(self) -> PathBuf {
-        self.dir().join(format!("{}hgrid{}", env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX))
+        self.dir().join(shared_library_name())
     }
 }
 
-/// Builds the static library with some of its methods: the names of features, separated by commas. Lighter
-/// optimisation cuts the compile time to a third, as only its answers matter, not its size; without any LTO,
-/// Rust's core would need a runtime.
-///
-/// # Panics
-/// If it cannot be built or copied.
+const STATIC_LIBRARY: &str = "libhgrid.a";
+
+fn shared_library_name() -> String {
+    format!("{}hgrid{}", env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX)
+}
+
+/// Builds the library with some of its methods: the names of features, separated by commas. Returns the path of
+/// the static library.
 #[must_use]
 pub fn library_with(features: &str) -> PathBuf {
-    // All are built in one folder and share their dependencies, so build one after the other.
-    static FOLDER: Mutex<()> = Mutex::new(());
-    let _turn = FOLDER.lock().expect("no thread panicked with the lock");
-    let target = target_dir().join("methods");
-    let mut build = cargo_in(&target, "rustc");
-    build.args(["--release", "-p", "hgrid-capi", "--no-default-features", "--features", features]);
-    build.args(["--lib", "--crate-type", "staticlib"]);
-    build.env("CARGO_PROFILE_RELEASE_LTO", "thin").env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
-    run(&mut build);
-    let library = target.join(format!("{}.a", features.replace(',', "_")));
-    fs::copy(target.join("release/libhgrid.a"), &library).expect("a copy");
-    library
+    let arguments = ["--no-default-features", "--features", features];
+    build(&features.replace(',', "_"), &arguments).join(STATIC_LIBRARY)
+}
+
+/// Builds both libraries with some features, and copies them into a folder with this name, which it returns.
+fn build(name: &str, features: &[&str]) -> PathBuf {
+    // cargo writes all of them to the same place.
+    static PLACE: Mutex<()> = Mutex::new(());
+    let _turn = PLACE.lock().expect("no thread panicked with the lock");
+    run(cargo("build").args(["--release", "-p", "hgrid-capi"]).args(features));
+    let folder = target_dir().join("libraries").join(name);
+    fs::create_dir_all(&folder).expect("a folder");
+    for library in [STATIC_LIBRARY, &shared_library_name()] {
+        fs::copy(target_dir().join("release").join(library), folder.join(library)).expect("a copy");
+    }
+    folder
 }
 
 /// Returns the folder of the libraries of the usual flavour.
