@@ -176,7 +176,7 @@ pub struct AnimateArgs {
     /// A mesh file or procedural:NAME:TRIANGLES
     #[arg(default_value = DEFAULT_SCENE)]
     pub scene: String,
-    /// How many frames
+    /// Number of frames
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 30,
           value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
@@ -224,7 +224,7 @@ pub struct CompareArgs {
     /// The other structures, between commas [default: all that this program has]
     #[arg(long, value_name = "PEERS", value_delimiter = ',', value_enum)]
     pub peers: Vec<Peer>,
-    /// What is asked of them, between commas [default: all]
+    /// The rays and points to ask for, between commas [default: all]
     #[arg(long, value_name = "WORKLOADS", value_delimiter = ',', value_enum)]
     pub workloads: Vec<Workload>,
     /// Compare scenes of this many instances of the mesh (`bvh` and Embree only); 0 compares the mesh itself

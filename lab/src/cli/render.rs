@@ -28,7 +28,7 @@ pub struct RenderArgs {
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
     pub picture: Picture,
-    /// What the colours mean
+    /// Meaning of the colours
     #[arg(long, value_enum, default_value_t = Shading::Diffuse)]
     pub shading: Shading,
     /// Rays through each pixel, against jagged edges and noise [default: 4; 1 for the four grids of the paper]
