@@ -4,15 +4,22 @@
 //! the slot empty, and a task that was never run is still there at the end. [`Shared`] holds words that all
 //! tasks write, no two of them the same word.
 //!
-//! A processor without atomic operations has one core: there the build runs its tasks itself.
+//! A processor without atomic operations has one core: there work is not cut.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+#[cfg(target_has_atomic = "32")]
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+#[cfg(target_has_atomic = "32")]
+use try_lock::TryLock;
+#[cfg(target_has_atomic = "32")]
+use zerocopy::{FromBytes, IntoBytes};
 
 use crate::control::Control;
 use crate::error::Error;
 use crate::simd::IS_SMALL;
 
 /// The content of a task's slot.
+#[cfg(target_has_atomic = "32")]
 enum State<T, R> {
     /// There is no such task, it is being run, or its result was taken.
     Nothing,
@@ -21,7 +28,8 @@ enum State<T, R> {
 }
 
 /// Tasks that work is cut into, at most. A microcontroller has one core.
-pub(crate) const MOST: usize = if IS_SMALL { 1 } else { Control::MAX_TASKS as usize };
+pub(crate) const MOST: usize =
+    if IS_SMALL || cfg!(not(target_has_atomic = "32")) { 1 } else { Control::MAX_TASKS as usize };
 
 /// The number of tasks that work is cut into. More than `most` would be too small to pay for a thread.
 #[expect(clippy::cast_possible_truncation, reason = "MAX_TASKS at most")]
@@ -36,24 +44,25 @@ pub(crate) fn task_count(parallel: &Control<'_>, most: usize) -> u32 {
 /// If the caller's loop does not run every task once, `take` gets the results that there are, and the error is
 /// [`Error::InvalidParallelFor`]. A single task is not handed to the loop.
 #[inline(always)]
-pub(crate) fn run<T: Portable, R: Portable>(
+pub(crate) fn run<T: Send, R: Send>(
     parallel: &Control<'_>,
     mut tasks: impl ExactSizeIterator<Item = T>,
-    work: impl Fn(T) -> R + Lendable,
+    work: impl Fn(T) -> R + Sync,
     mut take: impl FnMut(R) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    if IS_SMALL || tasks.len() < 2 {
+    if MOST == 1 || tasks.len() < 2 {
         return tasks.next().map_or(Ok(()), |task| take(work(task)));
     }
     run_several(parallel, tasks, work, take)
 }
 
 /// The same for several tasks. Out of line: the slots take stack only where it is called.
+#[cfg(target_has_atomic = "32")]
 #[inline(never)]
-pub(crate) fn run_several<T: Portable, R: Portable>(
+pub(crate) fn run_several<T: Send, R: Send>(
     parallel: &Control<'_>,
     tasks: impl Iterator<Item = T>,
-    work: impl Fn(T) -> R + Lendable,
+    work: impl Fn(T) -> R + Sync,
     mut take: impl FnMut(R) -> Result<(), Error>,
 ) -> Result<(), Error> {
     // A loop: array functions write the code of a slot out for each of them.
@@ -78,7 +87,7 @@ pub(crate) fn run_several<T: Portable, R: Portable>(
             _ => is_broken.store(true, Ordering::Relaxed),
         }
     };
-    run_each(parallel, count, &step);
+    (parallel.run)(count, &step);
     let mut outcome = Ok(());
     for slot in slots.iter().take(count as usize) {
         match slot.replace(State::Nothing) {
@@ -89,123 +98,56 @@ pub(crate) fn run_several<T: Portable, R: Portable>(
     if is_broken.into_inner() { Err(Error::InvalidParallelFor) } else { outcome }
 }
 
+/// Runs the tasks one after the other, on the only core.
+#[cfg(not(target_has_atomic = "32"))]
+pub(crate) fn run_several<T, R>(
+    _: &Control<'_>,
+    tasks: impl Iterator<Item = T>,
+    work: impl Fn(T) -> R,
+    mut take: impl FnMut(R) -> Result<(), Error>,
+) -> Result<(), Error> {
+    for task in tasks {
+        take(work(task))?;
+    }
+    Ok(())
+}
+
+/// A place from which one of several threads takes something.
 #[cfg(target_has_atomic = "32")]
-mod with_atomics {
-    use core::sync::atomic::{AtomicU32, Ordering};
+struct Slot<T>(TryLock<T>);
 
-    use try_lock::TryLock;
-    use zerocopy::{FromBytes, IntoBytes};
-
-    use super::Control;
-
-    /// Implemented by values that tasks take along and bring back.
-    pub(crate) use core::marker::Send as Portable;
-    /// Implemented by values that all tasks look at.
-    pub(crate) use core::marker::Sync as Lendable;
-
-    /// A place from which one of several threads takes something.
-    pub(super) struct Slot<T>(TryLock<T>);
-
-    impl<T> Slot<T> {
-        pub(super) const fn new(value: T) -> Self {
-            Self(TryLock::new(value))
-        }
-
-        /// Swaps the value; `None` if another thread holds the lock, which only a second run of the same task can do.
-        pub(super) fn replace(&self, value: T) -> Option<T> {
-            Some(core::mem::replace(&mut *self.0.try_lock()?, value))
-        }
+#[cfg(target_has_atomic = "32")]
+impl<T> Slot<T> {
+    const fn new(value: T) -> Self {
+        Self(TryLock::new(value))
     }
 
-    pub(super) fn run_each(parallel: &Control<'_>, count: u32, step: &(dyn Fn(u32) + Sync)) {
-        (parallel.run)(count, step);
+    /// Swaps the value; `None` if another thread holds the lock, which only a second run of the same task can do.
+    fn replace(&self, value: T) -> Option<T> {
+        Some(core::mem::replace(&mut *self.0.try_lock()?, value))
+    }
+}
+
+/// Words that several tasks write, no two of them the same.
+#[cfg(target_has_atomic = "32")]
+#[derive(Clone, Copy)]
+pub(crate) struct Shared<'w>(&'w [AtomicU32]);
+
+#[cfg(target_has_atomic = "32")]
+impl<'w> Shared<'w> {
+    pub(crate) fn new(words: &'w mut [u32]) -> Self {
+        let words = <[AtomicU32]>::mut_from_bytes(words.as_mut_bytes());
+        Self(words.map_or(&[], |words| words))
     }
 
-    /// Words that several tasks write, no two of them the same.
-    #[derive(Clone, Copy)]
-    pub(crate) struct Shared<'w>(&'w [AtomicU32]);
-
-    impl<'w> Shared<'w> {
-        pub(crate) fn new(words: &'w mut [u32]) -> Self {
-            let words = <[AtomicU32]>::mut_from_bytes(words.as_mut_bytes());
-            Self(words.map_or(&[], |words| words))
-        }
-
-        /// Writes words that lie there, if they do.
-        #[inline(always)]
-        pub(crate) fn set<const N: usize>(&self, at: usize, words: [u32; N]) {
-            // One comparison; behind where the first lies there would be two.
-            let end = at.checked_add(N);
-            let slots = end.and_then(|end| self.0.get(at..end));
-            for (slot, word) in slots.into_iter().flatten().zip(words) {
-                slot.store(word, Ordering::Relaxed);
-            }
+    /// Writes words that lie there, if they do.
+    #[inline(always)]
+    pub(crate) fn set<const N: usize>(&self, at: usize, words: [u32; N]) {
+        // One comparison; behind where the first lies there would be two.
+        let end = at.checked_add(N);
+        let slots = end.and_then(|end| self.0.get(at..end));
+        for (slot, word) in slots.into_iter().flatten().zip(words) {
+            slot.store(word, Ordering::Relaxed);
         }
     }
 }
-#[cfg(target_has_atomic = "32")]
-pub(crate) use with_atomics::Shared;
-#[cfg(target_has_atomic = "32")]
-use with_atomics::{Lendable, Portable, Slot, run_each};
-
-#[cfg(not(target_has_atomic = "32"))]
-mod without_atomics {
-    use core::cell::{Cell, RefCell};
-
-    use super::Control;
-
-    /// Implemented by values that tasks take along and bring back: on one core anything.
-    pub(crate) trait Portable {}
-
-    impl<T> Portable for T {}
-
-    /// Implemented by values that all tasks look at: on one core anything.
-    pub(crate) trait Lendable {}
-
-    impl<T> Lendable for T {}
-
-    /// A place from which one of several tasks takes something.
-    pub(super) struct Slot<T>(RefCell<T>);
-
-    impl<T> Slot<T> {
-        pub(super) const fn new(value: T) -> Self {
-            Self(RefCell::new(value))
-        }
-
-        /// Swaps the value; `None` if it is borrowed, which only a second run of the same task can do.
-        pub(super) fn replace(&self, value: T) -> Option<T> {
-            Some(core::mem::replace(&mut *self.0.try_borrow_mut().ok()?, value))
-        }
-    }
-
-    pub(super) fn run_each(_: &Control<'_>, count: u32, step: &dyn Fn(u32)) {
-        for index in 0..count {
-            step(index);
-        }
-    }
-
-    /// Words that several tasks write, no two of them the same.
-    #[derive(Clone, Copy)]
-    pub(crate) struct Shared<'w>(&'w [Cell<u32>]);
-
-    impl<'w> Shared<'w> {
-        pub(crate) fn new(words: &'w mut [u32]) -> Self {
-            Self(Cell::from_mut(words).as_slice_of_cells())
-        }
-
-        /// Writes words that lie there, if they do.
-        #[inline(always)]
-        pub(crate) fn set<const N: usize>(&self, at: usize, words: [u32; N]) {
-            // One comparison; behind where the first lies there would be two.
-            let end = at.checked_add(N);
-            let slots = end.and_then(|end| self.0.get(at..end));
-            for (slot, word) in slots.into_iter().flatten().zip(words) {
-                slot.set(word);
-            }
-        }
-    }
-}
-#[cfg(not(target_has_atomic = "32"))]
-pub(crate) use without_atomics::Shared;
-#[cfg(not(target_has_atomic = "32"))]
-use without_atomics::{Lendable, Portable, Slot, run_each};

@@ -9,6 +9,7 @@
     clippy::cast_possible_truncation,
     reason = "numbers of triangles, which fit into 32 bits"
 )]
+#![cfg_attr(not(target_has_atomic = "32"), allow(unused, reason = "there is one task"))]
 
 use super::census::{share, take};
 use super::key::{KEY_BITS, NO_KEY};
@@ -18,6 +19,7 @@ use crate::control::Control;
 use crate::error::Error;
 use crate::invariant::OrBug;
 use crate::simd::IS_SMALL;
+#[cfg(target_has_atomic = "32")]
 use crate::tasks::{Shared, run};
 
 /// Turns the bin counts of all tasks into write positions: within a bin, entries are in the order of the tasks.
@@ -57,23 +59,28 @@ pub(super) fn scatter(
         }
         return Ok(());
     }
-    let entries = Shared::new(entries.as_flattened_mut());
-    let mut counts = counts;
-    let parts = (0..tasks).map(|task| {
-        let heads = take(&mut counts, 1 << bits);
-        let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
-        let first = range.start as u32;
-        (first, keys.get(range).or_bug("a task behind the keys").unwrap_or_default(), heads)
-    });
-    let move_all = |(first, keys, heads): (u32, &[u32], &mut [u32])| {
-        for (id, &key) in (first..).zip(keys) {
-            let Some(head) = heads.get_mut((key >> shift) as usize) else {
-                debug_assert!(key == NO_KEY, "a key behind those of all bins");
-                continue;
-            };
-            entries.set(2 * *head as usize, [key, id]);
-            *head += 1;
-        }
-    };
-    run(control, parts, move_all, |()| Ok(()))
+    #[cfg(not(target_has_atomic = "32"))]
+    return Ok(());
+    #[cfg(target_has_atomic = "32")]
+    {
+        let entries = Shared::new(entries.as_flattened_mut());
+        let mut counts = counts;
+        let parts = (0..tasks).map(|task| {
+            let heads = take(&mut counts, 1 << bits);
+            let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
+            let first = range.start as u32;
+            (first, keys.get(range).or_bug("a task behind the keys").unwrap_or_default(), heads)
+        });
+        let move_all = |(first, keys, heads): (u32, &[u32], &mut [u32])| {
+            for (id, &key) in (first..).zip(keys) {
+                let Some(head) = heads.get_mut((key >> shift) as usize) else {
+                    debug_assert!(key == NO_KEY, "a key behind those of all bins");
+                    continue;
+                };
+                entries.set(2 * *head as usize, [key, id]);
+                *head += 1;
+            }
+        };
+        run(control, parts, move_all, |()| Ok(()))
+    }
 }
