@@ -79,10 +79,11 @@ fn span(macrocell: u32, factor: u32, end: u32) -> Range<u32> {
 pub(super) struct Levels {
     /// Level 1 first; level 0 is the grid itself.
     all: [Level; MAX_LEVELS],
-    count: usize,
+    pub(super) count: usize,
     /// Words of all levels together.
-    words: u64,
-    factor: NonZeroU32,
+    pub(super) words: u64,
+    /// Cells of the level below in a macrocell, on each axis.
+    pub(super) factor: NonZeroU32,
 }
 
 impl Levels {
@@ -109,25 +110,10 @@ impl Levels {
         levels
     }
 
-    /// Words of all levels together.
-    pub(super) const fn words(&self) -> u64 {
-        self.words
-    }
-
-    /// Number of levels, the grid not counted.
-    pub(super) const fn count(&self) -> usize {
-        self.count
-    }
-
     /// Cells of the grid in a macrocell of a level, on each axis.
     #[inline(always)]
     pub(super) fn size(&self, level: usize) -> u32 {
         (0..level).fold(1, |size: u32, _| size.saturating_mul(self.factor.get()))
-    }
-
-    /// Returns the number of cells of the level below that a macrocell has on each axis.
-    pub(super) const fn factor(&self) -> NonZeroU32 {
-        self.factor
     }
 
     /// A level, 1 the finest.
@@ -243,14 +229,14 @@ mod tests {
         for resolution in [[1, 1, 1], [4, 4, 4], [5, 4, 4], [303, 213, 135], [4096, 4096, 4096]] {
             for factor in [2, 3, 6, 100] {
                 let levels = Levels::new(resolution, factor);
-                assert!(levels.count() >= 1);
-                let is_complete = levels.level(levels.count()).cells() <= FEW_CELLS;
+                assert!(levels.count >= 1);
+                let is_complete = levels.level(levels.count).cells() <= FEW_CELLS;
                 assert!(
                     is_complete
-                        || levels.count() == MAX_LEVELS && factor <= 3
+                        || levels.count == MAX_LEVELS && factor <= 3
                         || resolution == [4096; 3]
                 );
-                let below = (1..levels.count()).map(|number| levels.level(number).cells());
+                let below = (1..levels.count).map(|number| levels.level(number).cells());
                 assert!(below.into_iter().all(|cells| cells > FEW_CELLS));
             }
         }
@@ -280,9 +266,9 @@ mod tests {
             let (domain_bits, full) = full_cells(resolution);
             for factor in [2, 3, 6, 64, 65, 5000] {
                 let levels = Levels::new(resolution, factor);
-                let mut words = vec![u64::MAX; usize::try_from(levels.words()).unwrap()];
+                let mut words = vec![u64::MAX; usize::try_from(levels.words).unwrap()];
                 levels.fill(resolution, &domain_bits, &mut words);
-                for number in 1..=levels.count() {
+                for number in 1..=levels.count {
                     let size = factor.pow(u32::try_from(number).unwrap());
                     let level = levels.level(number);
                     let mut expected = vec![false; usize::try_from(level.cells()).unwrap()];
@@ -298,7 +284,7 @@ mod tests {
                 assert_eq!(levels.first_wrong_word(resolution, &domain_bits, &words), None);
             }
         }
-        assert!(Levels::new([131, 37, 50], 2).count() > 1);
+        assert!(Levels::new([131, 37, 50], 2).count > 1);
     }
 
     #[test]
@@ -307,7 +293,7 @@ mod tests {
         let resolution = [131, 37, 50];
         let (domain_bits, _) = full_cells(resolution);
         let levels = Levels::new(resolution, 3);
-        let mut words = vec![0; usize::try_from(levels.words()).unwrap()];
+        let mut words = vec![0; usize::try_from(levels.words).unwrap()];
         levels.fill(resolution, &domain_bits, &mut words);
         for word in 0..words.len() {
             for bit in 0..64 {

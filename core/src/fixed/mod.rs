@@ -37,7 +37,7 @@ struct Macrocells {
 
 impl Overlay for Macrocells {
     fn words(&self, resolution: [u32; 3]) -> u64 {
-        Levels::new(resolution, self.factor).words()
+        Levels::new(resolution, self.factor).words
     }
 
     fn fill(&self, resolution: [u32; 3], domain_bits: &[u64], words: &mut [u64]) {
@@ -59,7 +59,7 @@ pub(crate) const fn bound(triangles: u32, density: f32, factor: u32) -> (u64, u6
     // A box with the most cells on every axis has the most macrocells on every level.
     let longest = one_level::longest(triangles, density) as u32 + 1;
     let levels = Levels::new([longest; 3], factor);
-    one_level::bound_under(triangles, density, levels.words())
+    one_level::bound_under(triangles, density, levels.words)
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to plan in.
@@ -127,9 +127,9 @@ impl<'a> Fixed<'a> {
         tally: &mut T,
         mut leaf: impl FnMut(&[u32], &mut T) -> f32,
     ) {
-        let words = self.cells.overlay();
+        let words = self.cells.sections.overlay;
         let mut limit = line.end;
-        let mut level = self.levels.count();
+        let mut level = self.levels.count;
         let top = self.levels.level(level);
         let mut size = self.levels.size(level);
         let mut walk = line.walk(0.0, as_f32(size), [0; 3], top.resolution.map(|r| r - 1), NEVER);
@@ -147,8 +147,8 @@ impl<'a> Fixed<'a> {
                     *slot = walk;
                 }
                 level -= 1;
-                size /= self.levels.factor();
-                let factor = self.levels.factor().get();
+                size /= self.levels.factor;
+                let factor = self.levels.factor.get();
                 let min = walk.cell().map(|cell| cell * factor);
                 let last = self.last(level);
                 let max = core::array::from_fn(|axis| (min[axis] + factor - 1).min(last[axis]));
@@ -161,12 +161,12 @@ impl<'a> Fixed<'a> {
                     Step::Inside => break,
                     Step::Ended => return,
                     Step::Outside => match above.get(level) {
-                        Some(parent) if level < self.levels.count() => walk = *parent,
+                        Some(parent) if level < self.levels.count => walk = *parent,
                         _ => return,
                     },
                 }
                 level += 1;
-                size *= self.levels.factor().get();
+                size *= self.levels.factor.get();
             }
         }
     }

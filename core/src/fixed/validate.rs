@@ -17,8 +17,12 @@ impl Fixed<'_> {
         mesh: &TriangleMesh<'_>,
     ) -> Result<(), Error> {
         self.cells.validate(header, lattice, blob, mesh)?;
-        let words = self.cells.overlay();
-        match self.levels.first_wrong_word(lattice.resolution, self.cells.domain_bits(), words) {
+        let words = self.cells.sections.overlay;
+        match self.levels.first_wrong_word(
+            lattice.resolution,
+            self.cells.sections.domain_bits,
+            words,
+        ) {
             Some(word) => {
                 let start = words.as_ptr().addr() - blob.as_ptr().addr();
                 Err(corrupt(start + word * size_of::<u64>()))

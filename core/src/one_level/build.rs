@@ -54,15 +54,6 @@ impl Overlay for () {
     }
 }
 
-/// The rows of cells, once they are marked and displaced.
-#[derive(Debug)]
-pub(crate) struct Rows<'s> {
-    pub(crate) offsets: &'s [i32],
-    pub(crate) domain_bits: &'s [u64],
-    /// The scratch that the plan left over.
-    pub(crate) rest: &'s mut [u8],
-}
-
 /// All that is known of a grid before its index is written.
 #[derive(Debug)]
 pub(crate) struct Plan<'s> {
@@ -71,7 +62,8 @@ pub(crate) struct Plan<'s> {
     pub(crate) survey: Survey,
     pub(crate) lattice: Lattice,
     pub(crate) density: f32,
-    pub(crate) rows: Option<Rows<'s>>,
+    /// The scratch, once rows are marked and displaced in it.
+    pub(crate) rows: Option<Scratch<'s>>,
 }
 
 impl<'s> Plan<'s> {
@@ -109,16 +101,12 @@ impl<'s> Plan<'s> {
         let overlay_words = overlay.words(lattice.resolution);
         let mut layout = Layout::new(lattice.resolution, 0, reference_count, overlay_words);
         layout.hash_count = u32::try_from(layout.cells).unwrap_or(u32::MAX);
-        let rows = match layout.scratch(scratch) {
-            Some(Scratch { row_offsets, domain_bits, occupied, rest }) => {
-                let width = lattice.resolution[0] as usize;
-                let slots = displace(domain_bits, width, row_offsets, occupied)
-                    .ok_or(Error::InvalidConfig(ConfigField::Density))?;
-                layout.hash_count = slots;
-                Some(Rows { offsets: row_offsets, domain_bits, rest })
-            }
-            None => None,
-        };
+        let mut rows = layout.scratch(scratch);
+        if let Some(Scratch { row_offsets, domain_bits, occupied, .. }) = &mut rows {
+            let width = lattice.resolution[0] as usize;
+            layout.hash_count = displace(domain_bits, width, row_offsets, occupied)
+                .ok_or(Error::InvalidConfig(ConfigField::Density))?;
+        }
         Ok(Self { layout, survey, lattice, density, rows })
     }
 
@@ -166,7 +154,7 @@ pub(crate) fn build_under<'a>(
 
     // Clear the header first: if the build is cancelled, the region must not open as a grid.
     sections.header.fill(0);
-    copy(rows.offsets, sections.row_offsets);
+    copy(rows.row_offsets, sections.row_offsets);
     copy(rows.domain_bits, sections.domain_bits);
     let spread = MeshSpread::new(mesh, &plan.lattice);
     fill(&spread, sections.row_offsets, sections.hash, sections.references, watch)?;

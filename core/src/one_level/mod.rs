@@ -34,10 +34,10 @@ use crate::dda::{Line, NEVER, Step};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 use crate::visit::Visitor;
-pub(crate) use build::{Overlay, Plan, Rows, build_under};
+pub(crate) use build::{Overlay, Plan, build_under};
 pub(crate) use displacement::displace;
 use layout::Sections;
-pub(crate) use layout::{Layout, longest};
+pub(crate) use layout::{Layout, Scratch, longest};
 pub(crate) use placed::PlacedBatch;
 pub(crate) use spread::{Spread, fill, mark};
 pub(crate) use triangles::MeshSpread;
@@ -48,7 +48,7 @@ pub(crate) use validate::{check_header, slots_are_sound};
 pub(crate) struct OneLevel<'a> {
     /// The last cell on each axis.
     last: [u32; 3],
-    sections: Sections<'a>,
+    pub(crate) sections: Sections<'a>,
 }
 
 /// The slot of a cell in the hash table.
@@ -140,32 +140,7 @@ impl<'a> OneLevel<'a> {
 
     /// Words of all lists.
     pub(crate) const fn list_words(&self) -> usize {
-        self.lists().len()
-    }
-
-    /// All lists, one behind the other.
-    pub(crate) const fn lists(&self) -> &'a [u32] {
-        self.sections.references
-    }
-
-    /// Returns the start of each row in the hash table.
-    pub(crate) const fn row_offsets(&self) -> &'a [i32] {
-        self.sections.row_offsets
-    }
-
-    /// For each slot where its list starts, and where the last one ends.
-    pub(crate) const fn hash(&self) -> &'a [u32] {
-        self.sections.hash
-    }
-
-    /// One bit a cell, row after row: whether it has primitives.
-    pub(crate) const fn domain_bits(&self) -> &'a [u64] {
-        self.sections.domain_bits
-    }
-
-    /// Returns the words that a structure above this one keeps behind it.
-    pub(crate) const fn overlay(&self) -> &'a [u64] {
-        self.sections.overlay
+        self.sections.references.len()
     }
 
     /// The primitive ids in a cell, ascending; `None` if it is empty.

@@ -26,7 +26,7 @@ use crate::invariant::OrBug;
 use crate::lists::pairs;
 use crate::mesh::TriangleMesh;
 use crate::one_level::{
-    Layout, MeshSpread, PlacedBatch, Plan, Rows, Spread, displace, fill, mark, slot,
+    Layout, MeshSpread, PlacedBatch, Plan, Scratch, Spread, displace, fill, mark, slot,
 };
 use crate::survey::reference_limit;
 
@@ -66,13 +66,6 @@ impl Spread for CellSpread<'_> {
     fn place(&self, places: Range<u32>, batch: &mut PlacedBatch) {
         batch.place_each(self, places);
     }
-}
-
-/// Arrays in which one subgrid after the other is planned.
-struct Bench<'s> {
-    row_offsets: &'s mut [i32],
-    domain_bits: &'s mut [u64],
-    occupied: &'s mut [u64],
 }
 
 /// The scratch behind the plan of the top.
@@ -206,7 +199,8 @@ fn run(
 ) -> Result<Header, Error> {
     let TopPlan { top: mut plan, scratch_bytes: needed_bytes, available_bytes } = plan;
     let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
-    let Rows { offsets, domain_bits, rest } = plan.rows.take().ok_or(too_small)?;
+    let Scratch { row_offsets: offsets, domain_bits, rest, .. } =
+        plan.rows.take().ok_or(too_small)?;
 
     // Sort the triangles into the lists of the top, and find the longest.
     let lists = Lists::new(&plan.layout, rest).ok_or(too_small)?;
@@ -214,12 +208,8 @@ fn run(
     fill(&MeshSpread::new(mesh, &plan.lattice), offsets, hash, references, &Watch::none())?;
     watch.at(0.5)?;
     let longest = pairs(hash).map(|(start, end)| end.wrapping_sub(start)).max().unwrap_or(0);
-    let bench = Layout::bound(longest, plan.density, 0).scratch(rest).ok_or(too_small)?;
-    let mut bench = Bench {
-        row_offsets: bench.row_offsets,
-        domain_bits: bench.domain_bits,
-        occupied: bench.occupied,
-    };
+    // Arrays in which one subgrid after the other is planned.
+    let mut bench = Layout::bound(longest, plan.density, 0).scratch(rest).ok_or(too_small)?;
     assign(plan.lattice.resolution, offsets, domain_bits, owners);
 
     // Cut the index into the sections of the top and the pool behind them, if it is large enough.
@@ -303,7 +293,7 @@ impl CellSpread<'_> {
     ///
     /// It must separate: the lists of its cells hold on average at most three quarters of the
     /// primitives. A pile of equal triangles stays a list.
-    fn subdivide(mut self, density: f32, bench: &mut Bench<'_>, pool: &mut Bump<'_>) -> bool {
+    fn subdivide(mut self, density: f32, bench: &mut Scratch<'_>, pool: &mut Bump<'_>) -> bool {
         let Some(layout) = self.plan(density, bench) else { return false };
         // An exhausted pool is legal: it counts.
         let Some(words) = pool.take(layout.words()) else { return true };
@@ -334,7 +324,7 @@ impl CellSpread<'_> {
     }
 
     /// Plans a subgrid: its frame, and its rows on the bench.
-    fn plan(&mut self, density: f32, bench: &mut Bench<'_>) -> Option<SubLayout> {
+    fn plan(&mut self, density: f32, bench: &mut Scratch<'_>) -> Option<SubLayout> {
         let reaches = self.ids.iter().filter_map(|&id| self.reach(id));
         let reach = reaches.reduce(|all, reach| all.union(&reach)).or_bug("an empty list")?;
         self.frame = Frame::around(&reach, self.cell);

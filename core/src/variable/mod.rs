@@ -67,7 +67,7 @@ impl<'a> Variable<'a> {
     fn content(&self, cell: [u32; 3]) -> Option<CellContent<'a>> {
         let [start, end] = self.top.ends(cell)?;
         let part = (start & !GRID) as usize..(end & !GRID) as usize;
-        let words = self.top.lists().get(part)?;
+        let words = self.top.sections.references.get(part)?;
         Some(if start & GRID == 0 { CellContent::List(words) } else { CellContent::Subgrid(words) })
     }
 

@@ -45,7 +45,7 @@ impl Variable<'_> {
         let all = CellRange { min: [0; 3], max: lattice.last() };
         for cell in all.cells() {
             match self.content(cell) {
-                None if self.top.is_marked(cell) => return Err(at(self.top.lists())),
+                None if self.top.is_marked(cell) => return Err(at(self.top.sections.references)),
                 None => {}
                 Some(CellContent::List(ids)) => {
                     let covers = |&id: &u32| {
@@ -71,7 +71,7 @@ impl Variable<'_> {
             }
         }
         if words_of_cells != u64::from(header.reference_count) {
-            return Err(at(self.top.lists()));
+            return Err(at(self.top.sections.references));
         }
 
         // There are as many as there must be.
@@ -87,13 +87,13 @@ impl Variable<'_> {
                 }
             }
         }
-        if listed == expected { Ok(()) } else { Err(at(self.top.lists())) }
+        if listed == expected { Ok(()) } else { Err(at(self.top.sections.references)) }
     }
 
     /// Proves that the table of the top cuts the pool into parts, as displaced rows leave it.
     fn check_table(&self, header: &Header, lattice: &Lattice, blob: &[u8]) -> Result<(), Error> {
         let at = |section: usize, byte: usize| corrupt(section - blob.as_ptr().addr() + byte);
-        let hash = self.top.hash();
+        let hash = self.top.sections.hash;
         let at_slot = |slot: usize| at(hash.as_ptr().addr(), slot * size_of::<u32>());
         let place = |word: u32| word & !GRID;
         if hash.first().is_none_or(|&first| place(first) != 0) {
@@ -112,14 +112,15 @@ impl Variable<'_> {
         if matches!(hash, [.., start, end] if place(*start) == *end) {
             return Err(corrupt(core::mem::offset_of!(Header, hash_count)));
         }
-        let rows = self.top.row_offsets();
+        let rows = self.top.sections.row_offsets;
         let is_full = pairs(hash).map(|(start, end)| place(start) < place(end));
         let offset = |row: usize| rows.get(row).copied();
         if !slots_are_sound(lattice.resolution, offset, |cell| self.top.is_marked(cell), is_full) {
             return Err(at(rows.as_ptr().addr(), 0));
         }
         // No bit is set behind the last cell.
-        let (bits, cells) = (self.top.domain_bits(), rows.len() * lattice.resolution[0] as usize);
+        let (bits, cells) =
+            (self.top.sections.domain_bits, rows.len() * lattice.resolution[0] as usize);
         match extent(bits, cells, WORD_BITS) {
             Some((first, _)) => Err(at(bits.as_ptr().addr(), (cells + first) / 8)),
             None => Ok(()),
