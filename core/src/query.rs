@@ -46,6 +46,10 @@ impl Grid<'_> {
         ray: &Ray,
         options: &mut QueryOptions<'_>,
     ) -> Option<Hit> {
+        // Save flash as `intersect` does.
+        if options.are_plain() && !IS_SMALL {
+            return self.intersect(ray);
+        }
         self.intersect_behind((place, ray), options, None, 1)
     }
 
@@ -119,7 +123,7 @@ impl Grid<'_> {
     /// ```
     #[must_use]
     pub fn occluder(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> Option<u32> {
-        self.occluder_at(0, ray, options)
+        self.occluder_at(0, ray, options).map(|hit| hit.primitive)
     }
 
     /// The same for the ray at a place of a batch.
@@ -128,18 +132,18 @@ impl Grid<'_> {
         place: usize,
         ray: &Ray,
         options: &mut QueryOptions<'_>,
-    ) -> Option<u32> {
+    ) -> Option<Hit> {
         // Save flash as `intersect` does.
         if options.are_plain() && !IS_SMALL {
-            return self.any(ray).map(|hit| hit.primitive);
+            return self.any(ray);
         }
         if options.filter.is_some() {
-            return self.intersect_at(place, ray, options).map(|hit| hit.primitive);
+            return self.intersect_at(place, ray, options);
         }
         // Without a filter no order is promised: any hit that counts will do.
         let mut hit = Hit::MISS;
         let found = self.nearest(ray, options, None, core::slice::from_mut(&mut hit), true);
-        (found > 0).then_some(hit.primitive)
+        (found > 0).then_some(hit)
     }
 
     /// All hits of a ray that the options let count: by ascending `t`, then id, each triangle once.

@@ -2,25 +2,22 @@
 
 use core::marker::PhantomData;
 
-use super::{Batch, Coherence, GridAnswer, alone};
+use super::{Batch, Coherence, HitAnswer, alone};
 use crate::arena::whole;
 use crate::bvh::{Bvh, Groups, Scope, SortKey, Together};
 use crate::grid::Grid;
-use crate::options::QueryOptions;
+use crate::options::{Choice, QueryOptions};
 use crate::ray::{Hit, INVALID_ID, Ray};
 
 /// A batch with its grid and its options; `ASKS` is true if the options have a filter.
 struct Asked<'r, 'm, 'q, B, A, const ASKS: bool> {
     grid: &'r Grid<'m>,
-    tree: &'r Bvh<'m>,
     batch: &'r mut B,
     options: &'r mut QueryOptions<'q>,
-    /// True if the options change nothing.
-    is_plain: bool,
     answers: PhantomData<A>,
 }
 
-impl<A: GridAnswer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_, B, A, ASKS> {
+impl<A: HitAnswer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_, B, A, ASKS> {
     #[inline(always)]
     fn count(&self) -> usize {
         self.batch.count()
@@ -38,7 +35,7 @@ impl<A: GridAnswer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_
 
     #[inline(always)]
     fn alone(&mut self, place: usize) {
-        alone(self.grid, self.batch, place, self.is_plain, self.options);
+        alone(self.grid, self.batch, place, self.options);
     }
 
     #[inline(always)]
@@ -67,33 +64,48 @@ const FEW: usize = 256;
 
 /// Answers all rays of a batch.
 #[inline(always)]
-pub(super) fn trace<A: GridAnswer, const ANY: bool>(
+pub(super) fn trace<A: HitAnswer>(
     grid: &Grid<'_>,
     tree: &Bvh<'_>,
     batch: &mut impl Batch<A>,
     coherence: Coherence,
     options: &mut QueryOptions<'_>,
 ) {
-    let (is_plain, answers) = (options.are_plain(), PhantomData::<A>);
+    let answers = PhantomData::<A>;
     let lent = core::mem::take(&mut options.scratch);
+    let choice = options.choice();
+    // If no hit can end a ray unasked, the first one is sooner found as the closest.
+    let asked = (choice, A::IS_ANY && !choice.asks_all(grid.mesh()));
     if options.filter.is_none() {
-        let mut asked = Asked::<_, A, false> { grid, tree, batch, options, is_plain, answers };
-        with_window(coherence, lent, &mut |memory| asked.groups::<ANY>(memory));
+        let batch = &mut Asked::<_, A, false> { grid, batch, options, answers };
+        in_groups(grid, tree, asked, coherence, lent, batch);
     } else {
-        let mut asked = Asked::<_, A, true> { grid, tree, batch, options, is_plain, answers };
-        with_window(coherence, lent, &mut |memory| asked.groups::<ANY>(memory));
+        let batch = &mut Asked::<_, A, true> { grid, batch, options, answers };
+        in_groups(grid, tree, asked, coherence, lent, batch);
     }
     options.scratch = lent;
+}
+
+/// Traces rays in groups, in windows that are sorted in memory or as given.
+#[inline(always)]
+pub(crate) fn in_groups(
+    grid: &Grid<'_>,
+    bvh: &Bvh<'_>,
+    (choice, is_any): (Choice, bool),
+    coherence: Coherence,
+    lent: &mut [u8],
+    batch: &mut impl Together,
+) {
+    let Scope { mesh, bounds, simd } = grid.scope();
+    with_window(coherence, lent, &mut |memory| {
+        Groups { bvh, mesh, bounds, choice, memory, batch }.trace(simd, is_any);
+    });
 }
 
 /// Passes `trace` the memory to sort rays in: what the caller lent, or a little on the stack; none for rays that keep
 /// their order.
 #[inline(always)]
-pub(crate) fn with_window(
-    coherence: Coherence,
-    lent: &mut [u8],
-    trace: &mut dyn FnMut(&mut [SortKey]),
-) {
+fn with_window(coherence: Coherence, lent: &mut [u8], trace: &mut dyn FnMut(&mut [SortKey])) {
     if coherence == Coherence::Coherent {
         return trace(&mut []);
     }
@@ -106,16 +118,4 @@ pub(crate) fn with_window(
 #[inline(never)]
 fn with_few(trace: &mut dyn FnMut(&mut [SortKey])) {
     trace(&mut [0; 2 * FEW]);
-}
-
-impl<A: GridAnswer, B: Batch<A>, const ASKS: bool> Asked<'_, '_, '_, B, A, ASKS> {
-    /// Traces rays in groups, in windows that are sorted in memory or as given.
-    #[inline(never)]
-    fn groups<const ANY: bool>(&mut self, memory: &mut [SortKey]) {
-        let Scope { mesh, bounds, simd } = self.grid.scope();
-        let (bvh, choice) = (self.tree, self.options.choice());
-        // If no hit can end a ray unasked, the first one is sooner found as the closest.
-        let is_any = ANY && !choice.asks_all(mesh);
-        Groups { bvh, mesh, bounds, choice, memory, batch: self }.trace(simd, is_any);
-    }
 }

@@ -284,7 +284,7 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) {
-        trace::<_, false>(self, batch, coherence, options);
+        trace(self, batch, coherence, options);
     }
 
     /// For each ray a byte: 1 if anything is hit, 0 if not.
@@ -355,7 +355,7 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) {
-        trace::<_, true>(self, batch, coherence, options);
+        trace(self, batch, coherence, options);
     }
 
     /// For each ray a `u32`: a triangle that blocks it, of those that the options let count, as
@@ -383,7 +383,7 @@ impl Grid<'_> {
         coherence: Coherence,
         options: &mut QueryOptions<'_>,
     ) {
-        trace::<_, true>(self, batch, coherence, options);
+        trace(self, batch, coherence, options);
     }
 }
 
@@ -391,6 +391,8 @@ impl Grid<'_> {
 pub(crate) trait Answer: Sized {
     /// The type of an element in an array of answers.
     type Stored: Immutable + IntoBytes;
+    /// True if any hit is an answer, false if it must be the closest.
+    const IS_ANY: bool;
 
     fn stored(self) -> Self::Stored;
 }
@@ -401,17 +403,9 @@ pub(crate) trait HitAnswer: Answer {
     fn of(hit: &Hit) -> Self;
 }
 
-/// The answer of a grid.
-trait GridAnswer: HitAnswer {
-    /// Traces a ray alone, without options.
-    fn plain(grid: &Grid<'_>, ray: &Ray) -> Self;
-
-    /// Traces the ray at a place of the batch alone, with options.
-    fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self;
-}
-
 impl Answer for Hit {
     type Stored = Self;
+    const IS_ANY: bool = false;
 
     #[inline(always)]
     fn stored(self) -> Self {
@@ -426,18 +420,9 @@ impl HitAnswer for Hit {
     }
 }
 
-impl GridAnswer for Hit {
-    fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
-        grid.intersect(ray).unwrap_or(Self::MISS)
-    }
-
-    fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self {
-        grid.intersect_at(place, ray, options).unwrap_or(Self::MISS)
-    }
-}
-
 impl Answer for bool {
     type Stored = u8;
+    const IS_ANY: bool = true;
 
     #[inline(always)]
     fn stored(self) -> u8 {
@@ -452,18 +437,9 @@ impl HitAnswer for bool {
     }
 }
 
-impl GridAnswer for bool {
-    fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
-        grid.occluded(ray)
-    }
-
-    fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self {
-        grid.occluder_at(place, ray, options).is_some()
-    }
-}
-
 impl Answer for u32 {
     type Stored = Self;
+    const IS_ANY: bool = true;
 
     #[inline(always)]
     fn stored(self) -> Self {
@@ -478,19 +454,9 @@ impl HitAnswer for u32 {
     }
 }
 
-impl GridAnswer for u32 {
-    fn plain(grid: &Grid<'_>, ray: &Ray) -> Self {
-        grid.any(ray).map_or(INVALID_ID, |hit| hit.primitive)
-    }
-
-    fn with(grid: &Grid<'_>, place: usize, ray: &Ray, options: &mut QueryOptions<'_>) -> Self {
-        grid.occluder_at(place, ray, options).unwrap_or(INVALID_ID)
-    }
-}
-
 /// Answers all rays of a batch: a tree's in groups, others one by one.
 #[inline(always)]
-fn trace<A: GridAnswer, const ANY: bool>(
+fn trace<A: HitAnswer>(
     grid: &Grid<'_>,
     batch: &mut impl Batch<A>,
     coherence: Coherence,
@@ -501,24 +467,26 @@ fn trace<A: GridAnswer, const ANY: bool>(
         && !options.are_for_single_rays()
         && let Some(tree) = grid.tree()
     {
-        return groups::trace::<A, ANY>(grid, tree, batch, coherence, options);
+        return groups::trace(grid, tree, batch, coherence, options);
     }
-    let is_plain = options.are_plain();
     for place in 0..batch.count() {
-        alone(grid, batch, place, is_plain, options);
+        alone(grid, batch, place, options);
     }
 }
 
-/// Answers one ray. It is plain if the options change nothing.
+/// Answers one ray.
 #[inline(never)]
-fn alone<A: GridAnswer>(
+fn alone<A: HitAnswer>(
     grid: &Grid<'_>,
     batch: &mut impl Batch<A>,
     place: usize,
-    is_plain: bool,
     options: &mut QueryOptions<'_>,
 ) {
     let ray = batch.ray(place);
-    let answer = if is_plain { A::plain(grid, &ray) } else { A::with(grid, place, &ray, options) };
-    batch.answer(place, answer);
+    let hit = if A::IS_ANY {
+        grid.occluder_at(place, &ray, options)
+    } else {
+        grid.intersect_at(place, &ray, options)
+    };
+    batch.answer(place, A::of(&hit.unwrap_or(Hit::MISS)));
 }

@@ -14,6 +14,7 @@ use crate::simd::HAS_VECTORS;
 
 impl Answer for SceneHit {
     type Stored = Self;
+    const IS_ANY: bool = false;
 
     fn stored(self) -> Self {
         self
@@ -22,23 +23,16 @@ impl Answer for SceneHit {
 
 /// The answer of a scene.
 pub(super) trait SceneAnswer: Answer {
-    /// True if any hit is an answer.
-    const IS_ANY: bool;
-
     fn of(hit: Option<SceneHit>) -> Self;
 }
 
 impl SceneAnswer for SceneHit {
-    const IS_ANY: bool = false;
-
     fn of(hit: Option<SceneHit>) -> Self {
         hit.unwrap_or(Self::MISS)
     }
 }
 
 impl SceneAnswer for bool {
-    const IS_ANY: bool = true;
-
     fn of(hit: Option<SceneHit>) -> Self {
         hit.is_some()
     }

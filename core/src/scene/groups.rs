@@ -16,9 +16,9 @@ use super::instance::{Seen, StoredInstance};
 use super::query::{InstanceSearch, Question, SceneHit, SceneOptions, ask_object, outward};
 use super::{Object, Scene};
 use crate::approach::LineF64;
-use crate::batch::groups::with_window;
+use crate::batch::groups::in_groups;
 use crate::batch::{Batch, Coherence};
-use crate::bvh::{Bvh, GROUP, Group, Groups, Rays, Scope, SortKey, Stack, Together, lanes};
+use crate::bvh::{Bvh, GROUP, Group, Rays, Scope, Stack, Together, lanes};
 use crate::grid::Grid;
 use crate::options::{QueryOptions, Selection};
 use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
@@ -38,8 +38,10 @@ pub(super) fn trace<A: SceneAnswer, B: Batch<A, RayF64>>(
 ) {
     let lent = core::mem::take(&mut options.scratch);
     let rays = &mut SceneRays::new(scene, Question::new(options, A::IS_ANY));
-    let mut asked = Asked { scene, batch, options, answers: PhantomData::<A>, rays };
-    with_window(coherence, lent, &mut |memory| asked.groups(tree, memory));
+    // All instances: `shown` leaves out those that the mask does not see.
+    let asked = (QueryOptions::default().choice(), false);
+    let batch = &mut Asked { scene, batch, options, answers: PhantomData::<A>, rays };
+    in_groups(&scene.tree, tree, asked, coherence, lent, batch);
     options.scratch = lent;
 }
 
@@ -50,17 +52,6 @@ struct Asked<'r, 's, 'q, B, A> {
     options: &'r mut SceneOptions<'q>,
     answers: PhantomData<A>,
     rays: &'r mut SceneRays<'s>,
-}
-
-impl<A: SceneAnswer, B: Batch<A, RayF64>> Asked<'_, '_, '_, B, A> {
-    /// Traces rays in groups, in windows that are sorted in memory or as given.
-    #[inline(never)]
-    fn groups(&mut self, bvh: &Bvh<'_>, memory: &mut [SortKey]) {
-        let Scope { mesh, bounds, simd } = self.scene.tree.scope();
-        // All instances: `shown` leaves out those that the mask does not see.
-        let choice = QueryOptions::default().choice();
-        Groups { bvh, mesh, bounds, choice, memory, batch: self }.trace(simd, false);
-    }
 }
 
 impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for Asked<'_, '_, '_, B, A> {

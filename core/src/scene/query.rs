@@ -369,12 +369,8 @@ pub(super) fn ask_object(
 ) -> Option<Hit> {
     let any = |is_hit: bool| is_hit.then_some(Hit { t: ray.t_min, ..Hit::MISS });
     match object {
-        Object::Grid(grid) => match (is_any, options.are_plain()) {
-            (false, true) => grid.intersect(ray),
-            (true, true) => any(grid.occluded(ray)),
-            (false, false) => grid.intersect_with(ray, options),
-            (true, false) => any(grid.occluded_with(ray, options)),
-        },
+        Object::Grid(grid) if is_any => any(grid.occluded_with(ray, options)),
+        Object::Grid(grid) => grid.intersect_with(ray, options),
         Object::Shapes(shapes, test) => {
             let mut test = |id: u32, ray: &Ray| test.test(id, ray);
             if is_any {

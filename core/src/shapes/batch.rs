@@ -58,7 +58,7 @@ impl Shapes<'_> {
         options: &mut QueryOptions<'_>,
         test: &mut ShapeTest<'_>,
     ) {
-        trace(self, batch, coherence, options, (test, false));
+        trace(self, batch, coherence, options, test);
     }
 
     /// For each ray a byte: 1 if any shape is hit, 0 if not. The options are for all rays.
@@ -86,27 +86,27 @@ impl Shapes<'_> {
         options: &mut QueryOptions<'_>,
         test: &mut ShapeTest<'_>,
     ) {
-        trace(self, batch, coherence, options, (test, true));
+        trace(self, batch, coherence, options, test);
     }
 }
 
-/// Answers all rays of a batch by a test; if it is `true`, any hit is an answer.
+/// Answers all rays of a batch by a test.
 fn trace<A: HitAnswer>(
     shapes: &Shapes<'_>,
     batch: &mut impl Batch<A>,
     coherence: Coherence,
     options: &mut QueryOptions<'_>,
-    (test, is_any): (&mut ShapeTest<'_>, bool),
+    test: &mut ShapeTest<'_>,
 ) {
     #[cfg(feature = "bvh")]
     if HAS_VECTORS
         && !options.are_for_single_rays()
         && let Some(tree) = shapes.grid.tree()
     {
-        return super::groups::trace(shapes, tree, batch, coherence, options, (test, is_any));
+        return super::groups::trace(shapes, tree, batch, coherence, options, test);
     }
     for place in 0..batch.count() {
-        alone(shapes, batch, place, options, (test, is_any));
+        alone(shapes, batch, place, options, test);
     }
 }
 
@@ -117,8 +117,8 @@ pub(super) fn alone<A: HitAnswer>(
     batch: &mut impl Batch<A>,
     place: usize,
     options: &mut QueryOptions<'_>,
-    (test, is_any): (&mut ShapeTest<'_>, bool),
+    test: &mut ShapeTest<'_>,
 ) {
-    let hit = shapes.search(&batch.ray(place), options, test, is_any);
+    let hit = shapes.search(&batch.ray(place), options, test, A::IS_ANY);
     batch.answer(place, A::of(&hit.unwrap_or(Hit::MISS)));
 }

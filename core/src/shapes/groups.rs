@@ -9,25 +9,26 @@ use core::marker::PhantomData;
 
 use super::batch::alone;
 use super::{ShapeTest, Shapes, hit_of};
-use crate::batch::groups::with_window;
+use crate::batch::groups::in_groups;
 use crate::batch::{Batch, Coherence, HitAnswer};
-use crate::bvh::{Bvh, Group, Groups, Scope, SortKey, Together, lanes};
+use crate::bvh::{Bvh, Group, Together, lanes};
 use crate::options::{QueryOptions, Selection};
 use crate::ray::{Hit, Ray};
 use crate::simd::SimdLevel;
 
-/// Answers all rays of a batch by a test; if it is `true`, any hit is an answer.
+/// Answers all rays of a batch by a test.
 pub(super) fn trace<A: HitAnswer, B: Batch<A>>(
     shapes: &Shapes<'_>,
     bvh: &Bvh<'_>,
     batch: &mut B,
     coherence: Coherence,
     options: &mut QueryOptions<'_>,
-    (test, is_any): (&mut ShapeTest<'_>, bool),
+    test: &mut ShapeTest<'_>,
 ) {
     let lent = core::mem::take(&mut options.scratch);
-    let mut asked = Asked { shapes, batch, options, test, is_any, answers: PhantomData::<A> };
-    with_window(coherence, lent, &mut |memory| asked.groups(bvh, memory));
+    let asked = (QueryOptions::default().choice(), A::IS_ANY);
+    let batch = &mut Asked { shapes, batch, options, test, answers: PhantomData::<A> };
+    in_groups(&shapes.grid, bvh, asked, coherence, lent, batch);
     options.scratch = lent;
 }
 
@@ -37,18 +38,7 @@ struct Asked<'r, 'q, 't, B, A> {
     batch: &'r mut B,
     options: &'r mut QueryOptions<'q>,
     test: &'r mut ShapeTest<'t>,
-    is_any: bool,
     answers: PhantomData<A>,
-}
-
-impl<A: HitAnswer, B: Batch<A>> Asked<'_, '_, '_, B, A> {
-    /// Traces rays in groups, in windows that are sorted in memory or as given.
-    #[inline(never)]
-    fn groups(&mut self, bvh: &Bvh<'_>, memory: &mut [SortKey]) {
-        let Scope { mesh, bounds, simd } = self.shapes.grid.scope();
-        let (choice, is_any) = (QueryOptions::default().choice(), self.is_any);
-        Groups { bvh, mesh, bounds, choice, memory, batch: self }.trace(simd, is_any);
-    }
 }
 
 impl<A: HitAnswer, B: Batch<A>> Together for Asked<'_, '_, '_, B, A> {
@@ -70,7 +60,7 @@ impl<A: HitAnswer, B: Batch<A>> Together for Asked<'_, '_, '_, B, A> {
     }
 
     fn alone(&mut self, place: usize) {
-        alone(self.shapes, self.batch, place, self.options, (self.test, self.is_any));
+        alone(self.shapes, self.batch, place, self.options, self.test);
     }
 }
 
