@@ -3,9 +3,10 @@
 
 use hgrid_core::{
     BatchField, Boxes, Coherence, Config, Counters, Cull, Error, Instance, Object, Ray, RayF64,
-    Scene, SceneHit, SceneOptions, Shapes, SimdLevel, Strided, StridedMut, Verdict,
+    Scene, SceneHit, SceneOptions, Shapes, SimdLevel, Strided, StridedMut, TriangleMesh, Verdict,
 };
 use hgrid_lab::camera::{Camera, Up, View};
+use hgrid_tests::owned::Owned;
 use hgrid_tests::random::Random;
 use hgrid_tests::scenes::{Built, scattered};
 
@@ -146,6 +147,32 @@ fn batches_meet_what_is_smaller_than_the_rounding_of_their_origins() {
         let hits = compare(&scene, &rays);
         assert!(hits > 2 * rays.len(), "{hits} hits");
     });
+}
+
+/// From so far away, the origin that the object sees is rounded to a place behind its only surface.
+#[test]
+fn batches_from_many_extents_away_answer_as_each_ray_alone() {
+    let corners = [[-1.0, -1.0, 0.3], [1.0, -1.0, 0.3], [1.0, 1.0, 0.3], [-1.0, 1.0, 0.3]];
+    let mesh = TriangleMesh::new(&corners, &[[0, 1, 2], [2, 3, 0]]).unwrap();
+    let owned = Owned::build(&mesh, &Config::default()).unwrap();
+    let grid = owned.open(&mesh).unwrap();
+    for distance in [1e8, 1e10, 1e11, 1e12, 1e13, 1e14] {
+        // The second instance makes the scene so wide that its rays are not remote.
+        let aside = Instance { translation: [distance, 0.0, 0.0], ..Instance::new(0) };
+        let objects = [Object::Grid(&grid)];
+        let instances = [Instance::new(0), aside];
+        let built = Built::scene(&instances, &objects, &Config::default()).unwrap();
+        let scene = built.open(&objects).unwrap();
+        let mut random = Random(18);
+        let ray = |_| {
+            let [x, y, z] = random.point().map(f64::from);
+            let [u, v, _] = random.point().map(|c| c * (0.4 / distance) as f32);
+            RayF64::new([0.4 * x, 0.4 * y, 0.3 * distance + z], [u, v, z as f32 - 2.0])
+        };
+        let rays: Vec<_> = (0..512).map(ray).collect();
+        let hits = compare(&scene, &rays);
+        assert!(hits > rays.len(), "{hits} hits, {distance}");
+    }
 }
 
 #[test]

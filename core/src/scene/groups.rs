@@ -152,22 +152,28 @@ impl<'r> SceneRays<'r> {
             return;
         }
         for lane in lanes(mask) {
-            let (at, question) = (lane as usize % GROUP, self.question);
-            let ray = &self.given[at];
-            let mut search = InstanceSearch {
-                scene: self.scene,
-                line: &ray.into(),
-                ray,
-                level: 0,
-                question: &question,
-                best: None,
-                limit: self.best[at].t,
-                filter: None,
-                counters: None,
-            };
-            if let Some(hit) = search.ask(number) {
-                self.keep(lane, &hit, outer);
-            }
+            self.alone(number, lane, outer);
+        }
+    }
+
+    /// Asks an instance for one ray.
+    #[inline(never)]
+    fn alone(&mut self, number: u32, lane: u32, outer: &mut Rays) {
+        let (at, question) = (lane as usize % GROUP, self.question);
+        let ray = &self.given[at];
+        let mut search = InstanceSearch {
+            scene: self.scene,
+            line: &ray.into(),
+            ray,
+            level: 0,
+            question: &question,
+            best: None,
+            limit: self.best[at].t,
+            filter: None,
+            counters: None,
+        };
+        if let Some(hit) = search.ask(number) {
+            self.keep(lane, &hit, outer);
         }
     }
 
@@ -189,6 +195,11 @@ impl<'r> SceneRays<'r> {
             let Some(mut seen) = Seen::new(&placed.line(&LineF64::from(ray))) else { continue };
             let limit = self.best[lane as usize % GROUP].t;
             let Some(inside) = seen.narrow(ray, limit, &corners) else { continue };
+            // A group takes no hits behind the origin.
+            if seen.is_from_afar(&corners) {
+                self.alone(number, lane, outer);
+                continue;
+            }
             self.inside.slots()[count % GROUP] = inside;
             self.seen[count % GROUP] = seen;
             self.lanes[count % GROUP] = lane;

@@ -206,6 +206,9 @@ pub(super) struct Seen {
 /// Objects farther away than so many of their extents are seen from where the ray enters their box.
 const FAR_EXTENTS: f64 = 4.0;
 
+/// From farther away than so many extents, the origin of a ray is brought to an object with a visible error.
+const AFAR: f64 = 536_870_912.0; // 2^29
+
 impl Seen {
     /// No ray: fills the places of a group.
     pub(super) const NONE: Self = {
@@ -252,6 +255,13 @@ impl Seen {
             direction: direction.map(round),
             t_max: if limit < t_max { limit } else { t_max },
         })
+    }
+
+    /// Returns true if rounding may have moved the origin past a surface of an object with this box: it was brought there
+    /// from more than 2^29 extents away, so it is off by more than 2^-23 of the extent. Hits may have a negative `t` then.
+    pub(super) fn is_from_afar(&self, (min, max): &([f32; 3], [f32; 3])) -> bool {
+        let size = |axis: usize| f64::from(max[axis]) - f64::from(min[axis]);
+        self.shift.abs() > greater(size(0), greater(size(1), size(2))) * AFAR
     }
 
     /// Finds the distance at which the ray's line enters a box, in multiples of its direction.
