@@ -492,6 +492,7 @@ static void overlaps_are_refused(void)
     check_overlap(true, 16, 32, 16, 31, 1);
     check_overlap(false, 16, 4096, 16, -16, 1);
     check_overlap(true, 16, SIZE_MAX, SIZE_MAX, 16, 1);
+    check_overlap(true, 16, SIZE_MAX - 99, SIZE_MAX - 99, -4, 1);
     check_overlap(false, 1, SIZE_MAX, SIZE_MAX, -1, 1);
 }
 

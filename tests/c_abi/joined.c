@@ -158,6 +158,9 @@ static void a_grid_of_them_is_that_of_one(int method)
     answers_are_the_same(&again, &one);
     every_triangle_is_located(&again);
     CHECK(is_proven(&again));
+    /* The first triangles of the parts are the last section. */
+    unsigned char *last = (unsigned char *)packed + packed_bytes - HGRID_ALIGNMENT;
+    EXPECT(HGRID_ERROR_OVERLAP, hgrid_validate(&again, last, HGRID_ALIGNMENT));
     EXPECT(HGRID_OK, hgrid_mesh_of(&again, &found));
     CHECK(found.parts == NULL && found.part_count == 0 && found.triangle_count == TRIANGLES);
     CHECK(memcmp(found.indices, all_indices, sizeof all_indices) == 0);
@@ -284,6 +287,13 @@ static void what_cannot_be_joined(void)
 #if SIZE_MAX > UINT32_MAX
     WRONG(HGRID_ERROR_TOO_MANY_TRIANGLES, wrong[2].triangle_count = UINT32_MAX);
 #endif
+    /* The second description of this size would not be aligned. */
+    struct {
+        hgrid_mesh first;
+        char rest[sizeof(hgrid_mesh)];
+    } odd = {meshes[1], {0}};
+    odd.first.struct_size++;
+    refuse_join(HGRID_ERROR_STRUCT_SIZE, &odd.first, 2);
     refuse_join(HGRID_ERROR_INVALID_PARTS, meshes, SIZE_MAX / 8);
 
     hgrid_mesh all = HGRID_MESH_INIT;

@@ -113,7 +113,8 @@ fn span(elements: &Elements) -> Span {
 /// Returns true if a byte of an answer lies in a ray.
 ///
 /// With one stride for both, the distance from a ray's start to the start of the next answer is the
-/// same everywhere: the answer lies between two rays, or all of them are hit.
+/// same everywhere: the answer lies between two rays, or all of them are hit. The stride of a single element may be
+/// any number, but its span is the element.
 fn overlap(
     (rays, ray_bytes): (&Elements, usize),
     (answers, answer_bytes): (&Elements, usize),
@@ -126,5 +127,5 @@ fn overlap(
     let is_between = distance.map(isize::cast_unsigned).is_some_and(|distance| {
         distance >= ray_bytes && distance.saturating_add(answer_bytes) <= rays.stride
     });
-    rays.stride != answers.stride || !is_between
+    rays.count < 2 || rays.stride != answers.stride || !is_between
 }

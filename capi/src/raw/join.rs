@@ -108,6 +108,9 @@ impl Meshes {
     /// The caller's promise.
     unsafe fn get(&self, at: usize) -> Result<TriangleMesh<'static>, hgrid_status> {
         let description = self.start.wrapping_byte_add(at * self.size);
+        if !description.is_aligned() {
+            return Err(HGRID_ERROR_STRUCT_SIZE);
+        }
         // Before what a larger one would have: it may lie behind the array.
         // SAFETY: the caller's promise, and within the array; the size comes first.
         if unsafe { read(description.cast::<u32>()) }? as usize != self.size {

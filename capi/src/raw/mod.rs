@@ -456,6 +456,7 @@ fn shares(mesh: &TriangleMesh<'_>, span: Span) -> bool {
         return false;
     }
     has(mesh)
+        || span_of(mesh.numbering().as_flattened()).overlaps(span)
         || join::span_of(mesh).overlaps(span)
         || mesh.parts().iter().any(|part| has(part.mesh()))
 }

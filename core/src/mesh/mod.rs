@@ -204,7 +204,9 @@ impl<'a> TriangleMesh<'a> {
     }
 
     /// The first triangles of the parts that a packed mesh was made of.
-    pub(crate) const fn numbering(&self) -> &'a [[u8; 4]] {
+    #[doc(hidden)]
+    #[must_use]
+    pub const fn numbering(&self) -> &'a [[u8; 4]] {
         match self.layout {
             IndexLayout::Packed(numbering) => numbering,
             IndexLayout::Indexed(_) | IndexLayout::Boxes(_) | IndexLayout::Joined(_) => &[],
