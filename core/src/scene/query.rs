@@ -101,18 +101,7 @@ impl Scene<'_> {
     /// The closest hit of a ray. Where several are equally close, that of the first instance, then of the lowest id.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let hit = scene.intersect(&RayF64::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0]));
     /// assert_eq!(hit.map(|hit| (hit.t, hit.path[0], hit.primitive)), Some((1.0, 0, 0)));
     /// # Ok::<(), Error>(())
@@ -125,18 +114,7 @@ impl Scene<'_> {
     /// Returns true if anything is hit.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// assert!(scene.occluded(&RayF64::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0])));
     /// # Ok::<(), Error>(())
     /// ```
@@ -148,18 +126,7 @@ impl Scene<'_> {
     /// [`intersect`](Self::intersect) with options.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let ray = RayF64::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0]);
     /// let mut options = SceneOptions { cull: Cull::Front, ..SceneOptions::default() };
     /// assert_eq!(scene.intersect_with(&ray, &mut options), None);

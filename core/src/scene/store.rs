@@ -191,18 +191,7 @@ impl<'a> Scene<'a> {
     /// [`Error::OtherContent`] for a blob that is no scene; those of [`Grid::open`].
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let mut copy = vec![Block::ZERO; Block::count_for(scene.blob().len())];
     /// Block::bytes_mut(&mut copy)[..scene.blob().len()].copy_from_slice(scene.blob());
     ///
@@ -298,18 +287,7 @@ impl<'a> Scene<'a> {
     /// [`Error::Corrupt`] it holds nothing of use.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let blob = scene.blob();
     /// # let mut copy = vec![Block::ZERO; Block::count_for(blob.len())];
     /// # Block::bytes_mut(&mut copy)[..blob.len()].copy_from_slice(blob);
