@@ -149,8 +149,8 @@ impl Scene<'_> {
         options: &mut SceneOptions<'_>,
         is_any: bool,
     ) -> Option<SceneHit> {
-        let mut work = options.counters.is_some().then(Counters::default);
         let question = Question::new(options, is_any);
+        let counters = options.counters.as_deref_mut();
         let mut show;
         let filter: Option<&mut Shown<'_>> = match &mut options.filter {
             Some(filter) => {
@@ -159,19 +159,7 @@ impl Scene<'_> {
             }
             None => None,
         };
-        let hit = self.trace(
-            &LineF64::from(ray),
-            ray,
-            f32::INFINITY,
-            0,
-            &question,
-            filter,
-            work.as_mut(),
-        );
-        if let (Some(counters), Some(work)) = (&mut options.counters, work) {
-            counters.add(&work);
-        }
-        hit
+        self.trace(&LineF64::from(ray), ray, f32::INFINITY, 0, &question, filter, counters)
     }
 
     /// An instance that a query sees, and its object.
@@ -204,7 +192,6 @@ impl Scene<'_> {
         if level >= MAX_NESTING {
             return None;
         }
-        let mut work = counters.is_some().then(Counters::default);
         let t_max = if limit < ray.t_max { limit } else { ray.t_max };
         let mut offered = InstanceSearch {
             scene: self,
@@ -215,7 +202,7 @@ impl Scene<'_> {
             best: None,
             limit,
             filter,
-            counters: work.as_mut(),
+            counters,
         };
         let mut steps = Counters::default();
         let mut offer = BoxSearch(&mut |number| offered.offer(number));
@@ -227,12 +214,10 @@ impl Scene<'_> {
             let range = [ray.t_min, t_max];
             self.tree.search_boxes_along(&line, scale, range, &mut offer, &mut steps);
         }
-        let best = offered.best;
-        if let (Some(counters), Some(work)) = (counters, work) {
+        if let Some(counters) = offered.counters {
             counters.add(&steps);
-            counters.add(&work);
         }
-        best
+        offered.best
     }
 }
 
