@@ -84,17 +84,8 @@ impl Approach {
         if distance <= FAR_EXTENTS * bounds.size().max_element() {
             let (near, far) = bounds.clip(ray.origin.map(f64::from), inverse)?;
             let reach = Reach::of(bounds, ray.origin);
-            let anchor = ray.origin;
-            return Some(Self {
-                anchor,
-                t: 0.0,
-                near,
-                far,
-                inverse,
-                slack: 0.0,
-                reach,
-                is_remote: false,
-            });
+            let (anchor, t, slack) = (ray.origin, 0.0, 0.0);
+            return Some(Self { anchor, t, near, far, inverse, slack, reach, is_remote: false });
         }
         let line =
             LineF64 { origin: ray.origin.map(f64::from), direction: ray.direction.map(f64::from) };
@@ -121,17 +112,11 @@ impl Approach {
             return Some(Self { slack: (approach.slack + bent).next_up(), ..approach });
         }
         let [x, y, z] = ray.origin.map(f32::abs);
-        Some(Self {
-            anchor: ray.origin,
-            t: 0.0,
-            near: 0.0,
-            far: 0.0,
-            inverse,
-            // The origin was rounded by half an ulp of a coordinate.
-            slack: (greater(x, greater(y, z)) * f32::EPSILON + bent).next_up(),
-            reach: Reach::of(bounds, ray.origin),
-            is_remote: false,
-        })
+        // The origin was rounded by half an ulp of a coordinate.
+        let slack = (greater(x, greater(y, z)) * f32::EPSILON + bent).next_up();
+        let reach = Reach::of(bounds, ray.origin);
+        let (anchor, t, near, far) = (ray.origin, 0.0, 0.0, 0.0);
+        Some(Self { anchor, t, near, far, inverse, slack, reach, is_remote: false })
     }
 
     /// The same for a ray whose origin is far away.
@@ -148,17 +133,8 @@ impl Approach {
             let growth = Vec3A::splat(round(2.0 * off)) + coordinate * (4.0 * f32::EPSILON);
             let bounds = Aabb { min: bounds.min - growth, max: bounds.max + growth };
             let (near, far) = bounds.clip(origin, inverse)?;
-            let (anchor, slack) = (ray.origin, round(2.0 * off));
-            return Some(Self {
-                anchor,
-                t: 0.0,
-                near,
-                far,
-                inverse,
-                slack,
-                reach: from_origin,
-                is_remote: true,
-            });
+            let (anchor, t, slack, reach) = (ray.origin, 0.0, round(2.0 * off), from_origin);
+            return Some(Self { anchor, t, near, far, inverse, slack, reach, is_remote: true });
         }
         let (t, _) = bounds.clip(origin, inverse)?;
         let at = |axis: usize| round(origin[axis] + t * direction[axis]);

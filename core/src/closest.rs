@@ -119,11 +119,7 @@ impl Grid<'_> {
     /// negative distance find nothing.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// let closest = grid.closest_point([0.5, 0.25, 3.0], 10.0, &mut QueryOptions::default());
     /// let closest = closest.expect("3 away");
     /// assert_eq!((closest.distance, closest.position), (3.0, [0.5, 0.25, 0.0]));

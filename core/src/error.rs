@@ -169,6 +169,7 @@ impl fmt::Display for Region {
 }
 
 impl fmt::Display for Error {
+    #[expect(clippy::too_many_lines, reason = "one arm an error")]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::OutOfMemory { region, needed_bytes, available_bytes } => {
@@ -210,11 +211,32 @@ impl fmt::Display for Error {
             Self::MethodLeftOut(method) => {
                 write!(f, "this library has no method {0}: turn on its feature {0}", method.name())
             }
-            Self::OtherContent(_)
-            | Self::InstanceWithoutObject { .. }
-            | Self::InstanceWithoutInverse { .. }
-            | Self::MissingObjects { .. }
-            | Self::TooDeep => self.describe_scene(f),
+            Self::OtherContent(Content::Triangles) => {
+                f.write_str("the blob is a grid of triangles: open it as a grid")
+            }
+            Self::OtherContent(Content::Shapes) => {
+                f.write_str("the blob is a tree of shapes: open it as shapes")
+            }
+            Self::OtherContent(Content::Instances) => {
+                f.write_str("the blob is a scene of instances: open it as a scene")
+            }
+            Self::OtherContent(Content::Packed) => {
+                f.write_str("the blob is a packed scene: open it as a packed scene")
+            }
+            Self::InstanceWithoutObject { instance } => {
+                write!(f, "instance {instance} names an object that there is not")
+            }
+            Self::InstanceWithoutInverse { instance } => write!(
+                f,
+                "the matrix of instance {instance} is singular or not finite, or takes its object beyond {:e}",
+                limits::MAX_COORDINATE
+            ),
+            Self::MissingObjects { needed, available } => {
+                write!(f, "the scene needs {needed} objects and was given {available}")
+            }
+            Self::TooDeep => {
+                write!(f, "more than {} scenes stand inside one another", limits::MAX_NESTING)
+            }
             Self::MethodRemoved => {
                 f.write_str("the grid was built with the method brick, which was removed: build it again")
             }
@@ -253,41 +275,6 @@ impl fmt::Display for Error {
                 f.write_str("only a tree can be refitted, and only without a packed mesh")
             }
             Self::Corrupt { offset } => write!(f, "the grid is damaged at byte {offset}"),
-        }
-    }
-}
-
-impl Error {
-    /// Describes errors of shapes and scenes.
-    fn describe_scene(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::OtherContent(Content::Triangles) => {
-                f.write_str("the blob is a grid of triangles: open it as a grid")
-            }
-            Self::OtherContent(Content::Shapes) => {
-                f.write_str("the blob is a tree of shapes: open it as shapes")
-            }
-            Self::OtherContent(Content::Instances) => {
-                f.write_str("the blob is a scene of instances: open it as a scene")
-            }
-            Self::OtherContent(Content::Packed) => {
-                f.write_str("the blob is a packed scene: open it as a packed scene")
-            }
-            Self::InstanceWithoutObject { instance } => {
-                write!(f, "instance {instance} names an object that there is not")
-            }
-            Self::InstanceWithoutInverse { instance } => write!(
-                f,
-                "the matrix of instance {instance} is singular or not finite, or takes its object beyond {:e}",
-                limits::MAX_COORDINATE
-            ),
-            Self::MissingObjects { needed, available } => {
-                write!(f, "the scene needs {needed} objects and was given {available}")
-            }
-            Self::TooDeep => {
-                write!(f, "more than {} scenes stand inside one another", limits::MAX_NESTING)
-            }
-            _ => Ok(()),
         }
     }
 }

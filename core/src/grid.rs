@@ -142,11 +142,7 @@ impl<'a> Grid<'a> {
     /// [`Error::Corrupt`] and [`Error::MethodLeftOut`], each for what it says.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// # let mesh = *grid.mesh();
     /// // The bytes of a build, say from a file, in memory at a multiple of 64.
     /// let mut memory = vec![Block::ZERO; Block::count_for(grid.blob_bytes())];
@@ -181,11 +177,7 @@ impl<'a> Grid<'a> {
     /// [`Error::IndexOutOfRange`] if the mesh itself is damaged.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// let mut scratch = vec![0; grid.validate_bytes()];
     /// grid.validate(&mut scratch)?;
     /// # Ok::<(), Error>(())
@@ -211,11 +203,7 @@ impl<'a> Grid<'a> {
     /// lowest id. [`intersect_with`](Self::intersect_with) takes options.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// let hit = grid.intersect(&Ray::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0]));
     /// assert_eq!(hit.map(|hit| (hit.t, hit.u, hit.v, hit.primitive)), Some((1.0, 0.25, 0.5, 0)));
     /// # Ok::<(), Error>(())
@@ -232,11 +220,7 @@ impl<'a> Grid<'a> {
     /// Returns true if [`intersect`](Self::intersect) would find a hit. It stops at the first hit, so it is faster.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// // Is the light at (0.25, 0.25, 1) seen from there?
     /// let to_light = Ray { t_max: 1.0, ..Ray::new([0.25, 0.25, -1.0], [0.0, 0.0, 2.0]) };
     /// assert!(grid.occluded(&to_light));

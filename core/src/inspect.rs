@@ -32,11 +32,7 @@ impl Grid<'_> {
     /// Looks at all lists and all triangles: O(cells + references + triangles), no memory.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// let statistics = grid.inspect();
     /// assert_eq!((statistics.longest_list, statistics.first_bad), (1, INVALID_ID));
     /// # Ok::<(), Error>(())

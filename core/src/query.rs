@@ -20,11 +20,7 @@ impl Grid<'_> {
     /// The closest hit of a ray, of those that the options let count.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
     /// let hit = grid.intersect(&ray).expect("in front of the camera");
     ///
@@ -87,11 +83,7 @@ impl Grid<'_> {
     /// Returns true if the ray hits a triangle that the options let count.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// // The triangle is a window: the filter rejects its hit, so the ray reaches the light.
     /// let mut through_windows = |_, _: &Hit| Verdict::Reject;
     /// let mut options =
@@ -112,11 +104,7 @@ impl Grid<'_> {
     /// batch or on another machine.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
     /// assert_eq!(grid.occluder(&ray, &mut QueryOptions::default()), Some(0));
     /// # Ok::<(), Error>(())

@@ -56,11 +56,7 @@ impl TriangleMesh<'_> {
     /// [`Cull`](crate::Cull) goes by, but for rays that see the triangle nearly edge on.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../doc/grid.txt")]
     /// let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
     /// let hit = grid.intersect(&ray).expect("in front of the camera");
     /// let surface = grid.mesh().surface(&ray, &hit).expect("a hit");

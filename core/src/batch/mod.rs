@@ -103,11 +103,7 @@ impl<'a> StridedMut<'a> {
 /// [`Grid::intersect_n`] takes arrays. This is for rays and answers in the same structs:
 ///
 /// ```
-/// # use hgrid_core::*;
-/// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-/// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-/// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-/// # let grid = owned.grid();
+#[doc = include_str!("../../doc/grid.txt")]
 /// struct Shadow {
 ///     ray: Ray,
 ///     is_lit: bool,
@@ -191,11 +187,7 @@ impl Grid<'_> {
     /// element, or there are not as many hits as rays. Nothing is written then.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../../doc/grid.txt")]
     /// let rays = [0.25, 2.0].map(|x| Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
     /// let mut hits = [Hit::MISS; 2];
     /// grid.intersect_n(&Strided::new(&rays), &mut StridedMut::new(&mut hits), Coherence::Coherent)?;
@@ -253,11 +245,7 @@ impl Grid<'_> {
     /// hits lie.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../../doc/grid.txt")]
     /// struct Pixels<'a>(&'a mut [(Ray, f32)]);
     ///
     /// impl Batch<Hit> for Pixels<'_> {
@@ -293,11 +281,7 @@ impl Grid<'_> {
     /// The same as of [`intersect_n`](Self::intersect_n).
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../../doc/grid.txt")]
     /// let rays = [0.25, 2.0].map(|x| Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
     /// let mut occluded = [0_u8; 2];
     /// let answers = &mut StridedMut::new(&mut occluded);
@@ -321,11 +305,7 @@ impl Grid<'_> {
     /// The same as of [`intersect_n`](Self::intersect_n).
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../../doc/grid.txt")]
     /// let rays = [0.25, 2.0].map(|x| Ray::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
     /// let mut occluded = [1_u8; 2];
     /// // Light comes through from the back.

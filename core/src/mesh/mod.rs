@@ -16,7 +16,7 @@ use core::fmt;
 use core::ops::Range;
 
 use glam::{Vec3A, Vec4};
-use zerocopy::{IntoBytes, transmute};
+use zerocopy::transmute;
 
 use crate::aabb::Aabb;
 use crate::error::{Error, MeshField};
@@ -89,13 +89,8 @@ impl<'a> TriangleMesh<'a> {
     /// A mesh of nothing.
     #[cfg(feature = "alloc")]
     pub(crate) const EMPTY: Self = {
-        let none = Strided { bytes: &[], stride: 0, count: 0 };
-        Self {
-            positions: none,
-            indices: none,
-            layout: IndexLayout::Indexed(IndexType::U32),
-            masks: none,
-        }
+        let (none, layout) = (Strided::NONE, IndexLayout::Indexed(IndexType::U32));
+        Self { positions: none, indices: none, layout, masks: none }
     };
 
     /// Says in one line what it is.
@@ -120,17 +115,7 @@ impl<'a> TriangleMesh<'a> {
     /// # Ok::<(), hgrid_core::Error>(())
     /// ```
     pub fn new(positions: &'a [[f32; 3]], indices: &'a [[u32; 3]]) -> Result<Self, Error> {
-        let positions = Strided {
-            bytes: positions.as_bytes(),
-            stride: size_of::<[f32; 3]>(),
-            count: positions.len(),
-        };
-        let indices = Strided {
-            bytes: indices.as_bytes(),
-            stride: size_of::<[u32; 3]>(),
-            count: indices.len(),
-        };
-        Self::strided(positions, indices, IndexType::U32)
+        Self::strided(Strided::new(positions), Strided::new(indices), IndexType::U32)
     }
 
     /// A mesh inside the caller's own structs: vertices and triangles at any byte stride.
@@ -524,6 +509,8 @@ impl<'a> TriangleMesh<'a> {
 #[cfg(test)]
 mod tests {
     use alloc::vec::Vec;
+
+    use zerocopy::IntoBytes;
 
     use super::*;
     use crate::ray::round;

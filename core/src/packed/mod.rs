@@ -61,11 +61,7 @@ impl BlobInfo {
     /// [`Error::Truncated`] if there are fewer bytes, [`Error::Corrupt`].
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../../doc/grid.txt")]
     /// let info = BlobInfo::peek(grid.blob())?;
     /// assert_eq!((info.method, info.triangle_count), (Method::Bvh, 1));
     /// assert!(!info.has_mesh && info.total_bytes == grid.blob_bytes() as u64);
@@ -144,11 +140,7 @@ impl<'a> Grid<'a> {
     /// vertices. Nothing is written then.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../../doc/grid.txt")]
     /// let mut memory = vec![Block::ZERO; Block::count_for(grid.packed_bytes() as usize)];
     /// let packed = grid.pack(Block::bytes_mut(&mut memory))?;
     ///
@@ -202,11 +194,7 @@ impl<'a> Grid<'a> {
     /// The errors of [`open`](Self::open), and [`Error::NoMesh`].
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = OwnedMesh::new(positions, [[0, 1, 2]])?;
-    /// # let owned = OwnedGrid::build(mesh, &Config::default())?;
-    /// # let grid = owned.grid();
+    #[doc = include_str!("../../doc/grid.txt")]
     /// let mut memory = vec![Block::ZERO; Block::count_for(grid.packed_bytes() as usize)];
     /// let packed = grid.pack(Block::bytes_mut(&mut memory))?;
     /// let grid = Grid::open_packed(packed)?;

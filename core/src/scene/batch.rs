@@ -47,18 +47,7 @@ impl Scene<'_> {
     /// element, or there are not as many hits as rays. Nothing is written then.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let rays = [0.25, 2.0].map(|x| RayF64::new([x, 0.25, 1.0], [0.0, 0.0, -1.0]));
     /// let mut hits = [SceneHit::MISS; 2];
     /// let (rays, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));

@@ -101,18 +101,7 @@ impl Scene<'_> {
     /// The closest hit of a ray. Where several are equally close, that of the first instance, then of the lowest id.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let hit = scene.intersect(&RayF64::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0]));
     /// assert_eq!(hit.map(|hit| (hit.t, hit.path[0], hit.primitive)), Some((1.0, 0, 0)));
     /// # Ok::<(), Error>(())
@@ -125,18 +114,7 @@ impl Scene<'_> {
     /// Returns true if anything is hit.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// assert!(scene.occluded(&RayF64::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0])));
     /// # Ok::<(), Error>(())
     /// ```
@@ -148,18 +126,7 @@ impl Scene<'_> {
     /// [`intersect`](Self::intersect) with options.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let ray = RayF64::new([0.25, 0.5, 1.0], [0.0, 0.0, -1.0]);
     /// let mut options = SceneOptions { cull: Cull::Front, ..SceneOptions::default() };
     /// assert_eq!(scene.intersect_with(&ray, &mut options), None);
@@ -182,8 +149,8 @@ impl Scene<'_> {
         options: &mut SceneOptions<'_>,
         is_any: bool,
     ) -> Option<SceneHit> {
-        let mut work = options.counters.is_some().then(Counters::default);
         let question = Question::new(options, is_any);
+        let counters = options.counters.as_deref_mut();
         let mut show;
         let filter: Option<&mut Shown<'_>> = match &mut options.filter {
             Some(filter) => {
@@ -192,19 +159,7 @@ impl Scene<'_> {
             }
             None => None,
         };
-        let hit = self.trace(
-            &LineF64::from(ray),
-            ray,
-            f32::INFINITY,
-            0,
-            &question,
-            filter,
-            work.as_mut(),
-        );
-        if let (Some(counters), Some(work)) = (&mut options.counters, work) {
-            counters.add(&work);
-        }
-        hit
+        self.trace(&LineF64::from(ray), ray, f32::INFINITY, 0, &question, filter, counters)
     }
 
     /// An instance that a query sees, and its object.
@@ -237,7 +192,6 @@ impl Scene<'_> {
         if level >= MAX_NESTING {
             return None;
         }
-        let mut work = counters.is_some().then(Counters::default);
         let t_max = if limit < ray.t_max { limit } else { ray.t_max };
         let mut offered = InstanceSearch {
             scene: self,
@@ -248,7 +202,7 @@ impl Scene<'_> {
             best: None,
             limit,
             filter,
-            counters: work.as_mut(),
+            counters,
         };
         let mut steps = Counters::default();
         let mut offer = BoxSearch(&mut |number| offered.offer(number));
@@ -260,12 +214,10 @@ impl Scene<'_> {
             let range = [ray.t_min, t_max];
             self.tree.search_boxes_along(&line, scale, range, &mut offer, &mut steps);
         }
-        let best = offered.best;
-        if let (Some(counters), Some(work)) = (counters, work) {
+        if let Some(counters) = offered.counters {
             counters.add(&steps);
-            counters.add(&work);
         }
-        best
+        offered.best
     }
 }
 

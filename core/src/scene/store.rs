@@ -53,14 +53,21 @@ fn boxes_of<'a>(
     TriangleMesh::of_boxes(boxes, Content::Instances)?.with_masks(masks)
 }
 
-/// Gives every instance its inverse and its box.
-fn place(
+/// Writes what stands behind the tree, each instance with its inverse and its box, and returns the boxes. `short` is
+/// the error if it has no room.
+fn fill<'t>(
+    tail: &'t mut [u8],
     instances: &[Instance],
     objects: &[Object<'_>],
-    sides: &mut [BoxSides],
-    places: &mut [StoredInstance],
-) -> Result<(), Error> {
-    let to = sides.iter_mut().zip(places);
+    short: Error,
+) -> Result<TriangleMesh<'t>, Error> {
+    let count = instances.len() as u64;
+    let sections = split_mut::<Table>(tail, 1).and_then(|(table, rest)| {
+        let (sides, rest) = split_mut::<BoxSides>(rest, count)?;
+        Some((table, sides, split_mut::<StoredInstance>(rest, count)?.0))
+    });
+    let (table, sides, places) = sections.ok_or(short)?;
+    let to = sides.iter_mut().zip(&mut *places);
     for (number, (instance, to)) in (0_u32..).zip(instances.iter().zip(to)) {
         let Some(object) = objects.get(instance.object as usize) else {
             return Err(Error::InstanceWithoutObject { instance: number });
@@ -72,7 +79,11 @@ fn place(
         };
         (*to.0, *to.1) = (bounds, placed);
     }
-    Ok(())
+    let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
+    if let Some(table) = table.first_mut().or_bug("a scene without a table") {
+        *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };
+    }
+    boxes_of(sides, places)
 }
 
 /// Scenes inside one another, with one around the objects.
@@ -155,17 +166,7 @@ impl<'a> Scene<'a> {
         let room = (index.len() & !(ALIGNMENT - 1)).checked_sub(space.unwrap_or(usize::MAX));
         let room = room.ok_or(short(HEADER_BYTES as u64))?;
         let (head, tail) = index.split_at_mut_checked(room).ok_or(short(0))?;
-        let sections = split_mut::<Table>(tail, 1).and_then(|(table, rest)| {
-            let (sides, rest) = split_mut::<BoxSides>(rest, count)?;
-            Some((table, sides, split_mut::<StoredInstance>(rest, count)?.0))
-        });
-        let (table, sides, placed) = sections.ok_or(short(0))?;
-        place(instances, objects, sides, placed)?;
-        let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
-        if let Some(table) = table.first_mut().or_bug("a scene without a table") {
-            *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };
-        }
-        let boxes = boxes_of(sides, placed)?;
+        let boxes = fill(tail, instances, objects, short(0))?;
         let tree = Grid::build_with(boxes, config, head, scratch, control);
         let tree_bytes = match tree {
             Ok(tree) => tree.blob_bytes(),
@@ -191,18 +192,7 @@ impl<'a> Scene<'a> {
     /// [`Error::OtherContent`] for a blob that is no scene; those of [`Grid::open`].
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let mut copy = vec![Block::ZERO; Block::count_for(scene.blob().len())];
     /// Block::bytes_mut(&mut copy)[..scene.blob().len()].copy_from_slice(scene.blob());
     ///
@@ -298,18 +288,7 @@ impl<'a> Scene<'a> {
     /// [`Error::Corrupt`] it holds nothing of use.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let blob = scene.blob();
     /// # let mut copy = vec![Block::ZERO; Block::count_for(blob.len())];
     /// # Block::bytes_mut(&mut copy)[..blob.len()].copy_from_slice(blob);
@@ -332,21 +311,10 @@ impl<'a> Scene<'a> {
             return Err(Error::MeshMismatch);
         }
         let (start, _) = ends_of(&Header::peek(index)?);
-        let count = instances.len() as u64;
         let start = usize::try_from(start).unwrap_or(usize::MAX);
         let damaged = corrupt(offset_of!(Header, triangle_count));
         let (head, tail) = index.split_at_mut_checked(start).ok_or(damaged)?;
-        let sections = split_mut::<Table>(tail, 1).and_then(|(table, rest)| {
-            let (sides, rest) = split_mut::<BoxSides>(rest, count)?;
-            Some((table, sides, split_mut::<StoredInstance>(rest, count)?.0))
-        });
-        let (table, sides, placed) = sections.ok_or(damaged)?;
-        place(instances, objects, sides, placed)?;
-        let object_count = instances.iter().map(|instance| instance.object.saturating_add(1)).max();
-        if let Some(table) = table.first_mut().or_bug("a scene without a table") {
-            *table = Table { object_count: object_count.unwrap_or(0), unused: [0; 15] };
-        }
-        refit_content(head, &boxes_of(sides, placed)?)
+        refit_content(head, &fill(tail, instances, objects, damaged)?)
     }
 }
 

@@ -50,18 +50,7 @@ impl Scene<'_> {
     /// without area holds here, too.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
-    /// # let config = Config::default();
-    /// # let needed = Scene::bound(1, &config).expect("one is not too many");
-    /// # let mut memory = [(); 2].map(|()| vec![Block::ZERO; Block::count_for(needed.index_bytes)]);
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(needed.scratch_bytes)];
-    /// # let scratch = Block::bytes_mut(&mut scratch);
-    /// # let [index, scene_index] = memory.each_mut().map(|blocks| Block::bytes_mut(blocks));
-    /// # let grid = Grid::build(mesh, &config, index, scratch)?;
-    /// # let objects = [Object::Grid(&grid)];
-    /// # let scene = Scene::build(&[Instance::new(0)], &objects, &config, scene_index, scratch)?;
+    #[doc = include_str!("../../doc/scene.txt")]
     /// let ray = RayF64::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
     /// let hit = scene.intersect(&ray).expect("in front of the camera");
     /// let surface = scene.surface(&ray, &hit).expect("a triangle");

@@ -18,15 +18,7 @@ impl Shapes<'_> {
     /// The errors of [`Grid::intersect_n`](crate::Grid::intersect_n).
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let boxes = [[-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]];
-    /// # let boxes = Boxes::new(&boxes)?;
-    /// # let config = Config::default();
-    /// # let sizes = Shapes::sizes(&boxes, &config, &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let shapes = Shapes::build(boxes, &config, index, scratch)?;
+    #[doc = include_str!("../../doc/shapes.txt")]
     /// let rays = [0.0, 3.0].map(|x| Ray::new([x, 0.0, 2.0], [0.0, 0.0, -1.0]));
     /// let mut hits = [Hit::MISS; 2];
     /// let (rays, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));

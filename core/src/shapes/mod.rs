@@ -268,15 +268,7 @@ impl<'a> Shapes<'a> {
     /// Returns true if any shape is hit.
     ///
     /// ```
-    /// # use hgrid_core::*;
-    /// # let boxes = [[-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]];
-    /// # let boxes = Boxes::new(&boxes)?;
-    /// # let config = Config::default();
-    /// # let sizes = Shapes::sizes(&boxes, &config, &mut [])?;
-    /// # let mut index = vec![Block::ZERO; Block::count_for(sizes.index_bytes)];
-    /// # let mut scratch = vec![Block::ZERO; Block::count_for(sizes.scratch_bytes)];
-    /// # let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
-    /// # let shapes = Shapes::build(boxes, &config, index, scratch)?;
+    #[doc = include_str!("../../doc/shapes.txt")]
     /// // The middle of each box is in the way, whatever its shape.
     /// let mut middle = |_, _: &Ray| Some(ShapeHit { t: 2.0, u: 0.0, v: 0.0 });
     /// let ray = Ray::new([0.0, 0.0, 2.0], [0.0, 0.0, -1.0]);
