@@ -70,8 +70,8 @@
  * includes this file), and have hgrid_create and hgrid_destroy as well.
  *
  * How large? HGRID_INDEX_BOUND and HGRID_SCRATCH_BOUND are constants that are enough for every mesh with
- * that many triangles, with the default configuration; hgrid_sizes looks at the mesh, takes any
- * configuration and returns less. Where the system provides memory page by page (on Linux mmap, and
+ * that many triangles, with the default configuration; hgrid_bound takes any configuration, and hgrid_sizes with
+ * scratch plans the grid and returns the exact size. Where the system provides memory page by page (on Linux mmap, and
  * large blocks of aligned_alloc), an index that is too large costs addresses but no memory, because
  * pages that are never touched are never allocated. There, call hgrid_bound or hgrid_sizes without
  * scratch, build in that much, and copy the report's index_bytes to a smaller block if you like. With
@@ -205,7 +205,7 @@
 
 #ifndef HGRID_ALIGNED
 /**
- * Put in front of the declaration of an array, makes it a region:
+ * Write it before an array to align the array to 64 bytes, as regions must be:
  * `HGRID_ALIGNED static unsigned char memory[HGRID_INDEX_BOUND(1000)];`
  */
 #if defined(_MSC_VER)
@@ -221,8 +221,8 @@
 
 /**
  * Bytes of index that are enough for any mesh with so many triangles, wherever they lie, with the
- * default configuration: a constant expression. A scan takes half of it, and no mesh of finite triangles less
- * than three tenths.
+ * default configuration: a constant expression. A scan uses about half of it, and every mesh of finite triangles
+ * at least three tenths.
  * Where `size_t` has 32 bits the result wraps beyond 268 million triangles; `hgrid_bound` answers with an
  * error there.
  */
@@ -359,7 +359,7 @@
  * tasks fill their parts of the index side by side, and where there is less, one task builds. A tree has no
  * more than 2^31 triangles.
  *
- * The number 5 was that of a method that the library has no more: it is never used for another one.
+ * The number 5 belonged to a method that was removed, and is not used again.
  */
 #define HGRID_METHOD_BVH 6
 
@@ -516,7 +516,7 @@ typedef struct hgrid_mesh {
      */
     size_t index_stride;
     /**
-     * Number of triangles, at most 4294967294.
+     * Number of triangles, a third of the number of indices: at most 2^31 for a tree, 4294967294 for other methods.
      */
     size_t triangle_count;
     /**
@@ -1199,7 +1199,8 @@ typedef struct hgrid_shapes {
 
 /**
  * A grid, a tree of shapes or a scene that instances show, by the address of its view. `hgrid_object_grid`,
- * `hgrid_object_shapes` and `hgrid_object_scene` make it.
+ * `hgrid_object_shapes` and `hgrid_object_scene` make it. `HGRID_OBJECT_INIT`, which is all zeros, shows nothing: rays
+ * miss its instances.
  *
  * The view stays where it is, with all that it refers to, for as long as scenes that show it are queried.
  */
@@ -1764,8 +1765,9 @@ hgrid_status hgrid_bound(size_t triangle_count,
 /**
  * Tells how much memory a build of this mesh takes.
  *
- * Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
- * `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more
+ * Without scratch (NULL, 0) the report's `scratch_bytes` and `index_bytes` are enough for a build, and
+ * `is_exact` is 0. With bvh the answer is that of `hgrid_bound`: the triangles are not read, so a vertex number out of
+ * range is found by the build. The other methods take two passes over the triangles, or a few. How much more
  * than enough the index is depends on the method: for a scan up to 2 times with one level, 4 with
  * fixed, 6 with variable, 2 with bvh; with recursive it is a bound that no mesh comes near.
  *
@@ -2211,7 +2213,7 @@ bool hgrid_locate(const struct hgrid_grid *grid,
  * }
  * ```
  *
- * With `count` 0 nothing is done. Rays are read and hits are written in any order, and a
+ * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a
  * ray perhaps more than once, before its hit is written.
  *
  * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for
@@ -2355,7 +2357,7 @@ hgrid_status hgrid_open(const void *blob,
  * any more: they can be asked without harm, but answer anything.
  *
  * The leaves stay as they were built, so rays take longer the more the mesh changes. Remember `cost_before` of
- * the first refit after a build, and build anew once `cost_after` is well above it: times of rays grow
+ * the first refit after a build, and build anew once `cost_after` is well above it, say by half: times of rays grow
  * about as the cost does.
  *
  * A triangle that the build left out, because a coordinate was not finite, must not have become finite. Scenes that
@@ -2657,7 +2659,7 @@ bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
  *
  * Of the options `mask`, `skip`, `counters` and `scratch` are looked at; with counters the rays are traced one by one.
  *
- * With `count` 0 nothing is done. Rays are read and hits are written in any order, and a ray perhaps more than once,
+ * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a ray perhaps more than once,
  * before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are
  * for all rays.
  *
@@ -3061,7 +3063,7 @@ bool hgrid_scene_normal(const struct hgrid_scene *scene,
  * `filter` or `counters` the rays are traced one by one, in the order of the array: the filter is asked about all
  * hits of one ray before those of the next. Nested scenes are asked for each ray alone, too.
  *
- * With `count` 0 nothing is done. Rays are read and hits are written in any order, and a ray perhaps more
+ * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a ray perhaps more
  * than once, before its hit is written.
  *
  * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for all rays.
@@ -3320,6 +3322,11 @@ bool hgrid_has_method(uint32_t method);
  * Initialises a `hgrid_scene` with zeros: a view that is recognised and hits nothing.
  */
 #define HGRID_SCENE_INIT {{0}}
+
+/**
+ * Initialises a `hgrid_object` with zeros: an object that shows nothing.
+ */
+#define HGRID_OBJECT_INIT {{0}}
 
 #if defined(HGRID_MALLOC)
 /**

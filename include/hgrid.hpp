@@ -1403,7 +1403,8 @@ private:
 /// A built grid and its memory. The mesh stays the caller's, unless `keep` takes it over.
 ///
 /// It is a view, so it answers queries, and where a view is wanted it can be given; that view is good
-/// for as long as the grid is. Moving it does not move the memory.
+/// for as long as the grid is. Moving it does not move the memory, but it moves the view: make objects
+/// of scenes again that were made from it.
 class grid : public view {
 public:
     /// No grid; hits nothing.

@@ -72,7 +72,7 @@ pub unsafe extern "C" fn hgrid_open(
 /// any more: they can be asked without harm, but answer anything.
 ///
 /// The leaves stay as they were built, so rays take longer the more the mesh changes. Remember `cost_before` of
-/// the first refit after a build, and build anew once `cost_after` is well above it: times of rays grow
+/// the first refit after a build, and build anew once `cost_after` is well above it, say by half: times of rays grow
 /// about as the cost does.
 ///
 /// A triangle that the build left out, because a coordinate was not finite, must not have become finite. Scenes that

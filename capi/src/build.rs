@@ -109,8 +109,9 @@ pub unsafe extern "C" fn hgrid_bound(
 
 /// Tells how much memory a build of this mesh takes.
 ///
-/// Without scratch (NULL, 0) the answer takes two passes over the triangles, or a few: the report's
-/// `scratch_bytes` and `index_bytes` are enough for a build, and `is_exact` is 0. How much more
+/// Without scratch (NULL, 0) the report's `scratch_bytes` and `index_bytes` are enough for a build, and
+/// `is_exact` is 0. With bvh the answer is that of `hgrid_bound`: the triangles are not read, so a vertex number out of
+/// range is found by the build. The other methods take two passes over the triangles, or a few. How much more
 /// than enough the index is depends on the method: for a scan up to 2 times with one level, 4 with
 /// fixed, 6 with variable, 2 with bvh; with recursive it is a bound that no mesh comes near.
 ///

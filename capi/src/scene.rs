@@ -38,7 +38,8 @@ pub struct hgrid_instance {
 }
 
 /// A grid, a tree of shapes or a scene that instances show, by the address of its view. `hgrid_object_grid`,
-/// `hgrid_object_shapes` and `hgrid_object_scene` make it.
+/// `hgrid_object_shapes` and `hgrid_object_scene` make it. `HGRID_OBJECT_INIT`, which is all zeros, shows nothing: rays
+/// miss its instances.
 ///
 /// The view stays where it is, with all that it refers to, for as long as scenes that show it are queried.
 #[repr(C)]

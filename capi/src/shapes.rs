@@ -287,7 +287,7 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
 ///
 /// Of the options `mask`, `skip`, `counters` and `scratch` are looked at; with counters the rays are traced one by one.
 ///
-/// With `count` 0 nothing is done. Rays are read and hits are written in any order, and a ray perhaps more than once,
+/// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a ray perhaps more than once,
 /// before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are
 /// for all rays.
 ///

@@ -202,7 +202,7 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
 pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
     match status {
         HGRID_OK => c"success",
-        HGRID_ERROR_NULL_ARGUMENT => c"a pointer is NULL that may not be: an argument, an array of the mesh, or the configuration's run",
+        HGRID_ERROR_NULL_ARGUMENT => c"a pointer is NULL that may not be: an argument, an array of the mesh, or the configuration's run where tasks is above 1",
         HGRID_ERROR_STRUCT_SIZE => {
             c"wrong struct_size, or a reserved field that is not 0: use the struct's HGRID_..._INIT macro"
         }
@@ -213,14 +213,14 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
             c"overlapping memory: keep index, scratch and mesh apart, and answers off their rays"
         }
         HGRID_ERROR_INDEX_TOO_SMALL => {
-            c"index too small: bring the report's index_bytes, or what the call wrote to bytes"
+            c"index, room or views too small: bring the report's index_bytes, or what the call wrote to bytes"
         }
-        HGRID_ERROR_SCRATCH_TOO_SMALL => c"scratch too small: bring the report's scratch_bytes",
+        HGRID_ERROR_SCRATCH_TOO_SMALL => c"scratch too small: bring the report's scratch_bytes, or what the call's description asks for",
         HGRID_ERROR_OUT_OF_MEMORY => {
             c"out of memory: the report says how many bytes index and scratch need"
         }
         HGRID_ERROR_INVALID_POSITIONS => {
-            c"invalid positions: check vertex_count, and position_stride (0, or 12 and more)"
+            c"invalid positions: check vertex_count, and position_stride (0, or 12 and more); of boxes box_stride (0, or 24 and more)"
         }
         HGRID_ERROR_INVALID_INDICES => {
             c"invalid indices: check triangle_count, and index_stride (0, or three indices and more)"
@@ -228,17 +228,17 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_INVALID_INDEX_TYPE => {
             c"unknown index_type: use HGRID_INDEX_U32 or HGRID_INDEX_U16"
         }
-        HGRID_ERROR_TOO_MANY_TRIANGLES => c"more than 4294967294 triangles, or than memory has addresses for: split the mesh",
+        HGRID_ERROR_TOO_MANY_TRIANGLES => c"too many triangles, boxes or instances: more than 2^31 for a tree, 4294967294 for other methods, or than memory has addresses for",
         HGRID_ERROR_INDEX_OUT_OF_RANGE => {
-            c"a vertex number is out of range: repair the report's triangle"
+            c"a vertex number is vertex_count or more (numbers begin at 0): repair the report's triangle"
         }
         HGRID_ERROR_NON_FINITE => {
-            c"a coordinate is not finite: repair the report's triangle, or build without \
-              HGRID_BUILD_STRICT to leave it out"
+            c"a coordinate is not finite: repair the report's triangle; a build without \
+              HGRID_BUILD_STRICT leaves it out"
         }
         HGRID_ERROR_INVALID_MASKS => c"invalid masks: one for each triangle, and mask_stride 0, or 4 and more",
         HGRID_ERROR_INVALID_PARTS => c"invalid parts: join meshes with arrays of their own by hgrid_join, and change nothing of what it fills",
-        HGRID_ERROR_INVALID_METHOD => c"unknown method: use one of HGRID_METHOD_...",
+        HGRID_ERROR_INVALID_METHOD => c"unknown method, or one that builds no shapes and scenes (HGRID_METHOD_BVH does): use one of HGRID_METHOD_...",
         HGRID_ERROR_INVALID_DENSITY => {
             c"invalid density: above 0, and lower if the grid would become too fine or too large"
         }
@@ -267,21 +267,21 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_UNSUPPORTED_VERSION => c"a blob of another version: build it again",
         HGRID_ERROR_TRUNCATED => c"a truncated blob: bring all of its bytes",
         HGRID_ERROR_MESH_MISMATCH => {
-            c"a blob of another mesh: bring the mesh it was built for, or build it again"
+            c"a blob of another mesh, or of a scene with another number of instances: bring what it was built for, or build it again"
         }
         HGRID_ERROR_CANNOT_REFIT => c"a blob that cannot be refitted: only trees can, and before they are packed",
         HGRID_ERROR_OTHER_CONTENT => {
-            c"a blob of another kind: open grids with hgrid_open, shapes with hgrid_open_shapes, scenes with hgrid_open_scene"
+            c"a blob of another kind: open grids with hgrid_open, shapes with hgrid_open_shapes, scenes with hgrid_open_scene or, if packed, hgrid_open_packed_scene; shapes in a scene cannot be packed"
         }
         HGRID_ERROR_INSTANCE_OBJECT => {
             c"an instance names an object that does not exist: the report's triangle is its number"
         }
         HGRID_ERROR_INSTANCE_MATRIX => {
-            c"a matrix without an inverse: repair the instance that the report's triangle names"
+            c"an instance is not finite, has no inverse, or lies too far out: repair the one that the report's triangle names"
         }
         HGRID_ERROR_MISSING_OBJECTS => c"too few objects: bring those that the scene was built with",
         HGRID_ERROR_TOO_DEEP => c"too many scenes inside one another: HGRID_MAX_NESTING at most",
-        HGRID_ERROR_CORRUPT => c"a damaged blob, or one of another mesh: build it again",
+        HGRID_ERROR_CORRUPT => c"a damaged blob, or one of another mesh: build it again; or a scene whose objects changed: refit it",
         HGRID_ERROR_INVALID_RAYS => {
             c"invalid rays: check count; stride is 0 or at least sizeof(hgrid_ray), in scenes sizeof(hgrid_ray_f64)"
         }

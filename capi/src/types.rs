@@ -88,7 +88,7 @@ pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 /// tasks fill their parts of the index side by side, and where there is less, one task builds. A tree has no
 /// more than 2^31 triangles.
 ///
-/// The number 5 was that of a method that the library has no more: it is never used for another one.
+/// The number 5 belonged to a method that was removed, and is not used again.
 pub const HGRID_METHOD_BVH: u32 = 6;
 
 /// The quality of a tree by default: the shortest build, in which triangles are binned by their centres and the
@@ -154,7 +154,7 @@ pub struct hgrid_mesh {
     pub indices: *const c_void,
     /// Bytes from one triangle to the next, at least three indices; 0 means exactly three indices.
     pub index_stride: usize,
-    /// Number of triangles, at most 4294967294.
+    /// Number of triangles, a third of the number of indices: at most 2^31 for a tree, 4294967294 for other methods.
     pub triangle_count: usize,
     /// The first triangle's mask, a `uint32_t`, or NULL: queries with a mask of their own see a
     /// triangle if both have a bit in common. NULL means that every triangle has all bits.
@@ -441,6 +441,20 @@ impl hgrid_report {
         if let Some(sizes) = bound {
             self.scratch_bytes = sizes.scratch_bytes as u64;
         }
+    }
+
+    /// Does the same as [`note_error`](Self::note_error) for a build over shapes or instances, whose bound says how much
+    /// the other region needs.
+    pub(crate) const fn note_unbuilt(
+        &mut self,
+        error: Error,
+        bound: Option<Sizes>,
+    ) -> hgrid_status {
+        if let (Error::OutOfMemory { .. }, Some(sizes)) = (&error, bound) {
+            self.index_bytes = sizes.index_bytes as u64;
+            self.scratch_bytes = sizes.scratch_bytes as u64;
+        }
+        self.note_error(error)
     }
 
     /// Notes what was missing or which triangle is to blame, and passes the error on.

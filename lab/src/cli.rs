@@ -101,7 +101,7 @@ fn nearest_command(error: &clap::Error) -> Option<String> {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Renders a scene, with shadows and ambient occlusion; the command may be left out
-    #[command(after_help = [RENDER_EXAMPLES, REPORT_EXAMPLES, SCENES, &views()].join("\n\n"))]
+    #[command(after_help = [RENDER_EXAMPLES, SCENES, &views()].join("\n\n"))]
     Render(RenderArgs),
     /// Says what is in a mesh file or a blob
     #[command(after_help = INFO_EXAMPLES)]

@@ -27,6 +27,10 @@ const IN_LINE: usize = 24;
 /// If the scene cannot be loaded or built, or the file cannot be written.
 pub fn run(args: &PackArgs) -> Result<()> {
     check(args)?;
+    let same = |path: &Path| path.canonicalize().ok();
+    let is_input =
+        same(&args.output).is_some_and(|output| same(args.scene.as_ref()) == Some(output));
+    ensure!(!is_input, "`{}` would be overwritten by its own blob: name another file", args.scene);
     check_writable(&args.output)?;
     let scene = Scene::load(&args.scene)?;
     let cannot = || format!("cannot pack `{}`", args.scene);
@@ -58,7 +62,7 @@ fn check(args: &PackArgs) -> Result<()> {
     let (method, output) = (args.method, args.output.display());
     ensure!(
         args.density.is_none() || Parameters::new(method).density().is_some(),
-        "--density is not for {}, which has none",
+        "--density is not for {}, which has none: name another --method, or leave it out",
         method.name()
     );
     args.tuning.check("--method", &[method])?;

@@ -135,10 +135,32 @@ static void what_scenes_refuse(void)
     no_scene(HGRID_ERROR_OVERLAP, (const hgrid_instance *)index, 3, 3, NULL, index, INDEX_BYTES, extra,
              SCRATCH_BYTES);
 
-    /* A scene may have no instances. */
+    /* What one build reports is enough for the next. */
+    for (size_t offered = 0; offered < 2048; offered += 64)
+        for (size_t lent = 0; lent < 2; lent++) {
+            hgrid_shapes shown;
+            hgrid_scene made;
+            const size_t extra_bytes = lent * SCRATCH_BYTES;
+            if (hgrid_build_shapes(&boxes, NULL, index, offered, extra, extra_bytes, &shown, &report) != HGRID_OK)
+                EXPECT(HGRID_OK, hgrid_build_shapes(&boxes, NULL, index, (size_t)report.index_bytes, extra,
+                                                    (size_t)report.scratch_bytes, &shown, NULL));
+            if (hgrid_build_scene(three, 3, objects, 3, NULL, index, offered, extra, extra_bytes, &made, &report)
+                != HGRID_OK)
+                EXPECT(HGRID_OK, hgrid_build_scene(three, 3, objects, 3, NULL, index, (size_t)report.index_bytes,
+                                                   extra, (size_t)report.scratch_bytes, &made, NULL));
+        }
+
+    /* A scene may have no instances, and instances of nothing. */
     hgrid_scene empty;
     hgrid_scene_hit hit;
     const hgrid_ray_f64 ray = wide_ray(0.5, 0.5, 1);
+    const hgrid_object nothing[2] = {HGRID_OBJECT_INIT, HGRID_OBJECT_INIT};
+    uint64_t packed_bytes;
+    EXPECT(HGRID_OK, hgrid_build_scene(three, 3, nothing, 2, NULL, index, INDEX_BYTES, extra, SCRATCH_BYTES, &empty,
+                                       NULL));
+    CHECK(!hgrid_intersect_scene(&empty, &ray, NULL, &hit));
+    void *packed = guarded(4096);
+    EXPECT(HGRID_OK, hgrid_pack_scene(&empty, packed, 4096, &packed_bytes));
     EXPECT(HGRID_OK, hgrid_build_scene(NULL, 0, NULL, 0, NULL, index, HGRID_SCENE_BOUND(0), extra, SCRATCH_BYTES,
                                        &empty, NULL));
     CHECK(!hgrid_intersect_scene(&empty, &ray, NULL, &hit));

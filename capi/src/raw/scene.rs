@@ -136,8 +136,9 @@ pub(crate) unsafe fn build_scene(
     let built = controlled(caller, |control| {
         Scene::build_with(instances, objects, &config, index, scratch, control)
     });
-    let built = built.map_err(|error| report.note_error(error))?;
-    report.note_built(built.blob(), Scene::bound(built.instance_count(), &config));
+    let bound = u32::try_from(instances.len()).ok().and_then(|count| Scene::bound(count, &config));
+    let built = built.map_err(|error| report.note_unbuilt(error, bound))?;
+    report.note_built(built.blob(), bound);
     report.reference_count = built.instance_count();
     // SAFETY: the caller's promise.
     unsafe { write_scene(to, &built) };

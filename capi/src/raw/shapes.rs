@@ -131,8 +131,9 @@ pub(crate) unsafe fn build_shapes(
     let [index, scratch] = unsafe { apart(inputs, memory) }?;
     let built =
         controlled(caller, |control| Shapes::build_with(boxes, &config, index, scratch, control));
-    let built = built.map_err(|error| report.note_error(error))?;
-    report.note_built(built.blob(), Sizes::bound(boxes.count(), &config));
+    let bound = Sizes::bound(boxes.count(), &config);
+    let built = built.map_err(|error| report.note_unbuilt(error, bound))?;
+    report.note_built(built.blob(), bound);
     report.skipped_count = built.skipped_count();
     report.reference_count = built.count() - built.skipped_count();
     // SAFETY: the caller's promise.

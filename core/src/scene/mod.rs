@@ -49,17 +49,19 @@ impl<F: Fn(u32, &Ray) -> Option<ShapeHit> + Sync> ObjectTest for F {
 }
 
 /// An object that instances show.
+// The C library lends these as `hgrid_object`, of which bytes that are all zero are `Nothing`.
+#[repr(usize)]
 #[derive(Clone, Copy, Default)]
 pub enum Object<'a> {
+    /// Nothing that a ray could hit: an object that is not there yet.
+    #[default]
+    Nothing = 0,
     /// A grid of triangles, by any method.
     Grid(&'a Grid<'a>),
     /// Shapes, and the test for them.
     Shapes(&'a Shapes<'a>, &'a dyn ObjectTest),
     /// A scene.
     Scene(&'a Scene<'a>),
-    /// Nothing that a ray could hit: an object that is not there yet.
-    #[default]
-    Nothing,
 }
 
 impl fmt::Debug for Object<'_> {

@@ -14,7 +14,7 @@ use zerocopy::IntoBytes;
 use super::instance::{Instance, StoredInstance};
 use super::{Object, Scene, Table};
 use crate::arena::{Sizes, align_up, check_alignment, section_bytes, split, split_mut};
-use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::blob::{Header, corrupt};
 use crate::config::Config;
 use crate::control::Control;
 use crate::error::{Error, Region};
@@ -150,11 +150,8 @@ impl<'a> Scene<'a> {
         config.check_tree()?;
         check_alignment(index, Region::Index)?;
         levels_over(objects)?;
-        let count = instances.len() as u64;
-        if u32::try_from(count).is_err() {
-            return Err(Error::TooManyTriangles);
-        }
-        let (behind, available_bytes) = (behind_bytes(count), index.len() as u64);
+        let count = u32::try_from(instances.len()).map_err(|_| Error::TooManyTriangles)?;
+        let (behind, available_bytes) = (behind_bytes(count.into()), index.len() as u64);
         let short = |tree: u64| Error::OutOfMemory {
             region: Region::Index,
             needed_bytes: align_up(tree).saturating_add(behind),
@@ -164,7 +161,9 @@ impl<'a> Scene<'a> {
         // Put boxes and instances at the end of the index, and the tree at its start.
         let space = usize::try_from(behind).ok();
         let room = (index.len() & !(ALIGNMENT - 1)).checked_sub(space.unwrap_or(usize::MAX));
-        let room = room.ok_or(short(HEADER_BYTES as u64))?;
+        // How large the tree gets shows only while it is built: ask for what is always enough.
+        let most = Self::bound(count, config).map_or(u64::MAX, |sizes| sizes.index_bytes as u64);
+        let room = room.ok_or(short(most.saturating_sub(behind)))?;
         let (head, tail) = index.split_at_mut_checked(room).ok_or(short(0))?;
         let boxes = fill(tail, instances, objects, short(0))?;
         let tree = Grid::build_with(boxes, config, head, scratch, control);

@@ -79,7 +79,7 @@ impl RenderArgs {
     pub fn check(&self) -> Result<()> {
         ensure!(
             self.density.is_none() || self.config().parameters.density().is_some(),
-            "--density is not for {}, which has none",
+            "--density is not for {}, which has none: name another --method, or leave it out",
             self.method.name()
         );
         self.tuning.check("--method", &[self.method])?;

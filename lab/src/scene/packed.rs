@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
-use hgrid_core::Grid;
+use anyhow::{Context as _, Result, ensure};
+use hgrid_core::{BlobInfo, Content, Grid};
 
 use super::Mesh;
 use crate::blob::Blob;
@@ -14,6 +14,11 @@ use crate::blob::Blob;
 /// If the file is no blob of this version, or has no mesh.
 pub(super) fn load(path: &Path) -> Result<Mesh> {
     let blob = Blob::read(path)?;
+    let content = BlobInfo::peek(blob.bytes())?.content;
+    ensure!(
+        content != Content::Packed,
+        "it is a packed scene, which only `hgrid info` and `hgrid validate` take"
+    );
     let grid = Grid::open_packed(blob.bytes()).context("it cannot be opened")?;
     let mesh = grid.mesh();
     let (vertices, _) = mesh.positions().bytes.as_chunks::<12>();
