@@ -357,9 +357,22 @@ impl Kernel for UnitsTask<'_> {
         let Self { work, range, entries, spare, ids, nodes, child, counts } = self;
         let BuildInputs { mesh, least, sizes, shift } = *work;
         let first = range.start as u32;
-        let subtree = &mut Subtree::new();
-        let mut roots =
-            Roots::new(mesh, least, entries, spare, ids, first, nodes, child, counts, subtree);
+        let mut roots = Roots {
+            mesh,
+            least,
+            entries,
+            spare,
+            ids,
+            first,
+            nodes,
+            child,
+            counts,
+            subtree: &mut Subtree::new(),
+            level: SimdLevel::detect(),
+            node_count: 0,
+            root_count: 0,
+            last: RootRecord::new_zeroed(),
+        };
         let units = Units::new(sizes).skip_while(|unit| unit.start < range.start);
         for unit in units.take_while(|unit| unit.start < range.end) {
             roots.unit(unit.start - range.start..unit.end - range.start, shift, 0);
