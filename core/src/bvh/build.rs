@@ -209,7 +209,7 @@ fn build_in(
     // Find the box, then every triangle's key.
     watch.at(CENSUS)?;
     let census = find_keys(mesh, flags, keys, counts, bits, control)?;
-    let Census { finite, skipped, bounds } = census;
+    let Census { finite, bounds } = census;
 
     // Give each bin its place, and each task its place in it.
     watch.at(SCATTER)?;
@@ -243,11 +243,27 @@ fn build_in(
     watch.at(TOP)?;
     let made = work.top(entries, spare, nodes, &made);
     let (node_count, levels) = made.ok_or(index_error(fast_bound(triangles, 1).0))?;
+    finish(mesh, Quality::Fast, scene, index, finite, node_count, levels)
+}
+
+/// Ends a build: checks that the index, if there is one, holds the tree, puts zeros behind it and returns its header.
+pub(super) fn finish(
+    mesh: &TriangleMesh<'_>,
+    quality: Quality,
+    scene: Aabb,
+    index: Option<&mut [u8]>,
+    finite: u32,
+    node_count: u32,
+    levels: u32,
+) -> Result<Header, Error> {
     let needed_bytes = index_bytes(finite.into(), node_count.into());
     if let Some(index) = index {
-        if needed_bytes > index_available {
-            return Err(index_error(needed_bytes));
+        let available_bytes = index.len() as u64;
+        if needed_bytes > available_bytes {
+            let region = Region::Index;
+            return Err(Error::OutOfMemory { region, needed_bytes, available_bytes });
         }
+        let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
         let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
         let padding = index.get_mut(used..needed_bytes as usize);
         if let Some(padding) = padding.or_bug("nodes behind the end of the index") {
@@ -255,8 +271,8 @@ fn build_in(
         }
     }
     let lattice = Lattice::new(scene, [1; 3]);
-    let mut header = Header::new(Parameters::Bvh { quality: Quality::Fast }, mesh, &lattice);
-    header.skipped_count = skipped;
+    let mut header = Header::new(Parameters::Bvh { quality }, mesh, &lattice);
+    header.skipped_count = mesh.triangle_count() - finite;
     header.reference_count = finite;
     header.node_count = node_count;
     header.levels = levels;
@@ -266,7 +282,7 @@ fn build_in(
 
 /// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
 /// axis has an inverse direction that is finite ([`slab`](super::slab)).
-pub(super) const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
+const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
 
 /// The smallest box of a scene that steps are made for.
 pub(crate) fn least_node(scene: &Aabb) -> f32 {

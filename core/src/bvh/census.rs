@@ -29,8 +29,6 @@ use super::key::{KEY_BITS, Keys, NO_KEY};
 pub(crate) struct Census {
     /// Triangles that go into the tree.
     pub(crate) finite: u32,
-    /// Triangles left out because a coordinate is not finite.
-    pub(crate) skipped: u32,
     /// The box around those in the tree.
     pub(crate) bounds: Aabb,
 }
@@ -76,19 +74,18 @@ pub(crate) fn count(
         KeysTask { mesh, flags, rule, first, keys, counts, shift: KEY_BITS - bits, skipped, bounds }
     });
     let level = SimdLevel::detect();
-    let mut census = Census { finite: 0, skipped: 0, bounds: Aabb::EMPTY };
+    let mut census = Census { finite: mesh.triangle_count(), bounds: Aabb::EMPTY };
     run(
         control,
         parts,
         |part| dispatch(level, part),
         |result| {
             let (skipped, bounds) = result?;
-            census.skipped += skipped;
+            census.finite -= skipped;
             census.bounds = census.bounds.union(&bounds);
             Ok(())
         },
     )?;
-    census.finite = mesh.triangle_count() - census.skipped;
     Ok(census)
 }
 

@@ -31,6 +31,7 @@ use fearless_simd::Simd;
 use glam::Vec3A;
 use zerocopy::transmute;
 
+use super::build::{finish, least_node};
 use super::census::{share, take};
 use super::layout::index_bytes;
 use super::node::Node;
@@ -38,7 +39,7 @@ use crate::aabb::Aabb;
 use crate::arena::{section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
-use crate::config::{BuildFlags, Parameters};
+use crate::config::BuildFlags;
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
 use crate::invariant::OrBug;
@@ -76,9 +77,6 @@ const DONE: f32 = 0.98;
 
 /// No task has fewer triangles.
 const LEAST_TASK: usize = 4096;
-
-/// No step of a node is smaller than that of a box of this part of the scene's extent.
-const LEAST_NODE: f32 = super::build::LEAST_NODE;
 
 /// Builds everything but the header, which it returns. Without an index it only computes the size.
 #[inline(never)]
@@ -129,34 +127,12 @@ pub(super) fn build_in(
     // Make the nodes.
     watch.at(TOP)?;
     let scene = Lattice::pad(&bounds);
-    let extent = scene.size().max_element();
-    let work = HighInputs { least: extent * LEAST_NODE, unit: inverse_power(extent), tasks };
+    let unit = inverse_power(scene.size().max_element());
+    let work = HighInputs { least: least_node(&scene), unit, tasks };
     let (node_count, levels) = work.make(items, ids, nodes, control, watch)?;
 
     watch.at(DONE)?;
-    let needed_bytes = index_bytes(finite as u64, node_count.into());
-    if let Some(index) = index {
-        if needed_bytes > index_available {
-            return Err(Error::OutOfMemory {
-                region: Region::Index,
-                needed_bytes,
-                available_bytes: index_available,
-            });
-        }
-        let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
-        let padding = index.get_mut(used..needed_bytes as usize);
-        if let Some(padding) = padding.or_bug("nodes behind the end of the index") {
-            padding.fill(0);
-        }
-    }
-    let lattice = Lattice::new(scene, [1; 3]);
-    let mut header = Header::new(Parameters::Bvh { quality: Quality::High }, mesh, &lattice);
-    header.skipped_count = triangles - finite as u32;
-    header.reference_count = finite as u32;
-    header.node_count = node_count;
-    header.levels = levels;
-    header.blob_bytes = needed_bytes;
-    Ok(header)
+    finish(mesh, Quality::High, scene, index, finite as u32, node_count, levels)
 }
 
 /// A power of two near the inverse of a length.
