@@ -79,6 +79,18 @@ impl Node {
         bounds: [[0xff; WIDTH], [0xff; WIDTH], [0xff; WIDTH], [0; WIDTH], [0; WIDTH], [0; WIDTH]],
     };
 
+    /// A node that waits for its children: the range that it will hold, and the levels above it.
+    pub(crate) fn waiting(start: u32, end: u32, level: u32) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "below 64")]
+        let counts = [level as u8, 0, 0, 0, 0, 0, 0, 0];
+        Self { word: WAITING, child: start, first: end, counts, ..Self::EMPTY }
+    }
+
+    /// Returns the range of a node that waits, and the levels above it.
+    pub(crate) fn waiter(&self) -> Option<[u32; 3]> {
+        (self.word == WAITING).then_some([self.child, self.first, self.counts[0].into()])
+    }
+
     /// Returns the position of bound 0.
     #[inline(always)]
     pub(crate) const fn origin(&self) -> [f32; 3] {
@@ -236,6 +248,9 @@ impl Kernel for SetBoxes<'_> {
         self.node.set_sides(simd, bounds, &children, self.least);
     }
 }
+
+/// The exponents of a node that waits for its children; no other node has them.
+const WAITING: u32 = 0;
 
 /// The map from the sides of a box to bytes: the three low ones, then the three high ones, mirrored.
 struct Quantiser<S: Simd> {

@@ -93,22 +93,6 @@ impl SubRange {
     }
 }
 
-/// The exponents of a node that waits for its children; no other node has them.
-pub(super) const WAITING: u32 = 0;
-
-/// A node that waits: the range it will hold, and the levels above it.
-fn waiting(job: &Job) -> Node {
-    #[expect(clippy::cast_possible_truncation, reason = "below 64")]
-    let level = job.level as u8;
-    Node {
-        word: WAITING,
-        child: job.start,
-        first: job.end,
-        counts: [level, 0, 0, 0, 0, 0, 0, 0],
-        ..Node::EMPTY
-    }
-}
-
 impl Kernel for Grow<'_> {
     type Output = Grown;
 
@@ -163,7 +147,9 @@ impl Kernel for Grow<'_> {
                 let below = Job { place: place + 1, start, end, level: job.level + 1 };
                 // Too little room for nodes is legal: they are counted.
                 match self.nodes.get_mut(place as usize) {
-                    Some(node) if part.count() <= self.wait => *node = waiting(&below),
+                    Some(node) if part.count() <= self.wait => {
+                        *node = Node::waiting(start, end, below.level);
+                    }
                     _ => {
                         if let Some(slot) = stack.get_mut(jobs).or_bug("too many jobs wait") {
                             *slot = below;
@@ -304,8 +290,7 @@ impl Cursor {
             level[0] += 1;
             // A node for which there was no room is legal: its range did not wait.
             let Some(node) = nodes.get(place as usize) else { continue };
-            if node.word == WAITING {
-                let (start, end, level) = (node.child, node.first, u32::from(node.counts[0]));
+            if let Some([start, end, level]) = node.waiter() {
                 return Some(Waiter { place, start, end, level });
             }
             let below = [node.child, node.child + node.inner().count_ones()];
