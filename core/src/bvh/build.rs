@@ -577,8 +577,8 @@ struct TaskTotals {
     last: RootRecord,
 }
 
-/// Moves elements to an earlier place.
-fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
+/// Moves elements to an earlier place; nothing where there are none. (`copy_within` can panic.)
+pub(super) fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
     debug_assert!(to <= from.start && from.end <= elements.len(), "elements move past an end");
     for (at, to) in from.zip(to..) {
         let Some(&element) = elements.get(at) else { return };

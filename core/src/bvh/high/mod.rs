@@ -31,7 +31,7 @@ use fearless_simd::Simd;
 use glam::Vec3A;
 use zerocopy::transmute;
 
-use super::build::{finish, least_node};
+use super::build::{finish, least_node, move_down};
 use super::census::{share, take};
 use super::layout::index_bytes;
 use super::node::Node;
@@ -186,7 +186,7 @@ fn boxes(
         let first = share(all, task, tasks);
         // Move the items of a task down over the places that earlier tasks left empty.
         if finite < first {
-            move_down(items, first, count, finite);
+            move_down(items, first..first + count, finite);
         }
         finite += count;
     }
@@ -224,17 +224,6 @@ impl Kernel for ItemsTask<'_> {
             }
         }
         Ok((count, bounds))
-    }
-}
-
-/// Copies elements to a place before them; nothing where there are none. (`copy_within` can panic.)
-fn move_down<T: Copy>(all: &mut [T], from: usize, count: usize, to: usize) {
-    debug_assert!(to <= from && from + count <= all.len(), "elements move past an end");
-    for at in 0..count {
-        let element = all.get(from + at).copied();
-        if let (Some(element), Some(slot)) = (element, all.get_mut(to + at)) {
-            *slot = element;
-        }
     }
 }
 
@@ -421,15 +410,15 @@ impl HighInputs {
                 let behind = items.get(waiter.start as usize..).unwrap_or_default();
                 let record = behind.first_chunk::<RECORD>().or_bug("a range without a record");
                 let Some(record) = record else { break };
-                let RangeRecord { mut root, nodes: below, levels: levels_of, .. } =
-                    transmute!(*record);
+                let RangeRecord { mut root, nodes: below, levels: most, .. } = transmute!(*record);
                 let moved = child - count;
                 if moved > 0 {
                     let from = child as usize..(child + below) as usize;
-                    for node in nodes.get_mut(from).or_bug("too many nodes").unwrap_or_default() {
+                    let of_range = nodes.get_mut(from.clone()).or_bug("too many nodes");
+                    for node in of_range.unwrap_or_default() {
                         node.child -= moved;
                     }
-                    move_down(nodes, child as usize, below as usize, count as usize);
+                    move_down(nodes, from, count as usize);
                 }
                 root.child -= moved;
                 if let Some(slot) = nodes.get_mut(waiter.place as usize).or_bug("no such node") {
@@ -437,7 +426,7 @@ impl HighInputs {
                 }
                 child += below;
                 count += below;
-                levels = levels.max(levels_of);
+                levels = levels.max(most);
             }
         }
         Ok((count, levels))
