@@ -44,7 +44,7 @@ use super::subtree::Subtree;
 use super::top::{self, ITEM, RootItem, Top};
 use super::units::{SEAM, Units, is_seam};
 use crate::aabb::Aabb;
-use crate::arena::{Sizes, section_bytes, split_mut, whole};
+use crate::arena::{Sizes, first_mut, section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
 use crate::config::{BuildFlags, Parameters};
@@ -110,11 +110,7 @@ pub(crate) fn build<'a>(
 ) -> Result<&'a [u8], Error> {
     check_count(mesh)?;
     let header = header_of(mesh, quality, flags, Some(&mut *index), scratch, control, watch)?;
-    let available_bytes = index.len() as u64;
-    let needed_bytes = header.blob_bytes;
-    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
-    let blob = usize::try_from(needed_bytes).ok().and_then(|bytes| index.get_mut(..bytes));
-    let blob = blob.ok_or(too_small)?;
+    let blob = first_mut(index, header.blob_bytes, Region::Index)?;
     if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>().or_bug("a blob without a header") {
         *head = header.to_bytes();
     }
@@ -156,16 +152,11 @@ fn build_in(
     let triangles = mesh.triangle_count();
     let all = u64::from(triangles);
     let index_available = index.as_ref().map_or(0, |index| index.len()) as u64;
-    let index_error = |needed_bytes: u64| Error::OutOfMemory {
-        region: Region::Index,
-        needed_bytes,
-        available_bytes: index_available,
-    };
+    let index_error = |needed| Error::out_of_memory(Region::Index, needed, index_available);
     let available_bytes = scratch.len() as u64;
     // Report the need of a whole `spare`: only the census, below, shows whether bins are crowded.
     let needed_bytes = scratch_bytes(all, 1, all);
-    let scratch_error =
-        Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
+    let scratch_error = Error::out_of_memory(Region::Scratch, needed_bytes, available_bytes);
 
     // Fewer tasks where there is no memory for more.
     let mut tasks = task_count(control, triangles as usize / SEAM);
@@ -258,15 +249,10 @@ pub(super) fn finish(
 ) -> Result<Header, Error> {
     let needed_bytes = index_bytes(finite.into(), node_count.into());
     if let Some(index) = index {
-        let available_bytes = index.len() as u64;
-        if needed_bytes > available_bytes {
-            let region = Region::Index;
-            return Err(Error::OutOfMemory { region, needed_bytes, available_bytes });
-        }
+        let blob = first_mut(index, needed_bytes, Region::Index)?;
         let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
         let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
-        let padding = index.get_mut(used..needed_bytes as usize);
-        if let Some(padding) = padding.or_bug("nodes behind the end of the index") {
+        if let Some(padding) = blob.get_mut(used..).or_bug("nodes behind the end of the index") {
             padding.fill(0);
         }
     }

@@ -36,7 +36,7 @@ use super::census::{share, take};
 use super::layout::index_bytes;
 use super::node::Node;
 use crate::aabb::Aabb;
-use crate::arena::{section_bytes, split_mut, whole};
+use crate::arena::{first_mut, section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
 use crate::config::BuildFlags;
@@ -91,10 +91,7 @@ pub(super) fn build_in(
     let triangles = mesh.triangle_count();
     let index_available = index.as_ref().map_or(0, |index| index.len()) as u64;
     let (index_bound, needed_bytes) = bound(triangles);
-    let available_bytes = scratch.len() as u64;
-    if available_bytes < needed_bytes {
-        return Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes });
-    }
+    let scratch = first_mut(scratch, needed_bytes, Region::Scratch)?;
     let items =
         match split_mut::<TriangleItem>(scratch, triangles.into()).or_bug("too little scratch") {
             Some((items, _)) => items,
