@@ -30,12 +30,8 @@ impl Sizes {
         let largest = if is_exact { u64::MAX } else { isize::MAX.unsigned_abs() as u64 };
         let index_bytes = index_bytes.min(largest);
         let fit = |needed_bytes: u64, region| {
-            let available_bytes = usize::MAX as u64;
-            usize::try_from(needed_bytes).map_err(|_| Error::OutOfMemory {
-                region,
-                needed_bytes,
-                available_bytes,
-            })
+            let too_small = Error::out_of_memory(region, needed_bytes, usize::MAX as u64);
+            usize::try_from(needed_bytes).map_err(|_| too_small)
         };
         Ok(Self {
             index_bytes: fit(index_bytes, Region::Index)?,
@@ -91,6 +87,12 @@ impl Block {
 pub(crate) fn check_alignment(bytes: &[u8], region: Region) -> Result<(), Error> {
     let is_aligned = bytes.is_empty() || bytes.as_ptr().addr().is_multiple_of(ALIGNMENT);
     if is_aligned { Ok(()) } else { Err(Error::Misaligned { region }) }
+}
+
+/// The first bytes of a region, as many as a call needs.
+pub(crate) fn first_mut(bytes: &mut [u8], needed: u64, region: Region) -> Result<&mut [u8], Error> {
+    let too_small = Error::out_of_memory(region, needed, bytes.len() as u64);
+    usize::try_from(needed).ok().and_then(|end| bytes.get_mut(..end)).ok_or(too_small)
 }
 
 /// The next multiple of [`ALIGNMENT`].

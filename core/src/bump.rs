@@ -8,7 +8,7 @@
 //! blob | header | fixed sections, if any | pool of words, list after list ->     | padding |
 //! ```
 
-use crate::arena::{section_bytes, whole};
+use crate::arena::{first_mut, section_bytes, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::error::{ConfigField, Error, Region};
 use crate::invariant::OrBug;
@@ -58,13 +58,10 @@ impl<'a> Bump<'a> {
 /// Ends a build: puts the header in front of the pool and zeros behind it, and returns the blob; or
 /// says what the index would have needed.
 pub(crate) fn finish(index: &mut [u8], header: Header) -> Result<&[u8], Error> {
-    let (needed_bytes, available_bytes) = (header.blob_bytes, index.len() as u64);
-    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
-    let bytes = usize::try_from(needed_bytes).ok();
-    let blob = bytes.and_then(|bytes| index.get_mut(..bytes)).ok_or(too_small)?;
+    let blob = first_mut(index, header.blob_bytes, Region::Index)?;
     let words = u64::from(header.reference_count);
     let padding = section_bytes::<u32>(words) - words * size_of::<u32>() as u64;
-    let padding = usize::try_from(padding).ok().and_then(|padding| bytes?.checked_sub(padding));
+    let padding = usize::try_from(padding).ok().and_then(|padding| blob.len().checked_sub(padding));
     let padding = padding.and_then(|start| blob.get_mut(start..));
     if let Some(padding) = padding.or_bug("padding before the blob") {
         padding.fill(0);

@@ -279,4 +279,15 @@ impl fmt::Display for Error {
     }
 }
 
+impl Error {
+    /// A region with fewer bytes than a call needs.
+    pub(crate) const fn out_of_memory(
+        region: Region,
+        needed_bytes: u64,
+        available_bytes: u64,
+    ) -> Self {
+        Self::OutOfMemory { region, needed_bytes, available_bytes }
+    }
+}
+
 impl core::error::Error for Error {}

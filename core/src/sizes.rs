@@ -189,10 +189,8 @@ fn fits(
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
     let needed = sizes(mesh, config, scratch)?;
-    let missing = |region, needed: usize, available: usize| Error::OutOfMemory {
-        region,
-        needed_bytes: needed as u64,
-        available_bytes: available as u64,
+    let missing = |region, needed: usize, available: usize| {
+        Error::out_of_memory(region, needed as u64, available as u64)
     };
     // Their bounds say nothing of what a mesh takes.
     let has_pool = !matches!(config.method(), Method::OneLevel | Method::Fixed);

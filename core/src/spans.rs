@@ -49,23 +49,45 @@ impl<S: Simd> Spans<S> {
         mesh: &WideMesh<'_>,
         first: u32,
     ) -> ([Span<S>; 3], mask32x8<S>) {
-        let low = four(simd, mesh, first);
-        let high = four(simd, mesh, first.wrapping_add(4));
-        let a = Corners::join(low[0], high[0]);
-        let b = Corners::join(low[1], high[1]);
-        let c = Corners::join(low[2], high[2]);
-        let limit = u32x8::splat(simd, MAX_COORDINATE.to_bits());
-        let is_finite = a.largest().max(b.largest()).max(c.largest()).simd_le(limit);
+        let ([a, b, c], is_finite) = eight(simd, mesh, first);
         let [x, y, z] = &self.axes;
-        let spans =
-            [x.span(simd, a.x, b.x, c.x), y.span(simd, a.y, b.y, c.y), z.span(simd, a.z, b.z, c.z)];
+        let spans = [
+            x.span(simd, a[0], b[0], c[0]),
+            y.span(simd, a[1], b[1], c[1]),
+            z.span(simd, a[2], b[2], c[2]),
+        ];
         (spans, is_finite)
     }
 }
 
+/// The corners of eight triangles that follow one another, by corner and axis, and for which of the triangles all of them
+/// are finite.
+#[inline(always)]
+pub(crate) fn eight<S: Simd>(
+    simd: S,
+    mesh: &WideMesh<'_>,
+    first: u32,
+) -> ([[f32x8<S>; 3]; 3], mask32x8<S>) {
+    let ([a, b, c], [d, e, f]) = (four(simd, mesh, first), four(simd, mesh, first.wrapping_add(4)));
+    let (a, b, c) = (join(a, d), join(b, e), join(c, f));
+    let limit = u32x8::splat(simd, MAX_COORDINATE.to_bits());
+    let is_finite = largest(a).max(largest(b)).max(largest(c)).simd_le(limit);
+    ([a, b, c], is_finite)
+}
+
+/// The largest magnitudes, as the bits that they have: those of what is not finite or no number
+/// are larger than all others.
+#[inline(always)]
+fn largest<S: Simd>([x, y, z]: [f32x8<S>; 3]) -> u32x8<S> {
+    let x = x.bitcast::<u32x8<S>>() & 0x7fff_ffff;
+    let y = y.bitcast::<u32x8<S>>() & 0x7fff_ffff;
+    let z = z.bitcast::<u32x8<S>>() & 0x7fff_ffff;
+    x.max(y).max(z)
+}
+
 /// The corners of four triangles that follow one another, by corner and axis.
 #[inline(always)]
-pub(crate) fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4<S>; 3]; 3] {
+fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4<S>; 3]; 3] {
     if let Some([a, b, c, d]) = mesh.four(first) {
         let row = |row: &RowBytes| load(simd, row);
         return [
@@ -124,32 +146,6 @@ impl<S: Simd> AxisScale<S> {
     fn whole(&self, simd: S, position: f32x8<S>) -> u32x8<S> {
         let clamped = position.greater(f32x8::splat(simd, 0.0)).lesser(self.end);
         (clamped - 0.5 + WHOLE_SHIFT).bitcast::<u32x8<S>>() & WHOLE_BITS
-    }
-}
-
-/// One corner of eight triangles.
-#[derive(Clone, Copy)]
-pub(crate) struct Corners<S: Simd> {
-    pub(crate) x: f32x8<S>,
-    pub(crate) y: f32x8<S>,
-    pub(crate) z: f32x8<S>,
-}
-
-impl<S: Simd> Corners<S> {
-    #[inline(always)]
-    pub(crate) fn join(low: [f32x4<S>; 3], high: [f32x4<S>; 3]) -> Self {
-        let [x, y, z] = join(low, high);
-        Self { x, y, z }
-    }
-
-    /// The largest magnitudes, as the bits that they have: those of what is not finite or no number
-    /// are larger than all others.
-    #[inline(always)]
-    pub(crate) fn largest(self) -> u32x8<S> {
-        let x = self.x.bitcast::<u32x8<S>>() & 0x7fff_ffff;
-        let y = self.y.bitcast::<u32x8<S>>() & 0x7fff_ffff;
-        let z = self.z.bitcast::<u32x8<S>>() & 0x7fff_ffff;
-        x.max(y).max(z)
     }
 }
 

@@ -44,7 +44,7 @@ use super::subtree::Subtree;
 use super::top::{self, ITEM, RootItem, Top};
 use super::units::{SEAM, Units, is_seam};
 use crate::aabb::Aabb;
-use crate::arena::{Sizes, section_bytes, split_mut, whole};
+use crate::arena::{Sizes, first_mut, section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
 use crate::config::{BuildFlags, Parameters};
@@ -110,11 +110,7 @@ pub(crate) fn build<'a>(
 ) -> Result<&'a [u8], Error> {
     check_count(mesh)?;
     let header = header_of(mesh, quality, flags, Some(&mut *index), scratch, control, watch)?;
-    let available_bytes = index.len() as u64;
-    let needed_bytes = header.blob_bytes;
-    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
-    let blob = usize::try_from(needed_bytes).ok().and_then(|bytes| index.get_mut(..bytes));
-    let blob = blob.ok_or(too_small)?;
+    let blob = first_mut(index, header.blob_bytes, Region::Index)?;
     if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>().or_bug("a blob without a header") {
         *head = header.to_bytes();
     }
@@ -156,16 +152,11 @@ fn build_in(
     let triangles = mesh.triangle_count();
     let all = u64::from(triangles);
     let index_available = index.as_ref().map_or(0, |index| index.len()) as u64;
-    let index_error = |needed_bytes: u64| Error::OutOfMemory {
-        region: Region::Index,
-        needed_bytes,
-        available_bytes: index_available,
-    };
+    let index_error = |needed| Error::out_of_memory(Region::Index, needed, index_available);
     let available_bytes = scratch.len() as u64;
     // Report the need of a whole `spare`: only the census, below, shows whether bins are crowded.
     let needed_bytes = scratch_bytes(all, 1, all);
-    let scratch_error =
-        Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
+    let scratch_error = Error::out_of_memory(Region::Scratch, needed_bytes, available_bytes);
 
     // Fewer tasks where there is no memory for more.
     let mut tasks = task_count(control, triangles as usize / SEAM);
@@ -209,7 +200,7 @@ fn build_in(
     // Find the box, then every triangle's key.
     watch.at(CENSUS)?;
     let census = find_keys(mesh, flags, keys, counts, bits, control)?;
-    let Census { finite, skipped, bounds } = census;
+    let Census { finite, bounds } = census;
 
     // Give each bin its place, and each task its place in it.
     watch.at(SCATTER)?;
@@ -243,20 +234,31 @@ fn build_in(
     watch.at(TOP)?;
     let made = work.top(entries, spare, nodes, &made);
     let (node_count, levels) = made.ok_or(index_error(fast_bound(triangles, 1).0))?;
+    finish(mesh, Quality::Fast, scene, index, finite, node_count, levels)
+}
+
+/// Ends a build: checks that the index, if there is one, holds the tree, puts zeros behind it and returns its header.
+pub(super) fn finish(
+    mesh: &TriangleMesh<'_>,
+    quality: Quality,
+    scene: Aabb,
+    index: Option<&mut [u8]>,
+    finite: u32,
+    node_count: u32,
+    levels: u32,
+) -> Result<Header, Error> {
     let needed_bytes = index_bytes(finite.into(), node_count.into());
     if let Some(index) = index {
-        if needed_bytes > index_available {
-            return Err(index_error(needed_bytes));
-        }
+        let blob = first_mut(index, needed_bytes, Region::Index)?;
+        let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
         let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
-        let padding = index.get_mut(used..needed_bytes as usize);
-        if let Some(padding) = padding.or_bug("nodes behind the end of the index") {
+        if let Some(padding) = blob.get_mut(used..).or_bug("nodes behind the end of the index") {
             padding.fill(0);
         }
     }
     let lattice = Lattice::new(scene, [1; 3]);
-    let mut header = Header::new(Parameters::Bvh { quality: Quality::Fast }, mesh, &lattice);
-    header.skipped_count = skipped;
+    let mut header = Header::new(Parameters::Bvh { quality }, mesh, &lattice);
+    header.skipped_count = mesh.triangle_count() - finite;
     header.reference_count = finite;
     header.node_count = node_count;
     header.levels = levels;
@@ -266,7 +268,7 @@ fn build_in(
 
 /// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
 /// axis has an inverse direction that is finite ([`slab`](super::slab)).
-pub(super) const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
+const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
 
 /// The smallest box of a scene that steps are made for.
 pub(crate) fn least_node(scene: &Aabb) -> f32 {
@@ -357,9 +359,22 @@ impl Kernel for UnitsTask<'_> {
         let Self { work, range, entries, spare, ids, nodes, child, counts } = self;
         let BuildInputs { mesh, least, sizes, shift } = *work;
         let first = range.start as u32;
-        let subtree = &mut Subtree::new();
-        let mut roots =
-            Roots::new(mesh, least, entries, spare, ids, first, nodes, child, counts, subtree);
+        let mut roots = Roots {
+            mesh,
+            least,
+            entries,
+            spare,
+            ids,
+            first,
+            nodes,
+            child,
+            counts,
+            subtree: &mut Subtree::new(),
+            level: SimdLevel::detect(),
+            node_count: 0,
+            root_count: 0,
+            last: RootRecord::new_zeroed(),
+        };
         let units = Units::new(sizes).skip_while(|unit| unit.start < range.start);
         for unit in units.take_while(|unit| unit.start < range.end) {
             roots.unit(unit.start - range.start..unit.end - range.start, shift, 0);
@@ -548,8 +563,8 @@ struct TaskTotals {
     last: RootRecord,
 }
 
-/// Moves elements to an earlier place.
-fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
+/// Moves elements to an earlier place; nothing where there are none. (`copy_within` can panic.)
+pub(super) fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
     debug_assert!(to <= from.start && from.end <= elements.len(), "elements move past an end");
     for (at, to) in from.zip(to..) {
         let Some(&element) = elements.get(at) else { return };

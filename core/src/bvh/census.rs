@@ -6,7 +6,7 @@
 //! ```
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u32x8};
+use fearless_simd::{Simd, f32x8};
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
@@ -15,11 +15,10 @@ use crate::control::Control;
 use crate::error::Error;
 use crate::extremes::Extremes;
 use crate::invariant::OrBug;
-use crate::limits::MAX_COORDINATE;
 use crate::mesh::Piece;
 use crate::mesh::TriangleMesh;
 use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
-use crate::spans::{Corners, four};
+use crate::spans::eight;
 use crate::tasks::run;
 
 use super::key::{KEY_BITS, Keys, NO_KEY};
@@ -29,8 +28,6 @@ use super::key::{KEY_BITS, Keys, NO_KEY};
 pub(crate) struct Census {
     /// Triangles that go into the tree.
     pub(crate) finite: u32,
-    /// Triangles left out because a coordinate is not finite.
-    pub(crate) skipped: u32,
     /// The box around those in the tree.
     pub(crate) bounds: Aabb,
 }
@@ -76,19 +73,18 @@ pub(crate) fn count(
         KeysTask { mesh, flags, rule, first, keys, counts, shift: KEY_BITS - bits, skipped, bounds }
     });
     let level = SimdLevel::detect();
-    let mut census = Census { finite: 0, skipped: 0, bounds: Aabb::EMPTY };
+    let mut census = Census { finite: mesh.triangle_count(), bounds: Aabb::EMPTY };
     run(
         control,
         parts,
         |part| dispatch(level, part),
         |result| {
             let (skipped, bounds) = result?;
-            census.skipped += skipped;
+            census.finite -= skipped;
             census.bounds = census.bounds.union(&bounds);
             Ok(())
         },
     )?;
-    census.finite = mesh.triangle_count() - census.skipped;
     Ok(census)
 }
 
@@ -118,7 +114,6 @@ impl Kernel for KeysTask<'_> {
     fn run<S: Simd>(mut self, simd: S) -> Self::Output {
         let mut low = [f32x8::splat(simd, f32::INFINITY); 3];
         let mut high = [f32x8::splat(simd, f32::NEG_INFINITY); 3];
-        let limit = u32x8::splat(simd, MAX_COORDINATE.to_bits());
         let mut all_keys = core::mem::take(&mut self.keys);
         #[expect(clippy::cast_possible_truncation, reason = "triangles of the mesh")]
         let end = self.first + all_keys.len() as u32;
@@ -131,23 +126,18 @@ impl Kernel for KeysTask<'_> {
                 let mut is_done = false;
                 if HAS_VECTORS {
                     // Load the corners of eight triangles.
-                    let (head, tail) =
-                        (four(simd, &wide, first), four(simd, &wide, first.wrapping_add(4)));
-                    let a = Corners::join(head[0], tail[0]);
-                    let b = Corners::join(head[1], tail[1]);
-                    let c = Corners::join(head[2], tail[2]);
-                    let largest = a.largest().max(b.largest()).max(c.largest());
-                    if largest.simd_le(limit).all_true() {
+                    let ([a, b, c], is_finite) = eight(simd, &wide, first);
+                    if is_finite.all_true() {
                         // Find their boxes, and grow the box of all.
                         let min = [
-                            a.x.lesser(b.x).lesser(c.x),
-                            a.y.lesser(b.y).lesser(c.y),
-                            a.z.lesser(b.z).lesser(c.z),
+                            a[0].lesser(b[0]).lesser(c[0]),
+                            a[1].lesser(b[1]).lesser(c[1]),
+                            a[2].lesser(b[2]).lesser(c[2]),
                         ];
                         let max = [
-                            a.x.greater(b.x).greater(c.x),
-                            a.y.greater(b.y).greater(c.y),
-                            a.z.greater(b.z).greater(c.z),
+                            a[0].greater(b[0]).greater(c[0]),
+                            a[1].greater(b[1]).greater(c[1]),
+                            a[2].greater(b[2]).greater(c[2]),
                         ];
                         low = [low[0].lesser(min[0]), low[1].lesser(min[1]), low[2].lesser(min[2])];
                         high = [

@@ -18,7 +18,7 @@
 
 use core::ops::Range;
 
-use zerocopy::{FromBytes, FromZeros, Immutable, IntoBytes, transmute};
+use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
 use crate::invariant::OrBug;
@@ -87,9 +87,9 @@ pub(crate) struct Roots<'w> {
     /// The number of the first of the nodes in the index.
     pub(crate) child: u32,
     /// One for each bin of the tree, so no fewer than any division of it has bins.
-    counts: &'w mut [u32],
-    subtree: &'w mut Subtree,
-    level: SimdLevel,
+    pub(super) counts: &'w mut [u32],
+    pub(super) subtree: &'w mut Subtree,
+    pub(super) level: SimdLevel,
     /// Nodes so far, whether or not there was room for them.
     pub(crate) node_count: u32,
     pub(crate) root_count: u32,
@@ -97,40 +97,7 @@ pub(crate) struct Roots<'w> {
     pub(crate) last: RootRecord,
 }
 
-impl<'w> Roots<'w> {
-    #[expect(clippy::too_many_arguments, reason = "each is its own")]
-    pub(crate) fn new(
-        mesh: &'w TriangleMesh<'w>,
-        least: f32,
-        entries: &'w mut [Entry],
-        spare: &'w mut [Entry],
-        ids: &'w mut [u32],
-        first: u32,
-        nodes: &'w mut [Node],
-        child: u32,
-        counts: &'w mut [u32],
-        subtree: &'w mut Subtree,
-    ) -> Self {
-        let last = RootRecord::new_zeroed();
-        let (node_count, root_count) = (0, 0);
-        Self {
-            mesh,
-            least,
-            entries,
-            spare,
-            ids,
-            first,
-            nodes,
-            child,
-            counts,
-            subtree,
-            level: SimdLevel::detect(),
-            node_count,
-            root_count,
-            last,
-        }
-    }
-
+impl Roots<'_> {
     /// Makes the roots of a unit that lies `depth` divisions deep. Its bins are in order; the keys of one bin differ
     /// only in their lowest `shift` bits.
     pub(crate) fn unit(&mut self, range: Range<usize>, shift: u32, depth: u32) {

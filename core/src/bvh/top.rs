@@ -118,7 +118,7 @@ pub(crate) fn build(
     #[expect(clippy::cast_possible_truncation, reason = "fewer than triangles")]
     let item_count = items.len() as u32;
     // A node that waits keeps its range and level where its children will be.
-    let mut root = waiting(0, item_count, 0);
+    let mut root = Node::waiting(0, item_count, 0);
     let (mut count, mut levels) = (0, 0);
     // The root of all comes before the first node.
     for at in (0_usize..).map(|at| at.checked_sub(1)) {
@@ -127,10 +127,7 @@ pub(crate) fn build(
             Some(at) if at < count as usize => nodes.get(at)?,
             Some(_) => break,
         };
-        if node.word != WAITING {
-            continue;
-        }
-        let (start, end, level) = (node.child, node.first, u32::from(node.counts[0]));
+        let Some([start, end, level]) = node.waiter() else { continue };
         let bounds = bounds_of(items, start, end);
         let parts = parts(items, ItemRange::new(start, end, bounds, level >= DEEP), level >= DEEP);
         let mut node = Node { child: child + count, ..Node::EMPTY };
@@ -145,7 +142,7 @@ pub(crate) fn build(
                     levels = levels.max(level + 1 + below);
                     node
                 }
-                _ => waiting(part.start, part.end, level + 1),
+                _ => Node::waiting(part.start, part.end, level + 1),
             };
             *nodes.get_mut(count as usize)? = below;
             count += 1;
@@ -157,21 +154,6 @@ pub(crate) fn build(
         }
     }
     Some(Top { root, count, levels })
-}
-
-/// The exponents of a node that waits for its children; no other node has them.
-const WAITING: u32 = 0;
-
-fn waiting(start: u32, end: u32, level: u32) -> Node {
-    #[expect(clippy::cast_possible_truncation, reason = "below 64")]
-    let level = level as u8;
-    Node {
-        word: WAITING,
-        child: start,
-        first: end,
-        counts: [level, 0, 0, 0, 0, 0, 0, 0],
-        ..Node::EMPTY
-    }
 }
 
 fn bounds_of(items: &[RootItem], start: u32, end: u32) -> Aabb {
@@ -334,7 +316,7 @@ mod tests {
         let mut met = Vec::new();
         let mut todo = vec![(root, 1)];
         while let Some((node, level)) = todo.pop() {
-            assert!(node.word != WAITING && level <= levels);
+            assert!(node.waiter().is_none() && level <= levels);
             for slot in 0..8 {
                 match node.child(slot) {
                     Child::Inner(child) => todo.push((nodes[child as usize - 1000], level + 1)),

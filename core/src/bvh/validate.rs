@@ -11,7 +11,7 @@ use glam::DVec3;
 use super::node::{Child, LEAF, Node, WIDTH};
 use super::{Bvh, LEVELS};
 use crate::aabb::Aabb;
-use crate::arena::section_bytes;
+use crate::arena::{first_mut, section_bytes};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::Lattice;
 use crate::error::{Error, Region};
@@ -65,11 +65,7 @@ impl Bvh<'_> {
         if header.reference_count != survey.finite_count {
             return Err(corrupt(core::mem::offset_of!(Header, reference_count)));
         }
-        let (needed_bytes, available_bytes) =
-            (proof_bytes(header.triangle_count), scratch.len() as u64);
-        let short = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
-        let bytes = usize::try_from(needed_bytes).ok().and_then(|bytes| scratch.get_mut(..bytes));
-        let met = bytes.ok_or(short)?;
+        let met = first_mut(scratch, proof_bytes(header.triangle_count), Region::Scratch)?;
         met.fill(0);
 
         let mut reader = mesh.reader();

@@ -20,7 +20,7 @@ use super::displacement::displace;
 use super::layout::{Layout, Scratch};
 use super::spread::{count_references, fill, mark};
 use super::triangles::MeshSpread;
-use crate::arena::copy;
+use crate::arena::{copy, first_mut};
 use crate::blob::Header;
 use crate::cell::{Lattice, woo};
 use crate::config::{BuildFlags, Parameters};
@@ -136,20 +136,15 @@ pub(crate) fn build_under<'a>(
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    let scratch_bytes = scratch.len() as u64;
+    let available_bytes = scratch.len() as u64;
     let plan = Plan::new(mesh, density, flags, overlay, scratch, watch)?;
     let Some(rows) = &plan.rows else {
-        return Err(Error::OutOfMemory {
-            region: Region::Scratch,
-            needed_bytes: plan.layout.scratch_bytes(),
-            available_bytes: scratch_bytes,
-        });
+        let needed_bytes = plan.layout.scratch_bytes();
+        return Err(Error::out_of_memory(Region::Scratch, needed_bytes, available_bytes));
     };
-    let available_bytes = index.len() as u64;
     let needed_bytes = plan.layout.index_bytes();
-    let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
-    let bytes = usize::try_from(needed_bytes).ok();
-    let blob = bytes.and_then(|bytes| index.get_mut(..bytes)).ok_or(too_small)?;
+    let too_small = Error::out_of_memory(Region::Index, needed_bytes, index.len() as u64);
+    let blob = first_mut(index, needed_bytes, Region::Index)?;
     let sections = plan.layout.sections_mut(blob).ok_or(too_small)?;
 
     // Clear the header first: if the build is cancelled, the region must not open as a grid.

@@ -19,7 +19,7 @@ use core::mem::offset_of;
 
 use zerocopy::IntoBytes;
 
-use crate::arena::{align_up, check_alignment, section_bytes};
+use crate::arena::{align_up, check_alignment, first_mut, section_bytes};
 use crate::blob::{BLOB_VERSION, HEADER_BYTES, HasMesh, Header, corrupt};
 use crate::error::{Error, Region};
 use crate::grid::Grid;
@@ -157,11 +157,7 @@ impl<'a> Grid<'a> {
         if let Some(triangle) = mesh.first_without_vertices() {
             return Err(Error::IndexOutOfRange { triangle });
         }
-        let available_bytes = to.len() as u64;
-        let needed_bytes = sections.end;
-        let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
-        let end = usize::try_from(needed_bytes).map_err(|_| too_small)?;
-        let to = to.get_mut(..end).ok_or(too_small)?;
+        let to = first_mut(to, sections.end, Region::Index)?;
 
         // Copy the grid, tell in its header what follows, and clear what the sections leave over.
         let mut out = Out { bytes: &mut *to };

@@ -17,7 +17,7 @@ use core::mem::{offset_of, take};
 use core::ops::ControlFlow;
 
 use super::{BlobInfo, Out};
-use crate::arena::{check_alignment, section_bytes, split};
+use crate::arena::{check_alignment, first_mut, section_bytes, split};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::error::{Error, Region};
 use crate::grid::Grid;
@@ -187,9 +187,8 @@ impl<'a> Scene<'a> {
     pub fn pack<'t>(&self, to: &'t mut [u8]) -> Result<&'t mut [u8], Error> {
         check_alignment(to, Region::Index)?;
         let PackedSizes { members, references, start, end } = self.plan()?;
-        let (needed_bytes, available_bytes) = (end, to.len() as u64);
-        let too_small = Error::OutOfMemory { region: Region::Index, needed_bytes, available_bytes };
-        let to = usize::try_from(end).ok().and_then(|end| to.get_mut(..end)).ok_or(too_small)?;
+        let too_small = Error::out_of_memory(Region::Index, end, to.len() as u64);
+        let to = first_mut(to, end, Region::Index)?;
         let start = usize::try_from(start).unwrap_or(usize::MAX);
         let (head, mut rest) = to.split_at_mut_checked(start).ok_or(too_small)?;
 

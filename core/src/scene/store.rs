@@ -152,11 +152,8 @@ impl<'a> Scene<'a> {
         levels_over(objects)?;
         let count = u32::try_from(instances.len()).map_err(|_| Error::TooManyTriangles)?;
         let (behind, available_bytes) = (behind_bytes(count.into()), index.len() as u64);
-        let short = |tree: u64| Error::OutOfMemory {
-            region: Region::Index,
-            needed_bytes: align_up(tree).saturating_add(behind),
-            available_bytes,
-        };
+        let needed = |tree: u64| align_up(tree).saturating_add(behind);
+        let short = |tree| Error::out_of_memory(Region::Index, needed(tree), available_bytes);
 
         // Put boxes and instances at the end of the index, and the tree at its start.
         let space = usize::try_from(behind).ok();

@@ -11,13 +11,12 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8};
-use glam::Vec3A;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use super::cut::{Bins, Extent, ID, TriangleItem, area};
-use crate::aabb::Aabb;
 use crate::bvh::LEVELS;
-use crate::bvh::node::{LEAF, Node, Sides, WIDTH};
+use crate::bvh::node::{LEAF, Node, WIDTH};
+use crate::extremes::Extremes;
 use crate::invariant::OrBug;
 use crate::simd::Kernel;
 
@@ -94,28 +93,6 @@ impl SubRange {
     }
 }
 
-/// The exponents of a node that waits for its children; no other node has them.
-pub(super) const WAITING: u32 = 0;
-
-/// A node that waits: the range it will hold, and the levels above it.
-fn waiting(job: &Job) -> Node {
-    #[expect(clippy::cast_possible_truncation, reason = "below 64")]
-    let level = job.level as u8;
-    Node {
-        word: WAITING,
-        child: job.start,
-        first: job.end,
-        counts: [level, 0, 0, 0, 0, 0, 0, 0],
-        ..Node::EMPTY
-    }
-}
-
-/// A box as two corners.
-fn corners(sides: &Sides) -> Aabb {
-    let [x, y, z, _, nx, ny, nz, _] = *sides;
-    Aabb { min: Vec3A::new(x, y, z), max: Vec3A::new(-nx, -ny, -nz) }
-}
-
 impl Kernel for Grow<'_> {
     type Output = Grown;
 
@@ -139,16 +116,16 @@ impl Kernel for Grow<'_> {
                 first: self.first + grown.ids,
                 ..Node::EMPTY
             };
-            let mut boxes = [Aabb::EMPTY; WIDTH];
-            let mut bounds = Aabb::EMPTY;
+            let mut bounds = f32x8::splat(simd, f32::INFINITY);
+            let mut boxes = [bounds; WIDTH];
             // Write the ids of leaves, leave ranges to tasks, push the others.
             let jobs_before = jobs;
-            for (slot, (part, bounds_of)) in parts.iter().zip(&mut boxes).enumerate() {
+            for (slot, (part, sides)) in parts.iter().zip(&mut boxes).enumerate() {
                 if part.count() == 0 {
                     break;
                 }
-                *bounds_of = corners(&part.extent.bounds);
-                bounds = bounds.union(bounds_of);
+                *sides = f32x8::simd_from(simd, part.extent.bounds);
+                bounds = bounds.lesser(*sides);
                 if part.count() <= LEAF as u32 {
                     #[expect(clippy::cast_possible_truncation, reason = "eight at most")]
                     let count = part.count() as u8;
@@ -170,7 +147,9 @@ impl Kernel for Grow<'_> {
                 let below = Job { place: place + 1, start, end, level: job.level + 1 };
                 // Too little room for nodes is legal: they are counted.
                 match self.nodes.get_mut(place as usize) {
-                    Some(node) if part.count() <= self.wait => *node = waiting(&below),
+                    Some(node) if part.count() <= self.wait => {
+                        *node = Node::waiting(start, end, below.level);
+                    }
                     _ => {
                         if let Some(slot) = stack.get_mut(jobs).or_bug("too many jobs wait") {
                             *slot = below;
@@ -184,7 +163,7 @@ impl Kernel for Grow<'_> {
                 pushed.reverse();
             }
             // Quantise the boxes, and write the node.
-            node.set_boxes(&bounds, &boxes, self.least);
+            node.set_sides(simd, bounds, &boxes, self.least);
             match job.place.checked_sub(1) {
                 None => grown.root = node,
                 Some(place) => {
@@ -311,8 +290,7 @@ impl Cursor {
             level[0] += 1;
             // A node for which there was no room is legal: its range did not wait.
             let Some(node) = nodes.get(place as usize) else { continue };
-            if node.word == WAITING {
-                let (start, end, level) = (node.child, node.first, u32::from(node.counts[0]));
+            if let Some([start, end, level]) = node.waiter() {
                 return Some(Waiter { place, start, end, level });
             }
             let below = [node.child, node.child + node.inner().count_ones()];

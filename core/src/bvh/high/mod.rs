@@ -31,14 +31,15 @@ use fearless_simd::Simd;
 use glam::Vec3A;
 use zerocopy::transmute;
 
+use super::build::{finish, least_node, move_down};
 use super::census::{share, take};
 use super::layout::index_bytes;
 use super::node::Node;
 use crate::aabb::Aabb;
-use crate::arena::{section_bytes, split_mut, whole};
+use crate::arena::{first_mut, section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
-use crate::config::{BuildFlags, Parameters};
+use crate::config::BuildFlags;
 use crate::control::{Control, Watch};
 use crate::error::{Error, Region};
 use crate::invariant::OrBug;
@@ -77,9 +78,6 @@ const DONE: f32 = 0.98;
 /// No task has fewer triangles.
 const LEAST_TASK: usize = 4096;
 
-/// No step of a node is smaller than that of a box of this part of the scene's extent.
-const LEAST_NODE: f32 = super::build::LEAST_NODE;
-
 /// Builds everything but the header, which it returns. Without an index it only computes the size.
 #[inline(never)]
 pub(super) fn build_in(
@@ -93,10 +91,7 @@ pub(super) fn build_in(
     let triangles = mesh.triangle_count();
     let index_available = index.as_ref().map_or(0, |index| index.len()) as u64;
     let (index_bound, needed_bytes) = bound(triangles);
-    let available_bytes = scratch.len() as u64;
-    if available_bytes < needed_bytes {
-        return Err(Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes });
-    }
+    let scratch = first_mut(scratch, needed_bytes, Region::Scratch)?;
     let items =
         match split_mut::<TriangleItem>(scratch, triangles.into()).or_bug("too little scratch") {
             Some((items, _)) => items,
@@ -129,34 +124,12 @@ pub(super) fn build_in(
     // Make the nodes.
     watch.at(TOP)?;
     let scene = Lattice::pad(&bounds);
-    let extent = scene.size().max_element();
-    let work = HighInputs { least: extent * LEAST_NODE, unit: inverse_power(extent), tasks };
+    let unit = inverse_power(scene.size().max_element());
+    let work = HighInputs { least: least_node(&scene), unit, tasks };
     let (node_count, levels) = work.make(items, ids, nodes, control, watch)?;
 
     watch.at(DONE)?;
-    let needed_bytes = index_bytes(finite as u64, node_count.into());
-    if let Some(index) = index {
-        if needed_bytes > index_available {
-            return Err(Error::OutOfMemory {
-                region: Region::Index,
-                needed_bytes,
-                available_bytes: index_available,
-            });
-        }
-        let used = HEADER_BYTES + ids_bytes + node_count as usize * size_of::<Node>();
-        let padding = index.get_mut(used..needed_bytes as usize);
-        if let Some(padding) = padding.or_bug("nodes behind the end of the index") {
-            padding.fill(0);
-        }
-    }
-    let lattice = Lattice::new(scene, [1; 3]);
-    let mut header = Header::new(Parameters::Bvh { quality: Quality::High }, mesh, &lattice);
-    header.skipped_count = triangles - finite as u32;
-    header.reference_count = finite as u32;
-    header.node_count = node_count;
-    header.levels = levels;
-    header.blob_bytes = needed_bytes;
-    Ok(header)
+    finish(mesh, Quality::High, scene, index, finite as u32, node_count, levels)
 }
 
 /// A power of two near the inverse of a length.
@@ -210,7 +183,7 @@ fn boxes(
         let first = share(all, task, tasks);
         // Move the items of a task down over the places that earlier tasks left empty.
         if finite < first {
-            move_down(items, first, count, finite);
+            move_down(items, first..first + count, finite);
         }
         finite += count;
     }
@@ -248,17 +221,6 @@ impl Kernel for ItemsTask<'_> {
             }
         }
         Ok((count, bounds))
-    }
-}
-
-/// Copies elements to a place before them; nothing where there are none. (`copy_within` can panic.)
-fn move_down<T: Copy>(all: &mut [T], from: usize, count: usize, to: usize) {
-    debug_assert!(to <= from && from + count <= all.len(), "elements move past an end");
-    for at in 0..count {
-        let element = all.get(from + at).copied();
-        if let (Some(element), Some(slot)) = (element, all.get_mut(to + at)) {
-            *slot = element;
-        }
     }
 }
 
@@ -445,15 +407,15 @@ impl HighInputs {
                 let behind = items.get(waiter.start as usize..).unwrap_or_default();
                 let record = behind.first_chunk::<RECORD>().or_bug("a range without a record");
                 let Some(record) = record else { break };
-                let RangeRecord { mut root, nodes: below, levels: levels_of, .. } =
-                    transmute!(*record);
+                let RangeRecord { mut root, nodes: below, levels: most, .. } = transmute!(*record);
                 let moved = child - count;
                 if moved > 0 {
                     let from = child as usize..(child + below) as usize;
-                    for node in nodes.get_mut(from).or_bug("too many nodes").unwrap_or_default() {
+                    let of_range = nodes.get_mut(from.clone()).or_bug("too many nodes");
+                    for node in of_range.unwrap_or_default() {
                         node.child -= moved;
                     }
-                    move_down(nodes, child as usize, below as usize, count as usize);
+                    move_down(nodes, from, count as usize);
                 }
                 root.child -= moved;
                 if let Some(slot) = nodes.get_mut(waiter.place as usize).or_bug("no such node") {
@@ -461,7 +423,7 @@ impl HighInputs {
                 }
                 child += below;
                 count += below;
-                levels = levels.max(levels_of);
+                levels = levels.max(most);
             }
         }
         Ok((count, levels))
