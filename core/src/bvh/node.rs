@@ -17,11 +17,11 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, u32x4, u32x8};
+use glam::Vec3A;
 use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
 use crate::extremes::Extremes;
-use crate::simd::{Kernel, SimdLevel, dispatch};
 
 /// Children of a node.
 pub(crate) const WIDTH: usize = 8;
@@ -170,30 +170,33 @@ impl Node {
 
     /// Writes the boxes of the children that there are, which `bounds` holds. No step is smaller than
     /// that of a box of size `least`.
-    #[inline(never)]
     pub(crate) fn set_boxes(&mut self, bounds: &Aabb, boxes: &[Aabb; WIDTH], least: f32) {
-        dispatch(SimdLevel::detect(), SetBoxes { node: self, bounds, boxes, least });
+        self.frame(bounds, least);
+        for (slot, child) in boxes.iter().enumerate() {
+            if self.inner() >> slot & 1 == 1 || self.counts[slot] > 0 {
+                self.set_box(slot, child);
+            }
+        }
     }
 
-    /// Does the same inside a kernel, with all sides of a child at once.
-    // Lanes one after the other are much code: a microcontroller gets them once, out of line.
-    #[cfg_attr(all(target_os = "none", target_pointer_width = "32"), inline(never))]
-    #[cfg_attr(not(all(target_os = "none", target_pointer_width = "32")), inline(always))]
+    /// Writes the same bits as [`set_boxes`](Self::set_boxes), all sides of a child at once. The first
+    /// `count` children are there, the others are not.
+    #[inline(always)]
     pub(crate) fn set_sides<S: Simd>(
         &mut self,
         simd: S,
         bounds: f32x8<S>,
         children: &[f32x8<S>; WIDTH],
+        count: usize,
         least: f32,
     ) {
-        // The frame of three axes at once. A quarter of a step must show beside the coordinates.
+        // The frame of three axes at once.
         let (low, high) = bounds.split();
         let magnitude = low.abs().greater(high.abs());
         let extent = (f32x4::splat(simd, 0.0) - (low + high))
             .greater(magnitude * LEAST_STEPS)
             .greater(f32x4::splat(simd, least));
         let bits = (extent * f32x4::splat(simd, 1.0 / 254.0)).bitcast::<u32x4<S>>();
-        // The next power of two; one is at least that large if there is a fraction or not.
         let exponent = ((bits >> 23) & 0xff) + 1;
         let exponent = exponent.max(u32x4::splat(simd, 1)).min(u32x4::splat(simd, 253));
         let step = (exponent << 23).bitcast::<f32x4<S>>();
@@ -211,41 +214,48 @@ impl Node {
         let sign = f32x4::splat(simd, 1.0).combine(f32x4::splat(simd, -1.0));
         let unused = u32x4::splat(simd, 0xff).combine(u32x4::splat(simd, 0));
         let rule = Quantiser { origin, inverse, end, sign, unused };
-        let used = self.used();
-        let first: [u32; 8] = rule.four(children, 0, used).into();
-        let second: [u32; 8] = rule.four(children, 4, used).into();
+        let first: [u32; 8] = rule.four(children, 0, count).into();
+        let second: [u32; 8] = rule.four(children, 4, count).into();
         for (row, lane) in self.bounds.iter_mut().zip([0, 1, 2, 4, 5, 6]) {
             *row = (u64::from(first[lane]) | u64::from(second[lane]) << 32).to_le_bytes();
         }
     }
-}
 
-/// A box in one vector.
-#[inline(always)]
-pub(crate) fn sides(bounds: &Aabb) -> Sides {
-    let ([x, y, z], [u, v, w]) = (bounds.min.to_array(), (-bounds.max).to_array());
-    [x, y, z, 0.0, u, v, w, 0.0]
-}
-
-/// The work of [`Node::set_boxes`].
-struct SetBoxes<'n> {
-    node: &'n mut Node,
-    bounds: &'n Aabb,
-    boxes: &'n [Aabb; WIDTH],
-    least: f32,
-}
-
-impl Kernel for SetBoxes<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        let mut children = [f32x8::splat(simd, 0.0); WIDTH];
-        for (child, bounds) in children.iter_mut().zip(self.boxes) {
-            *child = f32x8::simd_from(simd, sides(bounds));
+    /// Sets where bounds are measured from: steps that hold a box, none below `least` in size.
+    fn frame(&mut self, bounds: &Aabb, least: f32) {
+        let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+        let mut exponents = [0; 4];
+        for axis in 0..3 {
+            // A quarter of a step must show beside the coordinates.
+            let magnitude = min[axis].abs().max(max[axis].abs());
+            let extent = (max[axis] - min[axis]).max(magnitude * LEAST_STEPS).max(least);
+            let exponent = exponent_for(extent);
+            exponents[axis] = exponent;
+            self.origin[axis] = (min[axis] - 0.25 * step(exponent)).to_bits();
         }
-        let bounds = f32x8::simd_from(simd, sides(self.bounds));
-        self.node.set_sides(simd, bounds, &children, self.least);
+        self.word = self.word & 0xff00_0000 | u32::from_le_bytes(exponents);
+    }
+
+    /// Writes the box of child `slot`, which lies in the box that the frame was set for.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "the low byte")]
+    fn set_box(&mut self, slot: usize, bounds: &Aabb) {
+        let inverse = Vec3A::from_array(self.exponents().map(inverse_step));
+        let origin = Vec3A::from_array(self.origin());
+        // Rounding half a step and the margin away is rounding outwards by at least the margin.
+        let low = (bounds.min - origin) * inverse - Vec3A::splat(0.5 + MARGIN);
+        let high = (bounds.max - origin) * inverse + Vec3A::splat(0.5 + MARGIN);
+        let [low, high] = [low.max(Vec3A::ZERO), high.min(Vec3A::splat(255.0))];
+        let [low, high] = [low, high].map(|at| (at + Vec3A::splat(SHIFT)).to_array());
+        for axis in 0..3 {
+            let [low, high] = [low[axis], high[axis]].map(|at| at.to_bits() as u8);
+            if let Some(bound) = self.bounds[axis].get_mut(slot) {
+                *bound = low;
+            }
+            if let Some(bound) = self.bounds[axis + 3].get_mut(slot) {
+                *bound = high;
+            }
+        }
     }
 }
 
@@ -266,20 +276,19 @@ struct Quantiser<S: Simd> {
 impl<S: Simd> Quantiser<S> {
     /// The sides of four children, lane by lane the bytes of one word.
     #[inline(always)]
-    fn four(&self, children: &[f32x8<S>; WIDTH], first: usize, used: u32) -> u32x8<S> {
-        let a = self.one(children, first, used);
-        let b = self.one(children, first + 1, used);
-        let c = self.one(children, first + 2, used);
-        let d = self.one(children, first + 3, used);
+    fn four(&self, children: &[f32x8<S>; WIDTH], first: usize, count: usize) -> u32x8<S> {
+        let a = self.one(children, first, count);
+        let b = self.one(children, first + 1, count);
+        let c = self.one(children, first + 2, count);
+        let d = self.one(children, first + 3, count);
         (a | b << 8) | (c | d << 8) << 16
     }
 
     #[inline(always)]
-    fn one(&self, children: &[f32x8<S>; WIDTH], slot: usize, used: u32) -> u32x8<S> {
-        // Rounding half a step and the margin away is rounding outwards by at least the margin.
+    fn one(&self, children: &[f32x8<S>; WIDTH], slot: usize, count: usize) -> u32x8<S> {
         let at = (children[slot % WIDTH] - self.origin) * self.inverse - (0.5 + MARGIN);
         let bits = (at.greater(self.end) * self.sign + SHIFT).bitcast::<u32x8<S>>() & 0xff;
-        if used >> (slot % WIDTH) & 1 == 1 { bits } else { self.unused }
+        if slot < count { bits } else { self.unused }
     }
 }
 
@@ -291,17 +300,32 @@ const LEAST_STEPS: f32 = 254.0 / 2_097_152.0;
 /// Adding this rounds a small number to a whole one and leaves that in the low bits.
 const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 
+/// Returns the exponent bits of a power of two: the next one above a 254th of an extent.
+fn exponent_for(extent: f32) -> u8 {
+    let least = extent * (1.0 / 254.0);
+    let exponent = (least.to_bits() >> 23) & 0xff;
+    // The next power of two; one is at least that large if there is a fraction or not.
+    (exponent + 1).clamp(1, 253) as u8
+}
+
 /// A power of two from its exponent bits.
 #[inline(always)]
 const fn step(exponent: u8) -> f32 {
     f32::from_bits((exponent as u32) << 23)
 }
 
+/// One over a power of two from its exponent bits, which are at most 253.
+#[inline(always)]
+const fn inverse_step(exponent: u8) -> f32 {
+    f32::from_bits((254_u32.saturating_sub(exponent as u32)) << 23)
+}
+
 #[cfg(test)]
 mod tests {
-    use glam::{DVec3, Vec3A};
+    use glam::DVec3;
 
     use super::*;
+    use crate::simd::{Kernel, SimdLevel, dispatch};
 
     #[test]
     fn used_children_are_nodes_and_leaves_with_ids() {
@@ -343,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_hold_the_exact_ones_and_a_margin_at_any_scale_and_place_with_any_vectors() {
+    fn boxes_hold_the_exact_ones_and_a_margin_at_any_scale_and_place() {
         let mut state = 1;
         let cases = if cfg!(miri) { 1 } else { 100 };
         for scale in [1e-38, 1e-30, 1e-10, 1.0, 1e10, 1e30, 1e36] {
@@ -358,33 +382,11 @@ mod tests {
                             let half = random(&mut state).abs() * flat * scale * 0.1;
                             Aabb { min: center - half, max: center + half }
                         });
-                        // Some of the children are there, nodes and leaves.
-                        let mut empty = Node { child: 5, first: 6, ..Node::EMPTY };
-                        empty.set_inner(0);
-                        for counted in empty.counts.iter_mut().skip(1) {
-                            *counted = u8::from(random(&mut state).x > -0.5);
-                        }
-                        let used = empty.used();
-                        let all =
-                            boxes.iter().enumerate().filter(|(slot, _)| used >> slot & 1 == 1);
-                        let all = all.fold(Aabb::EMPTY, |all, (_, child)| all.union(child));
+                        let all = boxes.iter().fold(Aabb::EMPTY, |all, child| all.union(child));
                         let least = all.size().max_element() * 1e-10;
-                        let mut node = empty;
+                        let mut node = Node { counts: [1; WIDTH], ..Node::EMPTY };
                         node.set_boxes(&all, &boxes, least);
-                        for level in SimdLevel::available() {
-                            let (bounds, boxes, mut other) = (&all, &boxes, empty);
-                            dispatch(level, SetBoxes { node: &mut other, bounds, boxes, least });
-                            assert_eq!(other, node, "{level:?} {scale} {used:b}");
-                        }
                         for (slot, exact) in boxes.iter().enumerate() {
-                            if used >> slot & 1 == 0 {
-                                let (sides, none) = (node.bounds, Node::EMPTY.bounds);
-                                assert_eq!(
-                                    sides.map(|side| side[slot]),
-                                    none.map(|side| side[slot])
-                                );
-                                continue;
-                            }
                             let [min, max, step] = quantised(&node, slot);
                             // Smaller than the margin by the rounding of the build.
                             let margin = step / 128.0;
@@ -400,6 +402,56 @@ mod tests {
                             );
                         }
                     }
+                }
+            }
+        }
+    }
+
+    struct Set<'n> {
+        node: &'n mut Node,
+        bounds: Aabb,
+        boxes: [Aabb; WIDTH],
+        count: usize,
+        least: f32,
+    }
+
+    impl Kernel for Set<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) {
+            let sides = |bounds: &Aabb| {
+                let ([x, y, z], [u, v, w]) = (bounds.min.to_array(), (-bounds.max).to_array());
+                f32x8::simd_from(simd, [x, y, z, 0.0, u, v, w, 0.0])
+            };
+            let boxes = self.boxes.map(|bounds| sides(&bounds));
+            self.node.set_sides(simd, sides(&self.bounds), &boxes, self.count, self.least);
+        }
+    }
+
+    #[test]
+    fn every_kind_of_vectors_writes_the_same_boxes() {
+        let mut state = 7;
+        for scale in [1e-38, 1e-30, 1.0, 1e10, 1e36] {
+            for count in (1..=WIDTH).step_by(if cfg!(miri) { 7 } else { 1 }) {
+                let boxes = [0; WIDTH].map(|_| {
+                    let (center, half) = (random(&mut state), random(&mut state).abs() * 0.1);
+                    Aabb { min: (center - half) * scale, max: (center + half) * scale }
+                });
+                let used = boxes.iter().take(count);
+                let bounds = used.fold(Aabb::EMPTY, |all, child| all.union(child));
+                let least = bounds.size().max_element() * 1e-10;
+                let mut node = Node { child: 5, first: 6, ..Node::EMPTY };
+                node.set_inner(0);
+                for counted in node.counts.iter_mut().take(count).skip(1) {
+                    *counted = 3;
+                }
+                let mut expected = node;
+                expected.set_boxes(&bounds, &boxes, least);
+                for level in SimdLevel::available() {
+                    let mut node = node;
+                    dispatch(level, Set { node: &mut node, bounds, boxes, count, least });
+                    assert_eq!(node, expected, "{level:?} {scale} {count}");
                 }
             }
         }

@@ -27,7 +27,7 @@ use crate::mesh::TriangleMesh;
 use crate::simd::Kernel;
 
 use super::layout::{Entry, MOST_ROOT, most_of_root};
-use super::node::{LEAF, Node, Sides, WIDTH, sides};
+use super::node::{LEAF, Node, Sides, WIDTH};
 
 /// Nodes of a subtree, at most.
 const MOST_NODES: usize = MOST_ROOT / (WIDTH - 1) + 2;
@@ -270,6 +270,7 @@ impl Subtree {
         let mut bounds = f32x8::splat(simd, f32::INFINITY);
         let mut boxes = [bounds; WIDTH];
         let mut child = node.child as usize;
+        let mut used = 0;
         for (part, sides) in parts.iter().zip(&mut boxes) {
             let (start, count) = (usize::from(part.start), part.count());
             if count == 0 {
@@ -286,8 +287,9 @@ impl Subtree {
                 *sides = sides.lesser(f32x8::simd_from(simd, of_one.unwrap_or([f32::INFINITY; 8])));
             }
             bounds = bounds.lesser(*sides);
+            used += 1;
         }
-        node.set_sides(simd, bounds, &boxes, least);
+        node.set_sides(simd, bounds, &boxes, used, least);
         node.first += places[0];
         node.child = (node.child + places[1]).wrapping_sub(1);
         if let Some(slot) = self.boxes.get_mut(OF_NODES + at) {
@@ -308,7 +310,9 @@ pub(crate) fn slow_bounds(mesh: &TriangleMesh<'_>, id: u32) -> Aabb {
 #[cold]
 #[inline(never)]
 fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {
-    sides(&slow_bounds(mesh, id))
+    let bounds = slow_bounds(mesh, id);
+    let ([x, y, z], [u, v, w]) = (bounds.min.to_array(), (-bounds.max).to_array());
+    [x, y, z, 0.0, u, v, w, 0.0]
 }
 
 /// Cuts a range into eight parts, or into single entries if there are fewer, in the order of the keys: where

@@ -11,12 +11,13 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8};
+use glam::Vec3A;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use super::cut::{Bins, Extent, ID, TriangleItem, area};
+use crate::aabb::Aabb;
 use crate::bvh::LEVELS;
-use crate::bvh::node::{LEAF, Node, WIDTH};
-use crate::extremes::Extremes;
+use crate::bvh::node::{LEAF, Node, Sides, WIDTH};
 use crate::invariant::OrBug;
 use crate::simd::Kernel;
 
@@ -93,6 +94,12 @@ impl SubRange {
     }
 }
 
+/// A box as two corners.
+fn corners(sides: &Sides) -> Aabb {
+    let [x, y, z, _, nx, ny, nz, _] = *sides;
+    Aabb { min: Vec3A::new(x, y, z), max: Vec3A::new(-nx, -ny, -nz) }
+}
+
 impl Kernel for Grow<'_> {
     type Output = Grown;
 
@@ -116,16 +123,16 @@ impl Kernel for Grow<'_> {
                 first: self.first + grown.ids,
                 ..Node::EMPTY
             };
-            let mut bounds = f32x8::splat(simd, f32::INFINITY);
-            let mut boxes = [bounds; WIDTH];
+            let mut boxes = [Aabb::EMPTY; WIDTH];
+            let mut bounds = Aabb::EMPTY;
             // Write the ids of leaves, leave ranges to tasks, push the others.
             let jobs_before = jobs;
-            for (slot, (part, sides)) in parts.iter().zip(&mut boxes).enumerate() {
+            for (slot, (part, bounds_of)) in parts.iter().zip(&mut boxes).enumerate() {
                 if part.count() == 0 {
                     break;
                 }
-                *sides = f32x8::simd_from(simd, part.extent.bounds);
-                bounds = bounds.lesser(*sides);
+                *bounds_of = corners(&part.extent.bounds);
+                bounds = bounds.union(bounds_of);
                 if part.count() <= LEAF as u32 {
                     #[expect(clippy::cast_possible_truncation, reason = "eight at most")]
                     let count = part.count() as u8;
@@ -163,7 +170,7 @@ impl Kernel for Grow<'_> {
                 pushed.reverse();
             }
             // Quantise the boxes, and write the node.
-            node.set_sides(simd, bounds, &boxes, self.least);
+            node.set_boxes(&bounds, &boxes, self.least);
             match job.place.checked_sub(1) {
                 None => grown.root = node,
                 Some(place) => {
