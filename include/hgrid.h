@@ -492,7 +492,7 @@ typedef struct hgrid_mesh {
      */
     uint32_t struct_size;
     /**
-     * `HGRID_INDEX_U32` or `HGRID_INDEX_U16`.
+     * `HGRID_INDEX_U32` or `HGRID_INDEX_U16`. No call can tell that it is the wrong one.
      */
     uint32_t index_type;
     /**
@@ -845,7 +845,7 @@ typedef struct hgrid_query_options {
     void *context;
     /**
      * Returns whether a `hit` counts. NULL means that all hits count. `ray` is the number of the ray in
-     * its batch, 0 for a single ray.
+     * its batch, 0 for a single ray. `hgrid_closest_point` does not ask it.
      *
      * The filter gets the hits of a ray from near to far, at equal `t` by ascending triangle, and each
      * triangle at most once. In a batch it gets all hits of one ray before those of the next.

@@ -1624,7 +1624,8 @@ inline result<grid> grid::build(const mesh &of, const config &how, report *detai
 using shape_hit = ::hgrid_shape_hit;
 /// The hit of a ray in a scene. See `hgrid_scene_hit`.
 using scene_hit = ::hgrid_scene_hit;
-/// An object at a place in a scene. See `hgrid_instance`: `instance one = HGRID_INSTANCE_INIT;`
+/// An object at a place in a scene. See `hgrid_instance`: `instance one = HGRID_INSTANCE_INIT;`. One of zeros, as
+/// `std::vector<instance>(n)` has, is refused for its matrix.
 using instance = ::hgrid_instance;
 /// An object that instances show. See `hgrid_object`; `make_object` makes it.
 using object = ::hgrid_object;

@@ -143,7 +143,7 @@ pub struct hgrid_query_options {
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
     /// Returns whether a `hit` counts. NULL means that all hits count. `ray` is the number of the ray in
-    /// its batch, 0 for a single ray.
+    /// its batch, 0 for a single ray. `hgrid_closest_point` does not ask it.
     ///
     /// The filter gets the hits of a ray from near to far, at equal `t` by ascending triangle, and each
     /// triangle at most once. In a batch it gets all hits of one ray before those of the next.

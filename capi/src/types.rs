@@ -142,7 +142,7 @@ const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
 pub struct hgrid_mesh {
     /// `sizeof(hgrid_mesh)`.
     pub struct_size: u32,
-    /// `HGRID_INDEX_U32` or `HGRID_INDEX_U16`.
+    /// `HGRID_INDEX_U32` or `HGRID_INDEX_U16`. No call can tell that it is the wrong one.
     pub index_type: u32,
     /// The first vertex: three floats x, y, z, in scene units. NULL only without vertices.
     pub positions: *const c_void,
