@@ -60,8 +60,8 @@ impl<S: Simd> Spans<S> {
     }
 }
 
-/// The corners of eight triangles that follow one another, by corner and axis, and for which of the triangles all of them
-/// are finite.
+/// Loads the corners of eight triangles that follow one another, by corner and axis. The mask has the triangles whose
+/// corners are all finite.
 #[inline(always)]
 pub(crate) fn eight<S: Simd>(
     simd: S,

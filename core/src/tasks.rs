@@ -98,18 +98,15 @@ pub(crate) fn run_several<T: Send, R: Send>(
     if is_broken.into_inner() { Err(Error::InvalidParallelFor) } else { outcome }
 }
 
-/// Runs the tasks one after the other, on the only core.
+/// Runs the only task: work is not cut.
 #[cfg(not(target_has_atomic = "32"))]
 pub(crate) fn run_several<T, R>(
     _: &Control<'_>,
     tasks: impl Iterator<Item = T>,
     work: impl Fn(T) -> R,
-    mut take: impl FnMut(R) -> Result<(), Error>,
+    take: impl FnMut(R) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    for task in tasks {
-        take(work(task))?;
-    }
-    Ok(())
+    tasks.map(work).try_for_each(take)
 }
 
 /// A place from which one of several threads takes something.

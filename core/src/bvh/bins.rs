@@ -5,12 +5,7 @@
 //! for each task: for each triangle of its share: write the entry, move the start of its bin by one (scatter)
 //! ```
 
-#![expect(
-    clippy::cast_possible_truncation,
-    reason = "numbers of triangles, which fit into 32 bits"
-)]
-#![cfg_attr(not(target_has_atomic = "32"), allow(unused, reason = "there is one task"))]
-
+#[cfg(target_has_atomic = "32")]
 use super::census::{share, take};
 use super::key::{KEY_BITS, NO_KEY};
 use super::layout::{CROWD, Entry};
@@ -59,28 +54,46 @@ pub(super) fn scatter(
         }
         return Ok(());
     }
-    #[cfg(not(target_has_atomic = "32"))]
-    return Ok(());
     #[cfg(target_has_atomic = "32")]
     {
-        let entries = Shared::new(entries.as_flattened_mut());
-        let mut counts = counts;
-        let parts = (0..tasks).map(|task| {
-            let heads = take(&mut counts, 1 << bits);
-            let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
-            let first = range.start as u32;
-            (first, keys.get(range).or_bug("a task behind the keys").unwrap_or_default(), heads)
-        });
-        let move_all = |(first, keys, heads): (u32, &[u32], &mut [u32])| {
-            for (id, &key) in (first..).zip(keys) {
-                let Some(head) = heads.get_mut((key >> shift) as usize) else {
-                    debug_assert!(key == NO_KEY, "a key behind those of all bins");
-                    continue;
-                };
-                entries.set(2 * *head as usize, [key, id]);
-                *head += 1;
-            }
-        };
-        run(control, parts, move_all, |()| Ok(()))
+        scatter_by_tasks(keys, entries, counts, bits, control)
     }
+    #[cfg(not(target_has_atomic = "32"))]
+    {
+        let _ = control;
+        debug_assert!(false, "several tasks without atomics");
+        Err(Error::InvalidParallelFor)
+    }
+}
+
+/// Does the same with several tasks.
+#[cfg(target_has_atomic = "32")]
+#[expect(clippy::cast_possible_truncation, reason = "numbers of triangles, which fit into 32 bits")]
+fn scatter_by_tasks(
+    keys: &[u32],
+    entries: &mut [Entry],
+    counts: &mut [u32],
+    bits: u32,
+    control: &Control<'_>,
+) -> Result<(), Error> {
+    let (tasks, shift) = (counts.len() >> bits, KEY_BITS - bits);
+    let entries = Shared::new(entries.as_flattened_mut());
+    let mut counts = counts;
+    let parts = (0..tasks).map(|task| {
+        let heads = take(&mut counts, 1 << bits);
+        let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
+        let first = range.start as u32;
+        (first, keys.get(range).or_bug("a task behind the keys").unwrap_or_default(), heads)
+    });
+    let move_all = |(first, keys, heads): (u32, &[u32], &mut [u32])| {
+        for (id, &key) in (first..).zip(keys) {
+            let Some(head) = heads.get_mut((key >> shift) as usize) else {
+                debug_assert!(key == NO_KEY, "a key behind those of all bins");
+                continue;
+            };
+            entries.set(2 * *head as usize, [key, id]);
+            *head += 1;
+        }
+    };
+    run(control, parts, move_all, |()| Ok(()))
 }

@@ -189,6 +189,7 @@ impl<'a> TriangleMesh<'a> {
     }
 
     /// The first triangles of the parts that a packed mesh was made of.
+    // For the overlap checks of the C library.
     #[doc(hidden)]
     #[must_use]
     pub const fn numbering(&self) -> &'a [[u8; 4]] {

@@ -206,7 +206,8 @@ pub(super) struct Seen {
 /// Objects farther away than so many of their extents are seen from where the ray enters their box.
 const FAR_EXTENTS: f64 = 4.0;
 
-/// From farther away than so many extents, the origin of a ray is brought to an object with a visible error.
+/// The rounding of f64 moves the origin of a ray by 2^-23 of an extent if it comes from so many extents away. At 2^-19
+/// it passes the growth of the box ([`GROWTH`]); the rest is a margin.
 const AFAR: f64 = 536_870_912.0; // 2^29
 
 impl Seen {
@@ -257,8 +258,8 @@ impl Seen {
         })
     }
 
-    /// Returns true if rounding may have moved the origin past a surface of an object with this box: it was brought there
-    /// from more than 2^29 extents away, so it is off by more than 2^-23 of the extent. Hits may have a negative `t` then.
+    /// Returns true if the ray was brought to this box from so far away that rounding may have put its origin behind a
+    /// surface. Hits may have a negative `t` then.
     pub(super) fn is_from_afar(&self, (min, max): &([f32; 3], [f32; 3])) -> bool {
         let size = |axis: usize| f64::from(max[axis]) - f64::from(min[axis]);
         self.shift.abs() > greater(size(0), greater(size(1), size(2))) * AFAR

@@ -49,7 +49,7 @@ impl<F: Fn(u32, &Ray) -> Option<ShapeHit> + Sync> ObjectTest for F {
 }
 
 /// An object that instances show.
-// The C library lends these as `hgrid_object`, of which bytes that are all zero are `Nothing`.
+// The C library lends these as `hgrid_object`. Zeros must be `Nothing`.
 #[repr(usize)]
 #[derive(Clone, Copy, Default)]
 pub enum Object<'a> {

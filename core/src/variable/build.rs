@@ -198,7 +198,7 @@ fn run(
     watch: &Watch<'_>,
 ) -> Result<Header, Error> {
     let TopPlan { top: mut plan, scratch_bytes: needed_bytes, available_bytes } = plan;
-    let too_small = Error::OutOfMemory { region: Region::Scratch, needed_bytes, available_bytes };
+    let too_small = Error::out_of_memory(Region::Scratch, needed_bytes, available_bytes);
     let Scratch { row_offsets: offsets, domain_bits, rest, .. } =
         plan.rows.take().ok_or(too_small)?;
 
