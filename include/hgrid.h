@@ -492,7 +492,7 @@ typedef struct hgrid_mesh {
      */
     uint32_t struct_size;
     /**
-     * `HGRID_INDEX_U32` or `HGRID_INDEX_U16`. No call can tell that it is the wrong one.
+     * `HGRID_INDEX_U32` or `HGRID_INDEX_U16`. The library cannot check that it fits the array.
      */
     uint32_t index_type;
     /**
@@ -1461,7 +1461,8 @@ typedef struct hgrid_allocator {
 /**
  * A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
  * and what is behind the known fields is not zero; or the `reserved` field of an allocator or a
- * configuration is not 0. The usual cause is a struct that was not initialised with its `_INIT` macro.
+ * configuration is not 0; or, from `hgrid_join`, the size puts the next mesh at an address that is not aligned. The
+ * usual cause is a struct that was not initialised with its `_INIT` macro.
  */
 #define HGRID_ERROR_STRUCT_SIZE -2
 
@@ -1472,14 +1473,14 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_MISALIGNED -3
 
 /**
- * The index or the scratch overlaps the other one or the mesh; the room for a packed blob overlaps
- * its grid or its mesh; or answers of a batch overlap its rays.
+ * Memory that the call writes (an index, scratch, the room for a packed blob or its views, parts, answers of a batch)
+ * overlaps other such memory or what the call reads: a mesh, boxes, instances, objects, a blob, rays.
  */
 #define HGRID_ERROR_OVERLAP -4
 
 /**
- * The index is too small. The report says how many bytes it needs;
- * with `hgrid_pack`, `bytes` says it.
+ * The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `hgrid_pack_scene` and
+ * `hgrid_open_packed_scene`, where it is the room or the views, `bytes` says it.
  *
  * With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
  * methods the grid was written as far as it went, so the index may hold anything.
@@ -1487,7 +1488,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INDEX_TOO_SMALL -10
 
 /**
- * The scratch is too small. The report says how many bytes it needs.
+ * The scratch is too small. The report says how many bytes it needs, or, where a call has none, its description.
  */
 #define HGRID_ERROR_SCRATCH_TOO_SMALL -11
 
@@ -1497,7 +1498,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_OUT_OF_MEMORY -12
 
 /**
- * The position stride is below 12 bytes, or the vertices do not fit into memory.
+ * The position stride is below 12 bytes, or the box stride below 24, or the vertices or boxes do not fit into memory.
  */
 #define HGRID_ERROR_INVALID_POSITIONS -20
 
@@ -1512,8 +1513,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_INDEX_TYPE -22
 
 /**
- * The mesh has more than 4294967294 triangles; or, from `hgrid_bound`, the sizes do not fit into the
- * machine's address space.
+ * There are more triangles, boxes or instances than the method takes, 2^31 for a tree and 4294967294 for the others;
+ * or the arrays or the sizes do not fit into the machine's address space.
  */
 #define HGRID_ERROR_TOO_MANY_TRIANGLES -23
 
@@ -1540,7 +1541,7 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_PARTS -27
 
 /**
- * The configuration's `method` is none that this version knows.
+ * The configuration's `method` is none that this version knows, or, for shapes and scenes, not `HGRID_METHOD_BVH`.
  */
 #define HGRID_ERROR_INVALID_METHOD -30
 
@@ -1608,13 +1609,13 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_TRUNCATED -43
 
 /**
- * The blob was built for a mesh with another number of vertices or triangles; or, from `hgrid_refit`, a
- * triangle that the build left out is finite now.
+ * The blob was built for a mesh with another number of vertices or triangles, or for another number of instances; or,
+ * from `hgrid_refit`, a triangle that the build left out is finite now.
  */
 #define HGRID_ERROR_MESH_MISMATCH -44
 
 /**
- * The blob contradicts itself or its mesh.
+ * The blob contradicts itself or its mesh, or the objects of a scene changed after its build.
  */
 #define HGRID_ERROR_CORRUPT -45
 
@@ -1634,7 +1635,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_METHOD_REMOVED -48
 
 /**
- * The blob is built over something else: triangles, shapes or instances. Open it with the function for these.
+ * The blob is built over something else: triangles, shapes or instances. Open it with the function for these. Or a
+ * scene was to be packed that shows shapes, which cannot be packed.
  */
 #define HGRID_ERROR_OTHER_CONTENT -49
 
@@ -2213,8 +2215,8 @@ bool hgrid_locate(const struct hgrid_grid *grid,
  * }
  * ```
  *
- * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a
- * ray perhaps more than once, before its hit is written.
+ * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any
+ * order, and a ray perhaps more than once, before its hit is written.
  *
  * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for
  * all rays.
@@ -2659,9 +2661,9 @@ bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
  *
  * Of the options `mask`, `skip`, `counters` and `scratch` are looked at; with counters the rays are traced one by one.
  *
- * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a ray perhaps more than once,
- * before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are
- * for all rays.
+ * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and
+ * a ray perhaps more than once, before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may
+ * be NULL: the defaults. They are for all rays.
  *
  * Returns `HGRID_OK` and has written all hits, or returns what `hgrid_intersect_n` returns and has written none;
  * `HGRID_ERROR_OVERLAP` also for `scratch` in the view, the blob or the boxes. A tree without a test hits nothing.
@@ -3063,8 +3065,8 @@ bool hgrid_scene_normal(const struct hgrid_scene *scene,
  * `filter` or `counters` the rays are traced one by one, in the order of the array: the filter is asked about all
  * hits of one ray before those of the next. Nested scenes are asked for each ray alone, too.
  *
- * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a ray perhaps more
- * than once, before its hit is written.
+ * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any
+ * order, and a ray perhaps more than once, before its hit is written.
  *
  * `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for all rays.
  *

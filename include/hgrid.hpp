@@ -1403,8 +1403,8 @@ private:
 /// A built grid and its memory. The mesh stays the caller's, unless `keep` takes it over.
 ///
 /// It is a view, so it answers queries, and where a view is wanted it can be given; that view is good
-/// for as long as the grid is. Moving it does not move the memory, but it moves the view: make objects
-/// of scenes again that were made from it.
+/// for as long as the grid is. Moving it does not move the memory. After a move, make the objects of
+/// scenes that show it again.
 class grid : public view {
 public:
     /// No grid; hits nothing.
@@ -1627,7 +1627,8 @@ using scene_hit = ::hgrid_scene_hit;
 /// An object at a place in a scene. See `hgrid_instance`: `instance one = HGRID_INSTANCE_INIT;`. One of zeros, as
 /// `std::vector<instance>(n)` has, is refused for its matrix.
 using instance = ::hgrid_instance;
-/// An object that instances show. See `hgrid_object`; `make_object` makes it.
+/// An object that instances show. See `hgrid_object`; `make_object` makes it. `object none{};` shows nothing: rays miss
+/// its instances.
 using object = ::hgrid_object;
 
 /// The options of a query of a scene: `hgrid_scene_options`. They refer to the filter, the counters and the memory

@@ -50,8 +50,8 @@ use crate::types::hgrid_grid;
 /// }
 /// ```
 ///
-/// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a
-/// ray perhaps more than once, before its hit is written.
+/// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any
+/// order, and a ray perhaps more than once, before its hit is written.
 ///
 /// `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for
 /// all rays.

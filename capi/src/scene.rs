@@ -49,6 +49,7 @@ pub struct hgrid_object {
     pub opaque: [MaybeUninit<usize>; 4],
 }
 
+// The tag of `Object::Nothing` is 0, so that it is `HGRID_OBJECT_INIT`: see `Object` in core.
 const _: () = assert!(size_of::<Object<'_>>() == size_of::<hgrid_object>());
 const _: () = assert!(align_of::<Object<'_>>() <= align_of::<hgrid_object>());
 

@@ -34,8 +34,8 @@ use crate::status::{HGRID_OK, hgrid_status};
 /// `filter` or `counters` the rays are traced one by one, in the order of the array: the filter is asked about all
 /// hits of one ray before those of the next. Nested scenes are asked for each ray alone, too.
 ///
-/// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a ray perhaps more
-/// than once, before its hit is written.
+/// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any
+/// order, and a ray perhaps more than once, before its hit is written.
 ///
 /// `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are for all rays.
 ///

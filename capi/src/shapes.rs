@@ -287,9 +287,9 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
 ///
 /// Of the options `mask`, `skip`, `counters` and `scratch` are looked at; with counters the rays are traced one by one.
 ///
-/// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and a ray perhaps more than once,
-/// before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may be NULL: the defaults. They are
-/// for all rays.
+/// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and
+/// a ray perhaps more than once, before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may
+/// be NULL: the defaults. They are for all rays.
 ///
 /// Returns `HGRID_OK` and has written all hits, or returns what `hgrid_intersect_n` returns and has written none;
 /// `HGRID_ERROR_OVERLAP` also for `scratch` in the view, the blob or the boxes. A tree without a test hits nothing.

@@ -18,31 +18,32 @@ pub const HGRID_ERROR_NULL_ARGUMENT: hgrid_status = -1;
 
 /// A struct's `struct_size` is smaller than the struct, or above 4096, or larger than the struct
 /// and what is behind the known fields is not zero; or the `reserved` field of an allocator or a
-/// configuration is not 0. The usual cause is a struct that was not initialised with its `_INIT` macro.
+/// configuration is not 0; or, from `hgrid_join`, the size puts the next mesh at an address that is not aligned. The
+/// usual cause is a struct that was not initialised with its `_INIT` macro.
 pub const HGRID_ERROR_STRUCT_SIZE: hgrid_status = -2;
 
 /// The index, the scratch, the blob or the room for one does not start at a multiple of
 /// `HGRID_ALIGNMENT`.
 pub const HGRID_ERROR_MISALIGNED: hgrid_status = -3;
 
-/// The index or the scratch overlaps the other one or the mesh; the room for a packed blob overlaps
-/// its grid or its mesh; or answers of a batch overlap its rays.
+/// Memory that the call writes (an index, scratch, the room for a packed blob or its views, parts, answers of a batch)
+/// overlaps other such memory or what the call reads: a mesh, boxes, instances, objects, a blob, rays.
 pub const HGRID_ERROR_OVERLAP: hgrid_status = -4;
 
-/// The index is too small. The report says how many bytes it needs;
-/// with `hgrid_pack`, `bytes` says it.
+/// The index is too small. The report says how many bytes it needs; with `hgrid_pack`, `hgrid_pack_scene` and
+/// `hgrid_open_packed_scene`, where it is the room or the views, `bytes` says it.
 ///
 /// With `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the index was not touched; with the other
 /// methods the grid was written as far as it went, so the index may hold anything.
 pub const HGRID_ERROR_INDEX_TOO_SMALL: hgrid_status = -10;
 
-/// The scratch is too small. The report says how many bytes it needs.
+/// The scratch is too small. The report says how many bytes it needs, or, where a call has none, its description.
 pub const HGRID_ERROR_SCRATCH_TOO_SMALL: hgrid_status = -11;
 
 /// The allocator has no more memory. The report says how many bytes index and scratch need.
 pub const HGRID_ERROR_OUT_OF_MEMORY: hgrid_status = -12;
 
-/// The position stride is below 12 bytes, or the vertices do not fit into memory.
+/// The position stride is below 12 bytes, or the box stride below 24, or the vertices or boxes do not fit into memory.
 pub const HGRID_ERROR_INVALID_POSITIONS: hgrid_status = -20;
 
 /// The index stride is below three indices, or the indices do not fit into memory.
@@ -51,8 +52,8 @@ pub const HGRID_ERROR_INVALID_INDICES: hgrid_status = -21;
 /// The mesh's `index_type` is none that this version knows.
 pub const HGRID_ERROR_INVALID_INDEX_TYPE: hgrid_status = -22;
 
-/// The mesh has more than 4294967294 triangles; or, from `hgrid_bound`, the sizes do not fit into the
-/// machine's address space.
+/// There are more triangles, boxes or instances than the method takes, 2^31 for a tree and 4294967294 for the others;
+/// or the arrays or the sizes do not fit into the machine's address space.
 pub const HGRID_ERROR_TOO_MANY_TRIANGLES: hgrid_status = -23;
 
 /// A triangle names a vertex that the mesh does not have. The report says which triangle.
@@ -69,7 +70,7 @@ pub const HGRID_ERROR_INVALID_MASKS: hgrid_status = -26;
 /// or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
 pub const HGRID_ERROR_INVALID_PARTS: hgrid_status = -27;
 
-/// The configuration's `method` is none that this version knows.
+/// The configuration's `method` is none that this version knows, or, for shapes and scenes, not `HGRID_METHOD_BVH`.
 pub const HGRID_ERROR_INVALID_METHOD: hgrid_status = -30;
 
 /// The density is NaN, infinite or not above 0, or asks for too much: more than 4096 cells on an
@@ -113,11 +114,11 @@ pub const HGRID_ERROR_UNSUPPORTED_VERSION: hgrid_status = -42;
 /// The bytes end before the blob does.
 pub const HGRID_ERROR_TRUNCATED: hgrid_status = -43;
 
-/// The blob was built for a mesh with another number of vertices or triangles; or, from `hgrid_refit`, a
-/// triangle that the build left out is finite now.
+/// The blob was built for a mesh with another number of vertices or triangles, or for another number of instances; or,
+/// from `hgrid_refit`, a triangle that the build left out is finite now.
 pub const HGRID_ERROR_MESH_MISMATCH: hgrid_status = -44;
 
-/// The blob contradicts itself or its mesh.
+/// The blob contradicts itself or its mesh, or the objects of a scene changed after its build.
 pub const HGRID_ERROR_CORRUPT: hgrid_status = -45;
 
 /// The blob holds a grid and no mesh, and none was brought.
@@ -129,7 +130,8 @@ pub const HGRID_ERROR_CANNOT_REFIT: hgrid_status = -47;
 /// The blob was built by an older version with the method brick, which was removed: build it with another method.
 pub const HGRID_ERROR_METHOD_REMOVED: hgrid_status = -48;
 
-/// The blob is built over something else: triangles, shapes or instances. Open it with the function for these.
+/// The blob is built over something else: triangles, shapes or instances. Open it with the function for these. Or a
+/// scene was to be packed that shows shapes, which cannot be packed.
 pub const HGRID_ERROR_OTHER_CONTENT: hgrid_status = -49;
 
 /// The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
@@ -199,10 +201,14 @@ pub(crate) const fn status_of(error: Error) -> hgrid_status {
 }
 
 /// Returns what a status means and what to do.
+#[expect(clippy::too_many_lines, reason = "one arm a status")]
 pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
     match status {
         HGRID_OK => c"success",
-        HGRID_ERROR_NULL_ARGUMENT => c"a pointer is NULL that may not be: an argument, an array of the mesh, or the configuration's run where tasks is above 1",
+        HGRID_ERROR_NULL_ARGUMENT => {
+            c"a pointer is NULL that may not be: an argument, an array of the mesh, or the \
+              configuration's run where tasks is above 1"
+        }
         HGRID_ERROR_STRUCT_SIZE => {
             c"wrong struct_size, or a reserved field that is not 0: use the struct's HGRID_..._INIT macro"
         }
@@ -215,12 +221,15 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_INDEX_TOO_SMALL => {
             c"index, room or views too small: bring the report's index_bytes, or what the call wrote to bytes"
         }
-        HGRID_ERROR_SCRATCH_TOO_SMALL => c"scratch too small: bring the report's scratch_bytes, or what the call's description asks for",
+        HGRID_ERROR_SCRATCH_TOO_SMALL => {
+            c"scratch too small: bring the report's scratch_bytes, or what the call's description asks for"
+        }
         HGRID_ERROR_OUT_OF_MEMORY => {
             c"out of memory: the report says how many bytes index and scratch need"
         }
         HGRID_ERROR_INVALID_POSITIONS => {
-            c"invalid positions: check vertex_count, and position_stride (0, or 12 and more); of boxes box_stride (0, or 24 and more)"
+            c"invalid positions: check vertex_count, and position_stride (0, or 12 and more); \
+              of boxes count, and box_stride (0, or 24 and more)"
         }
         HGRID_ERROR_INVALID_INDICES => {
             c"invalid indices: check triangle_count, and index_stride (0, or three indices and more)"
@@ -228,7 +237,10 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_INVALID_INDEX_TYPE => {
             c"unknown index_type: use HGRID_INDEX_U32 or HGRID_INDEX_U16"
         }
-        HGRID_ERROR_TOO_MANY_TRIANGLES => c"too many triangles, boxes or instances: more than 2^31 for a tree, 4294967294 for other methods, or than memory has addresses for",
+        HGRID_ERROR_TOO_MANY_TRIANGLES => {
+            c"too many triangles, boxes or instances: a tree takes 2^31, other methods take 4294967294, \
+              and memory must have addresses for them"
+        }
         HGRID_ERROR_INDEX_OUT_OF_RANGE => {
             c"a vertex number is vertex_count or more (numbers begin at 0): repair the report's triangle"
         }
@@ -238,7 +250,9 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         }
         HGRID_ERROR_INVALID_MASKS => c"invalid masks: one for each triangle, and mask_stride 0, or 4 and more",
         HGRID_ERROR_INVALID_PARTS => c"invalid parts: join meshes with arrays of their own by hgrid_join, and change nothing of what it fills",
-        HGRID_ERROR_INVALID_METHOD => c"unknown method, or one that builds no shapes and scenes (HGRID_METHOD_BVH does): use one of HGRID_METHOD_...",
+        HGRID_ERROR_INVALID_METHOD => {
+            c"unknown method: use one of HGRID_METHOD_..., for shapes and scenes HGRID_METHOD_BVH"
+        }
         HGRID_ERROR_INVALID_DENSITY => {
             c"invalid density: above 0, and lower if the grid would become too fine or too large"
         }
@@ -267,21 +281,27 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
         HGRID_ERROR_UNSUPPORTED_VERSION => c"a blob of another version: build it again",
         HGRID_ERROR_TRUNCATED => c"a truncated blob: bring all of its bytes",
         HGRID_ERROR_MESH_MISMATCH => {
-            c"a blob of another mesh, or of a scene with another number of instances: bring what it was built for, or build it again"
+            c"a blob of another mesh, or of a scene with another number of instances: \
+              bring what it was built for, or build it again"
         }
         HGRID_ERROR_CANNOT_REFIT => c"a blob that cannot be refitted: only trees can, and before they are packed",
         HGRID_ERROR_OTHER_CONTENT => {
-            c"a blob of another kind: open grids with hgrid_open, shapes with hgrid_open_shapes, scenes with hgrid_open_scene or, if packed, hgrid_open_packed_scene; shapes in a scene cannot be packed"
+            c"a blob of another kind: open grids with hgrid_open, shapes with hgrid_open_shapes, \
+              scenes with hgrid_open_scene, packed scenes with hgrid_open_packed_scene; \
+              scenes that show shapes cannot be packed"
         }
         HGRID_ERROR_INSTANCE_OBJECT => {
             c"an instance names an object that does not exist: the report's triangle is its number"
         }
         HGRID_ERROR_INSTANCE_MATRIX => {
-            c"an instance is not finite, has no inverse, or lies too far out: repair the one that the report's triangle names"
+            c"an instance is not finite, has no inverse, or lies too far out: \
+              repair the one that the report's triangle names"
         }
         HGRID_ERROR_MISSING_OBJECTS => c"too few objects: bring those that the scene was built with",
         HGRID_ERROR_TOO_DEEP => c"too many scenes inside one another: HGRID_MAX_NESTING at most",
-        HGRID_ERROR_CORRUPT => c"a damaged blob, or one of another mesh: build it again; or a scene whose objects changed: refit it",
+        HGRID_ERROR_CORRUPT => {
+            c"a damaged blob, or one of another mesh: build it again; or a scene whose objects changed: refit it"
+        }
         HGRID_ERROR_INVALID_RAYS => {
             c"invalid rays: check count; stride is 0 or at least sizeof(hgrid_ray), in scenes sizeof(hgrid_ray_f64)"
         }

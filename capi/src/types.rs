@@ -142,7 +142,7 @@ const _: () = assert!(HGRID_BUILD_STRICT == BuildFlags::STRICT.bits());
 pub struct hgrid_mesh {
     /// `sizeof(hgrid_mesh)`.
     pub struct_size: u32,
-    /// `HGRID_INDEX_U32` or `HGRID_INDEX_U16`. No call can tell that it is the wrong one.
+    /// `HGRID_INDEX_U32` or `HGRID_INDEX_U16`. The library cannot check that it fits the array.
     pub index_type: u32,
     /// The first vertex: three floats x, y, z, in scene units. NULL only without vertices.
     pub positions: *const c_void,
@@ -443,8 +443,7 @@ impl hgrid_report {
         }
     }
 
-    /// Does the same as [`note_error`](Self::note_error) for a build over shapes or instances, whose bound says how much
-    /// the other region needs.
+    /// Notes the error of a build over shapes or instances, and for the other region what is always enough.
     pub(crate) const fn note_unbuilt(
         &mut self,
         error: Error,

@@ -135,21 +135,6 @@ static void what_scenes_refuse(void)
     no_scene(HGRID_ERROR_OVERLAP, (const hgrid_instance *)index, 3, 3, NULL, index, INDEX_BYTES, extra,
              SCRATCH_BYTES);
 
-    /* What one build reports is enough for the next. */
-    for (size_t offered = 0; offered < 2048; offered += 64)
-        for (size_t lent = 0; lent < 2; lent++) {
-            hgrid_shapes shown;
-            hgrid_scene made;
-            const size_t extra_bytes = lent * SCRATCH_BYTES;
-            if (hgrid_build_shapes(&boxes, NULL, index, offered, extra, extra_bytes, &shown, &report) != HGRID_OK)
-                EXPECT(HGRID_OK, hgrid_build_shapes(&boxes, NULL, index, (size_t)report.index_bytes, extra,
-                                                    (size_t)report.scratch_bytes, &shown, NULL));
-            if (hgrid_build_scene(three, 3, objects, 3, NULL, index, offered, extra, extra_bytes, &made, &report)
-                != HGRID_OK)
-                EXPECT(HGRID_OK, hgrid_build_scene(three, 3, objects, 3, NULL, index, (size_t)report.index_bytes,
-                                                   extra, (size_t)report.scratch_bytes, &made, NULL));
-        }
-
     /* A scene may have no instances, and instances of nothing. */
     hgrid_scene empty;
     hgrid_scene_hit hit;

@@ -173,6 +173,54 @@ static void a_refit_follows_the_instances(void)
     CHECK(memcmp(copy, inner_blob, inner_bytes) == 0);
 }
 
+static void run_all(void *context, uint32_t count, hgrid_task task, void *task_context)
+{
+    (void)context;
+    for (uint32_t i = 0; i < count; i++)
+        task(task_context, i);
+}
+
+/* Sizes that one build reports are enough for the next. */
+static void reports_are_enough(const hgrid_config *config)
+{
+    const hgrid_instance three[3] = {HGRID_INSTANCE_INIT, HGRID_INSTANCE_INIT, HGRID_INSTANCE_INIT};
+    const size_t large = 256 * 1024;
+    void *const index = guarded(large), *const extra = guarded(large);
+    const hgrid_status missing[2] = {HGRID_ERROR_SCRATCH_TOO_SMALL, HGRID_ERROR_INDEX_TOO_SMALL};
+    int refusals[2][2] = {{0, 0}, {0, 0}};
+    for (size_t offered = 0; offered < 2048; offered += 64)
+        for (size_t lent = 0; lent < 2; lent++) {
+            hgrid_report report = new_report;
+            hgrid_shapes tree;
+            hgrid_scene made;
+            hgrid_status status = hgrid_build_shapes(&boxes, config, index, lent ? offered : large, extra,
+                                                     lent * large, &tree, &report);
+            refusals[0][lent] += status == missing[lent];
+            if (status != HGRID_OK)
+                EXPECT(HGRID_OK, hgrid_build_shapes(&boxes, config, index, (size_t)report.index_bytes, extra,
+                                                    (size_t)report.scratch_bytes, &tree, NULL));
+            report = new_report;
+            status = hgrid_build_scene(three, 3, objects, 3, config, index, lent ? offered : large, extra,
+                                       lent * large, &made, &report);
+            refusals[1][lent] += status == missing[lent];
+            if (status != HGRID_OK)
+                EXPECT(HGRID_OK, hgrid_build_scene(three, 3, objects, 3, config, index, (size_t)report.index_bytes,
+                                                   extra, (size_t)report.scratch_bytes, &made, NULL));
+        }
+    for (int of = 0; of < 2; of++)
+        CHECK(refusals[of][0] > 0 && refusals[of][1] > 0);
+}
+
+static void what_is_reported_is_enough(void)
+{
+    hgrid_config config = HGRID_CONFIG_INIT;
+    reports_are_enough(NULL);
+    config.tasks = 2, config.run = run_all;
+    reports_are_enough(&config);
+    config.quality = HGRID_QUALITY_HIGH;
+    reports_are_enough(&config);
+}
+
 int main(void)
 {
     prepare();
@@ -180,5 +228,6 @@ int main(void)
     scenes_show_grids_shapes_and_scenes();
     filters_are_shown_hits_of_the_scene();
     a_refit_follows_the_instances();
+    what_is_reported_is_enough();
     return 0;
 }

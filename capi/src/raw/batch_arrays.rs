@@ -113,8 +113,8 @@ fn span(elements: &Elements) -> Span {
 /// Returns true if a byte of an answer lies in a ray.
 ///
 /// With one stride for both, the distance from a ray's start to the start of the next answer is the
-/// same everywhere: the answer lies between two rays, or all of them are hit. The stride of a single element may be
-/// any number, but its span is the element.
+/// same everywhere: the answer lies between two rays, or all of them are hit. With fewer than two elements the stride
+/// means nothing, and the spans decide.
 fn overlap(
     (rays, ray_bytes): (&Elements, usize),
     (answers, answer_bytes): (&Elements, usize),

@@ -55,7 +55,7 @@ pub(crate) unsafe fn write_object(to: NonNull<hgrid_object>, object: Object<'sta
 /// The array of a scene's objects.
 ///
 /// # Safety
-/// The caller's promise; the objects were written by [`write_object`] or copied from such.
+/// The caller's promise; each object was written by [`write_object`], copied from such, or is all zeros.
 unsafe fn objects(
     (start, count): (*const hgrid_object, usize),
 ) -> Result<&'static [Object<'static>], hgrid_status> {
@@ -64,8 +64,8 @@ unsafe fn objects(
     }
     let fits = Elements::new(start.cast(), 0, count, size_of::<hgrid_object>());
     fits.ok_or(HGRID_ERROR_TOO_MANY_TRIANGLES)?;
-    // SAFETY: not NULL, so aligned and readable by the caller's promise, and objects by this function's contract; an
-    // object is as large as `hgrid_object`.
+    // SAFETY: not NULL, so aligned and readable by the caller's promise, and objects by this function's contract: zeros
+    // are `Object::Nothing`, whose tag is 0. An object is as large as `hgrid_object`.
     Ok(unsafe { slice::from_raw_parts(start.cast(), count) })
 }
 
@@ -136,7 +136,8 @@ pub(crate) unsafe fn build_scene(
     let built = controlled(caller, |control| {
         Scene::build_with(instances, objects, &config, index, scratch, control)
     });
-    let bound = u32::try_from(instances.len()).ok().and_then(|count| Scene::bound(count, &config));
+    let count = u32::try_from(instances.len()).ok();
+    let bound = count.and_then(|count| Scene::bound_parallel(count, &config, caller.tasks));
     let built = built.map_err(|error| report.note_unbuilt(error, bound))?;
     report.note_built(built.blob(), bound);
     report.reference_count = built.instance_count();

@@ -131,7 +131,7 @@ pub(crate) unsafe fn build_shapes(
     let [index, scratch] = unsafe { apart(inputs, memory) }?;
     let built =
         controlled(caller, |control| Shapes::build_with(boxes, &config, index, scratch, control));
-    let bound = Sizes::bound(boxes.count(), &config);
+    let bound = Sizes::bound_parallel(boxes.count(), &config, caller.tasks);
     let built = built.map_err(|error| report.note_unbuilt(error, bound))?;
     report.note_built(built.blob(), bound);
     report.skipped_count = built.skipped_count();
