@@ -49,6 +49,18 @@ impl Drop for Folder {
 }
 
 #[test]
+fn a_blob_overwrites_none_of_its_sources() {
+    let folder = Folder::new("sources").unwrap();
+    folder.says("pack a.obj -o a.hgrid").unwrap();
+    for scene in ["a.hgrid", "./a.hgrid", "a.hgrid+a.obj", "a.obj+a.hgrid"] {
+        let said = folder.fails(&format!("pack {scene} -o a.hgrid")).unwrap();
+        assert!(said.contains("would be overwritten"), "{scene}: {said}");
+    }
+    folder.says("validate a.hgrid").unwrap();
+    folder.says("pack a.hgrid -o b.hgrid").unwrap();
+}
+
+#[test]
 fn a_file_alone_is_rendered() {
     let folder = Folder::new("render").unwrap();
     let text = folder.says("a.obj --size 16").unwrap();
