@@ -3,7 +3,8 @@
 
 use hgrid_core::{
     BatchField, Boxes, Coherence, Config, Counters, Cull, Error, Instance, Object, Ray, RayF64,
-    Scene, SceneHit, SceneOptions, Shapes, SimdLevel, Strided, StridedMut, TriangleMesh, Verdict,
+    Scene, SceneHit, SceneOptions, ShapeHit, Shapes, SimdLevel, Strided, StridedMut, TriangleMesh,
+    Verdict,
 };
 use hgrid_lab::camera::{Camera, Up, View};
 use hgrid_tests::owned::Owned;
@@ -156,16 +157,31 @@ fn batches_from_many_extents_away_answer_as_each_ray_alone() {
     let mesh = TriangleMesh::new(&corners, &[[0, 1, 2], [2, 3, 0]]).unwrap();
     let owned = Owned::build(&mesh, &Config::default()).unwrap();
     let grid = owned.open(&mesh).unwrap();
+    // The same square as a shape, in a box that holds its hits with their rounding.
+    let view = Boxes::new(&[[-1.0, -1.0, 0.299, 1.0, 1.0, 0.301]]).unwrap();
+    let tree = Built::shapes(view, &Config::default()).unwrap();
+    let shapes = Shapes::open(tree.bytes(), view).unwrap();
+    let square = |_: u32, ray: &Ray| {
+        let [x, y, z] = ray.origin;
+        let [u, v, w] = ray.direction;
+        let t = (0.3 - z) / w;
+        let is_inside = (x + t * u).abs() < 1.0 && (y + t * v).abs() < 1.0;
+        is_inside.then_some(ShapeHit { t, u: 0.0, v: 0.0 })
+    };
     for distance in [1e8, 1e10, 1e11, 1e12, 1e13, 1e14] {
         // The second instance makes the scene so wide that its rays are not remote.
         let aside = Instance { translation: [distance, 0.0, 0.0], ..Instance::new(0) };
-        let objects = [Object::Grid(&grid)];
-        let instances = [Instance::new(0), aside];
+        let objects = [Object::Grid(&grid), Object::Shapes(&shapes, &square)];
+        let linear = [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.5]];
+        let scaled =
+            |object, x| Instance { linear, translation: [x, 0.0, 0.0], ..Instance::new(object) };
+        let instances = [Instance::new(0), scaled(0, 4.0), scaled(1, 8.0), aside];
         let built = Built::scene(&instances, &objects, &Config::default()).unwrap();
         let scene = built.open(&objects).unwrap();
         let mut random = Random(18);
-        let ray = |_| {
+        let ray = |i: u32| {
             let [x, y, z] = random.point().map(f64::from);
+            let x = x + 10.0 * f64::from(i % 3);
             let [u, v, _] = random.point().map(|c| c * (0.4 / distance) as f32);
             RayF64::new([0.4 * x, 0.4 * y, 0.3 * distance + z], [u, v, z as f32 - 2.0])
         };

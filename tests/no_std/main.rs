@@ -69,13 +69,9 @@ fn only(method: &str) -> [&str; 3] {
 
 /// Builds core and the C library for a target, and returns their folder. `arguments` may leave methods out; each choice
 /// has a folder of its own, so that none replaces another.
-fn build(target: &str, arguments: &[&str]) -> PathBuf {
-    build_all(target, &[], arguments)
-}
-
-/// Does the same, and builds for other targets at the same time if they are installed. Two tests that call this for each
-/// other's target take less time than two builds.
-fn build_all(target: &str, others: &[&str], arguments: &[&str]) -> PathBuf {
+///
+/// Other targets are built at the same time if they are installed: two tests that name each other's need one build.
+fn build(target: &str, others: &[&str], arguments: &[&str]) -> PathBuf {
     let others = others.iter().copied().filter(|other| rustlib(other).join("lib").is_dir());
     let dir = target_dir().join("no_std").join(arguments.last().unwrap_or(&"all"));
     let mut build = cargo_in(&dir, "build");
@@ -90,8 +86,8 @@ const BROWSER: &str = "wasm32-unknown-unknown";
 #[test]
 fn a_microcontroller_gets_a_static_library() {
     if is_available(MICROCONTROLLER) {
-        let build = build_all(MICROCONTROLLER, &[BROWSER], &only("one-level"));
-        let archive = build.join("libhgrid.a");
+        let dir = build(MICROCONTROLLER, &[BROWSER], &only("one-level"));
+        let archive = dir.join("libhgrid.a");
         let bytes = fs::read(&archive).expect("the C library");
         assert!(bytes.starts_with(b"!<arch>\n"));
         check_flash("| `one-level` | ", &archive);
@@ -102,9 +98,9 @@ fn a_microcontroller_gets_a_static_library() {
 #[ignore = "slow: three more libraries, optimised as a whole"]
 fn each_method_takes_as_much_flash_as_the_page_says() {
     if is_available(MICROCONTROLLER) {
-        check_flash("| all | ", &build(MICROCONTROLLER, &[]).join("libhgrid.a"));
+        check_flash("| all | ", &build(MICROCONTROLLER, &[], &[]).join("libhgrid.a"));
         for method in ["fixed", "bvh"] {
-            let archive = build(MICROCONTROLLER, &only(method)).join("libhgrid.a");
+            let archive = build(MICROCONTROLLER, &[], &only(method)).join("libhgrid.a");
             check_flash(&format!("| `{method}` | "), &archive);
         }
     }
@@ -148,7 +144,7 @@ fn a_web_page_gets_all_methods() {
 
 fn check_module(arguments: &[&str]) {
     if is_available(BROWSER) {
-        let dir = build_all(BROWSER, &[MICROCONTROLLER], arguments);
+        let dir = build(BROWSER, &[MICROCONTROLLER], arguments);
         let module = fs::read(dir.join("hgrid.wasm")).expect("the module");
         let sections = sections(&module);
         assert!(sections.contains(&EXPORTS) && !sections.contains(&IMPORTS), "{sections:?}");

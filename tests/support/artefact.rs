@@ -4,9 +4,10 @@
 //! because a test program holds the lock of the target folder itself. Sets of features share that folder, and with
 //! it the compiled dependencies; each library is copied, so that none replaces another.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::{Mutex, OnceLock};
+use std::sync::OnceLock;
 use std::{env, fs};
 
 use cc::Tool;
@@ -110,12 +111,13 @@ pub fn library_with(features: &str) -> PathBuf {
 
 /// Builds both libraries with some features, and copies them into a folder with this name, which it returns.
 fn build(name: &str, features: &[&str]) -> PathBuf {
-    // cargo writes all of them to the same place.
-    static PLACE: Mutex<()> = Mutex::new(());
-    let _turn = PLACE.lock().expect("no thread panicked with the lock");
-    run(cargo("build").args(["--release", "-p", "hgrid-capi"]).args(features));
-    let folder = target_dir().join("libraries").join(name);
+    let libraries = target_dir().join("libraries");
+    let folder = libraries.join(name);
     fs::create_dir_all(&folder).expect("a folder");
+    // cargo writes all of them to the same place: no other thread or test program builds before this one is copied.
+    let place = File::create(libraries.join("lock")).expect("a lock");
+    place.lock().expect("a turn");
+    run(cargo("build").args(["--release", "-p", "hgrid-capi"]).args(features));
     for library in [STATIC_LIBRARY, &shared_library_name()] {
         fs::copy(target_dir().join("release").join(library), folder.join(library)).expect("a copy");
     }
