@@ -1159,6 +1159,15 @@ public:
     /// The same.
     template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
     static result<view> open(Blob &&) = delete;
+    /// Gives the tree in a blob the boxes of a mesh whose vertices moved, in place; other views of the blob are of no use
+    /// any more.
+    static result<view> refit(const mesh &of, span<byte> blob, refit_report *details = nullptr) noexcept
+    {
+        view moved;
+        const status answer =
+            detail::said(::hgrid_refit(&of.c(), blob.data(), blob.size(), &moved.raw_, details));
+        return answer == status::ok ? result<view>(moved) : answer;
+    }
     /// Bytes of scratch that `validate` takes: some for a tree, none for the other methods.
     std::size_t validate_bytes() const noexcept { return ::hgrid_validate_bytes(&raw_); }
     /// Proves that a blob from elsewhere is the grid of its mesh, in scratch that may lie at any address.
@@ -1504,12 +1513,10 @@ public:
     result<refit_report> refit(const mesh &of) noexcept
     {
         refit_report found = HGRID_REFIT_REPORT_INIT;
-        ::hgrid_grid fresh = HGRID_GRID_INIT;
-        const status answer = detail::said(::hgrid_refit(&of.c(), blob_.data(), blob_.size(),
-                                                         &fresh, &found));
-        if (answer != status::ok)
-            return answer;
-        static_cast<view &>(*this) = view(fresh);
+        const auto moved = view::refit(of, blob_, &found);
+        if (!moved)
+            return moved.error();
+        static_cast<view &>(*this) = *moved;
         return found;
     }
 
@@ -1624,9 +1631,15 @@ inline result<grid> grid::build(const mesh &of, const config &how, report *detai
 using shape_hit = ::hgrid_shape_hit;
 /// The hit of a ray in a scene. See `hgrid_scene_hit`.
 using scene_hit = ::hgrid_scene_hit;
-/// An object at a place in a scene. See `hgrid_instance`: `instance one = HGRID_INSTANCE_INIT;`. One of zeros, as
-/// `std::vector<instance>(n)` has, is refused for its matrix.
-using instance = ::hgrid_instance;
+/// An object at a place in a scene. See `hgrid_instance`.
+struct instance : ::hgrid_instance {
+    /// The first object where it is, with the identity transform.
+    instance() noexcept : ::hgrid_instance HGRID_INSTANCE_INIT {}
+    /// The object of this number among those of the scene.
+    explicit instance(std::uint32_t number) noexcept : instance() { object = number; }
+    /// One that was filled in C.
+    instance(const ::hgrid_instance &raw) noexcept : ::hgrid_instance(raw) {}
+};
 /// An object that instances show. See `hgrid_object`; `make_object` makes it. `object none{};` shows nothing: rays miss
 /// its instances.
 using object = ::hgrid_object;
@@ -1758,15 +1771,21 @@ public:
         return detail::said(::hgrid_validate_shapes(&raw_, scratch.data(), scratch.size()));
     }
     /// The closest shape that a ray hits.
-    optional<hit> intersect(const ray &along) const noexcept
+    optional<hit> intersect(const ray &along) const noexcept { return intersect(along, nullptr); }
+    /// The same with options.
+    optional<hit> intersect(const ray &along, const options &with) const noexcept
     {
-        hit found;
-        return ::hgrid_intersect_shapes(&raw_, &along, nullptr, &found) ? optional<hit>(found) : optional<hit>();
+        return intersect(along, &with.c());
     }
     /// Returns true if a ray hits any shape.
     bool occluded(const ray &along) const noexcept
     {
         return ::hgrid_occluded_shapes(&raw_, &along, nullptr);
+    }
+    /// The same with options.
+    bool occluded(const ray &along, const options &with) const noexcept
+    {
+        return ::hgrid_occluded_shapes(&raw_, &along, &with.c());
     }
     /// The closest shape that each ray hits; a miss has the primitive `invalid_id`. There are as many hits as rays, or the
     /// answer is `invalid_answers`.
@@ -1796,6 +1815,11 @@ public:
     const ::hgrid_shapes &c() const noexcept { return raw_; }
 
 private:
+    optional<hit> intersect(const ray &along, const ::hgrid_query_options *with) const noexcept
+    {
+        hit found;
+        return ::hgrid_intersect_shapes(&raw_, &along, with, &found) ? optional<hit>(found) : optional<hit>();
+    }
     status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
                        const ::hgrid_query_options *with) const noexcept
     {
@@ -1828,6 +1852,7 @@ public:
     static result<scene> build(span<const instance> all, span<const object> of, const config &how, span<byte> index,
                                span<byte> scratch, report *details = nullptr) noexcept
     {
+        static_assert(sizeof(instance) == sizeof(::hgrid_instance), "C reads arrays of them");
         scene built;
         const ::hgrid_config raw = how.c();
         const status answer =
@@ -1966,8 +1991,7 @@ public:
     /// The innermost instance that a hit names; one of no object if it names none.
     instance instance_of(const scene_hit &of) const noexcept
     {
-        instance found = HGRID_INSTANCE_INIT;
-        found.object = HGRID_INVALID_ID;
+        instance found(HGRID_INVALID_ID);
         static_cast<void>(::hgrid_scene_locate(&raw_, &of, &found, nullptr));
         return found;
     }

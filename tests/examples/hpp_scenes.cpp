@@ -110,6 +110,10 @@ void check_scenes()
     const auto hit = shapes->intersect(hgrid::make_ray({10.25f, 0.5f, 3}, {0, 0, -1}));
     CHECK(hit && hit->primitive == 5 && hit->t == 2 && hit->u == 0.25f);
     CHECK(!shapes->occluded(hgrid::make_ray({11.5f, 0.5f, 3}, {0, 0, -1})));
+    hgrid::options no_fifth;
+    no_fifth.skip(5);
+    const auto fifth = hgrid::make_ray({10.25f, 0.5f, 3}, {0, 0, -1});
+    CHECK(shapes->occluded(fifth) && !shapes->occluded(fifth, no_fifth) && !shapes->intersect(fifth, no_fifth));
     const auto again = hgrid::shapes::open(hgrid::as_bytes(shape_index), boxes);
     CHECK(again && again->occluded(hgrid::make_ray({0.5f, 0.5f, 3}, {0, 0, -1})));
     CHECK(!hgrid::shapes().occluded(hgrid::make_ray({0.5f, 0.5f, 3}, {0, 0, -1})));
@@ -138,13 +142,26 @@ void check_scenes()
     const auto grid = hgrid::view::build(hgrid::mesh(corners, indices), hgrid::config(),
                                          hgrid::as_writable_bytes(grid_index), hgrid::as_writable_bytes(scratch));
     CHECK(grid);
+    const std::vector<std::array<float, 3>> lower = {{{0, 0, -2}}, {{1, 0, -2}}, {{0, 1, -2}}};
+    hgrid::refit_report costs = HGRID_REFIT_REPORT_INIT;
+    const auto down = hgrid::view::refit(hgrid::mesh(lower, indices), hgrid::as_writable_bytes(grid_index), &costs);
+    const auto inwards = hgrid::make_ray({0.25f, 0.25f, 1}, {0, 0, -1});
+    CHECK(down && down->intersect(inwards)->t == 3 && costs.cost_after > 0);
+    CHECK(hgrid::view::refit(hgrid::mesh(corners, indices), hgrid::as_writable_bytes(grid_index)));
+    CHECK(grid->intersect(inwards)->t == 1);
+    auto owner = hgrid::grid::build(hgrid::mesh(corners, indices));
+    CHECK(owner && owner->refit(hgrid::mesh(lower, indices)) && owner->intersect(inwards)->t == 3);
+    const std::vector<std::uint32_t> two = {0, 1, 2, 0, 1, 2};
+    CHECK(owner->refit(hgrid::mesh(lower, two)).error() == hgrid::status::mesh_mismatch);
+    CHECK(owner->intersect(inwards)->t == 3);
     const auto one = hgrid::make_object(*grid), other = hgrid::make_object(*shapes);
     CHECK(one && other);
     const std::array<hgrid::object, 2> objects = {{*one, *other}};
     std::array<hgrid::instance, 3> instances;
-    instances.fill(hgrid::instance HGRID_INSTANCE_INIT);
     instances[1].translation[2] = -5, instances[1].linear[0][0] = -1;
-    instances[2].object = 1, instances[2].translation[1] = 10;
+    instances[2] = hgrid::instance(1), instances[2].translation[1] = 10;
+    const ::hgrid_instance usual = HGRID_INSTANCE_INIT;
+    CHECK(instances[0].object == usual.object && hgrid::instance(usual).linear[2][2] == 1);
     const auto scene = hgrid::scene::build(instances, objects, hgrid::config(),
                                            hgrid::as_writable_bytes(scene_index),
                                            hgrid::as_writable_bytes(scratch));
