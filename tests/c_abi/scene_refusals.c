@@ -134,6 +134,10 @@ static void what_scenes_refuse(void)
     no_scene(HGRID_ERROR_SCRATCH_TOO_SMALL, three, 3, 3, NULL, index, INDEX_BYTES, extra, 0);
     no_scene(HGRID_ERROR_OVERLAP, (const hgrid_instance *)index, 3, 3, NULL, index, INDEX_BYTES, extra,
              SCRATCH_BYTES);
+    /* Nor may a region lie over an object's blob or view. */
+    no_scene(HGRID_ERROR_OVERLAP, three, 3, 3, NULL, shape_blob, shape_bytes, extra, SCRATCH_BYTES);
+    no_scene(HGRID_ERROR_OVERLAP, three, 3, 3, NULL, index, INDEX_BYTES, inner_blob, inner_bytes);
+    no_scene(HGRID_ERROR_OVERLAP, three, 3, 3, NULL, index, INDEX_BYTES, &inner, sizeof inner);
 
     /* A scene may have no instances, and instances of nothing. */
     hgrid_scene empty;
@@ -175,6 +179,8 @@ static void what_scenes_refuse(void)
            hgrid_refit_scene(instances, INSTANCES - 1, objects, 2, copy, inner_bytes, &empty, NULL));
     EXPECT(HGRID_ERROR_OVERLAP, hgrid_refit_scene((const hgrid_instance *)copy, INSTANCES, objects, 2, copy,
                                                   inner_bytes, &empty, NULL));
+    EXPECT(HGRID_ERROR_OVERLAP,
+           hgrid_refit_scene(instances, INSTANCES, objects, 3, inner_blob, inner_bytes, &empty, NULL));
     hgrid_refit_report refit = HGRID_REFIT_REPORT_INIT;
     instances[3].object = 9;
     EXPECT(HGRID_ERROR_INSTANCE_OBJECT,

@@ -130,9 +130,8 @@ pub(crate) unsafe fn build_scene(
     let objects = unsafe { objects(shown) }?;
     // SAFETY: the caller's promise.
     let (config, caller) = unsafe { config(settings) }?;
-    let shown = Span::new(shown.0.cast(), size_of_val(objects));
     // SAFETY: the caller's promise.
-    let [index, scratch] = unsafe { apart([span, shown], memory) }?;
+    let [index, scratch] = unsafe { apart_from(span, objects, memory) }?;
     let built = controlled(caller, |control| {
         Scene::build_with(instances, objects, &config, index, scratch, control)
     });
@@ -183,9 +182,8 @@ pub(crate) unsafe fn refit_scene(
     let (instances, span) = unsafe { instances(given) }?;
     // SAFETY: this function's contract.
     let objects = unsafe { objects(shown) }?;
-    let shown = Span::new(shown.0.cast(), size_of_val(objects));
     // SAFETY: the caller's promise.
-    let [blob, _] = unsafe { apart([span, shown], [blob, Region::NONE]) }?;
+    let [blob, _] = unsafe { apart_from(span, objects, [blob, Region::NONE]) }?;
     let refitted = Scene::refit(blob, instances, objects);
     report.note(&refitted);
     let opened = refitted.and_then(|_| Scene::open(blob, objects)).map_err(status_of)?;
@@ -214,22 +212,51 @@ pub(crate) unsafe fn validate_scene(
 
 /// Returns true if a scene reads something that lies in a span.
 fn reads(scene: &Scene<'_>, span: Span) -> bool {
-    let objects = scene.objects();
-    let array = Span::new(objects.as_ptr().cast(), size_of_val(objects));
-    let has = |object: &Object<'_>| match object {
+    let within = |object: &Object<'_>| match object {
+        Object::Scene(inner) => reads(inner, span),
+        _ => touches(object, span),
+    };
+    holds(scene, span) || scene.objects().iter().any(within)
+}
+
+/// Returns true if a view of a scene, its blob or its array of objects lies in a span.
+fn holds(scene: &Scene<'_>, span: Span) -> bool {
+    view_of(scene).overlaps(span)
+        || span_of(scene.blob()).overlaps(span)
+        || view_of(scene.objects()).overlaps(span)
+}
+
+/// Returns true if something of an object lies in a span, but for what a scene shows.
+fn touches(object: &Object<'_>, span: Span) -> bool {
+    match object {
         Object::Grid(grid) => {
             view_of(*grid).overlaps(span)
                 || span_of(grid.blob()).overlaps(span)
                 || shares(grid.mesh(), span)
         }
-        Object::Scene(inner) => reads(inner, span),
+        Object::Scene(inner) => holds(inner, span),
         Object::Shapes(shapes, test) => view_of(*test).overlaps(span) || shapes_read(shapes, span),
         Object::Nothing => false,
-    };
-    view_of(scene).overlaps(span)
-        || span_of(scene.blob()).overlaps(span)
-        || array.overlaps(span)
-        || objects.iter().any(has)
+    }
+}
+
+/// Regions to write for a scene, once it is sure that its instances, the array of its objects and these themselves lie
+/// elsewhere. What a scene among them shows is not looked at: that may be much more than the scene itself.
+///
+/// # Safety
+/// The caller's promise.
+unsafe fn apart_from(
+    instances: Span,
+    objects: &[Object<'_>],
+    regions: [Region; 2],
+) -> Result<[&'static mut [u8]; 2], hgrid_status> {
+    let written = regions.map(|region| region.span());
+    let is_shared = |object: &Object<'_>| written.iter().any(|&span| touches(object, span));
+    if objects.iter().any(is_shared) {
+        return Err(HGRID_ERROR_OVERLAP);
+    }
+    // SAFETY: the caller's promise.
+    unsafe { apart([instances, view_of(objects)], regions) }
 }
 
 /// Writes a scene and all that it shows.
