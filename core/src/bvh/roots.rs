@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! for each unit (a crowded bin, or bins side by side that make up a root):
-//!     crowded: a box of its own around the centres, new keys, new bins; then these
+//!     crowded: new keys in the box around its centres, new bins; then their units
 //!     else:    sort by key, cut where high bits of the key change, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units |
@@ -110,13 +110,12 @@ impl Roots<'_> {
                     self.divide(range, &centers, depth);
                     return;
                 }
-                // Equal centres have no order but that of their ids.
+                // Equal centres keep the order of their ids.
                 for entry in entries {
                     entry[0] = 0;
                 }
             }
         } else if let Some(spare) = self.spare.get_mut(..entries.len()).or_bug("no room to sort") {
-            // The keys of one bin differ only in their lowest `shift` bits.
             let ends = entries.first().zip(entries.last());
             let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
             sort(entries, spare, (32 - differing.leading_zeros()).max(shift));
@@ -205,8 +204,8 @@ impl Roots<'_> {
         }
     }
 
-    /// Sorts a crowded unit into `2^bits` bins, by keys in the box of its centres. Out of line, as [`sort`]: divisions
-    /// inside one another would keep its variables on the stack.
+    /// Sorts a crowded unit into `2^bits` bins, by keys in the box of its centres. Out of line, as [`sort`]: nested
+    /// divisions would each keep its variables on the stack.
     #[inline(never)]
     fn bin(&mut self, range: Range<usize>, centers: &Aabb, bits: u32) {
         let rule = &Keys::new(centers);
