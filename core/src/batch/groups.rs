@@ -74,7 +74,8 @@ pub(super) fn trace<A: HitAnswer>(
     let answers = PhantomData::<A>;
     let lent = core::mem::take(&mut options.scratch);
     let choice = options.choice();
-    // If no hit can end a ray unasked, the first one is sooner found as the closest.
+    // If the filter is asked about every triangle, no hit ends a ray at once: search for the closest, which is asked
+    // about first.
     let asked = (choice, A::IS_ANY && !choice.asks_all(grid.mesh()));
     if options.filter.is_none() {
         let batch = &mut Asked::<_, A, false> { grid, batch, options, answers };

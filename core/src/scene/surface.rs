@@ -92,7 +92,7 @@ impl Place<'_> {
 
     /// A normal of the object in the scene, of length 1.
     pub(super) fn normal(&self, normal: DVec3) -> Option<DVec3> {
-        // Of length 1 on the way, or scales would add up.
+        // Normalize at each instance: scales would multiply.
         let turned = |normal, instance: &StoredInstance| instance.normal(normal).try_normalize();
         self.instances().rev().try_fold(normal, turned)
     }
@@ -100,7 +100,7 @@ impl Place<'_> {
     /// The start on a side of a facet, 1 above and -1 below.
     fn start(&self, facet: &Facet, side: f64, extent: f64) -> Option<DVec3> {
         let mut lift = facet.lift;
-        // A lift beyond the object would be none: give up.
+        // A lift larger than the object is of no use: give up.
         while lift <= extent {
             let wanted = facet.point + facet.normal * (side * lift);
             let start = self.outward(wanted)?;
