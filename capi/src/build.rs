@@ -72,10 +72,10 @@ pub unsafe extern "C" fn hgrid_join(
 /// Tells how much memory is enough for any mesh with so many triangles, wherever they
 /// lie: O(1), nothing is looked at.
 ///
-/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
-/// as constants, rounded up a little; with bvh and `tasks` above 1 the scratch is larger. How much
-/// more than enough it is depends on the method: a scan takes a sixth of it or less with one level,
-/// half with bvh; with recursive it is generous beyond use.
+/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants, rounded up
+/// a little; with bvh and `tasks` above 1 the scratch is larger. How much more than enough it is depends on the
+/// method: a scan takes a sixth of it or less with one level, half with bvh; with recursive it is too large to be of
+/// use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
 /// has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -206,7 +206,7 @@ pub unsafe extern "C" fn hgrid_fit(
     let scratch = Region { start: scratch, bytes: scratch_bytes };
     let call = |report: &mut hgrid_report| {
         let to = NonNull::new(fitted).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
-        // Room for all that is written, which may be more than the caller's version knows.
+        // Require room for all fields of this version: all are written.
         // SAFETY: the caller's promise.
         let hgrid_config { struct_size, .. } = unsafe { raw::read_sized(fitted) }?;
         // SAFETY: the caller's promise.

@@ -31,7 +31,7 @@ pub struct hgrid_instance {
     /// The place of the object's origin in the scene. Places are computed in double: far from the scene's origin rays
     /// are traced as exactly as near it.
     pub translation: [f64; 3],
-    /// Queries see the instance if their mask has a bit of it.
+    /// Queries see the instance if their mask and this have a bit in common.
     pub mask: u32,
     /// Yours: not read.
     pub id: u32,
@@ -119,9 +119,10 @@ pub struct hgrid_scene_options {
     pub reserved: u32,
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
-    /// Says of a `hit` whether it counts; or NULL: all do. Within an instance it is asked from near to far and about each
-    /// triangle at most once; instances come about from near to far, so a hit that it accepts may be replaced by a closer
-    /// one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it.
+    /// Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
+    /// far and about each triangle at most once; instances come about from near to far, so a hit that it accepts may
+    /// be replaced by a closer one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes
+    /// are not shown to it.
     pub filter: Option<
         unsafe extern "C" fn(context: *mut c_void, hit: *const hgrid_scene_hit) -> hgrid_verdict,
     >,
@@ -205,8 +206,8 @@ pub unsafe extern "C" fn hgrid_object_grid(
 
 /// Makes an object of a tree of shapes, which brings its test.
 ///
-/// The test gets the ray as the object sees it, in the object's space, with a direction and a range of its own, and answers
-/// for that ray. Any number of threads may call it at once. No argument may be NULL. Returns `HGRID_OK`, or what
+/// The test gets the ray in the object's space, with a direction and a range of its own. The `t` of its answer is
+/// along this ray. Any number of threads may call it at once. No argument may be NULL. Returns `HGRID_OK`, or what
 /// `hgrid_object_grid` returns.
 ///
 /// Threads: any number of calls at once.
@@ -366,7 +367,7 @@ pub unsafe extern "C" fn hgrid_open_scene(
     opened.err().unwrap_or(HGRID_OK)
 }
 
-/// Gives a built scene the instances of another moment: in place, without scratch, in less than the time of a build.
+/// Gives a built scene instances that moved: in place, without scratch, in less than the time of a build.
 ///
 /// There are as many instances as in the build; `hgrid_refit` says when to build anew. Arguments are as those of
 /// `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the
@@ -421,8 +422,8 @@ pub unsafe extern "C" fn hgrid_validate_scene(
     unsafe { raw::validate_scene(scene, scratch) }.err().unwrap_or(HGRID_OK)
 }
 
-/// Writes a scene and all grids, meshes and scenes that it shows as one blob, which `hgrid_open_packed_scene` needs nothing
-/// else for: `hgrid_pack` for scenes.
+/// Writes a scene and all grids, meshes and scenes that it shows as one blob for `hgrid_open_packed_scene`:
+/// `hgrid_pack` for scenes.
 ///
 /// A grid or scene is stored once, however many instances and scenes show it: the same address of a view is the same grid.
 /// Shapes cannot be stored: their boxes and test are yours.

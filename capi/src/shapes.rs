@@ -203,11 +203,11 @@ pub unsafe extern "C" fn hgrid_validate_shapes(
 
 /// Finds the closest shape that a ray hits.
 ///
-/// Returns true and writes `hit`, with the number of the shape as `primitive` and `t`, `u` and `v` as the test said; or
-/// returns false and writes nothing. Where several shapes are hit at the same `t`, the one with the lowest number is
-/// reported. Of the options `mask`, `skip` and `counters` are looked at: sides and filters are the test's own business.
-/// `options` may be NULL. With another NULL, a view of zeros, a tree without a test, or options that break the rules for
-/// structs nothing is hit.
+/// Returns true and writes `hit`, with the number of the shape as `primitive` and `t`, `u` and `v` as the test said;
+/// or returns false and writes nothing. Where several shapes are hit at the same `t`, the one with the lowest number
+/// is reported. Of the options `mask`, `skip` and `counters` are used; `cull` and `filter` are ignored. `options` may
+/// be NULL. With another NULL, a view of zeros, a tree without a test, or options that break the rules for structs
+/// nothing is hit.
 ///
 /// The test for discs that lie flat:
 ///
@@ -269,9 +269,9 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
 /// Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for bit, and
 /// sooner for rays near each other.
 ///
-/// It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the same. A
-/// miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; rays of a batch take
-/// turns. It runs on the thread that calls.
+/// It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the
+/// same. A miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; calls for
+/// different rays alternate. It runs on the thread that calls.
 ///
 /// ```c
 /// static size_t trace_tile_of_shapes(const hgrid_shapes *shapes, const hgrid_ray rays[64], hgrid_hit hits[64])
@@ -285,7 +285,7 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
 /// }
 /// ```
 ///
-/// Of the options `mask`, `skip`, `counters` and `scratch` are looked at; with counters the rays are traced one by one.
+/// Of the options `mask`, `skip`, `counters` and `scratch` are used; with counters the rays are traced one by one.
 ///
 /// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and
 /// a ray perhaps more than once, before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may

@@ -130,8 +130,8 @@ pub const HGRID_ERROR_CANNOT_REFIT: hgrid_status = -47;
 /// The blob was built by an older version with the method brick, which was removed: build it with another method.
 pub const HGRID_ERROR_METHOD_REMOVED: hgrid_status = -48;
 
-/// The blob is built over something else: triangles, shapes or instances. Open it with the function for these. Or a
-/// scene was to be packed that shows shapes, which cannot be packed.
+/// The blob is built over other primitives: open it with the function for triangles, shapes or instances. Or a scene
+/// that shows shapes was to be packed: shapes cannot be packed.
 pub const HGRID_ERROR_OTHER_CONTENT: hgrid_status = -49;
 
 /// The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.

@@ -413,7 +413,7 @@ pub(crate) unsafe fn query_scene(
     Ok(unsafe { asked.ask(find) })
 }
 
-/// Asks a scene for many rays: `trace` gets them as core asks for them, and what the caller told.
+/// Asks a scene for many rays: `trace` gets them as core asks for them, and the caller's options.
 ///
 /// # Safety
 /// The contract of [`scene`]; and the elements of both arrays are the caller's to be read and written.
