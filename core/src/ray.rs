@@ -8,9 +8,9 @@ pub const INVALID_ID: u32 = u32::MAX;
 
 /// A ray, or the part of it between `t_min` and `t_max`: 32 bytes in DXR order.
 ///
-/// The direction has any length, and every `t` is a multiple of it. A hit is accepted for
-/// `t_min <= t <= t_max`, closed at both ends, and decided exactly: see [`Hit`]. A ray with a NaN anywhere, an infinite origin or
-/// direction, a zero direction or `t_min > t_max` hits nothing.
+/// The direction has any length, and every `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`,
+/// closed at both ends, and decided exactly: see [`Hit`]. A ray with a NaN anywhere, an infinite origin or direction,
+/// a zero direction or `t_min > t_max` hits nothing.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Ray {

@@ -36,8 +36,8 @@ pub struct Surface {
     pub is_front: u32,
 }
 
-/// The amount by which a start is lifted, in parts of the distance from the point to the farthest corner, measured along
-/// one axis.
+/// The amount by which a start is lifted, in parts of the distance from the point to the farthest corner, measured
+/// along one axis.
 const LIFT: f64 = 1.0 / (1 << 20) as f64;
 
 /// A few times the resolution of f32 near zero.

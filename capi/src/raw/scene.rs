@@ -82,8 +82,8 @@ unsafe fn instances(
     if start.is_null() {
         return if count == 0 { Ok((&[], span)) } else { Err(HGRID_ERROR_NULL_ARGUMENT) };
     }
-    // SAFETY: not NULL, so aligned and readable by the caller's promise; any bytes are an instance, which is laid out as
-    // `hgrid_instance`.
+    // SAFETY: not NULL, so aligned and readable by the caller's promise; any bytes are an instance, which is laid out
+    // as `hgrid_instance`.
     Ok((unsafe { slice::from_raw_parts(start.cast(), count) }, span))
 }
 

@@ -77,7 +77,8 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
         boxes
     }
 
-    /// The boxes of a leaf relative to a point, grown on each side; the last one again where there are fewer than eight.
+    /// The boxes of a leaf relative to a point, grown on each side; the last one again where there are fewer than
+    /// eight.
     #[inline(always)]
     pub(crate) fn of_leaf(
         simd: S,

@@ -10,9 +10,10 @@
 //! spare   | second buffer of the sort, and of binning a crowded unit again | untouched |
 //! ```
 //!
-//! Binning again copies a unit's entries to the start of `spare` and back. All units use that start, so a mesh of several
-//! crowded units touches less of `spare` than it has entries. The record of a root is 112 bytes, written over entries that
-//! were used up: [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192 bytes.
+//! Binning again copies a unit's entries to the start of `spare` and back. All units use that start, so a mesh of
+//! several crowded units touches less of `spare` than it has entries. The record of a root is 112 bytes, written over
+//! entries that were used up: [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192
+//! bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
 
@@ -218,7 +219,8 @@ impl Roots<'_> {
         counts.fill(0);
         dispatch(self.level, NewKeys { entries, spare: self.spare, rule, shift, counts });
 
-        // Copy the entries to `spare` in the order of their bins, crowded bins first. Then copy them back in that order.
+        // Copy the entries to `spare` in the order of their bins, crowded bins first. Then copy them back in that
+        // order.
         let mut next = starts(counts);
         for count in &mut *counts {
             let next = &mut next[usize::from(*count as usize <= CROWD)];

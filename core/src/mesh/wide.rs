@@ -7,8 +7,8 @@ use super::{IndexLayout, IndexType, Strided, TriangleMesh};
 
 /// A mesh whose vertices are read in pieces of sixteen bytes, which is one load and one check each.
 ///
-/// `index * stride` does not overflow 64 bits, because a stride has 16 bits. The bytes end with the last element, so a read
-/// that ends inside them reads an element.
+/// `index * stride` does not overflow 64 bits, because a stride has 16 bits. The bytes end with the last element, so
+/// a read that ends inside them reads an element.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WideMesh<'a> {
     positions: &'a [u8],

@@ -232,8 +232,8 @@ impl Seen {
         })
     }
 
-    /// The ray in f32 for an object with this box, up to a `t` of the scene's ray: from near the box. `None` if it passes
-    /// the box.
+    /// The ray in f32 for an object with this box, up to a `t` of the scene's ray: from near the box. `None` if it
+    /// passes the box.
     pub(super) fn narrow(
         &mut self,
         ray: &RayF64,

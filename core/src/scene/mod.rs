@@ -216,7 +216,8 @@ impl<'a> Scene<'a> {
         None
     }
 
-    /// The instance that shows the object that a hit names, the innermost one, as [`instance`](Self::instance) gives it.
+    /// The instance that shows the object that a hit names, the innermost one, as [`instance`](Self::instance) gives
+    /// it.
     #[must_use]
     pub fn instance_of(&self, hit: &SceneHit) -> Option<Instance> {
         self.place(hit)?.instances().next_back()?.instance()

@@ -48,7 +48,8 @@ impl SceneHit {
         path: [INVALID_ID; MAX_NESTING],
     };
 
-    /// Returns true if this hit is reported rather than the other: smaller `t`, then the smaller path, then the smaller id.
+    /// Returns true if this hit is reported rather than the other: smaller `t`, then the smaller path, then the
+    /// smaller id.
     #[must_use]
     pub fn is_closer(&self, other: &Self) -> bool {
         self.t < other.t

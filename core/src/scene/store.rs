@@ -121,10 +121,10 @@ impl<'a> Scene<'a> {
     /// The instances are copied; the objects are not, and are read at every query.
     ///
     /// # Errors
-    /// [`Error::InstanceWithoutObject`] and [`Error::InstanceWithoutInverse`] name the instance;
-    /// [`Error::TooDeep`] for more than [`MAX_NESTING`] scenes inside one another; [`Error::OutOfMemory`],
-    /// [`Error::Misaligned`], [`Error::TooManyTriangles`] for more instances than ids, and [`Error::InvalidConfig`] if the
-    /// method is not [`Method::Bvh`](crate::Method::Bvh). After an error the index holds nothing of use.
+    /// [`Error::InstanceWithoutObject`] and [`Error::InstanceWithoutInverse`] name the instance; [`Error::TooDeep`]
+    /// for more than [`MAX_NESTING`] scenes inside one another; [`Error::OutOfMemory`], [`Error::Misaligned`],
+    /// [`Error::TooManyTriangles`] for more instances than ids, and [`Error::InvalidConfig`] if the method is not
+    /// [`Method::Bvh`](crate::Method::Bvh). After an error the index holds nothing of use.
     pub fn build(
         instances: &[Instance],
         objects: &'a [Object<'a>],

@@ -43,11 +43,11 @@ impl Scene<'_> {
     /// sides of the triangle apart: f64 at this distance from the scene's origin, or f32 in the object.
     ///
     /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the
-    /// other side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the plane,
-    /// as the object sees them, may hit it, because normal and direction are rounded. A start is lifted as in a mesh, or
-    /// by up to four times the rounding error of its transformation, if that is more. Do not round a start to f32: it may
-    /// lie below the plane then. What [`TriangleMesh::surface`](crate::TriangleMesh::surface) says about triangles
-    /// without area holds here, too.
+    /// other side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the
+    /// plane, as the object sees them, may hit it, because normal and direction are rounded. A start is lifted as in
+    /// a mesh, or by up to four times the rounding error of its transformation, if that is more. Do not round a start
+    /// to f32: it may lie below the plane then. What [`TriangleMesh::surface`](crate::TriangleMesh::surface) says
+    /// about triangles without area holds here, too.
     ///
     /// ```
     #[doc = include_str!("../../doc/scene.txt")]
