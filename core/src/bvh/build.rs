@@ -266,11 +266,11 @@ pub(super) fn finish(
     Ok(header)
 }
 
-/// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
-/// axis has an inverse direction that is finite ([`slab`](super::slab)).
-const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
+/// No step of a node is smaller than that of a box of this part of the scene's extent. So a finite number can stand
+/// for the inverse of a zero direction ([`slab`](super::slab)).
+const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 254 * 2^-60
 
-/// The smallest box of a scene that steps are made for.
+/// The size of that box in a scene.
 pub(crate) fn least_node(scene: &Aabb) -> f32 {
     scene.size().max_element() * LEAST_NODE
 }
