@@ -338,9 +338,9 @@ pub struct hgrid_statistics {
     pub longest_list: u32,
     /// 0.
     pub reserved: u32,
-    /// A hash of the grid's box, its resolution and its lists in order, but not of the cells that they
-    /// belong to. The same grid has the same hash on every platform, whatever its byte order. It does not
-    /// protect against forgery.
+    /// A hash of the method, the grid's box, its resolution and its lists in order, but not of the cells that they
+    /// belong to. The same grid has the same hash on every platform, whatever its byte order. It does not protect
+    /// against forgery.
     pub content_hash: u64,
 }
 
