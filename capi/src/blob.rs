@@ -65,11 +65,11 @@ pub unsafe extern "C" fn hgrid_open(
 /// Gives a tree (`HGRID_METHOD_BVH`) the boxes of a mesh whose vertices moved: in place, in a fraction of
 /// the time of a build, without scratch.
 ///
-/// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`; `blob_bytes` is its
-/// size, and bytes behind the blob are not touched. `mesh` has the same triangles as the mesh that the tree
-/// was built for, with the vertices where they are now; blob and mesh do not overlap. Queries on the view that
-/// the call writes answer as those of a new build do. Views that were made before the call are of no use
-/// any more: they can be asked without harm, but answer anything.
+/// `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`; `blob_bytes` is its size, and
+/// bytes behind the blob are not touched. `mesh` has the same triangles as the mesh that the tree was built for, with
+/// the vertices where they are now; blob and mesh do not overlap. Queries on the view that the call writes answer as
+/// those of a new build do. Do not use views that were made before the call: queries on them do no harm, but may
+/// answer anything.
 ///
 /// The leaves stay as they were built, so rays take longer the more the mesh changes. Remember `cost_before` of
 /// the first refit after a build, and build anew once `cost_after` is well above it, say by half: times of rays grow

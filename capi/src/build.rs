@@ -10,12 +10,12 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_part, hgrid_repor
 
 /// Joins meshes: describes several of them as one, for a grid of them all.
 ///
-/// Nothing is copied. Each mesh keeps its arrays, with strides and an index type of its own, and with masks or without. The
-/// triangles are numbered through all meshes, in the order of the array: a hit names one by that number,
-/// and `hgrid_locate` tells which mesh it is of and which triangle there. Where several triangles are hit at the same `t`,
-/// the one of the first mesh counts. So a grid of joined meshes is, byte by byte, that of one mesh
-/// with the same triangles, and each ray takes one walk. One mesh alone is read faster than joined ones: the
-/// part of a triangle has to be found, in a binary search.
+/// Nothing is copied. Each mesh keeps its arrays, with strides and an index type of its own, and with masks or
+/// without. The triangles are numbered through all meshes, in the order of the array: a hit names one by that number,
+/// and `hgrid_locate` tells which mesh it is of and which triangle there. Where several triangles are hit at the same
+/// `t`, the one of the first mesh counts. So a grid of joined meshes is, byte by byte, that of one mesh with the same
+/// triangles, and each ray takes one walk. One mesh alone is read faster than joined ones: the part of a triangle has
+/// to be found, in a binary search.
 ///
 /// ```c
 /// static hgrid_status build_both(const hgrid_mesh meshes[2], hgrid_part parts[2], void *index,
@@ -30,19 +30,20 @@ use crate::types::{hgrid_config, hgrid_grid, hgrid_mesh, hgrid_part, hgrid_repor
 /// }
 /// ```
 ///
-/// `meshes` are `count` structs side by side, all with the same `struct_size`, none of them joined itself. They are only read
-/// during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps neither the
-/// structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a grid of the
-/// joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without
-/// triangles. `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds the
-/// number of all triangles and vertices, and `parts`; its other fields are 0 or NULL. Such a call first goes over the
-/// parts, `hgrid_open` too. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another build;
-/// after arrays moved or counts changed, join the meshes again.
+/// `meshes` are `count` structs side by side, all with the same `struct_size`, none of them joined itself. They are
+/// only read during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps
+/// neither the structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a
+/// grid of the joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without
+/// triangles. `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds
+/// the number of all triangles and vertices, and `parts`; its other fields are 0 or NULL. Such a call first goes over
+/// the parts, `hgrid_open` too. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another
+/// build; after arrays moved or counts changed, join the meshes again.
 ///
 /// The report of a build that fails names the triangle to blame by its number in the joined mesh: take the triangle
 /// counts of the first meshes off it.
 ///
-/// Returns `HGRID_OK` and fills `joined`, or returns the reason and leaves it as it was; then `parts` may hold anything:
+/// Returns `HGRID_OK` and fills `joined`, or returns the reason and leaves it as it was; then `parts` may hold
+/// anything:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_OVERLAP`;
 /// - with one of the meshes: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
 ///   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`;
@@ -72,10 +73,10 @@ pub unsafe extern "C" fn hgrid_join(
 /// Tells how much memory is enough for any mesh with so many triangles, wherever they
 /// lie: O(1), nothing is looked at.
 ///
-/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
-/// as constants, rounded up a little; with bvh and `tasks` above 1 the scratch is larger. How much
-/// more than enough it is depends on the method: a scan takes a sixth of it or less with one level,
-/// half with bvh; with recursive it is generous beyond use.
+/// `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants, rounded up
+/// a little; with bvh and `tasks` above 1 the scratch is larger. How much more than enough it is depends on the
+/// method: a scan takes a sixth of it or less with one level, half with bvh; with recursive it is too large to be of
+/// use.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
 /// has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -206,7 +207,7 @@ pub unsafe extern "C" fn hgrid_fit(
     let scratch = Region { start: scratch, bytes: scratch_bytes };
     let call = |report: &mut hgrid_report| {
         let to = NonNull::new(fitted).ok_or(HGRID_ERROR_NULL_ARGUMENT)?;
-        // Room for all that is written, which may be more than the caller's version knows.
+        // Require room for all fields of this version: all are written.
         // SAFETY: the caller's promise.
         let hgrid_config { struct_size, .. } = unsafe { raw::read_sized(fitted) }?;
         // SAFETY: the caller's promise.

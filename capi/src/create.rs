@@ -125,9 +125,9 @@ pub unsafe extern "C" fn hgrid_create(
 
 /// Gives back all memory of a grid that `hgrid_create` made.
 ///
-/// `grid` may be NULL: nothing happens. It may be nothing else than what `hgrid_create` wrote,
-/// once: not the view of a build or of an open, and no copy of a view. No query runs, and copies of
-/// the view are good for nothing afterwards.
+/// `grid` may be NULL: nothing happens. Otherwise it is what `hgrid_create` wrote, and is destroyed once: not the
+/// view of a build or of an open, and no copy of a view. No query may run during the call, and copies of the view may
+/// not be used afterwards.
 ///
 /// Threads: any number of calls at once, each for a grid of its own, if the allocator's functions
 /// allow it; on any thread, not only on the one that created the grid.
@@ -184,8 +184,7 @@ unsafe fn create(
     Ok(owned.cast())
 }
 
-/// An [`hgrid_allocator`] that has both functions. They do what it asks of them: the one who made
-/// this promised it.
+/// An [`hgrid_allocator`] that has both functions. Whoever made it promised that they keep its contract.
 #[derive(Debug, Clone, Copy)]
 struct Allocator {
     context: *mut c_void,

@@ -15,7 +15,7 @@ pub(crate) fn divide(dividend: u64, divisor: u64) -> [u64; 2] {
     [quotient, rest]
 }
 
-/// The same with signs: the quotient is rounded towards 0, and the rest has the dividend's sign.
+/// [`divide`] with signs: the quotient is rounded towards 0, and the rest has the dividend's sign.
 pub(crate) fn divide_signed(dividend: i64, divisor: i64) -> [i64; 2] {
     let [quotient, rest] = divide(dividend.unsigned_abs(), divisor.unsigned_abs());
     let sign = |value: u64, is_negative| {

@@ -9,7 +9,7 @@ use crate::raw::Caller;
 use crate::status::hgrid_status;
 use crate::types::hgrid_report;
 
-/// Everything that goes in.
+/// The checked input of a call.
 #[derive(Debug)]
 pub(crate) struct Input {
     pub(crate) mesh: TriangleMesh<'static>,
@@ -72,7 +72,7 @@ impl Input {
     }
 }
 
-/// Shows `visit` how a build is run.
+/// Calls `visit` with a control that calls the caller's functions.
 pub(crate) fn controlled<T>(caller: Caller, visit: impl FnOnce(&Control<'_>) -> T) -> T {
     let run = |count: u32, task: &Task<'_>| caller.run(count, task);
     let progress = |done: f32| caller.progress(done);

@@ -11,8 +11,8 @@ use hgrid_core::{
 
 use crate::status::{HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_CULL, hgrid_status};
 
-/// Says what you know about the rays of a batch, so that the library can choose their order: one of
-/// `HGRID_COHERENCE_...`. It changes how fast the answers come, never the answers.
+/// What you know about the rays of a batch, so that the library can choose their order: one of `HGRID_COHERENCE_...`.
+/// It changes the speed, never the answers.
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_coherence = u32;
 
@@ -328,7 +328,7 @@ pub struct hgrid_statistics {
     /// Triangles of which two corners are the same point. They are in
     /// the grid, and no ray hits them.
     pub degenerate_count: u32,
-    /// The first triangle that is one or the other, or `HGRID_INVALID_ID`.
+    /// The first skipped or degenerate triangle, or `HGRID_INVALID_ID`.
     pub first_bad: u32,
     /// Lists of triangles: one for each cell that has any; the leaves of a tree.
     pub list_count: u64,
@@ -338,9 +338,9 @@ pub struct hgrid_statistics {
     pub longest_list: u32,
     /// 0.
     pub reserved: u32,
-    /// A hash of the grid's box, its resolution and its lists in order, but not of the cells that they
-    /// belong to. The same grid has the same hash on every platform, whatever its byte order. It does not
-    /// protect against forgery.
+    /// A hash of the method, the grid's box, its resolution and its lists in order, but not of the cells that they
+    /// belong to. The same grid has the same hash on every platform, whatever its byte order. It does not protect
+    /// against forgery.
     pub content_hash: u64,
 }
 
@@ -458,7 +458,7 @@ impl hgrid_refit_report {
         Self { struct_size, triangle: INVALID_ID, cost_before: 0.0, cost_after: 0.0 }
     }
 
-    /// Notes what came out of a refit, or of a call that did not get so far.
+    /// Notes the result of a refit.
     pub(crate) fn note(&mut self, refitted: &Result<Refit, Error>) {
         (self.triangle, self.cost_before, self.cost_after) = match *refitted {
             Ok(Refit { cost_before, cost_after }) => (INVALID_ID, cost_before, cost_after),
@@ -496,7 +496,7 @@ impl hgrid_blob_info {
 }
 
 impl hgrid_statistics {
-    /// Notes what a look found.
+    /// Notes the statistics that were found.
     pub(crate) fn note(&mut self, found: &Statistics) {
         *self = Self {
             struct_size: self.struct_size,

@@ -31,7 +31,7 @@ pub struct hgrid_instance {
     /// The place of the object's origin in the scene. Places are computed in double: far from the scene's origin rays
     /// are traced as exactly as near it.
     pub translation: [f64; 3],
-    /// Queries see the instance if their mask has a bit of it.
+    /// Queries see the instance if their mask and this have a bit in common.
     pub mask: u32,
     /// Yours: not read.
     pub id: u32,
@@ -53,8 +53,8 @@ pub struct hgrid_object {
 const _: () = assert!(size_of::<Object<'_>>() == size_of::<hgrid_object>());
 const _: () = assert!(align_of::<Object<'_>>() <= align_of::<hgrid_object>());
 
-/// A built scene and its objects, ready for queries: a view, held by value as a `hgrid_grid`. It holds the addresses of its
-/// blob and of the array of its objects, or of the `views` of a packed scene.
+/// A built scene and its objects, ready for queries: a view, held by value as a `hgrid_grid`. It holds the addresses
+/// of its blob and of the array of its objects, or of the `views` of a packed scene.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct hgrid_scene {
@@ -119,17 +119,18 @@ pub struct hgrid_scene_options {
     pub reserved: u32,
     /// Yours: passed on to `filter`.
     pub context: *mut c_void,
-    /// Says of a `hit` whether it counts; or NULL: all do. Within an instance it is asked from near to far and about each
-    /// triangle at most once; instances come about from near to far, so a hit that it accepts may be replaced by a closer
-    /// one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it.
+    /// Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
+    /// far and about each triangle at most once; instances come about from near to far, so a hit that it accepts may
+    /// be replaced by a closer one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes
+    /// are not shown to it.
     pub filter: Option<
         unsafe extern "C" fn(context: *mut c_void, hit: *const hgrid_scene_hit) -> hgrid_verdict,
     >,
     /// The counters that the work is added to, or NULL. An instance that a ray is offered counts as a test.
     pub counters: *mut hgrid_counters,
     /// Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL: as `scratch` of
-    /// `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries of
-    /// one ray do not look at it.
+    /// `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries
+    /// of one ray do not look at it.
     pub scratch: *mut c_void,
     /// Bytes of `scratch`. With 16 bytes for each ray a whole batch is sorted at once.
     pub scratch_bytes: usize,
@@ -181,8 +182,8 @@ impl From<hgrid_ray_f64> for RayF64 {
 
 /// Makes an object of a grid.
 ///
-/// Neither argument may be NULL. Returns `HGRID_OK`, `HGRID_ERROR_NULL_ARGUMENT`, or `HGRID_ERROR_NOT_A_GRID` for a view
-/// of zeros.
+/// Neither argument may be NULL. Returns `HGRID_OK`, `HGRID_ERROR_NULL_ARGUMENT`, or `HGRID_ERROR_NOT_A_GRID` for a
+/// view of zeros.
 ///
 /// Threads: any number of calls at once.
 ///
@@ -205,8 +206,8 @@ pub unsafe extern "C" fn hgrid_object_grid(
 
 /// Makes an object of a tree of shapes, which brings its test.
 ///
-/// The test gets the ray as the object sees it, in the object's space, with a direction and a range of its own, and answers
-/// for that ray. Any number of threads may call it at once. No argument may be NULL. Returns `HGRID_OK`, or what
+/// The test gets the ray in the object's space, with a direction and a range of its own. The `t` of its answer is
+/// along this ray. Any number of threads may call it at once. No argument may be NULL. Returns `HGRID_OK`, or what
 /// `hgrid_object_grid` returns.
 ///
 /// Threads: any number of calls at once.
@@ -250,8 +251,8 @@ pub unsafe extern "C" fn hgrid_object_scene(
     made.err().unwrap_or(HGRID_OK)
 }
 
-/// Tells how much memory is enough for any scene of so many instances: `hgrid_bound` for scenes. `HGRID_SCENE_BOUND` and
-/// `HGRID_SCRATCH_BOUND` are the same as constants, rounded up a little.
+/// Tells how much memory is enough for any scene of so many instances: `hgrid_bound` for scenes. `HGRID_SCENE_BOUND`
+/// and `HGRID_SCRATCH_BOUND` are the same as constants, rounded up a little.
 ///
 /// `config` may be NULL: the defaults. `report` may not be NULL. Returns what `hgrid_bound` returns, and
 /// `HGRID_ERROR_INVALID_METHOD` for another method than bvh.
@@ -279,10 +280,10 @@ pub unsafe extern "C" fn hgrid_scene_bound(
 
 /// Builds a scene: a tree over instances of objects, in O(n).
 ///
-/// The instances are copied. The array of objects is not: it stays where it is, with the views that it names, for as long
-/// as the scene is queried. An object may be shown by any number of instances. Scenes may be shown in scenes,
-/// `HGRID_MAX_NESTING` deep. The index is a blob as that of every build: it names objects by number, and `hgrid_open_scene`
-/// opens it elsewhere with the same objects.
+/// The instances are copied. The array of objects is not: it stays where it is, with the views that it names, for as
+/// long as the scene is queried. An object may be shown by any number of instances. Scenes may be shown in scenes,
+/// `HGRID_MAX_NESTING` deep. The index is a blob, as after every build: it names objects by number, and
+/// `hgrid_open_scene` opens it elsewhere with the same objects.
 ///
 /// ```c
 /// static hgrid_status put_twice(const hgrid_grid *grid, void *index, size_t index_bytes, void *scratch,
@@ -299,8 +300,8 @@ pub unsafe extern "C" fn hgrid_scene_bound(
 /// ```
 ///
 /// `instances` may be NULL if there are none, and `objects` likewise; `index`, `scratch` and `scene` may not be NULL.
-/// `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and writes
-/// the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
+/// `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
+/// writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
 ///   `HGRID_ERROR_OVERLAP` (also with an object; not with what is shown by a scene among them, which is not looked at),
 ///   `HGRID_ERROR_TOO_MANY_TRIANGLES`;
@@ -367,13 +368,13 @@ pub unsafe extern "C" fn hgrid_open_scene(
     opened.err().unwrap_or(HGRID_OK)
 }
 
-/// Gives a built scene the instances of another moment: in place, without scratch, in less than the time of a build.
+/// Gives a built scene instances that moved: in place, without scratch, in less than the time of a build.
 ///
 /// There are as many instances as in the build; `hgrid_refit` says when to build anew. Arguments are as those of
 /// `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the
 /// reason: `HGRID_ERROR_MESH_MISMATCH` for another number of instances, what `hgrid_open_scene` returns, and
-/// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are as they
-/// were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the
+/// `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are
+/// as they were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the
 /// report's `triangle`, after which the blob holds nothing of use.
 ///
 /// Threads: as for `hgrid_refit`.
@@ -402,10 +403,11 @@ pub unsafe extern "C" fn hgrid_refit_scene(
     unsafe { raw::reporting_refit(report, call) }
 }
 
-/// Proves that a scene is one of its objects, in `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch: the tree and the
-/// box of every instance. The objects have proofs of their own.
+/// Proves that a scene is one of its objects, in `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch: the tree
+/// and the box of every instance. The objects have proofs of their own.
 ///
-/// `scene` may not be NULL, `scratch` only if it has no bytes. Returns `HGRID_OK`, or what `hgrid_validate_shapes` returns.
+/// `scene` may not be NULL; `scratch` may be if `scratch_bytes` is 0. Returns `HGRID_OK`, or what
+/// `hgrid_validate_shapes` returns.
 ///
 /// Threads: any number of calls and queries on the same scene at once, each with scratch of its own.
 ///
@@ -422,21 +424,21 @@ pub unsafe extern "C" fn hgrid_validate_scene(
     unsafe { raw::validate_scene(scene, scratch) }.err().unwrap_or(HGRID_OK)
 }
 
-/// Writes a scene and all grids, meshes and scenes that it shows as one blob, which `hgrid_open_packed_scene` needs nothing
-/// else for: `hgrid_pack` for scenes.
+/// Writes a scene and all grids, meshes and scenes that it shows as one blob for `hgrid_open_packed_scene`:
+/// `hgrid_pack` for scenes.
 ///
-/// A grid or scene is stored once, however many instances and scenes show it: the same address of a view is the same grid.
-/// Shapes cannot be stored: their boxes and test are yours.
+/// A grid or scene is stored once, however many instances and scenes show it: the same address of a view is the same
+/// grid. Shapes cannot be stored: their boxes and test are yours.
 ///
-/// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps nothing that the scene refers to, nor any argument of this
-/// call. It may be NULL if `capacity` is 0: to ask for the size. `scene` and `bytes` may not be NULL. The time is that
-/// of the copy, and of comparing each object with each.
+/// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps nothing that the scene refers to, nor any argument of
+/// this call. It may be NULL if `capacity` is 0: to ask for the size. `scene` and `bytes` may not be NULL. The call
+/// copies everything, and compares each object with each other.
 ///
-/// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both cases
-/// `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
-/// `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing; or
-/// `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is needed is not
-/// touched.
+/// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both
+/// cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
+/// `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing;
+/// or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is
+/// needed is not touched.
 ///
 /// Threads: any number of calls and queries on the same scene at once, each with memory of its own.
 ///
@@ -457,13 +459,13 @@ pub unsafe extern "C" fn hgrid_pack_scene(
 
 /// Opens a blob that `hgrid_pack_scene` wrote where it lies: in time proportional to the grids in it, without a copy.
 ///
-/// `blob` starts at a multiple of `HGRID_ALIGNMENT`; bytes behind it are ignored. `views` is memory for the views of what is
-/// in it, at a multiple of `HGRID_ALIGNMENT` as well: like the blob, it stays where it is and as it is for as long as the
-/// scene is queried. It may be NULL if `views_bytes` is 0: to ask for the size.
+/// `blob` starts at a multiple of `HGRID_ALIGNMENT`; bytes behind it are ignored. `views` is memory for the views of
+/// what is in it, at a multiple of `HGRID_ALIGNMENT` as well: like the blob, it stays where it is and as it is for as
+/// long as the scene is queried. It may be NULL if `views_bytes` is 0: to ask for the size.
 ///
-/// With `scratch` all grids and scenes in the blob are proven, as `hgrid_validate` and `hgrid_validate_scene` do: a 64th of
-/// the blob's bytes is enough, at any address. With NULL, and `scratch_bytes` 0, nothing is proven, and what `hgrid_open` says of damaged
-/// bytes holds. Blob, views and scratch do not overlap.
+/// With `scratch` all grids and scenes in the blob are proven, as `hgrid_validate` and `hgrid_validate_scene` do: a
+/// 64th of the blob's bytes is enough, at any address. With NULL, and `scratch_bytes` 0, nothing is proven, and what
+/// `hgrid_open` says of damaged bytes holds. Blob, views and scratch do not overlap.
 ///
 /// `blob`, `bytes` and `scene` may not be NULL. Returns `HGRID_OK` and writes the view to `scene`, or
 /// `HGRID_ERROR_INDEX_TOO_SMALL` if the views have too little memory; in both cases `bytes` becomes what the views
@@ -500,11 +502,12 @@ pub unsafe extern "C" fn hgrid_open_packed_scene(
 
 /// Finds the closest thing in a scene that a ray hits.
 ///
-/// Returns true and writes `hit`; or returns false and writes nothing. Where several are hit at the same `t`, that of the
-/// first instance is reported, and in it the lowest number. `options` may be NULL: the defaults. With another NULL, a view
-/// of zeros, or options that break the rules for structs nothing is hit.
+/// Returns true and writes `hit`; or returns false and writes nothing. Where several are hit at the same `t`, that of
+/// the first instance is reported, and in it the lowest number. `options` may be NULL: the defaults. With another
+/// NULL, a view of zeros, or options that break the rules for structs nothing is hit.
 ///
-/// A query allocates nothing and always ends. It takes up to 8 KiB of stack for the scene and for each scene inside it, and 7 KiB for a grid.
+/// A query allocates nothing and always ends. It takes up to 8 KiB of stack for the scene and for each scene inside
+/// it, and 7 KiB for a grid.
 ///
 /// Threads: any number of queries on the same scene at once; each thread with counters of its own.
 ///
@@ -545,12 +548,13 @@ pub unsafe extern "C" fn hgrid_occluded_scene(
     matches!(unsafe { raw::query_scene(scene, ray, options, true) }, Ok(Some(_)))
 }
 
-/// Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid that it shows.
+/// Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid
+/// that it shows.
 ///
-/// For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob. The
-/// matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and `grid` may be
-/// NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or `hit` is NULL, or the
-/// hit names nothing in the scene.
+/// For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob.
+/// The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
+/// `grid` may be NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or
+/// `hit` is NULL, or the hit names nothing in the scene.
 ///
 /// Threads: any number of calls and queries on the same scene at once.
 ///

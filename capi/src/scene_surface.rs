@@ -39,11 +39,12 @@ impl From<SceneSurface> for hgrid_scene_surface {
 /// - coordinates are too coarse to tell the sides of the triangle apart: `double` at this distance from the scene's
 ///   origin, or `float` in the object.
 ///
-/// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the other
-/// side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane, as the object
-/// sees them, may hit it, because normal and direction are rounded. A start is lifted as by `hgrid_surface_at`, or by up
-/// to four times the rounding error of its transformation, if that is more. Do not round a start to `float`: it may lie
-/// below the plane then. What `hgrid_surface_at` says about triangles without area holds here, too.
+/// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the
+/// other side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane, as the
+/// object sees them, may hit it, because normal and direction are rounded. A start is lifted as by
+/// `hgrid_surface_at`, or by up to four times the rounding error of its transformation, if that is more. Do not round
+/// a start to `float`: it may lie below the plane then. What `hgrid_surface_at` says about triangles without area
+/// holds here, too.
 ///
 /// ```c
 /// static bool sees_light_in_scene(const hgrid_scene *scene, const hgrid_ray_f64 *ray, const hgrid_scene_hit *hit,

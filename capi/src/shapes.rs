@@ -49,7 +49,8 @@ pub struct hgrid_boxes {
     pub masks: *const c_void,
     /// Bytes from one mask to the next, at least 4; 0 means 4.
     pub mask_stride: usize,
-    /// Tests a shape: writes `hit` and returns true if `ray` hits shape number `shape`. May be NULL: then nothing is hit.
+    /// Tests a shape: writes `hit` and returns true if `ray` hits shape number `shape`. May be NULL: then nothing is
+    /// hit.
     ///
     /// `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
     /// NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
@@ -203,11 +204,11 @@ pub unsafe extern "C" fn hgrid_validate_shapes(
 
 /// Finds the closest shape that a ray hits.
 ///
-/// Returns true and writes `hit`, with the number of the shape as `primitive` and `t`, `u` and `v` as the test said; or
-/// returns false and writes nothing. Where several shapes are hit at the same `t`, the one with the lowest number is
-/// reported. Of the options `mask`, `skip` and `counters` are looked at: sides and filters are the test's own business.
-/// `options` may be NULL. With another NULL, a view of zeros, a tree without a test, or options that break the rules for
-/// structs nothing is hit.
+/// Returns true and writes `hit`, with the number of the shape as `primitive` and `t`, `u` and `v` as the test said;
+/// or returns false and writes nothing. Where several shapes are hit at the same `t`, the one with the lowest number
+/// is reported. Of the options `mask`, `skip` and `counters` are used; `cull` and `filter` are ignored. `options` may
+/// be NULL. With another NULL, a view of zeros, a tree without a test, or options that break the rules for structs
+/// nothing is hit.
 ///
 /// The test for discs that lie flat:
 ///
@@ -266,12 +267,12 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
     matches!(unsafe { raw::query_shapes(shapes, ray, options, true) }, Ok(Some(_)))
 }
 
-/// Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for bit, and
-/// sooner for rays near each other.
+/// Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for
+/// bit, and sooner for rays near each other.
 ///
-/// It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the same. A
-/// miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; rays of a batch take
-/// turns. It runs on the thread that calls.
+/// It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the
+/// same. A miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; calls for
+/// different rays alternate. It runs on the thread that calls.
 ///
 /// ```c
 /// static size_t trace_tile_of_shapes(const hgrid_shapes *shapes, const hgrid_ray rays[64], hgrid_hit hits[64])
@@ -285,11 +286,11 @@ pub unsafe extern "C" fn hgrid_occluded_shapes(
 /// }
 /// ```
 ///
-/// Of the options `mask`, `skip`, `counters` and `scratch` are looked at; with counters the rays are traced one by one.
+/// Of the options `mask`, `skip`, `counters` and `scratch` are used; with counters the rays are traced one by one.
 ///
-/// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and
-/// a ray perhaps more than once, before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may
-/// be NULL: the defaults. They are for all rays.
+/// With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order,
+/// and a ray perhaps more than once, before its hit is written. `rays` and `hits` may be NULL if `count` is 0.
+/// `options` may be NULL: the defaults. They are for all rays.
 ///
 /// Returns `HGRID_OK` and has written all hits, or returns what `hgrid_intersect_n` returns and has written none;
 /// `HGRID_ERROR_OVERLAP` also for `scratch` in the view, the blob or the boxes. A tree without a test hits nothing.
@@ -328,9 +329,10 @@ pub unsafe extern "C" fn hgrid_intersect_shapes_n(
 
 /// Tells for each of many rays whether it hits any shape: what `hgrid_occluded_shapes` would say for each, but sooner.
 ///
-/// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from `occluded` on. All
-/// else is as with `hgrid_intersect_shapes_n`. `rays` and `occluded` may be NULL if `count` is 0, `options` may be NULL.
-/// Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_shapes_n` returns and has written none.
+/// Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from `occluded` on.
+/// All else is as with `hgrid_intersect_shapes_n`. `rays` and `occluded` may be NULL if `count` is 0, `options` may
+/// be NULL. Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_shapes_n` returns and has
+/// written none.
 ///
 /// Threads: any number of queries on the same tree at once; each thread with bytes and counters of its own.
 ///

@@ -66,8 +66,8 @@ pub const HGRID_ERROR_NON_FINITE: hgrid_status = -25;
 /// The mask stride is below 4 bytes, or the masks do not fit into memory.
 pub const HGRID_ERROR_INVALID_MASKS: hgrid_status = -26;
 
-/// The parts of a joined mesh: they were not written by `hgrid_join`, or not with these counts, or the mesh has arrays, too;
-/// or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
+/// The parts of a joined mesh: they were not written by `hgrid_join`, or not with these counts, or the mesh has
+/// arrays, too; or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
 pub const HGRID_ERROR_INVALID_PARTS: hgrid_status = -27;
 
 /// The configuration's `method` is none that this version knows, or, for shapes and scenes, not `HGRID_METHOD_BVH`.
@@ -130,8 +130,8 @@ pub const HGRID_ERROR_CANNOT_REFIT: hgrid_status = -47;
 /// The blob was built by an older version with the method brick, which was removed: build it with another method.
 pub const HGRID_ERROR_METHOD_REMOVED: hgrid_status = -48;
 
-/// The blob is built over something else: triangles, shapes or instances. Open it with the function for these. Or a
-/// scene was to be packed that shows shapes, which cannot be packed.
+/// The blob is built over other primitives: open it with the function for triangles, shapes or instances. Or a scene
+/// that shows shapes was to be packed: shapes cannot be packed.
 pub const HGRID_ERROR_OTHER_CONTENT: hgrid_status = -49;
 
 /// The stride of a batch's rays is below the size of a ray, or the rays do not fit into memory.
@@ -249,7 +249,10 @@ pub(crate) const fn text(status: hgrid_status) -> &'static CStr {
               HGRID_BUILD_STRICT leaves it out"
         }
         HGRID_ERROR_INVALID_MASKS => c"invalid masks: one for each triangle, and mask_stride 0, or 4 and more",
-        HGRID_ERROR_INVALID_PARTS => c"invalid parts: join meshes with arrays of their own by hgrid_join, and change nothing of what it fills",
+        HGRID_ERROR_INVALID_PARTS => {
+            c"invalid parts: join meshes with arrays of their own by hgrid_join, \
+              and change nothing of what it fills"
+        }
         HGRID_ERROR_INVALID_METHOD => {
             c"unknown method: use one of HGRID_METHOD_..., for shapes and scenes HGRID_METHOD_BVH"
         }

@@ -57,9 +57,8 @@ pub const HGRID_METHOD_FIXED: u32 = 2;
 /// Choose it where detail is uneven but spread over the scene. Where all of it is in one spot of a
 /// large scene, two levels are not enough: choose bvh. `subdivide_above` belongs to it.
 ///
-/// Memory: four to seven times that of one level. How much it takes shows only while the index is
-/// written: `hgrid_sizes` without scratch answers with a generous bound, with scratch with the
-/// exact size.
+/// Memory: four to seven times that of one level. The exact size takes a dry run: `hgrid_sizes` without scratch
+/// answers with a generous bound, with scratch with the exact size.
 pub const HGRID_METHOD_VARIABLE: u32 = 3;
 
 /// Grids in the cells of grids, not hashed, as in the Manta ray tracer: what hashed grids are
@@ -69,17 +68,16 @@ pub const HGRID_METHOD_VARIABLE: u32 = 3;
 /// to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
 /// it.
 ///
-/// Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch
-/// for each triangle. How much index it takes shows only while it is written. `hgrid_sizes`
-/// without scratch answers with a bound that no mesh comes near, up to 8 GiB: ask with
-/// scratch, which gives the exact size.
+/// Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch for each triangle. The
+/// exact size takes a dry run. `hgrid_sizes` without scratch answers with a bound that no mesh comes near, up to 8
+/// GiB: ask with scratch, which gives the exact size.
 pub const HGRID_METHOD_RECURSIVE: u32 = 4;
 
 /// A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
 /// to eight children with tight boxes.
 ///
-/// It is the default: rays of every kind, scenes of every kind, and the smallest bound that is known before the build.
-/// `quality` belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.
+/// It is the default, for all rays and all scenes, with the smallest bound that is known before the build. `quality`
+/// belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.
 ///
 /// Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
 /// alone and is less than twice that: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it
@@ -341,7 +339,7 @@ impl hgrid_config {
         report: &mut hgrid_report,
     ) -> Result<(), hgrid_status> {
         let (config, tasks) = (self.to_core()?, self.task_count()?);
-        // Without triangles there is nothing that could be wrong but the configuration.
+        // With an empty mesh only the configuration can be wrong.
         let nothing = TriangleMesh::new(&[], &[]).map_err(status_of)?;
         sizes(&nothing, &config, &mut []).map_err(status_of)?;
         let count = u32::try_from(triangle_count).ok().filter(|&c| c as usize <= MAX_TRIANGLES);
@@ -377,13 +375,13 @@ impl hgrid_config {
         }
     }
 
-    /// The configuration as core knows it. The numbers are core's to judge.
+    /// The configuration as core knows it. Core checks the numbers.
     pub(crate) fn to_core(self) -> Result<Config, hgrid_status> {
         let Self { density, macrocell_factor, subdivide_above, depth, .. } = self;
         if self.reserved != 0 {
             return Err(HGRID_ERROR_STRUCT_SIZE);
         }
-        // Told only if method and flags are right.
+        // Report a wrong quality only if method and flags are right.
         let quality = Quality::from_u32(self.quality).ok_or(HGRID_ERROR_INVALID_QUALITY);
         let parameters = match self.method {
             HGRID_METHOD_ONE_LEVEL => Ok(Parameters::OneLevel { density }),
@@ -554,7 +552,7 @@ impl hgrid_mesh {
             .ok_or(HGRID_ERROR_INVALID_POSITIONS)
     }
 
-    /// The triangles. Their number is judged first: no array of so many would fit into memory.
+    /// The triangles. Their number is checked first: no array of too many would fit into memory.
     pub(crate) fn index_elements(&self) -> Result<Elements, hgrid_status> {
         let Self { indices, index_stride, triangle_count, .. } = *self;
         let size = match self.index_type()? {

@@ -18,7 +18,7 @@ impl Aabb {
     /// The box around a triangle, or `None` if one of its coordinates is not finite.
     #[inline(always)]
     pub(crate) fn of([a, b, c]: [Vec3A; 3]) -> Option<Self> {
-        // Largest magnitude per axis with the NaN-keeping comparison: `<=` fails on NaN.
+        // `<=` fails on NaN, so one comparison refuses all that is not finite.
         let limit = Vec3A::splat(MAX_COORDINATE);
         let finite = a.abs().cmple(limit) & b.abs().cmple(limit) & c.abs().cmple(limit);
         finite.all().then(|| Self { min: a.min(b).min(c), max: a.max(b).max(c) })
@@ -45,8 +45,8 @@ impl Aabb {
 
     /// The part `(near, far)` of a line inside the box, in multiples of its direction.
     ///
-    /// The line is given with the inverse of its direction, infinite where that is zero. The box is
-    /// a finite one, and so are the origin and every inverse that is used: no product is a NaN.
+    /// `inverse` is one over the direction, infinite where a component is zero. The box, the origin and all other
+    /// inverses are finite, so no product is a NaN.
     #[inline]
     pub(crate) fn clip(&self, origin: [f64; 3], inverse: [f64; 3]) -> Option<(f64, f64)> {
         let (min, max) = (self.min.to_array(), self.max.to_array());

@@ -1,13 +1,13 @@
 //! Moves the start of a ray from far away to the scene's box, so that traversal and filter compute at the
 //! scale of the box.
 //!
-//! A cell's border minus an origin a million extents away has lost all that tells cells apart. So a
-//! ray from far away gets a new origin where it enters the box, the anchor, computed in f64; the
-//! traversal and the f32 filter start there. `t` is still measured from the ray's own origin, and
-//! the triangle test works from there, too.
+//! The distance between a cell's border and an origin a million extents away is rounded too coarsely to tell cells
+//! apart. So a ray from far away gets a new origin where it enters the box, the anchor, computed in f64; the
+//! traversal and the f32 filter start there. `t` is still measured from the ray's own origin, and the triangle test
+//! works from there, too.
 //!
 //! ```text
-//! distance of the origin   starts at      the triangle test may see the ray off by
+//! distance of the origin   starts at      the walk and the filter are off the ray of the triangle test by
 //! up to 4 extents          the origin     nothing
 //! up to 2^29               the anchor     slack: 2^-23 of the anchor's coordinates + 2^-49 of the distance
 //! beyond                   the origin     more than the margin of the cells: the caller tests all triangles
@@ -47,7 +47,7 @@ impl From<&RayF64> for LineF64 {
     }
 }
 
-/// A ray that was brought to a box.
+/// Where a ray starts at a box, and how exactly.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Approach {
     /// The ray's origin, or a point of the ray at the box if that is far away.
@@ -71,7 +71,7 @@ pub(crate) struct Approach {
 }
 
 impl Approach {
-    /// Brings a ray to a box; `None` if the ray is not valid or its line misses the box.
+    /// Finds where a ray starts at a box; `None` if the ray is not valid or its line misses the box.
     #[inline]
     pub(crate) fn new(ray: &Ray, bounds: &Aabb) -> Option<Self> {
         if !ray.is_valid() {
@@ -92,8 +92,8 @@ impl Approach {
         Self::from_afar(ray, &line, bounds, inverse)
     }
 
-    /// Brings a ray that is given in f64 to a box that holds boxes, not triangles. `ray` is that line, rounded.
-    /// Nothing reads `near` and `far` then: they may be 0.
+    /// Finds where a line starts at a box that holds boxes, not triangles; `ray` is the line rounded to f32. `near`
+    /// and `far` may be 0, because nothing reads them.
     #[inline(never)]
     pub(crate) fn of_line(ray: &Ray, line: &LineF64, bounds: &Aabb) -> Option<Self> {
         if !ray.is_valid() {
@@ -119,7 +119,7 @@ impl Approach {
         Some(Self { anchor, t, near, far, inverse, slack, reach, is_remote: false })
     }
 
-    /// The same for a ray whose origin is far away.
+    /// The approach of a ray whose origin is far away.
     #[cold]
     #[inline(never)]
     fn from_afar(ray: &Ray, line: &LineF64, bounds: &Aabb, inverse: [f64; 3]) -> Option<Self> {
@@ -128,7 +128,7 @@ impl Approach {
         let from_origin = Reach::of(bounds, ray.origin);
         let off = from_origin.distance * OFF;
         if from_origin.distance > REMOTE_EXTENTS * from_origin.extent {
-            // Grow the box by what may be wrong, with what f32 cannot hold.
+            // Grow the box by the error of the ray and by the f32 rounding of the grown corners.
             let coordinate = bounds.min.abs().max(bounds.max.abs());
             let growth = Vec3A::splat(round(2.0 * off)) + coordinate * (4.0 * f32::EPSILON);
             let bounds = Aabb { min: bounds.min - growth, max: bounds.max + growth };
@@ -142,7 +142,6 @@ impl Approach {
         let (near, far) = bounds.clip(anchor.map(f64::from), inverse)?;
         let [x, y, z] = anchor.map(|coordinate| f64::from(coordinate.abs()));
         let slack = greater(x, greater(y, z)) * f64::from(f32::EPSILON) + off;
-        // Rounded up.
         let slack = round(slack).next_up();
         let reach = Reach::of(bounds, anchor);
         Some(Self { anchor, t, near, far, inverse, slack, reach, is_remote: false })

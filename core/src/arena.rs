@@ -18,8 +18,8 @@ pub struct Sizes {
     pub index_bytes: usize,
     /// For the region that only the build needs.
     pub scratch_bytes: usize,
-    /// True if `index_bytes` is what the build needs, to the byte; otherwise it is no less. `scratch_bytes` is enough,
-    /// and exact for one-level and fixed grids.
+    /// True if `index_bytes` is exactly what the build needs; otherwise it is an upper bound. `scratch_bytes` is an
+    /// upper bound, and exact for one-level and fixed grids.
     pub is_exact: bool,
 }
 
@@ -82,8 +82,7 @@ impl Block {
     }
 }
 
-/// Refuses a region that does not start at a multiple of
-/// [`ALIGNMENT`]; an empty one starts nowhere.
+/// Refuses a region that does not start at a multiple of [`ALIGNMENT`], unless it is empty.
 pub(crate) fn check_alignment(bytes: &[u8], region: Region) -> Result<(), Error> {
     let is_aligned = bytes.is_empty() || bytes.as_ptr().addr().is_multiple_of(ALIGNMENT);
     if is_aligned { Ok(()) } else { Err(Error::Misaligned { region }) }
@@ -132,7 +131,7 @@ pub(crate) fn split<T: FromBytes + Immutable>(bytes: &[u8], count: u64) -> Optio
     Some((words, rest))
 }
 
-/// The whole elements of some bytes; none if the bytes are not aligned for them.
+/// The bytes as elements, as many as fit whole; none if the bytes are not aligned for them.
 pub(crate) fn whole<T: FromBytes + IntoBytes>(bytes: &mut [u8]) -> &mut [T] {
     <[T]>::mut_from_prefix(bytes).map_or(&mut [], |(elements, _)| elements)
 }

@@ -5,7 +5,7 @@ use crate::invariant::OrBug;
 /// Bits in a word.
 pub(crate) const WORD_BITS: usize = 64;
 
-/// Sets `bit` and the `more` bits behind it; what is past the end is dropped.
+/// Sets `bit` and the `more` bits behind it; bits past the end are dropped.
 #[inline(always)]
 pub(crate) fn set_range(words: &mut [u64], bit: usize, more: usize) {
     let (mut word, mut shift, mut left) = (bit / WORD_BITS, bit % WORD_BITS, more);
@@ -35,18 +35,18 @@ pub(crate) fn is_set(words: &[u64], bit: usize) -> bool {
     words.get(bit / WORD_BITS).is_some_and(|word| word >> (bit % WORD_BITS) & 1 != 0)
 }
 
-/// The 64 bits that start at any bit; bits past the end are zero.
+/// The 64 bits from `bit` on; bits past the end are zero.
 #[inline(always)]
 pub(crate) fn load(words: &[u64], bit: usize) -> u64 {
     let (word, shift) = (bit / WORD_BITS, bit % WORD_BITS);
     let low = words.get(word).copied().unwrap_or(0) >> shift;
     let high = words.get(word + 1).copied().unwrap_or(0);
-    // A shift by 64 is not a shift: move by 63 and then by 1.
+    // Shift by 63 and then by 1: a shift by 64 overflows.
     low | (high << (WORD_BITS - 1 - shift)) << 1
 }
 
-/// Shows `visit` the set bits among `count` bits from any bit on, ascending, numbered from 0, until
-/// it answers `false`.
+/// Calls `visit` with each set bit of the `count` bits from `bit` on, ascending and numbered from 0, until it returns
+/// false.
 #[inline(always)]
 pub(crate) fn each_one(
     words: &[u64],
@@ -65,7 +65,7 @@ pub(crate) fn each_one(
     }
 }
 
-/// The first and the last set bit among `count` bits from any bit on, numbered from 0.
+/// The first and the last set bit of the `count` bits from `bit` on, numbered from 0.
 #[inline]
 pub(crate) fn extent(words: &[u64], bit: usize, count: usize) -> Option<(usize, usize)> {
     let mut extent = None;

@@ -72,8 +72,7 @@ pub(crate) struct Header {
     pub(crate) depth: u32,
     /// The primitives that it is built over, as [`Content`] numbers them.
     content: u32,
-    /// True if the mesh lies behind the grid: see [`HasMesh`]. Above these two bits the number of parts that
-    /// the mesh was joined from, 0 if it was not.
+    /// Two bits for [`HasMesh`]; above them the number of parts that the mesh was joined from, 0 if it was not.
     mesh: u32,
     /// Nodes of a tree; 0 for a method without nodes.
     pub(crate) node_count: u32,
@@ -81,11 +80,11 @@ pub(crate) struct Header {
     pub(crate) levels: u32,
     /// The quality of a tree, as [`Quality`] numbers them; 0 for a method without nodes.
     pub(crate) quality: u32,
-    /// Over all bytes before it: a header is what a build wrote, or `open` refuses it.
+    /// A hash of all bytes before it; `open` refuses a header with another.
     checksum: u32,
 }
 
-/// The mesh behind a grid.
+/// What a blob holds behind the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum HasMesh {
     /// Nothing: the caller has the mesh.
@@ -182,7 +181,7 @@ impl Header {
         Ok(header)
     }
 
-    /// Reads the header of foreign bytes, of which there may be no more.
+    /// Reads the header of foreign bytes; the rest of the blob may be missing.
     pub(crate) fn peek(bytes: &[u8]) -> Result<Self, Error> {
         let Ok((header, _)) = Self::read_from_prefix(bytes) else {
             return Err(if bytes.starts_with(&MAGIC) {
@@ -235,12 +234,12 @@ impl Header {
         self.mesh >> 2
     }
 
-    /// The same header for a blob with a mesh, of so many parts.
+    /// The header of the same grid with its mesh behind it, joined from so many parts.
     pub(crate) const fn packed(self, mesh: HasMesh, part_count: u32) -> Self {
         Self { mesh: mesh as u32 | part_count << 2, ..self }
     }
 
-    /// The header of a packed scene whose own header this is.
+    /// The header of a packed scene, from the header of the scene alone.
     pub(crate) const fn holding(self, members: u32, references: u64, blob_bytes: u64) -> Self {
         Self {
             blob_bytes,
@@ -268,8 +267,8 @@ impl Header {
         Ok(Lattice::new(bounds, self.resolution))
     }
 
-    /// Checks that the header says what the mesh says: what was skipped, its box, and the resolution
-    /// that `rule` has for the box's size and so many triangles.
+    /// Checks the header against the mesh: the skipped triangles, the box, the density, and the resolution that
+    /// `rule` computes from the box's size and the number of finite triangles.
     pub(crate) fn check(
         &self,
         lattice: &Lattice,
@@ -286,7 +285,7 @@ impl Header {
         Ok(())
     }
 
-    /// Surveys the mesh; an error unless the header says what it says: what was skipped, and its box.
+    /// Surveys the mesh; an error unless the header has as many skipped triangles and the same box.
     pub(crate) fn survey(
         &self,
         lattice: &Lattice,

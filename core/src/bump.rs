@@ -13,8 +13,7 @@ use crate::blob::{HEADER_BYTES, Header};
 use crate::error::{ConfigField, Error, Region};
 use crate::invariant::OrBug;
 
-/// The bit of an offset into a pool that says "a grid lies there", not
-/// a list. The others say where.
+/// The bit of an offset into a pool that tells a grid from a list.
 pub(crate) const GRID: u32 = 1 << 31;
 
 /// Words to give away, and how many were asked for.
@@ -32,7 +31,7 @@ impl<'a> Bump<'a> {
         Self { free: whole(pool), asked: 0, is_exhausted: false }
     }
 
-    /// The next `count` words, or `None` if they are not there. From then on there are none.
+    /// The next `count` words, or `None` if they do not fit; from then on always `None`.
     pub(crate) fn take(&mut self, count: usize) -> Option<&'a mut [u32]> {
         self.asked += count as u64;
         match core::mem::take(&mut self.free).split_at_mut_checked(count) {
@@ -55,8 +54,8 @@ impl<'a> Bump<'a> {
     }
 }
 
-/// Ends a build: puts the header in front of the pool and zeros behind it, and returns the blob; or
-/// says what the index would have needed.
+/// Ends a build: puts the header in front of the pool and zeros behind it, and returns the blob. An error tells what
+/// the index would have needed.
 pub(crate) fn finish(index: &mut [u8], header: Header) -> Result<&[u8], Error> {
     let blob = first_mut(index, header.blob_bytes, Region::Index)?;
     let words = u64::from(header.reference_count);

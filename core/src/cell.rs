@@ -20,8 +20,7 @@ use glam::Vec3A;
 use crate::aabb::Aabb;
 use crate::limits::MAX_RESOLUTION;
 
-/// Smallest margin, so that a scene of a single point still has a box, and one whose cells per unit
-/// do not overflow.
+/// Smallest margin: with it the box of a single point has an inside, and its cells per unit do not overflow.
 const LEAST_MARGIN: f32 = f32::from_bits(0x0680_0000); // 2^-114
 
 /// The cells that a box overlaps, both ends included.
@@ -102,7 +101,7 @@ pub(crate) fn woo(size: Vec3A, density: f64, primitives: u32) -> Option<[u32; 3]
 /// The cube root of a positive number, by Newton's method: the same bits everywhere, and exact for
 /// the cubes of whole numbers.
 pub(crate) const fn cube_root(x: f64) -> f64 {
-    // Adding it rounds a number of this size to a whole one.
+    // Adding and subtracting it rounds a smaller number to a whole one.
     const WHOLE: f64 = 4_503_599_627_370_496.0; // 2^52
 
     // A third of the exponent is a start that is right to a few percent; 5 rounds give all bits.
@@ -262,8 +261,8 @@ pub(crate) const fn whole(position: f32) -> u32 {
     position as u32
 }
 
-/// The whole parts of positions between 0 and four times [`MAX_RESOLUTION`] (quarters); an odd
-/// whole number may count as the end of the cell before it, which the margin allows.
+/// The whole parts of positions from 0 to four times [`MAX_RESOLUTION`], for quarters of cells. An odd whole number
+/// rounds down to the cell before it, which the margin allows.
 ///
 /// Adding 1.5 * 2^23 rounds to whole numbers and leaves them in the low bits: casts take longer, because they must
 /// saturate.

@@ -1,8 +1,8 @@
 //! The point of a mesh that is closest to a point.
 //!
-//! A tree is searched nearest child first ([`bvh`](crate::bvh)). In a grid, a box around the point grows
-//! until nothing outside can be closer: from the cells next to the point on, twice as wide each time, and
-//! once something was found, as wide as that is far.
+//! A tree is searched nearest child first ([`bvh`](crate::bvh)). In a grid, a box around the point starts with the
+//! cells next to the point and doubles until it holds a triangle. The last box reaches as far as the closest triangle
+//! found.
 //!
 //! ```text
 //! +-----------------------+
@@ -38,8 +38,7 @@ pub struct ClosestPoint {
 }
 
 impl ClosestPoint {
-    /// The point of one triangle that is closest to a point: what a
-    /// loop over all triangles compares.
+    /// The point of one triangle that is closest to a point. [`Grid::closest_point`] is the closest of these.
     ///
     /// `None` if a coordinate is not finite. A triangle without area has points, too.
     ///
@@ -109,14 +108,13 @@ impl Grid<'_> {
     /// The point of the mesh that is closest to a point, and no farther than `max_distance`; where
     /// several triangles are equally close, that of the lowest id.
     ///
-    /// [`Method::Bvh`](crate::Method::Bvh) visits the nodes that are no farther than the answer, wherever the
-    /// point lies. With the other methods the time grows with the triangles in a cube around the point that
-    /// reaches as far as the answer: it is short near the mesh, and that of a good part of all triangles far
-    /// outside of it.
+    /// [`Method::Bvh`](crate::Method::Bvh) visits the nodes that are no farther than the answer, wherever the point
+    /// lies. With the other methods the time grows with the triangles in a cube around the point that reaches as far
+    /// as the answer: few near the mesh, a good part of all far outside of it.
     ///
-    /// Of the options, mask, the triangle to skip and counters mean something here: a cell step is
-    /// a list or a leaf that was looked at, a grid step a node of a tree. A point or a distance that is NaN, an infinite point and a
-    /// negative distance find nothing.
+    /// Of the options, only the mask, the triangle to skip and the counters apply. A cell step is a list or a leaf, a
+    /// grid step a node of a tree. A point or a distance that is NaN, an infinite point and a negative distance find
+    /// nothing.
     ///
     /// ```
     #[doc = include_str!("../doc/grid.txt")]
@@ -168,13 +166,13 @@ impl Grid<'_> {
         best: &mut ClosestPoint,
         work: &mut Counters,
     ) {
-        // Begin with the cells next to where the point is, or would come in.
+        // Begin with the cells around the point, or around the place where the box is closest to it.
         let center = DVec3::from_array(point.map(f64::from));
         let (min, max) = self.bounds();
         let [min, max] = [min, max].map(|corner| DVec3::from_array(corner.map(f64::from)));
         let outside = (min - center).max(center - max).max(DVec3::ZERO).max_element();
-        // No less than what makes a difference so far out.
-        let mut inside = f64::from(self.cell_size().max_element()).max(outside * FAR);
+        // Grow by no less than what changes a sum in f64 so far out.
+        let mut inside = f64::from(self.cell_size().max_element()).max(outside * LEAST_PART);
         let mut reach = outside + inside;
         loop {
             self.visit(&around(center, reach), &mut |ids| {
@@ -189,8 +187,8 @@ impl Grid<'_> {
                 }
             });
             let is_all = (center - reach).cmple(min).all() && (center + reach).cmpge(max).all();
-            // Until something is found, `best` is as far as anything may be.
-            // Search as far as points that round to the same distance may be.
+            // Include all points whose distance rounds to that of `best`, which is `max_distance` until a point is
+            // found.
             let needed = f64::from(best.distance.next_up());
             if needed <= reach || is_all {
                 break;
@@ -207,8 +205,8 @@ impl ClosestPoint {
         Self { position: [0.0; 3], distance: 0.0, u: 0.0, v: 0.0, primitive: INVALID_ID };
 }
 
-/// A difference below this part of the distance is invisible.
-const FAR: f64 = 1.0 / 1_125_899_906_842_624.0; // 2^-50
+/// A smaller part of a distance may be lost when it is added to the distance.
+const LEAST_PART: f64 = 1.0 / 1_125_899_906_842_624.0; // 2^-50
 
 /// A cube around a point, rounded outwards.
 fn around(center: DVec3, reach: f64) -> Aabb {

@@ -15,7 +15,7 @@ bitflags! {
     }
 }
 
-/// A method and all that it can be told.
+/// A method and its parameters.
 ///
 /// The density is the number of cells per primitive (the paper's rho): more cells mean fewer tests, more steps,
 /// more memory.
@@ -115,7 +115,7 @@ impl Parameters {
     }
 }
 
-/// Everything a build can be told.
+/// The configuration of a build.
 ///
 /// ```
 /// use hgrid_core::{BuildFlags, Config, Method};

@@ -5,13 +5,13 @@ use core::fmt;
 
 use crate::error::Error;
 
-/// A function that a build hands to the caller's loop: does the task with a number.
+/// A function that a build hands to the caller's loop. It runs the task with the given number.
 pub type Task<'t> = dyn Fn(u32) + Sync + 't;
 
 /// The control of a build: the number of tasks, the threads, and the progress callback.
 /// `Control::default()` is one task and no progress callback.
 ///
-/// The grid does not depend on it, to the bit.
+/// The grid has the same bits with any control.
 ///
 /// ```
 /// use hgrid_core::{Block, Config, Control, Grid, Method, TriangleMesh, sizes_with};
@@ -41,8 +41,8 @@ pub type Task<'t> = dyn Fn(u32) + Sync + 't;
 /// ```
 #[derive(Clone, Copy)]
 pub struct Control<'c> {
-    /// The most tasks that run at once, from 1 to [`MAX_TASKS`](Self::MAX_TASKS): what is outside
-    /// counts as the nearest of both. Each takes scratch of its own.
+    /// The most tasks that run at once, from 1 to [`MAX_TASKS`](Self::MAX_TASKS): other numbers are clamped. Each
+    /// takes scratch of its own.
     pub tasks: u32,
     /// Calls the task with every number below the count exactly once, in any order, and
     /// returns when all calls have returned. A build calls it with counts from 2 to
@@ -50,12 +50,12 @@ pub struct Control<'c> {
     ///
     /// On targets without atomic operations it is never called.
     pub run: &'c dyn for<'t> Fn(u32, &'t Task<'t>),
-    /// Told how much of a build is done, from 0 to 1, and answers whether to go on. It is called on
-    /// the thread that builds; what is done grows from call to call, and with the last call of a
-    /// build that succeeds it is exactly 1, whatever the answer to that. After the answer `false`
-    /// the build ends with [`Error::Cancelled`], at the latest when a pass over the mesh is over.
+    /// Receives the part of the build that is done, from 0 to 1, and returns whether to go on. It is called on the
+    /// thread that builds, with parts that grow from call to call. The last call of a build that succeeds has exactly
+    /// 1, and its answer is ignored. After any other answer `false` the build ends with [`Error::Cancelled`], at the
+    /// latest at the end of a pass over the mesh.
     ///
-    /// Questions for sizes do not call it.
+    /// [`sizes_with`](crate::sizes_with) does not call it.
     pub progress: Option<&'c dyn Fn(f32) -> bool>,
 }
 
@@ -90,7 +90,7 @@ impl Control<'_> {
     };
 }
 
-/// At every so many places of a loop the caller is asked: a millisecond or two.
+/// Places of a loop between two reports of progress: a millisecond or two.
 pub(crate) const OFTEN: u32 = 1 << 16;
 
 /// Smaller steps than this are not reported.
@@ -112,10 +112,10 @@ impl<'c> Watch<'c> {
         Self { progress: control.progress, done: Cell::new(f32::NEG_INFINITY) }
     }
 
-    /// Tells that this much is done; an error if the caller does not want the rest.
+    /// Reports that this much is done; an error if the caller cancels.
     pub(crate) fn at(&self, done: f32) -> Result<(), Error> {
         let Some(progress) = self.progress else { return Ok(()) };
-        // Leave it to `end` to say once that all is done, whatever the numbers of a loop round to.
+        // Leave 1 to `end`, which reports it once, however a loop rounds.
         if done >= 1.0 {
             return Ok(());
         }
@@ -130,13 +130,13 @@ impl<'c> Watch<'c> {
         Ok(())
     }
 
-    /// Tells now and then how much of a part of the build is done, given the place in a loop.
+    /// Reports the progress of a part of the build, at some places of its loop.
     #[inline(always)]
     pub(crate) fn step(&self, place: u32, count: u32, [from, to]: [f32; 2]) -> Result<(), Error> {
         if place.is_multiple_of(OFTEN) { self.between(place, count, [from, to]) } else { Ok(()) }
     }
 
-    /// Tells how much of a part of the build is done.
+    /// Reports the progress of a part of the build.
     #[expect(clippy::cast_precision_loss, reason = "a share")]
     pub(crate) fn between(
         &self,
@@ -147,7 +147,7 @@ impl<'c> Watch<'c> {
         self.at(from + (to - from) * (place as f32 / count.max(1) as f32))
     }
 
-    /// Tells that all is done.
+    /// Reports that all is done.
     pub(crate) fn end(&self) {
         if let Some(progress) = self.progress {
             progress(1.0);

@@ -8,12 +8,12 @@ pub struct Counters {
     pub primitive_tests: u64,
     /// Cells and macrocells entered ("cell traversals"), empty ones included; leaves of a tree.
     pub cell_steps: u64,
-    /// Macrocells gone down into, subgrids and nodes entered ("grid traversals"); 0 for a one-level grid.
+    /// Macrocells descended into, subgrids and nodes entered ("grid traversals"); 0 for a one-level grid.
     pub grid_steps: u64,
 }
 
 impl Counters {
-    /// Adds the work of other queries. Sums stop at the largest number instead of starting again.
+    /// Adds the work of other queries. Sums saturate.
     pub const fn add(&mut self, work: &Self) {
         self.primitive_tests = self.primitive_tests.saturating_add(work.primitive_tests);
         self.cell_steps = self.cell_steps.saturating_add(work.cell_steps);

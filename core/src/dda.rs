@@ -27,7 +27,7 @@ pub(crate) struct Line {
     rate: Vec3A,
     /// Distance for each cell, negative where the ray runs downwards; zero if parallel.
     delta: Vec3A,
-    /// Distance of the border between no cells and cell 0; infinite if parallel.
+    /// Distance of the border at which cell 0 begins; infinite if parallel.
     base: Vec3A,
     /// The number to add to the cell on each axis: 1 or -1; 0 if parallel.
     step: Vec3A,
@@ -62,7 +62,7 @@ pub(crate) struct Walk {
     last: Vec3A,
 }
 
-/// The exits of a walk that only the end of the ray ends.
+/// Exits that are never reached: only the end of the ray ends the walk.
 pub(crate) const NEVER: Vec3A = Vec3A::INFINITY;
 
 /// The outcome of a step.
@@ -81,11 +81,11 @@ pub(crate) enum Step {
 const PARALLEL: f64 = 1.0 / 1_099_511_627_776.0; // 2^-40
 
 impl Line {
-    /// The line of a ray that was brought to the lattice's box; `None` if it ends before.
+    /// The line of a ray that starts at the lattice's box; `None` if the ray's range lies outside of it.
     #[inline]
     pub(crate) fn new(lattice: &Lattice, ray: &Ray, approach: &Approach) -> Option<Self> {
-        // Hits are sought from a reported `t` on, too, which was rounded
-        // to f32: before, it may lie half an ulp out.
+        // A query may go on from the reported `t` of a hit, which was rounded: the hit itself may lie half an ulp
+        // outside.
         let start = approach.near.max(f64::from(ray.t_min.next_down()) - approach.t);
         let end = approach.far.min(f64::from(ray.t_max.next_up()) - approach.t);
         if start > end {
@@ -96,13 +96,13 @@ impl Line {
         let [x, y, z] = direction;
         let longest = greater(x.abs(), greater(y.abs(), z.abs()));
         let scale = longest * lattice.finest();
-        // Compute its inverse from those that are there: a division is slow.
+        // Multiply known inverses: a division is slow.
         let least = |[x, y, z]: [f64; 3]| lesser(x, lesser(y, z));
         let inverse_scale = least(approach.inverse.map(f64::abs))
             * least([0, 1, 2].map(|axis| lattice.units_per_cell(axis)));
 
-        // Axis by axis as numbers, vectors at last: one that is filled
-        // number by number is slow to read.
+        // Compute numbers axis by axis, and make vectors of them last: a vector that is filled number by number is
+        // slow to read.
         let (mut position, mut rate, mut delta) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         let (mut base, mut step) = ([f32::INFINITY; 3], [0.0; 3]);
         for axis in 0..3 {
@@ -194,9 +194,8 @@ impl Line {
     /// A walk from a distance on through the cells `min..=max`, each `size` cells of the lattice
     /// wide, which ends where the ray passes `exits`.
     ///
-    /// They are those of the larger cell around these ([`Walk::next`]), not computed from
-    /// these: along a border that the ray hardly crosses the two differ by many cells,
-    /// and between them would be a gap.
+    /// `exits` are those of the larger cell around these ([`Walk::next`]). They are not computed from the last cells
+    /// here: where the ray runs nearly along a border, the two differ by many cells, and the walk would leave a gap.
     #[inline(always)]
     pub(crate) fn walk(
         &self,
@@ -225,7 +224,7 @@ impl Walk {
         (self.cell + WHOLE_SHIFT).to_array().map(|cell| cell.to_bits() & WHOLE_BITS)
     }
 
-    /// Enters the next cell, unless the walk leaves its cells or has `limit` behind it by then.
+    /// Enters the next cell, unless the walk leaves its cells or reaches `limit` first.
     ///
     /// Every call moves one axis towards its end, whatever the floats say: a walk takes at most as
     /// many steps as it has cells on the three axes together.
@@ -239,15 +238,15 @@ impl Walk {
         let (next, yzx, zxy) = (self.next, self.next.yzx(), self.next.zxy());
         let mut axis = next.cmplt(yzx) & next.cmplt(zxy);
         let mut border = next.min(yzx).min(zxy).x;
-        // Two borders in one point, or distances that are no numbers.
+        // Two borders in one point, or NaN distances.
         if !axis.any() {
             (axis, border) = nearest_of(next);
         }
         self.step_along(axis, border, limit)
     }
 
-    /// The same with an arm for each axis, which is told to `along`, also
-    /// when the step leaves the cells.
+    /// [`advance`](Self::advance) with a branch for each axis. `along` receives the axis, also if the step leaves the
+    /// cells.
     ///
     /// In a walk of dozens of cells the processor predicts the axis and does not wait for
     /// distances, which [`advance`](Self::advance) always does.
@@ -270,7 +269,7 @@ impl Walk {
     #[inline(always)]
     fn step_along(&mut self, axis: BVec3A, border: f32, limit: f32) -> Step {
         self.entered = border;
-        // Damaged bytes make numbers that are none: whatever is not before the limit is behind it.
+        // Damaged bytes make NaNs: they count as behind the limit.
         let is_before = border < limit;
         if !is_before {
             return Step::Ended;
@@ -288,7 +287,7 @@ impl Walk {
 /// The axis with the nearest border, and its distance; of borders in one point the last
 /// axis', as in [`Walk::advance_far`].
 ///
-/// Takes a copy: where a walk itself is handed on, it lives in memory.
+/// It takes a copy of the distances: a walk that is passed by reference lives in memory.
 #[cold]
 fn nearest_of(next: Vec3A) -> (BVec3A, f32) {
     let [x, y, z] = next.to_array();

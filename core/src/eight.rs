@@ -40,7 +40,7 @@ impl<S: Simd> Eight<S> {
     #[inline(always)]
     pub(crate) fn of(simd: S, mesh: &TriangleMesh<'_>, ids: [u32; LANES], count: usize) -> Self {
         let [i, j, k, l, m, n, o, p] = ids;
-        // The part of a joined mesh that the triangles before lie in.
+        // The part of a joined mesh that holds the triangle before.
         let mut last_part = None;
         let (low, used) = four(simd, mesh, [i, j, k, l], &mut last_part);
         let (high, used_high) = if count > LANES / 2 {

@@ -1,5 +1,4 @@
-//! The errors, with the number that helps: one enum for build and
-//! open, no strings, no allocation.
+//! The errors: one enum for all calls, with the numbers that help, without strings or allocation.
 //!
 //! A query of one ray has no error: a miss is not one, and a grid that
 //! was opened answers every ray.
@@ -9,7 +8,7 @@ use core::fmt;
 use crate::limits;
 use crate::method::{Content, Method};
 
-/// A memory region of the caller, which an error speaks of.
+/// A memory region that an error names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Region {
     /// The region that keeps the built grid.
@@ -18,7 +17,7 @@ pub enum Region {
     Scratch,
 }
 
-/// The part of a mesh description that an error speaks of.
+/// The part of a mesh description that an error names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MeshField {
     /// The vertices: their bytes end before the last vertex, or the stride is below 12 bytes.
@@ -42,7 +41,7 @@ pub enum BatchField {
     Answers,
 }
 
-/// The field of a [`Config`](crate::Config) that an error speaks of.
+/// The field of a [`Config`](crate::Config) that an error names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ConfigField {
     /// Not a method of this version.
@@ -105,7 +104,7 @@ pub enum Error {
     /// The caller's [`Control::progress`](crate::Control::progress)
     /// asked to stop. There is no grid.
     Cancelled,
-    /// An array of a batch of rays cannot be what it should: see the field.
+    /// An array of a batch of rays has the wrong length or stride.
     InvalidBatch(BatchField),
     /// The bytes are not a grid.
     NotAGrid,
@@ -128,9 +127,9 @@ pub enum Error {
     /// The grid was built for a mesh with other triangle or vertex counts; or, in a refit, a triangle became
     /// finite that the build left out.
     MeshMismatch,
-    /// The blob is built over something else: over triangles, shapes or instances. Open it as what it is.
+    /// The blob is built over other primitives than the call expects: open it as [`Content`] says.
     OtherContent(Content),
-    /// An instance of a scene names an object that there is not.
+    /// An instance of a scene names an object that does not exist.
     InstanceWithoutObject {
         /// The first such instance.
         instance: u32,
@@ -145,7 +144,7 @@ pub enum Error {
     MissingObjects {
         /// Objects that the scene needs.
         needed: u32,
-        /// Objects that there are.
+        /// Objects that were given.
         available: u32,
     },
     /// More scenes stand inside one another than [`MAX_NESTING`](limits::MAX_NESTING).

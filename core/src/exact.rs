@@ -56,7 +56,7 @@ const LIMBS: usize = 36;
 struct Sum([i64; LIMBS]);
 
 impl Sum {
-    /// Adds `scale * x * y * z`. Out of line, as all here: this is about size.
+    /// Adds `scale * x * y * z`. Out of line, as all functions here, to save code.
     #[inline(never)]
     fn add(&mut self, scale: Number, x: Number, y: Number, z: Number) {
         let factor = |number: Number| i128::from(number.mantissa);
@@ -116,8 +116,8 @@ impl Sum {
     }
 }
 
-/// Compares the place where a line meets a triangle's plane with `t`; `None` if it runs along the plane or
-/// there is none.
+/// Compares the `t` at which a line meets a triangle's plane with `t`; `None` if the line is parallel to the plane or
+/// the triangle has no area.
 #[cold]
 #[inline(never)]
 pub(crate) fn compare(

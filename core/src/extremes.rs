@@ -35,7 +35,7 @@ macro_rules! implement {
     )*};
 }
 
-/// Vectors of four lanes, and those that are two of half their length.
+/// Vectors of four lanes, and longer ones, which are split in halves.
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 macro_rules! implement {
     ($four:ident $($vector:ident)*) => {

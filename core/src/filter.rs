@@ -64,13 +64,13 @@ use crate::ray::round;
 /// The largest reach with which nothing overflows.
 const MOST_REACH: f64 = f64::from_bits(0x43b0_0000_0000_0000); // 2^60
 
-/// More than all that underflows, for each unit of distance.
+/// An upper bound of all underflow, for each unit of distance.
 const LEAST: f64 = f64::from_bits(0x3870_0000_0000_0000); // 2^-120
 
 /// 2^-24: how much rounding to f32 changes a number, in parts of it.
 const UNIT: f64 = 1.0 / (1 << 24) as f64;
 
-/// Rounds up what f64 and f32 round to nearest.
+/// Growth of a bound that covers its own rounding, in f64 and to f32.
 const UP: f64 = 1.0 + 1.0 / (1 << 20) as f64;
 
 /// [`UNIT`], with room for roundings in f32.
@@ -79,7 +79,7 @@ const NEARBY_UNIT: f32 = 1.001 / 16_777_216.0;
 const NEARBY_REACH: f32 = f32::from_bits(0x5d80_0000); // 2^60
 /// Growth of the floor with the square of the distance: 28 * (7 * 2^-53)^2, and a little more.
 const NEARBY_FLOOR: f32 = 2e-29;
-/// Distances count as no less: so nothing is denormal on the way to the floor, which takes long.
+/// Shorter distances count as this one: no step towards the floor is denormal then, which would be slow.
 const NEARBY_LEAST: f32 = 1.0 / 32_768.0;
 
 /// Directions that are longer or shorter are not scaled in f32.
@@ -118,7 +118,7 @@ impl Lanes for f32 {
 
     #[inline(always)]
     fn are_opposite([u, v, w]: [Self; 3], error: Self) -> bool {
-        // Of two numbers the second one if either is NaN: so a NaN in w is left out.
+        // `lesser` and `greater` give the second number if either is NaN, so a NaN in w is left out.
         lesser(w, lesser(u, v)) < -error && greater(w, greater(u, v)) > error
     }
 }
@@ -138,7 +138,7 @@ impl<S: Simd> Lanes for f32x8<S> {
 
     #[inline(always)]
     fn are_opposite([u, v, w]: [Self; 3], error: Self) -> mask32x8<S> {
-        // Compared one by one, as least and greatest numbers are not the same on all machines.
+        // Compare one by one: minimum and maximum differ between machines.
         let below = -error;
         let any_negative = u.simd_lt(below) | v.simd_lt(below) | w.simd_lt(below);
         let any_positive = u.simd_gt(error) | v.simd_gt(error) | w.simd_gt(error);
@@ -213,9 +213,9 @@ impl RayFilter {
         Self { origin: anchor, direction: [x, y, z], slope, floor: round(floor * UP) }
     }
 
-    /// The filter of a ray that starts at its own origin, which no corner is farther from than `distance`.
-    /// The direction is scaled, and `sum` is the sum of its components' magnitudes. In f32: each number of
-    /// [`new`](Self::new), or a little more.
+    /// The filter of a ray from whose origin no corner is farther than `distance`. The direction is scaled, and `sum`
+    /// is the sum of its components' magnitudes. It computes in f32: slope and floor are those of [`new`](Self::new),
+    /// or a little more.
     #[inline(always)]
     pub(crate) fn nearby(
         origin: [f32; 3],

@@ -132,14 +132,12 @@ impl<'a> Grid<'a> {
     /// Opens a grid that was built earlier or elsewhere, in O(1);
     /// bytes behind the grid are ignored.
     ///
-    /// The mesh must be the one it was built for. What O(1) cannot see is not trusted: on damaged
-    /// bytes queries may answer wrongly, but they stay inside the blob and end. Use
-    /// [`validate`](Self::validate) to be sure.
+    /// The mesh must be the one it was built for. O(1) cannot find all damage: on damaged bytes queries may answer
+    /// wrongly, but they stay inside the blob and end. Use [`validate`](Self::validate) to be sure.
     ///
     /// # Errors
-    /// [`Error::Misaligned`], [`Error::NotAGrid`], [`Error::WrongByteOrder`],
-    /// [`Error::UnsupportedVersion`], [`Error::Truncated`], [`Error::MeshMismatch`],
-    /// [`Error::Corrupt`] and [`Error::MethodLeftOut`], each for what it says.
+    /// [`Error::Misaligned`], [`Error::NotAGrid`], [`Error::WrongByteOrder`], [`Error::UnsupportedVersion`],
+    /// [`Error::Truncated`], [`Error::MeshMismatch`], [`Error::Corrupt`] and [`Error::MethodLeftOut`].
     ///
     /// ```
     #[doc = include_str!("../doc/grid.txt")]
@@ -265,7 +263,7 @@ impl<'a> Grid<'a> {
         );
     }
 
-    /// The same in a grid of cells.
+    /// [`search`](Self::search) in a grid of cells.
     #[inline(always)]
     fn search_cells<F: Search, T: Tally>(
         &self,
@@ -280,7 +278,7 @@ impl<'a> Grid<'a> {
         if approach.is_remote {
             return test_all(&self.mesh, &test, search, tally);
         }
-        // The test has the ray's own range: the same hit, whichever part of the ray is walked.
+        // The test keeps the ray's own range, so that a hit does not depend on the part that is walked.
         let part = Ray { t_min: begin, ..*ray };
         let Some(line) = Line::new(&self.lattice, &part, &approach) else { return };
         self.traverse(&line, &test, search, tally);
@@ -353,7 +351,8 @@ impl<'a> Grid<'a> {
         by_kind!(&self.structure, tree => tree.search_boxes(&self.scope(), ray, search, counters), ());
     }
 
-    /// The same for a line, and a range of `t`. The `t` along the line is `scale` times that.
+    /// [`search_boxes`](Self::search_boxes) along a line. A `t` of the range or of a hit is `scale` times as large
+    /// along the line.
     pub(crate) fn search_boxes_along(
         &self,
         line: &LineF64,
@@ -394,13 +393,13 @@ impl<'a> Grid<'a> {
         self.lattice.cell_size()
     }
 
-    /// The same grid with queries that use no more than these instructions: the same hits, slower.
+    /// The same grid with queries limited to these instructions: the same hits, slower.
     #[must_use]
     pub const fn with_simd(self, simd: SimdLevel) -> Self {
         Self { simd, ..self }
     }
 
-    /// Returns true if a ray is shown each triangle at most once.
+    /// Returns true if a traversal passes each triangle to the search at most once.
     pub(crate) const fn shows_once(&self) -> bool {
         by_kind!(self.structure, _ => true, false)
     }
@@ -425,8 +424,7 @@ impl<'a> Grid<'a> {
         self.blob.len()
     }
 
-    /// Bytes of scratch that the build of this grid took, or at most took
-    /// where a bump allocator gave it.
+    /// Bytes of scratch that the build of this grid took; an upper bound where a bump allocator gave them.
     #[must_use]
     pub fn scratch_bytes(&self) -> u64 {
         self.header().map_or(0, |header| self.structure.scratch_bytes(&header))
@@ -485,7 +483,7 @@ impl<'a> Grid<'a> {
         Self { mesh, blob, lattice, structure, simd: SimdLevel::detect() }
     }
 
-    /// Says in one line what it is.
+    /// Writes its fields for `Debug`.
     pub(crate) fn describe(&self, mut to: fmt::DebugStruct<'_, '_>) -> fmt::Result {
         to.field("method", &self.method())
             .field("triangles", &self.mesh.triangle_count())

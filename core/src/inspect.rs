@@ -14,7 +14,7 @@ pub struct Statistics {
     /// Triangles of which two corners are the same point. They are in
     /// the grid, and no ray hits them.
     pub degenerate_count: u32,
-    /// The first triangle that is one or the other, or [`INVALID_ID`].
+    /// The first skipped or degenerate triangle, or [`INVALID_ID`].
     pub first_bad: u32,
     /// Lists of primitives: one for each cell or leaf that has any.
     pub list_count: u64,
@@ -22,9 +22,8 @@ pub struct Statistics {
     pub reference_count: u64,
     /// Ids in the longest list.
     pub longest_list: u32,
-    /// A hash of the box, the resolution and all lists in order, not of which cell has
-    /// which: the same for the same grid on every platform, whatever its byte order.
-    /// Not a defence against forgery.
+    /// A hash of the method, the box, the resolution and all lists in order, but not of the cells that have them. It
+    /// is the same for the same grid on every platform, whatever its byte order. Not a defence against forgery.
     pub content_hash: u64,
 }
 

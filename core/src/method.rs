@@ -17,8 +17,8 @@ pub enum Method {
     Variable = 3,
     /// An uncompressed recursive grid, as in the Manta ray tracer: what the paper compares with.
     Recursive = 4,
-    /// A wide tree of tight boxes over a grid of the triangles' centres: this project's own, for rays of
-    /// every kind in scenes of every kind, in memory that the number of triangles bounds.
+    /// A bounding volume hierarchy with eight children a node, for all rays in all scenes, in memory that the number
+    /// of triangles bounds. It is not from the paper.
     #[default]
     Bvh = 6, // 5 was `brick`, a removed method; see `REMOVED_METHOD`.
 }

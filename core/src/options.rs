@@ -59,14 +59,14 @@ pub struct QueryOptions<'q> {
     pub mask: u32,
     /// The sides that are not hit.
     pub cull: Cull,
-    /// A triangle that is not hit: the one that the ray leaves, which it cannot hit again, without
-    /// any epsilon. A neighbour across an edge still may be, where the origin was rounded to just
-    /// below it. The default is [`INVALID_ID`], which names none.
+    /// A triangle that is not hit: usually the one that the ray leaves, so no epsilon is needed. Its neighbour across
+    /// an edge may still be hit, if the origin was rounded to just below it. The default is [`INVALID_ID`], which
+    /// names none.
     pub skip: u32,
-    /// Decides whether a hit counts. It receives the ray's place in its batch, 0 for a single ray, and the hit. It is
-    /// asked about hits from near to far, where `t` is equal by ascending id, and about each triangle at most once for
-    /// each ray; about all hits of one ray of a batch before those of the next. It may or may not be asked about a ray
-    /// of [`occluded_with`](crate::Grid::occluded_with) and its like that an opaque triangle blocks.
+    /// Decides whether a hit counts: see [`Filter`]. It is asked about hits by ascending `t`, then id, about each
+    /// triangle at most once for each ray, and about all hits of one ray of a batch before those of the next. Queries
+    /// for any hit ([`occluded_with`](crate::Grid::occluded_with)) need not ask about a ray that an opaque triangle
+    /// blocks.
     pub filter: Option<&'q mut Filter<'q>>,
     /// The filter is asked about a triangle if a bit of this is set in its mask, too. The others are opaque: their hits
     /// count, and rays that meet only them cost what they cost without a filter. The default is all bits: the filter is
@@ -144,7 +144,7 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
-    /// All triangles from both sides, unasked.
+    /// All triangles, from both sides, without a filter.
     pub(crate) const ALL: Self =
         Self { mask: u32::MAX, skip: INVALID_ID, cull: Cull::None, asked: 0 };
 

@@ -6,11 +6,10 @@
 //!   index   | up to 63 bytes | blob, from a multiple of 64 on | up to 63 bytes |
 //! ```
 //!
-//! Nothing refers to anything beside it, so the struct can move: a view is opened anew for each batch of
-//! queries, which is O(1). The regions come from the allocator as zeros of alignment 1, because that is how
-//! Rust's allocators pass the question on to `calloc` and `realloc`: pages that the build does not touch
-//! are never there, and what the grid does not take goes back without a copy. Zeros of alignment 64 would
-//! be written one by one, and shrinking would move them.
+//! Nothing refers to anything beside it, so the struct can move: a view is opened anew for each batch of queries,
+//! which is O(1). The regions are allocated as zeros of alignment 1, because Rust's allocators then call `calloc` and
+//! `realloc`: pages that the build does not touch are never mapped, and the rest is given back without a copy. With
+//! alignment 64, zeros would be written one by one, and shrinking would move them.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -215,7 +214,7 @@ impl Memory {
         self.length = length.min(self.length);
         self.bytes.truncate(self.length.saturating_add(ALIGNMENT - 1));
         self.bytes.shrink_to_fit();
-        // An allocator may move them, and to an address that lies otherwise.
+        // The allocator may move the bytes to an address with another offset from the alignment.
         let start = self.start();
         if start != before {
             self.bytes.copy_within(before..before + self.length, start);
@@ -269,8 +268,8 @@ impl OwnedGrid {
         let view = mesh.try_view()?;
         let mut sizes = sizes_with(&view, config, &mut [], control)?;
         let mut scratch = Memory::new(sizes.scratch_bytes, Region::Scratch)?;
-        // A tree's bound is at most twice what it takes, and only what it takes is touched. Those of the
-        // other methods may be more than there is: find out.
+        // A tree's bound is at most twice what it takes, and only what it takes is touched. The bounds of other
+        // methods may exceed the memory: compute the exact size.
         if config.method() != Method::Bvh {
             sizes = sizes_with(&view, config, scratch.bytes_mut(), control)?;
         }

@@ -150,7 +150,7 @@ impl<S: Simd> Turn<S> {
     }
 }
 
-// Functions, not closures: a closure is compiled for the processor around it only where it is inlined.
+// Functions, not closures: a closure gets the instructions of its caller only where it is inlined.
 
 /// A corner relative to the ray, sheared so that the ray is the z axis.
 #[inline(always)]

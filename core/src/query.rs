@@ -35,7 +35,7 @@ impl Grid<'_> {
         self.intersect_at(0, ray, options)
     }
 
-    /// The same for the ray at a place of a batch.
+    /// [`intersect_with`](Self::intersect_with) for the ray at a place of a batch.
     pub(crate) fn intersect_at(
         &self,
         place: usize,
@@ -49,7 +49,7 @@ impl Grid<'_> {
         self.intersect_behind((place, ray), options, None, 1)
     }
 
-    /// The same once the first hit is known, which the filter is asked about.
+    /// [`intersect_at`](Self::intersect_at) for a ray whose first hit is known: the filter is asked about it first.
     pub(crate) fn intersect_from(
         &self,
         place: usize,
@@ -64,7 +64,7 @@ impl Grid<'_> {
         Some(*first)
     }
 
-    /// The first hit behind another that counts. The first walk collects `room` hits.
+    /// The first hit behind `after` that counts. The first walk collects `room` hits.
     fn intersect_behind(
         &self,
         ray: (usize, &Ray),
@@ -100,8 +100,8 @@ impl Grid<'_> {
     /// A triangle that blocks a ray, of those that the options let count; `None` if the ray is not
     /// [`occluded`](Grid::occluded_with).
     ///
-    /// It is hit within the ray's range, but need not be the closest, and another one may be named in a
-    /// batch or on another machine.
+    /// It is hit within the ray's range, but need not be the closest. A batch or another machine may name another
+    /// one.
     ///
     /// ```
     #[doc = include_str!("../doc/grid.txt")]
@@ -114,7 +114,7 @@ impl Grid<'_> {
         self.occluder_at(0, ray, options).map(|hit| hit.primitive)
     }
 
-    /// The same for the ray at a place of a batch.
+    /// [`occluder`](Self::occluder) for the ray at a place of a batch, with the hit.
     pub(crate) fn occluder_at(
         &self,
         place: usize,
@@ -169,7 +169,7 @@ impl Grid<'_> {
         if options.filter.is_none() && self.shows_once() {
             return self.heap(ray, options, hits);
         }
-        // Without a filter all that is found counts: collect it where it is wanted.
+        // Without a filter all hits count: collect them in `hits` itself.
         if options.filter.is_none() && hits.len() > ROOM {
             count = self.nearest(ray, options, None, hits, false);
             match hits.last() {

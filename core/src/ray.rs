@@ -8,9 +8,9 @@ pub const INVALID_ID: u32 = u32::MAX;
 
 /// A ray, or the part of it between `t_min` and `t_max`: 32 bytes in DXR order.
 ///
-/// The direction has any length, and every `t` is a multiple of it. A hit is accepted for
-/// `t_min <= t <= t_max`, closed at both ends, and decided exactly: see [`Hit`]. A ray with a NaN anywhere, an infinite origin or
-/// direction, a zero direction or `t_min > t_max` hits nothing.
+/// The direction has any length, and every `t` is a multiple of it. A hit is accepted for `t_min <= t <= t_max`,
+/// closed at both ends, and decided exactly: see [`Hit`]. A ray with a NaN anywhere, an infinite origin or direction,
+/// a zero direction or `t_min > t_max` hits nothing.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Ray {
@@ -50,9 +50,8 @@ impl Ray {
 
 /// A ray whose origin is given in f64: 48 bytes, for scenes in which f32 is too coarse for an origin.
 ///
-/// At 1e7 units from where it starts, f32 tells places apart that are one unit apart, f64 a billionth.
-/// Direction and range are those of a [`Ray`], and so is what makes a ray miss everything; an origin that f32
-/// cannot hold misses, too.
+/// At 1e7 units from the scene's origin, f32 resolves one unit, f64 a billionth. Direction, range and what makes a
+/// ray miss everything are as for a [`Ray`]; a ray whose origin overflows f32 misses everything, too.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct RayF64 {
@@ -99,19 +98,18 @@ impl RayF64 {
 /// triangle's vertices `a`, `b`, `c`, up to rounding. A hit is a function of the ray and the triangle
 /// alone: other triangles, the method and the box of the grid do not change a bit of it.
 ///
-/// There is no epsilon. Let L be the largest difference of a coordinate between the origin and a
-/// vertex, Z the range of `t` between the vertices. The hit is that of a triangle whose vertices lie
-/// up to 2^-50 L across the ray from where they are. Of this hit `u` and `v` are off by no more than
-/// (2^-24 + 2^-38) of their value, `t` by no more than 2^-24 |t| + 2^-38 (|t| + Z); below 1.2e-38 by
-/// 2^-149. Triangles that share a vertex share the place where it lies, so nothing slips between them.
+/// There is no epsilon. Let L be the largest difference of a coordinate between the origin and a vertex, Z the range
+/// of `t` between the vertices. The hit is that of a triangle whose vertices lie up to 2^-50 L across the ray from
+/// where they are. Of this hit `u` and `v` are off by no more than (2^-24 + 2^-38) of their value, `t` by no more
+/// than 2^-24 |t| + 2^-38 (|t| + Z); below 1.2e-38 by 2^-149. Triangles that share a vertex move it alike, so no ray
+/// slips between them.
 ///
-/// The range is decided exactly, for all finite numbers, by the point where the ray's line meets the
-/// plane of the vertices as they are: a ray that starts above a plane and leaves it does not hit it,
-/// however close it starts. Only an end that lies between vertices is asked about: all points of
-/// the triangle keep the other one. The `t` that is reported lies in the range, too: it is the end for a
-/// triangle that the ray grazes, whose own `t` may be up to 2^-21 Z outside. It is rounded: a range that ends at it may
-/// leave out the hit that it was reported for. An origin more than 2^50 times as far away as a triangle
-/// is large may not tell its vertices apart, and miss it. The proof is the head of `triangle.rs`.
+/// The range is decided exactly, for all finite numbers, by the point where the ray's line meets the plane of the
+/// vertices as they are: a ray that starts above a plane and leaves it does not hit it, however close it starts. Only
+/// an end of the range that lies between the vertices needs this decision. The reported `t` lies in the range, too:
+/// for a triangle that the ray grazes, whose own `t` may be up to 2^-21 Z outside, it is the end. It is rounded, so a
+/// range that ends at it may leave out the same hit. A ray from more than 2^50 times as far away as a triangle is
+/// large may miss it. The proof is the head of `triangle.rs`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, Immutable, IntoBytes, KnownLayout)]
 pub struct Hit {

@@ -62,7 +62,7 @@ pub fn refit(index: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<Refit, Error> 
     refit_content(index, mesh)
 }
 
-/// The same for triangles or boxes.
+/// [`refit`] for a tree of triangles or of boxes.
 pub(crate) fn refit_content(index: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<Refit, Error> {
     let grid = Grid::open(index, *mesh)?;
     let (method, blob_bytes) = (grid.method(), grid.blob_bytes());

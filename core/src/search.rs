@@ -42,7 +42,7 @@ pub(crate) trait Search {
         false
     }
 
-    /// Shows the hit with a triangle that passed the filter, if it is one.
+    /// Tests a triangle that passed the filter, and shows the hit if there is one.
     #[inline(always)]
     fn decide(&mut self, test: &TriangleTest, mesh: &TriangleMesh<'_>, id: u32) -> Outcome {
         if self.knows(id) {
@@ -51,7 +51,7 @@ pub(crate) trait Search {
         self.decided(test.decide(mesh, id))
     }
 
-    /// Shows what became of a triangle that passed the filter: a hit, or none.
+    /// Receives the result of a triangle's test: a hit or [`Hit::MISS`].
     #[inline(always)]
     fn decided(&mut self, hit: Hit) -> Outcome {
         if hit.primitive == INVALID_ID { Outcome::Unchanged } else { self.show(hit) }
@@ -199,7 +199,7 @@ impl AllHits<'_> {
 fn sift_down(heap: &mut [Hit]) {
     let Some(&hit) = heap.first() else { return };
     let mut place = 0;
-    // Children of a place in a slice of hits, which are 16 bytes each: no overflow.
+    // A hit takes 16 bytes, so the place of a child does not overflow.
     while let Some(&left) = heap.get(2 * place + 1) {
         let (mut at, mut child) = (2 * place + 1, left);
         if let Some(&right) = heap.get(at + 1).filter(|right| child.is_closer(right)) {
@@ -247,7 +247,7 @@ impl NearestHits<'_> {
     }
 }
 
-/// Shows a search what a ray hits of all triangles.
+/// Tests all triangles of the mesh, one by one.
 #[cold]
 #[inline(never)]
 pub(crate) fn test_all<F: Search, T: Tally>(
@@ -262,8 +262,8 @@ pub(crate) fn test_all<F: Search, T: Tally>(
     });
 }
 
-/// Names the triangles with finite corners, those that the structure has, until the search is over. Through a pointer: it
-/// is compiled once.
+/// Calls `ask` with each finite triangle, which are those in the structure, until the search is over. `ask` is a
+/// pointer, so that this is compiled once.
 #[cold]
 #[inline(never)]
 fn for_finite(mesh: &TriangleMesh<'_>, ask: &mut dyn FnMut(u32) -> Outcome) {

@@ -147,8 +147,8 @@ mod machine {
 
     pub(super) const BASE: SimdLevel = SimdLevel::Sse2;
 
-    /// The answer of [`ask`], for an instruction that takes a hundred cycles and under a hypervisor
-    /// thousands. The first thread writes what all others would write.
+    /// The answer of [`ask`], kept because `cpuid` takes a hundred cycles, under a hypervisor thousands. All threads
+    /// write the same value.
     static DETECTED: AtomicU8 = AtomicU8::new(UNKNOWN);
     const UNKNOWN: u8 = u8::MAX;
 
@@ -196,8 +196,8 @@ mod machine {
         }
     }
 
-    // The tokens. Each function names what `ask` asks for (the last one what this module's target has):
-    // if a later version of the crate wanted more, the safe call in it would not compile.
+    // The tokens. Each function enables what `ask` asks for (the last one what this module's target has). If a later
+    // version of `fearless_simd` required more, the safe call in it would not compile.
 
     #[inline]
     #[target_feature(enable = "adx,aes,avx512bitalg,avx512bw,avx512cd,avx512dq,avx512f")]
@@ -221,18 +221,18 @@ mod machine {
         Sse2::assume_supported()
     }
 
-    /// Out of line as the others are, or its stack would be that of the others, too.
+    /// Out of line as the others: inlined, its stack would be added to theirs.
     #[inline(never)]
     fn base<K: Kernel>(simd: Sse2, kernel: K) -> K::Output {
         kernel.run(simd)
     }
 
-    /// Asks the processor for all that the tokens promise, not only for what gives them the name.
+    /// Asks the processor for every feature that the tokens promise, not only for those that name them.
     #[cold]
     #[allow(unused_unsafe, reason = "__cpuid is safe since Rust 1.94, _xgetbv is not")]
     #[expect(unsafe_code, reason = "the question to the processor")]
     fn ask() -> SimdLevel {
-        // An enclave may not ask, and Miri has no processor.
+        // `cpuid` is forbidden in an enclave, and Miri has no processor.
         if cfg!(any(miri, target_env = "sgx")) {
             return BASE;
         }
@@ -282,7 +282,7 @@ mod machine {
     }
 }
 
-/// All other targets: what they have is known when they are built.
+/// All other targets: their instructions are known at build time.
 #[cfg(not(all(
     any(target_arch = "x86", target_arch = "x86_64"),
     target_feature = "sse2",
@@ -307,7 +307,7 @@ mod machine {
         BASE
     }
 
-    /// Out of line as on x86: what calls a kernel twice has it once.
+    /// Out of line as on x86: two calls of a kernel share its code.
     #[inline(never)]
     pub(super) fn dispatch<K: Kernel>(_: SimdLevel, kernel: K) -> K::Output {
         let simd = token();

@@ -12,9 +12,9 @@ use crate::structure;
 impl Sizes {
     /// Enough for any mesh with so many triangles, wherever they lie: O(1), usable in a constant.
     ///
-    /// A one-level grid of a scan takes a sixth of it or less, a tree half; for
-    /// recursive grids it is generous beyond use. `None` if no build takes the configuration (its
-    /// method is left out, say) or a tree of more than 2^31 triangles, or the sizes do not fit the machine's address space.
+    /// A one-level grid of a scan takes a sixth of it or less, a tree half; for recursive grids it is too large to be
+    /// of use. `None` if the configuration is invalid or its method left out, for a tree of more than 2^31 triangles,
+    /// and if the sizes do not fit the machine's address space.
     ///
     /// ```
     /// use hgrid_core::{Block, Config, Method, Sizes};
@@ -59,15 +59,14 @@ impl Sizes {
 
 /// The memory that a build of this mesh takes.
 ///
-/// With an empty `scratch` the answer takes two passes over the triangles, one more for each
-/// halving of the density, and `index_bytes` is enough: for a scan up to twice what one level
-/// takes, four times what a fixed grid takes, twice what a tree
-/// takes, for the others a generous multiple. With `scratch_bytes` of scratch (same alignment rule as for a build) the grid
-/// is planned in it and `index_bytes` is exact, for about half the time of a build, up to all of it
-/// for the others. The scratch holds nothing of use afterwards.
+/// With an empty `scratch`, `index_bytes` is an upper bound: for a scan up to twice what one level or a tree takes,
+/// four times what a fixed grid takes, for the others a generous multiple. A grid of cells takes two passes over the
+/// triangles for that, one more for each halving of the density. With `scratch_bytes` of scratch (aligned as for a
+/// build) the grid is planned in it and `index_bytes` is exact, for about half the time of a build, up to all of it
+/// for trees and recursive grids. The scratch holds nothing of use afterwards.
 ///
 /// # Errors
-/// The errors of [`Grid::build`](crate::Grid::build), but for index memory.
+/// The errors of [`Grid::build`](crate::Grid::build), except those of the index region.
 ///
 /// ```
 /// use hgrid_core::{Block, Config, TriangleMesh, sizes};
@@ -90,7 +89,7 @@ pub fn sizes(mesh: &TriangleMesh<'_>, config: &Config, scratch: &mut [u8]) -> Re
 /// the answer for several tasks is never exact.
 ///
 /// # Errors
-/// The errors of [`Grid::build_with`](crate::Grid::build_with), but for index memory.
+/// The errors of [`Grid::build_with`](crate::Grid::build_with), except those of the index region.
 ///
 /// ```
 /// use hgrid_core::{Config, Control, Error, TriangleMesh, sizes, sizes_with};
@@ -113,14 +112,13 @@ pub fn sizes_with(
     structure::sizes(mesh, config, scratch, control)
 }
 
-/// The finest grid of a method that fits into so many bytes of index, and what it takes: a
-/// configuration that is the given one, or has a lower density, by no more than a step too much. [`Method::Bvh`] has no cells: its tree fits or
-/// does not.
+/// The finest grid of a method that fits into `index_bytes`, and its sizes: the given configuration, or one with a
+/// lower density, at most a step too low. [`Method::Bvh`] has no density: its tree fits or does not.
 ///
-/// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls
-/// of [`sizes`] at most. `scratch` is for them: as much as [`sizes`] without scratch says. With less a grid may get
-/// coarser than the index had to be: one-level and fixed grids must fit by their bound then, the
-/// others must be such that they can be planned in the scratch.
+/// A step is a factor of the square root of 2 in the number of cells. It takes about a dozen calls of [`sizes`] at
+/// most, which use `scratch`: bring as much as [`sizes`] without scratch says. With less the grid may be coarser than
+/// the index requires: one-level and fixed grids must then fit by their bound, variable and recursive grids must be
+/// small enough to plan in the scratch.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] with the bytes of index that the coarsest grid needs, or
@@ -144,7 +142,7 @@ pub fn fit(
     scratch: &mut [u8],
 ) -> Result<(Config, Sizes), Error> {
     config.check()?;
-    // A tree is neither fine nor coarse.
+    // A tree has no density.
     let most_steps = if config.parameters.density().is_some() { MOST_STEPS } else { 0 };
     let mut try_with = |steps: u32| fits(mesh, &coarsened(config, steps), index_bytes, scratch);
     // The first number of steps of 0, 1, 2, 4, ... that fits, then the smallest one below it.
@@ -166,7 +164,7 @@ pub fn fit(
     Ok((coarsened(config, high), needed))
 }
 
-/// From the finest grid that f32 can ask for to one cell.
+/// Steps from the largest density in f32 to one cell, at most.
 const MOST_STEPS: u32 = 1024;
 
 /// A configuration that asks for so many steps fewer cells.
@@ -192,7 +190,7 @@ fn fits(
     let missing = |region, needed: usize, available: usize| {
         Error::out_of_memory(region, needed as u64, available as u64)
     };
-    // Their bounds say nothing of what a mesh takes.
+    // The bound of a method with a pool says little about the need of a mesh.
     let has_pool = !matches!(config.method(), Method::OneLevel | Method::Fixed);
     if has_pool && !needed.is_exact {
         return Err(missing(Region::Scratch, needed.scratch_bytes, scratch.len()));
@@ -203,7 +201,7 @@ fn fits(
     Ok(needed)
 }
 
-/// Returns true if a coarser grid may do: one that would be too fine is one that is too large.
+/// Returns true if a coarser grid may succeed: too high a density counts as too large.
 const fn is_too_large(error: Error) -> bool {
     matches!(error, Error::OutOfMemory { .. } | Error::InvalidConfig(ConfigField::Density))
 }

@@ -1,9 +1,8 @@
 //! Finds the cells of eight triangles at a time: the first step of a pass over a mesh.
 //!
-//! The result has the same bits as [`Lattice::range`] of each triangle: gather the corners, unite
-//! them to a box, round its sides by an addition. A pass finds the cells of many triangles before
-//! it spreads the first: the number of cells cannot be predicted, so the branch on it mispredicts,
-//! and the work on the next triangles is then done already.
+//! The result has the same bits as [`Lattice::range`] of each triangle: gather the corners, unite them to a box,
+//! round its sides by an addition. A pass finds the cells of many triangles before it spreads the first. The
+//! processor mispredicts the number of cells of each triangle; by then, the cells of the next triangles are known.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
@@ -28,8 +27,7 @@ pub(crate) struct Spans<S: Simd> {
 }
 
 impl<S: Simd> Spans<S> {
-    /// In cells of a lattice, or in parts of them: a power of two on
-    /// each axis, so that nothing rounds.
+    /// Spans in cells of a lattice, each cut into `parts` on each axis: a power of two, so that nothing rounds.
     #[inline(always)]
     pub(crate) fn new(simd: S, lattice: &Lattice, parts: u32) -> Self {
         debug_assert!(parts.is_power_of_two());
@@ -39,9 +37,8 @@ impl<S: Simd> Spans<S> {
         Self { axes: [x, y, z] }
     }
 
-    /// The cells of the triangles `first..first + 8` on each axis, and for which of the triangles
-    /// this is the answer: those with finite corners that can be read this way. Of the others, one
-    /// with the mesh's last vertex among them, nothing is known.
+    /// The cells of the triangles `first..first + 8` on each axis, and a mask of the triangles for which they are
+    /// valid: those with finite corners that can be read this way. A triangle with the mesh's last vertex cannot.
     #[inline(always)]
     pub(crate) fn of(
         &self,
@@ -75,8 +72,7 @@ pub(crate) fn eight<S: Simd>(
     ([a, b, c], is_finite)
 }
 
-/// The largest magnitudes, as the bits that they have: those of what is not finite or no number
-/// are larger than all others.
+/// The largest magnitude of three coordinates, as bits: those of infinities and NaNs are larger than all others.
 #[inline(always)]
 fn largest<S: Simd>([x, y, z]: [f32x8<S>; 3]) -> u32x8<S> {
     let x = x.bitcast::<u32x8<S>>() & 0x7fff_ffff;
@@ -99,7 +95,7 @@ fn four<S: Simd>(simd: S, mesh: &WideMesh<'_>, first: u32) -> [[f32x4<S>; 3]; 3]
     corners_of(simd, &read(mesh, first))
 }
 
-/// The corners of four triangles; no numbers for those that are not there or cannot be read.
+/// The corners of four triangles; NaNs for those that do not exist or cannot be read.
 #[cold]
 #[inline(never)]
 fn read(mesh: &WideMesh<'_>, first: u32) -> [[RowBytes; 4]; 3] {

@@ -1,4 +1,4 @@
-//! The methods of the library: the one place that lists what is done by method.
+//! The methods of the library: the only place that dispatches on the method.
 //!
 //! A method is a folder with a cargo feature of its name. Without the feature the folder is not compiled, and calls
 //! with the method return [`Error::MethodLeftOut`]. Each folder has the functions `bound`, `sizes` and `build`, which
@@ -31,7 +31,7 @@ macro_rules! by_kind {
 }
 pub(crate) use by_kind;
 
-/// Fits the boxes of a tree to a mesh that moved, and returns what a ray costs before and after.
+/// Fits the boxes of a tree to a mesh that moved, and returns the SAH costs before and after.
 pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2], Error> {
     #[cfg(feature = "bvh")]
     return crate::bvh::refit(blob, mesh);
@@ -112,7 +112,7 @@ macro_rules! methods {
         }
 
         impl<'a> Structure<'a> {
-            /// Nothing at all, by whatever method there is.
+            /// An empty structure, of any method that is compiled.
             #[cfg(feature = "alloc")]
             pub(crate) const NOTHING: Self = [
                 $(#[cfg(feature = $feature)] Self::$Cells(crate::$cells::$Cells::NOTHING),)*

@@ -12,8 +12,8 @@
 //!   what a start is lifted by                                 2^-20 L
 //! ```
 //!
-//! The lift is larger than it has to be: it is also there for renderers that round the start again. The
-//! start is rounded away from the plane on each axis, so rounding takes nothing from the lift.
+//! The lift is larger than necessary, for renderers that round the start again. The start is rounded away from the
+//! plane on each axis, so rounding takes nothing from the lift.
 
 use glam::DVec3;
 
@@ -36,8 +36,8 @@ pub struct Surface {
     pub is_front: u32,
 }
 
-/// The amount by which a start is lifted, in parts of the distance from the point to the farthest corner, measured along
-/// one axis.
+/// The amount by which a start is lifted, in parts of the distance from the point to the farthest corner, measured
+/// along one axis.
 const LIFT: f64 = 1.0 / (1 << 20) as f64;
 
 /// A few times the resolution of f32 near zero.
@@ -51,9 +51,9 @@ impl TriangleMesh<'_> {
     /// `below` to the other side: with `t_min` 0, at any scale, in single queries and batches. Rays
     /// nearly along the plane may, as the normal is rounded.
     ///
-    /// A triangle without area, or a needle thinner than 1e-9 of its length, has no normal that could
-    /// be relied on; without any the normal is the one that faces the ray. `is_front` is what
-    /// [`Cull`](crate::Cull) goes by, but for rays that see the triangle nearly edge on.
+    /// The normal of a triangle without area, or of a needle thinner than 1e-9 of its length, is not reliable; where
+    /// there is none, it faces the ray. `is_front` agrees with [`Cull`](crate::Cull), except for rays that see the
+    /// triangle nearly edge on.
     ///
     /// ```
     #[doc = include_str!("../doc/grid.txt")]
@@ -120,7 +120,7 @@ fn wide(xyz: [f32; 3]) -> DVec3 {
 /// The f32 that is next to a coordinate with its lift, and not short of it.
 fn lifted(coordinate: f64, lift: f64) -> f32 {
     let nearest = round(coordinate + lift);
-    // Not from their sum, in which a lift far from the origin is lost.
+    // Subtract first: a sum far from the origin loses the lift.
     let missing = (coordinate - f64::from(nearest)) + lift;
     if lift > 0.0 && missing > 0.0 {
         nearest.next_up()

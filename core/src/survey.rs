@@ -1,4 +1,4 @@
-//! The first look at a mesh: is it sound, how many triangles count, what box holds them.
+//! The first pass over a mesh: checks its indices, counts its finite triangles and finds their box.
 
 use crate::aabb::Aabb;
 use crate::config::BuildFlags;
@@ -6,7 +6,7 @@ use crate::control::Watch;
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 
-/// The part of a build that the survey is, about.
+/// The share of the survey in the progress of a build, about.
 const SHARE: [f32; 2] = [0.0, 0.15];
 
 /// The results of one pass over the triangles.
@@ -60,7 +60,7 @@ pub(crate) fn boxes<'m>(mesh: &'m TriangleMesh<'_>) -> impl Iterator<Item = (u32
 pub(crate) const fn reference_limit(triangles: u32) -> u32 {
     /// Several times what any scan needs, and what a scene of walls and floors needs.
     const PER_TRIANGLE: u32 = 16;
-    /// Added so that a handful of triangles is not denied the few cells it asks for.
+    /// Added so that a handful of triangles gets the few cells that it asks for.
     const AT_LEAST: u32 = 64;
     triangles.saturating_mul(PER_TRIANGLE).saturating_add(AT_LEAST)
 }

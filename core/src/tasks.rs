@@ -56,7 +56,7 @@ pub(crate) fn run<T: Send, R: Send>(
     run_several(parallel, tasks, work, take)
 }
 
-/// The same for several tasks. Out of line: the slots take stack only where it is called.
+/// [`run`] for several tasks. Out of line: the slots take stack only where it is called.
 #[cfg(target_has_atomic = "32")]
 #[inline(never)]
 pub(crate) fn run_several<T: Send, R: Send>(
@@ -137,10 +137,10 @@ impl<'w> Shared<'w> {
         Self(words.map_or(&[], |words| words))
     }
 
-    /// Writes words that lie there, if they do.
+    /// Writes words at a place; none if they do not fit.
     #[inline(always)]
     pub(crate) fn set<const N: usize>(&self, at: usize, words: [u32; N]) {
-        // One comparison; behind where the first lies there would be two.
+        // Slice once: a slice from `at` on and one of its start take two comparisons.
         let end = at.checked_add(N);
         let slots = end.and_then(|end| self.0.get(at..end));
         for (slot, word) in slots.into_iter().flatten().zip(words) {

@@ -29,19 +29,17 @@
 //! t        the weights, of the largest |t| of a corner; to f32    2^-24 |t| + 2^-38 (|t| + Z)
 //! ```
 //!
-//! So a hit is that of a triangle whose corners lie up to 2^-50 L across the ray from where they
-//! should be, rounded to f32. Corner and origin are f32: where their exponents differ by no more
-//! than 28, `p - o` is exact. An origin more than 2^50 times as far away as the triangle is large
-//! may make one place of all corners: a miss.
+//! So a hit is that of a triangle whose corners lie up to 2^-50 L across the ray from where they should be, rounded
+//! to f32. Corner and origin are f32: where their exponents differ by no more than 28, `p - o` is exact. From more
+//! than 2^50 times as far away as the triangle is large, all corners may have one place: a miss.
 //!
 //! # The range
 //!
 //! Next to an end of the range the rounded t may not decide: a ray must not hit the surface that it leaves. A
-//! triangle with all corners between the ends is in, one with all corners outside is out. For any other
-//! triangle the point T where the line meets its plane decides, exactly: in f64 with an error bound, and
-//! where that is not enough without rounding ([`exact`]), for all finite numbers. Both are asked of a
-//! triangle that the ray grazes: its t may be up to 2^-21 Z outside, no more. The t that is reported lies in
-//! the range.
+//! triangle with all corners between the ends is in, one with all corners outside is out. For any other triangle the
+//! point T where the line meets its plane decides, exactly: in f64 with an error bound, and where that is not enough
+//! without rounding ([`exact`]), for all finite numbers. For a triangle that the ray grazes, the rounded t must also
+//! be at most 2^-21 Z outside. The t that is reported lies in the range.
 
 use core::cmp::Ordering;
 
@@ -86,7 +84,7 @@ pub struct TriangleTest {
     direction: [f32; 3],
     /// Direction x / z and y / z: at most 1.
     shear: [f64; 2],
-    /// The range of t, without what is not finite: empty if the ray's had nothing else.
+    /// The finite part of the range of t; empty if there is none.
     t_min: f32,
     t_max: f32,
     cull: Cull,
@@ -135,16 +133,16 @@ impl TriangleTest {
         ray.is_valid().then(|| Self::with(ray, RayFilter::NONE))
     }
 
-    /// The same for a ray that was brought to a box and is asked about triangles in it.
+    /// Prepares a ray for tests against triangles in the box of its approach.
     ///
-    /// Out of line, or each kind of query would have its own: without f64 in hardware two kilobytes.
+    /// Out of line, so that all kinds of queries share it: it takes two kilobytes where f64 is software.
     #[inline(never)]
     pub(crate) fn from(ray: &Ray, approach: &Approach) -> Self {
         let Approach { anchor, slack, reach, .. } = *approach;
         Self::with(ray, RayFilter::new(ray.direction, anchor, slack, reach))
     }
 
-    /// A valid ray with a filter for the triangles that it will be asked about.
+    /// Prepares a valid ray, with a filter for the triangles that it will be tested against.
     #[inline(always)]
     pub(crate) fn with(ray: &Ray, filter: RayFilter) -> Self {
         let [dx, dy, dz] = ray.direction.map(f32::abs);
@@ -169,7 +167,7 @@ impl TriangleTest {
         }
     }
 
-    /// The same test, that some sides of triangles pass.
+    /// The same test, in which some sides of triangles are not hit.
     ///
     /// ```
     /// use hgrid_core::{Cull, Ray, TriangleTest};
@@ -202,8 +200,8 @@ impl TriangleTest {
 
     /// The hit with a triangle that passed, or [`Hit::MISS`].
     ///
-    /// Out of line: rare, and inside it would take the registers from the filter. The triangle is read again and the
-    /// hit is returned in registers, because a load that spans several stores waits for all of them.
+    /// Out of line: it is rare, and inlined it would take registers from the filter. The triangle is read again and
+    /// the hit is returned in registers, because a load that spans several stores waits for all of them.
     #[inline(never)]
     pub(crate) fn decide(&self, mesh: &TriangleMesh<'_>, id: u32) -> Hit {
         let hit = mesh.triangle(id).and_then(
@@ -215,7 +213,8 @@ impl TriangleTest {
 
     /// The hit of a ray with a triangle that passed a filter, or [`Hit::MISS`].
     ///
-    /// In one piece: a test made elsewhere goes through memory, and the end of the ray waits for it.
+    /// Prepares the ray and tests in one function: a prepared test would go through memory, and the end of the ray
+    /// would wait for it.
     #[inline(never)]
     pub(crate) fn decide_for(ray: &Ray, cull: Cull, mesh: &TriangleMesh<'_>, id: u32) -> Hit {
         let test = Self::with(ray, RayFilter::NONE).culling(cull);
@@ -269,12 +268,12 @@ impl TriangleTest {
             _ => {}
         }
 
-        // Interpolate the depth. Adding zero makes the negative zero of a vertex a plain one.
+        // Interpolate the depth. Adding zero turns -0 into 0.
         let share = 1.0 / area;
         let weights = [u * share + 0.0, v * share + 0.0, w * share + 0.0];
         let depth = weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2];
 
-        // Compare the corners' depths, and if they lie on both sides of an end the hit's.
+        // Compare the corners' depths with the range; if they lie on both sides of an end, compare the hit's.
         let depths = [a[2], b[2], c[2]];
         if !self.is_between(depths) && !self.is_in_range(&triangle, depths, depth) {
             return None;
@@ -309,14 +308,14 @@ impl TriangleTest {
 
     /// Returns true if all corners lie in the range and none at an end of it.
     ///
-    /// Rounding is monotonic and the ends are exact: so what the rounded depths say is true.
+    /// Rounding is monotonic and the ends are exact, so rounded depths compare as exact ones.
     #[inline(always)]
     fn is_between(&self, depths: [f64; 3]) -> bool {
         let ([from, to], [first, last]) = (self.ends(), self.extremes(depths));
         first > from && last < to
     }
 
-    /// Returns true if a hit is in the range whose corners are not all between its ends.
+    /// Returns true if a hit whose corners are not all in the range is in it.
     #[cold]
     #[inline(never)]
     fn is_in_range(&self, triangle: &Triangle, depths: [f64; 3], depth: f64) -> bool {
@@ -336,8 +335,8 @@ impl TriangleTest {
         is_close && (first > from || not_before()) && (last < to || not_behind())
     }
 
-    /// Compares the place where the line meets a triangle's plane with `t`; `None` if it runs along the plane
-    /// or there is none.
+    /// Compares the `t` at which the line meets a triangle's plane with `t`; `None` if the line is parallel to the
+    /// plane or the triangle has no area.
     fn compare(&self, triangle: &Triangle, t: f32) -> Option<Ordering> {
         let wide = |[x, y, z]: [f32; 3]| [f64::from(x), f64::from(y), f64::from(z)];
         let [a, b, c] = [wide(triangle[0]), wide(triangle[1]), wide(triangle[2])];
@@ -346,15 +345,15 @@ impl TriangleTest {
         let (e, f) = (minus(b, a), minus(c, a));
         let start = minus(a, origin);
 
-        // The normal's products with the direction and with what leads from the point to the plane,
-        // each with the sum of its terms' magnitudes.
+        // Multiply the normal by the direction and by the vector from the point at `t` to a corner; bound the errors
+        // by the sums of the terms' magnitudes.
         let (left, right) = (turned(e, f), turned(f, e));
         let (normal, size) = (minus(left, right), magnitudes(left, right));
         let slope = dot(normal, direction);
         let height = dot(normal, minus(start, along));
         let slope_bound = BOUND * dot(size, magnitudes(direction, [0.0; 3]));
         let height_bound = BOUND * dot(size, magnitudes(start, along));
-        // Without any term there is no rounding.
+        // A bound of 0 means that all terms are 0.
         let is_sure = |value: f64, bound: f64| value.abs() > bound || bound <= 0.0;
         if !(is_sure(slope, slope_bound) && is_sure(height, height_bound)) {
             return exact::compare(self.origin, self.direction, triangle, t);
@@ -418,7 +417,7 @@ fn difference(x: [f64; 2], y: [f64; 2]) -> f64 {
     high + (rest + (low + least))
 }
 
-/// A sum of two numbers, rounded, and what is left. Out of line: rare, and long where f64 is software.
+/// The rounded sum of two numbers, and its error. Out of line: it is rare, and long where f64 is software.
 #[inline(never)]
 fn sum(a: f64, b: f64) -> [f64; 2] {
     let sum = a + b;
@@ -426,7 +425,7 @@ fn sum(a: f64, b: f64) -> [f64; 2] {
     [sum, (a - (sum - part)) + (b - part)]
 }
 
-/// A product of two numbers, rounded, and what is left. Out of line, too.
+/// The rounded product of two numbers, and its error. Out of line, too.
 #[inline(never)]
 fn product([a, b]: [f64; 2]) -> [f64; 2] {
     let product = a * b;

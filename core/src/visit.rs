@@ -3,7 +3,7 @@
 
 use crate::aabb::Aabb;
 
-/// All that there is, in cells.
+/// The box of all cells.
 pub(crate) const EVERYWHERE: Aabb =
     Aabb { min: glam::Vec3A::NEG_INFINITY, max: glam::Vec3A::INFINITY };
 

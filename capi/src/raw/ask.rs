@@ -66,8 +66,8 @@ impl Asked {
         unsafe { self.ask_and_see(None, |_| {}, ask) }
     }
 
-    /// The same; `see` is shown what counts: what the caller's filter accepts, and the opaque triangles
-    /// of the mesh if there is one.
+    /// [`ask`](Self::ask) with `see`, which is shown what counts: what the caller's filter accepts, and the opaque
+    /// triangles of the mesh if there is one.
     ///
     /// # Safety
     /// The caller's promise.
@@ -118,7 +118,7 @@ impl Asked {
     }
 }
 
-/// Runs a query, with options if there are any. An error if there is nothing to ask.
+/// Runs a query, with options if there are any. An error if an argument is invalid.
 ///
 /// # Safety
 /// The contract of [`grid`].
@@ -245,7 +245,7 @@ pub(crate) unsafe fn locate(
     Ok(grid.mesh().locate(primitive))
 }
 
-/// Runs a batch: `trace` gets the rays as core asks for them, and what the caller told.
+/// Runs a batch: `trace` gets the rays as core asks for them, and the caller's options.
 ///
 /// # Safety
 /// The contract of [`grid`]; and the elements of both arrays are the caller's to be read and written.

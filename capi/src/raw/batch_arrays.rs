@@ -74,7 +74,8 @@ pub(crate) struct Arrays<'b, R, T>(&'b BatchArrays<R, T>);
 
 impl<'b, R, T> Arrays<'b, R, T> {
     /// # Safety
-    /// Until it is dropped, the elements of both arrays are the caller's to be read and written, and any bytes are an `R`.
+    /// Until it is dropped, the elements of both arrays are the caller's to be read and written, and any bytes are an
+    /// `R`.
     pub(super) const unsafe fn new(batch: &'b BatchArrays<R, T>) -> Self {
         Self(batch)
     }

@@ -29,7 +29,7 @@ struct Head {
     count: usize,
 }
 
-/// The tag of parts that were joined; anything else is none.
+/// The tag of parts that were joined.
 const TAG: u64 = u64::from_le_bytes(*b"hgridpt1");
 
 const _: () = assert!(size_of::<Head>() + size_of::<MeshPart<'_>>() <= size_of::<hgrid_part>());

@@ -72,7 +72,7 @@ struct View {
     grid: Grid<'static>,
 }
 
-/// The tag of a view that a build or an open has written; anything else is none.
+/// The tag of a view that a build or an open has written.
 const VIEW_TAG: u64 = u64::from_le_bytes(*b"hgridvw1");
 
 const _: () = assert!(size_of::<View>() <= size_of::<hgrid_grid>());
@@ -237,7 +237,7 @@ unsafe fn config(config: *const hgrid_config) -> Result<(Config, Caller), hgrid_
     Ok((config.to_core()?, Caller { tasks, context, run, progress }))
 }
 
-/// The callbacks of a build: a loop over tasks, and an eye on how far it is.
+/// The callbacks of a build: the loop over tasks, and the progress.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Caller {
     /// 2 or more if there is a loop.
@@ -248,11 +248,11 @@ pub(crate) struct Caller {
 }
 
 impl Caller {
-    /// Neither.
+    /// No callbacks.
     pub(crate) const NOBODY: Self =
         Self { tasks: 1, context: null_mut(), run: None, progress: None };
 
-    /// Has the caller's loop call a task with every number below the count; without one does it.
+    /// Runs a task with every number below the count: by the caller's loop, or here if there is none.
     pub(crate) fn run(&self, count: u32, task: &Task<'_>) {
         let Some(run) = self.run else { return (0..count).for_each(task) };
         // SAFETY: a function of this type by the caller's promise, and with `call` all it needs:
@@ -267,7 +267,7 @@ impl Caller {
         self.progress.is_some()
     }
 
-    /// Tells how far a build is; `false` if the caller does not want the rest.
+    /// Reports progress; false if the caller cancels.
     ///
     /// Core's steps are larger than a thousandth, so the whole numbers grow as its shares do.
     #[expect(
@@ -381,7 +381,7 @@ pub(crate) unsafe fn refit(
     refitted.and_then(|_| Grid::open(blob, mesh)).map_err(status_of)
 }
 
-/// Runs a refit that tells what it did, in a report that may be NULL.
+/// Runs a refit that fills a report, which may be NULL.
 ///
 /// # Safety
 /// The caller's promise.
@@ -500,7 +500,7 @@ pub(crate) unsafe fn write_grid(to: NonNull<hgrid_grid>, grid: &Grid<'static>) {
     unsafe { write(to.cast(), View { tag: VIEW_TAG, grid: *grid }) }
 }
 
-/// Runs a call that tells what it found out, in a report that may be NULL.
+/// Runs a call that fills a report, which may be NULL.
 ///
 /// # Safety
 /// The caller's promise.

@@ -82,8 +82,8 @@ unsafe fn instances(
     if start.is_null() {
         return if count == 0 { Ok((&[], span)) } else { Err(HGRID_ERROR_NULL_ARGUMENT) };
     }
-    // SAFETY: not NULL, so aligned and readable by the caller's promise; any bytes are an instance, which is laid out as
-    // `hgrid_instance`.
+    // SAFETY: not NULL, so aligned and readable by the caller's promise; any bytes are an instance, which is laid out
+    // as `hgrid_instance`.
     Ok((unsafe { slice::from_raw_parts(start.cast(), count) }, span))
 }
 
@@ -440,7 +440,7 @@ pub(crate) unsafe fn query_scene(
     Ok(unsafe { asked.ask(find) })
 }
 
-/// Asks a scene for many rays: `trace` gets them as core asks for them, and what the caller told.
+/// Asks a scene for many rays: `trace` gets them as core asks for them, and the caller's options.
 ///
 /// # Safety
 /// The contract of [`scene`]; and the elements of both arrays are the caller's to be read and written.

@@ -247,7 +247,7 @@ pub(super) fn shapes_read(shapes: &Shapes<'_>, span: Span) -> bool {
     arrays.iter().any(|array| span_of(array).overlaps(span))
 }
 
-/// Asks a tree of shapes for many rays: `trace` gets them as core asks for them, what the caller told, and the test.
+/// Asks a tree of shapes for many rays: `trace` gets them as core asks for them, the caller's options, and the test.
 ///
 /// # Safety
 /// The contract of [`shapes`]; and the elements of both arrays are the caller's to be read and written.

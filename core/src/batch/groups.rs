@@ -10,14 +10,14 @@ use crate::options::{Choice, QueryOptions};
 use crate::ray::{Hit, INVALID_ID, Ray};
 
 /// A batch with its grid and its options; `ASKS` is true if the options have a filter.
-struct Asked<'r, 'm, 'q, B, A, const ASKS: bool> {
+struct GridBatch<'r, 'm, 'q, B, A, const ASKS: bool> {
     grid: &'r Grid<'m>,
     batch: &'r mut B,
     options: &'r mut QueryOptions<'q>,
     answers: PhantomData<A>,
 }
 
-impl<A: HitAnswer, B: Batch<A>, const ASKS: bool> Together for Asked<'_, '_, '_, B, A, ASKS> {
+impl<A: HitAnswer, B: Batch<A>, const ASKS: bool> Together for GridBatch<'_, '_, '_, B, A, ASKS> {
     #[inline(always)]
     fn count(&self) -> usize {
         self.batch.count()
@@ -74,13 +74,14 @@ pub(super) fn trace<A: HitAnswer>(
     let answers = PhantomData::<A>;
     let lent = core::mem::take(&mut options.scratch);
     let choice = options.choice();
-    // If no hit can end a ray unasked, the first one is sooner found as the closest.
+    // If the filter is asked about every triangle, no hit ends a ray at once: search for the closest, which is asked
+    // about first.
     let asked = (choice, A::IS_ANY && !choice.asks_all(grid.mesh()));
     if options.filter.is_none() {
-        let batch = &mut Asked::<_, A, false> { grid, batch, options, answers };
+        let batch = &mut GridBatch::<_, A, false> { grid, batch, options, answers };
         in_groups(grid, tree, asked, coherence, lent, batch);
     } else {
-        let batch = &mut Asked::<_, A, true> { grid, batch, options, answers };
+        let batch = &mut GridBatch::<_, A, true> { grid, batch, options, answers };
         in_groups(grid, tree, asked, coherence, lent, batch);
     }
     options.scratch = lent;

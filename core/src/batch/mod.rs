@@ -29,8 +29,8 @@ use crate::options::QueryOptions;
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::simd::HAS_VECTORS;
 
-/// Says what the caller knows about the rays of a batch, so that the grid can choose their order. It
-/// changes how fast the answers come, never the answers.
+/// What the caller knows about the rays of a batch, so that the grid can choose their order. It changes the speed,
+/// never the answers.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Coherence {
@@ -98,7 +98,7 @@ impl<'a> StridedMut<'a> {
     }
 }
 
-/// Rays that are asked about together, and places for their answers, wherever they lie.
+/// Rays that are traced together, and places for their answers, wherever they lie.
 ///
 /// [`Grid::intersect_n`] takes arrays. This is for rays and answers in the same structs:
 ///

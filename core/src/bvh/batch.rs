@@ -140,7 +140,7 @@ fn take_turns(
 ) {
     for (at, id) in order.deferred() {
         let place = first + at;
-        // The same bits as the group found.
+        // This gives the same bits as the group did.
         let test = TriangleTest::with(&batch.ray(place), RayFilter::NONE).culling(cull);
         let hit = if id == INVALID_ID { Hit::MISS } else { test.decide(mesh, id) };
         if hit.primitive == INVALID_ID {

@@ -66,7 +66,7 @@ pub(super) fn scatter(
     }
 }
 
-/// Does the same with several tasks.
+/// [`scatter`] with several tasks.
 #[cfg(target_has_atomic = "32")]
 #[expect(clippy::cast_possible_truncation, reason = "numbers of triangles, which fit into 32 bits")]
 fn scatter_by_tasks(

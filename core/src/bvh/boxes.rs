@@ -50,7 +50,8 @@ pub(crate) struct Beam<S: Simd> {
 pub(crate) struct BeamMet<S: Simd> {
     /// The boxes that at least one ray may meet, as bits.
     pub(crate) some: u32,
-    /// The boxes that every ray meets before it ends, up to rounding, as bits; extra rays do no harm.
+    /// The boxes that every ray meets before it ends, up to rounding, as bits. A ray that misses such a box only
+    /// costs time.
     pub(crate) all: u32,
     /// For each box, a distance before which no ray enters it.
     pub(crate) enter: f32x8<S>,
@@ -76,7 +77,8 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
         boxes
     }
 
-    /// The boxes of a leaf relative to a point, grown on each side; the last one again where there are fewer than eight.
+    /// The boxes of a leaf relative to a point, grown on each side; the last one again where there are fewer than
+    /// eight.
     #[inline(always)]
     pub(crate) fn of_leaf(
         simd: S,
@@ -116,7 +118,7 @@ impl<S: Simd> WideBoxes<f32x8<S>> {
             let (low, high) = (self.low[axis], self.high[axis]);
             let is_positive = beam.is_positive[axis];
             let (near, far) = if is_positive { (low, high) } else { (high, low) };
-            // The distance to a side is extreme where origin and direction are.
+            // The distance to a side is extreme at the extremes of origin and direction.
             let (a, b) = ((near - first) * least, (near - first) * most);
             let (c, d) = ((near - last) * least, (near - last) * most);
             enter = enter.greater(a.lesser(b).lesser(c.lesser(d)));

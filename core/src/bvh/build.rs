@@ -11,10 +11,10 @@
 //! scratch | counts of tasks, sizes of bins | entries (then records of roots, items) | spare |
 //! ```
 //!
-//! `spare` is the second buffer of the sort, and of binning crowded bins again, after it has held their centres. `sizes`
-//! computes the exact size by a build without an index: it also puts the keys and the top tree into `spare`, and only
-//! counts ids and nodes. A build puts the keys there, too, if they do not fit into the index: an index of exact size has
-//! no room for keys of triangles that are skipped.
+//! `spare` is the second buffer when a bin is sorted. For a crowded bin it holds the centres first, and is then the
+//! second buffer when the bin is divided. `sizes` computes the exact size by a build without an index: it also puts
+//! the keys and the top tree into `spare`, and only counts ids and nodes. A build puts the keys there, too, if they
+//! do not fit into the index: an index of exact size has no room for keys of triangles that are skipped.
 //!
 //! Each step but the last is cut into tasks: the passes by triangles, the roots by bins. The tree does not
 //! depend on how many there are: a bin has its entries in the order of their ids, and subtrees end up
@@ -266,11 +266,11 @@ pub(super) fn finish(
     Ok(header)
 }
 
-/// No step of a node is smaller than that of a box of this part of the scene's extent: so a ray along an
-/// axis has an inverse direction that is finite ([`slab`](super::slab)).
-const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 2^60
+/// No step of a node is smaller than that of a box of this part of the scene's extent. So a finite number can stand
+/// for the inverse of a zero direction ([`slab`](super::slab)).
+const LEAST_NODE: f32 = 254.0 / (1_048_576.0 * 1_048_576.0 * 1_048_576.0); // 254 * 2^-60
 
-/// The smallest box of a scene that steps are made for.
+/// The size of that box in a scene.
 pub(crate) fn least_node(scene: &Aabb) -> f32 {
     scene.size().max_element() * LEAST_NODE
 }
@@ -290,7 +290,7 @@ fn find_keys(
     if census.bounds == vertices || census.finite == 0 {
         return Ok(census);
     }
-    // Vertices that no triangle has would coarsen the keys: take them from the box of the triangles.
+    // Unused vertices would coarsen the keys: compute them in the box of the triangles.
     counts.fill(0);
     let rule = Keys::new(&census.bounds);
     count(mesh, flags, &rule, keys, counts, bits, control)
@@ -398,16 +398,16 @@ impl BuildInputs<'_> {
         if !IS_SMALL && counts.len() > self.sizes.len() {
             return self.roots_of_tasks(entries, spare, ids, nodes, counts, control);
         }
-        // The root of all comes first.
+        // The root of the tree is the first node.
         let (range, child) = (0..entries.len(), 1);
-        // To have no nodes is legal: then they are only counted.
+        // Empty `nodes` are legal: nodes are only counted then.
         let nodes = nodes.get_mut(1..).unwrap_or_default();
         let all = UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
         let (made, last) = dispatch(SimdLevel::detect(), all);
         Ok(TaskTotals { nodes: 1 + made.nodes, roots: made.roots, last })
     }
 
-    /// The same by several tasks. Out of line: what they return takes stack.
+    /// [`roots`](Self::roots) with several tasks. Out of line: their results take stack.
     #[inline(never)]
     fn roots_of_tasks(
         &self,
@@ -422,7 +422,7 @@ impl BuildInputs<'_> {
         let tasks = counts.len() >> bits;
         let mut ends = [0; tasks::MOST];
         self.cut(&mut ends, tasks, entries.len());
-        // The root of all comes first.
+        // The root of the tree is the first node.
         debug_assert!(!nodes.is_empty(), "several tasks without room for nodes");
         let (mut rest_of_nodes, mut child) = (nodes.get_mut(1..).unwrap_or_default(), 1);
         let (mut rest, mut spare, mut ids) = (&mut *entries, spare, ids);
@@ -517,9 +517,9 @@ impl BuildInputs<'_> {
         nodes: &mut [Node],
         all: &TaskTotals,
     ) -> Option<(u32, u32)> {
-        // One root or none is all there is.
+        // A single root is the whole tree.
         if all.roots < 2 {
-            // To have no nodes is legal: then they are only counted.
+            // Empty `nodes` are legal: nodes are only counted then.
             if let Some(root) = nodes.first_mut() {
                 *root = if all.roots == 1 { all.last.node } else { Node::EMPTY };
             }
@@ -546,7 +546,7 @@ impl BuildInputs<'_> {
         };
         let behind = nodes.get_mut(all.nodes as usize..).and_then(&mut build);
         let Top { root, count, levels } = behind.or_else(|| build(whole(spare.as_mut_bytes())))?;
-        // To have no nodes is legal: then they are only counted.
+        // Empty `nodes` are legal: nodes are only counted then.
         if let Some(slot) = nodes.first_mut() {
             *slot = root;
         }
@@ -563,7 +563,7 @@ struct TaskTotals {
     last: RootRecord,
 }
 
-/// Moves elements to an earlier place; nothing where there are none. (`copy_within` can panic.)
+/// Moves elements to an earlier place, as `copy_within`, which can panic, does.
 pub(super) fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
     debug_assert!(to <= from.start && from.end <= elements.len(), "elements move past an end");
     for (at, to) in from.zip(to..) {

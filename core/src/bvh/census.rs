@@ -181,7 +181,7 @@ impl KeysTask<'_> {
         }
     }
 
-    /// Triangles that are not all finite, or cannot be read eight at a time.
+    /// Finds the keys of triangles one by one.
     #[inline(never)]
     fn one_by_one(&mut self, piece: &Piece<'_>, first: u32, keys: &mut [u32]) -> Result<(), Error> {
         for (own, key) in (first..).zip(keys) {

@@ -22,7 +22,7 @@ use super::layout::Entry;
 use super::subtree::slow_bounds;
 
 /// Finds the box around the centres of the triangles' boxes. Notes twice the centre of each: x and y in `spare`, z in
-/// place of the key. Out of line: few units are crowded, and all others are slower with this in their midst.
+/// place of the key. Out of line: few units are crowded, and inlined it would slow down all others.
 #[inline(never)]
 pub(crate) fn centers(mesh: &TriangleMesh<'_>, entries: &mut [Entry], spare: &mut [Entry]) -> Aabb {
     debug_assert!(spare.len() >= entries.len(), "too little room for the centres of a unit");

@@ -92,8 +92,8 @@ impl Group<'_> {
         }
     }
 
-    /// Offers `offer` the boxes of a tree of boxes that rays meet, each once and about from near to far: its number, the
-    /// rays as a mask, and all rays, so that it can end some. Returns what [`trace`](Self::trace) returns.
+    /// Calls `offer` with each box of a tree of boxes that rays meet, once and about from near to far: its number,
+    /// the rays as a mask, and all rays, so that it can end some. Returns what [`trace`](Self::trace) returns.
     #[inline(never)]
     pub(crate) fn offer(&mut self, level: SimdLevel, is_any: bool, offer: &mut Offer<'_>) -> u64 {
         dispatch(level, Descent { group: self, leaves: Boxes { offer, is_any } })
@@ -303,7 +303,7 @@ fn side_by_side<S: Simd>(
     }
 }
 
-/// Pushes a child; for closest hits behind those of the same node that begin farther away.
+/// Pushes a child; for closest hits, above those of the same node that begin farther away.
 #[inline(always)]
 fn push<L: Leaves>(stack: &mut [GroupEntry], top: &mut usize, base: usize, waiting: GroupEntry) {
     let mut at = *top;

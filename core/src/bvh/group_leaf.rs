@@ -33,8 +33,8 @@ pub(super) trait Leaves {
     /// True if children may come in any order: the first hit of each ray ends it.
     const IS_ANY: bool;
 
-    /// Returns true if rays that start far apart go together, too: in any order, they still share the first nodes, and
-    /// many end soon.
+    /// Returns true if rays that start far apart are traced as a group, too: rays for any hit share the first nodes,
+    /// and many end soon.
     fn takes_scattered(&self) -> bool;
 
     /// Lets the rays of a mask enter a leaf.

@@ -17,7 +17,7 @@ pub(crate) const KEY_BITS: u32 = 30;
 /// In place of a key, for a triangle with a corner that is not finite.
 pub(crate) const NO_KEY: u32 = u32::MAX;
 
-/// Takes boxes to keys.
+/// The map from boxes to keys.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Keys {
     /// Twice the least corner of the cube.
@@ -26,7 +26,7 @@ pub(crate) struct Keys {
     scale: f32,
 }
 
-/// The last cell of an axis, and a part of it.
+/// The largest position on an axis, half a cell into the last cell.
 const END: f32 = 1023.5;
 /// Adding this rounds a small number to a whole one and leaves that in the low bits.
 const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
@@ -36,7 +36,7 @@ impl Keys {
     /// Keys for boxes whose centres lie in `centers`. A box of a single point has one key.
     pub(crate) fn new(centers: &Aabb) -> Self {
         let extent = centers.size().max_element();
-        // Not infinite, so that nothing times it is a NaN.
+        // Keep it finite: zero times infinity is a NaN.
         let scale = (512.0 / extent).min(MOST_SCALE);
         let is_box = extent >= 0.0;
         let origin = if is_box { centers.min + centers.min } else { Vec3A::ZERO };

@@ -16,9 +16,8 @@
 //! - There is no more than one root for [`TRIANGLES_PER_ROOT`] triangles ([`units`](super::units)). The rest of
 //!   [`NODES_PER_TRIANGLE`] is left for the nodes below roots: a root that would have more is built
 //!   again by halving its entries ([`most_of_root`]).
-//! - One more root may stand behind the crowded bins of the tree, and behind those of each division of a
-//!   crowded bin. A crowded bin has more than [`CROWD`] triangles, and at most [`DIVISIONS`] of them that are
-//!   divided lie inside one another.
+//! - One more root may stand behind the crowded bins of the tree, and behind those of each division of a crowded bin.
+//!   A crowded bin has more than [`CROWD`] triangles, and divisions nest at most [`DIVISIONS`] deep.
 //!
 //! A bin has one count a task and one for all, and there is at most one bin for sixteen triangles. A bin is
 //! sorted with `spare` as the second buffer; only bins of more than [`CROWD`] entries need more of it than that.
@@ -55,8 +54,8 @@ pub(crate) const fn most_of_root(triangles: usize) -> usize {
 /// Bins with more entries are crowded: they come first, and are divided again above [`MOST_UNIT`].
 pub(crate) const CROWD: usize = 4096;
 
-/// Entries of a unit of bins that is not divided, at most: a bin, and what is too little for a root before
-/// and behind it.
+/// Entries of a unit of bins that is not divided, at most: a bin, and before and behind it fewer entries than a root
+/// needs.
 pub(crate) const MOST_UNIT: usize = CROWD + 2 * TRIANGLES_PER_ROOT;
 
 /// Divisions of a bin inside one another, at most.
@@ -65,7 +64,7 @@ pub(crate) const DIVISIONS: u32 = 5;
 /// The most bits of a key that choose a bin.
 const MOST_BITS: u32 = 18;
 
-/// A triangle in the making: its key, then its id.
+/// The entry of a triangle during a build: its key, then its id.
 pub(crate) type Entry = [u32; 2];
 
 /// The most triangles of a tree: a place on the stack of a query names a node and a child in 32 bits.

@@ -47,7 +47,7 @@ const DOTS: f32 = 1.0 / 2_097_152.0; // 2^-21
 /// 2^-45 of above.
 const SLACK: f32 = 1.0 / 1_048_576.0 / 1_048_576.0; // 2^-40
 
-/// A point, and what is looked for.
+/// The search for the triangle that is closest to a point.
 pub(crate) struct ClosestSearch<'r, F, T> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
@@ -75,10 +75,10 @@ impl Point {
     #[inline(always)]
     fn new(point: [f32; 3], bounds: &Aabb) -> Self {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
-        // Of all corners of the scene, and the largest coordinate.
+        // Find the distance to the farthest side of the scene, and its largest coordinate.
         let (mut farthest, mut largest) = (0.0, 0.0);
         for axis in 0..3 {
-            // A quarter, which does not overflow.
+            // Quarters do not overflow.
             let [at, min, max] = [point[axis], min[axis], max[axis]].map(|side| 0.25 * side);
             farthest = greater(farthest, greater((at - min).abs(), (at - max).abs()));
             largest = greater(largest, greater(min.abs(), max.abs()));
@@ -89,7 +89,7 @@ impl Point {
         Self { at: point.map(|at| at * scale), scale, slack: largest * scale * (4.0 * SLACK) }
     }
 
-    /// The square of a distance, or more than that of all distances that round to it.
+    /// An upper bound of the squares of all distances that round to this one.
     #[inline(always)]
     fn reach(&self, distance: f32) -> f32 {
         let distance = distance.next_up() * self.scale + self.slack;

@@ -128,8 +128,8 @@ impl Node {
         self.word >> 24
     }
 
-    /// The mask of inner children, and the first child node, in one load: a second one of the word alone would
-    /// bring the word to vectors by way of a plain register.
+    /// The mask of inner children, and the first child node, in one load. With a load of the word alone, the compiler
+    /// would share it with [`wide_steps`](Self::wide_steps) and move it from a scalar register to a vector.
     #[inline(always)]
     fn inner_and_child(&self) -> (u32, u32) {
         let pair = self.as_bytes().get(12..20).and_then(|bytes| bytes.first_chunk()).copied();
@@ -137,7 +137,7 @@ impl Node {
         (pair[0] >> 24, pair[1])
     }
 
-    /// The children that there are, as bits.
+    /// The children that exist, as bits.
     #[inline(always)]
     pub(crate) const fn used(&self) -> u32 {
         let counts = u64::from_le_bytes(self.counts);
@@ -168,8 +168,8 @@ impl Node {
         Child::Leaf { first, count: (counts >> shift & 0xff) as u32 }
     }
 
-    /// Writes the boxes of the children that there are, which `bounds` holds. No step is smaller than
-    /// that of a box of size `least`.
+    /// Writes the boxes of the children that exist; `bounds` holds them all. No step is smaller than that of a box of
+    /// size `least`.
     pub(crate) fn set_boxes(&mut self, bounds: &Aabb, boxes: &[Aabb; WIDTH], least: f32) {
         self.frame(bounds, least);
         for (slot, child) in boxes.iter().enumerate() {
@@ -179,8 +179,8 @@ impl Node {
         }
     }
 
-    /// Writes the same bits as [`set_boxes`](Self::set_boxes), all sides of a child at once. The first
-    /// `count` children are there, the others are not.
+    /// Writes the same bits as [`set_boxes`](Self::set_boxes), all sides of a child at once. Only the first `count`
+    /// children exist.
     #[inline(always)]
     pub(crate) fn set_sides<S: Simd>(
         &mut self,
@@ -221,12 +221,12 @@ impl Node {
         }
     }
 
-    /// Sets where bounds are measured from: steps that hold a box, none below `least` in size.
+    /// Sets origin and steps so that bounds can hold a box. No step is smaller than that of a box of size `least`.
     fn frame(&mut self, bounds: &Aabb, least: f32) {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         let mut exponents = [0; 4];
         for axis in 0..3 {
-            // A quarter of a step must show beside the coordinates.
+            // A quarter of a step must be no less than the rounding of coordinates.
             let magnitude = min[axis].abs().max(max[axis].abs());
             let extent = (max[axis] - min[axis]).max(magnitude * LEAST_STEPS).max(least);
             let exponent = exponent_for(extent);
@@ -242,7 +242,7 @@ impl Node {
     fn set_box(&mut self, slot: usize, bounds: &Aabb) {
         let inverse = Vec3A::from_array(self.exponents().map(inverse_step));
         let origin = Vec3A::from_array(self.origin());
-        // Rounding half a step and the margin away is rounding outwards by at least the margin.
+        // Move by half a step and the margin, then round to nearest: this rounds outwards by at least the margin.
         let low = (bounds.min - origin) * inverse - Vec3A::splat(0.5 + MARGIN);
         let high = (bounds.max - origin) * inverse + Vec3A::splat(0.5 + MARGIN);
         let [low, high] = [low.max(Vec3A::ZERO), high.min(Vec3A::splat(255.0))];
@@ -268,11 +268,11 @@ struct Quantiser<S: Simd> {
     inverse: f32x8<S>,
     end: f32x8<S>,
     sign: f32x8<S>,
-    /// The sides of a child that is not there.
+    /// The sides of a child that does not exist.
     unused: u32x8<S>,
 }
 
-// Functions, not closures: a closure is compiled for the processor around it only where it is inlined.
+// Functions, not closures: a closure gets the instructions of its caller only where it is inlined.
 impl<S: Simd> Quantiser<S> {
     /// The sides of four children, lane by lane the bytes of one word.
     #[inline(always)]
@@ -304,7 +304,7 @@ const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 fn exponent_for(extent: f32) -> u8 {
     let least = extent * (1.0 / 254.0);
     let exponent = (least.to_bits() >> 23) & 0xff;
-    // The next power of two; one is at least that large if there is a fraction or not.
+    // Take the next power of two, also if `least` is one itself.
     (exponent + 1).clamp(1, 253) as u8
 }
 

@@ -42,7 +42,7 @@ const SAMPLE: usize = GROUP / 4 + 1;
 /// The rays of a window in order, and which of them wait until all others are done.
 pub(crate) struct Sorted<'m> {
     order: &'m [SortKey],
-    /// By their places in the window.
+    /// The deferred rays, by place in the window.
     waiting: &'m mut [SortKey],
 }
 
@@ -136,7 +136,7 @@ fn are_scattered(batch: &impl Together, first: usize, count: usize, bounds: &Aab
     4 * scattered > groups
 }
 
-/// Moves rays to where one digit of their keys says, those of equal digits in their order.
+/// Sorts rays by one digit of their keys, stably.
 fn pass(from: &[SortKey], to: &mut [SortKey], counts: &mut [u32; DIGITS], number: u32) {
     let mut next = 0;
     for count in counts.iter_mut() {
@@ -170,7 +170,7 @@ impl Cells {
         Self { min: bounds.min.to_array(), rate }
     }
 
-    /// The key of any ray, also of one that is none or starts outside.
+    /// The key of any ray, also of an invalid one or one that starts outside.
     #[inline(always)]
     fn key(&self, ray: &Ray) -> u32 {
         let Ray { origin, direction, .. } = ray;

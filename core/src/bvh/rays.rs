@@ -70,7 +70,8 @@ pub(crate) struct Rays {
     pair_count: usize,
 }
 
-/// The spread of scattered rays, in extents of the scene: eight roundings of an origin a quarter of it away.
+/// Rays with a larger spread are scattered. In extents of the scene: eight roundings of an origin a quarter of an
+/// extent away.
 const SCATTERED: f32 = 8.0 * UNIT / 4.0;
 
 /// Pairs that are decided at once.
@@ -134,7 +135,7 @@ impl Rays {
             let [x, y, z] = direction;
             let longest = x.abs().greater(y.abs()).greater(z.abs());
 
-            // Find the rays that can hit anything, and those that are not for vectors.
+            // Find the rays that can hit anything, and those that must be traced alone.
             let [a, b, c] = origin;
             let is_finite = a.abs().simd_lt(finite)
                 & b.abs().simd_lt(finite)
@@ -196,8 +197,8 @@ impl Rays {
         self.spread > SCATTERED * bounds.size().max_element()
     }
 
-    /// Measures origins from that of the first ray. A ray that is not on its way gets what the first one
-    /// has, so that it widens no interval.
+    /// Measures origins from that of the first ray. A ray that is not alive gets the numbers of the first, so that it
+    /// widens no interval.
     #[inline(always)]
     fn settle<S: Simd>(&mut self, simd: S) {
         let first = self.alive.trailing_zeros();
@@ -511,7 +512,7 @@ fn put(row: &mut PerRay, ray: usize, number: f32) {
 
 #[inline(always)]
 fn get(row: &PerRay, ray: u32) -> f32 {
-    // Flat, so that its place is one index from where the row lies.
+    // Use a flat array, which takes one index, not two.
     let row: &[f32; GROUP] = transmute_ref!(row);
     row[ray as usize % GROUP]
 }

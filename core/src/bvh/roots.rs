@@ -3,16 +3,17 @@
 //!
 //! ```text
 //! for each unit (a crowded bin, or bins side by side that make up a root):
-//!     crowded: a box of its own around the centres, new keys, new bins; then these
+//!     crowded: new keys in the box around its centres, new bins; then their units
 //!     else:    sort by key, cut where high bits of the key change, make a subtree of each part
 //!
 //! entries | records of roots | used up | this unit | later units |
 //! spare   | second buffer of the sort, and of binning a crowded unit again | untouched |
 //! ```
 //!
-//! Binning again copies a unit's entries to the start of `spare` and back. All units use that start, so a mesh of several
-//! crowded units touches less of `spare` than it has entries. The record of a root is 112 bytes, written over entries that
-//! were used up: [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192 bytes.
+//! Binning again copies a unit's entries to the start of `spare` and back. All units use that start, so a mesh of
+//! several crowded units touches less of `spare` than it has entries. The record of a root is 112 bytes, written over
+//! entries that were used up: [`TRIANGLES_PER_ROOT`](super::layout::TRIANGLES_PER_ROOT) of them for each root, 192
+//! bytes.
 
 #![expect(clippy::cast_possible_truncation, reason = "no more entries than ids have values")]
 
@@ -110,13 +111,12 @@ impl Roots<'_> {
                     self.divide(range, &centers, depth);
                     return;
                 }
-                // Equal centres have no order but that of their ids.
+                // Equal centres keep the order of their ids.
                 for entry in entries {
                     entry[0] = 0;
                 }
             }
         } else if let Some(spare) = self.spare.get_mut(..entries.len()).or_bug("no room to sort") {
-            // The keys of one bin differ only in their lowest `shift` bits.
             let ends = entries.first().zip(entries.last());
             let differing = ends.map_or(0, |(first, last)| first[0] ^ last[0]);
             sort(entries, spare, (32 - differing.leading_zeros()).max(shift));
@@ -205,8 +205,8 @@ impl Roots<'_> {
         }
     }
 
-    /// Sorts a crowded unit into `2^bits` bins, by keys in the box of its centres. Out of line, as [`sort`]: divisions
-    /// inside one another would keep its variables on the stack.
+    /// Sorts a crowded unit into `2^bits` bins, by keys in the box of its centres. Out of line, as [`sort`]: nested
+    /// divisions would each keep its variables on the stack.
     #[inline(never)]
     fn bin(&mut self, range: Range<usize>, centers: &Aabb, bits: u32) {
         let rule = &Keys::new(centers);
@@ -219,7 +219,8 @@ impl Roots<'_> {
         counts.fill(0);
         dispatch(self.level, NewKeys { entries, spare: self.spare, rule, shift, counts });
 
-        // Copy the entries to `spare` in the order of their bins, crowded bins first. Then copy them back in that order.
+        // Copy the entries to `spare` in the order of their bins, crowded bins first. Then copy them back in that
+        // order.
         let mut next = starts(counts);
         for count in &mut *counts {
             let next = &mut next[usize::from(*count as usize <= CROWD)];

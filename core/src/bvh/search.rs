@@ -23,7 +23,7 @@ pub(crate) struct Scope<'m> {
 }
 
 impl Bvh<'_> {
-    /// Walks a ray through a tree and shows a search what it hits.
+    /// Walks a ray through the tree and passes its hits to a search.
     #[inline(always)]
     pub(crate) fn search<F: Search, T: Tally>(
         &self,
@@ -65,7 +65,8 @@ impl Bvh<'_> {
         self.search_boxes_along(scope, &ray.into(), 1.0, [ray.t_min, ray.t_max], search, counters);
     }
 
-    /// The same for a line, and a range of `t`. The `t` along the line is `scale` times that.
+    /// [`search_boxes`](Self::search_boxes) along a line. A `t` of the range or of a hit is `scale` times as large
+    /// along the line.
     pub(crate) fn search_boxes_along(
         &self,
         scope: &Scope<'_>,
@@ -75,7 +76,7 @@ impl Bvh<'_> {
         search: &mut BoxSearch<'_>,
         counters: &mut Counters,
     ) {
-        // Beyond f32 every origin is remote.
+        // An origin beyond the range of f32 is remote: clamp it.
         let most = f64::from(f32::MAX);
         let origin = line.origin.map(|c| round(c.clamp(-most, most)));
         let ray = &Ray { origin, t_min, direction: line.direction.map(round), t_max };
@@ -87,7 +88,7 @@ impl Bvh<'_> {
         self.walk(scope, ray, t_min, Cull::None, Some(&afar), search, counters);
     }
 
-    /// Walks a ray through a tree; false if it comes from afar and must be brought to the box.
+    /// Walks a ray through the tree; false if it starts too far away and needs an [`Approach`].
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "each is its own")]
     fn walk<F: Search, T: Tally>(

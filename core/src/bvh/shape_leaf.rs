@@ -3,8 +3,8 @@
 //!
 //! A box is six numbers in the caller's memory, not quantised, so it has no margin of its own. Each side is
 //! subtracted and multiplied with two roundings, which the wider inverse of far sides absorbs
-//! ([`slab`](super::slab)). A direction that is zero has an inverse that is a number, so a side that the ray
-//! runs along would be met at 0: [`pad_of`] moves it behind the end of the scene.
+//! ([`slab`](super::slab)). The inverse of a zero direction is finite, so a ray along a side would cross it at
+//! distance 0: [`pad_of`] moves the crossing behind the scene.
 
 use fearless_simd::{Simd, f32x4, f32x8};
 
@@ -57,7 +57,7 @@ fn rows(mesh: &TriangleMesh<'_>, id: u32) -> [RowBytes; 2] {
     [*first, *last]
 }
 
-/// A 2^40th.
+/// 2^-40.
 const PAD: f32 = 1.0 / (1_048_576.0 * 1_048_576.0);
 
 /// Returns the distance by which the sides of boxes are moved outwards: 2^-40 of the scene's extent. Times the steepest

@@ -31,13 +31,12 @@ pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0
 /// The factor that widens far distances by their relative error: 1 + 2^-20.
 pub(crate) const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
 
-/// The amount by which a ray starts earlier, relative to its start: more than [`WIDER`] brings a far side
-/// with a negative distance nearer.
+/// The amount by which a ray starts earlier, relative to its start. It is more than [`WIDER`] moves a far side with a
+/// negative distance nearer.
 pub(crate) const EARLIER: f32 = 2.0 * (WIDER - 1.0);
 
-/// Returns the amount by which near sides are taken farther back where sides may lie behind the start: a far
-/// side with a negative distance does not go farther by [`WIDER`], it comes nearer. `distance` is that of the
-/// scene's farthest corner.
+/// Returns the amount by which near sides are moved back where sides may lie behind the start: [`WIDER`] moves a far
+/// side with a negative distance nearer, not farther. `distance` is that of the scene's farthest corner.
 #[inline(always)]
 fn behind(distance: f32) -> f32 {
     2.0 * (WIDER - 1.0) * distance
@@ -65,8 +64,8 @@ pub(crate) struct Slab {
 }
 
 impl Slab {
-    /// A ray that starts near a box, looked at from `begin` on, and its filter for triangles there; `None`
-    /// if it is none or its direction is very long or short.
+    /// A ray that starts near a box, from `begin` on, and its filter for triangles there; `None` if it starts farther
+    /// away, is invalid, or has a very long or short direction.
     #[inline(always)]
     pub(crate) fn nearby(ray: &Ray, begin: f32, bounds: &Aabb) -> Option<(Self, RayFilter)> {
         let [x, y, z] = ray.direction;
@@ -118,7 +117,7 @@ impl Slab {
         Some((slab, filter))
     }
 
-    /// A ray that was brought to the scene, looked at from `begin` on.
+    /// A ray that starts where its approach says, from `begin` on.
     #[cold]
     #[inline(never)]
     pub(crate) fn new(ray: &Ray, begin: f32, approach: &Approach) -> Self {
@@ -155,7 +154,7 @@ impl Slab {
         slab
     }
 
-    /// The same for a ray whose `t` is `scale` times the `t` of its range and of hits.
+    /// [`new`](Self::new) for a ray along which a `t` of its range or of a hit is `scale` times as large.
     #[cold]
     #[inline(never)]
     pub(crate) fn along(ray: &Ray, approach: &Approach, scale: f64) -> Self {
@@ -165,19 +164,19 @@ impl Slab {
         slab
     }
 
-    /// A distance no farther than a `t` and all that rounds to it.
+    /// A distance no farther than that of any number that rounds to `t`.
     fn earliest(&self, t: f32) -> f32 {
         let distance = round((f64::from(t.next_down()) - self.t) * self.scale);
-        // Infinity has no margin to take off.
+        // Infinity minus its margin would be a NaN.
         let distance = lesser(distance, f32::MAX);
         (distance - distance.abs() * EARLIER) - TINY
     }
 
-    /// A distance no nearer than a `t` and all that rounds to it.
+    /// A distance no nearer than that of any number that rounds to `t`.
     #[inline(always)]
     pub(crate) fn latest(&self, t: f32) -> f32 {
         if self.nearby > 0.0 {
-            // As the end of such a ray: the margin holds what rounds to the same t.
+            // Compute it as [`nearby`](Self::nearby) does: the margin covers all that rounds to the same t.
             let distance = t * self.nearby;
             let tiny = TINY * self.nearby.max(1.0);
             return distance + (distance.abs() * (WIDER - 1.0) + tiny);

@@ -206,7 +206,7 @@ impl Subtree {
             let [low, high] = [low.simd_eq(level).to_bitmask(), high.simd_eq(level).to_bitmask()];
             u128::from(low) | u128::from(high) << 64
         };
-        // The levels that there are.
+        // The levels that occur, as bits.
         let levels = self.changes.iter().fold(0_u32, |levels, &level| levels | 1 << (level % 32));
         (self.count, self.id_count) = (1, 0);
         let mut at = 0;
@@ -306,7 +306,7 @@ pub(crate) fn slow_bounds(mesh: &TriangleMesh<'_>, id: u32) -> Aabb {
     bounds.or_bug("an entry is not of a finite triangle").unwrap_or(Aabb::EMPTY)
 }
 
-/// The sides of this box.
+/// [`slow_bounds`] as sides.
 #[cold]
 #[inline(never)]
 fn slow_sides(mesh: &TriangleMesh<'_>, id: u32) -> Sides {

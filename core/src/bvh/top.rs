@@ -95,7 +95,7 @@ impl ItemRange {
 /// The tree over the roots.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Top {
-    /// The root of all.
+    /// The root of the whole tree.
     pub(crate) root: Node,
     /// The nodes below it, those of the roots included.
     pub(crate) count: u32,
@@ -120,7 +120,7 @@ pub(crate) fn build(
     // A node that waits keeps its range and level where its children will be.
     let mut root = Node::waiting(0, item_count, 0);
     let (mut count, mut levels) = (0, 0);
-    // The root of all comes before the first node.
+    // Start with the root, which is not among `nodes`.
     for at in (0_usize..).map(|at| at.checked_sub(1)) {
         let node = match at {
             None => &root,
@@ -235,8 +235,8 @@ fn cut(items: &mut [RootItem], halve: bool) -> usize {
             *used |= 1 << (at % BINS);
         }
     }
-    // Sweep over each axis: costs of what is before, then of what is behind. A cut before an empty bin is
-    // one before the next that is not.
+    // Sweep over each axis from both ends. Skip empty bins: a cut before one is a cut before the next that is not
+    // empty.
     let mut best = (f32::INFINITY, 0, 0);
     for (axis, (bins, &used)) in bins.iter().zip(&used).enumerate() {
         let mut before = [0.0; BINS];
@@ -275,7 +275,7 @@ fn partition(items: &mut [RootItem], is_first: impl Fn(&RootItem) -> bool) -> us
     let mut count = 0;
     for at in 0..items.len() {
         if items.get(at).is_some_and(&is_first) {
-            // Equal places are an error here, and need no swap.
+            // `get_disjoint_mut` refuses equal places, which need no swap.
             if let Ok([first, other]) = items.get_disjoint_mut([count, at]) {
                 core::mem::swap(first, other);
             }

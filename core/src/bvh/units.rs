@@ -65,7 +65,7 @@ impl<'s> Units<'s> {
         Self { sizes, bin: 0, is_crowded: true, start: 0, budget: RootBudget::default(), all }
     }
 
-    /// The size of the next bin of its kind.
+    /// The size of the next crowded bin; after the last one, of the next other bin.
     fn next_bin(&mut self) -> Option<usize> {
         loop {
             let Some(&size) = self.sizes.get(self.bin) else {

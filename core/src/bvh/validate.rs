@@ -23,7 +23,7 @@ pub(crate) const fn proof_bytes(triangles: u32) -> u64 {
     triangles.div_ceil(u32::BITS) as u64 * size_of::<u32>() as u64
 }
 
-/// The part of a step that a box must be larger by: less than a build's, by its own rounding.
+/// The margin that a box must have, in steps: less than that of a build, whose rounding may take some of it.
 const MARGIN: f64 = 1.0 / 128.0;
 
 /// A node on the way down.
@@ -32,7 +32,7 @@ struct OpenNode {
     node: u32,
     /// Children that are still to be looked at.
     rest: u32,
-    /// The box that those above leave.
+    /// The intersection of the boxes above.
     min: DVec3,
     max: DVec3,
 }

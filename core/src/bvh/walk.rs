@@ -203,7 +203,7 @@ fn side<S: Simd>(simd: S, node: &Node, axis: usize, flip: usize) -> f32x8<S> {
     bytes(simd, row, row).0
 }
 
-/// The row of a side. The mask is for the compiler: it sees that there is such a row.
+/// The row of a side. The mask shows the compiler that the row exists.
 #[inline(always)]
 fn row(node: &Node, axis: usize, flip: usize) -> [u8; WIDTH] {
     node.bounds[axis % 3 + (flip & FLIP)]

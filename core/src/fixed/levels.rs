@@ -184,8 +184,8 @@ impl Levels {
 
 /// Sets the bit of every macrocell that has a bit set below it.
 ///
-/// All rows of a row of macrocells are laid over each other first, 64 cells at a time: a division for each full cell
-/// takes longer.
+/// First the rows of cells in a row of macrocells are combined by OR, 64 cells at a time: a division for each full
+/// cell takes longer.
 fn scale_down(below: &Level, from: &[u64], above: &Level, to: &mut [u64], factor: u32) {
     let [width, height, depth] = below.resolution;
     let [columns, rows, layers] = above.resolution;
@@ -210,7 +210,7 @@ fn scale_down(below: &Level, from: &[u64], above: &Level, to: &mut [u64], factor
 /// Words of the longest row.
 const WIDEST: usize = MAX_RESOLUTION as usize / WORD_BITS;
 
-/// Lays a row of bits over others.
+/// Combines a row of bits with others by OR.
 fn or_row(any: &mut [u64; WIDEST], words: &[u64], bit: usize, width: usize) {
     for (word, from) in any.iter_mut().zip((0..width).step_by(WORD_BITS)) {
         *word |= load(words, bit + from) & low_bits(width - from);

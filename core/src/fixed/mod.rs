@@ -73,7 +73,7 @@ pub(crate) fn sizes(
     one_level::sizes_under(mesh, density, flags, &Macrocells { factor }, scratch)
 }
 
-/// Builds in memory of which [`sizes`] tells how much there must be.
+/// Builds in as much memory as [`sizes`] says.
 pub(crate) fn build<'a>(
     mesh: &TriangleMesh<'_>,
     density: f32,
@@ -108,12 +108,12 @@ impl<'a> Fixed<'a> {
         Ok(Self { cells, levels: Levels::new(lattice.resolution, factor) })
     }
 
-    /// No ray is shown more primitives than this.
+    /// The most primitives that a ray is shown.
     pub(crate) const fn list_words(&self) -> usize {
         self.cells.list_words()
     }
 
-    /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.
+    /// Shows the lists of all cells that a box, given in cells, meets; `false` if the visitor's budget is used up.
     pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
         self.cells.visit(reach, visitor)
     }

@@ -5,8 +5,8 @@
 //!            '- stride -----'                              '- stride -'
 //! ```
 //!
-//! The last element needs only its own bytes, not its stride. Nothing has to be aligned: every
-//! read goes through bytes, which costs nothing on the machines that matter and removes a rule.
+//! The last element needs only its own bytes, not its stride. Nothing has to be aligned: every read goes through
+//! bytes, which costs nothing on common processors.
 
 mod parts;
 mod strided;
@@ -54,11 +54,11 @@ impl IndexType {
 enum IndexLayout<'a> {
     /// By three indices of so many bytes.
     Indexed(IndexType),
-    /// By three indices of four bytes. The mesh was joined before it was packed: here are the first triangles
-    /// of the parts.
+    /// By three indices of four bytes, in a mesh that was joined before it was packed: here are the first triangles
+    /// of its parts.
     Packed(&'a [[u8; 4]]),
-    /// A "triangle" is a box of six numbers: its least corner, its greatest corner, and that again. So
-    /// whatever builds and proves a tree of triangles does the same for boxes.
+    /// By boxes of six numbers: the corners of a "triangle" are the least corner of its box, the greatest, and the
+    /// greatest again. So the code that builds and validates trees of triangles serves boxes, too.
     Boxes(Content),
     /// In the part where the triangle lies.
     Joined(&'a [MeshPart<'a>]),
@@ -93,7 +93,7 @@ impl<'a> TriangleMesh<'a> {
         Self { positions: none, indices: none, layout, masks: none }
     };
 
-    /// Says in one line what it is.
+    /// Writes its fields for `Debug`.
     pub(crate) fn describe(&self, mut to: fmt::DebugStruct<'_, '_>) -> fmt::Result {
         to.field("vertices", &self.vertex_count())
             .field("triangles", &self.triangle_count())
@@ -182,7 +182,7 @@ impl<'a> TriangleMesh<'a> {
         Self { positions, indices, layout: IndexLayout::Joined(parts), masks }
     }
 
-    /// The same mesh, of indices of four bytes, with the first triangles of the parts that it was packed from.
+    /// The same mesh, with indices of four bytes, as one that was packed from parts with these first triangles.
     pub(crate) const fn numbered(self, numbering: &'a [[u8; 4]]) -> Self {
         debug_assert!(matches!(self.layout, IndexLayout::Indexed(IndexType::U32)));
         Self { layout: IndexLayout::Packed(numbering), ..self }
@@ -337,7 +337,7 @@ impl<'a> TriangleMesh<'a> {
         }
     }
 
-    /// The masks, where the caller has them; none if there are none, and for a joined mesh.
+    /// The masks, where the caller has them; no elements without masks, and for a joined mesh.
     #[must_use]
     pub const fn masks(&self) -> Strided<'a> {
         self.own(self.masks)
@@ -372,7 +372,7 @@ impl<'a> TriangleMesh<'a> {
         }
     }
 
-    /// The first triangle that names a vertex that there is not.
+    /// The first triangle that names a vertex that does not exist.
     pub(crate) fn first_without_vertices(&self) -> Option<u32> {
         self.pieces(0..self.triangle_count()).find_map(|piece| {
             let count = piece.mesh.vertex_count();
@@ -426,7 +426,7 @@ impl<'a> TriangleMesh<'a> {
         bounds
     }
 
-    /// The same of a mesh that was not joined.
+    /// [`vertex_bounds`](Self::vertex_bounds) of a mesh that was not joined.
     fn own_vertex_bounds(&self, vertices: Range<usize>) -> Aabb {
         // Four vertices that lie side by side are three vectors: x y z x | y z x y | z x y z.
         let fours = self.positions.tight::<12>(vertices.start, vertices.len()).as_chunks::<4>().0;

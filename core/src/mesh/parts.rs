@@ -6,10 +6,10 @@
 //! triangles:  | 0 1 2 3 4 5 6       | 7 8 9 10 |     what grids and hits know
 //! ```
 //!
-//! So a grid over parts is the grid over one mesh with the same triangles, bit for bit, and a hit stays
-//! as small as it is. Reading triangle `i` takes a binary search for its part. Code that reads many
-//! triangles in order goes from [`Piece`] to piece, and code that reads triangles that lie near one another
-//! remembers the part of the last one ([`Reader`]).
+//! So a grid over parts is the grid over one mesh with the same triangles, bit for bit, and a hit needs no number of
+//! a part. Reading triangle `i` takes a binary search for its part. Code that reads many triangles in order goes from
+//! [`Piece`] to piece, and code that reads triangles that lie near one another remembers the part of the last one
+//! ([`Reader`]).
 
 use core::ops::Range;
 
@@ -223,7 +223,7 @@ pub(crate) struct Piece<'m> {
     pub(crate) mesh: &'m TriangleMesh<'m>,
     /// The number of this mesh's first triangle in the whole.
     pub(crate) first: u32,
-    /// The triangles, as this mesh calls them.
+    /// The triangles, in this mesh's numbers.
     pub(crate) triangles: Range<u32>,
 }
 
@@ -250,7 +250,7 @@ impl<'a> LastPart<'a> {
         self.wide.corners(triangle.wrapping_sub(self.first))
     }
 
-    /// The mesh or part, and what a triangle of the whole is called there.
+    /// The mesh or part, and the number that a triangle of the whole has there.
     #[inline(always)]
     pub(crate) const fn own(self, triangle: u32) -> (WideMesh<'a>, u32) {
         (self.wide, triangle.wrapping_sub(self.first))
@@ -286,7 +286,7 @@ impl Reader<'_> {
         self.mesh.own_corners(triangle.wrapping_sub(self.first))
     }
 
-    /// Turns to the part of a triangle; false if it is the one that it was.
+    /// Turns to the part of a triangle; false if that is the current one.
     #[inline(never)]
     fn turn(&mut self, triangle: u32) -> bool {
         let Some(part) = self.whole.part_of(triangle) else { return false };

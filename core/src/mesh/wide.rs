@@ -7,8 +7,8 @@ use super::{IndexLayout, IndexType, Strided, TriangleMesh};
 
 /// A mesh whose vertices are read in pieces of sixteen bytes, which is one load and one check each.
 ///
-/// `index * stride` does not overflow 64 bits, because a stride has 16 bits. The bytes end with the last element, so a read
-/// that ends inside them reads an element.
+/// `index * stride` does not overflow 64 bits, because a stride has 16 bits. The bytes end with the last element, so
+/// a read that ends inside them reads an element.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WideMesh<'a> {
     positions: &'a [u8],
@@ -36,7 +36,7 @@ impl<'a> WideMesh<'a> {
     /// The corners of four triangles that follow one another; `None` if one of them cannot be read this way.
     #[inline(always)]
     pub(crate) fn four(&self, first: u32) -> Option<[[&'a [u8; 16]; 3]; 4]> {
-        // Most meshes are packed: load all indices at once, and let the compiler know the products.
+        // Most meshes are tight: load all indices at once, with strides that the compiler knows.
         if (self.index_stride, self.position_stride) == (12, 12) {
             let indices: &[u8; 48] = element(self.indices, 12, first)?;
             let [a, b, c, d]: [[u32; 3]; 4] = transmute!(*indices);
@@ -86,7 +86,7 @@ pub(crate) fn vector(bytes: &[u8; 16]) -> Vec3A {
 /// `N` bytes from where an element starts, if all of them are there.
 #[inline(always)]
 fn element<const N: usize>(bytes: &[u8], stride: u16, index: u32) -> Option<&[u8; N]> {
-    // Not checked where pointers have 64 bits: the compiler sees that these two cannot overflow.
+    // Where pointers have 64 bits the compiler drops both checks.
     let start = (index as usize).checked_mul(usize::from(stride))?;
     let end = start.checked_add(N)?;
     bytes.get(start..end)?.first_chunk()

@@ -37,11 +37,11 @@ pub(crate) trait Overlay {
     /// Writes the words.
     fn fill(&self, resolution: [u32; 3], domain_bits: &[u64], words: &mut [u64]);
 
-    /// The parameters that build both, with this density.
+    /// The parameters of the grid and its overlay, with this density.
     fn parameters(&self, density: f32) -> Parameters;
 }
 
-/// Nothing.
+/// No overlay.
 impl Overlay for () {
     fn words(&self, _: [u32; 3]) -> u64 {
         0
@@ -97,7 +97,7 @@ impl<'s> Plan<'s> {
         };
 
         watch.at(0.4)?;
-        // Displace the rows: the one number that no pass over the triangles can tell.
+        // Displace the rows: only this tells the number of slots.
         let overlay_words = overlay.words(lattice.resolution);
         let mut layout = Layout::new(lattice.resolution, 0, reference_count, overlay_words);
         layout.hash_count = u32::try_from(layout.cells).unwrap_or(u32::MAX);

@@ -28,9 +28,8 @@ const WINDOW_SLOTS: usize = 2048;
 
 /// Finds an offset for every row and returns the number of slots, or `None` beyond `i32::MAX`.
 ///
-/// `domain_bits` holds the rows, `width` bits each. `occupied` must have one bit for
-/// every cell and a word more, may hold anything, and is left with the slots in use; bits
-/// behind the last one say nothing.
+/// `domain_bits` holds the rows, `width` bits each. `occupied` must have one bit for every cell and a word more, may
+/// hold anything, and is left with the slots in use; bits behind the last slot mean nothing.
 pub(crate) fn displace(
     domain_bits: &[u64],
     width: usize,
@@ -67,11 +66,11 @@ impl Kernel for Displace<'_> {
             };
             let row = CellRow { domain_bits, start: start + first, width: last - first + 1 };
 
-            // Clear what is read when it is tried at the end of the table: its words and a vector.
+            // Clear the words that a try at the end of the table reads: those of the row and a vector.
             let behind = slots / WORD_BITS + row.width.div_ceil(WORD_BITS) + WORDS;
             if cleared < behind {
                 let end = occupied.len().min(behind + CLEARED_WORDS);
-                // To find nothing is legal: all words were cleared.
+                // An empty range is legal: all words were cleared.
                 occupied.get_mut(cleared..end).unwrap_or_default().fill(0);
                 cleared = end.max(behind);
             }
@@ -131,7 +130,7 @@ impl CellRow<'_> {
         (taken != u64::MAX).then(|| taken.trailing_ones() as usize)
     }
 
-    /// The same of eight words.
+    /// [`fit_one`](Self::fit_one) for eight words.
     #[inline(always)]
     fn fit_eight<S: Simd>(self, simd: S, occupied: &[u64], word: usize) -> Option<usize> {
         let full = u64x8::splat(simd, u64::MAX);
@@ -143,7 +142,7 @@ impl CellRow<'_> {
             while rest != 0 {
                 let bit = rest.trailing_zeros();
                 rest &= rest - 1;
-                // A shift by 64 is not a shift: move by 63 and then by 1.
+                // Shift by 63 and then by 1: a shift by 64 overflows.
                 taken |= (low >> bit) | ((high << (63 - bit)) << 1);
                 if taken.simd_eq(full).all_true() {
                     return None;
@@ -183,7 +182,7 @@ const fn bits_at(bits: u64, place: usize) -> [u64; 2] {
     [bits << shift, bits >> 1 >> (WORD_BITS - 1 - shift)]
 }
 
-/// Eight words; none is set behind the end.
+/// Eight words; zeros behind the end.
 #[inline(always)]
 fn eight<S: Simd>(simd: S, words: &[u64], at: usize) -> u64x8<S> {
     let eight = words.get(at..at.saturating_add(WORDS)).and_then(<[u64]>::first_chunk);

@@ -71,7 +71,7 @@ pub(crate) struct Scratch<'a> {
     pub(crate) rest: &'a mut [u8],
 }
 
-/// No axis of a grid of so many triangles has more cells, but for rounding.
+/// The most cells on an axis of a grid of so many triangles, up to rounding.
 pub(crate) const fn longest(triangles: u32, density: f32) -> f64 {
     cube_root(density as f64 * triangles as f64).min(MAX_RESOLUTION as f64)
 }

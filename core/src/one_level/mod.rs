@@ -62,7 +62,7 @@ pub(crate) const fn bound(triangles: u32, density: f32) -> (u64, u64) {
     bound_under(triangles, density, 0)
 }
 
-/// The same with so many words of another structure on top.
+/// [`bound`] with an overlay of so many words.
 pub(crate) const fn bound_under(triangles: u32, density: f32, words: u64) -> (u64, u64) {
     let layout = Layout::bound(triangles, density, words);
     (layout.index_bytes(), layout.scratch_bytes())
@@ -83,7 +83,7 @@ pub(crate) fn sizes(
     sizes_under(mesh, density, flags, &(), scratch)
 }
 
-/// The same with another structure on top.
+/// [`sizes`] with an overlay.
 pub(crate) fn sizes_under(
     mesh: &TriangleMesh<'_>,
     density: f32,
@@ -95,7 +95,7 @@ pub(crate) fn sizes_under(
     Sizes::new(plan.layout.index_bytes(), plan.layout.scratch_bytes(), plan.is_exact())
 }
 
-/// Builds in memory of which [`sizes`] tells how much there must be.
+/// Builds in as much memory as [`sizes`] says.
 pub(crate) fn build<'a>(
     mesh: &TriangleMesh<'_>,
     density: f32,
@@ -116,7 +116,7 @@ impl<'a> OneLevel<'a> {
         Self::open_under(header, lattice, &(), blob)
     }
 
-    /// The same with another structure on top.
+    /// [`open`](Self::open) with an overlay.
     pub(crate) fn open_under(
         header: &Header,
         lattice: &Lattice,
@@ -174,7 +174,7 @@ impl<'a> OneLevel<'a> {
         if self.is_marked(cell) { self.ends_of_marked(cell) } else { None }
     }
 
-    /// The same for a cell whose domain bit is set.
+    /// [`ends`](Self::ends) of a cell whose domain bit is set.
     #[inline(always)]
     fn ends_of_marked(&self, [x, y, z]: [u32; 3]) -> Option<[u32; 2]> {
         let row = row(self.last[1] + 1, y, z);
@@ -182,12 +182,13 @@ impl<'a> OneLevel<'a> {
         self.sections.hash.get(slot..)?.first_chunk().copied()
     }
 
-    /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.
+    /// Shows the lists of all cells that a box, given in cells, meets; `false` if the visitor's budget is used up.
     pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
         self.each_marked(reach, |cell| self.references(cell).is_none_or(|ids| visitor.list(ids)))
     }
 
-    /// Shows the cells with primitives that a box meets, given in cells, until that is enough.
+    /// Calls `visit` with each marked cell that a box, given in cells, meets, until it returns false; returns false
+    /// then.
     pub(crate) fn each_marked(
         &self,
         reach: &Aabb,
@@ -216,8 +217,8 @@ impl<'a> OneLevel<'a> {
 
     /// Walks the cells of a ray in order and shows `leaf` the primitives of each that has any.
     ///
-    /// `leaf` answers with the distance at which the ray now ends: the closest hit's, or less than
-    /// any to stop at once.
+    /// `leaf` returns the distance at which the ray now ends: that of the closest hit, or negative infinity to stop
+    /// at once.
     #[inline(always)]
     pub(crate) fn traverse<T: Tally>(
         &self,

@@ -22,9 +22,9 @@ struct CellSpan {
     more: u32,
 }
 
-/// Bits of the number of more cells on an axis; those of y stand above those of x, z's above these.
+/// Bits of `more` for each axis: x in the lowest, then y, then z.
 pub(super) const MORE_BITS: u32 = 10;
-/// The most of them.
+/// The most additional cells on an axis.
 pub(super) const MOST_MORE: u32 = (1 << MORE_BITS) - 1;
 
 /// One more cell on an axis, or on some.
@@ -58,7 +58,7 @@ pub(crate) struct PlacedBatch {
     pub(super) is_placed: u64,
 }
 
-/// Progress is told at some places, all of which are a batch's first.
+/// Progress is reported only at the first place of a batch.
 const _: () = assert!(OFTEN.is_multiple_of(PlacedBatch::SIZE));
 
 impl PlacedBatch {
@@ -76,8 +76,8 @@ impl PlacedBatch {
         }
     }
 
-    /// Goes over all batches of primitives, from the first or from the last on, until `visit` had
-    /// enough, and tells whether it had.
+    /// Places all batches of primitives, from the first or from the last on, until `visit` returns false; returns
+    /// false then.
     #[inline(always)]
     pub(super) fn each<const REVERSE: bool>(
         spread: &dyn Spread,

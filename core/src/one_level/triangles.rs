@@ -45,7 +45,7 @@ impl Spread for MeshSpread<'_> {
 
     fn place(&self, places: Range<u32>, batch: &mut PlacedBatch) {
         let (wide, first) = (self.wide, places.start);
-        // Of joined meshes the part of the first triangle: others are placed one by one.
+        // In a joined mesh, read the part of the first triangle; triangles of others are placed one by one.
         let (wide, first) = if self.mesh.parts().is_empty() {
             (wide, first)
         } else {
@@ -63,7 +63,7 @@ impl Spread for MeshSpread<'_> {
 struct PlaceBatch<'f, 'm> {
     spread: &'f MeshSpread<'m>,
     wide: WideMesh<'m>,
-    /// The first triangle, as `wide` calls it.
+    /// The first triangle, in the numbers of `wide`.
     first: u32,
     batch: &'f mut PlacedBatch,
 }

@@ -116,8 +116,8 @@ impl OneLevel<'_> {
         Ok(())
     }
 
-    /// The primitives of a cell if they are as they must be: some, ascending, each covering it.
-    /// Else the list that is not, if there is one.
+    /// The list of a cell if it is right: not empty, ascending, each primitive covering the cell. Else the wrong
+    /// list, if there is one.
     fn list(
         &self,
         lattice: &Lattice,
@@ -162,7 +162,7 @@ pub(crate) fn slots_are_sound(
     sum == 0
 }
 
-/// A number whose sums do not meet by chance (the finisher of `SplitMix`).
+/// Scrambles a number so that sums do not agree by chance (the finisher of `SplitMix`).
 const fn scramble(slot: u64) -> u64 {
     let z = (slot ^ (slot >> 30)).wrapping_add(1).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

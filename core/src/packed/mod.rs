@@ -128,8 +128,8 @@ impl<'a> Grid<'a> {
         packed.map_or(0, |sections| sections.end)
     }
 
-    /// Writes grid and mesh as one blob, which [`open_packed`](Self::open_packed) needs nothing
-    /// else for, and returns the bytes of `to` that it takes.
+    /// Writes grid and mesh as one blob for [`open_packed`](Self::open_packed), and returns the bytes of `to` that it
+    /// takes.
     ///
     /// Of a joined mesh ([`TriangleMesh::join`]) the blob holds one mesh with the same triangles and numbers,
     /// and [`TriangleMesh::locate`] still tells which part a triangle is of.
@@ -260,7 +260,7 @@ impl<'a> Grid<'a> {
     fn packed_header(&self) -> Result<Header, Error> {
         let has_mesh = if self.mesh().has_masks() { HasMesh::WithMasks } else { HasMesh::Yes };
         let parts = self.mesh().parts().len().max(self.mesh().numbering().len());
-        // No more than fit: joined parts are counted, and others come from a header.
+        // The number fits: `join` limits it, and others come from a header.
         let parts = u32::try_from(parts).unwrap_or(0);
         Ok(Header::read(self.blob(), self.mesh())?.packed(has_mesh, parts))
     }

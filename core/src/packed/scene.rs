@@ -1,4 +1,4 @@
-//! A scene and all that it shows in one blob, for those who have nothing else.
+//! A scene and all that it shows in one blob, which opens without anything else.
 //!
 //! ```text
 //! 0        128                                                              blob_bytes
@@ -6,8 +6,8 @@
 //!            4 each           a packed grid, or a nested scene
 //! ```
 //!
-//! A member is stored once, however many scenes show it. Members stand in front of the scenes that show them, so there
-//! are no cycles. The references are the numbers of the members that the objects of each scene are, scene after scene.
+//! A member is stored once, however many scenes show it. Members stand in front of the scenes that show them, so
+//! there are no cycles. The references are the members' numbers for the objects of each scene, scene after scene.
 //! Blobs are those that were built: [`Grid::pack`] and [`Scene::blob`] write them.
 //!
 //! There is no allocation: to open one, the caller lends room for the views of the members and for the arrays of
@@ -77,7 +77,7 @@ impl<'a> Scene<'a> {
         self.objects().get(..self.object_count as usize).unwrap_or(self.objects())
     }
 
-    /// Shows all objects of this scene and of those inside it, what a scene shows before the scene.
+    /// Shows all objects of this scene and of scenes inside it; the objects of a scene come before the scene.
     fn each_object(&self, show: &mut dyn FnMut(&Object<'a>) -> ControlFlow<()>) -> ControlFlow<()> {
         for object in self.named() {
             if let Object::Scene(inner) = object {
@@ -149,8 +149,8 @@ impl<'a> Scene<'a> {
         self.plan().map_or(0, |plan| plan.end)
     }
 
-    /// Writes the scene and all grids, meshes and scenes that it shows as one blob, which
-    /// [`open_packed`](Self::open_packed) needs nothing else for, and returns the bytes of `to` that it takes.
+    /// Writes the scene and all grids, meshes and scenes that it shows as one blob for
+    /// [`open_packed`](Self::open_packed), and returns the bytes of `to` that it takes.
     ///
     /// A grid or scene is stored once, however often it is shown: the same address is the same grid.
     ///
@@ -192,7 +192,7 @@ impl<'a> Scene<'a> {
         let start = usize::try_from(start).unwrap_or(usize::MAX);
         let (head, mut rest) = to.split_at_mut_checked(start).ok_or(too_small)?;
 
-        // Where the members come, list their keys first: the number of a member is the place of its key.
+        // List the keys in the place of the members first: the number of a member is the place of its key.
         let (keys, _) = rest.as_chunks_mut::<8>();
         let mut free = keys.iter_mut();
         self.each_member(&mut |object| {

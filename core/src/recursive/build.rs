@@ -9,9 +9,9 @@
 //! cell becomes a grid, whose own lists stack up behind. When the pool runs out the build goes on
 //! and counts: at the end it knows, exactly, what index it would have needed.
 //!
-//! Nested detail, fans and slabs would make grids look at cells without end: each triangle lies in many cells
-//! of each grid. So a build may look at [`LOOKS`] cells for each triangle, and a grid at a share of what is
-//! left as large as its share of the references. A cell whose grid would take more stays a list.
+//! Nested detail, fans and slabs would make grids look at cells without end: each triangle lies in many cells of each
+//! grid. So a build may look at [`LOOKS`] cells for each triangle. A grid gets a share of those that are left, as
+//! large as its share of the references. A cell whose grid would take more stays a list.
 //!
 //! Resolution as in Manta: with n primitives at depth d of D, `m = (8 n)^(1 / (2 D + 1 - 2 d))` and
 //! `m * size / cbrt(volume)` cells on each axis, rounded; at least 8 cells.
@@ -36,7 +36,7 @@ use crate::survey::{Survey, boxes, reference_limit};
 
 /// Cells that grids below the root may look at for each triangle: several times what scans take.
 const LOOKS: u64 = 512;
-/// The same for a mesh of a few triangles, in all.
+/// Added to them, for meshes of a few triangles.
 const LEAST_LOOKS: u64 = 65_536;
 
 /// Cells that all grids below the root together may look at.
@@ -190,7 +190,7 @@ fn run(
     }
     let (scratch, _) = split_mut::<u32>(scratch, needed_bytes / 4).ok_or(too_small)?;
 
-    // An index that is too small is legal, and the sizes have none: the pool counts.
+    // An index that is too small or missing is legal: the pool only counts then.
     let (header, pool) = index.split_at_mut_checked(HEADER_BYTES).unwrap_or_default();
     // Clear the header first: if the build ends with an error, the region must not open as a grid.
     header.fill(0);
@@ -359,10 +359,10 @@ impl PlacedTriangle {
     }
 }
 
-/// The error for a grid that its scratch does not hold: nothing is left out in silence.
+/// The error for a grid that does not fit into its scratch.
 const TOO_FINE: Error = Error::InvalidConfig(ConfigField::Density);
 
-/// A build on its way.
+/// The state of a build.
 struct Builder<'m, 'p> {
     mesh: &'m TriangleMesh<'m>,
     lattice: &'m Lattice,
@@ -379,10 +379,10 @@ impl Builder<'_, '_> {
 
     /// Puts a grid of these primitives in this box into the pool, and all grids in it.
     ///
-    /// Answers `false`, and puts nothing, where a grid separates too little: if the lists of its
-    /// cells hold on average more than three quarters of the primitives, as in a pile of equal
-    /// triangles. Likewise where it would look at more than `looks` cells, of which it takes those that
-    /// it looks at. The root is always put.
+    /// Answers `false`, and puts nothing, where a grid separates too little: if the lists of its cells hold on
+    /// average more than three quarters of the primitives, as in a pile of equal triangles. Likewise where it would
+    /// look at more than `looks` cells. It subtracts the cells that it looked at from `looks`. The root is always
+    /// put.
     fn grid(
         &mut self,
         ids: &[u32],
@@ -476,8 +476,8 @@ impl Builder<'_, '_> {
 
     /// Chooses the resolution of a grid, and counts the references of each cell where their starts will be.
     ///
-    /// Returns the grid, its references and the cells that its triangles look at; `None` if those are
-    /// more than `looks`, of which it takes what it looked at.
+    /// Returns the grid, its references and the cells that its triangles look at; `None` if those are more than
+    /// `looks`. It subtracts what it looked at from `looks`.
     fn settle(
         &self,
         ids: &[u32],
@@ -488,7 +488,7 @@ impl Builder<'_, '_> {
     ) -> Result<Option<(Node, u64, u64)>, Error> {
         let count = u32::try_from(ids.len()).unwrap_or(u32::MAX);
         let at = self.pool.offset()?;
-        // Count the references of each cell, in coarser grids if they get out of hand.
+        // Count the references of each cell, in coarser grids while there are too many.
         let mut primitives = count;
         loop {
             let resolution = if depth == 0 {
@@ -507,7 +507,7 @@ impl Builder<'_, '_> {
             starts.fill(0);
             let limit = u64::from(reference_limit(count));
             let (mut references, mut looked) = (0_u64, 0_u64);
-            // The cells once, those that triangles look at twice: to count and to fill.
+            // A grid looks at its cells once, and at those of its triangles twice: to count and to fill.
             let most =
                 if depth == 0 { u64::MAX } else { looks.saturating_sub(node.cells() as u64) / 2 };
             for placed in ids.iter().filter_map(|&id| self.place(id)) {

@@ -57,12 +57,12 @@ impl<'a> Recursive<'a> {
         Ok(Self { pool })
     }
 
-    /// No ray is shown more primitives than this.
+    /// The most primitives that a ray is shown.
     pub(crate) const fn list_words(&self) -> usize {
         self.pool.len()
     }
 
-    /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.
+    /// Shows the lists of all cells that a box, given in cells, meets; `false` if the visitor's budget is used up.
     pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
         Node::open(self.pool, 0)
             .is_none_or(|root| self.visit_node(&root, reach, MAX_DEPTH, visitor))
@@ -117,8 +117,8 @@ impl<'a> Recursive<'a> {
                     }
                 }
             }
-            // Take a step; where a grid or the ray ends, take it in the grid around it. A grid reaches
-            // by the margin beyond its cell: what ends there may not end in the cell around it.
+            // Take a step; where a grid or the ray ends, take it in the grid around it. A grid reaches beyond its
+            // cell by the margin, so a ray that ends in it may go on in the cell around it.
             loop {
                 match walk.advance(limit) {
                     Step::Inside => break,

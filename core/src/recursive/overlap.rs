@@ -1,8 +1,7 @@
 //! Exact triangle-box overlap: the thirteen separating axes of Akenine-Möller (2001).
 //!
-//! In the coordinates of the root's cells, in which every length is of the order of
-//! one whatever the scene's scale; a box may be cut and scaled along the axes
-//! without changing what overlaps what.
+//! Coordinates are in the root's cells, so that lengths are of the order of one at any scale of the scene. Scaling
+//! the axes does not change which triangles overlap which boxes.
 
 use glam::Vec3A;
 
@@ -29,12 +28,13 @@ impl Overlap {
     pub(super) fn with(&self, center: Vec3A, half: Vec3A) -> bool {
         let [a, b, c] = self.corners.map(|corner| corner - center);
 
-        // The plane must pass the box.
+        // The plane must cut the box.
         let slack = self.slack * a.abs().max_element();
         if self.normal.dot(a).abs() > half.dot(self.normal.abs()) + slack {
             return false;
         }
-        // No axis across an edge of each may separate them: x, y and z of e.cross(unit) at once.
+        // No axis across an edge of the triangle and one of the box may separate them: x, y and z of e.cross(unit) at
+        // once.
         self.edges.iter().all(|&edge| {
             let [p, q, r] = [a, b, c].map(|corner| corner.cross(edge));
             let (min, max) = (p.min(q).min(r), p.max(q).max(r));

@@ -1,13 +1,12 @@
 //! Proof that a foreign blob is a recursive grid of its mesh.
 //!
-//! Grid by grid from the root: each cell's part of the pool starts where the part before it ends,
-//! so everything is read once. Every listed triangle overlaps its cell and the cells around that,
-//! and no list has it twice; so there are as many of them as the triangles have cells if and only
-//! if none is missing: one sum against another. A grid in a cell has the box and the resolution
-//! that a build gives to the triangles in it, and so many of them that it was worth it.
+//! Grid by grid from the root: each cell's part of the pool starts where the part before it ends, so everything is
+//! read once. Every listed triangle overlaps its cell and the cells around that, and no list has it twice; so there
+//! are as many of them as the triangles have cells if and only if none is missing: one sum against another. A grid in
+//! a cell has the box and the resolution that a build gives to the triangles in it, and separates them well enough.
 //!
-//! It would take memory to prove that a list is long because nothing would separate its triangles:
-//! a list may have any length. Queries do not mind.
+//! It would take memory to prove that a list is long because no grid would separate its triangles. So a list may have
+//! any length, which changes no answer.
 
 use super::build::{Fineness, PlacedTriangle, inside};
 use super::node::{CellContent, HEAD_WORDS, Node};
@@ -36,7 +35,7 @@ struct Check<'a> {
     cursor: usize,
     /// The cells around the list that is read, from the root on.
     places: [Option<CellOfGrid>; LEVELS],
-    /// For each of them the triangles in its grid, and what they reach.
+    /// For each of them the triangles in its grid.
     contents: [Contents; LEVELS],
     /// Ids in all lists.
     listed: u64,
@@ -154,7 +153,7 @@ impl Check<'_> {
             contents.references += references;
             contents.lists += u64::from(references > 0);
         }
-        // The end is an offset and nothing else.
+        // The last entry is the end, without the bit of a grid.
         let end = self.pool.get(at + HEAD_WORDS + node.cells());
         if end.is_none_or(|&end| end as usize != self.cursor) {
             return Err(wrong);
@@ -199,7 +198,7 @@ impl Check<'_> {
         if !is_worth_it {
             return false;
         }
-        // It is the finest of the grids that have not too many references.
+        // The grid must be the finest that has not too many references.
         let limit = u64::from(reference_limit(count));
         let tries = core::iter::successors(Some(count), |&n| (n > 0).then_some(n / 2));
         for primitives in tries {

@@ -1,8 +1,8 @@
 //! Many rays at once in a scene: [`Grid::intersect_n`](crate::Grid::intersect_n) and its like for scenes.
 //!
-//! A batch answers each ray as [`Scene::intersect`] or [`Scene::occluded`] would, bit for bit. Rays go together through the
-//! tree of the scene and through the trees of its objects ([`groups`](super::groups)). With a filter or counters each ray
-//! is traced alone, in the order of the rays.
+//! A batch answers each ray as [`Scene::intersect`] or [`Scene::occluded`] would, bit for bit. Rays go together
+//! through the tree of the scene and through the trees of its objects ([`groups`](super::groups)). With a filter or
+//! counters each ray is traced alone, in the order of the rays.
 
 use super::Scene;
 use super::query::{SceneHit, SceneOptions};
@@ -39,8 +39,8 @@ impl SceneAnswer for bool {
 }
 
 impl Scene<'_> {
-    /// The closest hit of each ray, an array of [`RayF64`]; [`SceneHit::MISS`] where there is none. The options are for all
-    /// rays.
+    /// The closest hit of each ray, an array of [`RayF64`]; [`SceneHit::MISS`] where there is none. The options are
+    /// for all rays.
     ///
     /// # Errors
     /// [`Error::InvalidBatch`] if a stride is below its element, an array ends before its last

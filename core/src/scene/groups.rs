@@ -40,13 +40,13 @@ pub(super) fn trace<A: SceneAnswer, B: Batch<A, RayF64>>(
     let rays = &mut SceneRays::new(scene, Question::new(options, A::IS_ANY));
     // All instances: `shown` leaves out those that the mask does not see.
     let asked = (QueryOptions::default().choice(), false);
-    let batch = &mut Asked { scene, batch, options, answers: PhantomData::<A>, rays };
+    let batch = &mut SceneBatch { scene, batch, options, answers: PhantomData::<A>, rays };
     in_groups(&scene.tree, tree, asked, coherence, lent, batch);
     options.scratch = lent;
 }
 
 /// A batch with its scene and its options.
-struct Asked<'r, 's, 'q, B, A> {
+struct SceneBatch<'r, 's, 'q, B, A> {
     scene: &'r Scene<'s>,
     batch: &'r mut B,
     options: &'r mut SceneOptions<'q>,
@@ -54,7 +54,7 @@ struct Asked<'r, 's, 'q, B, A> {
     rays: &'r mut SceneRays<'s>,
 }
 
-impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for Asked<'_, '_, '_, B, A> {
+impl<A: SceneAnswer, B: Batch<A, RayF64>> Together for SceneBatch<'_, '_, '_, B, A> {
     fn count(&self) -> usize {
         self.batch.count()
     }

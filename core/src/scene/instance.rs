@@ -37,7 +37,7 @@ pub struct Instance {
     pub object: u32,
     /// Position of the object's origin in the scene.
     pub translation: [f64; 3],
-    /// Seen by queries whose mask has a bit of it.
+    /// Queries see the instance if their mask and this have a bit in common.
     pub mask: u32,
     /// The caller's own, not read.
     pub id: u32,
@@ -147,7 +147,7 @@ impl StoredInstance {
         sides.iter().all(|side| side.abs() <= MAX_COORDINATE).then_some(sides)
     }
 
-    /// A direction that is across the object, as a normal, in the scene.
+    /// A normal of the object in the scene, of any length.
     pub(super) fn normal(&self, normal: DVec3) -> DVec3 {
         let [a, b, c] = self.inverse();
         let along = |axis: usize| normal.dot(DVec3::new(a[axis], b[axis], c[axis]));
@@ -232,8 +232,8 @@ impl Seen {
         })
     }
 
-    /// The ray in f32 for an object with this box, up to a `t` of the scene's ray: from near the box. `None` if it passes
-    /// the box.
+    /// The ray in f32 for an object with this box, up to a `t` of the scene's ray: from near the box. `None` if it
+    /// passes the box.
     pub(super) fn narrow(
         &mut self,
         ray: &RayF64,
@@ -258,7 +258,7 @@ impl Seen {
         })
     }
 
-    /// Returns true if the ray was brought to this box from so far away that rounding may have put its origin behind a
+    /// Returns true if the ray comes to this box from so far away that rounding may have put its new origin behind a
     /// surface. Hits may have a negative `t` then.
     pub(super) fn is_from_afar(&self, (min, max): &([f32; 3], [f32; 3])) -> bool {
         let size = |axis: usize| f64::from(max[axis]) - f64::from(min[axis]);
@@ -289,7 +289,7 @@ impl Seen {
         round(f64::from(t) * self.scale - self.shift)
     }
 
-    /// A `t` of the object's ray that is no nearer than all that stand for this one of the scene's ray.
+    /// A `t` of the object's ray that is no nearer than any that rounds to this one of the scene's ray.
     fn limit(&self, t: f32) -> f32 {
         round(f64::from(t.next_up()) * self.scale - self.shift).next_up()
     }

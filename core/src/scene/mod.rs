@@ -6,8 +6,8 @@
 //!         and move the `t` of what is hit back
 //! ```
 //!
-//! The tree is that of [`Shapes`](crate::Shapes): to it, instances are shapes. Objects are named by number and bound when
-//! a scene is opened, so the blob can be moved as every other. An instance keeps the inverse of its matrix
+//! The tree is that of [`Shapes`](crate::Shapes): to it, instances are shapes. Objects are named by number and bound
+//! when a scene is opened, so the blob can be moved like any other. An instance keeps the inverse of its matrix
 //! ([`instance`]).
 
 mod batch;
@@ -37,8 +37,8 @@ pub use surface::SceneSurface;
 /// Tests the shapes of an object in a scene, from any number of threads at once. Every function like a
 /// [`ShapeTest`](crate::ShapeTest) that needs no `&mut` is one.
 pub trait ObjectTest: Sync {
-    /// Returns the hit of a ray on a shape, if there is one. The ray is the one that the object sees: in the
-    /// object's space, with a direction and a range of its own, for which the answer is, too.
+    /// Returns the hit of a ray on a shape, if there is one. The ray is in the object's space, with a direction and a
+    /// range of its own. The `t` of the hit is along this ray.
     fn test(&self, shape: u32, ray: &Ray) -> Option<ShapeHit>;
 }
 
@@ -163,8 +163,8 @@ struct Table {
 const _: () = assert!(size_of::<Table>() == 64);
 
 impl<'a> Scene<'a> {
-    /// The same scene with a tree whose queries use no more than these instructions: the same hits, slower. Objects keep
-    /// their own.
+    /// The same scene with queries of its tree limited to these instructions: the same hits, slower. Objects keep
+    /// their own level.
     #[must_use]
     pub const fn with_simd(self, simd: SimdLevel) -> Self {
         Self { tree: self.tree.with_simd(simd), ..self }
@@ -216,7 +216,8 @@ impl<'a> Scene<'a> {
         None
     }
 
-    /// The instance that shows the object that a hit names, the innermost one, as [`instance`](Self::instance) gives it.
+    /// The instance that shows the object that a hit names, the innermost one, as [`instance`](Self::instance) gives
+    /// it.
     #[must_use]
     pub fn instance_of(&self, hit: &SceneHit) -> Option<Instance> {
         self.place(hit)?.instances().next_back()?.instance()
@@ -236,8 +237,8 @@ impl<'a> Scene<'a> {
         Some(self.place(hit)?.normal(normal)?.to_array().map(round))
     }
 
-    /// The normal of the triangle that was hit, of length 1, in the scene's space, on the side that the triangle has
-    /// as its front in its mesh. `None` if the hit names no triangle or it has no area.
+    /// The normal of the triangle that was hit, of length 1, in the scene's space, on the side that is the front in
+    /// the triangle's mesh. `None` if the hit names no triangle or it has no area.
     #[must_use]
     pub fn triangle_normal(&self, hit: &SceneHit) -> Option<[f32; 3]> {
         let Object::Grid(grid) = self.object_of(hit)? else { return None };

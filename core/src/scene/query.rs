@@ -48,7 +48,8 @@ impl SceneHit {
         path: [INVALID_ID; MAX_NESTING],
     };
 
-    /// Returns true if this hit is reported rather than the other: smaller `t`, then the smaller path, then the smaller id.
+    /// Returns true if this hit is reported rather than the other: smaller `t`, then the smaller path, then the
+    /// smaller id.
     #[must_use]
     pub fn is_closer(&self, other: &Self) -> bool {
         self.t < other.t
@@ -56,7 +57,7 @@ impl SceneHit {
     }
 }
 
-/// Says of a hit whether it counts: gets the place of the ray in its batch, 0 for a single one, and the hit.
+/// Decides whether a hit counts. Gets the number of the ray in its batch, 0 for a single ray, and the hit.
 pub type SceneFilter<'q> = dyn FnMut(usize, &SceneHit) -> Verdict + 'q;
 
 /// The options of a query of a scene. `SceneOptions::default()` changes nothing.
@@ -67,10 +68,10 @@ pub struct SceneOptions<'q> {
     /// The sides of triangles that are not hit. The front is decided in the space of the triangle's own mesh: an
     /// instance that mirrors does not turn it round.
     pub cull: Cull,
-    /// Says of a hit whether it counts. Within an instance it is asked from near to far and about each triangle at most
+    /// Decides whether a hit counts. Within an instance it is asked from near to far and about each triangle at most
     /// once; instances come about from near to far, so a hit that it accepts may still be replaced by a closer one of
-    /// another instance. [`Verdict::AcceptAndStop`] is the same as [`Verdict::Accept`]. Shapes are not shown to it: their
-    /// test decides.
+    /// another instance. [`Verdict::AcceptAndStop`] is the same as [`Verdict::Accept`]. Shapes are not shown to it:
+    /// their test decides.
     pub filter: Option<&'q mut SceneFilter<'q>>,
     /// Counters that add up the work: an instance that is offered is a primitive test. With counters or a filter, the
     /// rays of a batch are traced one by one.
@@ -152,7 +153,7 @@ impl Scene<'_> {
         let question = Question::new(options, is_any);
         let counters = options.counters.as_deref_mut();
         let mut show;
-        let filter: Option<&mut Shown<'_>> = match &mut options.filter {
+        let filter: Option<&mut HitFilter<'_>> = match &mut options.filter {
             Some(filter) => {
                 show = |hit: &SceneHit| filter(place, hit);
                 Some(&mut show)
@@ -186,7 +187,7 @@ impl Scene<'_> {
         limit: f32,
         level: usize,
         question: &Question,
-        filter: Option<&mut Shown<'_>>,
+        filter: Option<&mut HitFilter<'_>>,
         counters: Option<&mut Counters>,
     ) -> Option<SceneHit> {
         if level >= MAX_NESTING {
@@ -240,8 +241,8 @@ impl Question {
     }
 }
 
-/// A filter of one ray.
-pub(super) type Shown<'f> = dyn FnMut(&SceneHit) -> Verdict + 'f;
+/// The filter of one ray: it gets no place in a batch.
+pub(super) type HitFilter<'f> = dyn FnMut(&SceneHit) -> Verdict + 'f;
 
 /// The search over the instances whose boxes a ray meets.
 pub(super) struct InstanceSearch<'q, 'f> {
@@ -253,7 +254,7 @@ pub(super) struct InstanceSearch<'q, 'f> {
     pub(super) best: Option<SceneHit>,
     /// Nothing farther matters.
     pub(super) limit: f32,
-    pub(super) filter: Option<&'q mut Shown<'f>>,
+    pub(super) filter: Option<&'q mut HitFilter<'f>>,
     pub(super) counters: Option<&'q mut Counters>,
 }
 
@@ -285,7 +286,7 @@ impl InstanceSearch<'_, '_> {
                 hit
             };
             let mut show;
-            let filter: Option<&mut Shown<'_>> = match &mut self.filter {
+            let filter: Option<&mut HitFilter<'_>> = match &mut self.filter {
                 Some(filter) => {
                     show = |hit: &SceneHit| filter(&outward(hit));
                     Some(&mut show)
@@ -312,7 +313,7 @@ impl InstanceSearch<'_, '_> {
     }
 }
 
-/// Returns the closest hit of a ray in a grid or in shapes; if `is_any` is true, a hit that only says that there is one.
+/// Returns the closest hit of a ray in a grid or in shapes; with `is_any`, a hit that says only that there is one.
 pub(super) fn ask_object(
     object: &Object<'_>,
     ray: &Ray,

@@ -86,7 +86,7 @@ fn fill<'t>(
     boxes_of(sides, places)
 }
 
-/// Scenes inside one another, with one around the objects.
+/// The levels of a scene over these objects.
 fn levels_over(objects: &[Object<'_>]) -> Result<usize, Error> {
     let levels = 1 + objects.iter().map(Object::levels).max().unwrap_or(0);
     if levels > MAX_NESTING { Err(Error::TooDeep) } else { Ok(levels) }
@@ -121,10 +121,10 @@ impl<'a> Scene<'a> {
     /// The instances are copied; the objects are not, and are read at every query.
     ///
     /// # Errors
-    /// [`Error::InstanceWithoutObject`] and [`Error::InstanceWithoutInverse`] name the instance;
-    /// [`Error::TooDeep`] for more than [`MAX_NESTING`] scenes inside one another; [`Error::OutOfMemory`],
-    /// [`Error::Misaligned`], [`Error::TooManyTriangles`] for more instances than ids, and [`Error::InvalidConfig`] if the
-    /// method is not [`Method::Bvh`](crate::Method::Bvh). After an error the index holds nothing of use.
+    /// [`Error::InstanceWithoutObject`] and [`Error::InstanceWithoutInverse`] name the instance; [`Error::TooDeep`]
+    /// for more than [`MAX_NESTING`] scenes inside one another; [`Error::OutOfMemory`], [`Error::Misaligned`],
+    /// [`Error::TooManyTriangles`] for more instances than ids, and [`Error::InvalidConfig`] if the method is not
+    /// [`Method::Bvh`](crate::Method::Bvh). After an error the index holds nothing of use.
     pub fn build(
         instances: &[Instance],
         objects: &'a [Object<'a>],
@@ -158,7 +158,7 @@ impl<'a> Scene<'a> {
         // Put boxes and instances at the end of the index, and the tree at its start.
         let space = usize::try_from(behind).ok();
         let room = (index.len() & !(ALIGNMENT - 1)).checked_sub(space.unwrap_or(usize::MAX));
-        // How large the tree gets shows only while it is built: ask for what is always enough.
+        // The size of the tree is known only once it is built: ask for the bound.
         let most = Self::bound(count, config).map_or(u64::MAX, |sizes| sizes.index_bytes as u64);
         let room = room.ok_or(short(most.saturating_sub(behind)))?;
         let (head, tail) = index.split_at_mut_checked(room).ok_or(short(0))?;
@@ -180,8 +180,8 @@ impl<'a> Scene<'a> {
     /// Opens a scene that was built earlier or elsewhere; bytes behind it are ignored. O(1), but for a look at each
     /// object.
     ///
-    /// The objects must be those that it was built with, in their order. What is not checked is not trusted: on
-    /// damaged bytes, or with other objects, queries may answer wrongly, but they stay inside the blob and end.
+    /// The objects must be those that it was built with, in their order. On damaged bytes, or with other objects,
+    /// queries may answer wrongly, but they stay inside the blob and end.
     ///
     /// # Errors
     /// [`Error::MissingObjects`] if instances name more objects than there are; [`Error::TooDeep`];
@@ -275,8 +275,8 @@ impl<'a> Scene<'a> {
         self.tree.validate_bytes()
     }
 
-    /// Gives a built scene the instances of another moment: in place, O(n), without scratch. Their number is
-    /// that of the build. [`refit`](crate::refit) says when to build anew; [`open`](Self::open) the scene again afterwards.
+    /// Gives a built scene instances that moved: in place, O(n), without scratch. Their number is that of the build.
+    /// [`refit`](crate::refit) says when to build anew; [`open`](Self::open) the scene again afterwards.
     ///
     /// # Errors
     /// [`Error::MeshMismatch`] for another number of instances; those of [`open`](Self::open), after which the

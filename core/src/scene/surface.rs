@@ -43,11 +43,11 @@ impl Scene<'_> {
     /// sides of the triangle apart: f64 at this distance from the scene's origin, or f32 in the object.
     ///
     /// A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the
-    /// other side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the plane,
-    /// as the object sees them, may hit it, because normal and direction are rounded. A start is lifted as in a mesh, or
-    /// by up to four times the rounding error of its transformation, if that is more. Do not round a start to f32: it may
-    /// lie below the plane then. What [`TriangleMesh::surface`](crate::TriangleMesh::surface) says about triangles
-    /// without area holds here, too.
+    /// other side: with `t_min` 0, at any place in the scene, in single queries and batches. Rays nearly along the
+    /// plane, as the object sees them, may hit it, because normal and direction are rounded. A start is lifted as in
+    /// a mesh, or by up to four times the rounding error of its transformation, if that is more. Do not round a start
+    /// to f32: it may lie below the plane then. What [`TriangleMesh::surface`](crate::TriangleMesh::surface) says
+    /// about triangles without area holds here, too.
     ///
     /// ```
     #[doc = include_str!("../../doc/scene.txt")]
@@ -92,7 +92,7 @@ impl Place<'_> {
 
     /// A normal of the object in the scene, of length 1.
     pub(super) fn normal(&self, normal: DVec3) -> Option<DVec3> {
-        // Of length 1 on the way, or scales would add up.
+        // Normalize at each instance: scales would multiply.
         let turned = |normal, instance: &StoredInstance| instance.normal(normal).try_normalize();
         self.instances().rev().try_fold(normal, turned)
     }
@@ -100,7 +100,7 @@ impl Place<'_> {
     /// The start on a side of a facet, 1 above and -1 below.
     fn start(&self, facet: &Facet, side: f64, extent: f64) -> Option<DVec3> {
         let mut lift = facet.lift;
-        // A lift beyond the object would be none: give up.
+        // A lift larger than the object is of no use: give up.
         while lift <= extent {
             let wanted = facet.point + facet.normal * (side * lift);
             let start = self.outward(wanted)?;

@@ -1,7 +1,7 @@
 //! Many rays at once against shapes: [`Grid::intersect_n`](crate::Grid::intersect_n) and its like for shapes.
 //!
-//! A batch answers each ray as [`Shapes::intersect`] or [`Shapes::occluded`] would, bit for bit. Rays go through the tree
-//! together ([`groups`](super::groups)); with counters each is traced alone.
+//! A batch answers each ray as [`Shapes::intersect`] or [`Shapes::occluded`] would, bit for bit. Rays go through the
+//! tree together ([`groups`](super::groups)); with counters each is traced alone.
 
 use super::{ShapeTest, Shapes};
 use crate::batch::{Arrays, Batch, Coherence, HitAnswer, StridedMut};

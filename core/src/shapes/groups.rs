@@ -27,13 +27,13 @@ pub(super) fn trace<A: HitAnswer, B: Batch<A>>(
 ) {
     let lent = core::mem::take(&mut options.scratch);
     let asked = (QueryOptions::default().choice(), A::IS_ANY);
-    let batch = &mut Asked { shapes, batch, options, test, answers: PhantomData::<A> };
+    let batch = &mut ShapesBatch { shapes, batch, options, test, answers: PhantomData::<A> };
     in_groups(&shapes.grid, bvh, asked, coherence, lent, batch);
     options.scratch = lent;
 }
 
 /// A batch with its shapes and their test.
-struct Asked<'r, 'q, 't, B, A> {
+struct ShapesBatch<'r, 'q, 't, B, A> {
     shapes: &'r Shapes<'r>,
     batch: &'r mut B,
     options: &'r mut QueryOptions<'q>,
@@ -41,7 +41,7 @@ struct Asked<'r, 'q, 't, B, A> {
     answers: PhantomData<A>,
 }
 
-impl<A: HitAnswer, B: Batch<A>> Together for Asked<'_, '_, '_, B, A> {
+impl<A: HitAnswer, B: Batch<A>> Together for ShapesBatch<'_, '_, '_, B, A> {
     fn count(&self) -> usize {
         self.batch.count()
     }

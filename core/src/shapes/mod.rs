@@ -105,9 +105,9 @@ pub struct ShapeHit {
 /// Tests a shape: gets its number and the ray with the range that is left, `t_max` being that of the closest
 /// hit so far; answers where the ray hits it, if it does.
 ///
-/// An answer outside the range, or NaN, is no hit. The test may be asked about a shape that the ray does not
-/// meet; it is asked about each shape at most once for a ray, about from near to far, but not exactly. It may
-/// query this tree and others. Of the rays of a batch it is asked in turns.
+/// An answer outside the range, or NaN, is no hit. The test may be asked about a shape that the ray does not meet; it
+/// is asked about each shape at most once for a ray, about from near to far, but not exactly. It may query this tree
+/// and others. In a batch, calls for different rays alternate.
 ///
 /// All queries find the same hits if every hit lies inside the box of its shape, rounding included, and if the answer
 /// depends on the range in no other way.
@@ -280,8 +280,8 @@ impl<'a> Shapes<'a> {
         self.occluded_with(ray, &mut QueryOptions::default(), test)
     }
 
-    /// [`intersect`](Self::intersect) with options: `mask` and `skip` are looked up before a shape is tested.
-    /// Sides to cull and a filter are the test's own business, and ignored.
+    /// [`intersect`](Self::intersect) with options: `mask` and `skip` are looked up before a shape is tested. `cull`
+    /// and `filter` are ignored: the test decides.
     pub fn intersect_with(
         &self,
         ray: &Ray,

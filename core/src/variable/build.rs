@@ -98,7 +98,7 @@ const fn scratch_bytes_of(layout: &Layout, triangles: u32, density: f32) -> u64 
         + Layout::bound(triangles, density, 0).scratch_bytes()
 }
 
-/// The same for a grid with this header.
+/// The scratch that the build of a grid with this header takes.
 pub(crate) const fn scratch_bytes(header: &Header) -> u64 {
     let Header { triangle_count, density, resolution, .. } = *header;
     let layout = Layout::new(resolution, 0, reference_limit(triangle_count), 0);
@@ -355,8 +355,8 @@ impl CellSpread<'_> {
 
         let [width, height, depth] = self.frame.resolution.map(|cells| cells as usize);
         let row_offsets = bench.row_offsets.get_mut(..height * depth).or_bug("too many rows")?;
-        // A few words more, if there are: the last ones are not read eight at a time. And no
-        // more, which first fit would clear.
+        // Take a few words more, if there are: the last ones are not read eight at a time. Take no more: first fit
+        // would clear them.
         let enough = cells.div_ceil(WORD_BITS) + 1;
         let words = bench.occupied.len().min(enough + 8).max(enough);
         let occupied = bench.occupied.get_mut(..words).or_bug("more slots than on the bench")?;

@@ -57,7 +57,7 @@ impl<'a> Variable<'a> {
         Ok(Self { top: OneLevel::open(header, lattice, blob)? })
     }
 
-    /// No ray is shown more primitives than this.
+    /// The most primitives that a ray is shown.
     pub(crate) const fn list_words(&self) -> usize {
         self.top.list_words()
     }
@@ -71,7 +71,7 @@ impl<'a> Variable<'a> {
         Some(if start & GRID == 0 { CellContent::List(words) } else { CellContent::Subgrid(words) })
     }
 
-    /// Shows the lists of all cells that a box meets, given in cells; `false` if that was enough.
+    /// Shows the lists of all cells that a box, given in cells, meets; `false` if the visitor's budget is used up.
     pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
         self.top.each_marked(reach, |cell| match self.content(cell) {
             Some(CellContent::List(ids)) => visitor.list(ids),
@@ -115,8 +115,8 @@ impl<'a> Variable<'a> {
                     }
                 }
             }
-            // Take a step; where the subgrid or the ray ends, take it around the subgrid. A subgrid
-            // reaches by the margin beyond its cell: what ends there may not end in the cell.
+            // Take a step; where the subgrid or the ray ends, take it around the subgrid. A subgrid reaches beyond
+            // its cell by the margin, so a ray that ends in it may go on in the cell.
             loop {
                 let step = match &inside {
                     Some(_) => walk.advance(limit),

@@ -44,7 +44,7 @@ impl Frame {
         self.resolution.iter().map(|&cells| cells as usize).product()
     }
 
-    /// The frame around what primitives reach of a cell, in cells; a resolution follows.
+    /// The frame around the part of a cell that primitives reach; [`cut`](Self::cut) sets its resolution.
     pub(super) fn around(reach: &Aabb, cell: [u32; 3]) -> Self {
         let corner = Vec3A::from_array(cell.map(as_f32));
         let part = |position: Vec3A| {
@@ -61,7 +61,8 @@ impl Frame {
         *self == Self { resolution: self.resolution, ..Self::around(reach, cell) }
     }
 
-    /// Woo's resolution for so many primitives in this box of a cell with this size.
+    /// Sets Woo's resolution for so many primitives in this box of a cell with this size; false if an axis would need
+    /// too many cells.
     pub(super) fn cut(&mut self, cell_size: Vec3A, density: f64, primitives: u32) -> bool {
         let size = cell_size * self.parts();
         match woo(size, density, primitives) {
@@ -175,7 +176,7 @@ impl<'a> Subgrid<'a> {
         Some(Self { frame, row_offsets, domain_bits, hash, references })
     }
 
-    /// The line of a ray in this subgrid and a walk along it, or `None` if the ray passes it.
+    /// A walk along a line through this subgrid, or `None` if the line passes it.
     #[inline]
     pub(super) fn walk(&self, line: &Line, around: &Walk) -> Option<Walk> {
         let (origin, scale) = self.frame.zoom(around.cell());
@@ -187,7 +188,8 @@ impl<'a> Subgrid<'a> {
     pub(super) fn visit(&self, around: [u32; 3], reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
         let range = self.frame.range(around, reach);
         range.cells().all(|cell| {
-            // A cell has a bit, not a word, but damaged bytes may have this subgrid in many cells.
+            // Spend a word for each row: cells here have bits, not words, and damaged bytes may have this subgrid in
+            // many cells.
             let is_paid = cell[0] != range.min[0] || visitor.spend(1);
             is_paid && self.references(cell).is_none_or(|ids| visitor.list(ids))
         })

@@ -1,18 +1,17 @@
 //! Proof that a foreign blob is a variable grid of its mesh.
 //!
-//! The same count as for one level, over the cells of the top and of the subgrids: every listed
-//! triangle covers the cell that lists it and none is listed twice, so there are as many of them
-//! as the triangles have cells if and only if none is missing. Only lists that a cell names are
-//! counted. A table may cut out more, and nobody would read it.
+//! The same count as for one level, over the cells of the top and of the subgrids: every listed triangle covers the
+//! cell that lists it and none is listed twice, so there are as many of them as the triangles have cells if and only
+//! if none is missing. Only lists that a cell names are counted. A table may hold further lists, which no query
+//! reads.
 //!
-//! The words of all cells together are the words of the pool, and those of a subgrid's lists the
-//! words behind its table. Queries rely on that: a query that was shown more words than the pool
-//! has stops, as damaged bytes could keep it busy for ever.
+//! The words of all cells together are the words of the pool, and those of a subgrid's lists the words behind its
+//! table. Queries rely on that: a query stops once it was shown more words than the pool has, so that it ends on
+//! damaged bytes.
 //!
-//! A subgrid has the frame and the resolution that a build gives to the primitives in it, and so
-//! many of them that it was worth it. It would take memory to prove that a list is long because nothing
-//! would separate its primitives, so a list may have any length. No answer depends on it:
-//! a query reads a list from its start to its end, however long it is.
+//! A subgrid has the frame and the resolution that a build gives to the primitives in it, and separates them well
+//! enough. It would take memory to prove that a list is long because nothing would separate its primitives, so a list
+//! may have any length. No answer depends on it: a query reads a list from its start to its end, however long it is.
 
 use super::subgrid::Subgrid;
 use super::{CellContent, Variable};
@@ -128,7 +127,7 @@ impl Variable<'_> {
     }
 }
 
-/// A subgrid where it lies.
+/// A subgrid and the cell that holds it.
 struct Inside<'a> {
     grid: Subgrid<'a>,
     cell: [u32; 3],

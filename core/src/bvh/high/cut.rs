@@ -15,7 +15,7 @@ use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 use crate::bvh::node::Sides;
 use crate::extremes::Extremes;
 
-/// A triangle in the making, as bits: the least corner of its box, its id, minus the greatest corner, 0.
+/// A triangle during a build, as bits: the least corner of its box, its id, the negated greatest corner, 0.
 pub(super) type TriangleItem = [u32; 8];
 
 /// Index of the id in an item.
@@ -57,7 +57,7 @@ pub(super) struct Bins {
     counts: [[u32; BINS]; 3],
 }
 
-/// The box of an item: without its id, which would be a number too small for fast arithmetic.
+/// The box of an item without its id, which may be a denormal number: these are slow.
 #[inline(always)]
 fn load<S: Simd>(simd: S, item: &TriangleItem) -> f32x8<S> {
     let word = u32::MAX;
@@ -75,7 +75,7 @@ fn center<S: Simd>(sides: f32x8<S>) -> f32x8<S> {
 /// Adding this rounds a small number to a whole one and leaves that in the low bits.
 const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 
-/// Half the surface of a box in units that suit the scene.
+/// Half the surface of a box whose lengths are multiplied by `unit`.
 #[inline(always)]
 pub(super) fn area<S: Simd>(simd: S, sides: f32x8<S>, unit: f32) -> f32 {
     let (low, high) = sides.split();
@@ -94,7 +94,7 @@ const fn as_cost(count: u32) -> f32 {
 struct BinScale {
     /// The least corner of the box of twice the centres.
     low: [f32; 3],
-    /// Bins for each unit; as large as can be where all centres have the same coordinate.
+    /// Bins for each unit of length; `f32::MAX` where all centres have the same coordinate.
     scale: [f32; 3],
     /// Bins of each axis.
     count: usize,
@@ -105,7 +105,7 @@ impl BinScale {
     fn new(items: usize, centers: &Sides) -> Self {
         let count = bin_count(items);
         let [x, y, z, _, nx, ny, nz, _] = *centers;
-        // No centre's place reaches the number of bins, with all rounding.
+        // Keep every place below the number of bins, in spite of rounding.
         #[expect(clippy::cast_precision_loss, reason = "a few")]
         let bins = count as f32 * 0.999;
         let [a, b, c] = [bins / -(x + nx), bins / -(y + ny), bins / -(z + nz)];
@@ -153,8 +153,8 @@ impl Bins {
         Self { boxes: [[NOTHING; BINS]; 3], counts: [[0; BINS]; 3] }
     }
 
-    /// Cuts some items in two and returns how many are in the first part, and the extents of both; nothing
-    /// where no bins tell them apart. `unit` times a length suits the scene.
+    /// Cuts some items in two and returns how many are in the first part, and the extents of both; `None` if no bins
+    /// tell them apart. Lengths are multiplied by `unit` before areas are computed.
     #[inline(always)]
     pub(super) fn cut<S: Simd>(
         &mut self,

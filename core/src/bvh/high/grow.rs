@@ -278,7 +278,7 @@ pub(super) struct Waiter {
 }
 
 impl Cursor {
-    /// Before the first.
+    /// A cursor before the first of them.
     pub(super) fn new() -> Self {
         let mut levels = [[0; 2]; MOST_LEVELS as usize + 1];
         levels[0] = [0, 1];

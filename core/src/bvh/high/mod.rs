@@ -211,7 +211,7 @@ impl Kernel for ItemsTask<'_> {
                     continue;
                 };
                 bounds = bounds.union(&box_of);
-                // Of the two zeros the positive one, whatever the order of a union.
+                // Turn -0 into 0, so that the order of a union does not matter.
                 let [x, y, z] = (box_of.min + Vec3A::ZERO).to_array().map(f32::to_bits);
                 let [nx, ny, nz] = (-(box_of.max + Vec3A::ZERO)).to_array().map(f32::to_bits);
                 if let Some(item) = items.get_mut(count).or_bug("more triangles than items") {
@@ -323,7 +323,7 @@ impl HighInputs {
     ) -> Result<(u32, u32), Error> {
         let all = items.len() as u32;
         if all == 0 {
-            // To have no nodes is legal: then they are only counted.
+            // Empty `nodes` are legal: nodes are only counted then.
             if let Some(root) = nodes.first_mut() {
                 *root = Node::EMPTY;
             }
@@ -342,7 +342,7 @@ impl HighInputs {
         };
         let level = SimdLevel::detect();
         let Grown { root, nodes: below, ids: top_ids, mut levels } = dispatch(level, grow);
-        // To have no nodes and ids is legal, here and below: then they are only counted.
+        // Empty `nodes` and `ids` are legal, here and below: they are only counted then.
         if let Some(slot) = nodes.first_mut() {
             *slot = root;
         }
@@ -430,7 +430,7 @@ impl HighInputs {
     }
 }
 
-/// Parts of the work of a single task, after each of which the caller is asked whether to go on.
+/// Parts of the work of a single task, after each of which progress is reported.
 const STEPS: usize = 64;
 
 /// The ranges of a task, and where their nodes lie.
