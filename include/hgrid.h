@@ -324,9 +324,8 @@
  * Choose it where detail is uneven but spread over the scene. Where all of it is in one spot of a
  * large scene, two levels are not enough: choose bvh. `subdivide_above` belongs to it.
  *
- * Memory: four to seven times that of one level. How much it takes shows only while the index is
- * written: `hgrid_sizes` without scratch answers with a generous bound, with scratch with the
- * exact size.
+ * Memory: four to seven times that of one level. The exact size takes a dry run: `hgrid_sizes` without scratch
+ * answers with a generous bound, with scratch with the exact size.
  */
 #define HGRID_METHOD_VARIABLE 3
 
@@ -338,10 +337,9 @@
  * to compare, or for a mesh that never changes where memory does not matter. `depth` belongs to
  * it.
  *
- * Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch
- * for each triangle. How much index it takes shows only while it is written. `hgrid_sizes`
- * without scratch answers with a bound that no mesh comes near, up to 8 GiB: ask with
- * scratch, which gives the exact size.
+ * Memory: ten to thirteen times that of one level on scans, and about 530 bytes of scratch for each triangle. The
+ * exact size takes a dry run. `hgrid_sizes` without scratch answers with a bound that no mesh comes near, up to 8
+ * GiB: ask with scratch, which gives the exact size.
  */
 #define HGRID_METHOD_RECURSIVE 4
 
@@ -349,8 +347,8 @@
  * A tree of boxes over a grid of the triangles' centres: each triangle lies in one leaf, and a node has up
  * to eight children with tight boxes.
  *
- * It is the default: rays of every kind, scenes of every kind, and the smallest bound that is known before the build.
- * `quality` belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.
+ * It is the default, for all rays and all scenes, with the smallest bound that is known before the build. `quality`
+ * belongs to it. It has no cells, so `density` means nothing to it, and its resolution is 1 x 1 x 1.
  *
  * Memory: on scans about 9 bytes a triangle. What it takes at most depends on the number of triangles
  * alone and is less than twice that: `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` hold for it
@@ -994,8 +992,8 @@ typedef struct hgrid_surface {
 } hgrid_surface;
 
 /**
- * Says what you know about the rays of a batch, so that the library can choose their order: one of
- * `HGRID_COHERENCE_...`. It changes how fast the answers come, never the answers.
+ * What you know about the rays of a batch, so that the library can choose their order: one of `HGRID_COHERENCE_...`.
+ * It changes the speed, never the answers.
  */
 typedef uint32_t hgrid_coherence;
 
@@ -1088,7 +1086,7 @@ typedef struct hgrid_statistics {
      */
     uint32_t degenerate_count;
     /**
-     * The first triangle that is one or the other, or `HGRID_INVALID_ID`.
+     * The first skipped or degenerate triangle, or `HGRID_INVALID_ID`.
      */
     uint32_t first_bad;
     /**
@@ -1108,9 +1106,9 @@ typedef struct hgrid_statistics {
      */
     uint32_t reserved;
     /**
-     * A hash of the grid's box, its resolution and its lists in order, but not of the cells that they
-     * belong to. The same grid has the same hash on every platform, whatever its byte order. It does not
-     * protect against forgery.
+     * A hash of the method, the grid's box, its resolution and its lists in order, but not of the cells that they
+     * belong to. The same grid has the same hash on every platform, whatever its byte order. It does not protect
+     * against forgery.
      */
     uint64_t content_hash;
 } hgrid_statistics;
@@ -1170,7 +1168,8 @@ typedef struct hgrid_boxes {
      */
     size_t mask_stride;
     /**
-     * Tests a shape: writes `hit` and returns true if `ray` hits shape number `shape`. May be NULL: then nothing is hit.
+     * Tests a shape: writes `hit` and returns true if `ray` hits shape number `shape`. May be NULL: then nothing is
+     * hit.
      *
      * `ray` has the range that is left: `t_max` is that of the closest hit so far. An answer outside this range, or
      * NaN, is no hit. The test is called on the thread that asks, for shapes whose box the ray meets and perhaps some
@@ -1212,8 +1211,8 @@ typedef struct hgrid_object {
 } hgrid_object;
 
 /**
- * A built scene and its objects, ready for queries: a view, held by value as a `hgrid_grid`. It holds the addresses of its
- * blob and of the array of its objects, or of the `views` of a packed scene.
+ * A built scene and its objects, ready for queries: a view, held by value as a `hgrid_grid`. It holds the addresses
+ * of its blob and of the array of its objects, or of the `views` of a packed scene.
  */
 typedef struct hgrid_scene {
     /**
@@ -1242,7 +1241,7 @@ typedef struct hgrid_instance {
      */
     double translation[3];
     /**
-     * Queries see the instance if their mask has a bit of it.
+     * Queries see the instance if their mask and this have a bit in common.
      */
     uint32_t mask;
     /**
@@ -1334,9 +1333,10 @@ typedef struct hgrid_scene_options {
      */
     void *context;
     /**
-     * Says of a `hit` whether it counts; or NULL: all do. Within an instance it is asked from near to far and about each
-     * triangle at most once; instances come about from near to far, so a hit that it accepts may be replaced by a closer
-     * one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes are not shown to it.
+     * Returns whether a `hit` counts. NULL means that all hits count. Within an instance it is asked from near to
+     * far and about each triangle at most once; instances come about from near to far, so a hit that it accepts may
+     * be replaced by a closer one of another instance. `HGRID_ACCEPT_AND_STOP` is the same as `HGRID_ACCEPT`. Shapes
+     * are not shown to it.
      */
     hgrid_verdict (*filter)(void *context, const struct hgrid_scene_hit *hit);
     /**
@@ -1345,8 +1345,8 @@ typedef struct hgrid_scene_options {
     struct hgrid_counters *counters;
     /**
      * Memory in which a batch with `HGRID_COHERENCE_INCOHERENT` may sort its rays, or NULL: as `scratch` of
-     * `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries of
-     * one ray do not look at it.
+     * `hgrid_query_options`. It may overlap neither rays nor answers, nor anything that the scene refers to. Queries
+     * of one ray do not look at it.
      */
     void *scratch;
     /**
@@ -1535,8 +1535,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_INVALID_MASKS -26
 
 /**
- * The parts of a joined mesh: they were not written by `hgrid_join`, or not with these counts, or the mesh has arrays, too;
- * or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
+ * The parts of a joined mesh: they were not written by `hgrid_join`, or not with these counts, or the mesh has
+ * arrays, too; or, from `hgrid_join`, a mesh is joined itself, or the meshes or their vertices are too many.
  */
 #define HGRID_ERROR_INVALID_PARTS -27
 
@@ -1635,8 +1635,8 @@ typedef struct hgrid_allocator {
 #define HGRID_ERROR_METHOD_REMOVED -48
 
 /**
- * The blob is built over something else: triangles, shapes or instances. Open it with the function for these. Or a
- * scene was to be packed that shows shapes, which cannot be packed.
+ * The blob is built over other primitives: open it with the function for triangles, shapes or instances. Or a scene
+ * that shows shapes was to be packed: shapes cannot be packed.
  */
 #define HGRID_ERROR_OTHER_CONTENT -49
 
@@ -1688,12 +1688,12 @@ extern "C" {
 /**
  * Joins meshes: describes several of them as one, for a grid of them all.
  *
- * Nothing is copied. Each mesh keeps its arrays, with strides and an index type of its own, and with masks or without. The
- * triangles are numbered through all meshes, in the order of the array: a hit names one by that number,
- * and `hgrid_locate` tells which mesh it is of and which triangle there. Where several triangles are hit at the same `t`,
- * the one of the first mesh counts. So a grid of joined meshes is, byte by byte, that of one mesh
- * with the same triangles, and each ray takes one walk. One mesh alone is read faster than joined ones: the
- * part of a triangle has to be found, in a binary search.
+ * Nothing is copied. Each mesh keeps its arrays, with strides and an index type of its own, and with masks or
+ * without. The triangles are numbered through all meshes, in the order of the array: a hit names one by that number,
+ * and `hgrid_locate` tells which mesh it is of and which triangle there. Where several triangles are hit at the same
+ * `t`, the one of the first mesh counts. So a grid of joined meshes is, byte by byte, that of one mesh with the same
+ * triangles, and each ray takes one walk. One mesh alone is read faster than joined ones: the part of a triangle has
+ * to be found, in a binary search.
  *
  * ```c
  * static hgrid_status build_both(const hgrid_mesh meshes[2], hgrid_part parts[2], void *index,
@@ -1708,19 +1708,20 @@ extern "C" {
  * }
  * ```
  *
- * `meshes` are `count` structs side by side, all with the same `struct_size`, none of them joined itself. They are only read
- * during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps neither the
- * structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a grid of the
- * joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without
- * triangles. `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds the
- * number of all triangles and vertices, and `parts`; its other fields are 0 or NULL. Such a call first goes over the
- * parts, `hgrid_open` too. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another build;
- * after arrays moved or counts changed, join the meshes again.
+ * `meshes` are `count` structs side by side, all with the same `struct_size`, none of them joined itself. They are
+ * only read during the call. `parts` is memory for as many parts, which may hold anything before; it overlaps
+ * neither the structs nor their arrays. It belongs to the mesh: it stays where it is, unchanged, for as long as a
+ * grid of the joined mesh is queried, as the arrays do. Both may be NULL if `count` is 0: that is a mesh without
+ * triangles. `joined` was initialised with `HGRID_MESH_INIT` and is good for every call that takes a mesh. It holds
+ * the number of all triangles and vertices, and `parts`; its other fields are 0 or NULL. Such a call first goes over
+ * the parts, `hgrid_open` too. After vertices moved, the same joined mesh is good for `hgrid_refit` and for another
+ * build; after arrays moved or counts changed, join the meshes again.
  *
  * The report of a build that fails names the triangle to blame by its number in the joined mesh: take the triangle
  * counts of the first meshes off it.
  *
- * Returns `HGRID_OK` and fills `joined`, or returns the reason and leaves it as it was; then `parts` may hold anything:
+ * Returns `HGRID_OK` and fills `joined`, or returns the reason and leaves it as it was; then `parts` may hold
+ * anything:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_OVERLAP`;
  * - with one of the meshes: `HGRID_ERROR_INVALID_POSITIONS`, `HGRID_ERROR_INVALID_INDICES`,
  *   `HGRID_ERROR_INVALID_INDEX_TYPE`, `HGRID_ERROR_INVALID_MASKS`;
@@ -1741,10 +1742,10 @@ hgrid_status hgrid_join(const struct hgrid_mesh *meshes,
  * Tells how much memory is enough for any mesh with so many triangles, wherever they
  * lie: O(1), nothing is looked at.
  *
- * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration
- * as constants, rounded up a little; with bvh and `tasks` above 1 the scratch is larger. How much
- * more than enough it is depends on the method: a scan takes a sixth of it or less with one level,
- * half with bvh; with recursive it is generous beyond use.
+ * `HGRID_INDEX_BOUND` and `HGRID_SCRATCH_BOUND` are the same for the default configuration as constants, rounded up
+ * a little; with bvh and `tasks` above 1 the scratch is larger. How much more than enough it is depends on the
+ * method: a scan takes a sixth of it or less with one level, half with bvh; with recursive it is too large to be of
+ * use.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns `HGRID_OK`, and the report
  * has `index_bytes` and `scratch_bytes`; or what is wrong:
@@ -1812,8 +1813,8 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  *
  * `fitted` becomes a copy of `config` with the highest density whose index fits into `index_bytes`, found in steps
  * down from that of `config`. A step divides the number of cells by 1.41. A tree (`HGRID_METHOD_BVH`) has no cells: it
- * fits or does not. The call takes at most a dozen times as long
- * as `hgrid_sizes`. A density that is too fine for a build counts as one that does not fit.
+ * fits or does not. The call does the work of `hgrid_sizes` about a dozen times, and at most 22 times. A density that
+ * is too fine for a build counts as one that does not fit.
  *
  * Bring as much scratch as `hgrid_sizes` without scratch returns. With less, the grid may become coarser
  * than the index requires: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the bound of a grid must
@@ -2352,11 +2353,11 @@ hgrid_status hgrid_open(const void *blob,
  * Gives a tree (`HGRID_METHOD_BVH`) the boxes of a mesh whose vertices moved: in place, in a fraction of
  * the time of a build, without scratch.
  *
- * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`; `blob_bytes` is its
- * size, and bytes behind the blob are not touched. `mesh` has the same triangles as the mesh that the tree
- * was built for, with the vertices where they are now; blob and mesh do not overlap. Queries on the view that
- * the call writes answer as those of a new build do. Views that were made before the call are of no use
- * any more: they can be asked without harm, but answer anything.
+ * `blob` is the index of a build, or a copy of it, at a multiple of `HGRID_ALIGNMENT`; `blob_bytes` is its size, and
+ * bytes behind the blob are not touched. `mesh` has the same triangles as the mesh that the tree was built for, with
+ * the vertices where they are now; blob and mesh do not overlap. Queries on the view that the call writes answer as
+ * those of a new build do. Do not use views that were made before the call: queries on them do no harm, but may
+ * answer anything.
  *
  * The leaves stay as they were built, so rays take longer the more the mesh changes. Remember `cost_before` of
  * the first refit after a build, and build anew once `cost_after` is well above it, say by half: times of rays grow
@@ -2591,11 +2592,11 @@ hgrid_status hgrid_validate_shapes(const struct hgrid_shapes *shapes,
 /**
  * Finds the closest shape that a ray hits.
  *
- * Returns true and writes `hit`, with the number of the shape as `primitive` and `t`, `u` and `v` as the test said; or
- * returns false and writes nothing. Where several shapes are hit at the same `t`, the one with the lowest number is
- * reported. Of the options `mask`, `skip` and `counters` are looked at: sides and filters are the test's own business.
- * `options` may be NULL. With another NULL, a view of zeros, a tree without a test, or options that break the rules for
- * structs nothing is hit.
+ * Returns true and writes `hit`, with the number of the shape as `primitive` and `t`, `u` and `v` as the test said;
+ * or returns false and writes nothing. Where several shapes are hit at the same `t`, the one with the lowest number
+ * is reported. Of the options `mask`, `skip` and `counters` are used; `cull` and `filter` are ignored. `options` may
+ * be NULL. With another NULL, a view of zeros, a tree without a test, or options that break the rules for structs
+ * nothing is hit.
  *
  * The test for discs that lie flat:
  *
@@ -2640,12 +2641,12 @@ bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
                            const struct hgrid_query_options *options);
 
 /**
- * Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for bit, and
- * sooner for rays near each other.
+ * Finds the closest shape that each of many rays hits: what `hgrid_intersect_shapes` would find for each, bit for
+ * bit, and sooner for rays near each other.
  *
- * It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the same. A
- * miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; rays of a batch take
- * turns. It runs on the thread that calls.
+ * It is to shapes what `hgrid_intersect_n` is to a grid, and the rules for arrays, strides and coherence are the
+ * same. A miss writes a hit, too. The test gets one ray and one shape at a time, each pair at most once; calls for
+ * different rays alternate. It runs on the thread that calls.
  *
  * ```c
  * static size_t trace_tile_of_shapes(const hgrid_shapes *shapes, const hgrid_ray rays[64], hgrid_hit hits[64])
@@ -2659,11 +2660,11 @@ bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
  * }
  * ```
  *
- * Of the options `mask`, `skip`, `counters` and `scratch` are looked at; with counters the rays are traced one by one.
+ * Of the options `mask`, `skip`, `counters` and `scratch` are used; with counters the rays are traced one by one.
  *
- * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order, and
- * a ray perhaps more than once, before its hit is written. `rays` and `hits` may be NULL if `count` is 0. `options` may
- * be NULL: the defaults. They are for all rays.
+ * With `count` 0 the arguments are checked and nothing is traced. Rays are read and hits are written in any order,
+ * and a ray perhaps more than once, before its hit is written. `rays` and `hits` may be NULL if `count` is 0.
+ * `options` may be NULL: the defaults. They are for all rays.
  *
  * Returns `HGRID_OK` and has written all hits, or returns what `hgrid_intersect_n` returns and has written none;
  * `HGRID_ERROR_OVERLAP` also for `scratch` in the view, the blob or the boxes. A tree without a test hits nothing.
@@ -2687,9 +2688,10 @@ hgrid_status hgrid_intersect_shapes_n(const struct hgrid_shapes *shapes,
 /**
  * Tells for each of many rays whether it hits any shape: what `hgrid_occluded_shapes` would say for each, but sooner.
  *
- * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from `occluded` on. All
- * else is as with `hgrid_intersect_shapes_n`. `rays` and `occluded` may be NULL if `count` is 0, `options` may be NULL.
- * Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_shapes_n` returns and has written none.
+ * Writes a byte for each ray, 1 if it hits anything and 0 if not, every `occluded_stride` bytes from `occluded` on.
+ * All else is as with `hgrid_intersect_shapes_n`. `rays` and `occluded` may be NULL if `count` is 0, `options` may
+ * be NULL. Returns `HGRID_OK` and has written all bytes, or returns what `hgrid_intersect_shapes_n` returns and has
+ * written none.
  *
  * Threads: any number of queries on the same tree at once; each thread with bytes and counters of its own.
  *
@@ -2708,8 +2710,8 @@ hgrid_status hgrid_occluded_shapes_n(const struct hgrid_shapes *shapes,
 /**
  * Makes an object of a grid.
  *
- * Neither argument may be NULL. Returns `HGRID_OK`, `HGRID_ERROR_NULL_ARGUMENT`, or `HGRID_ERROR_NOT_A_GRID` for a view
- * of zeros.
+ * Neither argument may be NULL. Returns `HGRID_OK`, `HGRID_ERROR_NULL_ARGUMENT`, or `HGRID_ERROR_NOT_A_GRID` for a
+ * view of zeros.
  *
  * Threads: any number of calls at once.
  *
@@ -2722,8 +2724,8 @@ hgrid_status hgrid_object_grid(const struct hgrid_grid *grid,
 /**
  * Makes an object of a tree of shapes, which brings its test.
  *
- * The test gets the ray as the object sees it, in the object's space, with a direction and a range of its own, and answers
- * for that ray. Any number of threads may call it at once. No argument may be NULL. Returns `HGRID_OK`, or what
+ * The test gets the ray in the object's space, with a direction and a range of its own. The `t` of its answer is
+ * along this ray. Any number of threads may call it at once. No argument may be NULL. Returns `HGRID_OK`, or what
  * `hgrid_object_grid` returns.
  *
  * Threads: any number of calls at once.
@@ -2747,8 +2749,8 @@ hgrid_status hgrid_object_scene(const struct hgrid_scene *scene,
                                 struct hgrid_object *object);
 
 /**
- * Tells how much memory is enough for any scene of so many instances: `hgrid_bound` for scenes. `HGRID_SCENE_BOUND` and
- * `HGRID_SCRATCH_BOUND` are the same as constants, rounded up a little.
+ * Tells how much memory is enough for any scene of so many instances: `hgrid_bound` for scenes. `HGRID_SCENE_BOUND`
+ * and `HGRID_SCRATCH_BOUND` are the same as constants, rounded up a little.
  *
  * `config` may be NULL: the defaults. `report` may not be NULL. Returns what `hgrid_bound` returns, and
  * `HGRID_ERROR_INVALID_METHOD` for another method than bvh.
@@ -2765,10 +2767,10 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
 /**
  * Builds a scene: a tree over instances of objects, in O(n).
  *
- * The instances are copied. The array of objects is not: it stays where it is, with the views that it names, for as long
- * as the scene is queried. An object may be shown by any number of instances. Scenes may be shown in scenes,
- * `HGRID_MAX_NESTING` deep. The index is a blob as that of every build: it names objects by number, and `hgrid_open_scene`
- * opens it elsewhere with the same objects.
+ * The instances are copied. The array of objects is not: it stays where it is, with the views that it names, for as
+ * long as the scene is queried. An object may be shown by any number of instances. Scenes may be shown in scenes,
+ * `HGRID_MAX_NESTING` deep. The index is a blob, as after every build: it names objects by number, and
+ * `hgrid_open_scene` opens it elsewhere with the same objects.
  *
  * ```c
  * static hgrid_status put_twice(const hgrid_grid *grid, void *index, size_t index_bytes, void *scratch,
@@ -2785,8 +2787,8 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
  * ```
  *
  * `instances` may be NULL if there are none, and `objects` likewise; `index`, `scratch` and `scene` may not be NULL.
- * `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and writes
- * the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
+ * `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
+ * writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
  *   `HGRID_ERROR_OVERLAP` (also with an object; not with what is shown by a scene among them, which is not looked at),
  *   `HGRID_ERROR_TOO_MANY_TRIANGLES`;
@@ -2833,13 +2835,13 @@ hgrid_status hgrid_open_scene(const void *blob,
                               struct hgrid_scene *scene);
 
 /**
- * Gives a built scene the instances of another moment: in place, without scratch, in less than the time of a build.
+ * Gives a built scene instances that moved: in place, without scratch, in less than the time of a build.
  *
  * There are as many instances as in the build; `hgrid_refit` says when to build anew. Arguments are as those of
  * `hgrid_build_scene`; `report` may be NULL. Returns `HGRID_OK` and writes the view to `scene`; or returns the
  * reason: `HGRID_ERROR_MESH_MISMATCH` for another number of instances, what `hgrid_open_scene` returns, and
- * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are as they
- * were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the
+ * `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE` and `HGRID_ERROR_OVERLAP`, after which blob and `scene` are
+ * as they were; `HGRID_ERROR_INSTANCE_OBJECT` and `HGRID_ERROR_INSTANCE_MATRIX` for the instance whose number is the
  * report's `triangle`, after which the blob holds nothing of use.
  *
  * Threads: as for `hgrid_refit`.
@@ -2857,10 +2859,11 @@ hgrid_status hgrid_refit_scene(const struct hgrid_instance *instances,
                                struct hgrid_refit_report *report);
 
 /**
- * Proves that a scene is one of its objects, in `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch: the tree and the
- * box of every instance. The objects have proofs of their own.
+ * Proves that a scene is one of its objects, in `HGRID_VALIDATE_BOUND(instance_count)` bytes of scratch: the tree
+ * and the box of every instance. The objects have proofs of their own.
  *
- * `scene` may not be NULL, `scratch` only if it has no bytes. Returns `HGRID_OK`, or what `hgrid_validate_shapes` returns.
+ * `scene` may not be NULL; `scratch` may be if `scratch_bytes` is 0. Returns `HGRID_OK`, or what
+ * `hgrid_validate_shapes` returns.
  *
  * Threads: any number of calls and queries on the same scene at once, each with scratch of its own.
  *
@@ -2872,21 +2875,21 @@ hgrid_status hgrid_validate_scene(const struct hgrid_scene *scene,
                                   size_t scratch_bytes);
 
 /**
- * Writes a scene and all grids, meshes and scenes that it shows as one blob, which `hgrid_open_packed_scene` needs nothing
- * else for: `hgrid_pack` for scenes.
+ * Writes a scene and all grids, meshes and scenes that it shows as one blob for `hgrid_open_packed_scene`:
+ * `hgrid_pack` for scenes.
  *
- * A grid or scene is stored once, however many instances and scenes show it: the same address of a view is the same grid.
- * Shapes cannot be stored: their boxes and test are yours.
+ * A grid or scene is stored once, however many instances and scenes show it: the same address of a view is the same
+ * grid. Shapes cannot be stored: their boxes and test are yours.
  *
- * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps nothing that the scene refers to, nor any argument of this
- * call. It may be NULL if `capacity` is 0: to ask for the size. `scene` and `bytes` may not be NULL. The time is that
- * of the copy, and of comparing each object with each.
+ * `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps nothing that the scene refers to, nor any argument of
+ * this call. It may be NULL if `capacity` is 0: to ask for the size. `scene` and `bytes` may not be NULL. The call
+ * copies everything, and compares each object with each other.
  *
- * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both cases
- * `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
- * `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing; or
- * `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is needed is not
- * touched.
+ * Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both
+ * cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,
+ * `HGRID_ERROR_MISALIGNED`, `HGRID_ERROR_OVERLAP`, `HGRID_ERROR_OTHER_CONTENT` for shapes, and has written nothing;
+ * or `HGRID_ERROR_INDEX_OUT_OF_RANGE` if a mesh is damaged, after which `to` holds nothing of use. More than is
+ * needed is not touched.
  *
  * Threads: any number of calls and queries on the same scene at once, each with memory of its own.
  *
@@ -2901,13 +2904,13 @@ hgrid_status hgrid_pack_scene(const struct hgrid_scene *scene,
 /**
  * Opens a blob that `hgrid_pack_scene` wrote where it lies: in time proportional to the grids in it, without a copy.
  *
- * `blob` starts at a multiple of `HGRID_ALIGNMENT`; bytes behind it are ignored. `views` is memory for the views of what is
- * in it, at a multiple of `HGRID_ALIGNMENT` as well: like the blob, it stays where it is and as it is for as long as the
- * scene is queried. It may be NULL if `views_bytes` is 0: to ask for the size.
+ * `blob` starts at a multiple of `HGRID_ALIGNMENT`; bytes behind it are ignored. `views` is memory for the views of
+ * what is in it, at a multiple of `HGRID_ALIGNMENT` as well: like the blob, it stays where it is and as it is for as
+ * long as the scene is queried. It may be NULL if `views_bytes` is 0: to ask for the size.
  *
- * With `scratch` all grids and scenes in the blob are proven, as `hgrid_validate` and `hgrid_validate_scene` do: a 64th of
- * the blob's bytes is enough, at any address. With NULL, and `scratch_bytes` 0, nothing is proven, and what `hgrid_open` says of damaged
- * bytes holds. Blob, views and scratch do not overlap.
+ * With `scratch` all grids and scenes in the blob are proven, as `hgrid_validate` and `hgrid_validate_scene` do: a
+ * 64th of the blob's bytes is enough, at any address. With NULL, and `scratch_bytes` 0, nothing is proven, and what
+ * `hgrid_open` says of damaged bytes holds. Blob, views and scratch do not overlap.
  *
  * `blob`, `bytes` and `scene` may not be NULL. Returns `HGRID_OK` and writes the view to `scene`, or
  * `HGRID_ERROR_INDEX_TOO_SMALL` if the views have too little memory; in both cases `bytes` becomes what the views
@@ -2933,11 +2936,12 @@ hgrid_status hgrid_open_packed_scene(const void *blob,
 /**
  * Finds the closest thing in a scene that a ray hits.
  *
- * Returns true and writes `hit`; or returns false and writes nothing. Where several are hit at the same `t`, that of the
- * first instance is reported, and in it the lowest number. `options` may be NULL: the defaults. With another NULL, a view
- * of zeros, or options that break the rules for structs nothing is hit.
+ * Returns true and writes `hit`; or returns false and writes nothing. Where several are hit at the same `t`, that of
+ * the first instance is reported, and in it the lowest number. `options` may be NULL: the defaults. With another
+ * NULL, a view of zeros, or options that break the rules for structs nothing is hit.
  *
- * A query allocates nothing and always ends. It takes up to 8 KiB of stack for the scene and for each scene inside it, and 7 KiB for a grid.
+ * A query allocates nothing and always ends. It takes up to 8 KiB of stack for the scene and for each scene inside
+ * it, and 7 KiB for a grid.
  *
  * Threads: any number of queries on the same scene at once; each thread with counters of its own.
  *
@@ -2964,12 +2968,13 @@ bool hgrid_occluded_scene(const struct hgrid_scene *scene,
                           const struct hgrid_scene_options *options);
 
 /**
- * Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid that it shows.
+ * Tells what a hit names: the innermost instance on its path, with the object's number and your id, and the grid
+ * that it shows.
  *
- * For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob. The
- * matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and `grid` may be
- * NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or `hit` is NULL, or the
- * hit names nothing in the scene.
+ * For a scene that was opened with objects of yours these are at hand; for a packed scene they come from its blob.
+ * The matrix of the instance is yours but for rounding. For shapes, `grid` becomes a view of zeros. `instance` and
+ * `grid` may be NULL: then they are not written. Returns true and has written both; or false and nothing: `scene` or
+ * `hit` is NULL, or the hit names nothing in the scene.
  *
  * Threads: any number of calls and queries on the same scene at once.
  *
@@ -2991,11 +2996,12 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
  * - coordinates are too coarse to tell the sides of the triangle apart: `double` at this distance from the scene's
  *   origin, or `float` in the object.
  *
- * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the other
- * side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane, as the object
- * sees them, may hit it, because normal and direction are rounded. A start is lifted as by `hgrid_surface_at`, or by up
- * to four times the rounding error of its transformation, if that is more. Do not round a start to `float`: it may lie
- * below the plane then. What `hgrid_surface_at` says about triangles without area holds here, too.
+ * A ray from `above` to that side of the triangle's plane does not hit the triangle, nor one from `below` to the
+ * other side: with `t_min` 0, at any place in the scene, alone and in a batch. Rays nearly along the plane, as the
+ * object sees them, may hit it, because normal and direction are rounded. A start is lifted as by
+ * `hgrid_surface_at`, or by up to four times the rounding error of its transformation, if that is more. Do not round
+ * a start to `float`: it may lie below the plane then. What `hgrid_surface_at` says about triangles without area
+ * holds here, too.
  *
  * ```c
  * static bool sees_light_in_scene(const hgrid_scene *scene, const hgrid_ray_f64 *ray, const hgrid_scene_hit *hit,
@@ -3171,9 +3177,9 @@ hgrid_status hgrid_create(const struct hgrid_mesh *mesh,
 /**
  * Gives back all memory of a grid that `hgrid_create` made.
  *
- * `grid` may be NULL: nothing happens. It may be nothing else than what `hgrid_create` wrote,
- * once: not the view of a build or of an open, and no copy of a view. No query runs, and copies of
- * the view are good for nothing afterwards.
+ * `grid` may be NULL: nothing happens. Otherwise it is what `hgrid_create` wrote, and is destroyed once: not the
+ * view of a build or of an open, and no copy of a view. No query may run during the call, and copies of the view may
+ * not be used afterwards.
  *
  * Threads: any number of calls at once, each for a grid of its own, if the allocator's functions
  * allow it; on any thread, not only on the one that created the grid.

@@ -168,8 +168,8 @@ pub unsafe extern "C" fn hgrid_sizes(
 ///
 /// `fitted` becomes a copy of `config` with the highest density whose index fits into `index_bytes`, found in steps
 /// down from that of `config`. A step divides the number of cells by 1.41. A tree (`HGRID_METHOD_BVH`) has no cells: it
-/// fits or does not. The call takes at most a dozen times as long
-/// as `hgrid_sizes`. A density that is too fine for a build counts as one that does not fit.
+/// fits or does not. The call does the work of `hgrid_sizes` about a dozen times, and at most 22 times. A density that
+/// is too fine for a build counts as one that does not fit.
 ///
 /// Bring as much scratch as `hgrid_sizes` without scratch returns. With less, the grid may become coarser
 /// than the index requires: with `HGRID_METHOD_ONE_LEVEL` and `HGRID_METHOD_FIXED` the bound of a grid must

@@ -24,8 +24,8 @@ pub enum Method {
 }
 
 impl Method {
-    /// All methods, in the order of the paper's Table 1 but for its baseline, which comes last; also
-    /// those that this library has not ([`is_available`](Self::is_available)).
+    /// All methods: the paper's hashed grids in the order of its Table 1, the recursive grid, and the tree; also those
+    /// that this library has not ([`is_available`](Self::is_available)).
     pub const ALL: &[Self] =
         &[Self::OneLevel, Self::Variable, Self::Fixed, Self::Recursive, Self::Bvh];
 

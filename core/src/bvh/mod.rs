@@ -68,8 +68,8 @@ pub(crate) use refit::refit;
 pub(crate) use search::Scope;
 pub(crate) use validate::proof_bytes;
 
-/// Levels of nodes, at most: 20 by SAH and 9 that halve roots ([`top`]), 32 of a subtree, whose nodes take
-/// seven triangles each ([`subtree`]).
+/// Levels of nodes, at most: 20 by SAH and 9 that halve roots ([`top`]), and 20 of a subtree, which has no more nodes
+/// ([`subtree`]).
 pub(crate) const LEVELS: u32 = 64;
 
 /// The scratch that the build of a tree with this header takes.
