@@ -91,6 +91,22 @@ fn a_file_alone_is_rendered() {
     );
 }
 
+/// A full disk is an error with a message and a status, even if the message finds no room either.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_output_is_an_error() {
+    let folder = Folder::new("full").unwrap();
+    let full = || fs::File::options().write(true).open("/dev/full").unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
+    let command = command.current_dir(&folder.0).args(["info", "a.obj"]);
+    let output = command.stdout(full()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(said.starts_with("error: cannot write to standard output: "), "{said}");
+    let output = command.stdout(full()).stderr(full()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+}
+
 #[test]
 fn packed_files_are_described_proved_and_rendered() {
     let folder = Folder::new("pack").unwrap();
