@@ -91,6 +91,37 @@ fn a_file_alone_is_rendered() {
     );
 }
 
+#[test]
+fn a_missing_folder_is_named_before_the_work() {
+    let folder = Folder::new("missing").unwrap();
+    for (words, expected) in [
+        ("a.obj -o no/a.png", "cannot write `no/a.png`: there is no folder `no`: make it"),
+        ("a.obj -o .", "cannot write `.`: it is a folder: name a file in it"),
+        ("pack a.obj -o no/a.hgrid", "there is no folder `no`: make it"),
+        ("pack a.obj -o a.obj/a.hgrid", "`a.obj` is a file: name a folder in its place"),
+        ("animate a.obj -o a.obj", "cannot write into `a.obj`: it is a file: name a folder"),
+        ("figures a.obj -o a.obj", "cannot write into `a.obj`: it is a file: name a folder"),
+    ] {
+        let said = folder.fails(words).unwrap();
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+}
+
+#[test]
+fn an_animation_needs_triangles_and_makes_no_folder_without() {
+    let folder = Folder::new("still").unwrap();
+    fs::write(folder.0.join("points.obj"), "v 0 0 0\n").unwrap();
+    for (words, expected) in [
+        ("points.obj", "`points.obj` has no triangles: nothing to animate"),
+        ("a.obj --method fixed --refit", "--refit is for --method bvh: ask for that"),
+        ("a.obj --method fixed --instances 2", "--instances is for --method bvh: ask for that"),
+    ] {
+        let said = folder.fails(&format!("animate {words} --frames 1 --size 9 -o frames")).unwrap();
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+    assert!(!folder.0.join("frames").exists());
+}
+
 /// A full disk is an error with a message and a status, even if the message finds no room either.
 #[cfg(target_os = "linux")]
 #[test]
