@@ -187,6 +187,8 @@ fn a_blob_can_be_an_array_of_c() {
         ("pack a.obj -o a.c", "add --c-array NAME"),
         ("pack a.obj -o b.hgrid --c-array b", "is not C by its name"),
         ("pack a.obj -o b.c --c-array 1b", "is no name in C"),
+        ("pack a.obj -o b.c --c-array int", "`int` has a meaning in C or C++: take another name"),
+        ("pack a.obj -o b.c --c-array class", "`class` has a meaning"),
         ("pack a.obj -o b.ply", "would be a mesh by its name"),
         ("pack a.obj -o b.hgrid --depth 2", "--depth is for --method recursive"),
     ] {
