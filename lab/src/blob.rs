@@ -5,7 +5,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{BlobInfo, Block};
+use hgrid_core::{BlobInfo, Block, Member, Object};
 
 /// The bytes of a file, aligned so that a grid can be opened in them.
 #[derive(Debug)]
@@ -32,6 +32,18 @@ impl Blob {
             needed.total_bytes
         );
         Ok(Self { memory, length })
+    }
+
+    /// Returns room for the views with which a packed scene is opened.
+    ///
+    /// # Errors
+    /// If the header asks for more views than the bytes can hold.
+    pub fn views<'a>(&self, info: &BlobInfo) -> Result<(Vec<Member<'a>>, Vec<Object<'a>>)> {
+        let is_sound = info.vertex_count <= info.total_bytes / 4
+            && u64::from(info.triangle_count) <= info.total_bytes / 128;
+        ensure!(is_sound && info.total_bytes <= self.length as u64, "it is truncated or damaged");
+        let objects = vec![Object::Nothing; usize::try_from(info.vertex_count)?];
+        Ok((vec![Member::EMPTY; info.triangle_count as usize], objects))
     }
 
     /// Makes room for a blob.
