@@ -10,6 +10,7 @@ use core::iter;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use anyhow::ensure;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use hgrid_core::{Config, Method, Quality};
@@ -322,6 +323,10 @@ impl Race {
     /// If there is one; the message names the parameter and its method.
     pub fn check(&self) -> anyhow::Result<()> {
         let methods: Vec<_> = self.configs().iter().map(Config::method).collect();
+        ensure!(
+            self.builders.threads == 1 || methods.contains(&Method::Bvh),
+            "--threads is for --methods bvh: ask for that, or leave out --threads"
+        );
         self.tuning.check("--methods", &methods)
     }
 

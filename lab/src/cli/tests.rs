@@ -135,7 +135,9 @@ fn parameters_of_others_are_refused() {
         TableArgs::parse_from(["hgrid", "a.ply"].into_iter().chain(words.split(' '))).race.check()
     };
     check("--depth 2").unwrap();
-    check("--methods fixed,bvh --quality high").unwrap();
+    check("--methods fixed,bvh --quality high --threads 2").unwrap();
+    let message = check("--methods fixed --threads 2").unwrap_err().to_string();
+    assert!(message.contains("--threads is for --methods bvh"), "{message}");
     let message = check("--methods fixed,bvh --depth 2").unwrap_err().to_string();
     assert!(message.contains("--depth is for --methods recursive"), "{message}");
 }
