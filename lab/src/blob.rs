@@ -1,11 +1,12 @@
 //! Blobs in files: grids, with their mesh (packed) or without it.
 
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use hgrid_core::{BlobInfo, Block, Member, Object};
+
+use crate::file;
 
 /// The bytes of a file, aligned so that a grid can be opened in them.
 #[derive(Debug)]
@@ -20,7 +21,7 @@ impl Blob {
     /// # Errors
     /// If it cannot be read, is no blob of this version, or is cut off.
     pub fn read(path: &Path) -> Result<Self> {
-        let mut file = File::open(path).context("cannot open it")?;
+        let mut file = file::open(path)?;
         let length = usize::try_from(file.metadata()?.len()).context("it is too large")?;
         let mut memory = vec![Block::ZERO; Block::count_for(length)];
         let bytes = &mut Block::bytes_mut(&mut memory)[..length];

@@ -122,6 +122,22 @@ fn an_animation_needs_triangles_and_makes_no_folder_without() {
     assert!(!folder.0.join("frames").exists());
 }
 
+#[test]
+fn what_is_no_file_is_refused() {
+    let folder = Folder::new("kinds").unwrap();
+    for command in ["info", "render", "validate"] {
+        let said = folder.fails(&format!("{command} .")).unwrap();
+        assert!(said.contains("it is a folder: name a file in it"), "{command}: {said}");
+    }
+    if cfg!(unix) {
+        let said = folder.fails("info /dev/null").unwrap();
+        assert!(
+            said.contains("it is a pipe or a device: write what it holds into a file"),
+            "{said}"
+        );
+    }
+}
+
 /// A full disk is an error with a message and a status, even if the message finds no room either.
 #[cfg(target_os = "linux")]
 #[test]
