@@ -3,6 +3,7 @@
 //! A check before the work tests that the file can be written, and leaves no empty file behind. The file
 //! itself is written in a single write when the picture is complete.
 
+use core::iter;
 use std::fs::{self, OpenOptions};
 use std::io::{Cursor, ErrorKind};
 use std::path::{Path, is_separator};
@@ -42,6 +43,19 @@ pub fn check_writable(path: &Path) -> Result<()> {
         let cause = refusal(path).map_or_else(|| Error::new(error), Error::msg);
         cause.context(format!("cannot write `{}`", path.display()))
     })
+}
+
+/// Refuses to overwrite what a scene is read from, a file or two of them, by a blob or a picture of it.
+///
+/// # Errors
+/// If the output is one of them.
+pub fn check_sources(output: &Path, scene: &str, what: &str) -> Result<()> {
+    let Ok(output) = output.canonicalize() else { return Ok(()) };
+    for input in iter::once(scene).chain(scene.split('+')) {
+        let is_output = Path::new(input).canonicalize().is_ok_and(|input| input == output);
+        ensure!(!is_output, "`{input}` would be overwritten by its own {what}: name another file");
+    }
+    Ok(())
 }
 
 /// Returns the reason why no file of this name can be opened, with what to do; none if it is another one.

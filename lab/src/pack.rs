@@ -13,7 +13,7 @@ use indicatif::HumanCount;
 
 use crate::blob::Blob;
 use crate::cli::blob::PackArgs;
-use crate::image::check_writable;
+use crate::image::{check_sources, check_writable};
 use crate::regions::Regions;
 use crate::scene::Scene;
 use crate::scene::format::Format;
@@ -27,7 +27,7 @@ const IN_LINE: usize = 24;
 /// If the scene cannot be loaded or built, or the file cannot be written.
 pub fn run(args: &PackArgs) -> Result<()> {
     check(args)?;
-    check_inputs(args)?;
+    check_sources(&args.output, &args.scene, "blob")?;
     check_writable(&args.output)?;
     let scene = Scene::load(&args.scene)?;
     let cannot = || format!("cannot pack `{}`", args.scene);
@@ -51,16 +51,6 @@ pub fn run(args: &PackArgs) -> Result<()> {
         io::stdout(),
         "wrote {output}: {bytes} bytes, a {method} and its mesh of {triangles} triangles"
     )?;
-    Ok(())
-}
-
-/// Refuses to overwrite what the scene is read from: a file, or two of them.
-fn check_inputs(args: &PackArgs) -> Result<()> {
-    let Ok(output) = args.output.canonicalize() else { return Ok(()) };
-    for input in [&*args.scene].into_iter().chain(args.scene.split('+')) {
-        let is_output = Path::new(input).canonicalize().is_ok_and(|input| input == output);
-        ensure!(!is_output, "`{input}` would be overwritten by its own blob: name another file");
-    }
     Ok(())
 }
 

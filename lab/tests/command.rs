@@ -61,6 +61,17 @@ fn a_blob_overwrites_none_of_its_sources() {
 }
 
 #[test]
+fn a_picture_overwrites_none_of_its_sources() {
+    let folder = Folder::new("pictures").unwrap();
+    folder.says("pack a.obj -o blob").unwrap();
+    for scene in ["blob", "./blob", "a.obj+blob"] {
+        let said = folder.fails(&format!("{scene} --size 16 -o blob")).unwrap();
+        assert!(said.contains("would be overwritten by its own picture"), "{scene}: {said}");
+    }
+    folder.says("validate blob").unwrap();
+}
+
+#[test]
 fn a_file_alone_is_rendered() {
     let folder = Folder::new("render").unwrap();
     let text = folder.says("a.obj --size 16").unwrap();

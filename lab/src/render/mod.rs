@@ -49,6 +49,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let start = Instant::now();
     let (scene, model) = Scene::open(&args.scene, args.takes_instances())?;
     let load_seconds = start.elapsed().as_secs_f64();
+    // Only now, because a file that is no mesh has an error of its own.
+    image::check_sources(&args.output, &args.scene, "picture")?;
     let facts = match &model {
         None => SceneFacts::of(&scene),
         Some(model) => SceneFacts::of_model(&scene.name, model),
