@@ -8,7 +8,6 @@
 
 use core::f64::consts::TAU;
 use core::fmt;
-use std::fs;
 use std::io::{self, Write as _};
 use std::path::Path;
 use std::sync::Mutex;
@@ -41,14 +40,15 @@ const WAVELENGTH: f64 = 0.3;
 /// # Errors
 /// If the scene cannot be loaded or built, or a picture cannot be written.
 pub fn run(args: &AnimateArgs) -> Result<()> {
-    if let Some(folder) = &args.output {
-        fs::create_dir_all(folder)
-            .with_context(|| format!("cannot write into `{}`", folder.display()))?;
+    for (option, is_there) in [("--instances", args.instances > 0), ("--refit", args.refit)] {
+        let is_known = !is_there || args.method == Method::Bvh;
+        ensure!(is_known, "{option} is for --method bvh: ask for that, or leave out {option}");
     }
     let scene = Scene::load(&args.scene)?;
-    let is_tree = args.method == Method::Bvh;
-    ensure!(is_tree || args.instances == 0, "--instances is for bvh: scenes are trees");
-    ensure!(is_tree || !args.refit, "--refit is for bvh");
+    ensure!(!scene.indices.is_empty(), "`{}` has no triangles: nothing to animate", args.scene);
+    if let Some(folder) = &args.output {
+        image::make_folder(folder)?;
+    }
     let up = args.picture.up.unwrap_or_else(|| Up::of(&scene));
     let field = Field::new(scene.framed_bounds(), args.instances, up);
     let field = (args.instances > 0).then_some(field);
@@ -332,6 +332,8 @@ fn largest_extent((min, max): Bounds) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use clap::Parser as _;
     use hgrid_core::Method;
 

@@ -1,11 +1,12 @@
 //! Blobs in files: grids, with their mesh (packed) or without it.
 
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use hgrid_core::{BlobInfo, Block};
+use hgrid_core::{BlobInfo, Block, Member, Object};
+
+use crate::file;
 
 /// The bytes of a file, aligned so that a grid can be opened in them.
 #[derive(Debug)]
@@ -20,7 +21,7 @@ impl Blob {
     /// # Errors
     /// If it cannot be read, is no blob of this version, or is cut off.
     pub fn read(path: &Path) -> Result<Self> {
-        let mut file = File::open(path).context("cannot open it")?;
+        let mut file = file::open(path)?;
         let length = usize::try_from(file.metadata()?.len()).context("it is too large")?;
         let mut memory = vec![Block::ZERO; Block::count_for(length)];
         let bytes = &mut Block::bytes_mut(&mut memory)[..length];
@@ -32,6 +33,18 @@ impl Blob {
             needed.total_bytes
         );
         Ok(Self { memory, length })
+    }
+
+    /// Returns room for the views with which a packed scene is opened.
+    ///
+    /// # Errors
+    /// If the header asks for more views than the bytes can hold.
+    pub fn views<'a>(&self, info: &BlobInfo) -> Result<(Vec<Member<'a>>, Vec<Object<'a>>)> {
+        let is_sound = info.vertex_count <= info.total_bytes / 4
+            && u64::from(info.triangle_count) <= info.total_bytes / 128;
+        ensure!(is_sound && info.total_bytes <= self.length as u64, "it is truncated or damaged");
+        let objects = vec![Object::Nothing; usize::try_from(info.vertex_count)?];
+        Ok((vec![Member::EMPTY; info.triangle_count as usize], objects))
     }
 
     /// Makes room for a blob.

@@ -10,6 +10,7 @@ use core::iter;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use anyhow::ensure;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use hgrid_core::{Config, Method, Quality};
@@ -22,7 +23,7 @@ use self::help::{
 pub use self::picture::Picture;
 use self::render::RenderArgs;
 pub use self::tuning::Tuning;
-use self::tuning::{method_parser, quality_parser, thread_parser};
+use self::tuning::{method_parser, quality_parser, thread_parser, whole};
 use crate::compare::first::COMMAND as FIRST_BUILD;
 use crate::compare::peers::Peer;
 use crate::compare::shown::Shown;
@@ -178,7 +179,7 @@ pub struct AnimateArgs {
     pub scene: String,
     /// Number of frames
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 30,
-          value_parser = clap::value_parser!(u32).range(1..=100_000))]
+          value_parser = whole(1..=100_000_u32))]
     pub frames: u32,
     /// The structure to build
     #[arg(long, value_parser = method_parser(), default_value = Method::default().name())]
@@ -188,7 +189,7 @@ pub struct AnimateArgs {
     pub tuning: Tuning,
     /// Show a field of so many moving instances of the mesh, in a scene that is built for every frame, too
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 0,
-          value_parser = clap::value_parser!(u32).range(..=10_000_000))]
+          value_parser = whole(0..=10_000_000_u32))]
     pub instances: u32,
     /// From the second frame on, give the trees of the first one their new boxes, for `bvh`
     #[arg(long)]
@@ -229,14 +230,14 @@ pub struct CompareArgs {
     pub workloads: Vec<Workload>,
     /// Compare scenes of this many instances of the mesh (`bvh` and Embree only); 0 compares the mesh itself
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 0, conflicts_with = "output",
-          value_parser = clap::value_parser!(u32).range(..=10_000_000))]
+          value_parser = whole(0..=10_000_000_u32))]
     pub instances: u32,
     /// Compare trees over spheres, a shape of the caller's own, in place of triangles (`bvh` and Embree only)
     #[arg(long, conflicts_with_all = ["instances", "output"])]
     pub spheres: bool,
     /// Build and trace so many times, taking turns, and report the medians
     #[arg(long, value_name = "TIMES", allow_negative_numbers = true, default_value_t = 5,
-          value_parser = clap::value_parser!(u32).range(1..=1000))]
+          value_parser = whole(1..=1000_u32))]
     pub repeat: u32,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
@@ -302,7 +303,7 @@ pub struct Race {
     methods: Vec<Method>,
     /// Build and render so many times, taking turns, and report the medians
     #[arg(long, value_name = "TIMES", allow_negative_numbers = true, default_value_t = 3,
-          value_parser = clap::value_parser!(u32).range(1..=1000))]
+          value_parser = whole(1..=1000_u32))]
     pub repeat: u32,
     #[expect(missing_docs, reason = "a doc would become the help of all its options")]
     #[command(flatten)]
@@ -322,6 +323,10 @@ impl Race {
     /// If there is one; the message names the parameter and its method.
     pub fn check(&self) -> anyhow::Result<()> {
         let methods: Vec<_> = self.configs().iter().map(Config::method).collect();
+        ensure!(
+            self.builders.threads == 1 || methods.contains(&Method::Bvh),
+            "--threads is for --methods bvh: ask for that, or leave out --threads"
+        );
         self.tuning.check("--methods", &methods)
     }
 

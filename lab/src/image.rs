@@ -3,11 +3,12 @@
 //! A check before the work tests that the file can be written, and leaves no empty file behind. The file
 //! itself is written in a single write when the picture is complete.
 
+use core::iter;
 use std::fs::{self, OpenOptions};
 use std::io::{Cursor, ErrorKind};
-use std::path::Path;
+use std::path::{Path, is_separator};
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Error, Result, ensure};
 
 use crate::shade::Rgb;
 
@@ -38,7 +39,54 @@ pub fn check_writable(path: &Path) -> Result<()> {
         }
         Err(error) => Err(error),
     };
-    attempt.with_context(|| format!("cannot write `{}`", path.display()))
+    attempt.map_err(|error| {
+        let cause = refusal(path).map_or_else(|| Error::new(error), Error::msg);
+        cause.context(format!("cannot write `{}`", path.display()))
+    })
+}
+
+/// Refuses to overwrite what a scene is read from, a file or two of them, by a blob or a picture of it.
+///
+/// # Errors
+/// If the output is one of them.
+pub fn check_sources(output: &Path, scene: &str, what: &str) -> Result<()> {
+    let Ok(output) = output.canonicalize() else { return Ok(()) };
+    for input in iter::once(scene).chain(scene.split('+')) {
+        let is_output = Path::new(input).canonicalize().is_ok_and(|input| input == output);
+        ensure!(!is_output, "`{input}` would be overwritten by its own {what}: name another file");
+    }
+    Ok(())
+}
+
+/// Returns the reason why no file of this name can be opened, with what to do; none if it is another one.
+fn refusal(path: &Path) -> Option<String> {
+    if path.is_dir() {
+        return Some("it is a folder: name a file in it".to_owned());
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty())?;
+    let name = folder.display();
+    // A folder that cannot be looked into may be there.
+    match (folder.try_exists().unwrap_or(true), folder.is_dir()) {
+        (false, _) => Some(format!("there is no folder `{name}`: make it, or name another one")),
+        (true, false) if folder.exists() => {
+            Some(format!("`{name}` is a file: name a folder in its place"))
+        }
+        (true, true) if path.as_os_str().to_string_lossy().ends_with(is_separator) => {
+            Some("its name ends like that of a folder: name a file".to_owned())
+        }
+        _ => None,
+    }
+}
+
+/// Makes a folder for several files, and those that it is in.
+///
+/// # Errors
+/// If there is a file of its name, and those of making it.
+pub fn make_folder(path: &Path) -> Result<()> {
+    let cannot = || format!("cannot write into `{}`", path.display());
+    let is_file = path.exists() && !path.is_dir();
+    ensure!(!is_file, "{}: it is a file: name a folder", cannot());
+    fs::create_dir_all(path).with_context(cannot)
 }
 
 /// Writes a picture of this width and height, rows from the top.
@@ -95,9 +143,20 @@ mod tests {
         check_writable(&path).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"before");
         write_png(&path, (1, 1), &[[0; 3]]).unwrap();
-        let message = format!("{:#}", check_writable(&folder).unwrap_err());
-        assert!(message.starts_with("cannot write `"), "{message}");
-        assert!(check_writable(&folder.join("missing/picture.png")).is_err());
+        for (name, expected) in [
+            ("", "`: it is a folder: name a file in it"),
+            ("missing/picture.png", "missing`: make it, or name another one"),
+            ("picture.png/other.png", "picture.png` is a file: name a folder in its place"),
+            ("other.png/", "`: its name ends like that of a folder: name a file"),
+        ] {
+            let message = format!("{:#}", check_writable(&folder.join(name)).unwrap_err());
+            assert!(message.starts_with("cannot write `"), "{message}");
+            assert!(message.ends_with(expected), "{message}");
+        }
+        make_folder(&folder.join("one/two")).unwrap();
+        make_folder(&folder.join("one")).unwrap();
+        let message = make_folder(&path).unwrap_err().to_string();
+        assert!(message.ends_with("`: it is a file: name a folder"), "{message}");
         fs::remove_dir_all(&folder).unwrap();
     }
 }

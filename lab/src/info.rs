@@ -4,7 +4,7 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use hgrid_core::{BlobInfo, Content, Grid};
+use hgrid_core::{BlobInfo, Content, Grid, Scene as Instances};
 use indicatif::HumanCount;
 use serde::Serialize;
 
@@ -42,8 +42,16 @@ fn count(count: impl TryInto<u64>) -> String {
 }
 
 fn corners([min, max]: [[f32; 3]; 2]) -> String {
-    let point = |[x, y, z]: [f32; 3]| format!("{x} {y} {z}");
+    let point = |[x, y, z]: [f32; 3]| [x, y, z].map(number).join(" ");
     format!("{}  to  {}", point(min), point(max))
+}
+
+/// Formats a coordinate; very large and very small ones with an exponent.
+fn number(coordinate: f32) -> String {
+    match coordinate.abs() {
+        size if size > 0.0 && !(1e-5..1e16).contains(&size) => format!("{coordinate:e}"),
+        _ => coordinate.to_string(),
+    }
 }
 
 /// The content of a file.
@@ -81,7 +89,7 @@ struct BlobFacts {
     format: &'static str,
     version: u32,
     method: &'static str,
-    /// The count of the things that it is built over, in one of these four.
+    /// The count of the things that it is built over, in one of these three.
     #[serde(skip_serializing_if = "Option::is_none")]
     triangles: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -117,7 +125,9 @@ impl Facts {
         let path = Path::new(file);
         if file.starts_with("procedural:") || !path.exists() {
             let scene = Scene::load(file)?;
-            return Ok(Self::Mesh(MeshFacts::of(file, "formula", [1, 1], &scene)));
+            let parts = scene.geometries.len().max(1);
+            let format = if parts > 1 { "A+B" } else { "formula" };
+            return Ok(Self::Mesh(MeshFacts::of(file, format, [parts; 2], &scene)));
         }
         let cannot = || format!("cannot read `{file}`");
         if Format::of(path).with_context(cannot)? == Format::Blob {
@@ -156,7 +166,7 @@ impl MeshFacts {
             ("instances", count(self.instances)),
             ("triangles", count(self.triangles)),
             ("vertices", count(self.vertices)),
-            ("bounds", self.bounds.map(corners).unwrap_or_default()),
+            ("bounds", self.bounds.map_or_else(|| "none".to_owned(), corners)),
             ("up", self.up.to_owned()),
         ];
         let flaws = [
@@ -246,6 +256,15 @@ impl BlobFacts {
 
     fn of(file: &str, blob: &Blob) -> Result<Self> {
         let info = BlobInfo::peek(blob.bytes())?;
+        let instances = match info.content {
+            Content::Packed => {
+                let (mut members, mut objects) = blob.views(&info)?;
+                let scene = Instances::open_packed(blob.bytes(), &mut members, &mut objects)?;
+                Some(scene.instance_count())
+            }
+            Content::Instances => Some(info.triangle_count),
+            Content::Triangles | Content::Shapes => None,
+        };
         let of = |content| (info.content == content).then_some(info.triangle_count);
         let is_mesh = info.content == Content::Triangles;
         let has_mesh = is_mesh && info.has_mesh;
@@ -257,7 +276,7 @@ impl BlobFacts {
             method: info.method.name(),
             triangles: of(Content::Triangles),
             shapes: of(Content::Shapes),
-            instances: of(Content::Instances),
+            instances,
             grids_and_scenes: of(Content::Packed),
             vertices: is_mesh.then_some(info.vertex_count),
             grid_bytes: info.grid_bytes,
@@ -280,5 +299,51 @@ impl GridFacts {
             longest_list: found.longest_list,
             content_hash: format!("{:016x}", found.content_hash),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hgrid_core::{Block, Config, Instance, Object, TriangleMesh};
+
+    use super::*;
+    use crate::regions::Regions;
+
+    #[test]
+    fn a_packed_scene_tells_its_instances() {
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]]).unwrap();
+        let config = Config::default();
+        let regions = Regions::build(mesh, &config).unwrap();
+        let grid = Grid::open(&regions.index, mesh).unwrap();
+        let placed = [Instance::new(0), Instance::new(0), Instance::new(0)];
+        let sizes = Instances::bound(3, &config).unwrap();
+        let [mut index, mut scratch] = [sizes.index_bytes, sizes.scratch_bytes]
+            .map(|bytes| vec![Block::ZERO; Block::count_for(bytes)]);
+        let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+        let objects = [Object::Grid(&grid)];
+        let scene = Instances::build(&placed, &objects, &config, index, scratch).unwrap();
+        let mut blob = Blob::zeroed(usize::try_from(scene.packed_bytes()).unwrap());
+        scene.pack(blob.bytes_mut()).unwrap();
+
+        let facts = BlobFacts::of("scene.hgrid", &blob).unwrap();
+        assert_eq!((facts.instances, facts.grids_and_scenes), (Some(3), Some(1)));
+        let rows = facts.rows();
+        assert!(rows.contains(&("instances", "3".to_owned())), "{rows:?}");
+        assert!(rows.contains(&("grids and scenes", "1".to_owned())), "{rows:?}");
+    }
+
+    #[test]
+    fn scenes_of_two_and_of_nothing_are_described() {
+        let facts = Facts::of("procedural:knot:800+procedural:soup:600").unwrap();
+        let rows = facts.rows();
+        assert!(rows.contains(&("format", "A+B".to_owned())), "{rows:?}");
+        assert!(rows.contains(&("meshes", "2".to_owned())), "{rows:?}");
+        let nothing = MeshFacts::of("a.obj", "OBJ", [1, 1], &Scene::default());
+        assert!(nothing.rows().contains(&("bounds", "none".to_owned())));
+        assert_eq!(
+            corners([[-3e38, 0.5, 0.0], [1e-30, 7.0, 1e9]]),
+            "-3e38 0.5 0  to  1e-30 7 1000000000"
+        );
     }
 }

@@ -24,6 +24,7 @@ pub mod cli;
 pub mod compare;
 pub mod field;
 pub mod figures;
+mod file;
 pub mod heat;
 pub mod image;
 pub mod info;

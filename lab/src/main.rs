@@ -33,10 +33,18 @@ fn main() -> ExitCode {
         }
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            // Not `eprintln`, which panics if nothing can be written.
+            let _ = writeln!(io::stderr(), "error: {}", message(&error));
             ExitCode::FAILURE
         }
     }
+}
+
+/// Returns the message of an error. Files have their names in it, and standard output gets one.
+fn message(error: &anyhow::Error) -> String {
+    let first = error.chain().next().and_then(|first| first.downcast_ref::<io::Error>());
+    let output = first.map_or("", |_| "cannot write to standard output: ");
+    format!("{output}{error:#}")
 }
 
 /// Returns true if the reader of the output, such as `head`, has closed it.

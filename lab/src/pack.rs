@@ -13,7 +13,7 @@ use indicatif::HumanCount;
 
 use crate::blob::Blob;
 use crate::cli::blob::PackArgs;
-use crate::image::check_writable;
+use crate::image::{check_sources, check_writable};
 use crate::regions::Regions;
 use crate::scene::Scene;
 use crate::scene::format::Format;
@@ -27,7 +27,7 @@ const IN_LINE: usize = 24;
 /// If the scene cannot be loaded or built, or the file cannot be written.
 pub fn run(args: &PackArgs) -> Result<()> {
     check(args)?;
-    check_inputs(args)?;
+    check_sources(&args.output, &args.scene, "blob")?;
     check_writable(&args.output)?;
     let scene = Scene::load(&args.scene)?;
     let cannot = || format!("cannot pack `{}`", args.scene);
@@ -51,16 +51,6 @@ pub fn run(args: &PackArgs) -> Result<()> {
         io::stdout(),
         "wrote {output}: {bytes} bytes, a {method} and its mesh of {triangles} triangles"
     )?;
-    Ok(())
-}
-
-/// Refuses to overwrite what the scene is read from: a file, or two of them.
-fn check_inputs(args: &PackArgs) -> Result<()> {
-    let Ok(output) = args.output.canonicalize() else { return Ok(()) };
-    for input in [&*args.scene].into_iter().chain(args.scene.split('+')) {
-        let is_output = Path::new(input).canonicalize().is_ok_and(|input| input == output);
-        ensure!(!is_output, "`{input}` would be overwritten by its own blob: name another file");
-    }
     Ok(())
 }
 
@@ -89,6 +79,7 @@ fn check(args: &PackArgs) -> Result<()> {
                 "`{output}` is not C by its name: name a file like x.c"
             );
             ensure!(is_identifier(name), "`{name}` is no name in C: take letters, digits and _");
+            ensure!(!is_reserved(name), "`{name}` has a meaning in C or C++: take another name");
         }
     }
     Ok(())
@@ -97,6 +88,19 @@ fn check(args: &PackArgs) -> Result<()> {
 fn is_identifier(name: &str) -> bool {
     let is_word = name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
     is_word && name.bytes().next().is_some_and(|first| !first.is_ascii_digit())
+}
+
+/// The words of C and C++ that can be no names, and the function that every program has.
+const RESERVED: &str = "alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t \
+    char32_t char8_t class co_await co_return co_yield compl concept const const_cast consteval constexpr \
+    constinit continue decltype default delete do double dynamic_cast else enum explicit export extern false \
+    float for friend goto if inline int long main mutable namespace new noexcept not not_eq nullptr operator or \
+    or_eq private protected public register reinterpret_cast requires restrict return short signed sizeof static \
+    static_assert static_cast struct switch template this thread_local throw true try typedef typeid typename \
+    typeof typeof_unqual union unsigned using virtual void volatile wchar_t while xor xor_eq";
+
+fn is_reserved(name: &str) -> bool {
+    RESERVED.split(' ').any(|word| word == name)
 }
 
 /// Builds a grid of a scene and writes both into one blob.

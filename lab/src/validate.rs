@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail, ensure};
-use hgrid_core::{BlobInfo, Content, Grid, Member, Object, Scene as Instances, TriangleMesh};
+use hgrid_core::{BlobInfo, Content, Grid, Scene as Instances, TriangleMesh};
 use indicatif::HumanCount;
 
 use crate::blob::Blob;
@@ -58,14 +58,8 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
 fn prove_scene(path: &Path, blob: &Blob, info: &BlobInfo) -> Result<()> {
     let file = path.display();
     let bytes = blob.bytes();
-    ensure!(
-        info.total_bytes <= bytes.len() as u64
-            && info.vertex_count <= info.total_bytes / 4
-            && u64::from(info.triangle_count) <= info.total_bytes / 128,
-        "`{file}` is truncated or damaged"
-    );
-    let mut members = vec![Member::EMPTY; info.triangle_count as usize];
-    let mut objects = vec![Object::Nothing; usize::try_from(info.vertex_count)?];
+    let views = blob.views(info).with_context(|| format!("`{file}` is not valid"))?;
+    let (mut members, mut objects) = views;
     let mut scratch = vec![0; bytes.len() / 64];
     let start = Instant::now();
     let scene = Instances::open_packed_proven(bytes, &mut members, &mut objects, &mut scratch)

@@ -61,6 +61,17 @@ fn a_blob_overwrites_none_of_its_sources() {
 }
 
 #[test]
+fn a_picture_overwrites_none_of_its_sources() {
+    let folder = Folder::new("pictures").unwrap();
+    folder.says("pack a.obj -o blob").unwrap();
+    for scene in ["blob", "./blob", "a.obj+blob"] {
+        let said = folder.fails(&format!("{scene} --size 16 -o blob")).unwrap();
+        assert!(said.contains("would be overwritten by its own picture"), "{scene}: {said}");
+    }
+    folder.says("validate blob").unwrap();
+}
+
+#[test]
 fn a_file_alone_is_rendered() {
     let folder = Folder::new("render").unwrap();
     let text = folder.says("a.obj --size 16").unwrap();
@@ -89,6 +100,69 @@ fn a_file_alone_is_rendered() {
             .unwrap()
             .contains("--depth is for --methods recursive")
     );
+}
+
+#[test]
+fn a_missing_folder_is_named_before_the_work() {
+    let folder = Folder::new("missing").unwrap();
+    for (words, expected) in [
+        ("a.obj -o no/a.png", "cannot write `no/a.png`: there is no folder `no`: make it"),
+        ("a.obj -o .", "cannot write `.`: it is a folder: name a file in it"),
+        ("pack a.obj -o no/a.hgrid", "there is no folder `no`: make it"),
+        ("pack a.obj -o a.obj/a.hgrid", "`a.obj` is a file: name a folder in its place"),
+        ("animate a.obj -o a.obj", "cannot write into `a.obj`: it is a file: name a folder"),
+        ("figures a.obj -o a.obj", "cannot write into `a.obj`: it is a file: name a folder"),
+    ] {
+        let said = folder.fails(words).unwrap();
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+}
+
+#[test]
+fn an_animation_needs_triangles_and_makes_no_folder_without() {
+    let folder = Folder::new("still").unwrap();
+    fs::write(folder.0.join("points.obj"), "v 0 0 0\n").unwrap();
+    for (words, expected) in [
+        ("points.obj", "`points.obj` has no triangles: nothing to animate"),
+        ("a.obj --method fixed --refit", "--refit is for --method bvh: ask for that"),
+        ("a.obj --method fixed --instances 2", "--instances is for --method bvh: ask for that"),
+    ] {
+        let said = folder.fails(&format!("animate {words} --frames 1 --size 9 -o frames")).unwrap();
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+    assert!(!folder.0.join("frames").exists());
+}
+
+#[test]
+fn what_is_no_file_is_refused() {
+    let folder = Folder::new("kinds").unwrap();
+    for command in ["info", "render", "validate"] {
+        let said = folder.fails(&format!("{command} .")).unwrap();
+        assert!(said.contains("it is a folder: name a file in it"), "{command}: {said}");
+    }
+    if cfg!(unix) {
+        let said = folder.fails("info /dev/null").unwrap();
+        assert!(
+            said.contains("it is a pipe or a device: write what it holds into a file"),
+            "{said}"
+        );
+    }
+}
+
+/// A full disk is an error with a message and a status, even if the message finds no room either.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_output_is_an_error() {
+    let folder = Folder::new("full").unwrap();
+    let full = || fs::File::options().write(true).open("/dev/full").unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hgrid"));
+    let command = command.current_dir(&folder.0).args(["info", "a.obj"]);
+    let output = command.stdout(full()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(said.starts_with("error: cannot write to standard output: "), "{said}");
+    let output = command.stdout(full()).stderr(full()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
 }
 
 #[test]
@@ -140,6 +214,8 @@ fn a_blob_can_be_an_array_of_c() {
         ("pack a.obj -o a.c", "add --c-array NAME"),
         ("pack a.obj -o b.hgrid --c-array b", "is not C by its name"),
         ("pack a.obj -o b.c --c-array 1b", "is no name in C"),
+        ("pack a.obj -o b.c --c-array int", "`int` has a meaning in C or C++: take another name"),
+        ("pack a.obj -o b.c --c-array class", "`class` has a meaning"),
         ("pack a.obj -o b.ply", "would be a mesh by its name"),
         ("pack a.obj -o b.hgrid --depth 2", "--depth is for --method recursive"),
     ] {

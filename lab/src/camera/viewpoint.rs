@@ -4,6 +4,7 @@
 //! flat, as a map          from above, at an angle
 //! a room with an open side    in through that side
 //! a room                  from within: the place and the direction that see farthest
+//! a sheet that faces x    from the right, a little above
 //! anything else           from the front, a little above
 //! ```
 //!
@@ -33,6 +34,11 @@ const OPEN_SIDE: u16 = LEVEL / 12;
 /// The view of a thing that is not flat.
 const THING: View = View::Angles { azimuth: 15.0, elevation: 12.0 };
 
+/// The view of a sheet that stands on edge toward the viewer, and the largest part of its height and depth that
+/// its width is: a wall that faces x.
+const SHEET: View = View::Angles { azimuth: 75.0, elevation: 12.0 };
+const SHEET_WIDTH: f64 = 0.05;
+
 /// The view of a flat scene.
 const MAP: View = View::Angles { azimuth: 25.0, elevation: 35.0 };
 
@@ -55,6 +61,10 @@ pub fn choose(world: World<'_>, part: Bounds, is_all: bool, up: Up, lens: Option
     let outside = |view| Camera::framing_through(lens.unwrap_or_default(), part, view, up);
     if is_flat(part, up) {
         return outside(MAP);
+    }
+    let [x, y, z] = up.turned(half_extent(part)).map(f64::abs);
+    if x < SHEET_WIDTH * y.min(z) {
+        return outside(SHEET);
     }
     let Point(middle) = Point::centre_of(part);
     if !is_all || !is_in_room(world, middle) {
@@ -189,6 +199,16 @@ mod tests {
         let regions = Regions::build(mesh, &Config::default()).unwrap();
         let grid = Grid::open(&regions.index, mesh).unwrap();
         ahead(&choose(World::Mesh(&grid), scene.framed_bounds(), true, Up::Y, None))
+    }
+
+    #[test]
+    fn a_wall_is_seen_from_its_broad_side() {
+        for (without, axis) in [([1, 2, 3, 4, 5], 0), ([0, 1, 2, 3, 5], 2)] {
+            let mut wall = room(&without);
+            wall.positions.iter_mut().for_each(|corner| corner[axis] = 0.0);
+            let (_, along) = chosen(&wall);
+            assert!(along[axis] < -0.9, "{along:?}");
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use anyhow::{Result, ensure};
 use clap::Args;
 
+use super::tuning::whole;
 use crate::camera::{Aim, Camera, Lens, Point, Up, View, viewpoint};
 use crate::scene::Scene;
 use crate::tiles::Tiles;
@@ -13,7 +14,7 @@ use crate::world::World;
 pub struct Picture {
     /// Pixels on each side
     #[arg(long, value_name = "PIXELS", allow_negative_numbers = true, default_value_t = 1024,
-          value_parser = clap::value_parser!(u16).range(1..=16_384))]
+          value_parser = whole(1..=16_384_u16))]
     pub size: u16,
     /// From which side to look, or a named view of the scene
     #[arg(long, allow_hyphen_values = true)]

@@ -8,6 +8,7 @@ use anyhow::{Result, ensure};
 use clap::{Parser, ValueEnum};
 use hgrid_core::{Config, Control, Method};
 
+use super::tuning::whole;
 use super::{DEFAULT_OUTPUT, DEFAULT_SCENE, Picture, Tuning, method_parser, thread_parser};
 use crate::heat::Counter;
 use crate::light::Lights;
@@ -33,11 +34,11 @@ pub struct RenderArgs {
     pub shading: Shading,
     /// Rays through each pixel, against jagged edges and noise [default: 4; 1 for the four grids of the paper]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true,
-          value_parser = clap::value_parser!(u16).range(1..=1024))]
+          value_parser = whole(1..=1024_u16))]
     samples: Option<u16>,
     /// Rays of ambient occlusion from each sample, 0 for none [default: 16 a pixel; 0 for the four grids of the paper]
     #[arg(long, value_name = "RAYS", allow_negative_numbers = true,
-          value_parser = clap::value_parser!(u16).range(0..=1024))]
+          value_parser = whole(0..=1024_u16))]
     ao: Option<u16>,
     /// The lamp casts no shadows
     #[arg(long)]
@@ -46,7 +47,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum)]
     pub counter: Option<Counter>,
     /// For heat: the number that is red, to compare pictures [default: what 99 of 100 rays take]
-    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = whole(1..=u32::MAX))]
     pub heat_top: Option<u32>,
     /// The structure to build
     #[arg(long, value_parser = method_parser(), default_value = Method::default().name())]

@@ -64,6 +64,23 @@ fn negative_numbers_are_refused_by_their_range() {
 }
 
 #[test]
+fn numbers_that_are_not_whole_are_refused_by_their_range() {
+    for (words, expected) in [
+        ("render --size 1e9", "'1e9' for '--size <PIXELS>': it is no whole number from 1 to 16384"),
+        ("render --size 1920x1080", "it is no whole number from 1 to 16384"),
+        ("render --size 100000000000000000000", "is not in 1..=16384"),
+        ("render --threads 1.5", "it is no whole number from 1 to 64"),
+        ("render --heat-top 0", "0 is not in 1..=4294967295"),
+        ("render --depth two", "it is no whole number from 0 to 4294967295"),
+        ("table a.ply --repeat NaN", "it is no whole number from 1 to 1000"),
+    ] {
+        let words = ["hgrid"].into_iter().chain(words.split(' '));
+        let message = Cli::try_parse_from(words).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
+    }
+}
+
+#[test]
 fn a_misspelt_command_is_no_file() {
     let message = |words: &str| {
         let words = words.split(' ').map(OsString::from);
@@ -118,7 +135,9 @@ fn parameters_of_others_are_refused() {
         TableArgs::parse_from(["hgrid", "a.ply"].into_iter().chain(words.split(' '))).race.check()
     };
     check("--depth 2").unwrap();
-    check("--methods fixed,bvh --quality high").unwrap();
+    check("--methods fixed,bvh --quality high --threads 2").unwrap();
+    let message = check("--methods fixed --threads 2").unwrap_err().to_string();
+    assert!(message.contains("--threads is for --methods bvh"), "{message}");
     let message = check("--methods fixed,bvh --depth 2").unwrap_err().to_string();
     assert!(message.contains("--depth is for --methods recursive"), "{message}");
 }

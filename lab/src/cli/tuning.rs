@@ -1,5 +1,9 @@
 //! The arguments for the parameters of single methods.
 
+use core::fmt;
+use core::num::IntErrorKind;
+use core::ops::RangeInclusive;
+
 use anyhow::{Result, ensure};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -9,13 +13,13 @@ use hgrid_core::{Config, Control, Method, Parameters, Quality};
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Tuning {
     /// For `fixed`: cells in a macrocell on each axis [default: the paper's, 6]
-    #[arg(long, value_name = "CELLS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "CELLS", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     pub macrocell_factor: Option<u32>,
     /// For `variable`: a cell with more triangles than this gets a subgrid [default: 16]
-    #[arg(long, value_name = "TRIANGLES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "TRIANGLES", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     pub subdivide_above: Option<u32>,
     /// For `recursive`: levels of grids [default: the paper's, 3]
-    #[arg(long, value_name = "LEVELS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "LEVELS", allow_negative_numbers = true, value_parser = whole(0..=u32::MAX))]
     pub depth: Option<u32>,
     /// For `bvh`: `high` builds longer for rays that are faster [default: fast]
     #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
@@ -65,7 +69,24 @@ impl Tuning {
 
 /// Parses a number of threads, at most as many as a build can use.
 pub(super) fn thread_parser() -> impl TypedValueParser<Value = u32> {
-    clap::value_parser!(u32).range(1..=i64::from(Control::MAX_TASKS))
+    whole(1..=Control::MAX_TASKS)
+}
+
+/// Parses a whole number in a range, and names the range to who writes `1e9` or `1920x1080`.
+pub(super) fn whole<T>(range: RangeInclusive<T>) -> impl TypedValueParser<Value = T>
+where
+    T: Copy + PartialOrd + fmt::Display + TryFrom<i64> + Send + Sync + 'static,
+{
+    move |word: &str| {
+        let (start, end) = (range.start(), range.end());
+        let number = match word.parse::<i64>().map_err(|error| *error.kind()) {
+            Ok(number) => T::try_from(number).ok(),
+            Err(IntErrorKind::PosOverflow | IntErrorKind::NegOverflow) => None,
+            Err(_) => return Err(format!("it is no whole number from {start} to {end}")),
+        };
+        let number = number.filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("{word} is not in {start}..={end}"))
+    }
 }
 
 /// Parses the name of a method.

@@ -45,6 +45,7 @@ use clap::ValueEnum as _;
 use hgrid_core::{Method, Parameters, Quality};
 
 use crate::cli::CompareArgs;
+use crate::image::{check_writable, make_folder};
 use grid::{GridSystem, HIGH};
 use numbers::Comparison;
 use peers::Peer;
@@ -62,8 +63,10 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let mut systems = methods_of(&args.methods, args.quality);
     systems.extend(peers::systems(&args.peers)?);
     if let Some(folder) = &args.output {
-        fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder `{}`", folder.display()))?;
+        make_folder(folder)?;
+    }
+    if let Some(path) = &args.json {
+        check_writable(path)?;
     }
     process::pin_to_one_core()?;
 

@@ -16,6 +16,7 @@ use plotters::prelude::RGBColor;
 use serde::Serialize;
 
 use crate::cli::FiguresArgs;
+use crate::image;
 use crate::plot::{COLORS, Drawing, save, svg};
 use crate::table::Results;
 
@@ -25,8 +26,7 @@ use crate::table::Results;
 /// If a scene cannot be loaded or built, or a file cannot be written.
 pub fn run(args: &FiguresArgs) -> Result<()> {
     let folder = &args.output;
-    let context = || format!("cannot write into `{}`", folder.display());
-    fs::create_dir_all(folder).with_context(context)?;
+    image::make_folder(folder)?;
 
     let curves = density::Curves::measure(args)?;
     write(&density::Figure(&curves), &curves, folder, "figure1")?;

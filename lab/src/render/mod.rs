@@ -29,10 +29,14 @@ use crate::light::Lights;
 use crate::measure::{self, SceneFacts, ratio};
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::shade::{Rgb, Shader};
+use crate::scene::model::Model;
+use crate::shade::{Rgb, Shader, normal_of};
 use crate::threads::Threads;
 use crate::tiles::Tiles;
 use crate::world::{World, on_mesh};
+
+/// The largest coordinate that rays are precise for.
+const LARGEST: f32 = 1e30;
 
 /// Renders, writes the picture and prints the numbers.
 ///
@@ -45,6 +49,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let start = Instant::now();
     let (scene, model) = Scene::open(&args.scene, args.takes_instances())?;
     let load_seconds = start.elapsed().as_secs_f64();
+    // Only now, because a file that is no mesh has an error of its own.
+    image::check_sources(&args.output, &args.scene, "picture")?;
     let facts = match &model {
         None => SceneFacts::of(&scene),
         Some(model) => SceneFacts::of_model(&scene.name, model),
@@ -64,11 +70,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     };
     let rendered = build(&scene, model.as_ref(), &args.config(), &threads, render);
     let (built, outcome, render_seconds) = rendered.with_context(none)?;
-    ensure!(
-        outcome.hits > 0,
-        "{}: no ray hits anything; look from elsewhere, by --view, or by --eye and --target",
-        none()
-    );
+    ensure!(outcome.hits > 0, "{}: {}", none(), unseen(args, &scene, model.as_ref()));
     let Picture { size, pixels } = outcome.picture;
     image::write_png(&args.output, size, &pixels)?;
 
@@ -100,6 +102,30 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         writeln!(out, "{summary}\nwrote {}{note}", args.output.display())?;
     }
     Ok(())
+}
+
+/// Returns the reason why no ray hits anything, and the remedy.
+fn unseen(args: &RenderArgs, scene: &Scene, model: Option<&Model>) -> &'static str {
+    let shown = model.into_iter().flat_map(|model| &model.meshes);
+    let shown = shown.map(|mesh| (&mesh.positions, &mesh.indices));
+    let mut meshes = shown.chain([(&scene.positions, &scene.indices)]);
+    let has_area = |positions: &[[f32; 3]], triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|vertex| positions.get(vertex as usize).copied());
+        let (Some(a), Some(b), Some(c)) = (a, b, c) else { return false };
+        [a, b, c].as_flattened().iter().all(|c| c.is_finite()) && normal_of(&[a, b, c]).is_some()
+    };
+    if !meshes.any(|(positions, indices)| indices.iter().any(|it| has_area(positions, it))) {
+        return "no triangle has finite corners and an area; `hgrid info` counts the others";
+    }
+    let (min, max) = scene.framed_bounds();
+    if min.iter().chain(&max).any(|c| c.abs() > LARGEST) {
+        return "no ray hits anything: its coordinates are larger than 1e30; scale them down";
+    }
+    if args.picture.view.is_none() && args.picture.eye.is_none() {
+        return "no ray hits anything: what it shows is smaller than a pixel; take a larger --size, or look from \
+                nearby, by --eye and --target";
+    }
+    "no ray hits anything; look from elsewhere, by --view, or by --eye and --target"
 }
 
 /// A picture, with the numbers of its rendering.
@@ -251,7 +277,11 @@ mod tests {
     #[test]
     fn failures_leave_no_picture_and_name_the_cause() {
         let nowhere = "v nan 0 0\nv nan 0 0\nv 0 nan 0\nf 1 2 3\n";
-        let cases: [(&str, &str, &str); 14] = [
+        let flat = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
+        let not_finite = "v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n";
+        let huge = "v 0 0 0\nv 3e38 0 0\nv 0 3e38 0\nf 1 2 3\n";
+        let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1e9 1e9 1e9\nf 1 2 3\n";
+        let cases: [(&str, &str, &str); 18] = [
             ("--method fixed --density -1", TRIANGLE, "density"),
             ("--ao 4 --shading normals", TRIANGLE, "--ao is for --shading diffuse"),
             ("--no-shadows --shading heat", TRIANGLE, "--no-shadows is for --shading diffuse"),
@@ -263,7 +293,11 @@ mod tests {
             ("--depth 2", TRIANGLE, "--depth is for --method recursive"),
             ("--method fixed --quality high", TRIANGLE, "--quality is for --method bvh"),
             ("--eye 1,2,3 --target 1,2,3", TRIANGLE, "--eye and --target are the same point"),
-            ("--eye 1,2,3 --target 1,2,4", TRIANGLE, "no ray hits anything"),
+            ("--eye 1,2,3 --target 1,2,4", TRIANGLE, "no ray hits anything; look from elsewhere"),
+            ("--json", flat, "no triangle has finite corners and an area"),
+            ("--json", not_finite, "no triangle has finite corners and an area"),
+            ("--json", huge, "its coordinates are larger than 1e30; scale them down"),
+            ("--json", apart, "smaller than a pixel; take a larger --size"),
             ("--json", "v 0 0 0\n", "it has no triangles"),
             ("--json", nowhere, "no vertex has finite coordinates"),
         ];

@@ -3,7 +3,7 @@
 //! For formats whose files start with a mark, the mark goes before the name. A file with the mark of a
 //! foreign format gets an error that names that format.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Read as _;
 use std::path::Path;
 
@@ -12,6 +12,7 @@ use hgrid_core::{BlobInfo, Error};
 
 use super::model::Model;
 use super::{gltf, obj, packed, ply, stl};
+use crate::file;
 
 /// The endings of readable files, for messages.
 pub const ENDINGS: &str = ".ply, .obj, .stl, .gltf, .glb or .hgrid";
@@ -51,8 +52,7 @@ impl Format {
     /// # Errors
     /// If the file cannot be read, or has none of the formats.
     pub fn of(path: &Path) -> Result<Self> {
-        let mut file = File::open(path).context("cannot open it")?;
-        ensure!(!file.metadata()?.is_dir(), "it is a folder: name a file in it");
+        let mut file = file::open(path)?;
         let mut start = Vec::new();
         file.by_ref().take(512).read_to_end(&mut start).context("cannot read it")?;
         Self::of_content(&start, Self::named(path))

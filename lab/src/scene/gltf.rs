@@ -20,12 +20,22 @@ use crate::vector::round;
 /// A matrix in `f64`, so that the product of a chain of nodes is rounded once.
 type Matrix = [[f64; 4]; 3];
 
+/// The first words of extensions that change materials, textures and lights, and leave triangles alone.
+const LOOKS: [&str; 6] = [
+    "KHR_materials_",
+    "KHR_texture_",
+    "KHR_lights_",
+    "EXT_texture_",
+    "EXT_lights_",
+    "MSFT_texture_",
+];
+
 /// Reads the bytes of a file, and the files that it names beside it.
 ///
 /// # Errors
 /// If it is not valid glTF, requires an unsupported extension, or names missing data.
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Model> {
-    let Gltf { document, blob } = Gltf::from_slice(bytes).context("it is not a valid glTF file")?;
+    let (document, blob) = parse(bytes)?;
     let buffers = buffers(&document, blob, path.parent().unwrap_or(Path::new("")))?;
     let mut model = Model::default();
     // Each glTF mesh has a range of primitives in `model.meshes`.
@@ -42,6 +52,26 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Model> {
     }
     model.instances = instances(&document, &places)?;
     Ok(model)
+}
+
+/// Parses and checks a file. Extensions that change how surfaces look are allowed even if the file requires them.
+fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
+    let cannot = "it is not a valid glTF file";
+    // Bytes 8 to 11 of a binary file are its length.
+    if let Some([b'g', b'l', b'T', b'F', _, _, _, _, a, b, c, d]) = bytes.first_chunk() {
+        let (needed, there) = (u32::from_le_bytes([*a, *b, *c, *d]), bytes.len());
+        let is_whole = there as u64 >= u64::from(needed);
+        ensure!(is_whole, "it is cut off: it has {there} bytes of {needed}");
+    }
+    let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).context(cannot)?;
+    let mut root = document.into_json();
+    root.extensions_required.retain(|name| !LOOKS.iter().any(|start| name.starts_with(start)));
+    if let Some(name) = root.extensions_required.first() {
+        bail!(
+            "it requires the extension {name}, which hgrid does not read: export it without that"
+        );
+    }
+    Ok((Document::from_json(root).context(cannot)?, blob))
 }
 
 /// Reads all buffers: the binary part of the file, files beside it, or text in it.
@@ -259,6 +289,19 @@ mod tests {
         ];
         let model = read(&file.concat(), Path::new("scene.glb")).unwrap();
         assert_eq!(model, read_text(&as_text()).unwrap());
+        let file = file.concat();
+        let (cut, length) = (&file[..file.len() - 9], file.len());
+        let message = read(cut, Path::new("scene.glb")).unwrap_err().to_string();
+        assert_eq!(message, format!("it is cut off: it has {} bytes of {length}", length - 9));
+    }
+
+    #[test]
+    fn extensions_for_looks_are_no_hindrance() {
+        let names =
+            r#""extensionsRequired": ["KHR_materials_unlit", "KHR_texture_basisu"], "asset""#;
+        let texture = r#""textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}], "#;
+        let text = as_text().replacen(r#""asset""#, &[texture, names].concat(), 1);
+        assert_eq!(read_text(&text).unwrap(), read_text(&as_text()).unwrap());
     }
 
     #[test]
@@ -279,7 +322,7 @@ mod tests {
             (
                 r#""asset""#,
                 r#""extensionsRequired": ["KHR_draco_mesh_compression"], "asset""#,
-                "draco",
+                "requires the extension KHR_draco_mesh_compression, which hgrid does not read",
             ),
             (r#""mesh": 0"#, r#""mesh": 8"#, "not a valid glTF file"),
             ("{", "[", "not a valid glTF file"),

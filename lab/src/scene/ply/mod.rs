@@ -4,6 +4,7 @@
 //! triangles needs no second copy. Everything but coordinates and lists of corners is skipped. The elements
 //! that nearly every binary file has are decoded a buffer at a time ([`fast`]), all others number by number.
 
+mod ascii;
 mod fast;
 
 use std::fs::File;
@@ -100,21 +101,27 @@ fn each<E: PropertyAccess>(
             Encoding::Ascii => {
                 line.clear();
                 match source.read_line(&mut line) {
-                    Ok(0) => Err(std::io::Error::from(ErrorKind::UnexpectedEof).into()),
-                    Ok(_) => parser.read_ascii_element(&line, element),
+                    Ok(0) => return Err(cut_off(number, element)),
+                    Ok(_) => ascii::read(&line, element),
                     Err(error) => Err(error.into()),
                 }
             }
-            Encoding::BinaryLittleEndian => parser.read_little_endian_element(source, element),
-            Encoding::BinaryBigEndian => parser.read_big_endian_element(source, element),
+            Encoding::BinaryLittleEndian | Encoding::BinaryBigEndian => {
+                let value = match encoding {
+                    Encoding::BinaryLittleEndian => {
+                        parser.read_little_endian_element(source, element)
+                    }
+                    _ => parser.read_big_endian_element(source, element),
+                };
+                if let Err(error) = value.as_ref()
+                    && error.kind() == ErrorKind::UnexpectedEof
+                {
+                    return Err(cut_off(number, element));
+                }
+                value.map_err(Into::into)
+            }
         };
-        if let Err(error) = value.as_ref()
-            && error.kind() == ErrorKind::UnexpectedEof
-        {
-            return Err(cut_off(number, element));
-        }
         value
-            .map_err(Into::into)
             .and_then(&mut take)
             .with_context(|| format!("`{}` element {number}", element.name))?;
     }
@@ -196,7 +203,7 @@ impl Face {
     /// Appends the triangle fan around the first corner; fewer than three corners give no triangle.
     fn fan(&self, triangles: &mut Vec<[u32; 3]>) -> Result<()> {
         let mut corners = self.0.iter().map(|&corner| {
-            u32::try_from(corner).with_context(|| format!("vertex {corner} does not exist"))
+            u32::try_from(corner).map_err(|_| anyhow!("vertex {corner} does not exist"))
         });
         let (Some(first), Some(second)) = (corners.next(), corners.next()) else { return Ok(()) };
         let (first, mut previous) = (first?, second?);
@@ -334,6 +341,15 @@ mod tests {
     }
 
     #[test]
+    fn text_has_the_numbers_that_programs_write() {
+        let text = String::from_utf8(ascii()).unwrap();
+        let text = text.replace("\n1 0 0 2", "\n1. -.0 +0 2").replace("0 1 5e-1 4", "nan -inf 0 4");
+        let mesh = read_all(text.as_bytes()).unwrap();
+        assert_eq!(mesh.positions[..2], VERTICES[..2]);
+        assert!(mesh.positions[3][0].is_nan() && mesh.positions[3][1].is_infinite());
+    }
+
+    #[test]
     fn every_cut_is_reported() {
         let file = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);
         for length in 0..file.len() - 1 {
@@ -350,7 +366,10 @@ mod tests {
         assert!(message(b"").contains("not a PLY file"));
         let text = String::from_utf8(ascii()).unwrap();
         let broken = [
-            ("1 0 0 2", "1 zero 0 2", "`vertex` element 1"),
+            ("1 0 0 2", "1 zero 0 2", "`vertex` element 1: `zero` is no number that fits here"),
+            ("1 0 0 2", "1 0", "`vertex` element 1: the line ends before `z`"),
+            ("3 3 2 1 9", "3 3 2.5 1 9", "`face` element 1: `2.5` is no number that fits here"),
+            ("3 3 2 1 9", "3 3 2", "`face` element 1: the line ends before `vertex_indices`"),
             ("3 3 2 1 9", "3 3 -2 1 9", "`face` element 1: vertex -2 does not exist"),
             ("vertex_indices", "corners", "no `vertex_indices`"),
             ("float z", "float w", "no `z`"),
