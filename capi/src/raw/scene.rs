@@ -250,7 +250,7 @@ unsafe fn apart_from(
     objects: &[Object<'_>],
     regions: [Region; 2],
 ) -> Result<[&'static mut [u8]; 2], hgrid_status> {
-    let written = regions.map(|region| region.span());
+    let written = regions.map(Region::span);
     let is_shared = |object: &Object<'_>| written.iter().any(|&span| touches(object, span));
     if objects.iter().any(is_shared) {
         return Err(HGRID_ERROR_OVERLAP);

@@ -234,10 +234,9 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
         let (begin, cull, afar) = (*begin, *cull, *afar);
         let nearby = if afar.is_none() { Slab::nearby(ray, begin, bounds) } else { afar.copied() };
         let Some((slab, filter)) = nearby else { return false };
-        let slab = &slab;
         // Boxes need no filter: the compiler drops its computation.
         let filter = if F::OF_BOXES { RayFilter::NONE } else { filter };
-        let given = ray;
+        let (slab, given) = (&slab, ray);
         // Hide the vectors from the compiler: it would compute in one lane and broadcast the result, which lengthens
         // the dependency chain from one node to the next.
         let wide = HAS_VECTORS.then(
