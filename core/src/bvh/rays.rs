@@ -12,7 +12,7 @@ use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};
 use zerocopy::{transmute_mut, transmute_ref};
 
 use super::boxes::{Beam, Slabs, bits, splat};
-use super::slab::{EARLIER, STEEP, TINY, WIDER};
+use super::slab::{EARLIER, STEEP, TINY, WIDER, growth_of_range};
 use crate::aabb::{Aabb, lesser};
 use crate::approach::FAR_EXTENTS;
 use crate::eight::columns;
@@ -44,6 +44,8 @@ pub(crate) struct Rays {
     pub(crate) starts_at_box: bool,
     /// The most that origins may be off, in scene units: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) origin_error: f32,
+    /// The extent of the scene.
+    extent: f32,
     /// The point that boxes and origins are relative to.
     pub(crate) center: [f32; 3],
     /// Eight roundings of the origin farthest from the center: the growth of boxes that covers them.
@@ -88,6 +90,7 @@ impl Rays {
         Self {
             alive: 0,
             choice,
+            extent: 0.0,
             center: [0.0; 3],
             starts_at_box: false,
             origin_error: 0.0,
@@ -124,6 +127,7 @@ impl Rays {
         let size = bounds.size();
         let half = (size * 0.5).to_array();
         let extent = size.max_element();
+        self.extent = extent;
         let near = f32x8::splat(simd, FAR_EXTENTS * extent);
         let zero = f32x8::splat(simd, 0.0);
         let finite = f32x8::splat(simd, f32::INFINITY);
@@ -447,8 +451,8 @@ impl Rays {
     pub(crate) fn end_at(&mut self, ray: u32, t: f32) {
         // Hits that round to the same t may lie farther away: see `Slab::nearby`.
         let scale = get(&self.scale, ray);
-        let (end, tiny) = (t * scale, TINY * scale.max(1.0));
-        put(&mut self.end, ray as usize % GROUP, end + (end.abs() * (WIDER - 1.0) + tiny));
+        let (end, growth) = (t * scale, growth_of_range(self.extent, scale));
+        put(&mut self.end, ray as usize % GROUP, end + (end.abs() * (WIDER - 1.0) + growth));
     }
 }
 

@@ -10,6 +10,8 @@
 //! - **Relative errors.** A side is subtracted, multiplied and added with at most six roundings. So `far` is
 //!   computed with an inverse direction that is larger by 2^-20, and the range of the ray is widened alike.
 //! - **Absolute errors** where the terms cancel: absorbed by the margin of quantised boxes ([`node`](super::node)).
+//! - **Errors of a hit's `t`**, where the range begins or ends at one: a part is that of the triangle's corners
+//!   ([`triangle`](crate::triangle)), so the range grows by a part of the scene, too.
 //! - **Zero directions.** Their inverse is [`STEEP`]: no box is thinner than 2^-60 of the scene and its margin is
 //!   2^-6 of a step, so a ray inside one leaves it behind the end of the scene, and one outside never
 //!   enters. Products stay finite as long as the scene is smaller than 2^50; beyond, a NaN counts as a
@@ -45,6 +47,15 @@ fn behind(distance: f32) -> f32 {
 /// More than what underflows on the way to a distance.
 pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
 
+/// Twice the error of a hit's `t` that its corners cause, in parts of the scene's extent: 2^-37.
+const OF_CORNERS: f32 = 1.0 / 137_438_953_472.0;
+
+/// Returns the amount by which a range grows at both ends, in scaled distances, beside what is relative to the ends.
+#[inline(always)]
+pub(crate) fn growth_of_range(extent: f32, scale: f32) -> f32 {
+    extent * OF_CORNERS + TINY * scale.max(1.0)
+}
+
 /// A ray, ready for boxes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slab {
@@ -61,6 +72,8 @@ pub(crate) struct Slab {
     scale: f64,
     /// The scale of a ray that starts at its origin; 0 of others.
     nearby: f32,
+    /// What [`growth_of_range`] returns.
+    growth: f32,
 }
 
 impl Slab {
@@ -97,23 +110,29 @@ impl Slab {
         // select, and the product that is not selected is computed, too.
         let start = lesser(begin * scale, f32::MAX);
         let end = greater(ray.t_max * scale, -f32::MAX);
-        let tiny = TINY * scale.max(1.0);
+        let extent = size.max_element();
+        let growth = growth_of_range(extent, scale);
         let half = (size * 0.5).to_array();
         let distance = greater(a + half[0], greater(b + half[1], c + half[2]));
-        let slack = if begin < 0.0 { behind(distance) } else { 0.0 };
-        let near = |axis: usize| ray.origin[axis] + slack.copysign(inverse[axis]);
+        // Hits that lie behind the origin are those of a negative `t_min`, wherever this walk begins.
+        let has_behind = ray.t_min < 0.0;
+        let near = |axis: usize| {
+            let at = ray.origin[axis];
+            if has_behind { moved(at, behind(distance).copysign(inverse[axis])) } else { at }
+        };
         let slab = Self {
             origin_near: [near(0), near(1), near(2)],
             origin_far: ray.origin,
             inverse,
-            start: start - (start.abs() * EARLIER + tiny),
-            end: end + (end.abs() * (WIDER - 1.0) + tiny),
+            start: start - (start.abs() * EARLIER + growth),
+            end: end + (end.abs() * (WIDER - 1.0) + growth),
             t: 0.0,
             scale: f64::from(scale),
             nearby: scale,
+            growth,
         };
         let sum = direction[0].abs() + direction[1].abs() + direction[2].abs();
-        let filter = RayFilter::nearby(ray.origin, direction, sum, distance, size.max_element());
+        let filter = RayFilter::nearby(ray.origin, direction, sum, distance, extent);
         Some((slab, filter))
     }
 
@@ -131,14 +150,8 @@ impl Slab {
         };
         let inverse = [inverse(x), inverse(y), inverse(z)];
         let slack = approach.slack + behind(round(approach.reach.distance));
-        let near = |axis: usize| {
-            let at = approach.anchor[axis];
-            if inverse[axis] > 0.0 { (at + slack).next_up() } else { (at - slack).next_down() }
-        };
-        let far = |axis: usize| {
-            let at = approach.anchor[axis];
-            if inverse[axis] > 0.0 { (at - slack).next_down() } else { (at + slack).next_up() }
-        };
+        let near = |axis: usize| moved(approach.anchor[axis], slack.copysign(inverse[axis]));
+        let far = |axis: usize| moved(approach.anchor[axis], -slack.copysign(inverse[axis]));
         let mut slab = Self {
             origin_near: [near(0), near(1), near(2)],
             origin_far: [far(0), far(1), far(2)],
@@ -148,6 +161,7 @@ impl Slab {
             t: approach.t,
             scale,
             nearby: 0.0,
+            growth: growth_of_range(round(approach.reach.extent), 1.0),
         };
         slab.start = slab.earliest(begin);
         slab.end = slab.latest(ray.t_max);
@@ -169,7 +183,7 @@ impl Slab {
         let distance = round((f64::from(t.next_down()) - self.t) * self.scale);
         // Infinity minus its margin would be a NaN.
         let distance = lesser(distance, f32::MAX);
-        (distance - distance.abs() * EARLIER) - TINY
+        (distance - distance.abs() * EARLIER) - self.growth
     }
 
     /// A distance no nearer than that of any number that rounds to `t`.
@@ -178,11 +192,10 @@ impl Slab {
         if self.nearby > 0.0 {
             // Compute it as [`nearby`](Self::nearby) does: the margin covers all that rounds to the same t.
             let distance = t * self.nearby;
-            let tiny = TINY * self.nearby.max(1.0);
-            return distance + (distance.abs() * (WIDER - 1.0) + tiny);
+            return distance + (distance.abs() * (WIDER - 1.0) + self.growth);
         }
         let distance = round((f64::from(t.next_up()) - self.t) * self.scale);
-        (distance + distance.abs() * (WIDER - 1.0)) + TINY
+        (distance + distance.abs() * (WIDER - 1.0)) + self.growth
     }
 
     /// The inverse direction for far sides.
@@ -190,4 +203,10 @@ impl Slab {
     pub(crate) fn inverse_far(&self) -> [f32; 3] {
         self.inverse.map(|inverse| inverse * WIDER)
     }
+}
+
+/// Moves a coordinate by at least an amount, however it is rounded.
+#[inline(always)]
+fn moved(at: f32, by: f32) -> f32 {
+    if by.is_sign_positive() { (at + by).next_up() } else { (at + by).next_down() }
 }

@@ -206,6 +206,10 @@ pub(super) struct Seen {
 /// Objects farther away than so many of their extents are seen from where the ray enters their box.
 const FAR_EXTENTS: f64 = 4.0;
 
+/// Twice the error of a hit's `t` that the triangle's corners cause, in parts of the object's extent: 2^-37. With it a
+/// hit is found again in another instance at the same place.
+const OF_CORNERS: f64 = 1.0 / 137_438_953_472.0;
+
 /// The rounding of f64 moves the origin of a ray by 2^-23 of an extent if it comes from so many extents away. At 2^-19
 /// it passes the growth of the box ([`GROWTH`]); the rest is a margin.
 const AFAR: f64 = 536_870_912.0; // 2^29
@@ -249,7 +253,7 @@ impl Seen {
             self.shift = self.entry(&center, &half)?;
         }
         let at = |axis: usize| round(origin[axis] + self.shift * direction[axis]);
-        let (limit, t_max) = (self.limit(limit), self.inward(ray.t_max));
+        let (limit, t_max) = (self.limit(limit, extent * OF_CORNERS), self.inward(ray.t_max));
         Some(Ray {
             origin: [at(0), at(1), at(2)],
             t_min: self.inward(ray.t_min),
@@ -289,9 +293,10 @@ impl Seen {
         round(f64::from(t) * self.scale - self.shift)
     }
 
-    /// A `t` of the object's ray that is no nearer than any that rounds to this one of the scene's ray.
-    fn limit(&self, t: f32) -> f32 {
-        round(f64::from(t.next_up()) * self.scale - self.shift).next_up()
+    /// The end of the object's ray behind a hit at a `t` of the scene's ray: no nearer than any hit of this object, whose
+    /// own `t` may be off by `error`, that has the same `t` there.
+    fn limit(&self, t: f32, error: f64) -> f32 {
+        round(f64::from(t.next_up()) * self.scale - self.shift + error).next_up()
     }
 
     /// The `t` of the scene's ray, which lies in that ray's range.
