@@ -5,6 +5,7 @@ mod batches;
 mod closest;
 mod exact;
 mod filters;
+mod flat;
 mod forms;
 mod hits;
 mod joined;

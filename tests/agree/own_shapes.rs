@@ -106,6 +106,44 @@ fn closest_and_any_are_those_of_a_loop_over_all_shapes() {
 }
 
 #[test]
+fn hits_behind_the_origin_are_found_however_far_from_zero() {
+    let mut random = Random(29);
+    for offset in [0.0, 64.0, 1000.0, 1e5] {
+        for round in 0..400 {
+            // Boxes that are flat on one axis. A shape is the middle of its box.
+            let axis = round % 3;
+            let boxes: Vec<[f32; 6]> = (0..1 + round % 9)
+                .map(|_| {
+                    let middle = random.point().map(|c| offset + (c * 8.0).round());
+                    let side = |k: usize, to: f32| middle[k] + if k == axis { 0.0 } else { to };
+                    std::array::from_fn(|i| side(i % 3, [-1.0, 1.0][i / 3]))
+                })
+                .collect();
+            let middle = |id: u32| {
+                [0, 1, 2].map(|k| 0.5 * (boxes[id as usize][k] + boxes[id as usize][k + 3]))
+            };
+            let views = Boxes::new(&boxes).unwrap();
+            let built = Built::shapes(views, &Config::default()).unwrap();
+            let shapes = Shapes::open(built.bytes(), views).unwrap();
+            // The ray passes through the middle of the first one at t = -3, without rounding.
+            let direction = random.point().map(|c| (c * 4.0).round());
+            if direction == [0.0; 3] {
+                continue;
+            }
+            let target = middle(0);
+            let origin = [0, 1, 2].map(|k| target[k] + 3.0 * direction[k]);
+            let ray = Ray { t_min: -8.0, t_max: -2.0, ..Ray::new(origin, direction) };
+            let mut test = |id: u32, _: &Ray| {
+                (middle(id) == target).then_some(ShapeHit { t: -3.0, u: 0.0, v: 0.0 })
+            };
+            let hit = shapes.intersect(&ray, &mut test);
+            assert_eq!(hit.map(|hit| hit.t), Some(-3.0), "{ray:?} {boxes:?}");
+            assert!(shapes.occluded(&ray, &mut test));
+        }
+    }
+}
+
+#[test]
 fn batches_answer_as_each_ray_alone() {
     for (count, size) in [(0, 1.0), (1, 1.0), (9, 0.3), (400, 0.1), (3000, 0.02)] {
         let all = spheres(count, size, 3);
