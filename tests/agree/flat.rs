@@ -123,7 +123,10 @@ fn the_first_of_the_instances_at_one_place_is_hit() {
             let alone = scene.intersect(ray).unwrap_or(SceneHit::MISS);
             assert_eq!(*found, alone, "{ray:?}");
             let is_first = alone.path[0] == 0;
-            assert!(is_first || alone.path[0] == INVALID_ID || alone.path[0] % 4 != 0, "{ray:?}");
+            assert!(
+                is_first || alone.path[0] == INVALID_ID || !alone.path[0].is_multiple_of(4),
+                "{ray:?}"
+            );
             hits += usize::from(is_first);
         }
     }

@@ -26,6 +26,7 @@ use crate::aabb::{Aabb, greater, lesser};
 use crate::approach::{Approach, FAR_EXTENTS};
 use crate::filter::{NEARBY_LONG, NEARBY_SHORT, RayFilter};
 use crate::ray::{Ray, round};
+use crate::triangle::OF_CORNERS;
 
 /// The inverse of a direction that is zero, or too small to divide by.
 pub(crate) const STEEP: f32 = 32_768.0 * 1_048_576.0 * 1_048_576.0 * 1_048_576.0; // 2^75
@@ -47,10 +48,8 @@ fn behind(distance: f32) -> f32 {
 /// More than what underflows on the way to a distance.
 pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
 
-/// Twice the error of a hit's `t` that its corners cause, in parts of the scene's extent: 2^-37.
-const OF_CORNERS: f32 = 1.0 / 137_438_953_472.0;
-
-/// Returns the amount by which a range grows at both ends, in scaled distances, beside what is relative to the ends.
+/// Returns the amount by which a range grows at both ends, in scaled distances, beside what is relative to the ends: for
+/// the error of a `t`, and for underflow.
 #[inline(always)]
 pub(crate) fn growth_of_range(extent: f32, scale: f32) -> f32 {
     extent * OF_CORNERS + TINY * scale.max(1.0)

@@ -25,6 +25,7 @@ use crate::aabb::{greater, lesser};
 use crate::approach::LineF64;
 use crate::limits::MAX_COORDINATE;
 use crate::ray::{Ray, RayF64, round};
+use crate::triangle::OF_CORNERS;
 
 /// An object at a place in a scene: 72 bytes.
 #[repr(C)]
@@ -206,10 +207,6 @@ pub(super) struct Seen {
 /// Objects farther away than so many of their extents are seen from where the ray enters their box.
 const FAR_EXTENTS: f64 = 4.0;
 
-/// Twice the error of a hit's `t` that the triangle's corners cause, in parts of the object's extent: 2^-37. With it a
-/// hit is found again in another instance at the same place.
-const OF_CORNERS: f64 = 1.0 / 137_438_953_472.0;
-
 /// The rounding of f64 moves the origin of a ray by 2^-23 of an extent if it comes from so many extents away. At 2^-19
 /// it passes the growth of the box ([`GROWTH`]); the rest is a margin.
 const AFAR: f64 = 536_870_912.0; // 2^29
@@ -253,7 +250,8 @@ impl Seen {
             self.shift = self.entry(&center, &half)?;
         }
         let at = |axis: usize| round(origin[axis] + self.shift * direction[axis]);
-        let (limit, t_max) = (self.limit(limit, extent * OF_CORNERS), self.inward(ray.t_max));
+        let error = extent * f64::from(OF_CORNERS);
+        let (limit, t_max) = (self.limit(limit, error), self.inward(ray.t_max));
         Some(Ray {
             origin: [at(0), at(1), at(2)],
             t_min: self.inward(ray.t_min),
