@@ -5,6 +5,7 @@
 //! (alignment and length), never assumed.
 
 use core::fmt;
+use core::ops::Range;
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -141,5 +142,16 @@ pub(crate) fn copy<T: Copy>(from: &[T], to: &mut [T]) {
     debug_assert!(from.len() == to.len(), "sections of two lengths");
     for (to, from) in to.iter_mut().zip(from) {
         *to = *from;
+    }
+}
+
+/// Moves elements to an earlier place, as `copy_within`, which can panic, does.
+pub(crate) fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
+    debug_assert!(to <= from.start && from.end <= elements.len(), "elements move past an end");
+    for (at, to) in from.zip(to..) {
+        let Some(&element) = elements.get(at) else { return };
+        if let Some(slot) = elements.get_mut(to) {
+            *slot = element;
+        }
     }
 }

@@ -31,6 +31,11 @@ pub(crate) struct CellRange {
 }
 
 impl CellRange {
+    /// All cells of a grid.
+    pub(crate) fn all(resolution: [u32; 3]) -> Self {
+        Self { min: [0; 3], max: resolution.map(|cells| cells - 1) }
+    }
+
     /// Number of cells.
     #[inline(always)]
     pub(crate) fn count(&self) -> u64 {
@@ -261,18 +266,16 @@ pub(crate) const fn whole(position: f32) -> u32 {
     position as u32
 }
 
-/// The whole parts of positions from 0 to four times [`MAX_RESOLUTION`], for quarters of cells. An odd whole number
-/// rounds down to the cell before it, which the margin allows.
-///
-/// Adding 1.5 * 2^23 rounds to whole numbers and leaves them in the low bits: casts take longer, because they must
-/// saturate.
+/// The whole parts of positions from 0 to [`MAX_RESOLUTION`]. An odd whole number rounds down to the cell before it,
+/// which the margin allows.
 #[inline(always)]
 fn wholes(position: Vec3A) -> [u32; 3] {
     let shifted = position - Vec3A::splat(0.5) + Vec3A::splat(WHOLE_SHIFT);
     shifted.to_array().map(|bits| bits.to_bits() & WHOLE_BITS)
 }
 
-/// The number that is added to round to a whole number: 1.5 * 2^23.
-pub(crate) const WHOLE_SHIFT: f32 = 12_582_912.0;
+/// Adding this rounds a small number to a whole one and leaves that in the low bits: casts take longer, because they
+/// must saturate.
+pub(crate) const WHOLE_SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 /// The bits of the sum that are the number.
 pub(crate) const WHOLE_BITS: u32 = 0x003f_ffff;

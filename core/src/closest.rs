@@ -66,6 +66,18 @@ impl ClosestPoint {
         self.distance < other.distance
             || (self.distance <= other.distance && self.primitive < other.primitive)
     }
+
+    /// Becomes the point of a selected triangle that is closest to a point, if it is closer.
+    #[inline]
+    fn offer(&mut self, id: u32, point: [f32; 3], selection: &Selection<'_>) {
+        if selection.has(id)
+            && let Some(triangle) = selection.mesh.triangle(id)
+            && let Some(found) = Self::on_triangle(&triangle, id, point)
+            && found.is_closer(self)
+        {
+            *self = found;
+        }
+    }
 }
 
 /// The weights of b and c in the point of a triangle that is closest to p: straight below
@@ -140,21 +152,13 @@ impl Grid<'_> {
             ClosestPoint { distance: max_distance, primitive: INVALID_ID, ..ClosestPoint::NONE };
         let mut best = farthest;
         let test = |id: u32| {
-            if selection.has(id) {
-                let triangle = self.mesh().triangle(id);
-                let found = triangle.and_then(|t| ClosestPoint::on_triangle(&t, id, point));
-                if let Some(found) = found.filter(|found| found.is_closer(&best)) {
-                    best = found;
-                }
-            }
+            best.offer(id, point, &selection);
             best.distance
         };
         if !self.approach(point, max_distance, test, &mut work) {
             self.grow(point, &selection, &mut best, &mut work);
         }
-        if let Some(counters) = &mut options.counters {
-            counters.add(&work);
-        }
+        options.count(&work);
         (best.primitive != INVALID_ID).then_some(best)
     }
 
@@ -178,12 +182,8 @@ impl Grid<'_> {
             self.visit(&around(center, reach), &mut |ids| {
                 work.cell_steps += 1;
                 work.primitive_tests += ids.len() as u64;
-                for id in ids.iter().copied().filter(|&id| selection.has(id)) {
-                    let triangle = self.mesh().triangle(id);
-                    let found = triangle.and_then(|t| ClosestPoint::on_triangle(&t, id, point));
-                    if let Some(found) = found.filter(|found| found.is_closer(best)) {
-                        *best = found;
-                    }
+                for &id in ids {
+                    best.offer(id, point, selection);
                 }
             });
             let is_all = (center - reach).cmple(min).all() && (center + reach).cmpge(max).all();

@@ -144,6 +144,7 @@ pub(crate) fn compare(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random;
 
     fn sum(terms: &[[f32; 4]]) -> Ordering {
         let mut sum = Sum([0; LIMBS]);
@@ -181,8 +182,8 @@ mod tests {
     fn planes_are_where_whole_numbers_say() {
         let mut state = 1_u32;
         let mut number = |width: u32| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            i16::try_from((state >> 8) % (2 * width + 1)).unwrap() - i16::try_from(width).unwrap()
+            i16::try_from((random::next(&mut state) >> 8) % (2 * width + 1)).unwrap()
+                - i16::try_from(width).unwrap()
         };
         let mut seen = [0; 4];
         for round in 0..20_000 {

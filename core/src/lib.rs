@@ -122,6 +122,8 @@ mod owned;
 mod packed;
 mod pairs;
 mod query;
+#[cfg(test)]
+mod random;
 mod ray;
 #[cfg(feature = "recursive")]
 mod recursive;

@@ -116,6 +116,13 @@ impl<'q> QueryOptions<'q> {
         Self { counters: Some(counters), ..Self::default() }
     }
 
+    /// Adds up work, if it is counted.
+    pub(crate) fn count(&mut self, work: &Counters) {
+        if let Some(counters) = &mut self.counters {
+            counters.add(work);
+        }
+    }
+
     /// Returns true if rays have to be traced one by one.
     pub(crate) const fn are_for_single_rays(&self) -> bool {
         self.counters.is_some()
@@ -170,7 +177,7 @@ impl Choice {
 /// The triangles that a query sees.
 #[derive(Debug)]
 pub(crate) struct Selection<'q> {
-    mesh: &'q TriangleMesh<'q>,
+    pub(crate) mesh: &'q TriangleMesh<'q>,
     choice: Choice,
 }
 

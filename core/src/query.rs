@@ -195,9 +195,7 @@ impl Grid<'_> {
         let mut show = TriangleSearch(&mut |hit| all.show(hit));
         self.search(ray, ray.t_min, options.cull, &mut show, &mut work);
         all.sort();
-        if let Some(counters) = &mut options.counters {
-            counters.add(&work);
-        }
+        options.count(&work);
         all.count
     }
 
@@ -258,9 +256,7 @@ impl Grid<'_> {
         let mut work = Counters::default();
         let mut show = TriangleSearch(&mut |hit| nearest.show(hit));
         self.search(ray, begin, options.cull, &mut show, &mut work);
-        if let Some(counters) = &mut options.counters {
-            counters.add(&work);
-        }
+        options.count(&work);
         nearest.count
     }
 }

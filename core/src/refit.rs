@@ -59,11 +59,6 @@ pub struct Refit {
 /// # Ok::<(), Error>(())
 /// ```
 pub fn refit(index: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<Refit, Error> {
-    refit_content(index, mesh)
-}
-
-/// [`refit`] for a tree of triangles or of boxes.
-pub(crate) fn refit_content(index: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<Refit, Error> {
     let grid = Grid::open(index, *mesh)?;
     let (method, blob_bytes) = (grid.method(), grid.blob_bytes());
     let header = Header::read(index, mesh)?;

@@ -27,14 +27,10 @@ pub(crate) struct Spans<S: Simd> {
 }
 
 impl<S: Simd> Spans<S> {
-    /// Spans in cells of a lattice, each cut into `parts` on each axis: a power of two, so that nothing rounds.
+    /// Spans in cells of a lattice.
     #[inline(always)]
-    pub(crate) fn new(simd: S, lattice: &Lattice, parts: u32) -> Self {
-        debug_assert!(parts.is_power_of_two());
-        let x = AxisScale::new(simd, lattice, 0, parts);
-        let y = AxisScale::new(simd, lattice, 1, parts);
-        let z = AxisScale::new(simd, lattice, 2, parts);
-        Self { axes: [x, y, z] }
+    pub(crate) fn new(simd: S, lattice: &Lattice) -> Self {
+        Self { axes: [0, 1, 2].map(|axis| AxisScale::new(simd, lattice, axis)) }
     }
 
     /// The cells of the triangles `first..first + 8` on each axis, and a mask of the triangles for which they are
@@ -120,13 +116,12 @@ struct AxisScale<S: Simd> {
 
 impl<S: Simd> AxisScale<S> {
     #[inline(always)]
-    fn new(simd: S, lattice: &Lattice, axis: usize, parts: u32) -> Self {
-        let end = as_f32(parts * lattice.resolution[axis]) - 0.5;
+    fn new(simd: S, lattice: &Lattice, axis: usize) -> Self {
         Self {
             origin: f32x8::splat(simd, lattice.min[axis]),
-            cells_per_unit: f32x8::splat(simd, as_f32(parts) * lattice.scale()[axis]),
-            margin: f32x8::splat(simd, as_f32(parts) * lattice.margin()[axis]),
-            end: f32x8::splat(simd, end),
+            cells_per_unit: f32x8::splat(simd, lattice.scale()[axis]),
+            margin: f32x8::splat(simd, lattice.margin()[axis]),
+            end: f32x8::splat(simd, as_f32(lattice.resolution[axis]) - 0.5),
         }
     }
 
@@ -156,6 +151,7 @@ mod tests {
     use crate::cell::CellRange;
     use crate::eight::LANES;
     use crate::mesh::TriangleMesh;
+    use crate::random;
     use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
 
     struct Of<'a>(&'a TriangleMesh<'a>, &'a Lattice, u32);
@@ -165,7 +161,7 @@ mod tests {
 
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let Self(mesh, lattice, first) = self;
-            let (spans, is_finite) = Spans::new(simd, lattice, 1).of(simd, &mesh.wide(), first);
+            let (spans, is_finite) = Spans::new(simd, lattice).of(simd, &mesh.wide(), first);
             let [x, y, z] = spans.map(|span| [<[u32; LANES]>::from(span.first), span.last.into()]);
             let bits = is_finite.to_bitmask();
             core::array::from_fn(|lane| {
@@ -199,10 +195,10 @@ mod tests {
         values.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40]);
         let mut state = 1_u32;
         let mut value = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let random = random::next(&mut state);
             // Mostly those in the box: one in ten triangles has one that is no number.
-            let end = if state >> 29 == 0 { values.len() } else { 36 };
-            values[(state >> 8) as usize % end]
+            let end = if random >> 29 == 0 { values.len() } else { 36 };
+            values[(random >> 8) as usize % end]
         };
         let positions: Vec<_> = (0..6000).map(|_| [value(), value(), value()]).collect();
         let indices: Vec<_> =

@@ -1,5 +1,7 @@
 //! The first pass over a mesh: checks its indices, counts its finite triangles and finds their box.
 
+use glam::Vec3A;
+
 use crate::aabb::Aabb;
 use crate::config::BuildFlags;
 use crate::control::Watch;
@@ -32,20 +34,29 @@ impl Survey {
         for piece in mesh.pieces(0..count) {
             for (id, corners) in piece.each() {
                 watch.step(id, count, SHARE)?;
-                let Some(corners) = corners else {
-                    return Err(Error::IndexOutOfRange { triangle: id });
-                };
-                match Aabb::of(corners) {
+                match finite_box(id, corners, flags)? {
                     Some(bounds) => survey.bounds = survey.bounds.union(&bounds),
-                    None if flags.contains(BuildFlags::STRICT) => {
-                        return Err(Error::NonFiniteTriangle { triangle: id });
-                    }
                     None => survey.skipped_count += 1,
                 }
             }
         }
         survey.finite_count = mesh.triangle_count() - survey.skipped_count;
         Ok(survey)
+    }
+}
+
+/// The box of a triangle with these corners; `None` if a build with these flags leaves it out, because a coordinate is
+/// not finite.
+#[inline(always)]
+pub(crate) fn finite_box(
+    triangle: u32,
+    corners: Option<[Vec3A; 3]>,
+    flags: BuildFlags,
+) -> Result<Option<Aabb>, Error> {
+    let Some(corners) = corners else { return Err(Error::IndexOutOfRange { triangle }) };
+    match Aabb::of(corners) {
+        None if flags.contains(BuildFlags::STRICT) => Err(Error::NonFiniteTriangle { triangle }),
+        bounds => Ok(bounds),
     }
 }
 

@@ -6,6 +6,7 @@
 //!
 //! A processor without atomic operations has one core: there work is not cut.
 
+use core::ops::Range;
 #[cfg(target_has_atomic = "32")]
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
@@ -36,6 +37,23 @@ pub(crate) const MOST: usize =
 pub(crate) fn task_count(parallel: &Control<'_>, most: usize) -> u32 {
     let most = u32::try_from(most).unwrap_or(u32::MAX);
     parallel.tasks.min(most).clamp(1, MOST as u32)
+}
+
+/// Returns the share of a task, if `things` elements are divided evenly among `tasks` tasks.
+#[expect(clippy::cast_possible_truncation, reason = "no more than there are things")]
+pub(crate) fn share(things: usize, task: usize, tasks: usize) -> Range<usize> {
+    let end =
+        |of: usize| (things as u64 * of as u64).checked_div(tasks as u64).unwrap_or(0) as usize;
+    end(task)..end(task + 1)
+}
+
+/// Takes the first elements of a slice, or all there are.
+#[expect(clippy::mut_mut, reason = "the slice becomes the rest of itself")]
+pub(crate) fn take<'w, T>(rest: &mut &'w mut [T], count: usize) -> &'w mut [T] {
+    let count = count.min(rest.len());
+    let (first, behind) = core::mem::take(rest).split_at_mut(count);
+    *rest = behind;
+    first
 }
 
 /// Runs tasks and hands their results to `take`, in the order of the tasks. After an error of `take` it gets no more of

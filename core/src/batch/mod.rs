@@ -155,7 +155,7 @@ impl<'r, 'a, 'b> Arrays<'r, 'a, 'b> {
         if rays.cut(size_of::<R>()).is_none() {
             return Err(Error::InvalidBatch(BatchField::Rays));
         }
-        if !answers.holds(size_of::<A::Stored>()) || answers.count != rays.count {
+        if !answers.holds(size_of::<A>()) || answers.count != rays.count {
             return Err(Error::InvalidBatch(BatchField::Answers));
         }
         Ok(Self { rays, answers })
@@ -175,7 +175,7 @@ impl<A: Answer, R: FromBytes> Batch<A, R> for Arrays<'_, '_, '_> {
 
     #[inline(always)]
     fn answer(&mut self, place: usize, answer: A) {
-        self.answers.write(place, &answer.stored());
+        self.answers.write(place, &answer);
     }
 }
 
@@ -368,13 +368,9 @@ impl Grid<'_> {
 }
 
 /// The answer to one ray of a batch: a hit, a flag, or the id of a triangle.
-pub(crate) trait Answer: Sized {
-    /// The type of an element in an array of answers.
-    type Stored: Immutable + IntoBytes;
+pub(crate) trait Answer: Immutable + IntoBytes {
     /// True if any hit is an answer, false if it must be the closest.
     const IS_ANY: bool;
-
-    fn stored(self) -> Self::Stored;
 }
 
 /// An answer that a hit gives.
@@ -384,13 +380,7 @@ pub(crate) trait HitAnswer: Answer {
 }
 
 impl Answer for Hit {
-    type Stored = Self;
     const IS_ANY: bool = false;
-
-    #[inline(always)]
-    fn stored(self) -> Self {
-        self
-    }
 }
 
 impl HitAnswer for Hit {
@@ -401,13 +391,7 @@ impl HitAnswer for Hit {
 }
 
 impl Answer for bool {
-    type Stored = u8;
     const IS_ANY: bool = true;
-
-    #[inline(always)]
-    fn stored(self) -> u8 {
-        self.into()
-    }
 }
 
 impl HitAnswer for bool {
@@ -418,13 +402,7 @@ impl HitAnswer for bool {
 }
 
 impl Answer for u32 {
-    type Stored = Self;
     const IS_ANY: bool = true;
-
-    #[inline(always)]
-    fn stored(self) -> Self {
-        self
-    }
 }
 
 impl HitAnswer for u32 {

@@ -5,8 +5,6 @@
 //! for each task: for each triangle of its share: write the entry, move the start of its bin by one (scatter)
 //! ```
 
-#[cfg(target_has_atomic = "32")]
-use super::census::{share, take};
 use super::key::{KEY_BITS, NO_KEY};
 use super::layout::{CROWD, Entry};
 use super::units::starts;
@@ -15,7 +13,7 @@ use crate::error::Error;
 use crate::invariant::OrBug;
 use crate::simd::IS_SMALL;
 #[cfg(target_has_atomic = "32")]
-use crate::tasks::{Shared, run};
+use crate::tasks::{Shared, run, share, take};
 
 /// Turns the bin counts of all tasks into write positions: within a bin, entries are in the order of the tasks.
 pub(super) fn place_tasks(sizes: &mut [u32], counts: &mut [u32], bits: u32) {
@@ -81,7 +79,7 @@ fn scatter_by_tasks(
     let mut counts = counts;
     let parts = (0..tasks).map(|task| {
         let heads = take(&mut counts, 1 << bits);
-        let range = share(keys.len(), task, tasks)..share(keys.len(), task + 1, tasks);
+        let range = share(keys.len(), task, tasks);
         let first = range.start as u32;
         (first, keys.get(range).or_bug("a task behind the keys").unwrap_or_default(), heads)
     });

@@ -31,7 +31,7 @@ use fearless_simd::Simd;
 use zerocopy::{FromZeros, IntoBytes};
 
 use super::bins::{place_tasks, scatter};
-use super::census::{Census, count, share, take};
+use super::census::{Census, count};
 use super::high;
 use super::key::{KEY_BITS, Keys};
 use super::layout::{
@@ -44,7 +44,7 @@ use super::subtree::Subtree;
 use super::top::{self, ITEM, RootItem, Top};
 use super::units::{SEAM, Units, is_seam};
 use crate::aabb::Aabb;
-use crate::arena::{Sizes, first_mut, section_bytes, split_mut, whole};
+use crate::arena::{Sizes, first_mut, move_down, section_bytes, split_mut, whole};
 use crate::blob::{HEADER_BYTES, Header};
 use crate::cell::Lattice;
 use crate::config::{BuildFlags, Parameters};
@@ -54,7 +54,7 @@ use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
-use crate::tasks::{self, run, run_several, task_count};
+use crate::tasks::{self, run, run_several, share, take, task_count};
 
 /// The memory that any mesh with so many triangles and a build with so many tasks needs.
 pub(crate) const fn bound(triangles: u32, quality: Quality, tasks: u32) -> Option<(u64, u64)> {
@@ -184,18 +184,13 @@ fn build_in(
     let (entries, spare) = split_mut::<Entry>(rest, all).ok_or(scratch_error)?;
     let spare = whole::<Entry>(spare);
     let has_whole_spare = spare.len() as u64 >= all;
-    let behind = index.as_mut().and_then(|index| {
-        // Clear the header first: if the build ends early, the region must not open as a grid.
-        index.first_chunk_mut::<HEADER_BYTES>()?.fill(0);
-        index.get_mut(HEADER_BYTES..)
-    });
-    let keys = if let Some((keys, _)) = behind.and_then(|behind| split_mut::<u32>(behind, all)) {
-        keys
-    } else {
+    clear_header(&mut index);
+    let (mut keys, _) = cut_index(&mut index, triangles);
+    if keys.len() < triangles as usize {
         // There are fewer ids than keys if triangles are skipped.
-        let keys = spare.as_flattened_mut().get_mut(..triangles as usize);
-        keys.filter(|_| has_whole_spare).ok_or(index_error(fast_bound(triangles, 1).0))?
-    };
+        let room = spare.as_flattened_mut().get_mut(..triangles as usize);
+        keys = room.filter(|_| has_whole_spare).ok_or(index_error(fast_bound(triangles, 1).0))?;
+    }
 
     // Find the box, then every triangle's key.
     watch.at(CENSUS)?;
@@ -219,13 +214,7 @@ fn build_in(
 
     // Cut bins into subtrees.
     watch.at(ROOTS)?;
-    let ids_bytes = section_bytes::<u32>(finite.into()) as usize;
-    // No index, or one that is too small, is legal: ids and nodes for which there is no room are only counted.
-    let behind = index.as_mut().and_then(|index| index.get_mut(HEADER_BYTES..));
-    let parts = behind.and_then(|behind| behind.split_at_mut_checked(ids_bytes));
-    let (ids, nodes) = parts.unwrap_or_default();
-    let (ids, _) = split_mut::<u32>(ids, finite.into()).unwrap_or_default();
-    let nodes = whole::<Node>(nodes);
+    let (ids, nodes) = cut_index(&mut index, finite);
     let scene = Lattice::pad(&bounds);
     let work = BuildInputs { mesh, least: least_node(&scene), sizes, shift: KEY_BITS - bits };
     let made = work.roots(entries, &mut *spare, ids, nodes, counts, control)?;
@@ -235,6 +224,37 @@ fn build_in(
     let made = work.top(entries, spare, nodes, &made);
     let (node_count, levels) = made.ok_or(index_error(fast_bound(triangles, 1).0))?;
     finish(mesh, Quality::Fast, scene, index, finite, node_count, levels)
+}
+
+/// Clears the header of an index: if the build ends early, the region must not open as a grid.
+pub(super) fn clear_header(index: &mut Option<&mut [u8]>) {
+    if let Some(header) = index.as_mut().and_then(|index| index.first_chunk_mut::<HEADER_BYTES>()) {
+        header.fill(0);
+    }
+}
+
+/// Returns the places of so many ids and of nodes in an index. No index, or one that is too small, is legal: ids and
+/// nodes for which there is no room are only counted.
+pub(super) fn cut_index<'i>(
+    index: &'i mut Option<&mut [u8]>,
+    ids: u32,
+) -> (&'i mut [u32], &'i mut [Node]) {
+    let behind = index.as_mut().and_then(|index| index.get_mut(HEADER_BYTES..));
+    let sections = behind.and_then(|behind| split_mut::<u32>(behind, ids.into()));
+    let (ids, nodes) = sections.unwrap_or_default();
+    (ids, whole(nodes))
+}
+
+/// Moves nodes together with their child nodes to an earlier place.
+pub(super) fn move_nodes(nodes: &mut [Node], from: Range<u32>, to: u32) {
+    let (moved, from) = (from.start - to, from.start as usize..from.end as usize);
+    if moved > 0 {
+        let found = nodes.get_mut(from.clone()).or_bug("nodes without room");
+        for node in found.unwrap_or_default() {
+            node.child -= moved;
+        }
+        move_down(nodes, from, to as usize);
+    }
 }
 
 /// Ends a build: checks that the index, if there is one, holds the tree, puts zeros behind it and returns its header.
@@ -303,12 +323,10 @@ fn vertex_bounds(
     control: &Control<'_>,
 ) -> Result<Aabb, Error> {
     let vertices = mesh.vertex_count();
-    let parts =
-        (0..tasks).map(|task| share(vertices, task, tasks)..share(vertices, task + 1, tasks));
     let mut bounds = Aabb::EMPTY;
     run(
         control,
-        parts,
+        (0..tasks).map(|task| share(vertices, task, tasks)),
         |part| mesh.vertex_bounds(part),
         |part| {
             bounds = bounds.union(&part);
@@ -464,14 +482,7 @@ impl BuildInputs<'_> {
         let mut all = TaskTotals { nodes: 1, roots: 0, last: RootRecord::new_zeroed() };
         for (made, last) in made.into_iter().flatten() {
             let moved = made.child - all.nodes;
-            let from = made.child as usize..(made.child + made.nodes) as usize;
-            debug_assert!(from.end <= nodes.len(), "a task made more nodes than it has room for");
-            if moved > 0 && from.end <= nodes.len() {
-                for node in nodes.get_mut(from.clone()).unwrap_or_default() {
-                    node.child -= moved;
-                }
-                move_down(nodes, from, all.nodes as usize);
-            }
+            move_nodes(nodes, made.child..made.child + made.nodes, all.nodes);
             let to = all.roots as usize * RECORD;
             let from = made.first as usize;
             let records = from..from + made.roots as usize * RECORD;
@@ -498,7 +509,7 @@ impl BuildInputs<'_> {
         let mut units = Units::new(self.sizes);
         let mut end = 0;
         for (task, slot) in ends.iter_mut().enumerate().take(tasks) {
-            let goal = share(entries, task + 1, tasks);
+            let goal = share(entries, task, tasks).end;
             while end < goal
                 && let Some(unit) = units.find(|unit| is_seam(unit) || unit.end == entries)
             {
@@ -561,15 +572,4 @@ struct TaskTotals {
     roots: u32,
     /// The record of the last root.
     last: RootRecord,
-}
-
-/// Moves elements to an earlier place, as `copy_within`, which can panic, does.
-pub(super) fn move_down<T: Copy>(elements: &mut [T], from: Range<usize>, to: usize) {
-    debug_assert!(to <= from.start && from.end <= elements.len(), "elements move past an end");
-    for (at, to) in from.zip(to..) {
-        let Some(&element) = elements.get(at) else { return };
-        if let Some(slot) = elements.get_mut(to) {
-            *slot = element;
-        }
-    }
 }

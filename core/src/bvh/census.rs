@@ -19,7 +19,8 @@ use crate::mesh::Piece;
 use crate::mesh::TriangleMesh;
 use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
 use crate::spans::eight;
-use crate::tasks::run;
+use crate::survey::finite_box;
+use crate::tasks::{run, share, take};
 
 use super::key::{KEY_BITS, Keys, NO_KEY};
 
@@ -58,17 +59,13 @@ pub(crate) fn count(
 ) -> Result<Census, Error> {
     let tasks = counts.len() >> bits;
     let triangles = keys.len();
-    let mut rest = keys;
-    let mut first = 0;
-    let mut all_counts = counts;
+    let (mut rest, mut all_counts) = (keys, counts);
     let parts = (0..tasks).map(|task| {
         let counts = take(&mut all_counts, 1 << bits);
-        let end = share(triangles, task + 1, tasks);
-        let keys = take(&mut rest, end.saturating_sub(first));
-        let start = first;
-        first = end;
+        let share = share(triangles, task, tasks);
+        let keys = take(&mut rest, share.len());
         #[expect(clippy::cast_possible_truncation, reason = "numbers of triangles")]
-        let first = start as u32;
+        let first = share.start as u32;
         let (skipped, bounds) = (0, Aabb::EMPTY);
         KeysTask { mesh, flags, rule, first, keys, counts, shift: KEY_BITS - bits, skipped, bounds }
     });
@@ -86,25 +83,6 @@ pub(crate) fn count(
         },
     )?;
     Ok(census)
-}
-
-/// Returns the end of the first `task` shares, if `things` elements are divided evenly among `tasks` tasks.
-#[expect(clippy::cast_possible_truncation, reason = "no more than there are things")]
-pub(crate) const fn share(things: usize, task: usize, tasks: usize) -> usize {
-    let all = things as u64 * task as u64;
-    match all.checked_div(tasks as u64) {
-        Some(share) => share as usize,
-        None => 0,
-    }
-}
-
-/// Takes the first elements of a slice, or all there are.
-#[expect(clippy::mut_mut, reason = "the slice becomes the rest of itself")]
-pub(crate) fn take<'w, T>(rest: &mut &'w mut [T], count: usize) -> &'w mut [T] {
-    let count = count.min(rest.len());
-    let (first, behind) = core::mem::take(rest).split_at_mut(count);
-    *rest = behind;
-    first
 }
 
 impl Kernel for KeysTask<'_> {
@@ -185,23 +163,14 @@ impl KeysTask<'_> {
     #[inline(never)]
     fn one_by_one(&mut self, piece: &Piece<'_>, first: u32, keys: &mut [u32]) -> Result<(), Error> {
         for (own, key) in (first..).zip(keys) {
-            let triangle = piece.first + own;
-            let Some(corners) = piece.mesh.own_corners(own) else {
-                return Err(Error::IndexOutOfRange { triangle });
-            };
-            match Aabb::of(corners) {
-                Some(bounds) => {
-                    self.bounds = self.bounds.union(&bounds);
-                    *key = self.rule.of(&bounds);
-                    self.add(*key);
-                }
-                None if self.flags.contains(BuildFlags::STRICT) => {
-                    return Err(Error::NonFiniteTriangle { triangle });
-                }
-                None => {
-                    *key = NO_KEY;
-                    self.skipped += 1;
-                }
+            let corners = piece.mesh.own_corners(own);
+            if let Some(bounds) = finite_box(piece.first + own, corners, self.flags)? {
+                self.bounds = self.bounds.union(&bounds);
+                *key = self.rule.of(&bounds);
+                self.add(*key);
+            } else {
+                *key = NO_KEY;
+                self.skipped += 1;
             }
         }
         Ok(())

@@ -110,15 +110,8 @@ mod tests {
 
     use super::*;
     use crate::mesh::MeshPart;
+    use crate::random;
     use crate::simd::{SimdLevel, dispatch};
-
-    /// Numbers from -1 to 1.
-    fn random(state: &mut u32) -> f32 {
-        *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        #[expect(clippy::cast_precision_loss, reason = "24 bits")]
-        let unit = (*state >> 8) as f32 / 8_388_608.0;
-        unit - 1.0
-    }
 
     /// Checks keys and counts against those of each triangle alone.
     fn check(mesh: &TriangleMesh<'_>, ids: &[u32]) {
@@ -145,7 +138,7 @@ mod tests {
     fn keys_are_those_of_each_triangle_alone() {
         let mut state = 1;
         let positions: Vec<[f32; 3]> =
-            (0..90).map(|_| [0; 3].map(|_| random(&mut state))).collect();
+            (0..90).map(|_| random::point(&mut state).to_array()).collect();
         // The last triangle has the last vertex, which is not read fast.
         let indices: Vec<[u32; 3]> = (0..30).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let mesh = TriangleMesh::new(&positions, &indices).unwrap();

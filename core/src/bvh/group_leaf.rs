@@ -14,7 +14,7 @@ use super::group::{Met, octets};
 use super::rays::{OCTETS, Rays};
 use super::shape_leaf::{nearest_of, pad_of};
 use crate::aabb::Aabb;
-use crate::eight::{Eight, first_eight};
+use crate::eight::Eight;
 use crate::mesh::TriangleMesh;
 
 /// A leaf that some rays of a group enter.
@@ -71,7 +71,7 @@ impl<const ANY: bool> Leaves for Triangles<ANY> {
         let Leaf { bvh, mesh, first, ids, .. } = *leaf;
         if mask.count_ones() as usize <= octets(mask) as usize * ids.len() {
             // Few rays: filter all triangles of the leaf for each ray.
-            let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
+            let lanes = bvh.lanes(first, ids);
             let triangles = Eight::of(simd, mesh, lanes, ids.len());
             let mut rest = mask;
             while rest != 0 {

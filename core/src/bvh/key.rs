@@ -9,6 +9,7 @@ use fearless_simd::{Simd, f32x8, u32x8};
 use glam::Vec3A;
 
 use crate::aabb::Aabb;
+use crate::cell::WHOLE_SHIFT;
 use crate::extremes::Extremes;
 
 /// Bits of a key.
@@ -28,8 +29,6 @@ pub(crate) struct Keys {
 
 /// The largest position on an axis, half a cell into the last cell.
 const END: f32 = 1023.5;
-/// Adding this rounds a small number to a whole one and leaves that in the low bits.
-const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 const CELL_BITS: u32 = 0x3ff;
 
 impl Keys {
@@ -54,7 +53,7 @@ impl Keys {
     pub(crate) fn of_twice(&self, center: Vec3A) -> u32 {
         let cell = (center - self.origin) * self.scale;
         let cell = cell.max(Vec3A::ZERO).min(Vec3A::splat(END));
-        let [x, y, z] = ((cell - Vec3A::splat(0.5)) + Vec3A::splat(SHIFT))
+        let [x, y, z] = ((cell - Vec3A::splat(0.5)) + Vec3A::splat(WHOLE_SHIFT))
             .to_array()
             .map(|cell| spread(cell.to_bits() & CELL_BITS));
         x << 2 | y << 1 | z
@@ -74,7 +73,7 @@ impl Keys {
         let origin = f32x8::splat(simd, self.origin[axis]);
         let cell = (twice - origin) * f32x8::splat(simd, self.scale);
         let cell = cell.greater(f32x8::splat(simd, 0.0)).lesser(f32x8::splat(simd, END));
-        let mut bits = ((cell - 0.5) + SHIFT).bitcast::<u32x8<S>>() & CELL_BITS;
+        let mut bits = ((cell - 0.5) + WHOLE_SHIFT).bitcast::<u32x8<S>>() & CELL_BITS;
         bits = (bits | bits << 16) & 0x0300_00ff;
         bits = (bits | bits << 8) & 0x0300_f00f;
         bits = (bits | bits << 4) & 0x030c_30c3;
@@ -100,6 +99,7 @@ mod tests {
     use alloc::vec::Vec;
 
     use super::*;
+    use crate::random;
     use crate::simd::{HAS_VECTORS, Kernel, SimdLevel, dispatch};
 
     struct Eight<'k> {
@@ -120,16 +120,6 @@ mod tests {
         }
     }
 
-    /// From -1 to 1.
-    fn random(state: &mut u32) -> Vec3A {
-        Vec3A::from_array([0; 3].map(|_| {
-            *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            #[expect(clippy::cast_precision_loss, reason = "24 bits")]
-            let unit = (*state >> 8) as f32 / 8_388_608.0;
-            unit - 1.0
-        }))
-    }
-
     #[test]
     fn every_kind_of_vectors_gives_the_same_keys() {
         let mut state = 1;
@@ -140,7 +130,8 @@ mod tests {
                 for _ in 0..if cfg!(miri) { 2 } else { 200 } {
                     // Also from beside the box of the centres, as those that are left out.
                     let boxes = [0; 8].map(|_| {
-                        let (center, half) = (random(&mut state) * 1.2, random(&mut state).abs());
+                        let (center, half) =
+                            (random::point(&mut state) * 1.2, random::point(&mut state).abs());
                         let (center, half) = (center * flat * scale, half * scale * 0.1);
                         Aabb { min: center - half, max: center + half }
                     });

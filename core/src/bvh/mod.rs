@@ -54,8 +54,9 @@ mod units;
 mod validate;
 mod walk;
 
-use crate::arena::split;
+use crate::arena::{section_bytes, split};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::eight::first_eight;
 use crate::error::Error;
 use crate::visit::Visitor;
 pub(crate) use batch::{Groups, Together};
@@ -121,6 +122,17 @@ impl<'a> Bvh<'a> {
         self.ids.len()
     }
 
+    /// The error for a word of the ids.
+    const fn wrong_id(word: u64) -> Error {
+        Error::Corrupt { offset: HEADER_BYTES as u64 + word * size_of::<u32>() as u64 }
+    }
+
+    /// The error for a node.
+    fn wrong_node(&self, node: u32) -> Error {
+        let nodes_at = HEADER_BYTES as u64 + section_bytes::<u32>(self.ids.len() as u64);
+        Error::Corrupt { offset: nodes_at + u64::from(node) * size_of::<Node>() as u64 }
+    }
+
     /// Nodes and leaves that a ray enters, at most: there are no more leaves than ids, and a node has
     /// eight children.
     #[inline(always)]
@@ -136,10 +148,11 @@ impl<'a> Bvh<'a> {
         self.ids.get(start..end).unwrap_or_default()
     }
 
-    /// The ids of a leaf and those behind them, if there are eight.
+    /// The ids of a leaf, and more to fill eight lanes: those behind them where there are eight, which takes one read.
     #[inline(always)]
-    fn eight(&self, first: u32) -> Option<[u32; LEAF]> {
-        self.ids.get(first as usize..)?.first_chunk().copied()
+    fn lanes(&self, first: u32, ids: &[u32]) -> [u32; LEAF] {
+        let eight = || self.ids.get(first as usize..)?.first_chunk().copied();
+        eight().unwrap_or_else(|| first_eight(ids))
     }
 
     /// Passes all leaves to a visitor; `false` if its budget is used up.

@@ -29,18 +29,16 @@ use super::Bvh;
 use super::boxes::{bits, splat};
 use super::node::{Child, Node, WIDTH};
 use super::shape_leaf::nearest_of;
+use super::slab::{TINY, WIDER};
 use super::walk::{StackEntry, bytes, pop, waiting};
 use crate::aabb::{Aabb, greater};
 use crate::counters::Tally;
-use crate::eight::{Eight, first_eight};
+use crate::eight::Eight;
 use crate::extremes::Extremes;
+use crate::filter::{cross, dot, minus};
 use crate::mesh::TriangleMesh;
 use crate::simd::Kernel;
 
-/// The factor that widens the reach by relative errors of up to 2^-20: see above.
-const WIDER: f32 = 1.0 + 1.0 / 1_048_576.0;
-/// More than what underflows in a squared distance.
-const TINY: f32 = f32::MIN_POSITIVE;
 /// Error bound of a scalar product, in parts of the product of the vectors' sums of magnitudes.
 const DOTS: f32 = 1.0 / 2_097_152.0; // 2^-21
 /// The most by which the test in f64 may report a point as too near, in parts of the largest coordinate: 32 times the
@@ -131,11 +129,7 @@ fn triangles<S: Simd>(simd: S, corners: &[Vectors<S>; 3], point: &Point) -> f32x
     let c = [c[0] * scale - at[0], c[1] * scale - at[1], c[2] * scale - at[2]];
     let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
     let edge = nearer(nearer(on_edge(simd, a, ab), on_edge(simd, a, ac)), on_edge(simd, b, bc));
-    let normal = [
-        ab[1] * ac[2] - ab[2] * ac[1],
-        ab[2] * ac[0] - ab[0] * ac[2],
-        ab[0] * ac[1] - ab[1] * ac[0],
-    ];
+    let normal = cross(ab, ac);
     let far = sum(a).greater(sum(b)).greater(sum(c)) * f32x8::splat(simd, DOTS);
     let corners = [a, b, c];
     across(simd, edge, &corners, far).greater(across(simd, normal, &corners, far))
@@ -175,16 +169,6 @@ fn across<S: Simd>(
     let gap = low.greater(-high) - sum(direction) * far;
     let gap = gap.greater(f32x8::splat(simd, 0.0));
     (gap * gap - f32x8::splat(simd, 64.0 * TINY)) / dot(direction, direction)
-}
-
-#[inline(always)]
-fn minus<S: Simd>([x, y, z]: Vectors<S>, [u, v, w]: Vectors<S>) -> Vectors<S> {
-    [x - u, y - v, z - w]
-}
-
-#[inline(always)]
-fn dot<S: Simd>([x, y, z]: Vectors<S>, [u, v, w]: Vectors<S>) -> f32x8<S> {
-    x * u + y * v + z * w
 }
 
 /// The sum of the magnitudes of the components.
@@ -246,7 +230,7 @@ impl<F: FnMut(u32) -> f32, T: Tally> Kernel for &mut ClosestSearch<'_, F, T> {
                     let ids = bvh.leaf(first, count);
                     tally.cell_step();
                     tally.primitive_tests(ids.len());
-                    let lanes = bvh.eight(first).unwrap_or_else(|| first_eight(ids));
+                    let lanes = bvh.lanes(first, ids);
                     let eight = Eight::of(simd, mesh, lanes, ids.len());
                     let away = triangles(simd, &eight.corners, &point);
                     let mut rest = !bits(away.simd_gt(f32x8::splat(simd, reach))) & eight.used;

@@ -21,6 +21,7 @@ use glam::Vec3A;
 use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
+use crate::cell::WHOLE_SHIFT;
 use crate::extremes::Extremes;
 
 /// Children of a node.
@@ -246,7 +247,7 @@ impl Node {
         let low = (bounds.min - origin) * inverse - Vec3A::splat(0.5 + MARGIN);
         let high = (bounds.max - origin) * inverse + Vec3A::splat(0.5 + MARGIN);
         let [low, high] = [low.max(Vec3A::ZERO), high.min(Vec3A::splat(255.0))];
-        let [low, high] = [low, high].map(|at| (at + Vec3A::splat(SHIFT)).to_array());
+        let [low, high] = [low, high].map(|at| (at + Vec3A::splat(WHOLE_SHIFT)).to_array());
         for axis in 0..3 {
             let [low, high] = [low[axis], high[axis]].map(|at| at.to_bits() as u8);
             if let Some(bound) = self.bounds[axis].get_mut(slot) {
@@ -287,7 +288,7 @@ impl<S: Simd> Quantiser<S> {
     #[inline(always)]
     fn one(&self, children: &[f32x8<S>; WIDTH], slot: usize, count: usize) -> u32x8<S> {
         let at = (children[slot % WIDTH] - self.origin) * self.inverse - (0.5 + MARGIN);
-        let bits = (at.greater(self.end) * self.sign + SHIFT).bitcast::<u32x8<S>>() & 0xff;
+        let bits = (at.greater(self.end) * self.sign + WHOLE_SHIFT).bitcast::<u32x8<S>>() & 0xff;
         if slot < count { bits } else { self.unused }
     }
 }
@@ -297,8 +298,6 @@ const MARGIN: f32 = 1.0 / 64.0;
 /// A box is at least this part of its coordinates wide, so that a quarter of a step is no less than
 /// their rounding.
 const LEAST_STEPS: f32 = 254.0 / 2_097_152.0;
-/// Adding this rounds a small number to a whole one and leaves that in the low bits.
-const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 
 /// Returns the exponent bits of a power of two: the next one above a 254th of an extent.
 fn exponent_for(extent: f32) -> u8 {
@@ -325,6 +324,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::random;
     use crate::simd::{Kernel, SimdLevel, dispatch};
 
     #[test]
@@ -334,8 +334,7 @@ mod tests {
             let mut node = Node::EMPTY;
             let mut expected = 0;
             for slot in 0..WIDTH {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                match state >> 30 {
+                match random::next(&mut state) >> 30 {
                     0 => node.set_inner(slot),
                     1 => node.counts[slot] = (state >> 8 & 0xff) as u8,
                     _ => continue,
@@ -344,16 +343,6 @@ mod tests {
             }
             assert_eq!(node.used(), expected, "{node:?}");
         }
-    }
-
-    /// From -1 to 1.
-    fn random(state: &mut u32) -> Vec3A {
-        Vec3A::from_array([0; 3].map(|_| {
-            *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            #[expect(clippy::cast_precision_loss, reason = "24 bits")]
-            let unit = (*state >> 8) as f32 / 8_388_608.0;
-            unit - 1.0
-        }))
     }
 
     /// The quantised box of a child, exactly, and a step.
@@ -375,11 +364,11 @@ mod tests {
                 // Thin ones, too.
                 for flat in [Vec3A::ONE, Vec3A::new(1.0, 1e-6, 1.0), Vec3A::new(0.0, 1.0, 0.0)] {
                     for _ in 0..cases {
-                        let place = (random(&mut state) * place * scale)
+                        let place = (random::point(&mut state) * place * scale)
                             .clamp(Vec3A::splat(-1e36), Vec3A::splat(1e36));
                         let boxes = [0; WIDTH].map(|_| {
-                            let center = place + random(&mut state) * flat * scale * 0.2;
-                            let half = random(&mut state).abs() * flat * scale * 0.1;
+                            let center = place + random::point(&mut state) * flat * scale * 0.2;
+                            let half = random::point(&mut state).abs() * flat * scale * 0.1;
                             Aabb { min: center - half, max: center + half }
                         });
                         let all = boxes.iter().fold(Aabb::EMPTY, |all, child| all.union(child));
@@ -435,7 +424,8 @@ mod tests {
         for scale in [1e-38, 1e-30, 1.0, 1e10, 1e36] {
             for count in (1..=WIDTH).step_by(if cfg!(miri) { 7 } else { 1 }) {
                 let boxes = [0; WIDTH].map(|_| {
-                    let (center, half) = (random(&mut state), random(&mut state).abs() * 0.1);
+                    let (center, half) =
+                        (random::point(&mut state), random::point(&mut state).abs() * 0.1);
                     Aabb { min: (center - half) * scale, max: (center + half) * scale }
                 });
                 let used = boxes.iter().take(count);

@@ -16,7 +16,7 @@ use super::node::{Child, LEAF, Node, WIDTH};
 use super::walk::FEW_LEVELS;
 use super::{Bvh, LEVELS};
 use crate::aabb::Aabb;
-use crate::arena::{section_bytes, split_mut};
+use crate::arena::split_mut;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::cell::Lattice;
 use crate::config::BuildFlags;
@@ -53,13 +53,9 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
 impl Bvh<'_> {
     /// Finds all that could be wrong with nodes and ids; returns the levels of nodes and the SAH cost.
     fn check(&self, header: &Header, mesh: &TriangleMesh<'_>) -> Result<(u32, f64), Error> {
-        let at = |byte: u64| corrupt(usize::try_from(byte).unwrap_or(usize::MAX));
-        let ids_at = HEADER_BYTES as u64;
-        let nodes_at = ids_at + section_bytes::<u32>(self.ids.len() as u64);
-        let node_at = |node: u32| at(nodes_at + u64::from(node) * size_of::<Node>() as u64);
         let triangles = mesh.triangle_count();
         if let Some(word) = self.ids.iter().position(|&id| id >= triangles) {
-            return Err(at(ids_at + word as u64 * size_of::<u32>() as u64));
+            return Err(Self::wrong_id(word as u64));
         }
         // The build left triangles out, so the mesh may have non-finite ones: none of them may be in a leaf.
         if header.skipped_count > 0 {
@@ -78,17 +74,17 @@ impl Bvh<'_> {
         let mut next = Some(0_u32);
         loop {
             if let Some(number) = next.take() {
-                let node = self.nodes.get(number as usize).ok_or(node_at(number))?;
-                unmet = unmet.checked_sub(1).ok_or(node_at(number))?;
+                let node = self.nodes.get(number as usize).ok_or(self.wrong_node(number))?;
+                unmet = unmet.checked_sub(1).ok_or(self.wrong_node(number))?;
                 for slot in 0..8 {
                     let Child::Leaf { first, count } = node.child(slot) else { continue };
                     let end = u64::from(first) + u64::from(count);
                     let is_inside = count == 0 || end <= self.ids.len() as u64;
                     if count as usize > LEAF || !is_inside {
-                        return Err(node_at(number));
+                        return Err(self.wrong_node(number));
                     }
                 }
-                *path.get_mut(depth).ok_or(node_at(number))? = (number, node.inner());
+                *path.get_mut(depth).ok_or(self.wrong_node(number))? = (number, node.inner());
                 depth += 1;
                 deepest = deepest.max(depth);
                 cost.add(node, number == 0);
@@ -101,7 +97,7 @@ impl Bvh<'_> {
             }
             let slot = rest.trailing_zeros();
             *rest &= *rest - 1;
-            let node = self.nodes.get(*number as usize).ok_or(node_at(*number))?;
+            let node = self.nodes.get(*number as usize).ok_or(self.wrong_node(*number))?;
             if let Child::Inner(child) = node.child(slot) {
                 next = Some(child);
             }

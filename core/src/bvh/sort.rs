@@ -75,6 +75,7 @@ mod tests {
     use alloc::vec::Vec;
 
     use super::*;
+    use crate::random;
 
     #[test]
     fn entries_are_in_the_order_of_their_keys_and_then_as_they_were() {
@@ -83,10 +84,10 @@ mod tests {
             for bits in [12, 15, 18, 30] {
                 let mut entries: Vec<Entry> = (0..count)
                     .map(|id| {
-                        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                         // Few different keys, so that many are equal; and the same bits above.
                         [
-                            ((state >> 7) % (count / 2 + 1)).wrapping_mul(0x0101_0101)
+                            ((random::next(&mut state) >> 7) % (count / 2 + 1))
+                                .wrapping_mul(0x0101_0101)
                                 % (1 << bits),
                             id,
                         ]

@@ -108,6 +108,7 @@ mod tests {
 
     use super::*;
     use crate::bvh::layout::MOST_UNIT;
+    use crate::random;
 
     /// The units of some bins, of which each holds what the layout promises.
     fn units(sizes: &[u32]) -> Vec<Range<usize>> {
@@ -167,9 +168,8 @@ mod tests {
         for _ in 0..if cfg!(miri) { 20 } else { 2000 } {
             let mut sizes = [0; 64];
             for size in &mut sizes {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 let some = [0, 1, per_root - 1, per_root, 100, crowd, crowd + 1, 5000];
-                *size = some[(state >> 29) as usize];
+                *size = some[(random::next(&mut state) >> 29) as usize];
             }
             units(&sizes);
         }

@@ -11,8 +11,8 @@ use glam::DVec3;
 use super::node::{Child, LEAF, Node, WIDTH};
 use super::{Bvh, LEVELS};
 use crate::aabb::Aabb;
-use crate::arena::{first_mut, section_bytes};
-use crate::blob::{HEADER_BYTES, Header, corrupt};
+use crate::arena::first_mut;
+use crate::blob::{Header, corrupt};
 use crate::cell::Lattice;
 use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
@@ -46,12 +46,6 @@ impl Bvh<'_> {
         mesh: &TriangleMesh<'_>,
         scratch: &mut [u8],
     ) -> Result<(), Error> {
-        let at = |byte: u64| corrupt(usize::try_from(byte).unwrap_or(usize::MAX));
-        let ids_at = HEADER_BYTES as u64;
-        let nodes_at = ids_at + section_bytes::<u32>(self.ids.len() as u64);
-        let node_at = |node: u32| at(nodes_at + u64::from(node) * size_of::<Node>() as u64);
-        let word_at = |word: u64| at(ids_at + word * size_of::<u32>() as u64);
-
         let survey = header.survey(lattice, mesh)?;
         if header.resolution != [1; 3] {
             return Err(corrupt(core::mem::offset_of!(Header, resolution)));
@@ -83,12 +77,13 @@ impl Bvh<'_> {
         }
         levels[0] = start(0, -everywhere, everywhere);
         loop {
-            let Some(level) = levels.get_mut(depth) else { return Err(node_at(0)) };
+            let Some(level) = levels.get_mut(depth) else { return Err(self.wrong_node(0)) };
             let number = level.node;
-            let node = self.nodes.get(number as usize).ok_or(node_at(number))?;
+            let wrong = self.wrong_node(number);
+            let node = self.nodes.get(number as usize).ok_or(wrong)?;
             if level.rest == 0xff {
-                budget = budget.checked_sub(1).ok_or(node_at(number))?;
-                node.check(least, number == 0 && self.ids.is_empty()).ok_or(node_at(number))?;
+                budget = budget.checked_sub(1).ok_or(wrong)?;
+                node.check(least, number == 0 && self.ids.is_empty()).ok_or(wrong)?;
             }
             if level.rest == 0 {
                 let Some(above) = depth.checked_sub(1) else { break };
@@ -102,23 +97,23 @@ impl Bvh<'_> {
             match node.child(slot) {
                 Child::Inner(child) => {
                     if child as usize >= self.nodes.len() {
-                        return Err(node_at(number));
+                        return Err(wrong);
                     }
                     depth += 1;
                     deepest = deepest.max(depth + 1);
-                    *levels.get_mut(depth).ok_or(node_at(number))? = start(child, min, max);
+                    *levels.get_mut(depth).ok_or(wrong)? = start(child, min, max);
                 }
                 Child::Leaf { first, count } => {
                     for word in (u64::from(first)..).take(count as usize) {
                         let id = usize::try_from(word).ok().and_then(|word| self.ids.get(word));
-                        let id = *id.ok_or(node_at(number))?;
-                        let byte = met.get_mut(id as usize / 8).ok_or(word_at(word))?;
+                        let (id, wrong) = (*id.ok_or(wrong)?, Self::wrong_id(word));
+                        let byte = met.get_mut(id as usize / 8).ok_or(wrong)?;
                         let bit = 1 << (id % 8);
-                        let bounds = reader.corners(id).and_then(Aabb::of).ok_or(word_at(word))?;
+                        let bounds = reader.corners(id).and_then(Aabb::of).ok_or(wrong)?;
                         let is_held = bounds.min.as_dvec3().cmpge(min).all()
                             && bounds.max.as_dvec3().cmple(max).all();
                         if *byte & bit != 0 || !is_held {
-                            return Err(word_at(word));
+                            return Err(wrong);
                         }
                         *byte |= bit;
                         ids += 1;

@@ -19,7 +19,7 @@ use super::shape_leaf::{boxes_of_leaf, meet_leaf, nearest_of, pad_of};
 use super::slab::Slab;
 use crate::aabb::{Aabb, greater, lesser};
 use crate::counters::Tally;
-use crate::eight::{Eight, first_eight};
+use crate::eight::Eight;
 use crate::extremes::Extremes;
 use crate::filter::{LineFilter, RayFilter};
 use crate::mesh::TriangleMesh;
@@ -100,12 +100,7 @@ impl<S: Simd> Wide<S> {
         first: u32,
         ids: &[u32],
     ) -> u32 {
-        // Read eight ids at once if the array has so many from here on; those behind the leaf are masked.
-        let lanes = match bvh.eight(first) {
-            Some(lanes) => lanes,
-            None => first_eight(ids),
-        };
-        let triangles = Eight::of(simd, mesh, lanes, ids.len());
+        let triangles = Eight::of(simd, mesh, bvh.lanes(first, ids), ids.len());
         #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
         let dropped = self.filter.drops(&triangles.corners).to_bitmask() as u32;
         !dropped & triangles.used
@@ -234,9 +229,9 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
         let (begin, cull, afar) = (*begin, *cull, *afar);
         let nearby = if afar.is_none() { Slab::nearby(ray, begin, bounds) } else { afar.copied() };
         let Some((slab, filter)) = nearby else { return false };
+        let slab = &slab;
         // Boxes need no filter: the compiler drops its computation.
         let filter = if F::OF_BOXES { RayFilter::NONE } else { filter };
-        let (slab, given) = (&slab, ray);
         // Hide the vectors from the compiler: it would compute in one lane and broadcast the result, which lengthens
         // the dependency chain from one node to the next.
         let wide = HAS_VECTORS.then(
@@ -333,7 +328,7 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
                 if search.knows(id) {
                     continue;
                 }
-                match search.decided(TriangleTest::decide_for(given, cull, mesh, id)) {
+                match search.decided(TriangleTest::decide_for(ray, cull, mesh, id)) {
                     Outcome::Unchanged => {}
                     Outcome::EndsAt(t) => end = slab.latest(t),
                     Outcome::Done => return true,

@@ -15,6 +15,7 @@ use core::num::NonZeroU32;
 use core::ops::Range;
 
 use crate::bits::{WORD_BITS, extent, is_set, load, low_bits, set_range};
+use crate::cell::CellRange;
 use crate::invariant::OrBug;
 use crate::limits::MAX_RESOLUTION;
 
@@ -158,21 +159,14 @@ impl Levels {
         let mut below = (Level { resolution, start: 0 }, domain_bits);
         for number in 1..=self.count {
             let level = self.level(number);
-            let [width, height, depth] = level.resolution;
-            for z in 0..depth {
-                for y in 0..height {
-                    for x in 0..width {
-                        let bit = level.bit([x, y, z]);
-                        if is_set(words, bit)
-                            != below.0.any_in(below.1, [x, y, z], self.factor.get())
-                        {
-                            return Some(bit / WORD_BITS);
-                        }
-                    }
+            for cell in CellRange::all(level.resolution).cells() {
+                let bit = level.bit(cell);
+                if is_set(words, bit) != below.0.any_in(below.1, cell, self.factor.get()) {
+                    return Some(bit / WORD_BITS);
                 }
             }
             // No bit is set behind the last macrocell.
-            let end = level.bit([0, 0, depth]);
+            let end = level.bit([0, 0, level.resolution[2]]);
             if extent(words, end, end.next_multiple_of(WORD_BITS) - end).is_some() {
                 return Some(end / WORD_BITS);
             }

@@ -25,7 +25,7 @@ use crate::dda::{Line, NEVER, Step};
 use crate::error::Error;
 use crate::mesh::TriangleMesh;
 pub(crate) use crate::one_level::scratch_bytes;
-use crate::one_level::{self, OneLevel, Overlay};
+use crate::one_level::{Layout, OneLevel, Overlay, Plan, build_under, longest};
 use crate::visit::Visitor;
 use levels::{Levels, MAX_LEVELS};
 
@@ -57,9 +57,9 @@ impl Overlay for Macrocells {
 )]
 pub(crate) const fn bound(triangles: u32, density: f32, factor: u32) -> (u64, u64) {
     // A box with the most cells on every axis has the most macrocells on every level.
-    let longest = one_level::longest(triangles, density) as u32 + 1;
-    let levels = Levels::new([longest; 3], factor);
-    one_level::bound_under(triangles, density, levels.words)
+    let most = longest(triangles, density) as u32 + 1;
+    let levels = Levels::new([most; 3], factor);
+    Layout::bound(triangles, density, levels.words).bytes()
 }
 
 /// The memory that a mesh needs: exact if the scratch is large enough to plan in.
@@ -70,7 +70,7 @@ pub(crate) fn sizes(
     flags: BuildFlags,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    one_level::sizes_under(mesh, density, flags, &Macrocells { factor }, scratch)
+    Plan::sizes(mesh, density, flags, &Macrocells { factor }, scratch)
 }
 
 /// Builds in as much memory as [`sizes`] says.
@@ -83,7 +83,7 @@ pub(crate) fn build<'a>(
     scratch: &mut [u8],
     watch: &Watch<'_>,
 ) -> Result<&'a [u8], Error> {
-    one_level::build_under(mesh, density, flags, &Macrocells { factor }, index, scratch, watch)
+    build_under(mesh, density, flags, &Macrocells { factor }, index, scratch, watch)
 }
 
 /// A view of a built fixed grid.

@@ -20,7 +20,7 @@ use super::displacement::displace;
 use super::layout::{Layout, Scratch};
 use super::spread::{count_references, fill, mark};
 use super::triangles::MeshSpread;
-use crate::arena::{copy, first_mut};
+use crate::arena::{Sizes, copy, first_mut};
 use crate::blob::Header;
 use crate::cell::{Lattice, woo};
 use crate::config::{BuildFlags, Parameters};
@@ -120,9 +120,17 @@ impl<'s> Plan<'s> {
         header
     }
 
-    /// Returns true if the sizes are exact.
-    pub(super) const fn is_exact(&self) -> bool {
-        self.rows.is_some()
+    /// The memory that a mesh needs: exact if the scratch is large enough to displace the rows in.
+    pub(crate) fn sizes(
+        mesh: &TriangleMesh<'_>,
+        density: f32,
+        flags: BuildFlags,
+        overlay: &dyn Overlay,
+        scratch: &mut [u8],
+    ) -> Result<Sizes, Error> {
+        let plan = Plan::new(mesh, density, flags, overlay, scratch, &Watch::none())?;
+        let (index_bytes, scratch_bytes) = plan.layout.bytes();
+        Sizes::new(index_bytes, scratch_bytes, plan.rows.is_some())
     }
 }
 

@@ -112,6 +112,11 @@ impl Layout {
         Self { reference_count, ..self }
     }
 
+    /// Bytes of the blob, and bytes that the build needs beside it.
+    pub(crate) const fn bytes(&self) -> (u64, u64) {
+        (self.index_bytes(), self.scratch_bytes())
+    }
+
     /// Bytes of the blob, header included.
     pub(crate) const fn index_bytes(&self) -> u64 {
         HEADER_BYTES as u64

@@ -41,7 +41,7 @@ pub(crate) use layout::{Layout, Scratch, longest};
 pub(crate) use placed::PlacedBatch;
 pub(crate) use spread::{Spread, fill, mark};
 pub(crate) use triangles::MeshSpread;
-pub(crate) use validate::{check_header, slots_are_sound};
+pub(crate) use validate::{check_header, is_list_of, slots_are_sound};
 
 /// A view of a built one-level grid.
 #[derive(Debug, Clone, Copy)]
@@ -59,13 +59,7 @@ pub(crate) fn slot(row_offset: i32, x: u32) -> Option<usize> {
 
 /// The most memory that a mesh with so many triangles can need.
 pub(crate) const fn bound(triangles: u32, density: f32) -> (u64, u64) {
-    bound_under(triangles, density, 0)
-}
-
-/// [`bound`] with an overlay of so many words.
-pub(crate) const fn bound_under(triangles: u32, density: f32, words: u64) -> (u64, u64) {
-    let layout = Layout::bound(triangles, density, words);
-    (layout.index_bytes(), layout.scratch_bytes())
+    Layout::bound(triangles, density, 0).bytes()
 }
 
 /// The scratch that the build of a grid with this header takes.
@@ -80,19 +74,7 @@ pub(crate) fn sizes(
     flags: BuildFlags,
     scratch: &mut [u8],
 ) -> Result<Sizes, Error> {
-    sizes_under(mesh, density, flags, &(), scratch)
-}
-
-/// [`sizes`] with an overlay.
-pub(crate) fn sizes_under(
-    mesh: &TriangleMesh<'_>,
-    density: f32,
-    flags: BuildFlags,
-    overlay: &dyn Overlay,
-    scratch: &mut [u8],
-) -> Result<Sizes, Error> {
-    let plan = Plan::new(mesh, density, flags, overlay, scratch, &Watch::none())?;
-    Sizes::new(plan.layout.index_bytes(), plan.layout.scratch_bytes(), plan.is_exact())
+    Plan::sizes(mesh, density, flags, &(), scratch)
 }
 
 /// Builds in as much memory as [`sizes`] says.
@@ -194,12 +176,11 @@ impl<'a> OneLevel<'a> {
         reach: &Aabb,
         mut visit: impl FnMut([u32; 3]) -> bool,
     ) -> bool {
-        let [width, height, _] = self.last.map(|last| last + 1);
         let range = cells_between(*reach, self.last.map(|last| last + 1));
         let [first, last] = [range.min[0], range.max[0]];
         for z in range.min[2]..=range.max[2] {
             for y in range.min[1]..=range.max[1] {
-                let bit = row(height, y, z) * width as usize + first as usize;
+                let bit = self.bit([first, y, z]);
                 let count = (last - first) as usize + 1;
                 let mut goes_on = true;
                 each_one(self.sections.domain_bits, bit, count, |x| {

@@ -136,6 +136,7 @@ mod tests {
     use crate::bits::is_set;
     use crate::cell::row;
     use crate::one_level::displace;
+    use crate::random;
 
     /// Primitives whose cells are written down.
     struct Written {
@@ -164,10 +165,7 @@ mod tests {
     /// Primitives of up to four cells an axis, a few with none and one that has a whole row.
     fn written(count: usize, resolution: [u32; 3]) -> Written {
         let mut state = 1_u32;
-        let mut below = |end: u32| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) % end
-        };
+        let mut below = |end: u32| (random::next(&mut state) >> 8) % end;
         let mut ranges = Vec::new();
         for place in 0..count {
             let min: [u32; 3] = resolution.map(&mut below);

@@ -74,7 +74,7 @@ impl Kernel for PlaceBatch<'_, '_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Self { spread, wide, first, batch } = self;
-        let spans = Spans::new(simd, spread.lattice, 1);
+        let spans = Spans::new(simd, spread.lattice);
         let [_, height, _] = spread.lattice.resolution;
         batch.is_placed = 0;
         let slots = batch.rows.iter_mut().zip(&mut batch.xs).zip(&mut batch.more);
@@ -99,6 +99,7 @@ mod tests {
     use super::*;
     use crate::cell::as_f32;
     use crate::cell::row;
+    use crate::random;
 
     /// The rows of cells of a batch's primitives, and their number of cells.
     fn rows(
@@ -119,10 +120,7 @@ mod tests {
         // Most triangles are small, some span the box, some are not finite or have no vertices; one
         // has the last vertex, behind which nothing can be read.
         let mut state = 1_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            state >> 8
-        };
+        let mut random = || random::next(&mut state) >> 8;
         let mut positions = Vec::new();
         for at in 0..65 {
             let mut coordinate = || as_f32(random() % 4096) / 4096.0;

@@ -126,12 +126,22 @@ impl OneLevel<'_> {
     ) -> Result<&[u32], Option<&[u32]>> {
         let cell = cell.ok_or(None)?;
         let list = self.references(cell).filter(|list| !list.is_empty()).ok_or(None)?;
-        let covers = |&id: &u32| {
-            let bounds = mesh.corners(id).and_then(Aabb::of);
-            bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
-        };
-        if ascends(list) && list.iter().all(covers) { Ok(list) } else { Err(Some(list)) }
+        if is_list_of(list, cell, lattice, mesh) { Ok(list) } else { Err(Some(list)) }
     }
+}
+
+/// Returns true if the ids in a list ascend and each covers the list's cell.
+pub(crate) fn is_list_of(
+    list: &[u32],
+    cell: [u32; 3],
+    lattice: &Lattice,
+    mesh: &TriangleMesh<'_>,
+) -> bool {
+    let covers = |&id: &u32| {
+        let bounds = mesh.corners(id).and_then(Aabb::of);
+        bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
+    };
+    ascends(list) && list.iter().all(covers)
 }
 
 /// Returns true if a table is as displaced rows leave it: a row without marked cells has offset 0, every

@@ -441,7 +441,7 @@ impl Builder<'_, '_> {
                 *entry = value;
             }
         };
-        let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
+        let all = CellRange::all(node.resolution);
         let cells = u32::try_from(node.cells()).unwrap_or(u32::MAX);
         let mut later = references as u64;
         for (number, cell) in all.cells().enumerate() {

@@ -56,6 +56,7 @@ fn across(half: Vec3A, edge: Vec3A) -> Vec3A {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random;
 
     fn overlaps(triangle: [[f32; 3]; 3]) -> bool {
         Overlap::new(triangle.map(Vec3A::from_array)).with(Vec3A::ZERO, Vec3A::ONE)
@@ -76,10 +77,8 @@ mod tests {
     #[test]
     fn never_misses_a_sliver() {
         let mut state = 5_u32;
-        let mut unit = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f32::from(u16::try_from(state >> 16).unwrap()) / 32768.0 - 1.0
-        };
+        let mut unit =
+            || f32::from(u16::try_from(random::next(&mut state) >> 16).unwrap()) / 32768.0 - 1.0;
         for width in [1e-2, 1e-3, 1e-4, 1e-5] {
             for half in [0.1, 0.01] {
                 for _ in 0..300 {
@@ -102,10 +101,8 @@ mod tests {
     #[cfg_attr(miri, ignore = "hours of arithmetic")]
     fn never_misses_a_point_inside() {
         let mut state = 3_u32;
-        let mut unit = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f32::from(u16::try_from(state >> 16).unwrap()) / 8192.0 - 4.0
-        };
+        let mut unit =
+            || f32::from(u16::try_from(random::next(&mut state) >> 16).unwrap()) / 8192.0 - 4.0;
         let (mut hits, mut misses) = (0, 0);
         for _ in 0..3000 {
             let triangle: [Vec3A; 3] = core::array::from_fn(|_| Vec3A::new(unit(), unit(), unit()));

@@ -119,7 +119,7 @@ impl Check<'_> {
         let wrong = Self::wrong(at);
         *self.contents.get_mut(depth).ok_or(wrong)? = Contents::NONE;
         self.cursor = node.contents();
-        let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
+        let all = CellRange::all(node.resolution);
         for (number, cell) in all.cells().enumerate() {
             if node.start(self.pool, number) != Some(self.cursor) {
                 return Err(wrong);
@@ -228,7 +228,7 @@ impl Check<'_> {
         depth: usize,
         visit: &mut impl FnMut(&PlacedTriangle),
     ) {
-        let all = CellRange { min: [0; 3], max: node.resolution.map(|cells| cells - 1) };
+        let all = CellRange::all(node.resolution);
         for cell in all.cells() {
             if let Some(place) = around.get_mut(depth) {
                 *place = Some((*node, cell));

@@ -13,12 +13,7 @@ use crate::ray::RayF64;
 use crate::simd::HAS_VECTORS;
 
 impl Answer for SceneHit {
-    type Stored = Self;
     const IS_ANY: bool = false;
-
-    fn stored(self) -> Self {
-        self
-    }
 }
 
 /// The answer of a scene.

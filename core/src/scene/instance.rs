@@ -22,7 +22,7 @@ use glam::DVec3;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use crate::aabb::{greater, lesser};
-use crate::approach::LineF64;
+use crate::approach::{FAR_EXTENTS, LineF64};
 use crate::limits::MAX_COORDINATE;
 use crate::ray::{Ray, RayF64, round};
 use crate::triangle::OF_CORNERS;
@@ -204,9 +204,6 @@ pub(super) struct Seen {
     shift: f64,
 }
 
-/// Objects farther away than so many of their extents are seen from where the ray enters their box.
-const FAR_EXTENTS: f64 = 4.0;
-
 /// The rounding of f64 moves the origin of a ray by 2^-23 of an extent if it comes from so many extents away. At 2^-19
 /// it passes the growth of the box ([`GROWTH`]); the rest is a margin.
 const AFAR: f64 = 536_870_912.0; // 2^29
@@ -245,8 +242,9 @@ impl Seen {
         let (center, half) = grown(bounds);
         let away = |axis: usize| (origin[axis] - center[axis]).abs();
         let extent = 2.0 * greater(half[0], greater(half[1], half[2]));
-        let is_far = greater(away(0), greater(away(1), away(2))) > FAR_EXTENTS * extent;
-        if is_far {
+        let away = greater(away(0), greater(away(1), away(2)));
+        // An object that is far away is seen from where the ray enters its box.
+        if away > f64::from(FAR_EXTENTS) * extent {
             self.shift = self.entry(&center, &half)?;
         }
         let at = |axis: usize| round(origin[axis] + self.shift * direction[axis]);

@@ -13,7 +13,7 @@ use zerocopy::IntoBytes;
 
 use super::instance::{Instance, StoredInstance};
 use super::{Object, Scene, Table};
-use crate::arena::{Sizes, align_up, check_alignment, section_bytes, split, split_mut};
+use crate::arena::{Sizes, align_up, check_alignment, move_down, section_bytes, split, split_mut};
 use crate::blob::{Header, corrupt};
 use crate::config::Config;
 use crate::control::Control;
@@ -23,7 +23,7 @@ use crate::invariant::OrBug;
 use crate::limits::{ALIGNMENT, MAX_NESTING};
 use crate::mesh::{BOX_BYTES, Strided, TriangleMesh};
 use crate::method::Content;
-use crate::refit::{Refit, refit_content};
+use crate::refit::{Refit, refit};
 
 type BoxSides = [f32; 6];
 
@@ -172,8 +172,11 @@ impl<'a> Scene<'a> {
             Err(error) => return Err(error),
         };
 
-        // Close the gap.
-        close_gap(index, tree_bytes, room);
+        // Close the gap. Blocks move sooner than bytes.
+        let block_of = |byte: usize| byte / ALIGNMENT;
+        let (blocks, _) = index.as_chunks_mut::<ALIGNMENT>();
+        let from = block_of(room)..blocks.len();
+        move_down(blocks, from, block_of(tree_bytes));
         Self::open(index, objects)
     }
 
@@ -244,27 +247,27 @@ impl<'a> Scene<'a> {
     pub fn validate(&self, scratch: &mut [u8]) -> Result<(), Error> {
         let header = Header::peek(self.blob)?;
         let (start, _) = ends_of(&header);
-        let at = |byte: u64| corrupt(usize::try_from(byte).unwrap_or(usize::MAX));
         self.tree.validate(scratch)?;
         let table_bytes = section_bytes::<Table>(1);
         let instances_at =
             start + table_bytes + section_bytes::<BoxSides>(header.triangle_count.into());
         let mut object_count = 0;
         for (number, placed) in (0_u32..).zip(self.instances) {
-            let instance_at = instances_at + u64::from(number) * size_of::<StoredInstance>() as u64;
-            let object = self.objects.get(placed.object() as usize).ok_or(at(instance_at))?;
-            let bounds = placed.bounds(&object.bounds()).ok_or(at(instance_at))?;
+            let offset = instances_at + u64::from(number) * size_of::<StoredInstance>() as u64;
+            let object = self.objects.get(placed.object() as usize);
+            let bounds = object.and_then(|object| placed.bounds(&object.bounds()));
+            let bounds = bounds.ok_or(Error::Corrupt { offset })?;
             object_count = object_count.max(placed.object().saturating_add(1));
             let stored = self.tree.mesh().box_bytes(number);
             if stored.is_none_or(|stored| stored != bounds.as_bytes()) {
-                return Err(at(start + table_bytes + u64::from(number) * BOX_BYTES as u64));
+                let offset = start + table_bytes + u64::from(number) * BOX_BYTES as u64;
+                return Err(Error::Corrupt { offset });
             }
         }
         let table = Table { object_count, unused: [0; 15] };
-        let start = usize::try_from(start).unwrap_or(usize::MAX);
-        let stored = self.blob.get(start..).and_then(|bytes| bytes.first_chunk::<64>());
-        if stored.is_none_or(|stored| stored != table.as_bytes()) {
-            return Err(corrupt(start));
+        let stored = usize::try_from(start).ok().and_then(|at| self.blob.get(at..)?.first_chunk());
+        if stored.is_none_or(|stored: &[u8; 64]| stored != table.as_bytes()) {
+            return Err(Error::Corrupt { offset: start });
         }
         Ok(())
     }
@@ -310,20 +313,6 @@ impl<'a> Scene<'a> {
         let start = usize::try_from(start).unwrap_or(usize::MAX);
         let damaged = corrupt(offset_of!(Header, triangle_count));
         let (head, tail) = index.split_at_mut_checked(start).ok_or(damaged)?;
-        refit_content(head, &fill(tail, instances, objects, damaged)?)
-    }
-}
-
-/// Moves the bytes from `from` on down to `to`, which is before it; both and the end are multiples of 64.
-fn close_gap(bytes: &mut [u8], to: usize, from: usize) {
-    debug_assert!(to <= from && from <= bytes.len(), "a tree longer than its room");
-    let count = bytes.len().saturating_sub(from) / 64;
-    for block in 0..count {
-        let block_at = |start: usize| start + 64 * block..start + 64 * (block + 1);
-        let moved: Option<[u8; 64]> =
-            bytes.get(block_at(from)).and_then(|bytes| bytes.first_chunk()).copied();
-        if let (Some(moved), Some(place)) = (moved, bytes.get_mut(block_at(to))) {
-            place.copy_from_slice(&moved);
-        }
+        refit(head, &fill(tail, instances, objects, damaged)?)
     }
 }

@@ -25,7 +25,7 @@ use crate::mesh::{Strided, TriangleMesh};
 use crate::method::Content;
 use crate::options::{QueryOptions, Selection};
 use crate::ray::{Hit, Ray};
-use crate::refit::{Refit, refit_content};
+use crate::refit::{Refit, refit};
 use crate::search::{self, Outcome};
 use crate::sizes::sizes_with;
 
@@ -222,7 +222,7 @@ impl<'a> Shapes<'a> {
     /// # Errors
     /// The errors of [`refit`](crate::refit).
     pub fn refit(index: &mut [u8], boxes: &Boxes<'_>) -> Result<Refit, Error> {
-        refit_content(index, &boxes.0)
+        refit(index, &boxes.0)
     }
 
     /// The boxes that the tree was built or opened with.
@@ -315,9 +315,7 @@ impl<'a> Shapes<'a> {
         let mut offer = search::BoxSearch(&mut |id| offered.offer(id));
         self.grid.search_boxes(&ray.into(), &mut offer, &mut work);
         let best = offered.best;
-        if let Some(counters) = &mut options.counters {
-            counters.add(&work);
-        }
+        options.count(&work);
         best
     }
 }

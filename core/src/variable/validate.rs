@@ -23,7 +23,7 @@ use crate::cell::{CellRange, Lattice};
 use crate::error::Error;
 use crate::lists::{ascends, pairs};
 use crate::mesh::TriangleMesh;
-use crate::one_level::{check_header, slots_are_sound};
+use crate::one_level::{check_header, is_list_of, slots_are_sound};
 use crate::survey::{boxes, reference_limit};
 
 impl Variable<'_> {
@@ -41,17 +41,12 @@ impl Variable<'_> {
 
         // Every list ascends, and its triangles cover its cell.
         let (mut listed, mut words_of_cells) = (0_u64, 0_u64);
-        let all = CellRange { min: [0; 3], max: lattice.last() };
-        for cell in all.cells() {
+        for cell in CellRange::all(lattice.resolution).cells() {
             match self.content(cell) {
                 None if self.top.is_marked(cell) => return Err(at(self.top.sections.references)),
                 None => {}
                 Some(CellContent::List(ids)) => {
-                    let covers = |&id: &u32| {
-                        let bounds = mesh.corners(id).and_then(Aabb::of);
-                        bounds.is_some_and(|bounds| lattice.range(&bounds).contains(cell))
-                    };
-                    if ids.is_empty() || !ascends(ids) || !ids.iter().all(covers) {
+                    if ids.is_empty() || !is_list_of(ids, cell, lattice, mesh) {
                         return Err(at(ids));
                     }
                     listed += ids.len() as u64;
@@ -138,8 +133,7 @@ struct Inside<'a> {
 impl Inside<'_> {
     /// The lists, each with its cell in the subgrid.
     fn lists(&self) -> impl Iterator<Item = ([u32; 3], &[u32])> {
-        let max = self.grid.frame.resolution.map(|cells| cells - 1);
-        let all = CellRange { min: [0; 3], max };
+        let all = CellRange::all(self.grid.frame.resolution);
         all.cells().filter_map(|sub| Some((sub, self.grid.references(sub)?)))
     }
 

@@ -13,6 +13,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, mask32x8, u32x8};
 
 use crate::bvh::node::Sides;
+use crate::cell::WHOLE_SHIFT;
 use crate::extremes::Extremes;
 
 /// A triangle during a build, as bits: the least corner of its box, its id, the negated greatest corner, 0.
@@ -72,9 +73,6 @@ fn center<S: Simd>(sides: f32x8<S>) -> f32x8<S> {
     (low - high).combine(high - low)
 }
 
-/// Adding this rounds a small number to a whole one and leaves that in the low bits.
-const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
-
 /// Half the surface of a box whose lengths are multiplied by `unit`.
 #[inline(always)]
 pub(super) fn area<S: Simd>(simd: S, sides: f32x8<S>, unit: f32) -> f32 {
@@ -121,7 +119,7 @@ impl BinScale {
         let low = f32x4::simd_from(simd, [x, y, z, 0.0]);
         let scale = f32x4::simd_from(simd, [a, b, c, 0.0]);
         let places = ((min - max) - low) * scale - f32x4::splat(simd, 0.5);
-        let [x, y, z, _]: [f32; 4] = (places + f32x4::splat(simd, SHIFT)).into();
+        let [x, y, z, _]: [f32; 4] = (places + f32x4::splat(simd, WHOLE_SHIFT)).into();
         [bin(x), bin(y), bin(z)]
     }
 
@@ -130,7 +128,7 @@ impl BinScale {
     fn bin_of(&self, item: &TriangleItem, axis: usize) -> usize {
         let twice = f32::from_bits(item[axis % 3]) - f32::from_bits(item[4 + axis % 3]);
         let place = (twice - self.low[axis % 3]) * self.scale[axis % 3] - 0.5;
-        bin(place + SHIFT)
+        bin(place + WHOLE_SHIFT)
     }
 }
 

@@ -31,13 +31,12 @@ use fearless_simd::Simd;
 use glam::Vec3A;
 use zerocopy::transmute;
 
-use super::build::{finish, least_node, move_down};
-use super::census::{share, take};
+use super::build::{clear_header, cut_index, finish, least_node, move_nodes};
 use super::layout::index_bytes;
 use super::node::Node;
 use crate::aabb::Aabb;
-use crate::arena::{first_mut, section_bytes, split_mut, whole};
-use crate::blob::{HEADER_BYTES, Header};
+use crate::arena::{first_mut, move_down, section_bytes, split_mut};
+use crate::blob::Header;
 use crate::cell::Lattice;
 use crate::config::BuildFlags;
 use crate::control::{Control, Watch};
@@ -46,7 +45,8 @@ use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
-use crate::tasks::{self, run, task_count};
+use crate::survey::finite_box;
+use crate::tasks::{self, run, share, take, task_count};
 use cut::TriangleItem;
 use grow::{Cursor, Grow, Grown, RECORD, RangeRecord};
 
@@ -102,30 +102,19 @@ pub(super) fn build_in(
     if index_available < index_bound {
         tasks = 1;
     }
-    let behind = index.as_mut().and_then(|index| {
-        // Clear the header first: if the build ends early, the region must not open as a grid.
-        index.first_chunk_mut::<HEADER_BYTES>()?.fill(0);
-        index.get_mut(HEADER_BYTES..)
-    });
+    clear_header(&mut index);
 
     // Find the boxes.
     watch.at(BOXES)?;
     let (finite, bounds) = boxes(mesh, flags, items, tasks, control)?;
     let items = items.get_mut(..finite).or_bug("more triangles than items").unwrap_or_default();
 
-    // Cut the index.
-    let ids_bytes = section_bytes::<u32>(finite as u64) as usize;
-    // No index, or one that is too small, is legal: ids and nodes for which there is no room are only counted.
-    let parts = behind.and_then(|behind| behind.split_at_mut_checked(ids_bytes));
-    let (ids, nodes) = parts.unwrap_or_default();
-    let (ids, _) = split_mut::<u32>(ids, finite as u64).unwrap_or_default();
-    let nodes = whole::<Node>(nodes);
-
     // Make the nodes.
     watch.at(TOP)?;
     let scene = Lattice::pad(&bounds);
     let unit = inverse_power(scene.size().max_element());
     let work = HighInputs { least: least_node(&scene), unit, tasks };
+    let (ids, nodes) = cut_index(&mut index, finite as u32);
     let (node_count, levels) = work.make(items, ids, nodes, control, watch)?;
 
     watch.at(DONE)?;
@@ -158,8 +147,8 @@ fn boxes(
     let (all, tasks) = (items.len(), tasks as usize);
     let mut rest = &mut *items;
     let parts = (0..tasks).map(|task| {
-        let (first, end) = (share(all, task, tasks), share(all, task + 1, tasks));
-        ItemsTask { mesh, flags, first: first as u32, items: take(&mut rest, end - first) }
+        let share = share(all, task, tasks);
+        ItemsTask { mesh, flags, first: share.start as u32, items: take(&mut rest, share.len()) }
     });
     let level = SimdLevel::detect();
     let mut bounds = Aabb::EMPTY;
@@ -180,7 +169,7 @@ fn boxes(
     )?;
     let mut finite = 0;
     for (task, count) in counts.into_iter().enumerate().take(tasks) {
-        let first = share(all, task, tasks);
+        let first = share(all, task, tasks).start;
         // Move the items of a task down over the places that earlier tasks left empty.
         if finite < first {
             move_down(items, first..first + count, finite);
@@ -201,15 +190,7 @@ impl Kernel for ItemsTask<'_> {
         let triangles = first..first + items.len() as u32;
         for piece in mesh.pieces(triangles) {
             for (triangle, corners) in piece.each() {
-                let Some(corners) = corners else {
-                    return Err(Error::IndexOutOfRange { triangle });
-                };
-                let Some(box_of) = Aabb::of(corners) else {
-                    if flags.contains(BuildFlags::STRICT) {
-                        return Err(Error::NonFiniteTriangle { triangle });
-                    }
-                    continue;
-                };
+                let Some(box_of) = finite_box(triangle, corners, flags)? else { continue };
                 bounds = bounds.union(&box_of);
                 // Turn -0 into 0, so that the order of a union does not matter.
                 let [x, y, z] = (box_of.min + Vec3A::ZERO).to_array().map(f32::to_bits);
@@ -376,18 +357,18 @@ impl HighInputs {
         if IS_SMALL || self.tasks == 1 {
             let mut made = 0;
             plans[0].child = top_count;
-            for step in 1..=STEPS {
-                let (part, ranges) = next(share(all as usize, step, STEPS) as u32);
+            for step in 0..STEPS {
+                let (part, ranges) = next(share(all as usize, step, STEPS).end as u32);
                 let nodes = rest.get_mut(made as usize..).unwrap_or_default();
                 plans[0].ranges += ranges.count;
                 made += part.make(nodes, top_count + made);
-                watch.between(step as u32, STEPS as u32, [BELOW, DONE])?;
+                watch.between(step as u32 + 1, STEPS as u32, [BELOW, DONE])?;
             }
         } else {
             let mut child = top_count;
             let tasks = self.tasks as usize;
             let parts = plans.iter_mut().take(tasks).enumerate().map(|(task, plan)| {
-                let (part, ranges) = next(share(all as usize, task + 1, tasks) as u32);
+                let (part, ranges) = next(share(all as usize, task, tasks).end as u32);
                 let nodes = take(&mut rest, ranges.nodes as usize);
                 *plan = TaskRanges { ranges: ranges.count, child };
                 child += ranges.nodes;
@@ -409,14 +390,7 @@ impl HighInputs {
                 let Some(record) = record else { break };
                 let RangeRecord { mut root, nodes: below, levels: most, .. } = transmute!(*record);
                 let moved = child - count;
-                if moved > 0 {
-                    let from = child as usize..(child + below) as usize;
-                    let of_range = nodes.get_mut(from.clone()).or_bug("too many nodes");
-                    for node in of_range.unwrap_or_default() {
-                        node.child -= moved;
-                    }
-                    move_down(nodes, from, count as usize);
-                }
+                move_nodes(nodes, child..child + below, count);
                 root.child -= moved;
                 if let Some(slot) = nodes.get_mut(waiter.place as usize).or_bug("no such node") {
                     *slot = root;
