@@ -1159,8 +1159,8 @@ public:
     /// The same.
     template <class Blob, std::enable_if_t<!detail::stays<Blob &&>::value, int> = 0>
     static result<view> open(Blob &&) = delete;
-    /// Gives the tree in a blob the boxes of a mesh whose vertices moved, in place; other views of the blob are of no use
-    /// any more.
+    /// Gives the tree in a blob the boxes of a mesh whose vertices moved, in place; other views of the blob are of no
+    /// use any more. After an error the blob is as it was. Errors are those of `hgrid_refit`.
     static result<view> refit(const mesh &of, span<byte> blob, refit_report *details = nullptr) noexcept
     {
         view moved;
@@ -1188,12 +1188,12 @@ public:
     /// The closest triangle that a ray hits.
     optional<hit> intersect(const ray &along) const noexcept
     {
-        return intersect(along, nullptr);
+        return intersect_in_c(along, nullptr);
     }
     /// The closest triangle that a ray hits and that the options let count.
     optional<hit> intersect(const ray &along, const options &with) const noexcept
     {
-        return intersect(along, &with.c());
+        return intersect_in_c(along, &with.c());
     }
 
     /// Returns true if a ray hits anything.
@@ -1223,13 +1223,13 @@ public:
     /// rays, or the answer is `invalid_answers`.
     status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know) const noexcept
     {
-        return intersect_n(rays, hits, know, nullptr);
+        return intersect_n_in_c(rays, hits, know, nullptr);
     }
     /// The same with options for all rays.
     status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
                        const options &with) const noexcept
     {
-        return intersect_n(rays, hits, know, &with.c());
+        return intersect_n_in_c(rays, hits, know, &with.c());
     }
 
     /// For each ray 1 if it hits anything, or else 0. There are as many answers as rays, or the answer
@@ -1237,13 +1237,13 @@ public:
     status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers,
                       coherence know) const noexcept
     {
-        return occluded_n(rays, answers, know, nullptr);
+        return occluded_n_in_c(rays, answers, know, nullptr);
     }
     /// The same with options for all rays.
     status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
                       const options &with) const noexcept
     {
-        return occluded_n(rays, answers, know, &with.c());
+        return occluded_n_in_c(rays, answers, know, &with.c());
     }
 
     /// For each ray a triangle that blocks it, or `invalid_id`. There are as many answers as rays, or the
@@ -1251,26 +1251,26 @@ public:
     status occluder_n(strided<const ray> rays, strided<std::uint32_t> answers,
                       coherence know) const noexcept
     {
-        return occluder_n(rays, answers, know, nullptr);
+        return occluder_n_in_c(rays, answers, know, nullptr);
     }
     /// The same with options for all rays.
     status occluder_n(strided<const ray> rays, strided<std::uint32_t> answers, coherence know,
                       const options &with) const noexcept
     {
-        return occluder_n(rays, answers, know, &with.c());
+        return occluder_n_in_c(rays, answers, know, &with.c());
     }
 
     /// Every triangle that a ray hits, sorted by t, as many as there is room for; gives their number,
     /// which may be larger.
     result<std::size_t> intersect_all(const ray &along, span<hit> hits) const noexcept
     {
-        return intersect_all(along, hits, nullptr);
+        return intersect_all_in_c(along, hits, nullptr);
     }
     /// The same with options.
     result<std::size_t> intersect_all(const ray &along, span<hit> hits,
                                       const options &with) const noexcept
     {
-        return intersect_all(along, hits, &with.c());
+        return intersect_all_in_c(along, hits, &with.c());
     }
 
     /// The nearest point of the mesh that is no farther away than this.
@@ -1278,13 +1278,13 @@ public:
     closest_point(const point &from,
                   float max_distance = std::numeric_limits<float>::infinity()) const noexcept
     {
-        return closest_point(from, max_distance, nullptr);
+        return closest_point_in_c(from, max_distance, nullptr);
     }
     /// The same with options; culling and filters do not matter.
     optional<closest> closest_point(const point &from, float max_distance,
                                          const options &with) const noexcept
     {
-        return closest_point(from, max_distance, &with.c());
+        return closest_point_in_c(from, max_distance, &with.c());
     }
 
     /// The point where a ray met the mesh, its normal there, and starts for rays that leave it; `at` is
@@ -1354,13 +1354,13 @@ private:
                                                         &opened.raw_));
         return answer == status::ok ? result<view>(opened) : answer;
     }
-    optional<hit> intersect(const ray &along, const ::hgrid_query_options *with) const noexcept
+    optional<hit> intersect_in_c(const ray &along, const ::hgrid_query_options *with) const noexcept
     {
         hit at;
         return ::hgrid_intersect(&raw_, &along, with, &at) ? optional<hit>(at) : optional<hit>();
     }
-    status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
-                       const ::hgrid_query_options *with) const noexcept
+    status intersect_n_in_c(strided<const ray> rays, strided<hit> hits, coherence know,
+                            const ::hgrid_query_options *with) const noexcept
     {
         if (rays.size() != hits.size())
             return status::invalid_answers;
@@ -1368,8 +1368,8 @@ private:
                                                 hits.stride(), rays.size(),
                                                 static_cast<::hgrid_coherence>(know), with));
     }
-    status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
-                      const ::hgrid_query_options *with) const noexcept
+    status occluded_n_in_c(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
+                           const ::hgrid_query_options *with) const noexcept
     {
         if (rays.size() != answers.size())
             return status::invalid_answers;
@@ -1377,8 +1377,8 @@ private:
                                                answers.stride(), rays.size(),
                                                static_cast<::hgrid_coherence>(know), with));
     }
-    status occluder_n(strided<const ray> rays, strided<std::uint32_t> answers, coherence know,
-                      const ::hgrid_query_options *with) const noexcept
+    status occluder_n_in_c(strided<const ray> rays, strided<std::uint32_t> answers, coherence know,
+                           const ::hgrid_query_options *with) const noexcept
     {
         if (rays.size() != answers.size())
             return status::invalid_answers;
@@ -1386,16 +1386,16 @@ private:
                                                answers.stride(), rays.size(),
                                                static_cast<::hgrid_coherence>(know), with));
     }
-    result<std::size_t> intersect_all(const ray &along, span<hit> hits,
-                                      const ::hgrid_query_options *with) const noexcept
+    result<std::size_t> intersect_all_in_c(const ray &along, span<hit> hits,
+                                           const ::hgrid_query_options *with) const noexcept
     {
         std::size_t count = 0;
         const status answer = detail::said(
             ::hgrid_intersect_all(&raw_, &along, with, hits.data(), hits.size(), &count));
         return answer == status::ok ? result<std::size_t>(count) : answer;
     }
-    optional<closest> closest_point(const point &from, float max_distance,
-                                         const ::hgrid_query_options *with) const noexcept
+    optional<closest> closest_point_in_c(const point &from, float max_distance,
+                                              const ::hgrid_query_options *with) const noexcept
     {
         const ::hgrid_point_query query = {{from[0], from[1], from[2]}, max_distance};
         closest at;
@@ -1631,7 +1631,7 @@ inline result<grid> grid::build(const mesh &of, const config &how, report *detai
 using shape_hit = ::hgrid_shape_hit;
 /// The hit of a ray in a scene. See `hgrid_scene_hit`.
 using scene_hit = ::hgrid_scene_hit;
-/// An object at a place in a scene. See `hgrid_instance`.
+/// An object at a place in a scene. See `hgrid_instance`. An array that was filled in C goes to `hgrid_build_scene`.
 struct instance : ::hgrid_instance {
     /// The first object where it is, with the identity transform.
     instance() noexcept : ::hgrid_instance HGRID_INSTANCE_INIT {}
@@ -1695,8 +1695,8 @@ inline constexpr std::size_t scene_bound(std::size_t instances) noexcept
 /// The boxes of shapes of one's own, six floats each, and the test for them: `hgrid_boxes`. It refers to both.
 class boxes {
 public:
-    /// Boxes with a test: `bool test(std::uint32_t shape, const hgrid::ray &along, hgrid::shape_hit &hit)`, a callable with a
-    /// name, which stays where it is for as long as shapes are queried.
+    /// Boxes with a test: `bool test(std::uint32_t shape, const hgrid::ray &along, hgrid::shape_hit &hit)`, a callable
+    /// with a name, which stays where it is for as long as shapes are queried.
     template <class Test>
     boxes(strided<const std::array<float, 6>> all, Test &test) noexcept
     {
@@ -1771,57 +1771,57 @@ public:
         return detail::said(::hgrid_validate_shapes(&raw_, scratch.data(), scratch.size()));
     }
     /// The closest shape that a ray hits.
-    optional<hit> intersect(const ray &along) const noexcept { return intersect(along, nullptr); }
-    /// The same with options.
+    optional<hit> intersect(const ray &along) const noexcept { return intersect_in_c(along, nullptr); }
+    /// The same with options, of which `mask`, `skip` and `counters` are used.
     optional<hit> intersect(const ray &along, const options &with) const noexcept
     {
-        return intersect(along, &with.c());
+        return intersect_in_c(along, &with.c());
     }
     /// Returns true if a ray hits any shape.
     bool occluded(const ray &along) const noexcept
     {
         return ::hgrid_occluded_shapes(&raw_, &along, nullptr);
     }
-    /// The same with options.
+    /// The same with options, of which `mask`, `skip` and `counters` are used.
     bool occluded(const ray &along, const options &with) const noexcept
     {
         return ::hgrid_occluded_shapes(&raw_, &along, &with.c());
     }
-    /// The closest shape that each ray hits; a miss has the primitive `invalid_id`. There are as many hits as rays, or the
-    /// answer is `invalid_answers`.
+    /// The closest shape that each ray hits; a miss has the primitive `invalid_id`. There are as many hits as rays, or
+    /// the answer is `invalid_answers`.
     status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know) const noexcept
     {
-        return intersect_n(rays, hits, know, nullptr);
+        return intersect_n_in_c(rays, hits, know, nullptr);
     }
     /// The same with options for all rays.
     status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
                        const options &with) const noexcept
     {
-        return intersect_n(rays, hits, know, &with.c());
+        return intersect_n_in_c(rays, hits, know, &with.c());
     }
     /// For each ray 1 if it hits any shape, or else 0. There are as many answers as rays, or the answer is
     /// `invalid_answers`.
     status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know) const noexcept
     {
-        return occluded_n(rays, answers, know, nullptr);
+        return occluded_n_in_c(rays, answers, know, nullptr);
     }
     /// The same with options for all rays.
     status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
                       const options &with) const noexcept
     {
-        return occluded_n(rays, answers, know, &with.c());
+        return occluded_n_in_c(rays, answers, know, &with.c());
     }
     /// The struct that C takes.
     const ::hgrid_shapes &c() const noexcept { return raw_; }
 
 private:
-    optional<hit> intersect(const ray &along, const ::hgrid_query_options *with) const noexcept
+    optional<hit> intersect_in_c(const ray &along, const ::hgrid_query_options *with) const noexcept
     {
         hit found;
         return ::hgrid_intersect_shapes(&raw_, &along, with, &found) ? optional<hit>(found) : optional<hit>();
     }
-    status intersect_n(strided<const ray> rays, strided<hit> hits, coherence know,
-                       const ::hgrid_query_options *with) const noexcept
+    status intersect_n_in_c(strided<const ray> rays, strided<hit> hits, coherence know,
+                            const ::hgrid_query_options *with) const noexcept
     {
         if (rays.size() != hits.size())
             return status::invalid_answers;
@@ -1829,8 +1829,8 @@ private:
                                                        hits.stride(), rays.size(),
                                                        static_cast<::hgrid_coherence>(know), with));
     }
-    status occluded_n(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
-                      const ::hgrid_query_options *with) const noexcept
+    status occluded_n_in_c(strided<const ray> rays, strided<std::uint8_t> answers, coherence know,
+                           const ::hgrid_query_options *with) const noexcept
     {
         if (rays.size() != answers.size())
             return status::invalid_answers;
@@ -1842,8 +1842,8 @@ private:
     ::hgrid_shapes raw_ = HGRID_SHAPES_INIT;
 };
 
-/// A tree over instances of objects: `hgrid_scene`, in memory that stays the caller's. The objects stay where they are, with
-/// the views that they name.
+/// A tree over instances of objects: `hgrid_scene`, in memory that stays the caller's. The objects stay where they are,
+/// with the views that they name.
 class scene {
 public:
     /// A view of nothing, which hits nothing.
@@ -1852,7 +1852,9 @@ public:
     static result<scene> build(span<const instance> all, span<const object> of, const config &how, span<byte> index,
                                span<byte> scratch, report *details = nullptr) noexcept
     {
-        static_assert(sizeof(instance) == sizeof(::hgrid_instance), "C reads arrays of them");
+        static_assert(sizeof(instance) == sizeof(::hgrid_instance) && std::is_standard_layout<instance>::value &&
+                          std::is_trivially_copyable<instance>::value,
+                      "C reads arrays of them");
         scene built;
         const ::hgrid_config raw = how.c();
         const status answer =
@@ -1919,8 +1921,8 @@ public:
                                                     &opened.raw_));
         return bytes;
     }
-    /// Opens what `pack` wrote, where it lies, with memory for its views, both of which stay where they are. With scratch
-    /// all that is in it is proven.
+    /// Opens what `pack` wrote, where it lies, with memory for its views, both of which stay where they are. With
+    /// scratch all that is in it is proven.
     static result<scene> open_packed(span<const byte> blob, span<byte> views,
                                      span<byte> scratch = span<byte>()) noexcept
     {
@@ -1932,11 +1934,11 @@ public:
         return answer == status::ok ? result<scene>(opened) : answer;
     }
     /// The closest thing that a ray hits.
-    optional<scene_hit> intersect(const ray_f64 &along) const noexcept { return intersect(along, nullptr); }
+    optional<scene_hit> intersect(const ray_f64 &along) const noexcept { return intersect_in_c(along, nullptr); }
     /// The same with options.
     optional<scene_hit> intersect(const ray_f64 &along, const scene_options &with) const noexcept
     {
-        return intersect(along, &with.c());
+        return intersect_in_c(along, &with.c());
     }
     /// Returns true if a ray hits anything.
     bool occluded(const ray_f64 &along) const noexcept
@@ -1953,25 +1955,25 @@ public:
     /// answer is `invalid_answers`.
     status intersect_n(strided<const ray_f64> rays, strided<scene_hit> hits, coherence know) const noexcept
     {
-        return intersect_n(rays, hits, know, nullptr);
+        return intersect_n_in_c(rays, hits, know, nullptr);
     }
     /// The same with options for all rays.
     status intersect_n(strided<const ray_f64> rays, strided<scene_hit> hits, coherence know,
                        const scene_options &with) const noexcept
     {
-        return intersect_n(rays, hits, know, &with.c());
+        return intersect_n_in_c(rays, hits, know, &with.c());
     }
     /// For each ray 1 if it hits anything, or else 0. There are as many answers as rays, or the answer is
     /// `invalid_answers`.
     status occluded_n(strided<const ray_f64> rays, strided<std::uint8_t> answers, coherence know) const noexcept
     {
-        return occluded_n(rays, answers, know, nullptr);
+        return occluded_n_in_c(rays, answers, know, nullptr);
     }
     /// The same with options for all rays.
     status occluded_n(strided<const ray_f64> rays, strided<std::uint8_t> answers, coherence know,
                       const scene_options &with) const noexcept
     {
-        return occluded_n(rays, answers, know, &with.c());
+        return occluded_n_in_c(rays, answers, know, &with.c());
     }
     /// The point where a ray met a triangle, its normal there, and starts for rays that leave it; `at` is
     /// what a query has found for the ray. Nothing where `hgrid_scene_surface_at` returns false.
@@ -2006,22 +2008,22 @@ public:
     const ::hgrid_scene &c() const noexcept { return raw_; }
 
 private:
-    optional<scene_hit> intersect(const ray_f64 &along, const ::hgrid_scene_options *with) const noexcept
+    optional<scene_hit> intersect_in_c(const ray_f64 &along, const ::hgrid_scene_options *with) const noexcept
     {
         scene_hit found;
         return ::hgrid_intersect_scene(&raw_, &along, with, &found) ? optional<scene_hit>(found)
                                                                     : optional<scene_hit>();
     }
-    status intersect_n(strided<const ray_f64> rays, strided<scene_hit> hits, coherence know,
-                       const ::hgrid_scene_options *with) const noexcept
+    status intersect_n_in_c(strided<const ray_f64> rays, strided<scene_hit> hits, coherence know,
+                            const ::hgrid_scene_options *with) const noexcept
     {
         if (rays.size() != hits.size())
             return status::invalid_answers;
         return detail::said(::hgrid_intersect_scene_n(&raw_, rays.first(), rays.stride(), hits.first(), hits.stride(),
                                                       rays.size(), static_cast<::hgrid_coherence>(know), with));
     }
-    status occluded_n(strided<const ray_f64> rays, strided<std::uint8_t> answers, coherence know,
-                      const ::hgrid_scene_options *with) const noexcept
+    status occluded_n_in_c(strided<const ray_f64> rays, strided<std::uint8_t> answers, coherence know,
+                           const ::hgrid_scene_options *with) const noexcept
     {
         if (rays.size() != answers.size())
             return status::invalid_answers;
