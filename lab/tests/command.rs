@@ -141,11 +141,13 @@ fn what_is_no_file_is_refused() {
         assert!(said.contains("it is a folder: name a file in it"), "{command}: {said}");
     }
     if cfg!(unix) {
-        let said = folder.fails("info /dev/null").unwrap();
-        assert!(
-            said.contains("it is a pipe or a device: write what it holds into a file"),
-            "{said}"
-        );
+        let made = Command::new("mkfifo").current_dir(&folder.0).arg("pipe").status().unwrap();
+        assert!(made.success());
+        for file in ["/dev/null", "pipe"] {
+            let said = folder.fails(&format!("info {file}")).unwrap();
+            let expected = "it is a pipe or a device: write what it holds into a file";
+            assert!(said.contains(expected), "{said}");
+        }
     }
 }
 
@@ -215,6 +217,7 @@ fn a_blob_can_be_an_array_of_c() {
         ("pack a.obj -o b.hgrid --c-array b", "is not C by its name"),
         ("pack a.obj -o b.c --c-array 1b", "is no name in C"),
         ("pack a.obj -o b.c --c-array int", "`int` has a meaning in C or C++: take another name"),
+        ("pack a.obj -o b.c --c-array _Bool", "`_Bool` has a meaning in C or C++"),
         ("pack a.obj -o b.c --c-array class", "`class` has a meaning"),
         ("pack a.obj -o b.ply", "would be a mesh by its name"),
         ("pack a.obj -o b.hgrid --depth 2", "--depth is for --method recursive"),

@@ -115,7 +115,7 @@ fn unseen(args: &RenderArgs, scene: &Scene, model: Option<&Model>) -> &'static s
         [a, b, c].as_flattened().iter().all(|c| c.is_finite()) && normal_of(&[a, b, c]).is_some()
     };
     if !meshes.any(|(positions, indices)| indices.iter().any(|it| has_area(positions, it))) {
-        return "no triangle has finite corners and an area; `hgrid info` counts the others";
+        return "no triangle has finite corners and an area; `hgrid info` counts those without";
     }
     let (min, max) = scene.framed_bounds();
     if min.iter().chain(&max).any(|c| c.abs() > LARGEST) {

@@ -1,6 +1,7 @@
 //! Elements as text: one in a line, its numbers between blanks.
 //!
-//! Numbers are those of Rust, so that what C and Python write is read: `nan`, `-inf`, `1.` and `.5`, too.
+//! Numbers are those of Rust, so that what C and Python write is read: `nan`, `-inf`, `1.` and `.5`, too. Whether a
+//! number is one of its declared type is not checked.
 
 use anyhow::{Context as _, Result};
 use ply_rs_bw::ply::{BeginList, ElementDef, PropertyAccess, PropertyType, ScalarType};
