@@ -139,6 +139,12 @@ fn hits_behind_the_origin_are_found_however_far_from_zero() {
             let hit = shapes.intersect(&ray, &mut test);
             assert_eq!(hit.map(|hit| hit.t), Some(-3.0), "{ray:?} {boxes:?}");
             assert!(shapes.occluded(&ray, &mut test));
+            let (rays, mut hits) = ([ray; 9], [Hit::MISS; 9]);
+            let (rays, answers) = (Strided::new(&rays), &mut StridedMut::new(&mut hits));
+            let options = &mut QueryOptions::default();
+            let coherence = Coherence::Coherent;
+            shapes.intersect_n(&rays, answers, coherence, options, &mut test).unwrap();
+            assert_eq!(hits, [hit.unwrap(); 9], "{ray:?} {boxes:?}");
         }
     }
 }

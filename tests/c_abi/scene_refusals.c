@@ -138,6 +138,11 @@ static void what_scenes_refuse(void)
     no_scene(HGRID_ERROR_OVERLAP, three, 3, 3, NULL, shape_blob, shape_bytes, extra, SCRATCH_BYTES);
     no_scene(HGRID_ERROR_OVERLAP, three, 3, 3, NULL, index, INDEX_BYTES, inner_blob, inner_bytes);
     no_scene(HGRID_ERROR_OVERLAP, three, 3, 3, NULL, index, INDEX_BYTES, &inner, sizeof inner);
+    no_scene(HGRID_ERROR_OVERLAP, three, 3, 1, NULL, index, INDEX_BYTES, &grid, sizeof grid);
+    no_scene(HGRID_ERROR_OVERLAP, three, 3, 1, NULL, index, INDEX_BYTES, &mesh_data, sizeof mesh_data);
+    no_scene(HGRID_ERROR_OVERLAP, three, 3, 2, NULL, index, INDEX_BYTES, &shapes, sizeof shapes);
+    no_scene(HGRID_ERROR_OVERLAP, three, 3, 2, NULL, index, INDEX_BYTES, spheres, sizeof spheres);
+    no_scene(HGRID_ERROR_OVERLAP, three, 3, 1, NULL, index, INDEX_BYTES, objects, sizeof *objects);
 
     /* A scene may have no instances, and instances of nothing. */
     hgrid_scene empty;
