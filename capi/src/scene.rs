@@ -303,8 +303,8 @@ pub unsafe extern "C" fn hgrid_scene_bound(
 /// `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
 /// writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
 /// - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
-///   `HGRID_ERROR_OVERLAP` (also with an object; not with what is shown by a scene among them, which is not looked at),
-///   `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+///   `HGRID_ERROR_OVERLAP` (view, blob and arrays of each object are checked, too; what an inner scene shows is not, and
+///   must lie elsewhere), `HGRID_ERROR_TOO_MANY_TRIANGLES`;
 /// - with an instance, whose number is the report's `triangle`: `HGRID_ERROR_INSTANCE_OBJECT`,
 ///   `HGRID_ERROR_INSTANCE_MATRIX`;
 /// - with the objects: `HGRID_ERROR_TOO_DEEP`;
@@ -432,7 +432,7 @@ pub unsafe extern "C" fn hgrid_validate_scene(
 ///
 /// `to` starts at a multiple of `HGRID_ALIGNMENT` and overlaps nothing that the scene refers to, nor any argument of
 /// this call. It may be NULL if `capacity` is 0: to ask for the size. `scene` and `bytes` may not be NULL. The call
-/// copies everything, and compares each object with each other.
+/// copies everything, and compares every two objects.
 ///
 /// Returns `HGRID_OK` and has written the blob, or `HGRID_ERROR_INDEX_TOO_SMALL` and has written none of it; in both
 /// cases `bytes` becomes its size. Or returns the reason: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_NOT_A_GRID`,

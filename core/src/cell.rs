@@ -274,7 +274,7 @@ fn wholes(position: Vec3A) -> [u32; 3] {
     shifted.to_array().map(|bits| bits.to_bits() & WHOLE_BITS)
 }
 
-/// Adding this rounds a small number to a whole one and leaves that in the low bits: casts take longer, because they
+/// Adding this rounds a small number to a whole one and leaves that in the low bits. A cast takes longer, because it
 /// must saturate.
 pub(crate) const WHOLE_SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
 /// The bits of the sum that are the number.

@@ -59,6 +59,7 @@ pub struct Refit {
 /// # Ok::<(), Error>(())
 /// ```
 pub fn refit(index: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<Refit, Error> {
+    // `Shapes::refit` and `Scene::refit` call this with boxes in the form of a mesh.
     let grid = Grid::open(index, *mesh)?;
     let (method, blob_bytes) = (grid.method(), grid.blob_bytes());
     let header = Header::read(index, mesh)?;

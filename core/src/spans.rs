@@ -208,7 +208,7 @@ mod tests {
         for bounds in [bounds, Lattice::pad(&bounds)] {
             let lattice = Lattice::new(bounds, [8, 5, 1]);
             let (mut some, mut none) = (0, 0);
-            // Behind the last one there is none, nor before the first.
+            // Also where fewer than eight triangles are left, and where `first + lane` wraps around.
             let ends = [5993, 5997, 5999, 6000, u32::MAX - 5];
             for first in (0..6000).step_by(LANES).chain(ends) {
                 let found =

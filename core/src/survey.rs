@@ -46,7 +46,7 @@ impl Survey {
 }
 
 /// The box of a triangle with these corners; `None` if a build with these flags leaves it out, because a coordinate is
-/// not finite.
+/// not finite. An error for a corner without a vertex, and with `STRICT` for one that is not finite.
 #[inline(always)]
 pub(crate) fn finite_box(
     triangle: u32,

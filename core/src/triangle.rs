@@ -115,8 +115,10 @@ pub(crate) const SMALL: f64 = 1.0 / (1 << 10) as f64;
 /// The most that the t of a hit may lie outside of the range, in parts of the range of its corners.
 pub(crate) const OUTSIDE: f64 = 1.0 / (1 << 21) as f64;
 
-/// Twice the error of a hit's `t` that its corners cause, in parts of the range of their t: 2^-37. What ends or begins at
-/// such a `t` has to reach that much farther to find all hits that are reported there.
+/// Twice the error of a hit's `t` that its corners cause, in parts of the range of their t: 2^-37. In scaled distances
+/// that range is at most the extent of the scene. A traversal that ends or begins at such a `t` has to reach that much
+/// farther to find all hits that are reported there. Only the reported `t` is bounded so, not the exact place that
+/// decides the range.
 pub(crate) const OF_CORNERS: f32 = 1.0 / (131_072.0 * 1_048_576.0);
 
 /// Error bound of a determinant in f64, in parts of the sum of its terms' magnitudes: nine

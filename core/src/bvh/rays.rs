@@ -44,7 +44,7 @@ pub(crate) struct Rays {
     pub(crate) starts_at_box: bool,
     /// The most that origins may be off, in scene units: they are given in f64 and were rounded. 0 for rays in f32.
     pub(crate) origin_error: f32,
-    /// The extent of the scene.
+    /// The extent of the box that the rays were prepared for.
     extent: f32,
     /// The point that boxes and origins are relative to.
     pub(crate) center: [f32; 3],
@@ -178,6 +178,7 @@ impl Rays {
                 self.origin[axis][octet] = origin[axis].into();
                 self.anchor[axis][octet] = origin[axis].into();
             }
+            // The caller's range is decided exactly: it needs no room for the error of a hit's `t`.
             let most = f32x8::splat(simd, f32::MAX);
             let (start, end) = ((start * scale).lesser(most), t_max * scale);
             let tiny = scale.greater(f32x8::splat(simd, 1.0)) * TINY;
@@ -449,7 +450,7 @@ impl Rays {
     /// Ends a ray at a `t`.
     #[inline(always)]
     pub(crate) fn end_at(&mut self, ray: u32, t: f32) {
-        // Hits that round to the same t may lie farther away: see `Slab::nearby`.
+        // Hits that round to the same t may lie farther away, or have one that is off by their corners.
         let scale = get(&self.scale, ray);
         let (end, growth) = (t * scale, growth_of_range(self.extent, scale));
         put(&mut self.end, ray as usize % GROUP, end + (end.abs() * (WIDER - 1.0) + growth));

@@ -10,8 +10,9 @@
 //! - **Relative errors.** A side is subtracted, multiplied and added with at most six roundings. So `far` is
 //!   computed with an inverse direction that is larger by 2^-20, and the range of the ray is widened alike.
 //! - **Absolute errors** where the terms cancel: absorbed by the margin of quantised boxes ([`node`](super::node)).
-//! - **Errors of a hit's `t`**, where the range begins or ends at one: a part is that of the triangle's corners
-//!   ([`triangle`](crate::triangle)), so the range grows by a part of the scene, too.
+//! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by 2^-24 of itself, and by 2^-38 of the
+//!   range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the scene's extent. The relative
+//!   margin covers the first; [`growth_of_range`] adds twice the second.
 //! - **Zero directions.** Their inverse is [`STEEP`]: no box is thinner than 2^-60 of the scene and its margin is
 //!   2^-6 of a step, so a ray inside one leaves it behind the end of the scene, and one outside never
 //!   enters. Products stay finite as long as the scene is smaller than 2^50; beyond, a NaN counts as a
@@ -77,7 +78,7 @@ pub(crate) struct Slab {
 
 impl Slab {
     /// A ray that starts near a box, from `begin` on, and its filter for triangles there; `None` if it starts farther
-    /// away, is invalid, or has a very long or short direction.
+    /// away, ends before `begin`, is invalid, or has a very long or short direction.
     #[inline(always)]
     pub(crate) fn nearby(ray: &Ray, begin: f32, bounds: &Aabb) -> Option<(Self, RayFilter)> {
         let [x, y, z] = ray.direction;
@@ -167,7 +168,8 @@ impl Slab {
         slab
     }
 
-    /// [`new`](Self::new) for a ray along which a `t` of its range or of a hit is `scale` times as large.
+    /// [`new`](Self::new) for a ray along which a `t` of its range or of a hit is `scale` times as large. In a tree of
+    /// instances, the growth of their boxes covers the error of a `t`.
     #[cold]
     #[inline(never)]
     pub(crate) fn along(ray: &Ray, approach: &Approach, scale: f64) -> Self {

@@ -16,7 +16,8 @@
 //! ```
 //!
 //! The `t` of a ray in a scene inside another is that of the outermost scene. The object's ray is a function of
-//! that ray, the instances on the path and the object's box alone, so every query asks the object the same.
+//! that ray, the instances on the path and the object's box alone, but for its end, which lies at the closest hit so
+//! far: so every query asks the object the same.
 
 use glam::DVec3;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -289,8 +290,9 @@ impl Seen {
         round(f64::from(t) * self.scale - self.shift)
     }
 
-    /// The end of the object's ray behind a hit at a `t` of the scene's ray: no nearer than any hit of this object, whose
-    /// own `t` may be off by `error`, that has the same `t` there.
+    /// The end of the object's ray behind a hit at a `t` of the scene's ray. Hits of this object that have the same `t`
+    /// there are not lost, although their own may be off by `error`, unless the ray grazes them: the exact place of such
+    /// a hit may lie behind any end.
     fn limit(&self, t: f32, error: f64) -> f32 {
         round(f64::from(t.next_up()) * self.scale - self.shift + error).next_up()
     }

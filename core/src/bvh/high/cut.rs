@@ -106,7 +106,8 @@ impl BinScale {
         // Keep every place below the number of bins, in spite of rounding.
         #[expect(clippy::cast_precision_loss, reason = "a few")]
         let bins = count as f32 * 0.999;
-        let [a, b, c] = [bins / -(x + nx), bins / -(y + ny), bins / -(z + nz)];
+        let extents = [0.0 - (x + nx), 0.0 - (y + ny), 0.0 - (z + nz)];
+        let [a, b, c] = extents.map(|extent| bins / extent);
         let scale = [a.min(f32::MAX), b.min(f32::MAX), c.min(f32::MAX)];
         Self { low: [x, y, z], scale, count }
     }
