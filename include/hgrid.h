@@ -2790,8 +2790,8 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
  * `config` may be NULL: the defaults; its method is `HGRID_METHOD_BVH`. `report` may be NULL. Returns `HGRID_OK` and
  * writes the view to `scene`; or returns the reason, leaves `scene` as it was, and the index holds nothing of use:
  * - with the call: `HGRID_ERROR_NULL_ARGUMENT`, `HGRID_ERROR_STRUCT_SIZE`, `HGRID_ERROR_MISALIGNED`,
- *   `HGRID_ERROR_OVERLAP` (view, blob and arrays of each object are checked, too; what an inner scene shows is not, and
- *   must lie elsewhere), `HGRID_ERROR_TOO_MANY_TRIANGLES`;
+ *   `HGRID_ERROR_OVERLAP` (view, blob and arrays of each object are checked, too; what an inner scene shows is not,
+ *   and must lie elsewhere), `HGRID_ERROR_TOO_MANY_TRIANGLES`;
  * - with an instance, whose number is the report's `triangle`: `HGRID_ERROR_INSTANCE_OBJECT`,
  *   `HGRID_ERROR_INSTANCE_MATRIX`;
  * - with the objects: `HGRID_ERROR_TOO_DEEP`;

@@ -84,8 +84,8 @@ impl Line {
     /// The line of a ray that starts at the lattice's box; `None` if the ray's range lies outside of it.
     #[inline]
     pub(crate) fn new(lattice: &Lattice, ray: &Ray, approach: &Approach) -> Option<Self> {
-        // A query may go on from the reported `t` of a hit, which is off by its rounding and by 2^-38 of the range of the
-        // corners' `t`: the next numbers cover the first, the margin of cells the second.
+        // A query may go on from the reported `t` of a hit, which is off by its rounding and by 2^-38 of the range of
+        // the corners' `t`: the next numbers cover the first, the margin of cells the second.
         let start = approach.near.max(f64::from(ray.t_min.next_down()) - approach.t);
         let end = approach.far.min(f64::from(ray.t_max.next_up()) - approach.t);
         if start > end {

@@ -45,8 +45,8 @@ pub fn check_writable(path: &Path) -> Result<()> {
     })
 }
 
-/// Refuses to overwrite the file or the two files that a scene is named by, by a blob or a picture of it. Buffers that a
-/// glTF file names are not looked at.
+/// Refuses to overwrite the file or the two files that a scene is named by, by a blob or a picture of it. Buffers
+/// that a glTF file names are not looked at.
 ///
 /// # Errors
 /// If the output is one of them.

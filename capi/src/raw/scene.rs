@@ -240,9 +240,9 @@ fn touches(object: &Object<'_>, span: Span) -> bool {
     }
 }
 
-/// Regions to write for a scene, once it is sure that its instances, the array of its objects and these themselves lie
-/// elsewhere. What a scene among them shows is not looked at: that may be much more than the scene itself. Takes a time that
-/// grows with the objects and the parts of their meshes.
+/// Regions to write for a scene, once it is sure that its instances, the array of its objects and these themselves
+/// lie elsewhere. What a scene among them shows is not looked at: that may be much more than the scene itself. Takes
+/// a time that grows with the objects and the parts of their meshes.
 ///
 /// # Safety
 /// The caller's promise.

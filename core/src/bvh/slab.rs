@@ -10,8 +10,8 @@
 //! - **Relative errors.** A side is subtracted, multiplied and added with at most six roundings. So `far` is
 //!   computed with an inverse direction that is larger by 2^-20, and the range of the ray is widened alike.
 //! - **Absolute errors** where the terms cancel: absorbed by the margin of quantised boxes ([`node`](super::node)).
-//! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by 2^-24 of itself, and by 2^-38 of the
-//!   range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the scene's extent. The relative
+//! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by 2^-24 of itself, and by 2^-38 of
+//!   the range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the scene's extent. The relative
 //!   margin covers the first; [`growth_of_range`] adds twice the second.
 //! - **Zero directions.** Their inverse is [`STEEP`]: no box is thinner than 2^-60 of the scene and its margin is
 //!   2^-6 of a step, so a ray inside one leaves it behind the end of the scene, and one outside never
@@ -49,8 +49,8 @@ fn behind(distance: f32) -> f32 {
 /// More than what underflows on the way to a distance.
 pub(crate) const TINY: f32 = f32::MIN_POSITIVE;
 
-/// Returns the amount by which a range grows at both ends, in scaled distances, beside what is relative to the ends: for
-/// the error of a `t`, and for underflow.
+/// Returns the amount by which a range grows at both ends, in scaled distances, beside what is relative to the ends:
+/// for the error of a `t`, and for underflow.
 #[inline(always)]
 pub(crate) fn growth_of_range(extent: f32, scale: f32) -> f32 {
     extent * OF_CORNERS + TINY * scale.max(1.0)

@@ -290,9 +290,9 @@ impl Seen {
         round(f64::from(t) * self.scale - self.shift)
     }
 
-    /// The end of the object's ray behind a hit at a `t` of the scene's ray. Hits of this object that have the same `t`
-    /// there are not lost, although their own may be off by `error`, unless the ray grazes them: the exact place of such
-    /// a hit may lie behind any end.
+    /// The end of the object's ray behind a hit at a `t` of the scene's ray. Hits of this object that have the same
+    /// `t` there are not lost, although their own may be off by `error`, unless the ray grazes them: the exact place
+    /// of such a hit may lie behind any end.
     fn limit(&self, t: f32, error: f64) -> f32 {
         round(f64::from(t.next_up()) * self.scale - self.shift + error).next_up()
     }

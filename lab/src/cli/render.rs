@@ -116,8 +116,8 @@ impl RenderArgs {
         if self.shading == Shading::Heat { 1 } else { self.samples.unwrap_or(default) }
     }
 
-    /// Returns the lights. By default a tree gets all of them, which takes it a few seconds. The four grids of the paper
-    /// are slow for rays in all directions, and get shadows alone.
+    /// Returns the lights. By default a tree gets all of them, which takes it a few seconds. The four grids of the
+    /// paper are slow for rays in all directions, and get shadows alone.
     #[must_use]
     pub fn lights(&self) -> Lights {
         if self.shading != Shading::Diffuse {
