@@ -91,7 +91,8 @@ fn is_identifier(name: &str) -> bool {
 }
 
 /// The words of C and C++ that can be no names, and the function that every program has.
-const RESERVED: &str = "_Alignas _Alignof _Atomic _BitInt _Bool _Complex _Decimal128 _Decimal32 _Decimal64 _Generic _Imaginary \
+const RESERVED: &str = "\
+    _Alignas _Alignof _Atomic _BitInt _Bool _Complex _Decimal128 _Decimal32 _Decimal64 _Generic _Imaginary \
     _Noreturn _Static_assert _Thread_local alignas alignof and and_eq asm auto bitand bitor bool break case \
     catch char char16_t char32_t char8_t class co_await co_return co_yield compl concept const const_cast \
     consteval constexpr constinit continue decltype default delete do double dynamic_cast else enum explicit \
