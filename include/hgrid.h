@@ -992,8 +992,8 @@ typedef struct hgrid_surface {
 } hgrid_surface;
 
 /**
- * What you know about the rays of a batch, so that the library can choose their order: one of `HGRID_COHERENCE_...`.
- * It changes the speed, never the answers.
+ * Your hint about the rays of a batch, by which the library chooses their order: one of `HGRID_COHERENCE_...`. The hint
+ * changes the speed, never the answers.
  */
 typedef uint32_t hgrid_coherence;
 

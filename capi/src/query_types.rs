@@ -11,8 +11,8 @@ use hgrid_core::{
 
 use crate::status::{HGRID_ERROR_INVALID_COHERENCE, HGRID_ERROR_INVALID_CULL, hgrid_status};
 
-/// What you know about the rays of a batch, so that the library can choose their order: one of `HGRID_COHERENCE_...`.
-/// It changes the speed, never the answers.
+/// Your hint about the rays of a batch, by which the library chooses their order: one of `HGRID_COHERENCE_...`. The hint
+/// changes the speed, never the answers.
 #[allow(non_camel_case_types, reason = "the C name")]
 pub type hgrid_coherence = u32;
 

@@ -84,7 +84,7 @@ pub(crate) struct Header {
     checksum: u32,
 }
 
-/// What a blob holds behind the grid.
+/// The mesh that a blob holds behind its grid, if any.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum HasMesh {
     /// Nothing: the caller has the mesh.

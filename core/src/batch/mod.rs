@@ -29,8 +29,8 @@ use crate::options::QueryOptions;
 use crate::ray::{Hit, INVALID_ID, Ray};
 use crate::simd::HAS_VECTORS;
 
-/// What the caller knows about the rays of a batch, so that the grid can choose their order. It changes the speed,
-/// never the answers.
+/// The caller's hint about the rays of a batch, by which the grid chooses their order. The hint changes the speed, never
+/// the answers.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Coherence {

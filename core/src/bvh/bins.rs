@@ -38,18 +38,12 @@ pub(super) fn scatter(
     let tasks = counts.len() >> bits;
     let shift = KEY_BITS - bits;
     if IS_SMALL || tasks == 1 {
-        for (id, &key) in (0..).zip(keys) {
-            // A triangle that is left out has a key behind that of all bins.
-            let Some(head) = counts.get_mut((key >> shift) as usize) else {
-                debug_assert!(key == NO_KEY, "a key behind those of all bins");
-                continue;
-            };
-            let entry = entries.get_mut(*head as usize);
-            if let Some(entry) = entry.or_bug("a bin has more entries than were counted") {
-                *entry = [key, id];
+        move_each(0, keys, counts, shift, |place, moved| {
+            let entry = entries.get_mut(place).or_bug("a bin has more entries than were counted");
+            if let Some(entry) = entry {
+                *entry = moved;
             }
-            *head += 1;
-        }
+        });
         return Ok(());
     }
     #[cfg(target_has_atomic = "32")]
@@ -61,6 +55,26 @@ pub(super) fn scatter(
         let _ = control;
         debug_assert!(false, "several tasks without atomics");
         Err(Error::InvalidParallelFor)
+    }
+}
+
+/// Passes `put` the entry of each triangle and its place, the next one of its bin. `first` is the first triangle.
+#[inline(always)]
+fn move_each(
+    first: u32,
+    keys: &[u32],
+    heads: &mut [u32],
+    shift: u32,
+    mut put: impl FnMut(usize, Entry),
+) {
+    for (id, &key) in (first..).zip(keys) {
+        // A triangle that is left out has a key behind that of all bins.
+        let Some(head) = heads.get_mut((key >> shift) as usize) else {
+            debug_assert!(key == NO_KEY, "a key behind those of all bins");
+            continue;
+        };
+        put(*head as usize, [key, id]);
+        *head += 1;
     }
 }
 
@@ -84,14 +98,7 @@ fn scatter_by_tasks(
         (first, keys.get(range).or_bug("a task behind the keys").unwrap_or_default(), heads)
     });
     let move_all = |(first, keys, heads): (u32, &[u32], &mut [u32])| {
-        for (id, &key) in (first..).zip(keys) {
-            let Some(head) = heads.get_mut((key >> shift) as usize) else {
-                debug_assert!(key == NO_KEY, "a key behind those of all bins");
-                continue;
-            };
-            entries.set(2 * *head as usize, [key, id]);
-            *head += 1;
-        }
+        move_each(first, keys, heads, shift, |place, moved| entries.set(2 * place, moved));
     };
     run(control, parts, move_all, |()| Ok(()))
 }

@@ -72,7 +72,7 @@ pub(crate) struct Slab {
     scale: f64,
     /// The scale of a ray that starts at its origin; 0 of others.
     nearby: f32,
-    /// What [`growth_of_range`] returns.
+    /// The amount by which the range grows at both ends, from [`growth_of_range`].
     growth: f32,
 }
 
