@@ -4,7 +4,7 @@
 //! queries on it. The default structure is a bounding volume hierarchy ([`Method::Bvh`]), a tree; the others are the
 //! four grids of the paper *Multi-Level Hashed Grid Construction Methods* (Costa, Pereira, Jorge, 2010). The API calls
 //! a tree a grid, too. No allocation, no threads, no I/O, no panic. Only `simd` contains `unsafe` code: it asks the
-//! processor for its vector instructions and makes the tokens that stand for them.
+//! processor for its vector instructions, makes the tokens that stand for them, and prefetches.
 //!
 //! ```
 //! use hgrid_core::{Block, Config, Grid, Ray, TriangleMesh, sizes};

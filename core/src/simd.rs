@@ -13,8 +13,8 @@
 //! all others      Scalar
 //! ```
 //!
-//! Here is all the `unsafe` of the crate: the questions to the processor, and the tokens that stand
-//! for its answers.
+//! Here is all the `unsafe` of the crate: the questions to the processor, the tokens that stand
+//! for its answers, and prefetches.
 
 use fearless_simd::Simd;
 
@@ -127,6 +127,15 @@ pub(crate) fn dispatch<K: Kernel>(level: SimdLevel, kernel: K) -> K::Output {
     machine::dispatch(level, kernel)
 }
 
+/// True if [`prefetch`] does something.
+pub(crate) const HAS_PREFETCH: bool = machine::HAS_PREFETCH;
+
+/// Asks the processor to load the cache line at an address, without waiting for it.
+#[inline(always)]
+pub(crate) fn prefetch<T>(at: &T) {
+    machine::prefetch(at);
+}
+
 /// x86 with the vectors that its 64-bit processors all have: wider ones are found at run time.
 #[cfg(all(
     any(target_arch = "x86", target_arch = "x86_64"),
@@ -135,9 +144,9 @@ pub(crate) fn dispatch<K: Kernel>(level: SimdLevel, kernel: K) -> K::Output {
 ))]
 mod machine {
     #[cfg(target_arch = "x86")]
-    use core::arch::x86::{__cpuid, __cpuid_count, _xgetbv};
+    use core::arch::x86::{__cpuid, __cpuid_count, _MM_HINT_T0, _mm_prefetch, _xgetbv};
     #[cfg(target_arch = "x86_64")]
-    use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
+    use core::arch::x86_64::{__cpuid, __cpuid_count, _MM_HINT_T0, _mm_prefetch, _xgetbv};
     use core::sync::atomic::{AtomicU8, Ordering};
 
     use fearless_simd::Simd;
@@ -151,6 +160,15 @@ mod machine {
     /// write the same value.
     static DETECTED: AtomicU8 = AtomicU8::new(UNKNOWN);
     const UNKNOWN: u8 = u8::MAX;
+
+    pub(super) const HAS_PREFETCH: bool = true;
+
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "the instruction takes a pointer")]
+    pub(super) fn prefetch<T>(at: &T) {
+        // SAFETY: it never faults and changes nothing that a program can see.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(core::ptr::from_ref(at).cast()) };
+    }
 
     #[inline]
     pub(super) fn detect() -> SimdLevel {
@@ -301,6 +319,10 @@ mod machine {
         } else {
             SimdLevel::Scalar
         };
+
+    pub(super) const HAS_PREFETCH: bool = false;
+
+    pub(super) const fn prefetch<T>(_: &T) {}
 
     #[inline]
     pub(super) const fn detect() -> SimdLevel {

@@ -9,6 +9,7 @@ mod flat;
 mod forms;
 mod hits;
 mod joined;
+mod large;
 mod own_shapes;
 mod range;
 mod refit;

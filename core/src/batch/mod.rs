@@ -2,8 +2,8 @@
 //!
 //! A batch answers each ray as [`Grid::intersect`] or [`Grid::occluded`] would, bit for bit. A tree
 //! ([`Method::Bvh`](crate::Method::Bvh)) takes rays of any kind in groups of up to 64, as they are
-//! given or sorted first. It traces a group one by one if the closest hits are asked for and the origins lie
-//! far apart. The other methods trace one ray after the other.
+//! given or sorted first. If the closest hits are asked for and the origins lie far apart, it traces the rays of a group
+//! one by one, or in a large tree interleaved. The other methods trace one ray after the other.
 //!
 //! A filter sees all hits of one ray before those of the next, in the order of the rays. Groups keep this order:
 //!

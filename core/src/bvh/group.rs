@@ -4,7 +4,8 @@
 //! a leaf's triangles are fetched once for all of them, and no ray waits for another.
 //!
 //! ```text
-//! prepare the rays; if they start far apart and want their closest hits, all are to be traced alone
+//! prepare the rays; if they start far apart and want their closest hits, interleave them (interleave.rs) or
+//!     have them traced alone
 //! stack = [(root, all rays)]
 //! pop a child and its rays, without those that are done or end before it begins
 //! node: decode the eight boxes
@@ -22,7 +23,8 @@ use fearless_simd::{Simd, f32x8, f32x16, mask32x16, u32x8};
 
 use super::Bvh;
 use super::boxes::{Beam, WideBoxes, bits};
-use super::group_leaf::{Boxes, Leaf, Leaves, Offer, Triangles};
+use super::group_leaf::{Boxes, Leaf, Leaves, Offer, Scattered, Triangles};
+use super::interleave;
 use super::node::{Child, WIDTH};
 use super::rays::{GROUP, OCTETS, Rays};
 use super::walk::STACK;
@@ -48,12 +50,25 @@ pub(crate) struct GroupEntry {
     /// Node and slot.
     place: u32,
     /// The least distance at which one of the rays enters.
-    near: f32,
+    pub(super) near: f32,
     rays: u64,
 }
 
 impl GroupEntry {
     const NONE: Self = Self { place: 0, near: 0.0, rays: 0 };
+
+    /// A child of a node.
+    #[inline(always)]
+    pub(super) const fn new(node: u32, slot: u32, near: f32, rays: u64) -> Self {
+        Self { place: node << 3 | slot, near, rays }
+    }
+
+    /// Returns the child.
+    #[inline(always)]
+    pub(super) fn child(self, bvh: &Bvh<'_>) -> Child {
+        let (node, slot) = (self.place >> 3, self.place & 7);
+        bvh.nodes.get(node as usize).map_or(Child::NONE, |node| node.child(slot))
+    }
 }
 
 /// The stack of a group.
@@ -62,6 +77,12 @@ pub(crate) struct Stack([GroupEntry; STACK]);
 impl Stack {
     pub(crate) const fn new() -> Self {
         Self([GroupEntry::NONE; STACK])
+    }
+
+    /// Cuts the stack into shares of a size.
+    #[inline(always)]
+    pub(super) fn shares(&mut self, size: usize) -> impl Iterator<Item = &mut [GroupEntry]> {
+        self.0.chunks_exact_mut(size)
     }
 }
 
@@ -112,12 +133,17 @@ impl<L: Leaves> Kernel for Descent<'_, '_, L> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u64 {
-        let Group { bounds, rays, count, .. } = &mut *self.group;
+        let Group { bvh, bounds, rays, count, .. } = &mut *self.group;
         let alone = rays.prepare(simd, *count, bounds);
-        if !self.leaves.takes_scattered() && rays.are_scattered(bounds) {
-            return alone | rays.alive;
+        match self.leaves.scattered() {
+            Scattered::Interleaved if rays.wait_for_memory(bounds, bvh) => {
+                return alone | interleave::trace(simd, self.group);
+            }
+            Scattered::Interleaved | Scattered::Alone if rays.are_scattered(bounds) => {
+                return alone | rays.alive;
+            }
+            _ => self.descend(simd),
         }
-        self.descend(simd);
         alone
     }
 }
@@ -150,8 +176,8 @@ impl<L: Leaves> Descent<'_, '_, L> {
                         let slot = slots.trailing_zeros();
                         slots &= slots - 1;
                         let (rays, near) = (by[slot as usize % WIDTH], near[slot as usize % WIDTH]);
-                        let place = number << 3 | slot;
-                        push::<L>(stack, &mut top, base, GroupEntry { place, near, rays });
+                        let waiting = GroupEntry::new(number, slot, near, rays);
+                        push(stack, &mut top, base, waiting, !L::IS_ANY);
                     }
                 }
                 Child::Leaf { first, count } => {
@@ -169,9 +195,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
                     mask = rays.ending_behind(simd, waiting.near, mask);
                 }
                 if mask != 0 {
-                    let (node, slot) = (waiting.place >> 3, waiting.place & 7);
-                    let node = bvh.nodes.get(node as usize);
-                    child = node.map_or(Child::NONE, |node| node.child(slot));
+                    child = waiting.child(bvh);
                     break;
                 }
             }
@@ -303,15 +327,21 @@ fn side_by_side<S: Simd>(
     }
 }
 
-/// Pushes a child; for closest hits, above those of the same node that begin farther away.
+/// Pushes a child; with `is_sorted`, for closest hits, above those of the same node that begin farther away.
 #[inline(always)]
-fn push<L: Leaves>(stack: &mut [GroupEntry], top: &mut usize, base: usize, waiting: GroupEntry) {
+pub(super) fn push(
+    stack: &mut [GroupEntry],
+    top: &mut usize,
+    base: usize,
+    waiting: GroupEntry,
+    is_sorted: bool,
+) {
     let mut at = *top;
     if at >= stack.len() {
         return;
     }
     *top += 1;
-    while !L::IS_ANY
+    while is_sorted
         && at > base
         && let Some(&below) = stack.get(at - 1)
         && below.near < waiting.near

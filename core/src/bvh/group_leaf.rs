@@ -16,6 +16,7 @@ use super::shape_leaf::{nearest_of, pad_of};
 use crate::aabb::Aabb;
 use crate::eight::Eight;
 use crate::mesh::TriangleMesh;
+use crate::simd::HAS_PREFETCH;
 
 /// A leaf that some rays of a group enter.
 pub(super) struct Leaf<'r> {
@@ -28,14 +29,24 @@ pub(super) struct Leaf<'r> {
     pub(super) ids: &'r [u32],
 }
 
+/// How rays that start far apart are traced.
+#[derive(Clone, Copy)]
+pub(super) enum Scattered {
+    /// As any group: rays for any hit share the first nodes, and many end soon.
+    Together,
+    /// Interleaved if they wait for memory, else alone.
+    Interleaved,
+    /// Each alone.
+    Alone,
+}
+
 /// The content of the leaves of a tree.
 pub(super) trait Leaves {
     /// True if children may come in any order: the first hit of each ray ends it.
     const IS_ANY: bool;
 
-    /// Returns true if rays that start far apart are traced as a group, too: rays for any hit share the first nodes,
-    /// and many end soon.
-    fn takes_scattered(&self) -> bool;
+    /// Tells how rays that start far apart are traced.
+    fn scattered(&self) -> Scattered;
 
     /// Lets the rays of a mask enter a leaf.
     fn enter<S: Simd>(
@@ -55,8 +66,12 @@ impl<const ANY: bool> Leaves for Triangles<ANY> {
     const IS_ANY: bool = ANY;
 
     #[inline(always)]
-    fn takes_scattered(&self) -> bool {
-        ANY
+    fn scattered(&self) -> Scattered {
+        match ANY {
+            true => Scattered::Together,
+            false if HAS_PREFETCH => Scattered::Interleaved,
+            false => Scattered::Alone,
+        }
     }
 
     #[inline(always)]
@@ -68,25 +83,10 @@ impl<const ANY: bool> Leaves for Triangles<ANY> {
         _: &Beam<S>,
         mask: u64,
     ) {
-        let Leaf { bvh, mesh, first, ids, .. } = *leaf;
+        let Leaf { mesh, ids, .. } = *leaf;
         if mask.count_ones() as usize <= octets(mask) as usize * ids.len() {
             // Few rays: filter all triangles of the leaf for each ray.
-            let lanes = bvh.lanes(first, ids);
-            let triangles = Eight::of(simd, mesh, lanes, ids.len());
-            let mut rest = mask;
-            while rest != 0 {
-                let ray = rest.trailing_zeros();
-                rest &= rest - 1;
-                let filter = rays.filter(simd, ray);
-                let dropped = bits(filter.drops(&triangles.corners));
-                let mut survivors = !dropped & triangles.used;
-                while survivors != 0 {
-                    let lane = survivors.trailing_zeros();
-                    survivors &= survivors - 1;
-                    let Some(&id) = ids.get(lane as usize) else { break };
-                    rays.candidate::<S, ANY>(simd, mesh, ray, id);
-                }
-            }
+            filter_for_each::<S, ANY>(simd, leaf, rays, mask);
         } else {
             // Many rays: filter each triangle for eight rays at a time.
             for &id in ids {
@@ -112,6 +112,32 @@ impl<const ANY: bool> Leaves for Triangles<ANY> {
     }
 }
 
+/// Filters all triangles of a leaf at once for each ray of a mask, and notes what passes.
+#[inline(always)]
+pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
+    simd: S,
+    leaf: &Leaf<'_>,
+    rays: &mut Rays,
+    mask: u64,
+) {
+    let Leaf { bvh, mesh, first, ids, .. } = *leaf;
+    let triangles = Eight::of(simd, mesh, bvh.lanes(first, ids), ids.len());
+    let mut rest = mask;
+    while rest != 0 {
+        let ray = rest.trailing_zeros();
+        rest &= rest - 1;
+        let filter = rays.filter(simd, ray);
+        let dropped = bits(filter.drops(&triangles.corners));
+        let mut survivors = !dropped & triangles.used;
+        while survivors != 0 {
+            let lane = survivors.trailing_zeros();
+            survivors &= survivors - 1;
+            let Some(&id) = ids.get(lane as usize) else { break };
+            rays.candidate::<S, ANY>(simd, mesh, ray, id);
+        }
+    }
+}
+
 /// Takes the number of a box, the rays that meet it as a mask, and all rays of the group.
 pub(crate) type Offer<'o> = dyn FnMut(u32, u64, &mut Rays) + 'o;
 
@@ -127,8 +153,8 @@ impl Leaves for Boxes<'_, '_> {
     const IS_ANY: bool = false;
 
     #[inline(always)]
-    fn takes_scattered(&self) -> bool {
-        self.is_any
+    fn scattered(&self) -> Scattered {
+        if self.is_any { Scattered::Together } else { Scattered::Alone }
     }
 
     #[inline(always)]

@@ -18,7 +18,7 @@
 //! format         node, layout, validate
 //! build          build: census (key), bins, units, crowd, sort, roots (subtree), top; high/ for quality `high`
 //! one ray        search, walk (slab; shape_leaf for shapes)
-//! batches        batch: order, rays, group (boxes, group_leaf)
+//! batches        batch: order, rays, group (boxes, group_leaf), interleave
 //! points         nearest
 //! moved meshes   refit
 //! ```
@@ -36,6 +36,7 @@ mod crowd;
 mod group;
 mod group_leaf;
 mod high;
+mod interleave;
 mod key;
 mod layout;
 mod nearest;
@@ -58,6 +59,7 @@ use crate::arena::{section_bytes, split};
 use crate::blob::{HEADER_BYTES, Header, corrupt};
 use crate::eight::first_eight;
 use crate::error::Error;
+use crate::simd::prefetch;
 use crate::visit::Visitor;
 pub(crate) use batch::{Groups, Together};
 pub(crate) use build::{bound, build, sizes};
@@ -138,6 +140,30 @@ impl<'a> Bvh<'a> {
     #[inline(always)]
     const fn budget(&self) -> usize {
         self.nodes.len() * 9
+    }
+
+    /// Returns true if nodes and ids take more than so many bytes.
+    const fn exceeds(&self, bytes: usize) -> bool {
+        size_of_val(self.nodes) + size_of_val(self.ids) > bytes
+    }
+
+    /// Prefetches a node, or the ids of a leaf.
+    #[inline(always)]
+    fn prefetch(&self, child: node::Child) {
+        match child {
+            node::Child::Inner(number) => {
+                if let Some(node) = self.nodes.get(number as usize) {
+                    // A node may lie across two cache lines.
+                    prefetch(&node.origin);
+                    prefetch(&node.bounds[5]);
+                }
+            }
+            node::Child::Leaf { first, .. } => {
+                if let Some(id) = self.ids.get(first as usize) {
+                    prefetch(id);
+                }
+            }
+        }
     }
 
     /// The ids of a leaf; none where there is no such leaf.

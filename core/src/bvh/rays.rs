@@ -11,6 +11,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};
 use zerocopy::{transmute_mut, transmute_ref};
 
+use super::Bvh;
 use super::boxes::{Beam, Slabs, bits, splat};
 use super::slab::{EARLIER, STEEP, TINY, WIDER, growth_of_range};
 use crate::aabb::{Aabb, lesser};
@@ -72,9 +73,13 @@ pub(crate) struct Rays {
     pair_count: usize,
 }
 
-/// Rays with a larger spread are scattered. In extents of the scene: eight roundings of an origin a quarter of an
-/// extent away.
-const SCATTERED: f32 = 8.0 * UNIT / 4.0;
+/// Bytes of the caches of one core, about: those of a tree over 110 000 triangles.
+const CORE_CACHES: usize = 1 << 20;
+/// Bytes of the cache that cores share, about: those of a tree over 1.8 million triangles.
+const SHARED_CACHE: usize = 16 << 20;
+
+/// The spread of rays as a part of the distance of their origins.
+const ROUNDINGS: f32 = 8.0 * UNIT;
 
 /// Pairs that are decided at once.
 const PAIRS: usize = 8;
@@ -199,7 +204,25 @@ impl Rays {
 
     /// Returns true if origins lie so far apart that rays share little: alone they are faster.
     pub(crate) fn are_scattered(&self, bounds: &Aabb) -> bool {
-        self.spread > SCATTERED * bounds.size().max_element()
+        self.are_apart(bounds, 1.0 / 4.0)
+    }
+
+    /// Returns true if rays share little of a tree that exceeds the caches: interleaved they are faster. Through a tree
+    /// that also exceeds the shared cache, rays that start closer to each other share too little.
+    pub(crate) fn wait_for_memory(&self, bounds: &Aabb, bvh: &Bvh<'_>) -> bool {
+        let far = if bvh.exceeds(SHARED_CACHE) { 1.0 / 32.0 } else { 1.0 / 4.0 };
+        bvh.exceeds(CORE_CACHES) && self.are_apart(bounds, far)
+    }
+
+    /// Returns true if some origin lies farther from the center than a part of the extent.
+    fn are_apart(&self, bounds: &Aabb, part: f32) -> bool {
+        self.spread > part * (ROUNDINGS * bounds.size().max_element())
+    }
+
+    /// The end of a ray, as a distance.
+    #[inline(always)]
+    pub(super) fn end_of(&self, ray: u32) -> f32 {
+        get(&self.end, ray)
     }
 
     /// Measures origins from that of the first ray. A ray that is not alive gets the numbers of the first, so that it
@@ -222,7 +245,7 @@ impl Rays {
                 self.inverse[axis][octet] = is_alive.select(inverse, inverse_of_first).into();
             }
         }
-        self.spread = farthest.reduce_max() * 8.0 * UNIT;
+        self.spread = farthest.reduce_max() * ROUNDINGS;
         self.growth = self.spread + self.origin_error;
     }
 

@@ -1,0 +1,152 @@
+//! Scattered rays of a group, interleaved: each goes its own way through the tree, and eight take turns.
+//!
+//! Rays that start far apart share few nodes and triangles. In a tree larger than the caches of a core, a ray traced
+//! alone waits for memory at each step. Here a ray prefetches what its next step reads, and the others take theirs
+//! meanwhile.
+//!
+//! ```text
+//! in turn, for each of eight rays:
+//!     node    intersect the ray with its boxes, push those that it meets but the nearest, go on with that one
+//!     leaf    first turn: prefetch the indices of its triangles; second: their corners; third: test them
+//!     then    if there is no child to go on with, pop the nearest; prefetch the node, or the ids of the leaf
+//!             if none is left, the next ray of the group takes these turns
+//! ```
+//!
+//! Source: asynchronous memory access chaining, Kocberber, Falsafi and Grot 2015, there for lookups in databases.
+
+use fearless_simd::Simd;
+
+use super::Bvh;
+use super::boxes::{WideBoxes, bits};
+use super::group::{Group, GroupEntry, push};
+use super::group_leaf::{Leaf, filter_for_each};
+use super::node::{Child, WIDTH};
+use super::rays::Rays;
+use super::walk::STACK;
+
+/// Rays that take turns.
+const IN_FLIGHT: usize = 8;
+
+/// The part of a group's stack for each of them. A ray that needs more is traced alone.
+const DEPTH: usize = STACK / IN_FLIGHT;
+
+/// A ray on its way.
+#[derive(Clone, Copy)]
+struct Traveller {
+    /// The slot in its group.
+    ray: u32,
+    /// The next child to enter; `None` if the ray is done.
+    child: Option<Child>,
+    /// Turns since this child was found.
+    turns: u32,
+    /// Children on the stack.
+    top: usize,
+    /// Nodes and leaves that it may still enter: damaged bytes may lead in circles.
+    budget: usize,
+}
+
+/// Finds the closest hit of each ray of a prepared group. Returns a mask of the rays that must be traced alone.
+#[inline(always)]
+pub(super) fn trace<S: Simd>(simd: S, group: &mut Group<'_>) -> u64 {
+    let Group { bvh, mesh, bounds, rays, stack, .. } = group;
+    let (bvh, mesh, budget) = (*bvh, *mesh, bvh.budget());
+    let start = |ray| Traveller { ray, child: Some(Child::Inner(0)), turns: 0, top: 0, budget };
+    let mut travellers = [Traveller { child: None, ..start(0) }; IN_FLIGHT];
+    let (mut queue, mut alone) = (rays.alive, 0);
+    loop {
+        let mut are_done = true;
+        for (one, stack) in travellers.iter_mut().zip(stack.shares(DEPTH)) {
+            if one.child.is_none() && queue != 0 {
+                *one = start(queue.trailing_zeros());
+                queue &= queue - 1;
+            }
+            let Some(child) = one.child else { continue };
+            are_done = false;
+
+            // Enter the child, or fetch what it holds.
+            let next = match child {
+                Child::Inner(number) => {
+                    if one.top + WIDTH > stack.len() {
+                        alone |= 1 << one.ray;
+                        one.child = None;
+                        continue;
+                    }
+                    enter_node(simd, bvh, rays, one, stack, number)
+                }
+                Child::Leaf { first, count } => {
+                    let ids = bvh.leaf(first, count);
+                    one.turns += 1;
+                    if one.turns < 3 {
+                        for &id in ids {
+                            match one.turns {
+                                1 => mesh.wide().prefetch_indices(id),
+                                _ => mesh.wide().prefetch_corners(id),
+                            }
+                        }
+                        continue;
+                    }
+                    let leaf = Leaf { bvh, mesh, bounds, first, ids };
+                    filter_for_each::<S, false>(simd, &leaf, rays, 1 << one.ray);
+                    rays.decide::<S, false>(simd, mesh);
+                    None
+                }
+            };
+
+            // Fetch what its next turn reads.
+            one.child = next.or_else(|| pop(bvh, stack, &mut one.top, rays.end_of(one.ray)));
+            (one.turns, one.budget) = (0, one.budget.saturating_sub(1));
+            match one.child {
+                _ if one.budget == 0 => one.child = None,
+                Some(child) => bvh.prefetch(child),
+                None => {}
+            }
+        }
+        if are_done {
+            return alone;
+        }
+    }
+}
+
+/// Intersects a ray with the boxes of a node. Pushes those that it meets but the nearest, and returns that one.
+#[inline(always)]
+fn enter_node<S: Simd>(
+    simd: S,
+    bvh: &Bvh<'_>,
+    rays: &Rays,
+    one: &mut Traveller,
+    stack: &mut [GroupEntry],
+    number: u32,
+) -> Option<Child> {
+    let node = bvh.nodes.get(number as usize)?;
+    let boxes = WideBoxes::decode(simd, node, rays.center, rays.growth);
+    let (near, met) = boxes.meet(simd, &rays.slab(simd, one.ray));
+    let near: [f32; WIDTH] = near.into();
+    let near = |slot: u32| near[slot as usize % WIDTH];
+    let mut rest = bits(met) & node.used();
+    let mut nearest = rest.trailing_zeros();
+    rest &= rest.wrapping_sub(1);
+    let base = one.top;
+    while rest != 0 {
+        let mut slot = rest.trailing_zeros();
+        rest &= rest - 1;
+        if near(slot) < near(nearest) {
+            core::mem::swap(&mut slot, &mut nearest);
+        }
+        let waiting = GroupEntry::new(number, slot, near(slot), 0);
+        push(stack, &mut one.top, base, waiting, true);
+    }
+    (nearest < u32::BITS).then(|| node.child(nearest))
+}
+
+/// Pops the nearest child that does not begin behind the end of the ray.
+#[inline(always)]
+fn pop(bvh: &Bvh<'_>, stack: &[GroupEntry], top: &mut usize, end: f32) -> Option<Child> {
+    loop {
+        *top = top.checked_sub(1)?;
+        let waiting = stack.get(*top)?;
+        let is_behind = waiting.near > end;
+        if !is_behind {
+            return Some(waiting.child(bvh));
+        }
+    }
+}
