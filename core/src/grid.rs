@@ -18,7 +18,7 @@ use crate::error::{Error, Region};
 use crate::mesh::TriangleMesh;
 use crate::method::Method;
 use crate::options::{Cull, QueryOptions};
-use crate::ray::{Hit, Ray, RayF64};
+use crate::ray::{Hit, INVALID_ID, Ray, RayF64};
 use crate::search::{BoxSearch, One, Outcome, Search, test_all};
 use crate::simd::{IS_SMALL, SimdLevel};
 use crate::structure::{self, Structure, by_kind};
@@ -212,7 +212,13 @@ impl<'a> Grid<'a> {
         if IS_SMALL {
             return self.intersect_with(ray, &mut QueryOptions::default());
         }
-        self.one(ray, false)
+        self.closest(ray, ray.t_max)
+    }
+
+    /// The closest hit of a ray, if its `t` is no more than `until`, behind which something else was hit.
+    #[inline(never)]
+    pub(crate) fn closest(&self, ray: &Ray, until: f32) -> Option<Hit> {
+        self.one(ray, until, false)
     }
 
     /// Returns true if [`intersect`](Self::intersect) would find a hit. It stops at the first hit, so it is faster.
@@ -234,32 +240,32 @@ impl<'a> Grid<'a> {
 
     /// Any hit of a ray.
     pub(crate) fn any(&self, ray: &Ray) -> Option<Hit> {
-        self.one(ray, true)
+        self.one(ray, ray.t_max, true)
     }
 
-    /// The closest hit of a ray, or any.
+    /// The closest hit of a ray up to a `t`, or any.
     #[inline(always)]
-    fn one(&self, ray: &Ray, is_any: bool) -> Option<Hit> {
-        let mut one = One { hit: None, is_any };
-        self.search(ray, ray.t_min, Cull::None, &mut one, &mut ());
-        one.hit
+    fn one(&self, ray: &Ray, until: f32, is_any: bool) -> Option<Hit> {
+        let mut one = One { hit: Hit { t: until, ..Hit::MISS }, is_any };
+        self.search(ray, [ray.t_min, until], Cull::None, &mut one, &mut ());
+        (one.hit.primitive != INVALID_ID).then_some(one.hit)
     }
 
-    /// Traverses the structure along a ray and passes the hits to a search: all from `begin` on, which is no
-    /// less than `t_min`, and perhaps some before.
+    /// Traverses the structure along a ray and passes the hits to a search: all whose `t` lies in a part of the ray's
+    /// range, and perhaps others. The ray's own range decides what it hits.
     #[inline(always)]
     pub(crate) fn search<F: Search, T: Tally>(
         &self,
         ray: &Ray,
-        begin: f32,
+        part: [f32; 2],
         cull: Cull,
         search: &mut F,
         tally: &mut T,
     ) {
         by_kind!(
             &self.structure,
-            tree => tree.search(&self.scope(), ray, begin, cull, search, tally),
-            self.search_cells(ray, begin, cull, search, tally)
+            tree => tree.search(&self.scope(), ray, part, cull, search, tally),
+            self.search_cells(ray, part, cull, search, tally)
         );
     }
 
@@ -268,7 +274,7 @@ impl<'a> Grid<'a> {
     fn search_cells<F: Search, T: Tally>(
         &self,
         ray: &Ray,
-        begin: f32,
+        [t_min, t_max]: [f32; 2],
         cull: Cull,
         search: &mut F,
         tally: &mut T,
@@ -279,7 +285,7 @@ impl<'a> Grid<'a> {
             return test_all(&self.mesh, &test, search, tally);
         }
         // The test keeps the ray's own range, so that a hit does not depend on the part that is walked.
-        let part = Ray { t_min: begin, ..*ray };
+        let part = Ray { t_min, t_max, ..*ray };
         let Some(line) = Line::new(&self.lattice, &part, &approach) else { return };
         self.traverse(&line, &test, search, tally);
     }

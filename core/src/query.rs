@@ -32,21 +32,22 @@ impl Grid<'_> {
     /// ```
     #[must_use]
     pub fn intersect_with(&self, ray: &Ray, options: &mut QueryOptions<'_>) -> Option<Hit> {
-        self.intersect_at(0, ray, options)
+        self.intersect_at((0, ray), ray.t_max, options)
     }
 
-    /// [`intersect_with`](Self::intersect_with) for the ray at a place of a batch.
+    /// [`intersect_with`](Self::intersect_with) for the ray at a place of a batch, if the `t` of the hit is no more
+    /// than `until`.
     pub(crate) fn intersect_at(
         &self,
-        place: usize,
-        ray: &Ray,
+        (place, ray): (usize, &Ray),
+        until: f32,
         options: &mut QueryOptions<'_>,
     ) -> Option<Hit> {
         // Save flash as `intersect` does.
         if options.are_plain() && !IS_SMALL {
-            return self.intersect(ray);
+            return self.closest(ray, until);
         }
-        self.intersect_behind((place, ray), options, None, 1)
+        self.intersect_behind((place, ray), until, options, None, 1)
     }
 
     /// [`intersect_at`](Self::intersect_at) for a ray whose first hit is known: the filter is asked about it first.
@@ -59,21 +60,22 @@ impl Grid<'_> {
     ) -> Option<Hit> {
         let verdict = options.filter.as_mut().map(|filter| filter(place, first));
         if verdict == Some(Verdict::Reject) {
-            return self.intersect_behind((place, ray), options, Some(*first), 2);
+            return self.intersect_behind((place, ray), ray.t_max, options, Some(*first), 2);
         }
         Some(*first)
     }
 
-    /// The first hit behind `after` that counts. The first walk collects `room` hits.
+    /// The first hit behind `after` that counts, up to `until`. The first walk collects `room` hits.
     fn intersect_behind(
         &self,
         ray: (usize, &Ray),
+        until: f32,
         options: &mut QueryOptions<'_>,
         after: Option<Hit>,
         room: usize,
     ) -> Option<Hit> {
         let mut closest = None;
-        self.in_order(ray, options, after, room, |hit| {
+        self.in_order(ray, until, options, after, room, |hit| {
             closest = Some(*hit);
             false
         });
@@ -126,11 +128,12 @@ impl Grid<'_> {
             return self.any(ray);
         }
         if options.filter.is_some() {
-            return self.intersect_at(place, ray, options);
+            return self.intersect_at((place, ray), ray.t_max, options);
         }
         // Without a filter no order is promised: any hit that counts will do.
         let mut hit = Hit::MISS;
-        let found = self.nearest(ray, options, None, core::slice::from_mut(&mut hit), true);
+        let found =
+            self.nearest(ray, ray.t_max, options, None, core::slice::from_mut(&mut hit), true);
         (found > 0).then_some(hit)
     }
 
@@ -171,13 +174,13 @@ impl Grid<'_> {
         }
         // Without a filter all hits count: collect them in `hits` itself.
         if options.filter.is_none() && hits.len() > ROOM {
-            count = self.nearest(ray, options, None, hits, false);
+            count = self.nearest(ray, ray.t_max, options, None, hits, false);
             match hits.last() {
                 Some(last) if count == hits.len() => after = Some(*last),
                 _ => return count,
             }
         }
-        self.in_order((0, ray), options, after, ROOM, |hit| {
+        self.in_order((0, ray), ray.t_max, options, after, ROOM, |hit| {
             if let Some(slot) = hits.get_mut(count) {
                 *slot = *hit;
             }
@@ -193,17 +196,18 @@ impl Grid<'_> {
         let mut all = AllHits { selection: &selection, hits, count: 0 };
         let mut work = Counters::default();
         let mut show = TriangleSearch(&mut |hit| all.show(hit));
-        self.search(ray, ray.t_min, options.cull, &mut show, &mut work);
+        self.search(ray, [ray.t_min, ray.t_max], options.cull, &mut show, &mut work);
         all.sort();
         options.count(&work);
         all.count
     }
 
-    /// Passes the hits behind `after` that count to `take`, in order, until `take` returns false. The first
-    /// walk collects `room` hits.
+    /// Passes the hits behind `after` and up to `until` that count to `take`, in order, until `take` returns false. The
+    /// first walk collects `room` hits.
     fn in_order(
         &self,
         (place, ray): (usize, &Ray),
+        until: f32,
         options: &mut QueryOptions<'_>,
         mut after: Option<Hit>,
         mut room: usize,
@@ -213,7 +217,7 @@ impl Grid<'_> {
         let choice = options.choice();
         loop {
             let space = buffer.get_mut(..room).unwrap_or_default();
-            let found = self.nearest(ray, options, after, space, false);
+            let found = self.nearest(ray, until, options, after, space, false);
             for hit in buffer.iter().take(found) {
                 let verdict = match &mut options.filter {
                     Some(filter) if choice.asks(self.mesh(), hit.primitive) => filter(place, hit),
@@ -245,17 +249,19 @@ impl Grid<'_> {
     fn nearest(
         &self,
         ray: &Ray,
+        until: f32,
         options: &mut QueryOptions<'_>,
         after: Option<Hit>,
         hits: &mut [Hit],
         is_any: bool,
     ) -> usize {
         let selection = Selection::new(self.mesh(), options);
-        let mut nearest = NearestHits { selection: &selection, after, hits, count: 0, is_any };
+        let mut nearest =
+            NearestHits { selection: &selection, after, until, hits, count: 0, is_any };
         let begin = after.map_or(ray.t_min, |after| after.t);
         let mut work = Counters::default();
         let mut show = TriangleSearch(&mut |hit| nearest.show(hit));
-        self.search(ray, begin, options.cull, &mut show, &mut work);
+        self.search(ray, [begin, until], options.cull, &mut show, &mut work);
         options.count(&work);
         nearest.count
     }

@@ -61,24 +61,24 @@ pub(crate) trait Search {
 /// One hit: the closest, and where several are equally close, that of the triangle with the lowest id; or any.
 #[derive(Debug)]
 pub(crate) struct One {
-    /// The hit so far.
-    pub(crate) hit: Option<Hit>,
+    /// The hit so far; before the first a miss, at the `t` up to which hits count.
+    pub(crate) hit: Hit,
     pub(crate) is_any: bool,
 }
 
 impl Search for One {
     #[inline(always)]
     fn show(&mut self, hit: Hit) -> Outcome {
-        if self.hit.is_some_and(|best| !hit.is_closer(&best)) {
+        if !hit.is_closer(&self.hit) {
             return Outcome::Unchanged;
         }
-        self.hit = Some(hit);
+        self.hit = hit;
         if self.is_any { Outcome::Done } else { Outcome::EndsAt(hit.t) }
     }
 
     #[inline(always)]
     fn knows(&self, id: u32) -> bool {
-        self.hit.is_some_and(|best| best.primitive == id)
+        self.hit.primitive == id
     }
 }
 
@@ -110,12 +110,13 @@ impl Search for BoxSearch<'_> {
     }
 }
 
-/// The nearest hits in order, as many as there is room for, each triangle once. Only hits behind `after`
-/// count, and only triangles of the selection.
+/// The nearest hits in order, as many as there is room for, each triangle once. Only hits behind `after` whose `t` is no
+/// more than `until` count, and only triangles of the selection.
 #[derive(Debug)]
 pub(crate) struct NearestHits<'q> {
     pub(crate) selection: &'q Selection<'q>,
     pub(crate) after: Option<Hit>,
+    pub(crate) until: f32,
     pub(crate) hits: &'q mut [Hit],
     /// Number of hits in `hits`.
     pub(crate) count: usize,
@@ -222,7 +223,7 @@ impl NearestHits<'_> {
     /// Takes a hit.
     pub(crate) fn show(&mut self, hit: Hit) -> Outcome {
         let is_behind = self.after.is_none_or(|after| after.is_closer(&hit));
-        if !is_behind || !self.selection.has(hit.primitive) {
+        if !is_behind || hit.t > self.until || !self.selection.has(hit.primitive) {
             return Outcome::Unchanged;
         }
         let found = self.hits.get(..self.count).unwrap_or_default();

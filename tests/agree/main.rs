@@ -7,6 +7,7 @@ mod exact;
 mod filters;
 mod flat;
 mod forms;
+mod grazing;
 mod hits;
 mod joined;
 mod large;

@@ -48,10 +48,10 @@ pub(crate) fn ray(random: &mut Random, round: usize, width: f32) -> RayF64 {
 }
 
 /// The instances of a scene, each in a scene of its own.
-struct Alone(Vec<Built>);
+pub(crate) struct Alone(Vec<Built>);
 
 impl Alone {
-    fn new(instances: &[Instance], objects: &[Object<'_>]) -> Self {
+    pub(crate) fn new(instances: &[Instance], objects: &[Object<'_>]) -> Self {
         let alone = |instance: &Instance| {
             Built::scene(std::slice::from_ref(instance), objects, &Config::default()).unwrap()
         };
@@ -59,7 +59,7 @@ impl Alone {
     }
 
     /// Returns the closest hit among the answers of all instances.
-    fn closest<'o>(
+    pub(crate) fn closest<'o>(
         &self,
         objects: &'o [Object<'o>],
         ray: &RayF64,

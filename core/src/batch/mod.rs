@@ -444,7 +444,7 @@ fn alone<A: HitAnswer>(
     let hit = if A::IS_ANY {
         grid.occluder_at(place, &ray, options)
     } else {
-        grid.intersect_at(place, &ray, options)
+        grid.intersect_at((place, &ray), ray.t_max, options)
     };
     batch.answer(place, A::of(&hit.unwrap_or(Hit::MISS)));
 }

@@ -78,8 +78,8 @@ impl<C: Together> Groups<'_, C> {
     pub(crate) fn trace(self, level: SimdLevel, is_any: bool) {
         let Self { bvh, mesh, bounds, choice, memory, batch } = self;
         let (mut rays, mut stack) = (Rays::new(choice), Stack::new());
-        let mut group =
-            Group { bvh, mesh, bounds: &bounds, rays: &mut rays, stack: &mut stack, count: 0 };
+        let (rays, stack) = (&mut rays, &mut stack);
+        let mut group = Group { bvh, mesh, bounds: &bounds, rays, stack, count: 0, until: None };
         let mut places = [0; GROUP];
         let window = order::window(memory);
         let all = batch.count();

@@ -96,6 +96,8 @@ pub(crate) struct Group<'r> {
     pub(crate) stack: &'r mut Stack,
     /// Number of rays in the first slots.
     pub(crate) count: usize,
+    /// The `t` up to which hits of each ray matter; none if all in their ranges do.
+    pub(crate) until: Option<&'r [f32; GROUP]>,
 }
 
 impl Group<'_> {
@@ -133,8 +135,11 @@ impl<L: Leaves> Kernel for Descent<'_, '_, L> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u64 {
-        let Group { bvh, bounds, rays, count, .. } = &mut *self.group;
+        let Group { bvh, bounds, rays, count, until, .. } = &mut *self.group;
         let alone = rays.prepare(simd, *count, bounds);
+        if let Some(until) = until {
+            rays.take_until(until);
+        }
         match self.leaves.scattered() {
             Scattered::Interleaved if rays.wait_for_memory(bounds, bvh) => {
                 return alone | interleave::trace(simd, self.group);

@@ -66,6 +66,7 @@ pub(crate) struct Rays {
     /// From `t` to distances.
     scale: PerRay,
     given: [Ray; GROUP],
+    /// The closest so far; before the first a miss, at the `t` up to which hits count.
     pub(crate) hits: [Hit; GROUP],
     /// Pairs of a ray and a triangle that passed the filter.
     pair_places: [u32; PAIRS],
@@ -465,6 +466,20 @@ impl Rays {
         }
     }
 
+    /// Lets only hits count whose `t` is no larger than the given one of their ray, before any are found. The ranges of
+    /// the rays stay: they decide what is a hit. Places without a ray may hold anything.
+    #[inline(always)]
+    pub(crate) fn take_until(&mut self, until: &[f32; GROUP]) {
+        let ends: &mut [f32; GROUP] = transmute_mut!(&mut self.end);
+        let scales: &[f32; GROUP] = transmute_ref!(&self.scale);
+        for ((end, &scale), &t) in ends.iter_mut().zip(scales).zip(until) {
+            *end = end_behind(t, scale, self.extent);
+        }
+        for (hit, &t) in self.hits.iter_mut().zip(until) {
+            hit.t = t;
+        }
+    }
+
     /// Ends a ray: nothing else matters to it.
     pub(crate) fn finish(&mut self, ray: u32) {
         self.alive &= !(1 << (ray % u64::BITS));
@@ -473,11 +488,17 @@ impl Rays {
     /// Ends a ray at a `t`.
     #[inline(always)]
     pub(crate) fn end_at(&mut self, ray: u32, t: f32) {
-        // Hits that round to the same t may lie farther away, or have one that is off by their corners.
-        let scale = get(&self.scale, ray);
-        let (end, growth) = (t * scale, growth_of_range(self.extent, scale));
-        put(&mut self.end, ray as usize % GROUP, end + (end.abs() * (WIDER - 1.0) + growth));
+        let end = end_behind(t, get(&self.scale, ray), self.extent);
+        put(&mut self.end, ray as usize % GROUP, end);
     }
+}
+
+/// The distance behind all hits with a `t`: those that round to it may lie farther away, or have one that is off by
+/// their corners.
+#[inline(always)]
+fn end_behind(t: f32, scale: f32, extent: f32) -> f32 {
+    let (end, growth) = (t * scale, growth_of_range(extent, scale));
+    end + (end.abs() * (WIDER - 1.0) + growth)
 }
 
 /// The lanes of a mask.

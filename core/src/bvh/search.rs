@@ -29,12 +29,12 @@ impl Bvh<'_> {
         &self,
         scope: &Scope<'_>,
         ray: &Ray,
-        begin: f32,
+        part: [f32; 2],
         cull: Cull,
         search: &mut F,
         tally: &mut T,
     ) {
-        if self.walk(scope, ray, begin, cull, None, search, tally) {
+        if self.walk(scope, ray, part, cull, None, search, tally) {
             return;
         }
         let Some(approach) = Approach::new(ray, &scope.bounds) else { return };
@@ -42,8 +42,8 @@ impl Bvh<'_> {
         if approach.is_remote {
             return test_all(scope.mesh, &test, search, tally);
         }
-        let afar = (Slab::new(ray, begin, &approach), test.filter);
-        self.walk(scope, ray, begin, cull, Some(&afar), search, tally);
+        let afar = (Slab::new(ray, part, &approach), test.filter);
+        self.walk(scope, ray, part, cull, Some(&afar), search, tally);
     }
 
     /// Walks a ray whose origin is given in f64 through a tree of boxes, and offers a search those that it
@@ -57,7 +57,8 @@ impl Bvh<'_> {
     ) {
         let narrow = &ray.rounded();
         if ray.is_exact() {
-            return self.search(scope, narrow, ray.t_min, Cull::None, search, counters);
+            let range = [ray.t_min, ray.t_max];
+            return self.search(scope, narrow, range, Cull::None, search, counters);
         }
         if !narrow.is_valid() {
             return;
@@ -85,7 +86,7 @@ impl Bvh<'_> {
             return test_all(scope.mesh, &TriangleTest::from(ray, &approach), search, counters);
         }
         let afar = (Slab::along(ray, &approach, scale), RayFilter::NONE);
-        self.walk(scope, ray, t_min, Cull::None, Some(&afar), search, counters);
+        self.walk(scope, ray, [t_min, t_max], Cull::None, Some(&afar), search, counters);
     }
 
     /// Walks a ray through the tree; false if it starts too far away and needs an [`Approach`].
@@ -95,7 +96,7 @@ impl Bvh<'_> {
         &self,
         scope: &Scope<'_>,
         ray: &Ray,
-        begin: f32,
+        part: [f32; 2],
         cull: Cull,
         afar: Option<&(Slab, RayFilter)>,
         search: &mut F,
@@ -107,7 +108,7 @@ impl Bvh<'_> {
             |stack| {
                 let bvh = self;
                 let mut ray =
-                    OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack };
+                    OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, stack };
                 dispatch(*simd, &mut ray)
             },
         )

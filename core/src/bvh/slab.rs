@@ -77,10 +77,14 @@ pub(crate) struct Slab {
 }
 
 impl Slab {
-    /// A ray that starts near a box, from `begin` on, and its filter for triangles there; `None` if it starts farther
-    /// away, ends before `begin`, is invalid, or has a very long or short direction.
+    /// A part of a ray that starts near a box, and its filter for triangles there; `None` if it starts farther away, is
+    /// empty or invalid, or has a very long or short direction.
     #[inline(always)]
-    pub(crate) fn nearby(ray: &Ray, begin: f32, bounds: &Aabb) -> Option<(Self, RayFilter)> {
+    pub(crate) fn nearby(
+        ray: &Ray,
+        [begin, until]: [f32; 2],
+        bounds: &Aabb,
+    ) -> Option<(Self, RayFilter)> {
         let [x, y, z] = ray.direction;
         let longest = greater(x.abs(), greater(y.abs(), z.abs()));
         let size = bounds.size();
@@ -90,7 +94,7 @@ impl Slab {
         let (a, b, c) = (away(a, 0), away(b, 1), away(c, 2));
         let limit = FAR_EXTENTS * size.max_element();
         let is_near = a <= limit && b <= limit && c <= limit;
-        let is_ray = longest > NEARBY_SHORT && longest < NEARBY_LONG && begin <= ray.t_max;
+        let is_ray = longest > NEARBY_SHORT && longest < NEARBY_LONG && begin <= until;
         // A NaN may hide beside the longest component.
         let is_number = x + y + z <= f32::MAX;
         if !(is_near && is_ray && is_number) {
@@ -109,7 +113,7 @@ impl Slab {
         // be denormal unless the ray is: some processors take 70 cycles for it. Use `max`, not `if`: an `if` becomes a
         // select, and the product that is not selected is computed, too.
         let start = lesser(begin * scale, f32::MAX);
-        let end = greater(ray.t_max * scale, -f32::MAX);
+        let end = greater(until * scale, -f32::MAX);
         let extent = size.max_element();
         let growth = growth_of_range(extent, scale);
         let half = (size * 0.5).to_array();
@@ -136,10 +140,10 @@ impl Slab {
         Some((slab, filter))
     }
 
-    /// A ray that starts where its approach says, from `begin` on.
+    /// A part of a ray that starts where its approach says.
     #[cold]
     #[inline(never)]
-    pub(crate) fn new(ray: &Ray, begin: f32, approach: &Approach) -> Self {
+    pub(crate) fn new(ray: &Ray, [begin, until]: [f32; 2], approach: &Approach) -> Self {
         let [x, y, z] = ray.direction;
         let largest = f64::from(x.abs().max(y.abs()).max(z.abs()));
         // A power of two: the exponent of the largest component.
@@ -164,7 +168,7 @@ impl Slab {
             growth: growth_of_range(round(approach.reach.extent), 1.0),
         };
         slab.start = slab.earliest(begin);
-        slab.end = slab.latest(ray.t_max);
+        slab.end = slab.latest(until);
         slab
     }
 
@@ -173,7 +177,7 @@ impl Slab {
     #[cold]
     #[inline(never)]
     pub(crate) fn along(ray: &Ray, approach: &Approach, scale: f64) -> Self {
-        let mut slab = Self::new(ray, ray.t_min, approach);
+        let mut slab = Self::new(ray, [ray.t_min, ray.t_max], approach);
         (slab.t, slab.scale) = (slab.t / scale, slab.scale * scale);
         (slab.start, slab.end) = (slab.earliest(ray.t_min), slab.latest(ray.t_max));
         slab

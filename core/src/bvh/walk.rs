@@ -46,8 +46,9 @@ pub(crate) struct OneRay<'r, F, T> {
     pub(crate) bvh: &'r Bvh<'r>,
     pub(crate) mesh: &'r TriangleMesh<'r>,
     pub(crate) ray: &'r Ray,
-    /// The `t` from which hits matter: `t_min`, or the `t` of the last hit that was found before.
-    pub(crate) begin: f32,
+    /// The part of its range in which hits matter: from `t_min` or the last hit that was found before, to `t_max` or
+    /// the closest hit that something else has.
+    pub(crate) part: [f32; 2],
     pub(crate) cull: Cull,
     /// The box of the scene.
     pub(crate) bounds: &'r Aabb,
@@ -225,9 +226,9 @@ impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> bool {
-        let OneRay { bvh, mesh, ray, begin, cull, bounds, afar, search, tally, stack } = self;
-        let (begin, cull, afar) = (*begin, *cull, *afar);
-        let nearby = if afar.is_none() { Slab::nearby(ray, begin, bounds) } else { afar.copied() };
+        let OneRay { bvh, mesh, ray, part, cull, bounds, afar, search, tally, stack } = self;
+        let (part, cull, afar) = (*part, *cull, *afar);
+        let nearby = if afar.is_none() { Slab::nearby(ray, part, bounds) } else { afar.copied() };
         let Some((slab, filter)) = nearby else { return false };
         let slab = &slab;
         // Boxes need no filter: the compiler drops its computation.
@@ -476,7 +477,7 @@ mod tests {
                     node.bounds[axis + 3][slot] = a.max(b);
                 }
             }
-            let Some((slab, _)) = Slab::nearby(&ray, 0.0, &bounds) else { continue };
+            let Some((slab, _)) = Slab::nearby(&ray, [0.0, 3.0], &bounds) else { continue };
             for &level in &levels {
                 let [(wide, near_wide), (missed, near)] =
                     dispatch(level, Both(&slab, &node, slab.end));

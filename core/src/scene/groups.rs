@@ -4,7 +4,7 @@
 //! take up to 64 rays through the tree of the scene together
 //! an instance whose box some of them meet: drop it by its mask; else
 //!     a tree:             move each of them into its space, as a single query does
-//!                         take them through it together
+//!                         take them through it together, each up to its closest hit so far
 //!                         move the `t` of what they hit back, and end them there
 //!     all else, or a few: ask it for each of them alone
 //! ```
@@ -93,6 +93,8 @@ struct SceneRays<'r> {
     /// The rays that enter an object, as it sees them, and their lanes in the group.
     seen: [Seen; GROUP],
     lanes: [u32; GROUP],
+    /// The `t` up to which hits of each matter.
+    until: [f32; GROUP],
     inside: Rays,
     stack: Stack,
 }
@@ -109,6 +111,7 @@ impl<'r> SceneRays<'r> {
             best: [SceneHit::MISS; GROUP],
             seen: [Seen::NONE; GROUP],
             lanes: [0; GROUP],
+            until: [0.0; GROUP],
             inside,
             stack: Stack::new(),
         }
@@ -194,12 +197,13 @@ impl<'r> SceneRays<'r> {
             let ray = &self.given[lane as usize % GROUP];
             let Some(mut seen) = Seen::new(&placed.line(&LineF64::from(ray))) else { continue };
             let limit = self.best[lane as usize % GROUP].t;
-            let Some(inside) = seen.narrow(ray, limit, &corners) else { continue };
+            let Some(inside) = seen.narrow(ray, &corners) else { continue };
             // A group takes no hits behind the origin.
             if seen.is_from_afar(&corners) {
                 self.alone(number, lane, outer);
                 continue;
             }
+            self.until[count % GROUP] = seen.until(limit, &inside);
             self.inside.slots()[count % GROUP] = inside;
             self.seen[count % GROUP] = seen;
             self.lanes[count % GROUP] = lane;
@@ -211,7 +215,8 @@ impl<'r> SceneRays<'r> {
         let is_any = self.question.is_any;
         let options = &mut self.question.options();
         let (rays, stack) = (&mut self.inside, &mut self.stack);
-        let mut group = Group { bvh, mesh, bounds: &bounds, rays, stack, count };
+        let until = Some(&self.until);
+        let mut group = Group { bvh, mesh, bounds: &bounds, rays, stack, count, until };
         let alone = match object {
             Object::Shapes(_, test) => {
                 let test = &mut |id: u32, ray: &Ray| test.test(id, ray);
@@ -224,7 +229,7 @@ impl<'r> SceneRays<'r> {
                 let hit = self.inside.hits[at];
                 (hit.primitive != INVALID_ID).then_some(hit)
             } else {
-                ask_object(object, &self.inside.slots()[at], is_any, options)
+                ask_object(object, &self.inside.slots()[at], self.until[at], is_any, options)
             };
             let Some(hit) = hit else { continue };
             let lane = self.lanes[at];

@@ -16,8 +16,8 @@
 //! ```
 //!
 //! The `t` of a ray in a scene inside another is that of the outermost scene. The object's ray is a function of
-//! that ray, the instances on the path and the object's box alone, but for its end, which lies at the closest hit so
-//! far: so every query asks the object the same.
+//! that ray, the instances on the path and the object's box alone: so every query asks the object the same. The
+//! closest hit so far only shortens the walk ([`Seen::until`]).
 
 use glam::DVec3;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -26,7 +26,6 @@ use crate::aabb::{greater, lesser};
 use crate::approach::{FAR_EXTENTS, LineF64};
 use crate::limits::MAX_COORDINATE;
 use crate::ray::{Ray, RayF64, round};
-use crate::triangle::OF_CORNERS;
 
 /// An object at a place in a scene: 72 bytes.
 #[repr(C)]
@@ -231,14 +230,8 @@ impl Seen {
         })
     }
 
-    /// The ray in f32 for an object with this box, up to a `t` of the scene's ray: from near the box. `None` if it
-    /// passes the box.
-    pub(super) fn narrow(
-        &mut self,
-        ray: &RayF64,
-        limit: f32,
-        bounds: &([f32; 3], [f32; 3]),
-    ) -> Option<Ray> {
+    /// The ray in f32 for an object with this box, from near the box. `None` if it passes the box.
+    pub(super) fn narrow(&mut self, ray: &RayF64, bounds: &([f32; 3], [f32; 3])) -> Option<Ray> {
         let LineF64 { origin, direction } = self.line;
         let (center, half) = grown(bounds);
         let away = |axis: usize| (origin[axis] - center[axis]).abs();
@@ -249,13 +242,11 @@ impl Seen {
             self.shift = self.entry(&center, &half)?;
         }
         let at = |axis: usize| round(origin[axis] + self.shift * direction[axis]);
-        let error = extent * f64::from(OF_CORNERS);
-        let (limit, t_max) = (self.limit(limit, error), self.inward(ray.t_max));
         Some(Ray {
             origin: [at(0), at(1), at(2)],
             t_min: self.inward(ray.t_min),
             direction: direction.map(round),
-            t_max: if limit < t_max { limit } else { t_max },
+            t_max: self.inward(ray.t_max),
         })
     }
 
@@ -290,11 +281,14 @@ impl Seen {
         round(f64::from(t) * self.scale - self.shift)
     }
 
-    /// The end of the object's ray behind a hit at a `t` of the scene's ray. Hits of this object that have the same
-    /// `t` there are not lost, although their own may be off by `error`, unless the ray grazes them: the exact place
-    /// of such a hit may lie behind any end.
-    fn limit(&self, t: f32, error: f64) -> f32 {
-        round(f64::from(t.next_up()) * self.scale - self.shift + error).next_up()
+    /// The `t` of the object's ray up to which hits matter, once something was hit at a `t` of the scene's ray: no less
+    /// than that of any hit in the object with the same `t` there.
+    ///
+    /// It must not end the range of `inside`, the object's ray, because the exact place of a hit decides about the
+    /// range. Where the ray grazes a triangle, this place may lie far behind the `t` that is reported.
+    pub(super) fn until(&self, t: f32, inside: &Ray) -> f32 {
+        let until = round(f64::from(t.next_up()) * self.scale - self.shift).next_up();
+        lesser(until, inside.t_max)
     }
 
     /// The `t` of the scene's ray, which lies in that ray's range.

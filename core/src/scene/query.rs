@@ -3,8 +3,9 @@
 //! ```text
 //! walk the tree of the scene; for each instance whose box the ray meets, about from near to far:
 //!     drop it by its mask
-//!     move the ray into the space of its object, in f64, and end it at the closest hit so far
-//!     a grid or shapes:   round the ray to f32, ask the object, move the `t` of its hit back
+//!     move the ray into the space of its object, in f64
+//!     a grid or shapes:   round the ray to f32, ask the object up to the closest hit so far,
+//!                         move the `t` of its hit back
 //!     a scene:            do the same there, with the ray still in f64
 //! ```
 
@@ -299,7 +300,8 @@ impl InstanceSearch<'_, '_> {
         }
 
         let mut seen = Seen::new(&line)?;
-        let inside = seen.narrow(ray, self.limit, &object.bounds())?;
+        let inside = seen.narrow(ray, &object.bounds())?;
+        let until = seen.until(self.limit, &inside);
         let outward = |hit: &Hit| outward(&seen, ray, level, number, hit);
         let mut show;
         let mut options = question.options();
@@ -308,24 +310,28 @@ impl InstanceSearch<'_, '_> {
             show = |_: usize, hit: &Hit| filter(&outward(hit));
             options.filter = Some(&mut show);
         }
-        let hit = ask_object(object, &inside, is_any, &mut options)?;
+        let hit = ask_object(object, &inside, until, is_any, &mut options)?;
         Some(outward(&hit))
     }
 }
 
-/// Returns the closest hit of a ray in a grid or in shapes; with `is_any`, a hit that says only that there is one.
+/// Returns the closest hit of a ray in a grid or in shapes, if its `t` is no more than `until`; with `is_any`, a hit
+/// that says only that there is one.
 pub(super) fn ask_object(
     object: &Object<'_>,
     ray: &Ray,
+    until: f32,
     is_any: bool,
     options: &mut QueryOptions<'_>,
 ) -> Option<Hit> {
     let any = |is_hit: bool| is_hit.then_some(Hit { t: ray.t_min, ..Hit::MISS });
     match object {
         Object::Grid(grid) if is_any => any(grid.occluded_with(ray, options)),
-        Object::Grid(grid) => grid.intersect_with(ray, options),
+        Object::Grid(grid) => grid.intersect_at((0, ray), until, options),
         Object::Shapes(shapes, test) => {
             let mut test = |id: u32, ray: &Ray| test.test(id, ray);
+            // The test of a shape compares the `t` that it reports with the range.
+            let ray = &Ray { t_max: until, ..*ray };
             if is_any {
                 any(shapes.occluded_with(ray, options, &mut test))
             } else {
