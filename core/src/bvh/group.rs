@@ -12,7 +12,7 @@
 //!       few rays: intersect each with the eight boxes
 //!       many:     intersect the beam of all rays with the eight boxes, then sixteen rays at a time with each
 //!                 box that is left
-//!       push the children with the rays that met them, those that begin nearest last
+//!       push the children with the rays that met them, those that begin nearest last; in a large tree prefetch them
 //! leaf: test its triangles, or offer its boxes (group_leaf.rs)
 //! ```
 //!
@@ -26,12 +26,12 @@ use super::boxes::{Beam, WideBoxes, bits};
 use super::group_leaf::{Boxes, Leaf, Leaves, Offer, Scattered, Triangles};
 use super::interleave;
 use super::node::{Child, WIDTH};
-use super::rays::{GROUP, OCTETS, Rays};
+use super::rays::{CORE_CACHES, GROUP, OCTETS, Rays};
 use super::walk::STACK;
 use crate::aabb::Aabb;
 use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
-use crate::simd::{Kernel, SimdLevel, dispatch};
+use crate::simd::{HAS_PREFETCH, Kernel, SimdLevel, dispatch};
 
 /// With more rays than this, the beam of all rays is tested before the rays.
 const FEW_RAYS: u32 = 8;
@@ -161,6 +161,7 @@ impl<L: Leaves> Descent<'_, '_, L> {
         let mut budget = bvh.budget();
         let mut top = 0;
         let mut met = Met::NONE;
+        let is_large = HAS_PREFETCH && bvh.exceeds(CORE_CACHES);
         let beam = rays.beam(simd);
         let (mut child, mut mask) = (Child::Inner(0), rays.alive);
         loop {
@@ -183,6 +184,9 @@ impl<L: Leaves> Descent<'_, '_, L> {
                         let (rays, near) = (by[slot as usize % WIDTH], near[slot as usize % WIDTH]);
                         let waiting = GroupEntry::new(number, slot, near, rays);
                         push(stack, &mut top, base, waiting, !L::IS_ANY);
+                        if is_large {
+                            bvh.prefetch(node.child(slot));
+                        }
                     }
                 }
                 Child::Leaf { first, count } => {

@@ -75,7 +75,7 @@ pub(crate) struct Rays {
 }
 
 /// Bytes of the caches of one core, about: those of a tree over 110 000 triangles.
-const CORE_CACHES: usize = 1 << 20;
+pub(super) const CORE_CACHES: usize = 1 << 20;
 /// Bytes of the cache that cores share, about: those of a tree over 1.8 million triangles.
 const SHARED_CACHE: usize = 16 << 20;
 
