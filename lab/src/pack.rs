@@ -65,6 +65,16 @@ fn check(args: &PackArgs) -> Result<()> {
     args.tuning.check("--method", &[method])?;
     let is_mesh = Format::named(&args.output).is_some_and(|format| format != Format::Blob);
     ensure!(!is_mesh, "`{output}` would be a mesh by its name: name a file like x.hgrid or x.c");
+    let pictures = ["png", "jpg", "jpeg", "svg", "gif", "webp", "bmp", "ppm", "exr", "hdr"];
+    let is_picture = args
+        .output
+        .extension()
+        .is_some_and(|ending| pictures.iter().any(|picture| ending.eq_ignore_ascii_case(picture)));
+    ensure!(
+        !is_picture,
+        "`{output}` would be a picture by its name: name a file like x.hgrid, or draw one with \
+         hgrid render"
+    );
     let is_source = |path: &Path| {
         let endings = ["c", "h", "cpp", "hpp", "cc"];
         path.extension().is_some_and(|ending| endings.iter().any(|source| ending == *source))

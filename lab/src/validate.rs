@@ -50,8 +50,21 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
         .with_context(|| format!("`{file}` is not valid"))?;
     let (method, triangles) = (grid.method().name(), HumanCount(info.triangle_count.into()));
     let time = seconds(start.elapsed().as_secs_f64());
-    writeln!(io::stdout(), "{file}: valid, a {method} of {triangles} triangles, proved in {time}")?;
+    let rest = rest(&blob, &info);
+    writeln!(
+        io::stdout(),
+        "{file}: valid, a {method} of {triangles} triangles, proved in {time}{rest}"
+    )?;
     Ok(())
+}
+
+/// Tells of the bytes of the file behind the blob, which nothing reads; empty if there are none.
+fn rest(blob: &Blob, info: &BlobInfo) -> String {
+    match (blob.bytes().len() as u64).saturating_sub(info.total_bytes) {
+        0 => String::new(),
+        1 => "; one byte behind it is no part of it".to_owned(),
+        count => format!("; {} bytes behind it are no part of it", HumanCount(count)),
+    }
 }
 
 /// Proves a packed scene with all grids and scenes that it shows.
@@ -66,10 +79,10 @@ fn prove_scene(path: &Path, blob: &Blob, info: &BlobInfo) -> Result<()> {
         .with_context(|| format!("`{file}` is not valid"))?;
     let [instances, shown] =
         [scene.instance_count(), info.triangle_count].map(|count| HumanCount(count.into()));
-    let time = seconds(start.elapsed().as_secs_f64());
+    let (time, rest) = (seconds(start.elapsed().as_secs_f64()), rest(blob, info));
     writeln!(
         io::stdout(),
-        "{file}: valid, a scene of {instances} instances with {shown} grids and scenes, proved in {time}"
+        "{file}: valid, a scene of {instances} instances with {shown} grids and scenes, proved in {time}{rest}"
     )?;
     Ok(())
 }

@@ -188,6 +188,12 @@ fn packed_files_are_described_proved_and_rendered() {
     let blob = fs::read(folder.0.join("a.hgrid")).unwrap();
     fs::write(folder.0.join("cut.hgrid"), &blob[..blob.len() - 64]).unwrap();
     assert!(folder.fails("validate cut.hgrid").unwrap().contains("it is cut off"));
+    fs::write(folder.0.join("long.hgrid"), [&blob[..], &[0; 3]].concat()).unwrap();
+    let said = folder.says("validate long.hgrid").unwrap();
+    assert!(
+        said.contains("valid") && said.contains("3 bytes behind it are no part of it"),
+        "{said}"
+    );
     // Flip a bit in the boxes or the ids of the tree.
     let mut damaged = blob;
     damaged[128 + 20] ^= 0x40;
@@ -220,6 +226,7 @@ fn a_blob_can_be_an_array_of_c() {
         ("pack a.obj -o b.c --c-array _Bool", "`_Bool` has a meaning in C or C++"),
         ("pack a.obj -o b.c --c-array class", "`class` has a meaning"),
         ("pack a.obj -o b.ply", "would be a mesh by its name"),
+        ("pack a.obj -o b.PNG", "would be a picture by its name"),
         ("pack a.obj -o b.hgrid --depth 2", "--depth is for --method recursive"),
     ] {
         let message = folder.fails(words).unwrap();
