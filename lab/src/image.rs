@@ -10,6 +10,7 @@ use std::path::{Path, is_separator};
 
 use anyhow::{Context as _, Error, Result, ensure};
 
+use crate::scene::gltf::files_of;
 use crate::shade::Rgb;
 
 /// Refuses a path where no PNG can be written, or whose name promises another format.
@@ -45,16 +46,25 @@ pub fn check_writable(path: &Path) -> Result<()> {
     })
 }
 
-/// Refuses to overwrite the file or the two files that a scene is named by, by a blob or a picture of it. Buffers
-/// that a glTF file names are not looked at.
+/// Refuses to overwrite the file or the two files that a scene is named by, or a buffer that they name, by a blob or a
+/// picture of it.
 ///
 /// # Errors
 /// If the output is one of them.
 pub fn check_sources(output: &Path, scene: &str, what: &str) -> Result<()> {
-    let Ok(output) = output.canonicalize() else { return Ok(()) };
+    let Ok(target) = output.canonicalize() else { return Ok(()) };
     for input in iter::once(scene).chain(scene.split('+')) {
-        let is_output = Path::new(input).canonicalize().is_ok_and(|input| input == output);
-        ensure!(!is_output, "`{input}` would be overwritten by its own {what}: name another file");
+        let is_output = |path: &Path| path.canonicalize().is_ok_and(|path| path == target);
+        ensure!(
+            !is_output(Path::new(input)),
+            "`{input}` would be overwritten by its own {what}: name another file"
+        );
+        let buffers = files_of(Path::new(input));
+        ensure!(
+            !buffers.iter().any(|file| is_output(file)),
+            "`{}` holds a part of `{input}`, whose {what} would overwrite it: name another file",
+            output.display()
+        );
     }
     Ok(())
 }

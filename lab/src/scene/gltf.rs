@@ -5,7 +5,7 @@
 
 use core::ops::Range;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use base64::Engine as _;
@@ -52,6 +52,21 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Model> {
     }
     model.instances = instances(&document, &places)?;
     Ok(model)
+}
+
+/// Returns the files that a glTF file names beside it; none if it cannot be read, which loading it reports.
+pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
+    let is_gltf = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+    let document =
+        if is_gltf { fs::read(path).ok().and_then(|bytes| parse(&bytes).ok()) } else { None };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let file = |buffer: gltf::Buffer<'_>| match buffer.source() {
+        Source::Uri(uri) if !uri.contains(':') => {
+            Some(folder.join(&*urlencoding::decode(uri).ok()?))
+        }
+        _ => None,
+    };
+    document.iter().flat_map(|(document, _)| document.buffers().filter_map(file)).collect()
 }
 
 /// Parses and checks a file. Extensions that change how surfaces look are allowed even if the file requires them.

@@ -5,7 +5,7 @@
 //! more than three corners into triangles.
 
 pub mod format;
-mod gltf;
+pub(crate) mod gltf;
 mod knot;
 pub mod model;
 mod noise;
