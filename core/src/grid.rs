@@ -215,7 +215,7 @@ impl<'a> Grid<'a> {
         self.closest(ray, ray.t_max)
     }
 
-    /// The closest hit of a ray, if its `t` is no more than `until`, behind which something else was hit.
+    /// The closest hit of a ray, if its `t` is no more than `until`: `t_max`, or the `t` of a hit in another instance.
     #[inline(never)]
     pub(crate) fn closest(&self, ray: &Ray, until: f32) -> Option<Hit> {
         self.one(ray, until, false)

@@ -61,7 +61,7 @@ pub(crate) trait Search {
 /// One hit: the closest, and where several are equally close, that of the triangle with the lowest id; or any.
 #[derive(Debug)]
 pub(crate) struct One {
-    /// The hit so far; before the first a miss, at the `t` up to which hits count.
+    /// The hit so far. Before the first it is a miss, whose `t` is the end.
     pub(crate) hit: Hit,
     pub(crate) is_any: bool,
 }

@@ -20,14 +20,15 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x16, u32x8};
+use zerocopy::{FromBytes, IntoBytes, transmute_mut};
 
 use super::Bvh;
 use super::boxes::{Beam, WideBoxes, bits};
 use super::group_leaf::{Boxes, Leaf, Leaves, Offer, Scattered, Triangles};
 use super::interleave;
 use super::node::{Child, WIDTH};
-use super::rays::{CORE_CACHES, GROUP, OCTETS, Rays};
-use super::walk::STACK;
+use super::rays::{GROUP, OCTETS, Rays};
+use super::walk::{STACK, StackEntry};
 use crate::aabb::Aabb;
 use crate::extremes::Extremes;
 use crate::mesh::TriangleMesh;
@@ -35,6 +36,22 @@ use crate::simd::{HAS_PREFETCH, Kernel, SimdLevel, dispatch};
 
 /// With more rays than this, the beam of all rays is tested before the rays.
 const FEW_RAYS: u32 = 8;
+
+/// Rays are scattered, and share little, if some origins lie farther apart than this part of the scene.
+const SCATTERED: f32 = 1.0 / 4.0;
+/// The same for a tree that exceeds [`SHARED_CACHE`]: little of it lies in the nodes that rays share.
+const SCATTERED_IN_HUGE: f32 = 1.0 / 32.0;
+
+/// Bytes of a tree that the caches of one core do not hold: that of a scan of 110 000 triangles.
+const CORE_CACHES: usize = 1 << 20;
+/// Bytes of a tree that the cache of all cores does not hold: that of a scan of 1.8 million triangles.
+const SHARED_CACHE: usize = 16 << 20;
+
+/// Returns true if scattered rays would wait for memory at each step of a tree.
+fn wait_for_memory(rays: &Rays, bvh: &Bvh<'_>) -> bool {
+    let part = if bvh.exceeds(SHARED_CACHE) { SCATTERED_IN_HUGE } else { SCATTERED };
+    bvh.exceeds(CORE_CACHES) && rays.are_apart(part)
+}
 
 /// Counts the vectors of eight rays that hold at least one of some rays.
 #[inline(always)]
@@ -45,30 +62,18 @@ pub(super) const fn octets(rays: u64) -> u32 {
 }
 
 /// A child that waits, and the rays that met it.
-#[derive(Clone, Copy)]
+#[repr(C)]
+#[derive(Clone, Copy, FromBytes, IntoBytes)]
 pub(crate) struct GroupEntry {
     /// Node and slot.
     place: u32,
     /// The least distance at which one of the rays enters.
-    pub(super) near: f32,
+    near: f32,
     rays: u64,
 }
 
 impl GroupEntry {
     const NONE: Self = Self { place: 0, near: 0.0, rays: 0 };
-
-    /// A child of a node.
-    #[inline(always)]
-    pub(super) const fn new(node: u32, slot: u32, near: f32, rays: u64) -> Self {
-        Self { place: node << 3 | slot, near, rays }
-    }
-
-    /// Returns the child.
-    #[inline(always)]
-    pub(super) fn child(self, bvh: &Bvh<'_>) -> Child {
-        let (node, slot) = (self.place >> 3, self.place & 7);
-        bvh.nodes.get(node as usize).map_or(Child::NONE, |node| node.child(slot))
-    }
 }
 
 /// The stack of a group.
@@ -79,10 +84,11 @@ impl Stack {
         Self([GroupEntry::NONE; STACK])
     }
 
-    /// Cuts the stack into shares of a size.
+    /// Cuts the stack into shares for single rays.
     #[inline(always)]
-    pub(super) fn shares(&mut self, size: usize) -> impl Iterator<Item = &mut [GroupEntry]> {
-        self.0.chunks_exact_mut(size)
+    pub(super) fn shares(&mut self, size: usize) -> impl Iterator<Item = &mut [StackEntry]> {
+        let entries: &mut [StackEntry; 2 * STACK] = transmute_mut!(&mut self.0);
+        entries.chunks_exact_mut(size)
     }
 }
 
@@ -96,7 +102,8 @@ pub(crate) struct Group<'r> {
     pub(crate) stack: &'r mut Stack,
     /// Number of rays in the first slots.
     pub(crate) count: usize,
-    /// The `t` up to which hits of each ray matter; none if all in their ranges do.
+    /// The `t` up to which hits of each ray matter; none if all in their ranges do. A ray without a hit then has a miss
+    /// with this `t`, not [`Hit::MISS`](crate::ray::Hit::MISS).
     pub(crate) until: Option<&'r [f32; GROUP]>,
 }
 
@@ -141,10 +148,10 @@ impl<L: Leaves> Kernel for Descent<'_, '_, L> {
             rays.take_until(until);
         }
         match self.leaves.scattered() {
-            Scattered::Interleaved if rays.wait_for_memory(bounds, bvh) => {
+            Scattered::Interleaved if wait_for_memory(rays, bvh) => {
                 return alone | interleave::trace(simd, self.group);
             }
-            Scattered::Interleaved | Scattered::Alone if rays.are_scattered(bounds) => {
+            Scattered::Interleaved | Scattered::Alone if rays.are_apart(SCATTERED) => {
                 return alone | rays.alive;
             }
             _ => self.descend(simd),
@@ -182,8 +189,8 @@ impl<L: Leaves> Descent<'_, '_, L> {
                         let slot = slots.trailing_zeros();
                         slots &= slots - 1;
                         let (rays, near) = (by[slot as usize % WIDTH], near[slot as usize % WIDTH]);
-                        let waiting = GroupEntry::new(number, slot, near, rays);
-                        push(stack, &mut top, base, waiting, !L::IS_ANY);
+                        let place = number << 3 | slot;
+                        push::<L>(stack, &mut top, base, GroupEntry { place, near, rays });
                         if is_large {
                             bvh.prefetch(node.child(slot));
                         }
@@ -204,7 +211,9 @@ impl<L: Leaves> Descent<'_, '_, L> {
                     mask = rays.ending_behind(simd, waiting.near, mask);
                 }
                 if mask != 0 {
-                    child = waiting.child(bvh);
+                    let (node, slot) = (waiting.place >> 3, waiting.place & 7);
+                    let node = bvh.nodes.get(node as usize);
+                    child = node.map_or(Child::NONE, |node| node.child(slot));
                     break;
                 }
             }
@@ -336,21 +345,15 @@ fn side_by_side<S: Simd>(
     }
 }
 
-/// Pushes a child; with `is_sorted`, for closest hits, above those of the same node that begin farther away.
+/// Pushes a child; for closest hits, above those of the same node that begin farther away.
 #[inline(always)]
-pub(super) fn push(
-    stack: &mut [GroupEntry],
-    top: &mut usize,
-    base: usize,
-    waiting: GroupEntry,
-    is_sorted: bool,
-) {
+fn push<L: Leaves>(stack: &mut [GroupEntry], top: &mut usize, base: usize, waiting: GroupEntry) {
     let mut at = *top;
     if at >= stack.len() {
         return;
     }
     *top += 1;
-    while is_sorted
+    while !L::IS_ANY
         && at > base
         && let Some(&below) = stack.get(at - 1)
         && below.near < waiting.near
@@ -366,3 +369,54 @@ pub(super) fn push(
 }
 
 const _: () = assert!(GROUP == 8 * OCTETS);
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use glam::Vec3A;
+
+    use super::super::node::Node;
+    use super::*;
+    use crate::options::Choice;
+    use crate::ray::Ray;
+    use crate::simd::dispatch;
+
+    /// Prepares rays of which the last starts elsewhere than the others.
+    struct Prepared<'a>(&'a mut Rays, f32);
+
+    impl Kernel for Prepared<'_> {
+        type Output = u64;
+
+        fn run<S: Simd>(self, simd: S) -> u64 {
+            let Self(rays, apart) = self;
+            for (slot, ray) in rays.slots().iter_mut().enumerate() {
+                let x = if slot == GROUP - 1 { apart } else { 0.0 };
+                *ray = Ray::new([x, 0.0, 0.0], [0.5, 1.0, 0.25]);
+            }
+            let bounds = Aabb { min: Vec3A::splat(-8.0), max: Vec3A::splat(8.0) };
+            rays.prepare(simd, GROUP, &bounds)
+        }
+    }
+
+    #[test]
+    fn scattered_rays_wait_for_memory_in_large_trees() {
+        let nodes = vec![Node::EMPTY; SHARED_CACHE / size_of::<Node>() + 1];
+        let few = CORE_CACHES / size_of::<Node>();
+        // A quarter of the extent is 4.
+        for (count, apart, waits) in [
+            (few, 8.0, false),
+            (few + 1, 8.0, true),
+            (few + 1, 3.5, false),
+            (nodes.len() - 1, 3.5, false),
+            (nodes.len(), 3.5, true),
+            (nodes.len(), 0.25, false),
+        ] {
+            let bvh = Bvh { nodes: &nodes[..count], ids: &[], levels: 1 };
+            let mut rays = Rays::new(Choice::ALL);
+            assert_eq!(dispatch(SimdLevel::detect(), Prepared(&mut rays, apart)), 0);
+            assert_eq!(rays.alive, u64::MAX);
+            assert_eq!(wait_for_memory(&rays, &bvh), waits, "{count} nodes, {apart} apart");
+        }
+    }
+}

@@ -8,27 +8,31 @@
 //! in turn, for each of eight rays:
 //!     node    intersect the ray with its boxes, push those that it meets but the nearest, go on with that one
 //!     leaf    first turn: prefetch the indices of its triangles; second: their corners; third: test them
-//!     then    if there is no child to go on with, pop the nearest; prefetch the node, or the ids of the leaf
-//!             if none is left, the next ray of the group takes these turns
+//!     then    if there is no child to go on with, pop the nearest
+//!             prefetch that child: a node, or the ids of a leaf
+//!             if there is none, the next ray of the group takes these turns
 //! ```
 //!
-//! Source: asynchronous memory access chaining, Kocberber, Falsafi and Grot 2015, there for lookups in databases.
+//! This is asynchronous memory access chaining (Kocberber, Falsafi and Grot 2015), which they use for lookups in
+//! databases.
 
 use fearless_simd::Simd;
 
 use super::Bvh;
 use super::boxes::{WideBoxes, bits};
-use super::group::{Group, GroupEntry, push};
+use super::group::Group;
 use super::group_leaf::{Leaf, filter_for_each};
 use super::node::{Child, WIDTH};
 use super::rays::Rays;
-use super::walk::STACK;
+use super::walk::{STACK, StackEntry, pop, push};
 
 /// Rays that take turns.
 const IN_FLIGHT: usize = 8;
 
-/// The part of a group's stack for each of them. A ray that needs more is traced alone.
-const DEPTH: usize = STACK / IN_FLIGHT;
+/// Children that may wait for each of them, in a share of the group's stack: more than for nearly all trees. A ray that
+/// needs more is traced alone.
+const DEPTH: usize = 7 * 8;
+const _: () = assert!(IN_FLIGHT * DEPTH <= 2 * STACK);
 
 /// A ray on its way.
 #[derive(Clone, Copy)]
@@ -50,6 +54,7 @@ struct Traveller {
 pub(super) fn trace<S: Simd>(simd: S, group: &mut Group<'_>) -> u64 {
     let Group { bvh, mesh, bounds, rays, stack, .. } = group;
     let (bvh, mesh, budget) = (*bvh, *mesh, bvh.budget());
+    let corners = mesh.wide();
     let start = |ray| Traveller { ray, child: Some(Child::Inner(0)), turns: 0, top: 0, budget };
     let mut travellers = [Traveller { child: None, ..start(0) }; IN_FLIGHT];
     let (mut queue, mut alone) = (rays.alive, 0);
@@ -66,7 +71,7 @@ pub(super) fn trace<S: Simd>(simd: S, group: &mut Group<'_>) -> u64 {
             // Enter the child, or fetch what it holds.
             let next = match child {
                 Child::Inner(number) => {
-                    if one.top + WIDTH > stack.len() {
+                    if one.top + (WIDTH - 1) > stack.len() {
                         alone |= 1 << one.ray;
                         one.child = None;
                         continue;
@@ -76,12 +81,10 @@ pub(super) fn trace<S: Simd>(simd: S, group: &mut Group<'_>) -> u64 {
                 Child::Leaf { first, count } => {
                     let ids = bvh.leaf(first, count);
                     one.turns += 1;
-                    if one.turns < 3 {
-                        for &id in ids {
-                            match one.turns {
-                                1 => mesh.wide().prefetch_indices(id),
-                                _ => mesh.wide().prefetch_corners(id),
-                            }
+                    if one.turns < 3 && !corners.is_empty() {
+                        match one.turns {
+                            1 => ids.iter().for_each(|&id| corners.prefetch_indices(id)),
+                            _ => ids.iter().for_each(|&id| corners.prefetch_corners(id)),
                         }
                         continue;
                     }
@@ -114,7 +117,7 @@ fn enter_node<S: Simd>(
     bvh: &Bvh<'_>,
     rays: &Rays,
     one: &mut Traveller,
-    stack: &mut [GroupEntry],
+    stack: &mut [StackEntry],
     number: u32,
 ) -> Option<Child> {
     let node = bvh.nodes.get(number as usize)?;
@@ -132,21 +135,7 @@ fn enter_node<S: Simd>(
         if near(slot) < near(nearest) {
             core::mem::swap(&mut slot, &mut nearest);
         }
-        let waiting = GroupEntry::new(number, slot, near(slot), 0);
-        push(stack, &mut one.top, base, waiting, true);
+        push(stack, &mut one.top, base, number, slot, near(slot).to_bits());
     }
     (nearest < u32::BITS).then(|| node.child(nearest))
-}
-
-/// Pops the nearest child that does not begin behind the end of the ray.
-#[inline(always)]
-fn pop(bvh: &Bvh<'_>, stack: &[GroupEntry], top: &mut usize, end: f32) -> Option<Child> {
-    loop {
-        *top = top.checked_sub(1)?;
-        let waiting = stack.get(*top)?;
-        let is_behind = waiting.near > end;
-        if !is_behind {
-            return Some(waiting.child(bvh));
-        }
-    }
 }

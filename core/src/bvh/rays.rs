@@ -11,7 +11,6 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, mask32x8, u32x8};
 use zerocopy::{transmute_mut, transmute_ref};
 
-use super::Bvh;
 use super::boxes::{Beam, Slabs, bits, splat};
 use super::slab::{EARLIER, STEEP, TINY, WIDER, growth_of_range};
 use crate::aabb::{Aabb, lesser};
@@ -66,7 +65,7 @@ pub(crate) struct Rays {
     /// From `t` to distances.
     scale: PerRay,
     given: [Ray; GROUP],
-    /// The closest so far; before the first a miss, at the `t` up to which hits count.
+    /// The closest hit of each ray so far. Before the first it is a miss, whose `t` is the end.
     pub(crate) hits: [Hit; GROUP],
     /// Pairs of a ray and a triangle that passed the filter.
     pair_places: [u32; PAIRS],
@@ -74,12 +73,7 @@ pub(crate) struct Rays {
     pair_count: usize,
 }
 
-/// Bytes of the caches of one core, about: those of a tree over 110 000 triangles.
-pub(super) const CORE_CACHES: usize = 1 << 20;
-/// Bytes of the cache that cores share, about: those of a tree over 1.8 million triangles.
-const SHARED_CACHE: usize = 16 << 20;
-
-/// The spread of rays as a part of the distance of their origins.
+/// Eight roundings of a number, in parts of it.
 const ROUNDINGS: f32 = 8.0 * UNIT;
 
 /// Pairs that are decided at once.
@@ -203,21 +197,9 @@ impl Rays {
         special
     }
 
-    /// Returns true if origins lie so far apart that rays share little: alone they are faster.
-    pub(crate) fn are_scattered(&self, bounds: &Aabb) -> bool {
-        self.are_apart(bounds, 1.0 / 4.0)
-    }
-
-    /// Returns true if rays share little of a tree that exceeds the caches: interleaved they are faster. Through a tree
-    /// that also exceeds the shared cache, rays that start closer to each other share too little.
-    pub(crate) fn wait_for_memory(&self, bounds: &Aabb, bvh: &Bvh<'_>) -> bool {
-        let far = if bvh.exceeds(SHARED_CACHE) { 1.0 / 32.0 } else { 1.0 / 4.0 };
-        bvh.exceeds(CORE_CACHES) && self.are_apart(bounds, far)
-    }
-
     /// Returns true if some origin lies farther from the center than a part of the extent.
-    fn are_apart(&self, bounds: &Aabb, part: f32) -> bool {
-        self.spread > part * (ROUNDINGS * bounds.size().max_element())
+    pub(super) fn are_apart(&self, part: f32) -> bool {
+        self.spread > part * (ROUNDINGS * self.extent)
     }
 
     /// The end of a ray, as a distance.

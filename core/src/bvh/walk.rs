@@ -221,7 +221,7 @@ fn numbers<S: Simd>(half: u16x8<S>) -> f32x8<S> {
 }
 
 impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
-    /// False if the ray starts too far away for [`Slab::nearby`]; nothing was traversed then.
+    /// False if [`Slab::nearby`] does not take the ray, mostly because it starts too far away; nothing was traversed then.
     type Output = bool;
 
     #[inline(always)]
@@ -387,7 +387,14 @@ pub(super) fn waiting(node: u32, slot: u32, near: u32) -> StackEntry {
 /// Pushes a child so that the nearest child of a node is popped first. `near` holds the bits of a distance: distance
 /// and child are stored as one integer, because a pop that spans two stores would wait for both.
 #[inline(always)]
-fn push(stack: &mut [StackEntry], top: &mut usize, base: usize, node: u32, slot: u32, near: u32) {
+pub(super) fn push(
+    stack: &mut [StackEntry],
+    top: &mut usize,
+    base: usize,
+    node: u32,
+    slot: u32,
+    near: u32,
+) {
     let waiting = waiting(node, slot, near);
     let mut at = *top;
     let Some(_) = stack.get(at) else { return };

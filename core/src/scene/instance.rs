@@ -17,7 +17,8 @@
 //!
 //! The `t` of a ray in a scene inside another is that of the outermost scene. The object's ray is a function of
 //! that ray, the instances on the path and the object's box alone: so every query asks the object the same. The
-//! closest hit so far only shortens the walk ([`Seen::until`]).
+//! closest hit so far only shortens the walk ([`Seen::until`]). Only the test of a shape gets the range that is left,
+//! because it compares its own `t` with it.
 
 use glam::DVec3;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -284,8 +285,8 @@ impl Seen {
     /// The `t` of the object's ray up to which hits matter, once something was hit at a `t` of the scene's ray: no less
     /// than that of any hit in the object with the same `t` there.
     ///
-    /// It must not end the range of `inside`, the object's ray, because the exact place of a hit decides about the
-    /// range. Where the ray grazes a triangle, this place may lie far behind the `t` that is reported.
+    /// For triangles it must not end the range of `inside`, the object's ray, because the exact place of a hit decides
+    /// about the range. Where the ray grazes a triangle, this place may lie far behind the `t` that is reported.
     pub(super) fn until(&self, t: f32, inside: &Ray) -> f32 {
         let until = round(f64::from(t.next_up()) * self.scale - self.shift).next_up();
         lesser(until, inside.t_max)
