@@ -110,8 +110,8 @@ impl Search for BoxSearch<'_> {
     }
 }
 
-/// The nearest hits in order, as many as there is room for, each triangle once. Only hits behind `after` whose `t` is no
-/// more than `until` count, and only triangles of the selection.
+/// The nearest hits in order, as many as there is room for, each triangle once. Only hits behind `after` count whose
+/// `t` is no more than `until`, and only triangles of the selection.
 #[derive(Debug)]
 pub(crate) struct NearestHits<'q> {
     pub(crate) selection: &'q Selection<'q>,
