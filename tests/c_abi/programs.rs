@@ -77,9 +77,9 @@ pub(crate) fn plain() -> impl Iterator<Item = (PathBuf, Flavour)> {
     let dir = DIR.get_or_init(|| {
         let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("c_abi");
         fs::create_dir_all(&dir).expect("a folder");
-        for (name, flavour) in PROGRAMS {
+        side_by_side(PROGRAMS.into(), |(name, flavour)| {
             compile(name, compiler("c99"), &[], &flavour.static_library(), &dir);
-        }
+        });
         dir
     });
     PROGRAMS.into_iter().map(move |(name, flavour)| (dir.join(name), flavour))
@@ -88,10 +88,10 @@ pub(crate) fn plain() -> impl Iterator<Item = (PathBuf, Flavour)> {
 #[test]
 fn they_pass_as_c99_with_sanitizers() {
     let dir = TempDir::new().expect("a folder");
-    for (name, flavour) in PROGRAMS {
+    side_by_side(PROGRAMS.into(), |(name, flavour)| {
         let library = flavour.static_library();
         run(&mut Command::new(compile(name, compiler("c99"), &SANITIZERS, &library, dir.path())));
-    }
+    });
 }
 
 /// Returns the sources of this folder that compile as they are: tests put examples of the header into the others.
@@ -189,17 +189,22 @@ fn pass_with_the_shared_libraries(programs: impl Iterator<Item = (&'static str, 
     }
 }
 
-/// Runs all commands, as many at once as there are cores.
-fn run_side_by_side(commands: Vec<Command>) {
-    let commands = Mutex::new(commands);
-    let next = || commands.lock().expect("no thread panics while it takes one").pop();
-    let work = || {
-        while let Some(mut command) = next() {
-            run(&mut command);
+/// Works on all items, on as many at once as there are cores.
+fn side_by_side<T: Send>(items: Vec<T>, work: impl Fn(T) + Sync) {
+    let items = Mutex::new(items);
+    let next = || items.lock().expect("no thread panics while it takes one").pop();
+    let work_on_all = || {
+        while let Some(item) = next() {
+            work(item);
         }
     };
     let count = thread::available_parallelism().map_or(1, usize::from);
-    thread::scope(|scope| (0..count).for_each(|_| drop(scope.spawn(work))));
+    thread::scope(|scope| (0..count).for_each(|_| drop(scope.spawn(work_on_all))));
+}
+
+/// Runs all commands.
+fn run_side_by_side(commands: Vec<Command>) {
+    side_by_side(commands, |mut command| drop(run(&mut command)));
 }
 
 /// Runs all programs in valgrind, which is slow: a part of their work, unless `HGRID_WHOLE` is set, as in

@@ -31,8 +31,9 @@ fn the_makefile_builds_and_runs_all() {
     let dir = TempDir::new().expect("a folder");
     let mut make = command("make");
     make.arg("-C").arg(root().join("c_examples")).arg("run");
-    // Remove variables that an outer make or cargo may have set.
-    for name in ["MAKEFLAGS", "MAKELEVEL", "CFLAGS", "RUSTFLAGS"] {
+    // Remove variables that an outer make or cargo may have set. With other flags, cargo would replace the library
+    // that other tests link.
+    for name in ["MAKEFLAGS", "MAKELEVEL", "CFLAGS", "RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
         make.env_remove(name);
     }
     make.env("CARGO_TARGET_DIR", target_dir())

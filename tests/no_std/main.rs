@@ -12,7 +12,7 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hgrid_tests::artefact::{cargo_in, run, target_dir};
+use hgrid_tests::artefact::{cargo_in, run, start_with, target_dir};
 use hgrid_tests::readme::check_sizes;
 use hgrid_tests::tools::{command, is_installed, skip};
 use tempfile::TempDir;
@@ -71,9 +71,16 @@ fn only(method: &str) -> [&str; 3] {
 /// has a folder of its own, so that none replaces another.
 ///
 /// Other targets are built at the same time if they are installed: two tests that name each other's need one build.
+/// The dependencies are compiled once, for the choice of the quick tests.
 fn build(target: &str, others: &[&str], arguments: &[&str]) -> PathBuf {
+    let folder = target_dir().join("no_std");
+    let dir = folder.join(arguments.last().unwrap_or(&"all"));
+    let first = only("one-level");
+    if arguments != first {
+        build(target, &[if target == BROWSER { MICROCONTROLLER } else { BROWSER }], &first);
+        start_with(&dir, &folder.join(first[2]));
+    }
     let others = others.iter().copied().filter(|other| rustlib(other).join("lib").is_dir());
-    let dir = target_dir().join("no_std").join(arguments.last().unwrap_or(&"all"));
     let mut build = cargo_in(&dir, "build");
     build.args(["--release", "-p", "hgrid-capi", "--target", target]).args(arguments);
     run(build.args(others.flat_map(|other| ["--target", other])));

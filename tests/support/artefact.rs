@@ -1,8 +1,9 @@
 //! The C library as users get it, and the C compiler that links it.
 //!
 //! The same cargo builds the library, in the release profile. It works in a folder below the target folder,
-//! because a test program holds the lock of the target folder itself. Sets of features share that folder, and with
-//! it the compiled dependencies; each library is copied, so that none replaces another.
+//! because a test program holds the lock of the target folder itself. Each set of features has a folder of its own:
+//! in one folder, each library would replace the one before and be built again in the next run. The folder starts as
+//! a copy with compiled dependencies.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -78,8 +79,10 @@ impl Flavour {
     /// Builds the flavour, and returns the folder of `libhgrid.a` and `libhgrid.so`.
     pub fn dir(self) -> &'static Path {
         static DIRS: [OnceLock<PathBuf>; 2] = [const { OnceLock::new() }; 2];
-        DIRS[self as usize]
-            .get_or_init(|| build(["bare", "malloc"][self as usize], self.features()))
+        DIRS[self as usize].get_or_init(|| match self {
+            Self::Bare => build(&target_dir(), &[]),
+            Self::Malloc => build_beside("malloc", self.features()),
+        })
     }
 
     /// Returns the path of the static library.
@@ -106,22 +109,40 @@ fn shared_library_name() -> String {
 #[must_use]
 pub fn library_with(features: &str) -> PathBuf {
     let arguments = ["--no-default-features", "--features", features];
-    build(&features.replace(',', "_"), &arguments).join(STATIC_LIBRARY)
+    build_beside(&features.replace(',', "_"), &arguments).join(STATIC_LIBRARY)
 }
 
-/// Builds both libraries with some features, and copies them into a folder with this name, which it returns.
-fn build(name: &str, features: &[&str]) -> PathBuf {
-    let libraries = target_dir().join("libraries");
-    let folder = libraries.join(name);
-    fs::create_dir_all(&folder).expect("a folder");
-    // cargo writes all of them to the same place: no other thread or test program builds before this one is copied.
-    let place = File::create(libraries.join("lock")).expect("a lock");
+/// Builds both libraries with some features in a folder of this name, and returns their folder.
+fn build_beside(name: &str, features: &[&str]) -> PathBuf {
+    let dir = target_dir().join("libraries").join(name);
+    start_with(&dir.join("release"), library_dir());
+    build(&dir, features)
+}
+
+/// Builds both libraries with some features in a target folder, and returns their folder.
+fn build(target_dir: &Path, features: &[&str]) -> PathBuf {
+    run(cargo_in(target_dir, "build").args(["--release", "-p", "hgrid-capi"]).args(features));
+    target_dir.join("release")
+}
+
+/// Copies a folder of cargo, where no cargo may work at the time, unless the copy is there. What cargo compiled
+/// for the one need not be compiled again for the other.
+///
+/// # Panics
+/// If there is no such folder, or the copy cannot be written.
+pub fn start_with(copy: &Path, compiled: &Path) {
+    let parent = copy.parent().expect("a folder in another");
+    fs::create_dir_all(parent).expect("a folder");
+    let place = File::create(parent.join("lock")).expect("a lock");
     place.lock().expect("a turn");
-    run(cargo("build").args(["--release", "-p", "hgrid-capi"]).args(features));
-    for library in [STATIC_LIBRARY, &shared_library_name()] {
-        fs::copy(target_dir().join("release").join(library), folder.join(library)).expect("a copy");
+    if !copy.is_dir() {
+        // What an interrupted run left is no whole copy.
+        let part = parent.join("part");
+        run(Command::new("rm").arg("-rf").arg(&part));
+        // cargo goes by the times of files, which -p keeps.
+        run(Command::new("cp").arg("-pR").arg(compiled).arg(&part));
+        fs::rename(part, copy).expect("a folder");
     }
-    folder
 }
 
 /// Returns the folder of the libraries of the usual flavour.
