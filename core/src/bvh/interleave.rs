@@ -25,6 +25,7 @@ use super::group_leaf::{Leaf, filter_for_each};
 use super::node::{Child, WIDTH};
 use super::rays::Rays;
 use super::walk::{STACK, StackEntry, pop, push};
+use crate::simd::prefetch;
 
 /// Rays that take turns.
 const IN_FLIGHT: usize = 8;
@@ -54,7 +55,7 @@ struct Traveller {
 pub(super) fn trace<S: Simd>(simd: S, group: &mut Group<'_>) -> u64 {
     let Group { bvh, mesh, bounds, rays, stack, .. } = group;
     let (bvh, mesh, budget) = (*bvh, *mesh, bvh.budget());
-    let corners = mesh.wide();
+    let triangles = mesh.wide();
     let start = |ray| Traveller { ray, child: Some(Child::Inner(0)), turns: 0, top: 0, budget };
     let mut travellers = [Traveller { child: None, ..start(0) }; IN_FLIGHT];
     let (mut queue, mut alone) = (rays.alive, 0);
@@ -81,10 +82,13 @@ pub(super) fn trace<S: Simd>(simd: S, group: &mut Group<'_>) -> u64 {
                 Child::Leaf { first, count } => {
                     let ids = bvh.leaf(first, count);
                     one.turns += 1;
-                    if one.turns < 3 && !corners.is_empty() {
-                        match one.turns {
-                            1 => ids.iter().for_each(|&id| corners.prefetch_indices(id)),
-                            _ => ids.iter().for_each(|&id| corners.prefetch_corners(id)),
+                    if one.turns < 3 && !triangles.is_empty() {
+                        for &id in ids {
+                            if one.turns == 1 {
+                                triangles.indices(id).map(prefetch);
+                            } else {
+                                triangles.corners(id).map(|corners| corners.map(prefetch));
+                            }
                         }
                         continue;
                     }

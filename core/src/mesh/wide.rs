@@ -3,8 +3,6 @@
 use glam::{Vec3A, Vec4};
 use zerocopy::transmute;
 
-use crate::simd::prefetch;
-
 use super::{IndexLayout, IndexType, Strided, TriangleMesh};
 
 /// A mesh whose vertices are read in pieces of sixteen bytes, which is one load and one check each.
@@ -31,24 +29,14 @@ impl<'a> WideMesh<'a> {
     /// nothing behind it, and some layouts are not read this way at all.
     #[inline(always)]
     pub(crate) fn corners(&self, triangle: u32) -> Option<[&'a [u8; 16]; 3]> {
-        let indices: &[u8; 12] = element(self.indices, self.index_stride, triangle)?;
+        let indices = self.indices(triangle)?;
         self.vertices(self.position_stride, transmute!(*indices))
     }
 
-    /// Prefetches what [`corners`](Self::corners) reads first.
+    /// The indices of a triangle, as [`corners`](Self::corners) reads them.
     #[inline(always)]
-    pub(crate) fn prefetch_indices(&self, triangle: u32) {
-        if let Some(indices) = element::<12>(self.indices, self.index_stride, triangle) {
-            prefetch(indices);
-        }
-    }
-
-    /// Prefetches the corners of a triangle, whose indices are there.
-    #[inline(always)]
-    pub(crate) fn prefetch_corners(&self, triangle: u32) {
-        if let Some(corners) = self.corners(triangle) {
-            corners.into_iter().for_each(prefetch);
-        }
+    pub(crate) fn indices(&self, triangle: u32) -> Option<&'a [u8; 12]> {
+        element(self.indices, self.index_stride, triangle)
     }
 
     /// The corners of four triangles that follow one another; `None` if one of them cannot be read this way.
