@@ -125,8 +125,8 @@ fn build(target_dir: &Path, features: &[&str]) -> PathBuf {
     target_dir.join("release")
 }
 
-/// Copies a folder of cargo, where no cargo may work at the time, unless the copy is there. What cargo compiled
-/// for the one need not be compiled again for the other.
+/// Copies a target folder of cargo, unless the copy is there, so that dependencies are not compiled again. No cargo may
+/// work in the folder meanwhile.
 ///
 /// # Panics
 /// If there is no such folder, or the copy cannot be written.
@@ -136,7 +136,7 @@ pub fn start_with(copy: &Path, compiled: &Path) {
     let place = File::create(parent.join("lock")).expect("a lock");
     place.lock().expect("a turn");
     if !copy.is_dir() {
-        // What an interrupted run left is no whole copy.
+        // An interrupted run may have left a part of a copy.
         let part = parent.join("part");
         run(Command::new("rm").arg("-rf").arg(&part));
         // cargo goes by the times of files, which -p keeps.

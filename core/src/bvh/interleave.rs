@@ -30,8 +30,8 @@ use crate::simd::prefetch;
 /// Rays that take turns.
 const IN_FLIGHT: usize = 8;
 
-/// Children that may wait for each of them, in a share of the group's stack: more than for nearly all trees. A ray that
-/// needs more is traced alone.
+/// Children that may wait for each of them, in a share of the group's stack. Few trees need more; a ray that does is
+/// traced alone.
 const DEPTH: usize = 7 * 8;
 const _: () = assert!(IN_FLIGHT * DEPTH <= 2 * STACK);
 

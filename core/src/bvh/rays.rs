@@ -448,8 +448,8 @@ impl Rays {
         }
     }
 
-    /// Lets only hits count whose `t` is no larger than the given one of their ray, before any are found. The ranges of
-    /// the rays stay: they decide what is a hit. Places without a ray may hold anything.
+    /// Drops hits whose `t` is larger than that in `until` for their ray; call it before any are found. The range of a
+    /// ray stays as it is and decides what is a hit. Places without a ray may hold anything.
     #[inline(always)]
     pub(crate) fn take_until(&mut self, until: &[f32; GROUP]) {
         let ends: &mut [f32; GROUP] = transmute_mut!(&mut self.end);

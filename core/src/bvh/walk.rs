@@ -221,7 +221,7 @@ fn numbers<S: Simd>(half: u16x8<S>) -> f32x8<S> {
 }
 
 impl<F: Search, T: Tally> Kernel for &mut OneRay<'_, F, T> {
-    /// False if [`Slab::nearby`] does not take the ray: mostly one that starts too far away. Nothing was traversed then.
+    /// False if [`Slab::nearby`] does not take the ray, mostly because it is far away. Nothing was traversed then.
     type Output = bool;
 
     #[inline(always)]

@@ -282,8 +282,8 @@ impl Seen {
         round(f64::from(t) * self.scale - self.shift)
     }
 
-    /// The `t` of the object's ray up to which hits matter, once something was hit at a `t` of the scene's ray: no less
-    /// than that of any hit in the object with the same `t` there.
+    /// The `t` of the object's ray up to which hits matter, once the scene's ray has a hit at `t`. It is no less than
+    /// that of any hit in the object that has the same `t` in the scene.
     ///
     /// For triangles it must not end the range of `inside`, the object's ray, because the exact place of a hit decides
     /// about the range. Where the ray grazes a triangle, this place may lie far behind the `t` that is reported.
