@@ -17,6 +17,7 @@ use zerocopy::{FromBytes, IntoBytes};
 
 use crate::control::Control;
 use crate::error::Error;
+use crate::invariant::OrBug;
 use crate::simd::IS_SMALL;
 
 /// The content of a task's slot.
@@ -47,9 +48,16 @@ pub(crate) fn share(things: usize, task: usize, tasks: usize) -> Range<usize> {
     end(task)..end(task + 1)
 }
 
-/// Takes the first elements of a slice, or all there are.
+/// Takes the first elements of a slice.
 #[expect(clippy::mut_mut, reason = "the slice becomes the rest of itself")]
 pub(crate) fn take<'w, T>(rest: &mut &'w mut [T], count: usize) -> &'w mut [T] {
+    debug_assert!(count <= rest.len(), "too few elements for a task");
+    take_up_to(rest, count)
+}
+
+/// Takes the first elements of a slice, or all there are: a build may have less room for ids and nodes than it counts.
+#[expect(clippy::mut_mut, reason = "the slice becomes the rest of itself")]
+pub(crate) fn take_up_to<'w, T>(rest: &mut &'w mut [T], count: usize) -> &'w mut [T] {
     let count = count.min(rest.len());
     let (first, behind) = core::mem::take(rest).split_at_mut(count);
     *rest = behind;
@@ -151,8 +159,8 @@ pub(crate) struct Shared<'w>(&'w [AtomicU32]);
 #[cfg(target_has_atomic = "32")]
 impl<'w> Shared<'w> {
     pub(crate) fn new(words: &'w mut [u32]) -> Self {
-        let words = <[AtomicU32]>::mut_from_bytes(words.as_mut_bytes());
-        Self(words.map_or(&[], |words| words))
+        let words = <[AtomicU32]>::mut_from_bytes(words.as_mut_bytes()).ok();
+        Self(words.or_bug("words are not aligned").map_or(&[], |words| words))
     }
 
     /// Writes words at a place; none if they do not fit.
@@ -160,7 +168,7 @@ impl<'w> Shared<'w> {
     pub(crate) fn set<const N: usize>(&self, at: usize, words: [u32; N]) {
         // Slice once: a slice from `at` on and one of its start take two comparisons.
         let end = at.checked_add(N);
-        let slots = end.and_then(|end| self.0.get(at..end));
+        let slots = end.and_then(|end| self.0.get(at..end)).or_bug("no task has such a word");
         for (slot, word) in slots.into_iter().flatten().zip(words) {
             slot.store(word, Ordering::Relaxed);
         }

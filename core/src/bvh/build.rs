@@ -54,7 +54,7 @@ use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
-use crate::tasks::{self, run, run_several, share, take, task_count};
+use crate::tasks::{self, run, run_several, share, take, take_up_to, task_count};
 
 /// The memory that any mesh with so many triangles and a build with so many tasks needs.
 pub(crate) const fn bound(triangles: u32, quality: Quality, tasks: u32) -> Option<(u64, u64)> {
@@ -451,12 +451,12 @@ impl BuildInputs<'_> {
             let end = ends.get(task).copied().or_bug("too many tasks").unwrap_or(start);
             let (count, is_last) = (end - start, task + 1 == tasks);
             let entries = take(&mut rest, count);
-            let ids = take(&mut ids, count);
+            let ids = take_up_to(&mut ids, count);
             let room =
                 if is_last { rest_of_nodes.len() } else { most_below(count as u64) as usize };
-            let nodes = take(&mut rest_of_nodes, room);
+            let nodes = take_up_to(&mut rest_of_nodes, room);
             let room_to_sort = if is_last { spare.len() } else { count };
-            let spare = take(&mut spare, room_to_sort);
+            let spare = take_up_to(&mut spare, room_to_sort);
             let range = start..end;
             let part = UnitsTask { work: self, range, entries, spare, ids, nodes, child, counts };
             start = end;

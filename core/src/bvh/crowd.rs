@@ -59,6 +59,7 @@ impl Kernel for NewKeys<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Self { entries, spare, rule, shift, counts } = self;
+        debug_assert!(spare.len() >= entries.len(), "entries without notes");
         for (entries, notes) in entries.chunks_mut(LANES).zip(spare.chunks(LANES)) {
             let (xs, ys) = notes.as_flattened().split_at_checked(entries.len()).unwrap_or_default();
             match (entries.first_chunk(), xs.first_chunk(), ys.first_chunk()) {

@@ -22,6 +22,7 @@ use crate::cell::Lattice;
 use crate::config::BuildFlags;
 use crate::control::Watch;
 use crate::error::Error;
+use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::survey::Survey;
 
@@ -44,7 +45,7 @@ pub(crate) fn refit(blob: &mut [u8], mesh: &TriangleMesh<'_>) -> Result<[f64; 2]
     };
     let scene = Lattice::pad(&bounds);
     (header.bounds_min, header.bounds_max) = (scene.min.to_array(), scene.max.to_array());
-    if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>() {
+    if let Some(head) = blob.first_chunk_mut::<HEADER_BYTES>().or_bug("a blob without a header") {
         *head = header.to_bytes();
     }
     Ok([before, after])
@@ -145,15 +146,17 @@ impl Tree<'_> {
         while let Some(level) = levels.get_mut(depth) {
             if let Some(number) = next.take() {
                 level.number = number;
-                let Some(node) = nodes.get(number as usize) else { break };
+                let node = nodes.get(number as usize).or_bug("a child that is no node");
+                let Some(node) = node else { break };
                 level.rest = node.inner();
                 for (slot, corners) in (0..).zip(&mut level.boxes) {
                     let mut bounds = Aabb::EMPTY;
                     if let Child::Leaf { first, count } = node.child(slot) {
                         let first = first as usize;
                         let leaf = ids.get(first..first.saturating_add(count as usize));
-                        for &id in leaf.unwrap_or_default() {
-                            let Some([a, b, c]) = reader.corners(id) else { continue };
+                        for &id in leaf.or_bug("a leaf behind the ids").unwrap_or_default() {
+                            let corners = reader.corners(id).or_bug("no such triangle");
+                            let Some([a, b, c]) = corners else { continue };
                             bounds.min = bounds.min.min(a.min(b).min(c));
                             bounds.max = bounds.max.max(a.max(b).max(c));
                         }
@@ -161,7 +164,8 @@ impl Tree<'_> {
                     *corners = [bounds.min.to_array(), bounds.max.to_array()];
                 }
             }
-            let Some(node) = nodes.get_mut(level.number as usize) else { break };
+            let node = nodes.get_mut(level.number as usize).or_bug("a child that is no node");
+            let Some(node) = node else { break };
             if level.rest != 0 {
                 level.slot = level.rest.trailing_zeros();
                 level.rest &= level.rest - 1;
@@ -188,7 +192,7 @@ impl Tree<'_> {
                 *corners = [bounds.min.to_array(), bounds.max.to_array()];
             }
         }
-        // Not reached: the check has walked the same way.
+        debug_assert!(false, "the check did not walk the same way");
         (Aabb::EMPTY, cost.total())
     }
 }

@@ -22,6 +22,7 @@ use core::ops::Range;
 use zerocopy::{FromBytes, Immutable, IntoBytes, transmute};
 
 use crate::aabb::Aabb;
+use crate::arena::copy;
 use crate::invariant::OrBug;
 use crate::mesh::TriangleMesh;
 use crate::simd::{SimdLevel, dispatch};
@@ -64,7 +65,7 @@ impl RootRecord {
 }
 
 /// Copies elements to the start of others, as many as have room there.
-pub(crate) fn copy<T: Copy>(from: &[T], to: Option<&mut [T]>) {
+fn copy_what_fits<T: Copy>(from: &[T], to: Option<&mut [T]>) {
     for (slot, element) in to.into_iter().flatten().zip(from) {
         *slot = *element;
     }
@@ -164,10 +165,10 @@ impl Roots<'_> {
         let (mesh, least, by) = (self.mesh, self.least, Cut::Keys);
         dispatch(self.level, Build { subtree, mesh, entries, first, child, least, by });
         // Too little room for ids and nodes is legal: they are counted.
-        copy(self.subtree.ids(), self.ids.get_mut(range.clone()));
+        copy_what_fits(self.subtree.ids(), self.ids.get_mut(range.clone()));
 
         let below = self.subtree.below();
-        copy(below, self.nodes.get_mut(self.node_count as usize..));
+        copy_what_fits(below, self.nodes.get_mut(self.node_count as usize..));
         self.node_count += below.len() as u32;
         let (node, &[x, y, z, _, u, v, w, _]) = self.subtree.root();
         let (min, max) = ([x, y, z], [-u, -v, -w]);
@@ -237,7 +238,7 @@ impl Roots<'_> {
                 *head += 1;
             }
         }
-        copy(binned, Some(entries));
+        copy(binned, entries);
     }
 
     /// Finds the end of the bin at the start of a range.

@@ -153,12 +153,12 @@ impl Subtree {
 
     /// The nodes below the root.
     pub(crate) fn below(&self) -> &[Node] {
-        self.nodes.get(1..self.count).unwrap_or_default()
+        self.nodes.get(1..self.count).or_bug("no root").unwrap_or_default()
     }
 
     /// The ids of all leaves, in their order in the index.
     pub(crate) fn ids(&self) -> &[u32] {
-        self.ids.get(..self.id_count).unwrap_or_default()
+        self.ids.get(..self.id_count).or_bug("too many ids").unwrap_or_default()
     }
 
     /// Reads ids, boxes and where keys change.

@@ -213,7 +213,10 @@ impl<'a> Scene<'a> {
         out.put(&header.to_bytes());
         let mut refer = |scene: &Scene<'_>| {
             for object in scene.named() {
-                out.put(&number_of(object).unwrap_or(INVALID_ID).to_ne_bytes());
+                let number = number_of(object);
+                let is_there = number.is_some() || matches!(object, Object::Nothing);
+                debug_assert!(is_there, "a member without a key");
+                out.put(&number.unwrap_or(INVALID_ID).to_ne_bytes());
             }
         };
         self.each_member(&mut |object| {

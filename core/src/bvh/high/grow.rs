@@ -166,7 +166,8 @@ impl Kernel for Grow<'_> {
                 }
             }
             // The first child comes next.
-            if let Some(pushed) = stack.get_mut(jobs_before..jobs) {
+            let pushed = stack.get_mut(jobs_before..jobs);
+            if let Some(pushed) = pushed.or_bug("jobs that do not wait") {
                 pushed.reverse();
             }
             // Quantise the boxes, and write the node.

@@ -46,7 +46,7 @@ use crate::mesh::TriangleMesh;
 use crate::method::Quality;
 use crate::simd::{IS_SMALL, Kernel, SimdLevel, dispatch};
 use crate::survey::finite_box;
-use crate::tasks::{self, run, share, take, task_count};
+use crate::tasks::{self, run, share, take, take_up_to, task_count};
 use cut::TriangleItem;
 use grow::{Cursor, Grow, Grown, RECORD, RangeRecord};
 
@@ -347,7 +347,7 @@ impl HighInputs {
                 ranges: ranges.count,
                 start,
                 items: take(&mut items_left, (end - start) as usize),
-                ids: take(&mut ids, ranges.triangles as usize),
+                ids: take_up_to(&mut ids, ranges.triangles as usize),
                 first,
             };
             first += ranges.triangles;
@@ -369,7 +369,7 @@ impl HighInputs {
             let tasks = self.tasks as usize;
             let parts = plans.iter_mut().take(tasks).enumerate().map(|(task, plan)| {
                 let (part, ranges) = next(share(all as usize, task, tasks).end as u32);
-                let nodes = take(&mut rest, ranges.nodes as usize);
+                let nodes = take_up_to(&mut rest, ranges.nodes as usize);
                 *plan = TaskRanges { ranges: ranges.count, child };
                 child += ranges.nodes;
                 (part, nodes, plan.child)
