@@ -24,7 +24,7 @@ use zerocopy::{FromBytes, IntoBytes, transmute_mut};
 
 use super::Bvh;
 use super::boxes::{Beam, WideBoxes, bits};
-use super::group_leaf::{Boxes, Leaf, Leaves, Offer, Scattered, Triangles};
+use super::group_leaf::{BoxLeaves, Leaf, Leaves, Offer, Scattered, TriangleLeaves};
 use super::interleave;
 use super::node::{Child, WIDTH};
 use super::rays::{GROUP, OCTETS, Rays};
@@ -116,9 +116,9 @@ impl Group<'_> {
     #[inline(never)]
     pub(crate) fn trace(&mut self, level: SimdLevel, is_any: bool) -> u64 {
         if is_any {
-            dispatch(level, Descent { group: self, leaves: Triangles::<true> })
+            dispatch(level, Descent { group: self, leaves: TriangleLeaves::<true> })
         } else {
-            dispatch(level, Descent { group: self, leaves: Triangles::<false> })
+            dispatch(level, Descent { group: self, leaves: TriangleLeaves::<false> })
         }
     }
 
@@ -126,7 +126,7 @@ impl Group<'_> {
     /// the rays as a mask, and all rays, so that it can end some. Returns what [`trace`](Self::trace) returns.
     #[inline(never)]
     pub(crate) fn offer(&mut self, level: SimdLevel, is_any: bool, offer: &mut Offer<'_>) -> u64 {
-        dispatch(level, Descent { group: self, leaves: Boxes { offer, is_any } })
+        dispatch(level, Descent { group: self, leaves: BoxLeaves { offer, is_any } })
     }
 }
 
@@ -403,7 +403,7 @@ mod tests {
     fn scattered_rays_wait_for_memory_in_large_trees() {
         let nodes = vec![Node::EMPTY; SHARED_CACHE / size_of::<Node>() + 1];
         let few = CORE_CACHES / size_of::<Node>();
-        // A quarter of the extent is 4.
+        // The scene is 16 wide: its quarter is 4, its thirty-second part 0.5.
         for (count, apart, waits) in [
             (few, 8.0, false),
             (few + 1, 8.0, true),

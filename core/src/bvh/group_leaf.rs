@@ -60,9 +60,9 @@ pub(super) trait Leaves {
 }
 
 /// Triangles, which are tested; with `ANY` the first hit of a ray ends it.
-pub(super) struct Triangles<const ANY: bool>;
+pub(super) struct TriangleLeaves<const ANY: bool>;
 
-impl<const ANY: bool> Leaves for Triangles<ANY> {
+impl<const ANY: bool> Leaves for TriangleLeaves<ANY> {
     const IS_ANY: bool = ANY;
 
     #[inline(always)]
@@ -142,13 +142,13 @@ pub(super) fn filter_for_each<S: Simd, const ANY: bool>(
 pub(crate) type Offer<'o> = dyn FnMut(u32, u64, &mut Rays) + 'o;
 
 /// Boxes, which are offered.
-pub(super) struct Boxes<'o, 'f> {
+pub(super) struct BoxLeaves<'o, 'f> {
     pub(super) offer: &'o mut Offer<'f>,
     /// True if the first hit of a ray ends it.
     pub(super) is_any: bool,
 }
 
-impl Leaves for Boxes<'_, '_> {
+impl Leaves for BoxLeaves<'_, '_> {
     // Near to far for any hit, too: one kernel serves both.
     const IS_ANY: bool = false;
 

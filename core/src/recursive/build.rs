@@ -19,7 +19,7 @@
 use glam::Vec3A;
 
 use super::FEW;
-use super::node::{HEAD_WORDS, Node};
+use super::node::{GridNode, HEAD_WORDS};
 use super::overlap::Overlap;
 use crate::aabb::Aabb;
 use crate::arena::{Sizes, copy, section_bytes, split_mut};
@@ -158,7 +158,7 @@ impl Root {
 
 /// Counts the references of the outermost grid, or returns some number above the limit.
 fn references(mesh: &TriangleMesh<'_>, lattice: &Lattice, limit: u64) -> u64 {
-    let node = Node::root(lattice.resolution);
+    let node = GridNode::root(lattice.resolution);
     let mut references = 0;
     for id in 0..mesh.triangle_count() {
         if let Some(placed) = PlacedTriangle::new(mesh, lattice, id) {
@@ -282,7 +282,7 @@ impl Fineness {
 }
 
 /// The part of a cell that its primitives reach.
-pub(super) fn inside(lattice: &Lattice, node: &Node, cell: [u32; 3], reach: &Aabb) -> Aabb {
+pub(super) fn inside(lattice: &Lattice, node: &GridNode, cell: [u32; 3], reach: &Aabb) -> Aabb {
     let Aabb { min, max } = node.cell_box(cell);
     // A reach that only touches the cell leaves a sliver as wide as the margin.
     let least = lattice.margin();
@@ -333,7 +333,7 @@ impl PlacedTriangle {
     /// Shows `visit` the cells of a grid that the triangle overlaps, with their
     /// numbers: one at least, so that a triangle which only touches a cell is not lost
     /// in the grid that the cell holds. Returns how many cells it looked at.
-    pub(super) fn each_cell(&self, node: &Node, mut visit: impl FnMut(usize, [u32; 3])) -> u64 {
+    pub(super) fn each_cell(&self, node: &GridNode, mut visit: impl FnMut(usize, [u32; 3])) -> u64 {
         let (origin, scale) = (Vec3A::from_array(node.origin), Vec3A::from_array(node.scale));
         let [width, height, _] = node.resolution;
         let number = |[x, y, z]: [u32; 3]| row(height, y, z) * width as usize + x as usize;
@@ -485,7 +485,7 @@ impl Builder<'_, '_> {
         depth: u32,
         looks: &mut u64,
         scratch: &mut [u32],
-    ) -> Result<Option<(Node, u64, u64)>, Error> {
+    ) -> Result<Option<(GridNode, u64, u64)>, Error> {
         let count = u32::try_from(ids.len()).unwrap_or(u32::MAX);
         let at = self.pool.offset()?;
         // Count the references of each cell, in coarser grids while there are too many.
@@ -499,7 +499,7 @@ impl Builder<'_, '_> {
             let is_last = primitives == 0;
             primitives /= 2;
             let Some(resolution) = resolution.or(is_last.then_some([1; 3])) else { continue };
-            let node = Node::new(at as usize, bounds.min, bounds.max, resolution);
+            let node = GridNode::new(at as usize, bounds.min, bounds.max, resolution);
             if depth > 0 && node.cells() as u64 > *looks {
                 return Ok(None);
             }
@@ -535,7 +535,7 @@ impl Builder<'_, '_> {
     }
 
     /// The part of a cell that its primitives reach.
-    fn inside(&self, node: &Node, cell: [u32; 3], ids: &[u32]) -> Aabb {
+    fn inside(&self, node: &GridNode, cell: [u32; 3], ids: &[u32]) -> Aabb {
         let reaches = ids.iter().filter_map(|&id| Some(self.place(id)?.reach));
         let reach = reaches.fold(Aabb::EMPTY, |all, reach| all.union(&reach));
         inside(self.lattice, node, cell, &reach)

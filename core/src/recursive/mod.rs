@@ -32,7 +32,7 @@ use crate::error::Error;
 use crate::limits::MAX_DEPTH;
 use crate::visit::Visitor;
 pub(crate) use build::{bound, build, scratch_bytes, sizes};
-use node::{CellContent, Node};
+use node::{GridNode, NestedCell};
 
 /// A cell with no more primitives than this is not divided.
 const FEW: usize = 4;
@@ -64,17 +64,23 @@ impl<'a> Recursive<'a> {
 
     /// Shows the lists of all cells that a box, given in cells, meets; `false` if the visitor's budget is used up.
     pub(crate) fn visit(&self, reach: &Aabb, visitor: &mut Visitor<'_>) -> bool {
-        Node::open(self.pool, 0)
+        GridNode::open(self.pool, 0)
             .is_none_or(|root| self.visit_node(&root, reach, MAX_DEPTH, visitor))
     }
 
-    fn visit_node(&self, node: &Node, reach: &Aabb, depth: u32, visitor: &mut Visitor<'_>) -> bool {
+    fn visit_node(
+        &self,
+        node: &GridNode,
+        reach: &Aabb,
+        depth: u32,
+        visitor: &mut Visitor<'_>,
+    ) -> bool {
         node.range(reach).cells().all(|cell| {
             visitor.spend(1)
                 && match node.content(self.pool, cell) {
                     None => true,
-                    Some(CellContent::List(ids)) => visitor.list(ids),
-                    Some(CellContent::Grid(at)) => Node::open(self.pool, at)
+                    Some(NestedCell::List(ids)) => visitor.list(ids),
+                    Some(NestedCell::Grid(at)) => GridNode::open(self.pool, at)
                         .filter(|_| depth > 0)
                         .is_none_or(|inner| self.visit_node(&inner, reach, depth - 1, visitor)),
                 }
@@ -90,7 +96,7 @@ impl<'a> Recursive<'a> {
         tally: &mut T,
         mut leaf: impl FnMut(&[u32], &mut T) -> f32,
     ) {
-        let Some(mut node) = Node::open(self.pool, 0) else { return };
+        let Some(mut node) = GridNode::open(self.pool, 0) else { return };
         let Some(mut walk) = node.walk(line, 0.0) else { return };
         let mut limit = line.end;
         let mut around = [(node, walk); MAX_DEPTH as usize];
@@ -101,11 +107,11 @@ impl<'a> Recursive<'a> {
             tally.cell_step();
             match node.content(self.pool, walk.cell()) {
                 None => {}
-                Some(CellContent::List(ids)) => limit = leaf(ids, tally),
-                Some(CellContent::Grid(at)) => {
+                Some(NestedCell::List(ids)) => limit = leaf(ids, tally),
+                Some(NestedCell::Grid(at)) => {
                     // Go down, unless the ray passes the grid within its cell.
                     let slot = around.get_mut(depth);
-                    let inner = Node::open(self.pool, at);
+                    let inner = GridNode::open(self.pool, at);
                     let enter =
                         inner.and_then(|inner| Some((inner, inner.walk(line, walk.entered)?)));
                     if let (Some(slot), Some((inner, within))) = (slot, enter) {

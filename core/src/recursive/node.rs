@@ -13,7 +13,7 @@ const RESOLUTION_BITS: u32 = (MAX_RESOLUTION_OF_RECURSIVE + 1).ilog2();
 
 /// The content of a cell.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum CellContent<'a> {
+pub(super) enum NestedCell<'a> {
     /// Primitive ids, ascending.
     List(&'a [u32]),
     /// Start of its grid in the pool.
@@ -22,7 +22,7 @@ pub(super) enum CellContent<'a> {
 
 /// A grid: where it lies and how finely it is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Node {
+pub(super) struct GridNode {
     /// Start of its entries in the pool.
     entries: usize,
     /// Least corner, in cells of the root.
@@ -32,7 +32,7 @@ pub(super) struct Node {
     pub(super) resolution: [u32; 3],
 }
 
-impl Node {
+impl GridNode {
     /// A grid whose words start at `at`.
     pub(super) fn new(at: usize, min: Vec3A, max: Vec3A, resolution: [u32; 3]) -> Self {
         let cells = Vec3A::from_array(resolution.map(as_f32));
@@ -117,15 +117,15 @@ impl Node {
         &self,
         pool: &'a [u32],
         [x, y, z]: [u32; 3],
-    ) -> Option<CellContent<'a>> {
+    ) -> Option<NestedCell<'a>> {
         let [width, height, _] = self.resolution;
         let cell = row(height, y, z) * width as usize + x as usize;
         let ends = pool.get(self.entries.checked_add(cell)?..)?.first_chunk::<2>()?;
         let (start, end) = ((ends[0] & !GRID) as usize, (ends[1] & !GRID) as usize);
         if ends[0] & GRID != 0 {
-            Some(CellContent::Grid(start))
+            Some(NestedCell::Grid(start))
         } else if start < end {
-            pool.get(start..end).map(CellContent::List)
+            pool.get(start..end).map(NestedCell::List)
         } else {
             None
         }

@@ -9,7 +9,7 @@
 //! any length, which changes no answer.
 
 use super::build::{Fineness, PlacedTriangle, inside};
-use super::node::{CellContent, HEAD_WORDS, Node};
+use super::node::{GridNode, HEAD_WORDS, NestedCell};
 use super::{FEW, Recursive};
 use crate::aabb::Aabb;
 use crate::blob::{HEADER_BYTES, Header, corrupt};
@@ -21,7 +21,7 @@ use crate::mesh::TriangleMesh;
 use crate::survey::reference_limit;
 
 /// A cell and the grid that it is a cell of.
-type CellOfGrid = (Node, [u32; 3]);
+type CellOfGrid = (GridNode, [u32; 3]);
 
 const LEVELS: usize = MAX_DEPTH as usize;
 
@@ -86,8 +86,8 @@ impl Recursive<'_> {
             contents: [Contents::NONE; LEVELS],
             listed: 0,
         };
-        let root = Node::root(lattice.resolution);
-        if !check.has_head(0, &root) || Node::open(self.pool, 0) != Some(root) {
+        let root = GridNode::root(lattice.resolution);
+        if !check.has_head(0, &root) || GridNode::open(self.pool, 0) != Some(root) {
             return Err(corrupt(HEADER_BYTES));
         }
         check.grid(&root, 0)?;
@@ -114,7 +114,7 @@ impl Check<'_> {
     }
 
     /// Checks a grid that starts at the cursor, and what is in it, and moves the cursor behind it.
-    fn grid(&mut self, node: &Node, depth: usize) -> Result<(), Error> {
+    fn grid(&mut self, node: &GridNode, depth: usize) -> Result<(), Error> {
         let at = self.cursor;
         let wrong = Self::wrong(at);
         *self.contents.get_mut(depth).ok_or(wrong)? = Contents::NONE;
@@ -127,7 +127,7 @@ impl Check<'_> {
             *self.places.get_mut(depth).ok_or(wrong)? = Some((*node, cell));
             let references = match node.content(self.pool, cell) {
                 None => 0,
-                Some(CellContent::List(ids)) => {
+                Some(NestedCell::List(ids)) => {
                     if !ascends(ids) || !ids.iter().all(|&id| self.count(id, depth)) {
                         return Err(wrong);
                     }
@@ -135,13 +135,13 @@ impl Check<'_> {
                     self.cursor += ids.len();
                     ids.len() as u64
                 }
-                Some(CellContent::Grid(inner)) => {
-                    let inner = Node::open(self.pool, inner).ok_or(wrong)?;
+                Some(NestedCell::Grid(inner)) => {
+                    let inner = GridNode::open(self.pool, inner).ok_or(wrong)?;
                     let start = self.cursor;
                     self.grid(&inner, depth + 1)?;
                     let contents = self.contents.get(depth + 1).ok_or(wrong)?;
                     let bounds = inside(self.lattice, node, cell, &contents.reach);
-                    let built = Node::new(start, bounds.min, bounds.max, inner.resolution);
+                    let built = GridNode::new(start, bounds.min, bounds.max, inner.resolution);
                     let is_built = self.is_built(&inner, &bounds, depth + 1, contents);
                     if !self.has_head(start, &built) || !is_built {
                         return Err(Self::wrong(start));
@@ -184,12 +184,12 @@ impl Check<'_> {
     }
 
     /// Returns true if the words of a grid start as its build writes them.
-    fn has_head(&self, at: usize, node: &Node) -> bool {
+    fn has_head(&self, at: usize, node: &GridNode) -> bool {
         self.pool.get(at..).and_then(|words| words.first_chunk()) == Some(&node.head())
     }
 
     /// Returns true if a build puts this grid into this box, for what is in it.
-    fn is_built(&self, grid: &Node, bounds: &Aabb, depth: usize, contents: &Contents) -> bool {
+    fn is_built(&self, grid: &GridNode, bounds: &Aabb, depth: usize, contents: &Contents) -> bool {
         let Contents { count, references, lists, .. } = *contents;
         let Ok(level) = u32::try_from(depth) else { return false };
         let is_worth_it = count as usize > FEW
@@ -207,7 +207,7 @@ impl Check<'_> {
             if resolution == grid.resolution {
                 return references <= limit || primitives == 0;
             }
-            let finer = Node::new(0, bounds.min, bounds.max, resolution);
+            let finer = GridNode::new(0, bounds.min, bounds.max, resolution);
             let mut references = 0;
             let mut around = [None; LEVELS];
             self.each_in(grid, &mut around, 0, &mut |placed| {
@@ -223,7 +223,7 @@ impl Check<'_> {
     /// Shows `visit` the triangles in a grid, each once: in the first list that has it.
     fn each_in(
         &self,
-        node: &Node,
+        node: &GridNode,
         around: &mut [Option<CellOfGrid>; LEVELS],
         depth: usize,
         visit: &mut impl FnMut(&PlacedTriangle),
@@ -236,15 +236,17 @@ impl Check<'_> {
             let here = around.get(..=depth).unwrap_or_default();
             match node.content(self.pool, cell) {
                 None => {}
-                Some(CellContent::List(ids)) => {
+                Some(NestedCell::List(ids)) => {
                     let placed =
                         ids.iter().map(|&id| PlacedTriangle::new(self.mesh, self.lattice, id));
                     for placed in placed.flatten().filter(|placed| is_first(placed, here)) {
                         visit(&placed);
                     }
                 }
-                Some(CellContent::Grid(at)) => {
-                    if let Some(inner) = Node::open(self.pool, at).filter(|_| depth + 1 < LEVELS) {
+                Some(NestedCell::Grid(at)) => {
+                    if let Some(inner) =
+                        GridNode::open(self.pool, at).filter(|_| depth + 1 < LEVELS)
+                    {
                         self.each_in(&inner, around, depth + 1, visit);
                     }
                 }
@@ -253,12 +255,14 @@ impl Check<'_> {
     }
 
     /// Counts the lists below a grid that must have a triangle.
-    fn expected(&self, node: &Node, placed: &PlacedTriangle, depth: u32) -> u64 {
+    fn expected(&self, node: &GridNode, placed: &PlacedTriangle, depth: u32) -> u64 {
         let mut sum = 0;
         placed.each_cell(node, |_, cell| {
             sum += match node.content(self.pool, cell) {
-                Some(CellContent::Grid(at)) if depth + 1 < MAX_DEPTH => Node::open(self.pool, at)
-                    .map_or(0, |inner| self.expected(&inner, placed, depth + 1)),
+                Some(NestedCell::Grid(at)) if depth + 1 < MAX_DEPTH => {
+                    GridNode::open(self.pool, at)
+                        .map_or(0, |inner| self.expected(&inner, placed, depth + 1))
+                }
                 _ => 1,
             };
         });

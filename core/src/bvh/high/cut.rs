@@ -73,11 +73,11 @@ fn center<S: Simd>(sides: f32x8<S>) -> f32x8<S> {
     (low - high).combine(high - low)
 }
 
-/// Half the surface of a box whose lengths are multiplied by `unit`.
+/// Half the surface of a box whose lengths are multiplied by `scale`.
 #[inline(always)]
-pub(super) fn area<S: Simd>(simd: S, sides: f32x8<S>, unit: f32) -> f32 {
+pub(super) fn area<S: Simd>(simd: S, sides: f32x8<S>, scale: f32) -> f32 {
     let (low, high) = sides.split();
-    let size: [f32; 4] = ((low + high) * f32x4::splat(simd, unit)).into();
+    let size: [f32; 4] = ((low + high) * f32x4::splat(simd, scale)).into();
     size[0] * size[1] + size[1] * size[2] + size[2] * size[0]
 }
 
@@ -153,18 +153,18 @@ impl Bins {
     }
 
     /// Cuts some items in two and returns how many are in the first part, and the extents of both; `None` if no bins
-    /// tell them apart. Lengths are multiplied by `unit` before areas are computed.
+    /// tell them apart. Lengths are multiplied by `scale` before areas are computed.
     #[inline(always)]
     pub(super) fn cut<S: Simd>(
         &mut self,
         simd: S,
         items: &mut [TriangleItem],
         centers: &Sides,
-        unit: f32,
+        scale: f32,
     ) -> Option<(usize, [Extent; 2])> {
         let rule = BinScale::new(items.len(), centers);
         self.fill(simd, items, &rule);
-        let place = self.best(simd, &rule, unit)?;
+        let place = self.best(simd, &rule, scale)?;
         let mut bounds = [f32x8::splat(simd, f32::INFINITY); 2];
         for (at, bin) in self.boxes[place.axis % 3].iter().enumerate().take(rule.count) {
             let side = &mut bounds[usize::from(at >= place.bin)];
@@ -200,7 +200,7 @@ impl Bins {
 
     /// Sweeps over each axis from both ends, for the cut of least cost.
     #[inline(always)]
-    fn best<S: Simd>(&self, simd: S, rule: &BinScale, unit: f32) -> Option<Split> {
+    fn best<S: Simd>(&self, simd: S, rule: &BinScale, scale: f32) -> Option<Split> {
         debug_assert!(rule.count <= BINS, "more bins than there is room for");
         let mut best = Split { axis: 0, bin: 0, cost: f32::INFINITY };
         for (axis, (boxes, counts)) in self.boxes.iter().zip(&self.counts).enumerate() {
@@ -213,7 +213,7 @@ impl Bins {
             let bins = boxes.iter().zip(counts).take(rule.count);
             for ((bin, counted), cost) in bins.zip(&mut costs) {
                 if sum > 0 {
-                    *cost = area(simd, all, unit) * as_cost(sum);
+                    *cost = area(simd, all, scale) * as_cost(sum);
                 }
                 all = all.lesser(f32x8::simd_from(simd, *bin));
                 sum += counted;
@@ -225,7 +225,7 @@ impl Bins {
                 let (Some(bounds), Some(counted), Some(before)) = places else { continue };
                 all = all.lesser(f32x8::simd_from(simd, *bounds));
                 sum += counted;
-                let cost = before + area(simd, all, unit) * as_cost(sum);
+                let cost = before + area(simd, all, scale) * as_cost(sum);
                 if sum > 0 && cost < best.cost {
                     best = Split { axis, bin, cost };
                 }
