@@ -1729,9 +1729,6 @@ extern "C" {
  *   if they are more than 2^30 - 1 or have more than 2^32 - 1 vertices together.
  *
  * Threads: any number of calls at once, each with parts and a joined mesh of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_join(const struct hgrid_mesh *meshes,
                         size_t count,
@@ -1757,9 +1754,6 @@ hgrid_status hgrid_join(const struct hgrid_mesh *meshes,
  *   `HGRID_ERROR_INVALID_QUALITY`.
  *
  * Threads: any number of calls at once, each with a report of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_bound(size_t triangle_count,
                          const struct hgrid_config *config,
@@ -1798,9 +1792,6 @@ hgrid_status hgrid_bound(size_t triangle_count,
  *
  * Threads: any number of calls at once, as long as each has a scratch and a report of its own. The
  * call starts no thread; tasks are called on those that `run` chooses.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
                          const struct hgrid_config *config,
@@ -1835,9 +1826,6 @@ hgrid_status hgrid_sizes(const struct hgrid_mesh *mesh,
  *
  * Threads: any number of calls at once, as long as each has a scratch, a configuration
  * to write and a report of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
                        const struct hgrid_config *config,
@@ -1931,9 +1919,6 @@ hgrid_status hgrid_fit(const struct hgrid_mesh *mesh,
  *
  * Threads: any number of calls at once, as long as each has regions, a view and a report of its
  * own. The call starts no thread; its tasks are called on those that `run` chooses.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
                          const struct hgrid_config *config,
@@ -1961,9 +1946,6 @@ hgrid_status hgrid_build(const struct hgrid_mesh *mesh,
  * always ends: in a grid of one level after at most as many steps as the three resolutions add up to.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_intersect(const struct hgrid_grid *grid,
                      const struct hgrid_ray *ray,
@@ -1980,9 +1962,6 @@ bool hgrid_intersect(const struct hgrid_grid *grid,
  * or with options that break the rules for structs, the answer is false.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_occluded(const struct hgrid_grid *grid,
                     const struct hgrid_ray *ray,
@@ -2006,9 +1985,6 @@ bool hgrid_occluded(const struct hgrid_grid *grid,
  * or with options that break the rules for structs, the answer is `HGRID_INVALID_ID`.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 uint32_t hgrid_occluder(const struct hgrid_grid *grid,
                         const struct hgrid_ray *ray,
@@ -2051,9 +2027,6 @@ uint32_t hgrid_occluder(const struct hgrid_grid *grid,
  *
  * Threads: any number of queries on the same grid at once; each thread with hits and counters of
  * its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
                                  const struct hgrid_ray *ray,
@@ -2088,9 +2061,6 @@ hgrid_status hgrid_intersect_all(const struct hgrid_grid *grid,
  * for points far outside they test a large part of all triangles.
  *
  * Threads: any number of queries on the same grid at once; each thread with counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_closest_point(const struct hgrid_grid *grid,
                          const struct hgrid_point_query *query,
@@ -2132,9 +2102,6 @@ bool hgrid_closest_point(const struct hgrid_grid *grid,
  * except for triangles that the ray sees nearly edge-on.
  *
  * Threads: any number of calls and queries on the same grid at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_surface_at(const struct hgrid_grid *grid,
                       const struct hgrid_ray *ray,
@@ -2164,9 +2131,6 @@ bool hgrid_surface_at(const struct hgrid_grid *grid,
  * ```
  *
  * Threads: any number of calls and queries on the same grid at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_locate(const struct hgrid_grid *grid,
                   uint32_t primitive,
@@ -2233,9 +2197,6 @@ bool hgrid_locate(const struct hgrid_grid *grid,
  *
  * Threads: any number of queries on the same grid at once; each thread with hits and counters of
  * its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_intersect_n(const struct hgrid_grid *grid,
                                const struct hgrid_ray *rays,
@@ -2276,9 +2237,6 @@ hgrid_status hgrid_intersect_n(const struct hgrid_grid *grid,
  *
  * Threads: any number of queries on the same grid at once; each thread with bytes and counters of
  * its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
                               const struct hgrid_ray *rays,
@@ -2301,9 +2259,6 @@ hgrid_status hgrid_occluded_n(const struct hgrid_grid *grid,
  *
  * Threads: any number of queries on the same grid at once; each thread with names and counters of
  * its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_occluder_n(const struct hgrid_grid *grid,
                               const struct hgrid_ray *rays,
@@ -2340,9 +2295,6 @@ hgrid_status hgrid_occluder_n(const struct hgrid_grid *grid,
  * - with both: `HGRID_ERROR_MESH_MISMATCH`, `HGRID_ERROR_NO_MESH`.
  *
  * Threads: any number of calls at once, also on the same blob, each with a view of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_open(const void *blob,
                         size_t blob_bytes,
@@ -2379,9 +2331,6 @@ hgrid_status hgrid_open(const void *blob,
  *
  * Threads: any number of calls at once, each with a blob, a view and a report of its own. No query may run
  * on the blob during the call.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_refit(const struct hgrid_mesh *mesh,
                          void *blob,
@@ -2400,9 +2349,6 @@ hgrid_status hgrid_refit(const struct hgrid_mesh *mesh,
  * `HGRID_ERROR_UNSUPPORTED_VERSION`, `HGRID_ERROR_METHOD_REMOVED`, `HGRID_ERROR_CORRUPT`.
  *
  * Threads: any number of calls at once, each with an info of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_peek(const void *blob, size_t blob_bytes, struct hgrid_blob_info *info);
 
@@ -2426,9 +2372,6 @@ hgrid_status hgrid_peek(const void *blob, size_t blob_bytes, struct hgrid_blob_i
  * mesh is damaged. More than is needed is not touched.
  *
  * Threads: any number of calls and queries on the same grid at once, each with memory of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_pack(const struct hgrid_grid *grid,
                         void *to,
@@ -2447,9 +2390,6 @@ hgrid_status hgrid_pack(const struct hgrid_grid *grid,
  * it as it was.
  *
  * Threads: any number of calls and queries on the same grid at once, each with a mesh of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_mesh_of(const struct hgrid_grid *grid,
                            struct hgrid_mesh *mesh);
@@ -2471,9 +2411,6 @@ hgrid_status hgrid_mesh_of(const struct hgrid_grid *grid,
  * `HGRID_ERROR_NULL_ARGUMENT`.
  *
  * Threads: any number of calls and queries on the same grid at once, each with scratch of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_validate(const struct hgrid_grid *grid,
                             void *scratch,
@@ -2486,9 +2423,6 @@ hgrid_status hgrid_validate(const struct hgrid_grid *grid,
  * 0 also for NULL and for a view of zeros (`HGRID_GRID_INIT`).
  *
  * Threads: any number of calls and queries on the same grid at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 size_t hgrid_validate_bytes(const struct hgrid_grid *grid);
 
@@ -2501,9 +2435,6 @@ size_t hgrid_validate_bytes(const struct hgrid_grid *grid);
  *
  * Threads: any number of calls and queries on the same grid at once,
  * each with statistics of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_inspect(const struct hgrid_grid *grid, struct hgrid_statistics *statistics);
 
@@ -2526,9 +2457,6 @@ hgrid_status hgrid_inspect(const struct hgrid_grid *grid, struct hgrid_statistic
  * The report is written in both cases; its `triangle` is the number of a shape.
  *
  * Threads: as for `hgrid_build`.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_build_shapes(const struct hgrid_boxes *boxes,
                                 const struct hgrid_config *config,
@@ -2547,9 +2475,6 @@ hgrid_status hgrid_build_shapes(const struct hgrid_boxes *boxes,
  * `HGRID_ERROR_INVALID_MASKS` for the boxes, and leaves `shapes` as it was.
  *
  * Threads: any number of calls at once, also on the same blob, each with a view of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_open_shapes(const void *blob,
                                size_t blob_bytes,
@@ -2563,9 +2488,6 @@ hgrid_status hgrid_open_shapes(const void *blob,
  * `shapes`, or returns what `hgrid_refit` returns, and blob and `shapes` are as they were.
  *
  * Threads: as for `hgrid_refit`.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_refit_shapes(const struct hgrid_boxes *boxes,
                                 void *blob,
@@ -2581,9 +2503,6 @@ hgrid_status hgrid_refit_shapes(const struct hgrid_boxes *boxes,
  * zeros (`HGRID_SHAPES_INIT`), `HGRID_ERROR_OVERLAP` for scratch in the tree, or `HGRID_ERROR_NULL_ARGUMENT`.
  *
  * Threads: any number of calls and queries on the same tree at once, each with scratch of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_validate_shapes(const struct hgrid_shapes *shapes,
                                    void *scratch,
@@ -2617,9 +2536,6 @@ hgrid_status hgrid_validate_shapes(const struct hgrid_shapes *shapes,
  * ```
  *
  * Threads: any number of queries on the same tree at once; each thread with counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_intersect_shapes(const struct hgrid_shapes *shapes,
                             const struct hgrid_ray *ray,
@@ -2632,9 +2548,6 @@ bool hgrid_intersect_shapes(const struct hgrid_shapes *shapes,
  * `options` may be NULL. With another NULL, and in all cases in which that function hits nothing, the answer is false.
  *
  * Threads: any number of queries on the same tree at once; each thread with counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
                            const struct hgrid_ray *ray,
@@ -2672,9 +2585,6 @@ bool hgrid_occluded_shapes(const struct hgrid_shapes *shapes,
  * The call allocates nothing and needs at most 36 KiB of stack, and what the test needs.
  *
  * Threads: any number of queries on the same tree at once; each thread with hits and counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_intersect_shapes_n(const struct hgrid_shapes *shapes,
                                       const struct hgrid_ray *rays,
@@ -2694,9 +2604,6 @@ hgrid_status hgrid_intersect_shapes_n(const struct hgrid_shapes *shapes,
  * written none.
  *
  * Threads: any number of queries on the same tree at once; each thread with bytes and counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_occluded_shapes_n(const struct hgrid_shapes *shapes,
                                      const struct hgrid_ray *rays,
@@ -2714,9 +2621,6 @@ hgrid_status hgrid_occluded_shapes_n(const struct hgrid_shapes *shapes,
  * view of zeros.
  *
  * Threads: any number of calls at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_object_grid(const struct hgrid_grid *grid,
                                struct hgrid_object *object);
@@ -2729,9 +2633,6 @@ hgrid_status hgrid_object_grid(const struct hgrid_grid *grid,
  * `hgrid_object_grid` returns.
  *
  * Threads: any number of calls at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_object_shapes(const struct hgrid_shapes *shapes,
                                  struct hgrid_object *object);
@@ -2741,9 +2642,6 @@ hgrid_status hgrid_object_shapes(const struct hgrid_shapes *shapes,
  * `hgrid_object_grid` returns.
  *
  * Threads: any number of calls at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_object_scene(const struct hgrid_scene *scene,
                                 struct hgrid_object *object);
@@ -2756,9 +2654,6 @@ hgrid_status hgrid_object_scene(const struct hgrid_scene *scene,
  * `HGRID_ERROR_INVALID_METHOD` for another method than bvh.
  *
  * Threads: any number of calls at once, each with a report of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_scene_bound(size_t instance_count,
                                const struct hgrid_config *config,
@@ -2800,9 +2695,6 @@ hgrid_status hgrid_scene_bound(size_t instance_count,
  * - with the memory: `HGRID_ERROR_INDEX_TOO_SMALL`, `HGRID_ERROR_SCRATCH_TOO_SMALL`.
  *
  * Threads: as for `hgrid_build`.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_build_scene(const struct hgrid_instance *instances,
                                size_t instance_count,
@@ -2824,9 +2716,6 @@ hgrid_status hgrid_build_scene(const struct hgrid_instance *instances,
  * `HGRID_ERROR_MISSING_OBJECTS` or `HGRID_ERROR_TOO_DEEP`, and leaves `scene` as it was.
  *
  * Threads: any number of calls at once, also on the same blob, each with a view of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_open_scene(const void *blob,
                               size_t blob_bytes,
@@ -2845,9 +2734,6 @@ hgrid_status hgrid_open_scene(const void *blob,
  * report's `triangle`, after which the blob holds nothing of use.
  *
  * Threads: as for `hgrid_refit`.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_refit_scene(const struct hgrid_instance *instances,
                                size_t instance_count,
@@ -2866,9 +2752,6 @@ hgrid_status hgrid_refit_scene(const struct hgrid_instance *instances,
  * `hgrid_validate_shapes` returns.
  *
  * Threads: any number of calls and queries on the same scene at once, each with scratch of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_validate_scene(const struct hgrid_scene *scene,
                                   void *scratch,
@@ -2892,9 +2775,6 @@ hgrid_status hgrid_validate_scene(const struct hgrid_scene *scene,
  * needed is not touched.
  *
  * Threads: any number of calls and queries on the same scene at once, each with memory of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_pack_scene(const struct hgrid_scene *scene,
                               void *to,
@@ -2920,9 +2800,6 @@ hgrid_status hgrid_pack_scene(const struct hgrid_scene *scene,
  * returns `HGRID_OK`, `scene` stays as it was, and the views hold nothing of use.
  *
  * Threads: any number of calls at once, also on the same blob, each with a view and memory of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_open_packed_scene(const void *blob,
                                      size_t blob_bytes,
@@ -2944,9 +2821,6 @@ hgrid_status hgrid_open_packed_scene(const void *blob,
  * it, and 7 KiB for a grid.
  *
  * Threads: any number of queries on the same scene at once; each thread with counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_intersect_scene(const struct hgrid_scene *scene,
                            const struct hgrid_ray_f64 *ray,
@@ -2959,9 +2833,6 @@ bool hgrid_intersect_scene(const struct hgrid_scene *scene,
  * `options` may be NULL. With another NULL, and in all cases in which that function hits nothing, the answer is false.
  *
  * Threads: any number of queries on the same scene at once; each thread with counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_occluded_scene(const struct hgrid_scene *scene,
                           const struct hgrid_ray_f64 *ray,
@@ -2977,9 +2848,6 @@ bool hgrid_occluded_scene(const struct hgrid_scene *scene,
  * `hit` is NULL, or the hit names nothing in the scene.
  *
  * Threads: any number of calls and queries on the same scene at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_scene_locate(const struct hgrid_scene *scene,
                         const struct hgrid_scene_hit *hit,
@@ -3019,9 +2887,6 @@ bool hgrid_scene_locate(const struct hgrid_scene *scene,
  * ```
  *
  * Threads: any number of calls and queries on the same scene at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_scene_surface_at(const struct hgrid_scene *scene,
                             const struct hgrid_ray_f64 *ray,
@@ -3036,9 +2901,6 @@ bool hgrid_scene_surface_at(const struct hgrid_scene *scene,
  * names nothing in the scene, or the normal is null, or it is NULL and the hit names no triangle.
  *
  * Threads: any number of calls and queries on the same scene at once.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 bool hgrid_scene_normal(const struct hgrid_scene *scene,
                         const struct hgrid_scene_hit *hit,
@@ -3087,9 +2949,6 @@ bool hgrid_scene_normal(const struct hgrid_scene *scene,
  * scene, and what the tests of shapes need.
  *
  * Threads: any number of queries on the same scene at once; each thread with hits and counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_intersect_scene_n(const struct hgrid_scene *scene,
                                      const struct hgrid_ray_f64 *rays,
@@ -3110,9 +2969,6 @@ hgrid_status hgrid_intersect_scene_n(const struct hgrid_scene *scene,
  * `hgrid_intersect_scene_n` returns and has written none.
  *
  * Threads: any number of queries on the same scene at once; each thread with bytes and counters of its own.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_occluded_scene_n(const struct hgrid_scene *scene,
                                     const struct hgrid_ray_f64 *rays,
@@ -3162,9 +3018,6 @@ hgrid_status hgrid_occluded_scene_n(const struct hgrid_scene *scene,
  * report is that of `hgrid_build`.
  *
  * Threads: any number of calls at once, if the allocator's functions allow it.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 hgrid_status hgrid_create(const struct hgrid_mesh *mesh,
                           const struct hgrid_config *config,
@@ -3183,9 +3036,6 @@ hgrid_status hgrid_create(const struct hgrid_mesh *mesh,
  *
  * Threads: any number of calls at once, each for a grid of its own, if the allocator's functions
  * allow it; on any thread, not only on the one that created the grid.
- *
- * # Safety
- * Pointers are as the head of this file says.
  */
 void hgrid_destroy(struct hgrid_grid *grid);
 #endif

@@ -5,7 +5,7 @@ use core::ptr::NonNull;
 
 use hgrid_core::Grid;
 
-use crate::query_types::{hgrid_blob_info, hgrid_refit_report, hgrid_statistics};
+use crate::blob_types::{hgrid_blob_info, hgrid_refit_report, hgrid_statistics};
 use crate::raw;
 use crate::span::Region;
 use crate::status::{

@@ -4,7 +4,7 @@
 //! is public are the text of `include/hgrid.h`, which a test makes with cbindgen: they are written
 //! for C readers, and the header's own head (in `cbindgen.toml`) holds the rules for pointers,
 //! structs and threads that they rely on. `build`, `query`, `batch`, `blob`, `shapes`, `scene`
-//! and `scene_batch` hold the functions, `types` and `query_types` the structs, and `raw` every use of a
+//! and `scene_batch` hold the functions, `types`, `query_types` and `blob_types` the structs, and `raw` every use of a
 //! caller's pointer.
 //!
 //! This package allocates nothing, keeps no state, starts no thread, and has no panic that a caller could
@@ -19,6 +19,8 @@
 mod types;
 
 mod query_types;
+
+mod blob_types;
 
 mod build;
 
@@ -56,6 +58,7 @@ mod system;
 
 pub use crate::batch::*;
 pub use crate::blob::*;
+pub use crate::blob_types::*;
 pub use crate::build::*;
 #[cfg(feature = "malloc")]
 pub use crate::create::*;

@@ -6,7 +6,8 @@ use core::ptr::{NonNull, null_mut};
 
 use hgrid_core::{Cull, Instance, MAX_NESTING, Object, RayF64, SceneHit};
 
-use crate::query_types::{cull, hgrid_counters, hgrid_refit_report, hgrid_verdict};
+use crate::blob_types::hgrid_refit_report;
+use crate::query_types::{cull, hgrid_counters, hgrid_verdict};
 use crate::raw;
 use crate::shapes::hgrid_shapes;
 use crate::span::Region;

@@ -6,9 +6,8 @@ use core::ptr::NonNull;
 
 use hgrid_core::{QueryOptions, ShapeHit, ShapeTest, Shapes};
 
-use crate::query_types::{
-    self, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray, hgrid_refit_report,
-};
+use crate::blob_types::hgrid_refit_report;
+use crate::query_types::{self, hgrid_coherence, hgrid_hit, hgrid_query_options, hgrid_ray};
 use crate::raw;
 use crate::raw::BatchArrays;
 use crate::span::Region;

@@ -48,8 +48,8 @@ pub(crate) use shapes::{
     build_shapes, open_shapes, query_shapes, refit_shapes, shapes, shapes_batch, validate_shapes,
 };
 
+use crate::blob_types::hgrid_refit_report;
 use crate::input::Input;
-use crate::query_types::hgrid_refit_report;
 use crate::span::{Region, Span};
 use crate::status::{
     HGRID_ERROR_NOT_A_GRID, HGRID_ERROR_NULL_ARGUMENT, HGRID_ERROR_OVERLAP,

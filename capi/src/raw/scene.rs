@@ -18,8 +18,9 @@ use super::shapes::shapes_read;
 use super::{
     apart, bytes, bytes_mut, config, read, read_sized, shares, span_of, view_of, write, write_grid,
 };
+use crate::blob_types::hgrid_refit_report;
 use crate::input::controlled;
-use crate::query_types::{hgrid_counters, hgrid_refit_report, verdict};
+use crate::query_types::{hgrid_counters, verdict};
 use crate::scene::{
     hgrid_instance, hgrid_object, hgrid_ray_f64, hgrid_scene, hgrid_scene_hit, hgrid_scene_options,
 };

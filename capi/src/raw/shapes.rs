@@ -10,8 +10,9 @@ use hgrid_core::{Boxes, Hit, ObjectTest, QueryOptions, Ray, ShapeHit, Shapes, Si
 use super::ask::all_options;
 use super::batch_arrays::{Arrays, BatchArrays};
 use super::{apart, bytes, bytes_mut, config, read, read_sized, span_of, strided, view_of, write};
+use crate::blob_types::hgrid_refit_report;
 use crate::input::controlled;
-use crate::query_types::{hgrid_query_options, hgrid_ray, hgrid_refit_report};
+use crate::query_types::{hgrid_query_options, hgrid_ray};
 use crate::shapes::{hgrid_boxes, hgrid_shape_hit, hgrid_shapes};
 use crate::span::{Region, Span};
 use crate::status::{
