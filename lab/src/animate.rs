@@ -44,6 +44,10 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
         let is_known = !is_there || args.method == Method::Bvh;
         ensure!(is_known, "{option} is for --method bvh: ask for that, or leave out {option}");
     }
+    ensure!(
+        !args.refit || args.frames > 1,
+        "--refit is for later frames than the first: ask for --frames 2 or more, or leave out --refit"
+    );
     let scene = Scene::load(&args.scene)?;
     ensure!(!scene.indices.is_empty(), "`{}` has no triangles: nothing to animate", args.scene);
     if let Some(folder) = &args.output {

@@ -218,10 +218,9 @@ pub struct CompareArgs {
     /// The structures of hgrid, between commas [default: all]
     #[arg(long, value_name = "METHODS", value_delimiter = ',', value_parser = method_parser())]
     pub methods: Vec<Method>,
-    /// For `bvh`: `high` builds longer for rays that are faster
-    #[arg(long, value_name = "QUALITY", value_parser = quality_parser(),
-          default_value = Quality::default().name())]
-    pub quality: Quality,
+    /// For `bvh`: `high` builds longer for rays that are faster [default: fast]
+    #[arg(long, value_name = "QUALITY", value_parser = quality_parser())]
+    pub quality: Option<Quality>,
     /// The other structures, between commas [default: all that this program has]
     #[arg(long, value_name = "PEERS", value_delimiter = ',', value_enum)]
     pub peers: Vec<Peer>,
@@ -254,6 +253,20 @@ pub struct CompareArgs {
 }
 
 impl CompareArgs {
+    /// Refuses a quality without a tree that could have it.
+    ///
+    /// # Errors
+    /// If there is one; the message names the option and its method.
+    pub fn check(&self) -> anyhow::Result<()> {
+        ensure!(
+            self.quality.is_none()
+                || self.methods.is_empty()
+                || self.methods.contains(&Method::Bvh),
+            "--quality is for --methods bvh: ask for that, or leave out --quality"
+        );
+        Ok(())
+    }
+
     /// Returns the content of the scenes.
     #[must_use]
     pub const fn shown(&self) -> Shown {

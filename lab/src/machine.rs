@@ -19,7 +19,7 @@ pub struct Machine {
     pub large_pages: Option<String>,
     /// The compiler that this program was built with.
     pub rustc: String,
-    /// The commit of the checkout that the command ran in, `-dirty` if files differ from it.
+    /// The commit of the checkout that the command ran in, `-dirty` if files outside of lab/results differ from it.
     #[serde(default)]
     pub commit: Option<String>,
     /// The day, in UTC, as YYYY-MM-DD.
@@ -68,7 +68,18 @@ fn commit() -> Option<String> {
     };
     let root = git(&["rev-parse", "--show-toplevel"])?;
     let is_hgrid = Path::new(&root).join("include/hgrid.h").is_file();
-    is_hgrid.then(|| git(&["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]))?
+    let commit =
+        is_hgrid.then(|| git(&["describe", "--always", "--abbrev=12", "--exclude=*"]))??;
+    // A measurement may follow another one, whose result lies there already.
+    let changes = git(&[
+        "status",
+        "--porcelain",
+        "--untracked-files=no",
+        "--",
+        ":/",
+        ":(top,exclude)lab/results",
+    ]);
+    Some(if changes?.is_empty() { commit } else { commit + "-dirty" })
 }
 
 /// Returns the word in brackets, which is the chosen one, in the text of a kernel's setting.

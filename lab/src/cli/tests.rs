@@ -140,6 +140,14 @@ fn parameters_of_others_are_refused() {
     assert!(message.contains("--threads is for --methods bvh"), "{message}");
     let message = check("--methods fixed,bvh --depth 2").unwrap_err().to_string();
     assert!(message.contains("--depth is for --methods recursive"), "{message}");
+
+    let compare = |words: &str| {
+        CompareArgs::parse_from(["hgrid", "a.ply"].into_iter().chain(words.split(' '))).check()
+    };
+    compare("--quality high").unwrap();
+    compare("--methods fixed,bvh --quality high").unwrap();
+    let message = compare("--methods fixed --quality high").unwrap_err().to_string();
+    assert!(message.contains("--quality is for --methods bvh"), "{message}");
 }
 
 #[test]

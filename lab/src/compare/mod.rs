@@ -60,7 +60,8 @@ use workloads::{Amount, Workload};
 /// If this program was built without the peers, a scene cannot be loaded, a structure cannot be
 /// built, two methods of hgrid disagree, or a file cannot be written.
 pub fn run(args: &CompareArgs) -> Result<()> {
-    let mut systems = methods_of(&args.methods, args.quality);
+    args.check()?;
+    let mut systems = methods_of(&args.methods, args.quality.unwrap_or_default());
     systems.extend(peers::systems(&args.peers)?);
     if let Some(folder) = &args.output {
         make_folder(folder)?;
