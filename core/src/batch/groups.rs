@@ -1,4 +1,12 @@
-//! Batches on a tree, in groups of rays.
+//! Answers a batch on a tree: in groups of up to 64 rays, which may be sorted first.
+//!
+//! ```text
+//! rays that the caller calls coherent       groups in the order given
+//! others                                    windows of rays, sorted by origin and direction (bvh/order.rs):
+//!                                           in the memory that the caller lent, or 256 rays on the stack
+//! rays that a group hands back              alone
+//! a filter, and a hit that it must judge    one ray, from that hit on
+//! ```
 
 use core::marker::PhantomData;
 

@@ -128,7 +128,7 @@ mod tests {
                 let centers = Aabb { min: -flat * scale, max: flat * scale };
                 let keys = Keys::new(&centers);
                 for _ in 0..if cfg!(miri) { 2 } else { 200 } {
-                    // Also from beside the box of the centres, as those that are left out.
+                    // Some centres lie outside of the box, as those of triangles do that the build leaves out.
                     let boxes = [0; 8].map(|_| {
                         let (center, half) =
                             (random::point(&mut state) * 1.2, random::point(&mut state).abs());

@@ -465,7 +465,7 @@ mod tests {
                 leaf(61, 1)
             ]
         );
-        // Bytes that no build writes wrap, and say so where they are looked up.
+        // Damaged bytes give numbers that wrap around: finding a child must not panic.
         node.counts = [0xff; WIDTH];
         (node.child, node.first) = (u32::MAX, u32::MAX);
         for slot in 0..8 {

@@ -278,11 +278,11 @@ mod tests {
     #[test]
     fn rays_that_gain_nothing_stay_as_they_are() {
         let memory = &mut vec![0; 6000];
-        // Too few for so many places; near each other; none at all.
+        // The rays are too few for so many places, or start near each other, or there are none.
         assert!(sort(&scattered(512, 400), 0, 512, &BOUNDS, memory).is_none());
         assert!(sort(&scattered(3000, 1), 0, 3000, &BOUNDS, memory).is_none());
         assert!(sort(&Rays(Vec::new()), 0, 0, &BOUNDS, memory).is_none());
-        // A camera's, whose pixels start at one point, however many there are.
+        // Rays of a camera start at one point, however many there are.
         let camera = Rays(vec![Ray::new([0.5; 3], [1.0; 3]); 3000]);
         assert!(sort(&camera, 0, 3000, &BOUNDS, memory).is_none());
     }

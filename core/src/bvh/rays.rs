@@ -309,7 +309,7 @@ impl Rays {
         }
     }
 
-    /// Returns those of some rays that do not end before a distance.
+    /// Returns the rays of a mask that reach a distance.
     #[inline(always)]
     pub(crate) fn ending_behind<S: Simd>(&self, simd: S, distance: f32, rays: u64) -> u64 {
         let distance = f32x16::splat(simd, distance);
@@ -475,8 +475,8 @@ impl Rays {
     }
 }
 
-/// The distance behind all hits with a `t`: those that round to it may lie farther away, or have one that is off by
-/// their corners.
+/// Returns a distance behind all hits that have this `t`. They may lie farther away than it says: it is rounded, and it
+/// is off by up to a share of the corners' range ([`slab`](super::slab)).
 #[inline(always)]
 fn end_behind(t: f32, scale: f32, extent: f32) -> f32 {
     let (end, growth) = (t * scale, growth_of_range(extent, scale));

@@ -1,4 +1,11 @@
-//! Queries of a tree: a ray against triangles, a ray with an f64 origin against boxes, triangles near a point.
+//! Starts the traversals of a tree: a ray against triangles, a ray with an f64 origin against boxes, a point.
+//!
+//! ```text
+//! ray     near the scene      traverse at once
+//!         farther away        move the origin to the scene first (approach.rs), then traverse
+//!         remote              test all triangles: distances in f32 would say nothing
+//! point   traverse, nearest boxes first (nearest.rs)
+//! ```
 
 use super::Bvh;
 use super::nearest::ClosestSearch;

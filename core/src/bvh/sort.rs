@@ -1,4 +1,12 @@
-//! Sorting the entries of a bin by their keys, stably, where they lie in cache.
+//! Sorts the entries of a bin by their keys: a radix sort from the low bits up, stable, in the cache.
+//!
+//! ```text
+//! up to 24 entries   insertion
+//! more               an even number of passes, so that the entries end where they began; each pass:
+//!                    count the entries of each digit, sum up the counts, move the entries
+//! ```
+//!
+//! All keys of a bin share their high bits, so only the low ones are sorted by.
 
 use super::layout::Entry;
 use crate::invariant::OrBug;

@@ -126,7 +126,7 @@ mod tests {
             if is_crowded {
                 continue;
             }
-            // There are triangles for all roots but the only one, and one behind crowded bins.
+            // Every root has its share of triangles, unless it is the only one or the last one behind crowded bins.
             let roots = if unit.len() > MOST_ROOT { unit.len() / LEAST_PIECE } else { 1 };
             let is_last = unit.end == all && (units.len() == 1 || others > 0);
             assert!(
@@ -149,17 +149,17 @@ mod tests {
         assert_eq!(units(&[0, 0, 0]), []);
         assert_eq!(units(&[0, 1, 0]), vec![0..1]);
         assert_eq!(units(&[per_root, per_root]).len(), 2);
-        // Too little joins the next, and so does what would leave too little.
+        // A bin with too few triangles joins the next one, and so does one before too few.
         assert_eq!(units(&[1, per_root]).len(), 1);
         assert_eq!(units(&[per_root, per_root - 1]).len(), 1);
         assert_eq!(units(&[per_root - 1, 1, per_root]).len(), 2);
-        // A large bin saves for small ones behind it.
+        // The triangles that a large bin has to spare count for small bins behind it.
         assert_eq!(units(&[3 * per_root, 1, 0, 2, per_root - 3]).len(), 4);
         assert_eq!(units(&[per_root, 3 * per_root, 1, 0, 2, per_root - 3]).len(), 5);
-        // Bins that are cut spend more.
+        // Bins that are cut into several roots have fewer to spare.
         assert_eq!(units(&[5 * 32, 5 * 8 - 1, 1]).len(), 3);
         assert_eq!(units(&[crowd, per_root, crowd]).len(), 3);
-        // Crowded ones come first, and a small rest stays by itself.
+        // Crowded bins come first, and the small rest is a unit of its own.
         let more = crowd as usize + 1;
         assert_eq!(units(&[1, crowd + 1, 2]), [0..more, more..more + 3]);
         // The balance starts again behind a seam, so a rest behind one joins what lies before it.

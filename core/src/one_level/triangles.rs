@@ -1,4 +1,12 @@
-//! The triangles of a mesh over the cells of a lattice, placed eight at a time.
+//! Finds the cells that each triangle of a mesh overlaps, eight triangles at a time.
+//!
+//! ```text
+//! read the corners of eight triangles, and take their boxes
+//! turn both ends of each box into cells
+//! note the row of the first cell, its x, and how many more cells the box spans on each axis
+//! ```
+//!
+//! A triangle that spans many cells, is not finite, or that wide reads cannot reach is looked at by itself.
 
 use core::ops::Range;
 
