@@ -759,13 +759,13 @@ typedef uint32_t hgrid_verdict;
  * of their value, `t` up to 2^-24 |t| + 2^-38 (|t| + Z); numbers below 1.2e-38 up to 2^-149. A vertex is
  * moved alike for all triangles that share it, so no ray passes between them.
  *
- * The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the
- * ray's line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does
- * not hit it, however close it starts. An end of the range needs this decision only if it lies between
- * the vertices. The reported `t` lies in the range, too: where a ray grazes a triangle, its own `t` may
- * be up to 2^-21 Z outside, and the end of the range is reported. The reported `t` is rounded, so a range
- * that ends at it may exclude the same hit. A triangle that is farther from the origin than 2^50 times
- * its size may be missed. (The head of core/src/triangle.rs has the proof.)
+ * The range `t_min <= t <= t_max` is decided exactly, for all finite numbers, by the point where the ray's
+ * line meets the plane of the unmoved vertices: a ray that starts above a plane and leaves it does not hit it,
+ * however close it starts. An end of the range needs this decision only if it lies between the vertices. The
+ * reported `t` lies in the range, too: where a ray grazes a triangle, its own `t` may be up to 2^-21 Z
+ * outside, and the end of the range is reported; farther outside, nothing is. The reported `t` is rounded, so
+ * a range that ends at it may exclude the same hit. A triangle that is farther from the origin than 2^50 times
+ * its size may be missed. (The source has the proof: core/src/triangle.rs.)
  */
 typedef struct hgrid_hit {
     /**

@@ -10,7 +10,7 @@
 //! - **Relative errors.** A side is subtracted, multiplied and added with at most six roundings. So `far` is
 //!   computed with an inverse direction that is larger by 2^-20, and the range of the ray is widened alike.
 //! - **Absolute errors** where the terms cancel: absorbed by the margin of quantised boxes ([`node`](super::node)).
-//! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by 2^-24 of itself, and by 2^-38 of
+//! - **Errors of a hit's `t`**, where the range begins or ends at one: it is off by less than 2^-23 of itself, and by 2^-38 of
 //!   the range of the corners' `t` ([`triangle`](crate::triangle)), which is at most the scene's extent. The relative
 //!   margin covers the first; [`growth_of_range`] adds twice the second.
 //! - **Zero directions.** Their inverse is [`STEEP`]: no box is thinner than 2^-60 of the scene and its margin is
