@@ -198,9 +198,11 @@ fn run(
 
     let finite = usize::try_from(survey.finite_count).unwrap_or(usize::MAX);
     let (ids, scratch) = scratch.split_at_mut_checked(finite).ok_or(too_small)?;
-    for (slot, (id, _)) in ids.iter_mut().zip(boxes(mesh)) {
-        *slot = id;
+    let mut finite_ids = boxes(mesh).map(|(id, _)| id);
+    for slot in ids.iter_mut() {
+        *slot = finite_ids.next().or_bug("fewer triangles than were counted").unwrap_or_default();
     }
+    debug_assert!(finite_ids.next().is_none(), "more triangles than were counted");
     let root = Aabb { min: Vec3A::ZERO, max: Vec3A::from_array(lattice.resolution.map(as_f32)) };
     let mut looks = looks(mesh.triangle_count());
     builder.grid(ids, &root, 0, &mut looks, scratch)?;
