@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail, ensure};
 use base64::Engine as _;
 use gltf::accessor::{DataType, Dimensions};
-use gltf::buffer::Source;
+use gltf::buffer::{Source, View};
 use gltf::mesh::Mode;
-use gltf::{Document, Gltf, Primitive, Semantic};
+use gltf::{Accessor, Document, Gltf, Primitive, Semantic};
 
 use super::model::{IDENTITY, Mesh, Model, Transform};
 use crate::vector::round;
@@ -77,6 +77,7 @@ fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
         let (needed, there) = (u32::from_le_bytes([*a, *b, *c, *d]), bytes.len());
         let is_whole = there as u64 >= u64::from(needed);
         ensure!(is_whole, "it is cut off: it has {there} bytes of {needed}");
+        ensure!(needed >= 12, "{cannot}: its header takes more than its {needed} bytes");
     }
     let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).context(cannot)?;
     let mut root = document.into_json();
@@ -86,6 +87,13 @@ fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
             "it requires the extension {name}, which hgrid does not read: export it without that"
         );
     }
+    // The crate looks for positions before it looks whether they are there, and panics.
+    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let mut named = primitives.flat_map(|primitive| primitive.attributes.values());
+    ensure!(
+        named.all(|accessor| accessor.value() < root.accessors.len()),
+        "{cannot}: a mesh names an accessor that is not there"
+    );
     Ok((Document::from_json(root).context(cannot)?, blob))
 }
 
@@ -137,17 +145,23 @@ fn triangles(primitive: &Primitive<'_>, buffers: &[Vec<u8>]) -> Result<Option<Me
         (accessor.data_type(), accessor.dimensions()) == (DataType::F32, Dimensions::Vec3),
         "its positions are not three floats each"
     );
-    ensure!(primitive.indices().is_none_or(|indices| indices.count() > 0), "it has no indices");
+    let outside = "its positions are outside their buffer";
+    ensure!(is_inside(&accessor, buffers), outside);
     let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|bytes| &**bytes));
-    let positions: Vec<_> =
-        reader.read_positions().context("its positions are outside their buffer")?.collect();
+    let positions: Vec<_> = reader.read_positions().context(outside)?.collect();
     let corners: Vec<u32> = match primitive.indices() {
         None => (0..u32::try_from(positions.len())?).collect(),
-        Some(_) => reader
-            .read_indices()
-            .context("its indices are outside their buffer")?
-            .into_u32()
-            .collect(),
+        Some(indices) => {
+            let kind = (indices.data_type(), indices.dimensions());
+            ensure!(
+                matches!(kind, (DataType::U8 | DataType::U16 | DataType::U32, Dimensions::Scalar)),
+                "its indices are not unsigned whole numbers"
+            );
+            ensure!(indices.count() > 0, "it has no indices");
+            let outside = "its indices are outside their buffer";
+            ensure!(is_inside(&indices, buffers), outside);
+            reader.read_indices().context(outside)?.into_u32().collect()
+        }
     };
     if let Some(corner) = corners.iter().find(|&&corner| corner as usize >= positions.len()) {
         bail!("there is no vertex {corner}, it has {}", positions.len());
@@ -167,6 +181,32 @@ fn triangles(primitive: &Primitive<'_>, buffers: &[Vec<u8>]) -> Result<Option<Me
         _ => corners.as_chunks::<3>().0.to_vec(),
     };
     Ok(Some(Mesh { positions, indices }))
+}
+
+/// Returns true if all elements of an accessor lie in their buffers, none in the next one. The crate panics where they
+/// overlap or their places overflow, and reserves memory for as many as a sparse accessor claims.
+fn is_inside(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> bool {
+    let holds = |view: View<'_>, offset: usize, count: usize, size: usize| {
+        let stride = view.stride().unwrap_or(size);
+        let last =
+            count.checked_sub(1).and_then(|last| last.checked_mul(stride)?.checked_add(offset));
+        let end = last.and_then(|last| last.checked_add(size)).filter(|&end| end <= view.length());
+        let end_of_view = view.offset().checked_add(view.length());
+        let bytes = buffers.get(view.buffer().index()).map_or(0, Vec::len);
+        stride >= size && end.is_some() && end_of_view.is_some_and(|end| end <= bytes)
+    };
+    let (count, size) = (accessor.count(), accessor.size());
+    let are_own = match accessor.view() {
+        Some(view) => holds(view, accessor.offset(), count, size),
+        // Zeros, but for those that a sparse accessor names.
+        None => count <= buffers.iter().map(Vec::len).sum(),
+    };
+    are_own
+        && accessor.sparse().is_none_or(|sparse| {
+            let (indices, values, count) = (sparse.indices(), sparse.values(), sparse.count());
+            holds(indices.view(), indices.offset(), count, indices.index_type().size())
+                && holds(values.view(), values.offset(), count, size)
+        })
 }
 
 /// Walks the nodes of the default scene, or of the first one; without scenes, all nodes.
@@ -308,6 +348,42 @@ mod tests {
         let (cut, length) = (&file[..file.len() - 9], file.len());
         let message = read(cut, Path::new("scene.glb")).unwrap_err().to_string();
         assert_eq!(message, format!("it is cut off: it has {} bytes of {length}", length - 9));
+        let message =
+            read(b"glTF\x02\0\0\0\x0b\0\0\0", Path::new("a.glb")).unwrap_err().to_string();
+        assert!(message.ends_with("its header takes more than its 11 bytes"), "{message}");
+    }
+
+    /// Sparse accessors replace single vertices of others, or of zeros.
+    #[test]
+    fn sparse_vertices_are_read_where_there_are_as_many() {
+        let file = |view: &str, vertices: &str, count: u32| {
+            let views = r#"{"buffer": 0, "byteOffset": 48, "byteLength": 6}"#;
+            let more = format!(
+                r#"{views}, {{"buffer": 0, "byteOffset": 48, "byteLength": 2}},
+                {{"buffer": 0, "byteOffset": 12, "byteLength": 12}}"#
+            );
+            let sparse = format!(
+                r#""sparse": {{"count": {count}, "indices": {{"bufferView": 2, "componentType": 5123}},
+                "values": {{"bufferView": 3}}}}, "min""#
+            );
+            let text = as_text().replacen(views, &more, 1).replacen(r#""min""#, &sparse, 1);
+            let text = text.replacen(r#""bufferView": 0, "#, view, 1);
+            read_text(&text.replacen(r#""count": 4"#, &format!(r#""count": {vertices}"#), 1))
+        };
+        let base = r#""bufferView": 0, "#;
+        let corners = |model: Model| model.meshes[0].positions.clone();
+        let read = corners(file(base, "4", 1).unwrap());
+        assert_eq!(read, [[0., 0., 0.], [1., 0., 0.], [1., 0., 0.], [1., 1., 0.]]);
+        assert_eq!(corners(file("", "3", 1).unwrap()), [[0.; 3], [0.; 3], [1., 0., 0.]]);
+        for (view, vertices, count) in [
+            (base, "4", 0),
+            (base, "4", 2),
+            ("", "4611686018427387904", 1),
+            ("", "18446744073709551615", 1),
+        ] {
+            let message = format!("{:#}", file(view, vertices, count).unwrap_err());
+            assert!(message.ends_with("its positions are outside their buffer"), "{message}");
+        }
     }
 
     #[test]
@@ -333,6 +409,26 @@ mod tests {
                 "mesh 0, primitive 0: there is no vertex 2, it has 2",
             ),
             (r#""count": 4"#, r#""count": 5"#, "mesh 0, primitive 0: its positions are outside"),
+            (r#""count": 4"#, r#""count": 4611686018427387904"#, "its positions are outside"),
+            (
+                r#""count": 4,"#,
+                r#""count": 4, "byteOffset": 18446744073709551608,"#,
+                "positions are",
+            ),
+            (
+                r#""byteLength": 48"#,
+                r#""byteLength": 48, "byteStride": 8"#,
+                "positions are outside",
+            ),
+            (
+                r#""byteLength": 48"#,
+                r#""byteLength": 18446744073709551615"#,
+                "positions are outside",
+            ),
+            (r#""byteOffset": 48"#, r#""byteOffset": 18446744073709551614"#, "indices are outside"),
+            ("5123", "5126", "mesh 0, primitive 0: its indices are not unsigned whole numbers"),
+            ("5123", "5122", "its indices are not unsigned whole numbers"),
+            (r#""SCALAR", "count": 3"#, r#""VEC3", "count": 1"#, "are not unsigned whole numbers"),
             (r#""children": [2]"#, r#""children": [0]"#, "two parents"),
             (
                 r#""asset""#,
@@ -340,6 +436,7 @@ mod tests {
                 "requires the extension KHR_draco_mesh_compression, which hgrid does not read",
             ),
             (r#""mesh": 0"#, r#""mesh": 8"#, "not a valid glTF file"),
+            (r#""POSITION": 0"#, r#""POSITION": 2"#, "a mesh names an accessor that is not there"),
             ("{", "[", "not a valid glTF file"),
         ] {
             let message = format!("{:#}", read_text(&text.replacen(from, to, 1)).unwrap_err());

@@ -7,6 +7,8 @@
 //!
 //! A file without transforms is one mesh with one instance, whose transform is the identity.
 
+use hgrid_core::{Block, Config, Instance, Object, Scene as Instances};
+
 use super::Bounds;
 use crate::vector::{Vector, dot, round};
 
@@ -42,16 +44,15 @@ impl From<Mesh> for Model {
 
 impl Model {
     /// Returns true if a mesh with triangles has more than one instance, and a scene can take all of them: no
-    /// transform is flat.
+    /// transform is flat, or so nearly that it has no inverse in f32.
     #[must_use]
     pub fn is_shared(&self) -> bool {
         let mut is_seen = vec![false; self.meshes.len()];
         let has_triangles =
             |mesh: usize| self.meshes.get(mesh).is_some_and(|mesh| !mesh.indices.is_empty());
-        let mut shown = self.instances.iter().filter(|(mesh, _)| has_triangles(*mesh));
-        let is_volume = |transform| determinant(transform).is_normal();
-        shown.clone().all(|(_, transform)| is_volume(transform))
-            && shown.any(|&(mesh, _)| core::mem::replace(&mut is_seen[mesh], true))
+        let shown = self.instances.iter().filter(|(mesh, _)| has_triangles(*mesh));
+        shown.clone().any(|&(mesh, _)| core::mem::replace(&mut is_seen[mesh], true))
+            && have_inverses(shown.map(|&(_, transform)| transform))
     }
 
     /// Returns the box around all finite vertices of all instances, or `None` if there are none.
@@ -100,6 +101,20 @@ impl Model {
         }
         Some(all)
     }
+}
+
+/// Returns true if scenes take instances with these transforms.
+fn have_inverses(mut transforms: impl Iterator<Item = Transform>) -> bool {
+    let config = Config::default();
+    let Some(sizes) = Instances::bound(1, &config) else { return false };
+    let [mut index, mut scratch] = [sizes.index_bytes, sizes.scratch_bytes]
+        .map(|bytes| vec![Block::ZERO; Block::count_for(bytes)]);
+    let (index, scratch) = (Block::bytes_mut(&mut index), Block::bytes_mut(&mut scratch));
+    // Whether an instance is taken depends on no other one.
+    transforms.all(|transform| {
+        let instance = Instance::with_transform(0, transform);
+        Instances::build(&[instance], &[Object::Nothing], &config, index, scratch).is_ok()
+    })
 }
 
 /// Transforms a point in `f64`, and rounds the result.
@@ -166,11 +181,14 @@ mod tests {
         };
         let beside = [[1.0, 0.0, 0.0, 5.0], IDENTITY[1], [0.0, 0.0, -1.0, 2.0]];
         let flat = [IDENTITY[0], IDENTITY[1], [0.0; 4]];
+        // Turned first and flattened then.
+        let nearly_flat = [[0.8, -0.6, 0.0, 0.0], [6e-7, 8e-7, 0.0, 0.0], IDENTITY[2]];
         assert!(of(&[(0, IDENTITY), (1, IDENTITY), (0, beside)]).is_shared());
         for alone in [
             &[(0, IDENTITY), (1, beside)][..],
             &[(2, IDENTITY), (2, beside), (0, beside)],
             &[(0, IDENTITY), (0, beside), (1, flat)],
+            &[(0, IDENTITY), (0, beside), (1, nearly_flat)],
             &[(7, IDENTITY), (7, IDENTITY)],
             &[],
         ] {

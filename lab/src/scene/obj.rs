@@ -17,11 +17,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh> {
     let mut largest = (0, 0);
     let mut corners = Vec::new();
     let mut joined = Vec::new();
+    // Some editors write a mark of the encoding first.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut lines = Lines { rest: bytes, number: 0 };
     while let Some(line) = lines.next() {
         let number = lines.number;
         let line = if line.ends_with(b"\\") { lines.join(line, &mut joined) } else { line };
-        let line = str::from_utf8(line).map_or("\0", str::trim_ascii);
+        // Names and comments may be in any encoding.
+        let line = String::from_utf8_lossy(line);
+        let line = line.trim_ascii();
         let (keyword, words) = line.split_once([' ', '\t']).unwrap_or((line, ""));
         let result = match keyword {
             "v" => vertex(words).map(|vertex| mesh.positions.push(vertex)),
@@ -133,6 +137,14 @@ mod tests {
         assert_eq!(mesh.positions.len(), 5);
         assert_eq!(mesh.indices, [[0, 1, 2], [0, 2, 3], [4, 0, 1]]);
         assert_eq!(read(b"\n").unwrap(), Mesh::default());
+    }
+
+    #[test]
+    fn marks_and_letters_of_encodings_are_no_part_of_a_mesh() {
+        let text = b"v 0 0 0\n# Gr\xf6\xdfe\nv 1 0 0\no W\xfcrfel\nv 0 1 0\nf 1 2 3\n";
+        let mesh = read(text).unwrap();
+        assert_eq!((mesh.positions.len(), &*mesh.indices), (3, &[[0, 1, 2]][..]));
+        assert_eq!(read(&[b"\xef\xbb\xbf", &text[..]].concat()).unwrap(), mesh);
     }
 
     #[test]
