@@ -45,7 +45,8 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
         ensure!(is_known, "{option} is for --method bvh: ask for that, or leave out {option}");
     }
     let scene = Scene::load(&args.scene)?;
-    ensure!(!scene.indices.is_empty(), "`{}` has no triangles: nothing to animate", args.scene);
+    let name = args.scene.display();
+    ensure!(!scene.indices.is_empty(), "`{name}` has no triangles: nothing to animate");
     if let Some(folder) = &args.output {
         image::make_folder(folder)?;
     }
@@ -64,8 +65,8 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
     };
     let is_refitted = args.refit;
     let plan = Plan { frames: args.frames, config, tiles, threads: &threads, field, is_refitted };
-    let report = animate(&scene, &plan, write, &mut progress)
-        .with_context(|| format!("cannot animate `{}`", args.scene))?;
+    let cannot = || format!("cannot animate `{name}`");
+    let report = animate(&scene, &plan, write, &mut progress).with_context(cannot)?;
     drop(progress);
 
     let mut out = io::stdout();

@@ -1,5 +1,6 @@
 //! The content of a file, a mesh or a blob: the `info` command.
 
+use std::ffi::OsStr;
 use std::io::{self, Write as _};
 use std::path::Path;
 
@@ -121,10 +122,11 @@ struct GridFacts {
 }
 
 impl Facts {
-    fn of(file: &str) -> Result<Self> {
+    fn of(file: &OsStr) -> Result<Self> {
         let path = Path::new(file);
+        let file = &*file.to_string_lossy();
         if file.starts_with("procedural:") || !path.exists() {
-            let scene = Scene::load(file)?;
+            let scene = Scene::load(path)?;
             let parts = scene.geometries.len().max(1);
             let format = if parts > 1 { "A+B" } else { "formula" };
             return Ok(Self::Mesh(MeshFacts::of(file, format, [parts; 2], &scene)));
@@ -335,7 +337,7 @@ mod tests {
 
     #[test]
     fn scenes_of_two_and_of_nothing_are_described() {
-        let facts = Facts::of("procedural:knot:800+procedural:soup:600").unwrap();
+        let facts = Facts::of("procedural:knot:800+procedural:soup:600".as_ref()).unwrap();
         let rows = facts.rows();
         assert!(rows.contains(&("format", "A+B".to_owned())), "{rows:?}");
         assert!(rows.contains(&("meshes", "2".to_owned())), "{rows:?}");

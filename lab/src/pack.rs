@@ -30,7 +30,7 @@ pub fn run(args: &PackArgs) -> Result<()> {
     check_sources(&args.output, &args.scene, "blob")?;
     check_writable(&args.output)?;
     let scene = Scene::load(&args.scene)?;
-    let cannot = || format!("cannot pack `{}`", args.scene);
+    let cannot = || format!("cannot pack `{}`", args.scene.display());
     let config = args.tuning.config(args.method, args.density);
     let blob = pack(&scene, &config).with_context(cannot)?;
     let written = match &args.c_array {

@@ -3,6 +3,7 @@
 //! Rows come in groups, one for each method, and scenes are columns, as in the paper. Below the paper's six
 //! rows of a method are its bytes, which the paper shows only in a chart.
 
+use std::ffi::OsString;
 use std::io::{self, Write as _};
 
 use anyhow::{Context as _, Result, ensure};
@@ -65,13 +66,13 @@ impl Results {
     ///
     /// # Errors
     /// The errors of [`run`].
-    pub fn measure(scenes: &[String], race: &Race) -> Result<Self> {
+    pub fn measure(scenes: &[OsString], race: &Race) -> Result<Self> {
         let configs = race.configs();
         let size = race.picture.size;
         let total = scenes.len() as u64 * rows(size, configs.len(), race.repeat);
         let mut progress = Progress::new("starting", total);
         let scenes = scenes.iter().map(|spec| {
-            let scene = Scene::load(spec)?;
+            let (scene, spec) = (Scene::load(spec)?, spec.display());
             ensure!(!scene.indices.is_empty(), "`{spec}` has no triangles: nothing to measure");
             let facts = SceneFacts::of(&scene);
             progress.set_scope(&display_name(&facts.scene));

@@ -38,7 +38,7 @@ pub fn run(args: &ValidateArgs) -> Result<()> {
         "`{file}` has no mesh in it: name the file that it was built for, by --mesh"
     );
     ensure!(!info.has_mesh || args.mesh.is_none(), "`{file}` has its mesh in it: leave out --mesh");
-    let scene = args.mesh.as_deref().map(Scene::load).transpose()?;
+    let scene = args.mesh.as_ref().map(Scene::load).transpose()?;
     let opened = match &scene {
         Some(scene) => TriangleMesh::new(&scene.positions, &scene.indices)
             .and_then(|mesh| Grid::open(blob.bytes(), mesh)),

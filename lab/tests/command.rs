@@ -164,6 +164,35 @@ fn what_is_no_file_is_refused() {
     }
 }
 
+/// The name of a file need not be text: output shows what can be shown of it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_name_that_is_no_text_names_a_file() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let folder = Folder::new("names").unwrap();
+    let name = std::ffi::OsStr::from_bytes(b"caf\xe9.obj");
+    fs::copy(folder.0.join("a.obj"), folder.0.join(name)).unwrap();
+    for (options, expected) in [
+        ("render --size 16", "caf\u{fffd}.obj: 3 triangles"),
+        ("info --json", "\"file\": \"caf\u{fffd}.obj\""),
+        ("pack -o a.hgrid", "wrote a.hgrid"),
+        ("animate --size 16 --frames 1", "caf\u{fffd}.obj: 3 triangles"),
+        ("table --size 16 --repeat 1 --methods bvh", "caf\u{fffd}"),
+        ("table --size 16 --repeat 1 --methods bvh --json", "caf\u{fffd}.obj"),
+        ("figures --size 16 --repeat 1 --methods fixed --densities 4", "figure2"),
+        ("first-build --instances 2", "seconds"),
+    ] {
+        let (program, mut words) = (env!("CARGO_BIN_EXE_hgrid"), options.split(' '));
+        let mut command = Command::new(program);
+        let command = command.current_dir(&folder.0).args(words.next()).arg(name).args(words);
+        let command = if options.starts_with("first") { command.arg("bvh") } else { command };
+        let output = command.output().unwrap();
+        let [said, error] =
+            [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+        assert!(output.status.success() && said.contains(expected), "{options}: {said} {error}");
+    }
+}
+
 /// A full disk is an error with a message and a status, even if the message finds no room either.
 #[cfg(target_os = "linux")]
 #[test]

@@ -55,7 +55,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         None => SceneFacts::of(&scene),
         Some(model) => SceneFacts::of_model(&scene.name, model),
     };
-    let none = || format!("no picture of `{}`", args.scene);
+    let none = || format!("no picture of `{}`", args.scene.display());
     ensure!(facts.triangles > 0, "{}: it has no triangles", none());
     ensure!(scene.bounds().is_some(), "{}: no vertex has finite coordinates", none());
 

@@ -15,6 +15,7 @@ mod ply;
 pub mod procedural;
 mod stl;
 
+use std::ffi::OsStr;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
@@ -56,8 +57,8 @@ impl Scene {
     /// assert_eq!(scene.indices.len(), 2000);
     /// # Ok::<(), anyhow::Error>(())
     /// ```
-    pub fn load(spec: &str) -> Result<Self> {
-        Self::open(spec, false).map(|(scene, _)| scene)
+    pub fn load(spec: impl AsRef<OsStr>) -> Result<Self> {
+        Self::open(spec.as_ref(), false).map(|(scene, _)| scene)
     }
 
     /// Loads a scene. If the caller takes instances, and the file shows a mesh more than once, the instances
@@ -66,12 +67,14 @@ impl Scene {
     ///
     /// # Errors
     /// The errors of [`load`](Self::load).
-    pub fn open(spec: &str, takes_instances: bool) -> Result<(Self, Option<Model>)> {
+    pub fn open(spec: &OsStr, takes_instances: bool) -> Result<(Self, Option<Model>)> {
         let path = Path::new(spec);
-        if let Some((inner, outer)) = spec.split_once('+').filter(|_| !path.exists()) {
+        // A name that is no text is that of one file.
+        let (text, spec) = (spec.to_str().unwrap_or_default(), spec.display());
+        if let Some((inner, outer)) = text.split_once('+').filter(|_| !path.exists()) {
             return Ok((Self::load(inner)?.within(Self::load(outer)?), None));
         }
-        if let Some(words) = spec.strip_prefix("procedural:") {
+        if let Some(words) = text.strip_prefix("procedural:") {
             let scene = procedural::make(words).with_context(|| format!("no scene `{spec}`"))?;
             return Ok((scene, None));
         }
@@ -209,7 +212,7 @@ mod tests {
         for triangle in 0..5000 {
             assert_eq!(joined.triangle(triangle), merged.triangle(triangle));
         }
-        let three = Scene::load(&format!("{spec}+procedural:soup:500")).unwrap();
+        let three = Scene::load(format!("{spec}+procedural:soup:500")).unwrap();
         assert_eq!(three.geometries, [0, 2000, 5000]);
         assert!(small.parts().unwrap().is_empty());
         let bad = Scene { indices: vec![[0, 1, 999_999]], ..small.clone() };
