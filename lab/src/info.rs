@@ -141,6 +141,7 @@ impl Facts {
         let mesh =
             model.flatten().context("it has more than 2^32 vertices").with_context(cannot)?;
         let scene = Scene {
+            of_triangles: mesh.bounds(),
             positions: mesh.positions,
             indices: mesh.indices,
             is_z_up: format.is_z_up(),

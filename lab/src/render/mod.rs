@@ -275,12 +275,22 @@ mod tests {
     }
 
     #[test]
+    fn vertices_without_a_triangle_do_not_change_the_picture() {
+        let picture = |text: &str| {
+            let (result, pixels) = run_words("loose", &["--ao", "0"], Some(("a.obj", text)));
+            result.unwrap();
+            pixels.unwrap()
+        };
+        assert!(picture(TRIANGLE) == picture(&format!("{TRIANGLE}v 1e9 1e9 1e9\n")));
+    }
+
+    #[test]
     fn failures_leave_no_picture_and_name_the_cause() {
         let nowhere = "v nan 0 0\nv nan 0 0\nv 0 nan 0\nf 1 2 3\n";
         let flat = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
         let not_finite = "v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n";
         let huge = "v 0 0 0\nv 3e38 0 0\nv 0 3e38 0\nf 1 2 3\n";
-        let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1e9 1e9 1e9\nf 1 2 3\n";
+        let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1e9 1e9 1e9\nf 1 2 3\nf 4 4 4\n";
         let cases: [(&str, &str, &str); 18] = [
             ("--method fixed --density -1", TRIANGLE, "density"),
             ("--ao 4 --shading normals", TRIANGLE, "--ao is for --shading diffuse"),

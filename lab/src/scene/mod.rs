@@ -40,6 +40,8 @@ pub struct Scene {
     pub geometries: Vec<usize>,
     /// The part that pictures show, if not all of it.
     pub focus: Option<Bounds>,
+    /// The box around the triangles of a file, which may have vertices elsewhere.
+    pub of_triangles: Option<Bounds>,
     /// The axis that the file's format says is up, if it does: true for z, false for y.
     pub is_z_up: Option<bool>,
 }
@@ -93,9 +95,10 @@ impl Scene {
             return Ok((Self { positions, ..scene }, Some(model)));
         }
         let mesh = model.flatten();
-        let Mesh { positions, indices } =
-            mesh.with_context(|| format!("`{spec}` has more than 2^32 vertices"))?;
-        Ok((Self { positions, indices, ..scene }, None))
+        let mesh = mesh.with_context(|| format!("`{spec}` has more than 2^32 vertices"))?;
+        let of_triangles = mesh.bounds();
+        let Mesh { positions, indices } = mesh;
+        Ok((Self { positions, indices, of_triangles, ..scene }, None))
     }
 
     /// Puts this scene in the middle of another, both at their own sizes; pictures show this one.
@@ -126,7 +129,8 @@ impl Scene {
         let behind = behind.map(|triangle| triangle.map(|v| vertex(v, others, shift)));
         let positions = self.positions.into_iter().map(place).chain(outer.positions).collect();
         let indices = inside.chain(behind).collect();
-        Self { name, positions, indices, geometries, focus, is_z_up: self.is_z_up }
+        let is_z_up = self.is_z_up;
+        Self { name, positions, indices, geometries, focus, of_triangles: None, is_z_up }
     }
 
     /// Returns the first triangle of each geometry, or 0 for a scene of one.
@@ -168,7 +172,7 @@ impl Scene {
     /// Returns the box that a picture shows: the focus, or all of the scene, or the origin if it is empty.
     #[must_use]
     pub fn framed_bounds(&self) -> Bounds {
-        self.focus.or_else(|| self.bounds()).unwrap_or_default()
+        self.focus.or(self.of_triangles).or_else(|| self.bounds()).unwrap_or_default()
     }
 }
 
