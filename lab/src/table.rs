@@ -15,6 +15,7 @@ use crate::cli::{Race, TableArgs};
 use crate::machine::Machine;
 use crate::measure::{Measurement, SceneFacts, Subject, measure, ratio, rows};
 use crate::progress::Progress;
+use crate::render::unseen;
 use crate::scene::Scene;
 use crate::shade::Shade;
 use crate::threads::Threads;
@@ -210,7 +211,10 @@ pub(crate) fn measure_diffuse(
     let subject = Subject { mesh, tiles: race.picture.tiles(scene)?, threads: &threads };
     let cost = |_: &Counters| 0;
     let shade: Shade = |shader, rays, hits, colors| shader.diffuse(rays, hits, colors);
-    Ok(measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements)
+    let measurements = measure(&subject, configs, race.repeat, shade, cost, progress)?.measurements;
+    let is_seen = measurements.iter().all(|measurement| measurement.hits > 0);
+    ensure!(is_seen, unseen(&race.picture, scene, None));
+    Ok(measurements)
 }
 
 /// Formats a table as Markdown, with its first columns of words aligned to the left.
@@ -326,6 +330,15 @@ mod tests {
             let message = format!("{:#}", results(words).unwrap_err());
             assert!(message.contains(words.split(' ').next().unwrap()), "{message}");
         }
+    }
+
+    #[test]
+    fn a_picture_that_shows_nothing_is_not_measured() {
+        let words = "procedural:knot:500 --size 16 --repeat 1 --eye 9,9,9 --target 10,10,10";
+        let message = format!("{:#}", results(words).unwrap_err());
+        let expected =
+            "cannot measure `procedural:knot:500`: no ray hits anything; look from elsewhere";
+        assert!(message.starts_with(expected), "{message}");
     }
 
     #[test]

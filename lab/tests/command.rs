@@ -147,6 +147,18 @@ fn an_animation_needs_triangles_and_makes_no_folder_without() {
 }
 
 #[test]
+fn an_animation_that_shows_nothing_is_an_error() {
+    let folder = Folder::new("unseen").unwrap();
+    for words in ["", "--instances 4", "--method fixed"] {
+        let words =
+            format!("animate a.obj {words} --frames 2 --size 9 --eye 9,9,9 --target 99,9,9");
+        let said = folder.fails(&words).unwrap();
+        let expected = "cannot animate `a.obj`: no ray hits anything; look from elsewhere";
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+}
+
+#[test]
 fn what_is_no_file_is_refused() {
     let folder = Folder::new("kinds").unwrap();
     for command in ["info", "render", "validate"] {

@@ -22,6 +22,7 @@ use self::paint::{Seen, paint};
 use self::studio::Studio;
 pub(crate) use self::summary::seconds;
 pub use self::summary::{Summary, Work};
+use crate::cli::Picture as View;
 use crate::cli::render::{RenderArgs, Shading};
 use crate::heat::{self, Counter, Picture};
 use crate::image;
@@ -70,7 +71,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     };
     let rendered = build(&scene, model.as_ref(), &args.config(), &threads, render);
     let (built, outcome, render_seconds) = rendered.with_context(none)?;
-    ensure!(outcome.hits > 0, "{}: {}", none(), unseen(args, &scene, model.as_ref()));
+    ensure!(outcome.hits > 0, "{}: {}", none(), unseen(&args.picture, &scene, model.as_ref()));
     let Picture { size, pixels } = outcome.picture;
     image::write_png(&args.output, size, &pixels)?;
 
@@ -104,8 +105,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     Ok(())
 }
 
-/// Returns the reason why no ray hits anything, and the remedy.
-fn unseen(args: &RenderArgs, scene: &Scene, model: Option<&Model>) -> &'static str {
+/// Returns the reason why no ray of a picture hits anything, and the remedy.
+pub(crate) fn unseen(picture: &View, scene: &Scene, model: Option<&Model>) -> &'static str {
     let shown = model.into_iter().flat_map(|model| &model.meshes);
     let shown = shown.map(|mesh| (&mesh.positions, &mesh.indices));
     let mut meshes = shown.chain([(&scene.positions, &scene.indices)]);
@@ -121,7 +122,7 @@ fn unseen(args: &RenderArgs, scene: &Scene, model: Option<&Model>) -> &'static s
     if min.iter().chain(&max).any(|c| c.abs() > LARGEST) {
         return "no ray hits anything: its coordinates are larger than 1e30; scale them down";
     }
-    if args.picture.view.is_none() && args.picture.eye.is_none() {
+    if picture.view.is_none() && picture.eye.is_none() {
         return "no ray hits anything: what it shows is smaller than a pixel; take a larger --size, or look from \
                 nearby, by --eye and --target";
     }
