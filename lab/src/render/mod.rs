@@ -292,7 +292,7 @@ mod tests {
         let not_finite = "v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n";
         let huge = "v 0 0 0\nv 3e38 0 0\nv 0 3e38 0\nf 1 2 3\n";
         let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1e9 1e9 1e9\nf 1 2 3\nf 4 4 4\n";
-        let cases: [(&str, &str, &str); 18] = [
+        let cases: [(&str, &str, &str); 20] = [
             ("--method fixed --density -1", TRIANGLE, "density"),
             ("--ao 4 --shading normals", TRIANGLE, "--ao is for --shading diffuse"),
             ("--no-shadows --shading heat", TRIANGLE, "--no-shadows is for --shading diffuse"),
@@ -302,6 +302,12 @@ mod tests {
             ("--density 8", TRIANGLE, "--density is not for bvh"),
             ("--macrocell-factor 8", TRIANGLE, "--macrocell-factor is for --method fixed"),
             ("--depth 2", TRIANGLE, "--depth is for --method recursive"),
+            (
+                "--method fixed --macrocell-factor 1",
+                TRIANGLE,
+                "--macrocell-factor must be at least 2",
+            ),
+            ("--method recursive --depth 5", TRIANGLE, "--depth must be 1 to 4"),
             ("--method fixed --quality high", TRIANGLE, "--quality is for --method bvh"),
             ("--eye 1,2,3 --target 1,2,3", TRIANGLE, "--eye and --target are the same point"),
             ("--eye 1,2,3 --target 1,2,4", TRIANGLE, "no ray hits anything; look from elsewhere"),
