@@ -25,6 +25,7 @@ use crate::cli::AnimateArgs;
 use crate::field::{self, Field, Memory};
 use crate::image;
 use crate::measure::median;
+use crate::plural::{self, counted};
 use crate::progress::Progress;
 use crate::regions::Regions;
 use crate::render::unseen;
@@ -81,7 +82,8 @@ pub fn run(args: &AnimateArgs) -> Result<()> {
         writeln!(out, "{report}")?;
     }
     if let Some(folder) = &args.output {
-        writeln!(io::stderr(), "wrote {} pictures into {}", args.frames, folder.display())?;
+        let pictures = counted(args.frames, "picture", "pictures");
+        writeln!(io::stderr(), "wrote {pictures} into {}", folder.display())?;
     }
     Ok(())
 }
@@ -147,9 +149,9 @@ pub struct Report {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { scene, triangles, instances, method, threads, size, .. } = self;
-        write!(f, "{scene}: {triangles} triangles, ")?;
+        write!(f, "{scene}: {}, ", plural::triangles(*triangles))?;
         if *instances > 0 {
-            write!(f, "{instances} instances, ")?;
+            write!(f, "{}, ", counted(*instances, "instance", "instances"))?;
         }
         let (refitted, plural) = (
             if self.is_refitted { ", refitted" } else { "" },
@@ -174,7 +176,7 @@ impl fmt::Display for Report {
         write!(f, "\nThe grid took up to {mebibytes:.1} MiB")?;
         match self.grown {
             0 => f.write_str(" of memory that was there from the first frame on."),
-            grown => write!(f, "; its memory grew {grown} times."),
+            grown => write!(f, "; its memory grew {}.", counted(grown, "time", "times")),
         }
     }
 }

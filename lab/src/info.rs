@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::blob::Blob;
 use crate::camera::Up;
 use crate::cli::blob::InfoArgs;
+use crate::plural::triangles;
 use crate::scene::format::Format;
 use crate::scene::{Scene, read_model};
 use crate::shade::normal_of;
@@ -178,9 +179,7 @@ impl MeshFacts {
             ("without area", self.triangles_without_area),
         ];
         let flaws = flaws.into_iter().filter(|&(_, number)| number > 0);
-        all.into_iter()
-            .chain(flaws.map(|(name, n)| (name, format!("{} triangles", count(n)))))
-            .collect()
+        all.into_iter().chain(flaws.map(|(name, n)| (name, triangles(n)))).collect()
     }
 
     fn of(
@@ -249,8 +248,8 @@ impl BlobFacts {
                 ("lists", count(grid.lists)),
                 ("longest list", count(grid.longest_list)),
                 ("references", count(grid.references)),
-                ("not finite", format!("{} triangles", count(grid.triangles_not_finite))),
-                ("without area", format!("{} triangles", count(grid.triangles_without_area))),
+                ("not finite", triangles(grid.triangles_not_finite)),
+                ("without area", triangles(grid.triangles_without_area)),
                 ("content hash", grid.content_hash.clone()),
             ]);
         }

@@ -259,6 +259,28 @@ fn packed_files_are_described_proved_and_rendered() {
 }
 
 #[test]
+fn one_triangle_is_no_plural() {
+    let folder = Folder::new("one").unwrap();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    fs::write(folder.0.join("one.obj"), format!("{corners}f 1 2 3\n")).unwrap();
+    fs::write(folder.0.join("flat.obj"), format!("{corners}f 1 2 3\nf 1 1 1\n")).unwrap();
+    fs::write(folder.0.join("nan.obj"), format!("{corners}v nan 0 0\nf 1 2 3\nf 1 2 4\n")).unwrap();
+    for (words, expected) in [
+        ("render one.obj --size 16", "one.obj: 1 triangle, 3 vertices, "),
+        ("render one.obj --size 16 --method fixed --ao 0 --no-shadows", "; 256 rays in "),
+        ("render nan.obj --size 16", "; one triangle that is not finite is left out"),
+        ("info flat.obj", "without area  1 triangle\n"),
+        ("pack one.obj -o one.hgrid", "its mesh of 1 triangle\n"),
+        ("validate one.hgrid", "valid, a bvh of 1 triangle, proved"),
+        ("animate one.obj --size 16 --frames 1", "one.obj: 1 triangle, bvh"),
+        ("animate a.obj --size 16 --frames 1 --instances 1", "a.obj: 3 triangles, 1 instance, bvh"),
+    ] {
+        let said = folder.says(words).unwrap();
+        assert!(said.contains(expected), "{words}: {said}");
+    }
+}
+
+#[test]
 fn a_blob_can_be_an_array_of_c() {
     let folder = Folder::new("c").unwrap();
     folder.says("pack a.obj -o a.hgrid").unwrap();
